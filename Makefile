@@ -1,0 +1,42 @@
+# The few commands of the project. `make` shows them.
+PYTHON ?= python3
+VENV   ?= .venv
+BIN    := $(VENV)/bin
+
+.DEFAULT_GOAL := help
+.PHONY: help study test test-all bench lint format clean
+
+help:  ## show this list
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
+
+study: $(VENV)/.core  ## set up the core and run the whole method on the bundled real data
+	$(BIN)/mrdamper study --out result
+
+test: $(VENV)/.dev  ## set up and run the tests
+	$(BIN)/python -m pytest -m "not slow"
+
+test-all: $(VENV)/.dev  ## the tests, slow ones too
+	$(BIN)/python -m pytest
+
+bench: $(VENV)/.dev  ## timings beside the peers that are installed
+	$(BIN)/python -m benchmarks
+
+lint: $(VENV)/.dev  ## format check, lint, types, import order of the layers
+	$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/pyright && $(BIN)/lint-imports
+
+format: $(VENV)/.dev  ## format and mend what ruff can mend
+	$(BIN)/ruff format . && $(BIN)/ruff check --fix .
+
+clean:  ## remove environments and results
+	rm -rf $(VENV) result dist
+
+$(VENV)/bin/python:
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.core: pyproject.toml constraints.txt | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .
+	@touch $@
+
+$(VENV)/.dev: pyproject.toml constraints.txt | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	@touch $@ $(VENV)/.core

@@ -1,0 +1,5 @@
+"""`python -m mrdamper.cli`."""
+
+from mrdamper.cli import main
+
+main()

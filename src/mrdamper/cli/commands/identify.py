@@ -1,0 +1,56 @@
+"""`mrdamper identify`: one model, run by run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Optional
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+
+    @app.command(help="Identify a model from every sine run of a dataset, run by run.")
+    def identify(
+        data: Optional[Path] = typer.Argument(None, help="Dataset folder; default: the bundled tests."),  # noqa: UP045
+        model: str = typer.Option("bouc-wen", "--model", help="Name of the model."),
+        method: str = typer.Option("projection", "--method", help="Name of the identification method."),
+        free: list[str] = typer.Option([], "--free", help="Preset parameter to determine as well; may be repeated."),
+        fix: list[str] = typer.Option([], "--fix", help="NAME=VALUE [SI] held fixed; may be repeated."),
+        delay: bool = typer.Option(False, "--delay", help="Also determine a delay of the force, within 3 ms."),
+        run: list[str] = typer.Option([], "--run", help="Only this run; may be repeated."),
+        out: Optional[Path] = typer.Option(None, "--out", help="CSV to write; default: standard output."),  # noqa: UP045
+        as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
+    ) -> None:
+        """Example: mrdamper identify rig/ --model bouc-wen --free n --out identifications.csv"""
+        from mrdamper import identification, workflow
+        from mrdamper.cli.output import parse_fixed, put
+        from mrdamper.cli.progress import progress_on_stderr
+        from mrdamper.identification.methods import method_named
+        from mrdamper.io.atomic import require_writable
+        from mrdamper.io.dataset import load_dataset
+        from mrdamper.models import model_type
+        from mrdamper.publication import identification_rows, table_text
+
+        chosen_model, chosen_method = model_type(model), method_named(method)
+        fixed = parse_fixed(fix)
+        if out is not None:
+            require_writable(out)
+        dataset = load_dataset(data)
+        if run:
+            dataset = dataset.only([dataset[name] for name in run])
+        sines, refused = workflow.usable_sines(dataset)
+        found = []
+        with progress_on_stderr() as progress:
+            for number, entry in enumerate(sines):
+                progress(f"run {entry.id}", number / len(sines))
+                found.append(
+                    identification.identify(
+                        entry, chosen_model, chosen_method, free=free, fixed=fixed, with_delay=delay
+                    )
+                )
+            progress("identified", 1.0)
+        for name, why in refused.items():
+            typer.echo(f"not identified: {name}: {why}", err=True)
+        put(identification_rows(found), out, as_json, table_text)

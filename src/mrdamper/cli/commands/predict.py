@@ -1,0 +1,50 @@
+"""`mrdamper predict`: the force at a condition, or along a motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Optional
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+
+    @app.command(help="Predict the force of a saved model at a condition, or along a motion from a file.")
+    def predict(
+        model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
+        current: Optional[float] = typer.Option(None, "--current", help="Coil current [A]."),  # noqa: UP045
+        frequency: Optional[float] = typer.Option(None, "--frequency", help="Frequency of a sine [Hz]."),  # noqa: UP045
+        amplitude: Optional[float] = typer.Option(None, "--amplitude", help="Amplitude of a sine [mm]."),  # noqa: UP045
+        motion: Optional[Path] = typer.Option(  # noqa: UP045
+            None, "--motion", help="CSV with time_s, displacement_m and optionally current_A."
+        ),
+        out: Optional[Path] = typer.Option(None, "--out", help="CSV to write; default: standard output."),  # noqa: UP045
+        as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
+    ) -> None:
+        """Example: mrdamper predict model.json --current 0.5 --frequency 2 --amplitude 10 --out force.csv"""
+        from mrdamper.cli.output import put
+        from mrdamper.data import Condition
+        from mrdamper.errors import InputError
+        from mrdamper.io.atomic import require_writable
+        from mrdamper.io.model_file import load_model
+        from mrdamper.io.motion import load_motion
+        from mrdamper.publication import prediction_rows, table_text
+
+        if out is not None:
+            require_writable(out)
+        damper = load_model(model)
+        if motion is not None:
+            if frequency is not None or amplitude is not None:
+                raise InputError("--motion beside --frequency or --amplitude", mend="give one or the other")
+            prediction = damper.predict_run(load_motion(motion, current))
+        else:
+            if current is None or frequency is None or amplitude is None:
+                raise InputError(
+                    "no condition", mend="give --current A --frequency Hz --amplitude mm, or --motion FILE"
+                )
+            prediction = damper.predict(Condition(current, frequency, 1e-3 * amplitude))
+        for flag in prediction.extrapolation:
+            typer.echo(f"extrapolation: {flag} lies outside the tests this model was identified from", err=True)
+        put(prediction_rows(prediction), out, as_json, table_text)

@@ -1,0 +1,67 @@
+"""`mrdamper study`: the whole method on a dataset."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Optional
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+
+    @app.command(help="Study a dataset: identify every run, map the parameters, validate; write report and models.")
+    def study(
+        data: Optional[Path] = typer.Argument(None, help="Dataset folder; default: the bundled tests of two dampers."),  # noqa: UP045
+        out: Path = typer.Option(..., "--out", help="Folder for report.html, model.json, tables and figures."),
+        as_json: bool = typer.Option(False, "--json", help="Print a summary a program can read."),
+    ) -> None:
+        """Example: mrdamper study rig/ --out result/"""
+        from mrdamper.cli.progress import progress_on_stderr
+        from mrdamper.io.atomic import require_writable
+        from mrdamper.io.dataset import load_dataset
+        from mrdamper.publication import write_study
+        from mrdamper.workflow import run_study
+
+        require_writable(out)
+        dataset = load_dataset(data)
+        with progress_on_stderr() as progress:
+            result = run_study(dataset, lambda what, share: progress(what, 0.6 * share))
+            written = write_study(result, out, lambda what, share: progress(what, 0.6 + 0.4 * share))
+        if as_json:
+            import json
+
+            print(json.dumps(_summary(result, [str(p) for p in written]), indent=1))
+            return
+        for rig in result.rigs:
+            print(f"{rig.rig or dataset.name}: {rig.damper.title} ({rig.damper.parameter_count} numbers)")
+            for candidate in rig.candidates:
+                print(
+                    f"  {candidate.damper.title:32} nrmse_pp  per run {100 * candidate.per_run_median:5.2f} %"
+                    f"  left out {100 * candidate.left_out.median():5.2f} %"
+                    + (f"  held out {100 * candidate.held_out.median():5.2f} %" if candidate.held_out.runs else "")
+                )
+        print(f"report: {written[0]}")
+
+
+def _summary(result, written: list[str]) -> dict:
+    return {
+        "rigs": {
+            rig.rig: {
+                "chosen": rig.chosen.title,
+                "candidates": {
+                    c.title: {
+                        "parameters": c.damper.parameter_count,
+                        "per_run_nrmse_pp": c.per_run_median,
+                        "left_out_nrmse_pp": c.left_out.median(),
+                        "held_out_nrmse_pp": c.held_out.median() if c.held_out.runs else None,
+                    }
+                    for c in rig.candidates
+                },
+            }
+            for rig in result.rigs
+        },
+        "files": written,
+        "seconds": result.seconds,
+    }

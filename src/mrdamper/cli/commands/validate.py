@@ -1,0 +1,56 @@
+"""`mrdamper validate`: score a saved model on a dataset."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Optional
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+
+    @app.command(help="Score a saved model on the runs of its rig: nrmse, wape, peak force and energy.")
+    def validate(
+        model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
+        data: Optional[Path] = typer.Argument(None, help="Dataset folder; default: the bundled tests."),  # noqa: UP045
+        rig: Optional[str] = typer.Option(None, "--rig", help="Score the runs of this rig instead."),  # noqa: UP045
+        split: Optional[str] = typer.Option(None, "--split", help="Only train or only validate runs."),  # noqa: UP045
+        out: Optional[Path] = typer.Option(None, "--out", help="CSV to write; default: standard output."),  # noqa: UP045
+        as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
+    ) -> None:
+        """Example: mrdamper validate model.json rig/ --out scores.csv"""
+        from mrdamper.cli.output import put
+        from mrdamper.errors import InputError, UnknownNameError
+        from mrdamper.io.atomic import require_writable
+        from mrdamper.io.dataset import load_dataset
+        from mrdamper.io.model_file import load_model
+        from mrdamper.publication import score_row, table_text
+        from mrdamper.validation import validate as score
+
+        if split not in (None, "train", "validate"):
+            raise UnknownNameError.of("split", str(split), ("train", "validate"))
+        if out is not None:
+            require_writable(out)
+        damper = load_model(model)
+        dataset = load_dataset(data)
+        wanted = rig if rig is not None else damper.rig
+        if rig is None and wanted not in dataset.rigs and len(dataset.rigs) == 1:
+            wanted = dataset.rigs[0]
+            typer.echo(f"the model is of rig {damper.rig!r}; scoring the dataset's one rig {wanted!r}", err=True)
+        runs = [run for run in dataset.rig(wanted) if split in (None, run.split)]
+        if not runs:
+            raise InputError(f"no {split} runs", where=f"rig {wanted}", mend="leave out --split")
+        validation = score(damper, runs)
+        put([score_row(run) for run in validation.runs], out, as_json, table_text)
+        floors = [run.floor for run in validation.runs if run.floor is not None]
+        outside = sum(bool(run.extrapolation) for run in validation.runs)
+        typer.echo(
+            f"{damper.title} on {len(runs)} runs of {wanted or dataset.name}: median nrmse_pp "
+            f"{100 * validation.median():.2f} %, worst {100 * validation.worst().scores.nrmse_pp:.2f} % "
+            f"({validation.worst().run_id}), median energy error {100 * validation.median('energy_error'):.1f} %"
+            + (f", scatter of the rig {100 * sorted(floors)[len(floors) // 2]:.2f} %" if floors else "")
+            + (f"; {outside} runs extrapolate" if outside else ""),
+            err=True,
+        )

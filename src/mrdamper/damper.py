@@ -1,0 +1,123 @@
+"""An identified damper: something that predicts a force, and knows where it was tested.
+
+Whatever the model behind it, a `Damper` answers two questions: the steady loop at a
+condition, and the force along a measured motion. Each answer carries the flags of its
+extrapolation.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from mrdamper.data import Condition, Floats, Run
+from mrdamper.excitation import Excitation, equivalent_sine, measured_motion
+from mrdamper.simulation import Response
+
+_SLACK = 0.02  # a test bench repeats a condition to a few per cent; within that nothing is extrapolated
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """Ranges of the tests a damper was identified from.
+
+    Attributes
+    ----------
+    current_A, frequency_Hz, amplitude_m, peak_velocity_m_s : (float, float)
+        Lowest and highest tested.
+    """
+
+    current_A: tuple[float, float]
+    frequency_Hz: tuple[float, float]
+    amplitude_m: tuple[float, float]
+    peak_velocity_m_s: tuple[float, float]
+
+    @classmethod
+    def of(cls, conditions: Sequence[Condition]) -> Envelope:
+        """The envelope of a set of tested conditions."""
+
+        def span(values: list[float]) -> tuple[float, float]:
+            return min(values), max(values)
+
+        return cls(
+            span([c.current_A for c in conditions]),
+            span([c.frequency_Hz for c in conditions]),
+            span([c.amplitude_m for c in conditions]),
+            span([c.peak_velocity for c in conditions]),
+        )
+
+    def flags(self, condition: Condition) -> tuple[str, ...]:
+        """Which quantities of a condition lie outside: empty inside the envelope."""
+        checks = (
+            ("current", condition.current_A, self.current_A),
+            ("frequency", condition.frequency_Hz, self.frequency_Hz),
+            ("amplitude", condition.amplitude_m, self.amplitude_m),
+            ("velocity", condition.peak_velocity, self.peak_velocity_m_s),
+        )
+        return tuple(
+            name
+            for name, value, (low, high) in checks
+            if value < low - _SLACK * high or value > high * (1 + _SLACK)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """A predicted force.
+
+    Attributes
+    ----------
+    motion : Excitation
+    force : (N,) array
+        [N]
+    condition : Condition
+        That the prediction was made for, or that the motion amounts to.
+    extrapolation : tuple of str
+        Quantities outside the tested envelope; empty inside.
+    """
+
+    motion: Excitation
+    force: Floats
+    condition: Condition
+    extrapolation: tuple[str, ...]
+
+
+class Damper(ABC):
+    """An identified damper."""
+
+    kind: ClassVar[str]
+    rig: str
+    envelope: Envelope
+    provenance: Mapping[str, str]
+
+    @property
+    @abstractmethod
+    def title(self) -> str:
+        """What to call it in a report."""
+
+    @property
+    @abstractmethod
+    def parameter_count(self) -> int:
+        """Numbers determined from the data."""
+
+    @abstractmethod
+    def loop(self, condition: Condition) -> Response:
+        """Steady loop at a condition, one closed cycle."""
+
+    @abstractmethod
+    def force_along(self, motion: Excitation, condition: Condition) -> Floats:
+        """Force [N] along a motion about mid-stroke that amounts to a condition."""
+
+    def predict(self, condition: Condition) -> Prediction:
+        """Steady loop at a condition, with its flags."""
+        response = self.loop(condition)
+        return Prediction(response.excitation, response.force, condition, self.envelope.flags(condition))
+
+    def predict_run(self, run: Run) -> Prediction:
+        """Force along the measured motion of a run, with its flags. The measured force is not looked at."""
+        found = equivalent_sine(run)
+        motion = measured_motion(run).about(found.centre)
+        flags = self.envelope.flags(found.condition) + (() if found.is_sine else ("not a sine",))
+        return Prediction(motion, self.force_along(motion, found.condition), found.condition, flags)

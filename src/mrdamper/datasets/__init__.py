@@ -1,0 +1,1 @@
+"""Bundled data: real tests of two MR dampers, with their licences."""

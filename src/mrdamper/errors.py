@@ -1,0 +1,125 @@
+"""Everything a user can get wrong, one exception each, with a code that never changes.
+
+A message says what was found, where, and how to mend it, in one line.
+Anything that is not an `InputError` is our fault, not the user's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class InputError(ValueError):
+    """Input that cannot be used.
+
+    Parameters
+    ----------
+    found : str
+        What was found.
+    where : str, optional
+        File, line, column, run or argument it was found in.
+    mend : str, optional
+        What the user can do about it.
+    code : str, optional
+        Replaces the class's code where one exception serves a family of findings.
+    """
+
+    code = "E_INPUT"
+
+    def __init__(self, found: str, *, where: str = "", mend: str = "", code: str | None = None):
+        self.found, self.where, self.mend = found, where, mend
+        self.code = code or type(self).code
+        super().__init__(found)
+
+    def __str__(self) -> str:
+        text = f"{self.where}: {self.found}" if self.where else self.found
+        if self.mend:
+            text += f"; {self.mend}"
+        return f"{text} [{self.code}]"
+
+
+class DatasetError(InputError):
+    """The dataset folder is missing, or one of its tables cannot be read."""
+
+    code = "E_DATASET"
+
+
+class ColumnError(InputError):
+    """A column is missing or holds something else than its name says."""
+
+    code = "E_COLUMN"
+
+
+class UnitError(InputError):
+    """A unit is missing, unknown or of the wrong dimension."""
+
+    code = "E_UNITS"
+
+
+class RunError(InputError):
+    """The arrays of a run do not fit together."""
+
+    code = "E_RUN"
+
+
+class TimeOrderError(RunError):
+    """Time stamps repeat or run backwards."""
+
+    code = "E_TIME_ORDER"
+
+
+class NonFiniteError(RunError):
+    """A channel holds NaN or infinity."""
+
+    code = "E_NONFINITE"
+
+
+class UnknownNameError(InputError):
+    """A model, method, rig or run of that name does not exist."""
+
+    code = "E_NAME"
+
+    @classmethod
+    def of(cls, kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
+        """Build the error with the near matches as the remedy."""
+        known = sorted(known)
+        near = get_close_matches(name, known, n=3, cutoff=0.5)
+        mend = f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(known)}"
+        return cls(f"no {kind} is called {name!r}", mend=mend)
+
+
+class ExcitationError(InputError):
+    """The motion does not allow what was asked: under a cycle, not a sine, no motion."""
+
+    code = "E_EXCITATION"
+
+
+class ParameterError(InputError):
+    """A model parameter lies outside what its physics allows."""
+
+    code = "E_PARAMETER"
+
+
+class IdentificationError(InputError):
+    """The data cannot determine the parameters asked for."""
+
+    code = "E_IDENTIFICATION"
+
+
+class ModelFileError(InputError):
+    """A saved model cannot be read: damaged, too new, or with unknown fields."""
+
+    code = "E_MODEL_FILE"
+
+
+class OutputError(InputError):
+    """A result cannot be written where it was asked for."""
+
+    code = "E_OUTPUT"
+
+
+class MissingExtraError(InputError):
+    """An optional dependency is not installed."""
+
+    code = "E_EXTRA"

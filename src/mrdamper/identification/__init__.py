@@ -1,0 +1,129 @@
+"""Identification: the parameters of a model from one run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from mrdamper.data import Floats, Run
+from mrdamper.errors import IdentificationError
+from mrdamper.gas_spring import GasSpring
+from mrdamper.identification.methods import all_methods, method_named
+from mrdamper.identification.problem import DELAY, Identification, Method, Problem, Solution
+from mrdamper.metrics import score
+from mrdamper.models import Model, model_type
+from mrdamper.uncertainty import standard_errors
+
+__all__ = ["Identification", "Method", "Problem", "Solution", "all_methods", "identify"]
+
+
+def identify(
+    run: Run,
+    model: str | type[Model] = "bouc-wen",
+    method: str | Method = "projection",
+    *,
+    free: Sequence[str] = (),
+    fixed: Mapping[str, float] | None = None,
+    gas: GasSpring | None = None,
+    with_delay: bool = False,
+) -> Identification:
+    """Identify a model from one run, inside its steady window.
+
+    Parameters
+    ----------
+    run : Run
+        At one current, at least one cycle of motion.
+    model : str or type of Model
+    method : str or Method
+    free : sequence of str
+        Preset parameters to determine as well, for example ("gamma", "n").
+    fixed : mapping
+        Parameters to hold at a value [SI].
+    gas : GasSpring, optional
+        Known gas spring: fixes k1, k2, k3 and lets the mass be determined.
+    with_delay : bool
+        Determine a delay of the force channel too, within ±3 ms.
+
+    Returns
+    -------
+    Identification
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such model, method or parameter.
+    ExcitationError
+        If the steady window holds under one cycle.
+    IdentificationError
+        If the run cannot determine what is asked for.
+    """
+    chosen_model = model_type(model) if isinstance(model, str) else model
+    chosen_method = method_named(method) if isinstance(method, str) else method
+    problem = Problem.of(run, chosen_model, free=free, fixed=fixed, gas=gas, with_delay=with_delay)
+    run.current_A  # noqa: B018  refuses a varying current before anything is computed
+    if np.ptp(problem.force) == 0:
+        raise IdentificationError("the force does not change", where=f"run {run.id}", mend="check the channel")
+    return conclude(problem, chosen_method, chosen_method.solve(problem))
+
+
+def conclude(problem: Problem, method: Method, solution: Solution) -> Identification:
+    """Score a solution and say how certain it is."""
+    motion = problem.motion.delayed(solution.delay) if solution.delay else problem.motion
+    seen = motion.part(problem.scored)
+    predicted = solution.model.force(seen, solution.model.state(motion)[problem.scored])
+    residual = predicted - problem.force
+    return Identification(
+        run_id=problem.run.id,
+        rig=problem.run.rig,
+        condition=problem.analysis.condition,
+        model=solution.model,
+        method=method.name,
+        free=problem.free,
+        at_bounds=solution.at_bounds,
+        delay=solution.delay,
+        scores=score(problem.force, predicted, seen.velocity, seen.time),
+        floor=problem.run.repeatability,
+        standard_errors=_standard_errors(problem, solution, residual),
+        start=solution.start,
+        end=solution.end,
+        evaluations=solution.evaluations,
+        message=solution.message,
+        seed=solution.seed,
+        notes=(*_notes(problem), *solution.notes),
+        residual=residual,
+    )
+
+
+def _standard_errors(problem: Problem, solution: Solution, residual: Floats) -> dict[str, float]:
+    """Differentiate the force by each free coordinate; those at a bound have no error to state."""
+    motion = problem.motion.delayed(solution.delay) if solution.delay else problem.motion
+    seen = motion.part(problem.scored)
+
+    def force(model: Model) -> Floats:
+        return model.force(seen, model.state(motion)[problem.scored])
+
+    linear = {i.name: getattr(solution.model, i.name) for i in solution.model.parameters() if i.linear}
+    searched = {name: value for name, value in solution.end.items() if name != DELAY}
+    point = {**problem.fixed, **searched, **linear}
+    names = [n for n in (*linear, *searched) if (n in problem.free or n in searched) and n not in solution.at_bounds]
+    base = force(solution.model)
+    columns = []
+    for name in names:
+        step = 1e-6 * abs(point[name]) or 1e-6
+        columns.append((force(problem.model_type.build({**point, name: point[name] + step})) - base) / step)
+    if not columns:
+        return {}
+    return dict(zip(names, standard_errors(np.column_stack(columns), residual).tolist(), strict=True))
+
+
+def _notes(problem: Problem) -> tuple[str, ...]:
+    notes = []
+    names = {info.name for info in problem.model_type.parameters()}
+    if "m" in names and "m" not in problem.free and not problem.fixed.get("m"):
+        notes.append("mass left out: on one frequency it is part of k1 (a = −ω² x); k1 holds k1 − m ω²")
+    if not problem.analysis.is_sine:
+        notes.append(f"the motion is no pure sine (distortion {100 * problem.analysis.distortion:.1f} %)")
+    if problem.run.window is None:
+        notes.append("no steady window is given: the whole record was used")
+    return tuple(notes)

@@ -1,0 +1,220 @@
+"""What is to be identified from a run, and what came out."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+from typing import ClassVar
+
+import numpy as np
+
+from mrdamper.data import Condition, Floats, Run
+from mrdamper.errors import IdentificationError, UnknownNameError
+from mrdamper.excitation import Excitation, MotionAnalysis, analyse_motion, measured_motion
+from mrdamper.gas_spring import GasSpring
+from mrdamper.metrics import Scores
+from mrdamper.models import Model
+
+DELAY = "delay"  # name of the search coordinate
+DELAY_LIMIT = 3e-3  # a free delay between the channels runs away beyond this [s]
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """One run, one model, and which of its parameters are free.
+
+    Attributes
+    ----------
+    run : Run
+    model_type : type of Model
+    free : tuple of str
+        Parameters to determine.
+    fixed : mapping of str to float
+        Parameters held at a value.
+    with_delay : bool
+        Also determine a delay of the force channel, within ±3 ms.
+    """
+
+    run: Run
+    model_type: type[Model]
+    free: tuple[str, ...]
+    fixed: Mapping[str, float]
+    with_delay: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        run: Run,
+        model_type: type[Model],
+        *,
+        free: Sequence[str] = (),
+        fixed: Mapping[str, float] | None = None,
+        gas: GasSpring | None = None,
+        with_delay: bool = False,
+    ) -> Problem:
+        """Settle which parameters are free: all but the presets, the fixed ones, and what gas fixes.
+
+        Parameters
+        ----------
+        free : sequence of str
+            Presets to free as well.
+        fixed : mapping
+            Parameters to hold at a value [SI].
+        gas : GasSpring, optional
+            A known gas spring fixes k1, k2 and k3 and thereby lets the mass be determined.
+
+        Raises
+        ------
+        UnknownNameError
+            If the model has no such parameter.
+        IdentificationError
+            If m and k1 are both to be free: on one frequency a = −ω² x, so no data can tell them apart.
+        """
+        infos = {info.name: info for info in model_type.parameters()}
+        held = dict(fixed or {})
+        wanted = list(free)
+        if gas is not None:
+            k1, k2, k3 = gas.stiffnesses("extension")
+            held = {"k1": k1, "k2": k2, "k3": k3} | held
+            if "m" not in held:
+                wanted.append("m")
+        for name in (*wanted, *held):
+            if name not in infos:
+                raise UnknownNameError.of(f"parameter of {model_type.name}", name, infos)
+        chosen = tuple(
+            name for name, info in infos.items() if name not in held and (not info.preset or name in wanted)
+        )
+        if {"m", "k1"} <= set(chosen):
+            raise IdentificationError(
+                "m and k1 are both free, and at one frequency a = −ω² x makes them one parameter",
+                where=f"run {run.id}",
+                mend="fix one, give a gas spring, or identify over several frequencies jointly",
+            )
+        presets = {n: i.default for n, i in infos.items() if n not in chosen and i.default is not None}
+        return cls(run, model_type, chosen, MappingProxyType({**presets, **held}), with_delay)
+
+    @cached_property
+    def analysis(self) -> MotionAnalysis:
+        """Frequency, amplitude and mean of the measured motion."""
+        return analyse_motion(self.run)
+
+    @cached_property
+    def motion(self) -> Excitation:
+        """Smooth measured motion about mid-stroke, from one cycle before the steady window on."""
+        run, window = self.run, self.run.window
+        if window is not None:
+            early = window[0] - 1.0 / self.analysis.condition.frequency_Hz
+            inside = np.flatnonzero((run.time >= early) & (run.time <= window[1]))
+            run = run.part(int(inside[0]), int(inside[-1]) + 1)
+        return measured_motion(run).about(self.analysis.series.mean)
+
+    @cached_property
+    def scored(self) -> slice:
+        """Samples of `motion` inside the steady window."""
+        return slice(len(self.motion) - int(np.count_nonzero(self.run.in_window)), None)
+
+    @cached_property
+    def force(self) -> Floats:
+        """Measured force in the steady window [N]."""
+        return self.run.force[self.run.in_window]
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What a method found.
+
+    Attributes
+    ----------
+    model : Model
+    delay : float
+        [s]
+    at_bounds : tuple of str
+    start, end : mapping
+        Search coordinates.
+    evaluations : int
+    message : str
+    seed : int or None
+    notes : tuple of str
+    """
+
+    model: Model
+    delay: float
+    at_bounds: tuple[str, ...]
+    start: Mapping[str, float]
+    end: Mapping[str, float]
+    evaluations: int
+    message: str
+    seed: int | None = None
+    notes: tuple[str, ...] = ()
+
+
+class Method(ABC):
+    """A way to determine the free parameters. A file dropped into `methods` is found."""
+
+    name: ClassVar[str]
+    summary: ClassVar[str]
+
+    @abstractmethod
+    def solve(self, problem: Problem) -> Solution:
+        """Determine the free parameters of a problem."""
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """A model identified from one run.
+
+    Attributes
+    ----------
+    run_id : str
+    rig : str
+    condition : Condition
+        Measured current, frequency, amplitude.
+    model : Model
+        With the parameters found.
+    method : str
+        Name of the method.
+    free, at_bounds : tuple of str
+        Parameters determined; those that ended at a limit.
+    delay : float
+        Delay of the force channel [s].
+    scores : Scores
+        Inside the steady window.
+    floor : float or None
+        The run's cycle-to-cycle scatter as nrmse_pp: no model can do better.
+    standard_errors : mapping of str to float
+        Of the linear parameters and the search coordinates, widened for autocorrelated residuals.
+    start, end : mapping of str to float
+        Search coordinates the refinement began and ended at.
+    evaluations : int
+        Forces computed.
+    message : str
+        Why the search stopped.
+    seed : int or None
+        Of the random search, where one was used.
+    notes : tuple of str
+        What the reader should know before trusting a parameter.
+    residual : (N,) array
+        Predicted minus measured force in the steady window [N].
+    """
+
+    run_id: str
+    rig: str
+    condition: Condition
+    model: Model
+    method: str
+    free: tuple[str, ...]
+    at_bounds: tuple[str, ...]
+    delay: float
+    scores: Scores
+    floor: float | None
+    standard_errors: Mapping[str, float]
+    start: Mapping[str, float]
+    end: Mapping[str, float]
+    evaluations: int
+    message: str
+    seed: int | None
+    notes: tuple[str, ...]
+    residual: Floats = field(repr=False)

@@ -1,0 +1,1 @@
+"""Reading and writing: datasets, saved models, rig files."""

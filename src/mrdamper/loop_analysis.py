@@ -1,0 +1,133 @@
+"""What a measured loop says before any model: peak force, energy, equivalent damping, dynamic range.
+
+The counterpart of the test analysis in section 2 of Qian et al. 2024.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrdamper.data import Condition, Floats, Run
+from mrdamper.excitation import MotionAnalysis, analyse_motion, measured_motion
+from mrdamper.metrics import dissipated_power
+
+
+@dataclass(frozen=True)
+class LoopAnalysis:
+    """Figures of one run's steady loops.
+
+    Attributes
+    ----------
+    run_id : str
+    split : str
+    motion : MotionAnalysis
+    peak_force : float
+        Half the peak-to-peak force, median over the cycles [N].
+    mean_force : float
+        Mean force over whole cycles [N]: gas force, preload, and the load cell's zero.
+    dissipated_energy : float
+        Per cycle [J].
+    equivalent_damping : float
+        Of the viscous damper that dissipates as much, W/(π ω X²) [N s/m].
+    """
+
+    run_id: str
+    split: str
+    motion: MotionAnalysis
+    peak_force: float
+    mean_force: float
+    dissipated_energy: float
+    equivalent_damping: float
+
+    @property
+    def condition(self) -> Condition:
+        """Measured current, frequency and amplitude."""
+        return self.motion.condition
+
+
+def analyse_loop(run: Run) -> LoopAnalysis:
+    """Analyse the whole cycles inside a run's steady window.
+
+    Raises
+    ------
+    ExcitationError
+        If there is under one cycle.
+    """
+    analysis = analyse_motion(run)
+    steady = run.steady()
+    whole = whole_cycles(steady.time, analysis.condition.frequency_Hz)
+    motion = measured_motion(steady).part(whole)
+    force = steady.force[whole]
+    frequency, amplitude = analysis.condition.frequency_Hz, analysis.condition.amplitude_m
+    energy = dissipated_power(force, motion.velocity, motion.time) / frequency
+    cycles = np.array_split(force, max(1, round(np.ptp(motion.time) * frequency)))
+    return LoopAnalysis(
+        run_id=run.id,
+        split=run.split,
+        motion=analysis,
+        peak_force=float(np.median([np.ptp(c) / 2 for c in cycles])),
+        mean_force=float(np.mean(force)),
+        dissipated_energy=energy,
+        equivalent_damping=energy / (2 * np.pi**2 * frequency * amplitude**2),
+    )
+
+
+def whole_cycles(time: Floats, frequency: float) -> slice:
+    """Samples of the largest whole number of cycles from the start."""
+    cycles = max(1, int(np.ptp(time) * frequency + 0.02))
+    return slice(0, int(np.searchsorted(time, time[0] + cycles / frequency + 1e-9, side="right")))
+
+
+@dataclass(frozen=True)
+class DynamicRange:
+    """Peak force at each current over that at the lowest, at one motion.
+
+    Attributes
+    ----------
+    frequency_Hz, amplitude_m : float
+    currents_A : tuple of float
+    ratios : tuple of float
+    """
+
+    frequency_Hz: float
+    amplitude_m: float
+    currents_A: tuple[float, ...]
+    ratios: tuple[float, ...]
+
+
+def same_motion(conditions: Sequence[Condition], tolerance: float = 0.05) -> list[list[int]]:
+    """Group conditions by motion: indices whose frequency and amplitude agree to a tolerance."""
+    groups: list[list[int]] = []
+    for index, condition in enumerate(conditions):
+        for group in groups:
+            first = conditions[group[0]]
+            if (
+                abs(condition.frequency_Hz / first.frequency_Hz - 1) <= tolerance
+                and abs(condition.amplitude_m / first.amplitude_m - 1) <= tolerance
+            ):
+                group.append(index)
+                break
+        else:
+            groups.append([index])
+    return groups
+
+
+def dynamic_ranges(loops: Sequence[LoopAnalysis]) -> tuple[DynamicRange, ...]:
+    """Dynamic range of every motion that was tested at two currents or more."""
+    ranges = []
+    for group in same_motion([loop.condition for loop in loops]):
+        members = sorted((loops[i] for i in group), key=lambda loop: loop.condition.current_A)
+        currents = tuple(m.condition.current_A for m in members)
+        if len(set(currents)) < 2:
+            continue
+        lowest = members[0].peak_force
+        first = members[0].condition
+        ranges.append(
+            DynamicRange(
+                first.frequency_Hz, first.amplitude_m, currents, tuple(m.peak_force / lowest for m in members)
+            )
+        )
+    return tuple(ranges)

@@ -1,0 +1,95 @@
+"""How far a predicted force is from the measured one; the normaliser is in the name.
+
+Every score is a fraction, not per cent. Arguments are (N,) forces [N], measured first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrdamper.data import Floats
+
+
+def rmse(measured: Floats, predicted: Floats) -> float:
+    """Root mean square error [N]."""
+    return float(np.sqrt(np.mean((predicted - measured) ** 2)))
+
+
+def nrmse_pp(measured: Floats, predicted: Floats) -> float:
+    """RMSE over the peak-to-peak value of the measured force."""
+    return rmse(measured, predicted) / float(np.ptp(measured))
+
+
+def nrmse_std(measured: Floats, predicted: Floats) -> float:
+    """RMSE over the standard deviation of the measured force."""
+    return rmse(measured, predicted) / float(np.std(measured))
+
+
+def wape(measured: Floats, predicted: Floats) -> float:
+    """Weighted absolute percentage error Σ|e| / Σ|F|."""
+    return float(np.sum(np.abs(predicted - measured)) / np.sum(np.abs(measured)))
+
+
+def mean_relative_error(measured: Floats, predicted: Floats) -> float:
+    """Mean of |e| / |F|.
+
+    [Qian et al. 2024, Eq. 44] It explodes where the force crosses zero: read it beside `wape`.
+    Samples with a measured force of exactly zero are left out.
+    """
+    nonzero = measured != 0
+    return float(np.mean(np.abs((predicted - measured)[nonzero] / measured[nonzero])))
+
+
+def r_squared(measured: Floats, predicted: Floats) -> float:
+    """Coefficient of determination, 1 − nrmse_std²."""
+    return 1.0 - nrmse_std(measured, predicted) ** 2
+
+
+def peak_force(force: Floats) -> float:
+    """Half the peak-to-peak force [N]."""
+    return float(np.ptp(force) / 2)
+
+
+def dissipated_power(force: Floats, velocity: Floats, time: Floats) -> float:
+    """Mean power F·v taken out of the motion [W]; over whole cycles, dissipated energy × frequency."""
+    return float(np.trapezoid(force * velocity, time) / (time[-1] - time[0]))
+
+
+@dataclass(frozen=True, slots=True)
+class Scores:
+    """Scores of one predicted run; fractions.
+
+    Attributes
+    ----------
+    nrmse_pp, nrmse_std, wape : float
+        See the functions of these names.
+    peak_error, energy_error : float
+        Relative error of half the peak-to-peak force and of the dissipated energy; positive
+        when the model has too much.
+    """
+
+    nrmse_pp: float
+    nrmse_std: float
+    wape: float
+    peak_error: float
+    energy_error: float
+
+
+def score(measured: Floats, predicted: Floats, velocity: Floats, time: Floats) -> Scores:
+    """Score one predicted run.
+
+    Parameters
+    ----------
+    measured, predicted, velocity, time : (N,) arrays
+        [N], [N], [m/s], [s].
+    """
+    dissipated = dissipated_power(measured, velocity, time)
+    return Scores(
+        nrmse_pp=nrmse_pp(measured, predicted),
+        nrmse_std=nrmse_std(measured, predicted),
+        wape=wape(measured, predicted),
+        peak_error=peak_force(predicted) / peak_force(measured) - 1,
+        energy_error=dissipated_power(predicted, velocity, time) / dissipated - 1 if dissipated else float("nan"),
+    )

@@ -1,0 +1,39 @@
+"""Damper models, one file each. A file dropped in here is found; there is no list."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from functools import cache
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from mrdamper.errors import UnknownNameError
+from mrdamper.models.base import Model, SearchAxis
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+__all__ = ["Model", "SearchAxis", "all_models", "model_type"]
+
+
+@cache
+def all_models() -> Mapping[str, type[Model]]:
+    """Every model by its name."""
+    for module in pkgutil.iter_modules(__path__):
+        importlib.import_module(f"{__name__}.{module.name}")
+    return MappingProxyType({cls.name: cls for cls in sorted(Model.__subclasses__(), key=lambda c: c.name)})
+
+
+def model_type(name: str) -> type[Model]:
+    """The model of that name.
+
+    Raises
+    ------
+    UnknownNameError
+        With the near matches.
+    """
+    models = all_models()
+    if name not in models:
+        raise UnknownNameError.of("model", name, models)
+    return models[name]

@@ -1,0 +1,122 @@
+"""What every damper model is: frozen parameters, and the force they give for a motion.
+
+A model is one file with one class. Its fields are its parameters (`param()` states unit,
+bounds and meaning); `force` is pure arithmetic on them. A model with memory also says how
+its internal state follows a motion (`state`), depending on its nonlinear parameters only:
+given the state, the force is linear in the parameters marked linear, and identification
+solves for those instead of searching.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import ClassVar, Self
+
+import numpy as np
+
+from mrdamper.data import Floats
+from mrdamper.errors import ParameterError
+from mrdamper.excitation import Excitation
+from mrdamper.parameters import ParameterInfo, parameters_of
+
+
+GENERAL_FORMS = (
+    "constant",
+    "linear-current",
+    "quadratic-current",
+    "linear-current-speed",
+    "quadratic-current-linear-speed",
+    "quadratic-current-speed",
+    "plane",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class SearchAxis:
+    """One coordinate a nonlinear search moves along.
+
+    Attributes
+    ----------
+    name : str
+        What it is called in results.
+    lower, upper : float
+        Limits in search units (the logarithm's argument for a log scale).
+    grid : tuple of float
+        Start points, in the same units.
+    log : bool
+        The search moves in the logarithm.
+    """
+
+    name: str
+    lower: float
+    upper: float
+    grid: tuple[float, ...]
+    log: bool = False
+
+
+@dataclass(frozen=True)
+class Model(ABC):
+    """A damper model. Subclasses are final: vary one with `dataclasses.replace`."""
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    equation: ClassVar[str]
+    source: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        for info in self.parameters():
+            value = getattr(self, info.name)
+            low, high = info.bounds
+            if not (np.isfinite(value) and low <= value <= high):
+                raise ParameterError(
+                    f"{info.name} = {value:g} {info.unit}",
+                    where=self.title,
+                    mend=f"{info.meaning} lies between {low:g} and {high:g} {info.unit}",
+                )
+
+    @abstractmethod
+    def force(self, motion: Excitation, state: Floats) -> Floats:
+        """Force [N] at the samples of a motion, given the internal state there."""
+
+    def state(self, motion: Excitation) -> Floats:
+        """Internal state (N,) along a motion; models without memory have none."""
+        return np.zeros(len(motion))
+
+    @classmethod
+    def parameters(cls) -> tuple[ParameterInfo, ...]:
+        """What is known of each parameter, in order."""
+        return parameters_of(cls)
+
+    @classmethod
+    def search_axes(cls, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
+        """Coordinates in which the free nonlinear parameters are searched.
+
+        Parameters
+        ----------
+        amplitude : float
+            Displacement amplitude of the data [m], for scale.
+        free : sequence of str
+            Names of the parameters to be determined.
+        """
+        return ()
+
+    @classmethod
+    def build(cls, values: Mapping[str, float]) -> Self:
+        """Make the model from its parameters or from the coordinates it is searched in."""
+        return cls(**values)
+
+    @classmethod
+    def map_forms(cls) -> Mapping[str, tuple[str, ...]]:
+        """Candidate parameter functions by parameter or coordinate, for the modified model."""
+        return {info.name: GENERAL_FORMS for info in cls.parameters() if not info.preset}
+
+    @classmethod
+    def log_coordinates(cls) -> frozenset[str]:
+        """Coordinates whose logarithm is mapped."""
+        return frozenset(info.name for info in cls.parameters() if info.scale == "log")
+
+    def values(self) -> dict[str, float]:
+        """Parameter values by name."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}

@@ -1,0 +1,122 @@
+"""Bouc–Wen with viscosity, gas spring, inertia and offset: the model of the method."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from mrdamper.data import Floats
+from mrdamper.excitation import Excitation
+from mrdamper.hysteresis import Path, Shape, follow
+from mrdamper.models.base import GENERAL_FORMS, Model, SearchAxis
+from mrdamper.parameters import param
+
+
+@dataclass(frozen=True)
+class BoucWen(Model):
+    """F = k1 x + k2 x² + k3 x³ + c v + m a + alpha z + f0, dz/dt = v − beta |v| |z|^(n−1) z − gamma v |z|^n.
+
+    The factor A of the general form is 1: it can be absorbed in alpha, beta and gamma
+    without changing any force. `beta` multiplies |v| and `gamma` multiplies v; Spencer and
+    co-workers use the letters the other way round. On one frequency m and k1 cannot be told
+    apart (a = −ω² x), so m is preset to zero unless the gas spring is known.
+
+    References
+    ----------
+    Wen (1976), "Method for random vibration of hysteretic systems"; Qian et al. (2024),
+    Actuators 13, 297, Eq. 2 and 8, for the gas spring and the inertia.
+    """
+
+    name: ClassVar[str] = "bouc-wen"
+    title: ClassVar[str] = "Bouc–Wen"
+    equation: ClassVar[str] = (
+        r"F = k_1 x + k_2 x^2 + k_3 x^3 + c\,v + m\,a + \alpha z + f_0,\quad"
+        r"\dot z = v - \beta |v| |z|^{n-1} z - \gamma v |z|^n"
+    )
+    source: ClassVar[str] = "Wen 1976; Qian et al. 2024, Eq. 8"
+
+    c: float = param("N s/m", "post-yield viscous damping", bounds=(0, np.inf), linear=True)
+    alpha: float = param("N/m", "hysteretic stiffness", bounds=(0, np.inf), linear=True)
+    beta: float = param("m^-n", "Bouc–Wen coefficient of |v|", bounds=(0, np.inf), scale="log")
+    gamma: float = param("m^-n", "Bouc–Wen coefficient of v", preset=True)
+    n: float = param("-", "sharpness of the yield", bounds=(1, 10), preset=True, default=2.0)
+    f0: float = param("N", "offset force", linear=True, default=0.0)
+    k1: float = param("N/m", "stiffness", linear=True, default=0.0)
+    k2: float = param("N/m^2", "quadratic stiffness", linear=True, preset=True, default=0.0)
+    k3: float = param("N/m^3", "cubic stiffness", linear=True, preset=True, default=0.0)
+    m: float = param("kg", "equivalent mass", linear=True, preset=True, default=0.0)
+
+    @property
+    def shape(self) -> Shape:
+        """Shape of the hysteresis without its force scale."""
+        return Shape.from_bouc_wen(self.beta, self.gamma, self.n)
+
+    @property
+    def yield_displacement(self) -> float:
+        """z_max: the displacement in which the hysteretic force is spent [m]."""
+        return float(self.shape.yield_displacement)
+
+    @property
+    def yield_force(self) -> float:
+        """alpha · z_max, the hysteretic force after yield [N]."""
+        return self.alpha * self.yield_displacement
+
+    def state(self, motion: Excitation) -> Floats:
+        """z [m] along the motion, from z = 0."""
+        return self.yield_displacement * follow(self.shape, Path.of(motion.displacement))
+
+    def force(self, motion: Excitation, state: Floats) -> Floats:
+        x, v, a = motion.displacement, motion.velocity, motion.acceleration
+        spring = self.k1 * x + self.k2 * x**2 + self.k3 * x**3
+        return spring + self.c * v + self.m * a + self.alpha * state + self.f0
+
+    @classmethod
+    def search_axes(cls, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
+        """Yield displacement (log), asymmetry (gamma − beta)/(gamma + beta) and n: nearly orthogonal."""
+        ladder = tuple(amplitude * np.geomspace(1e-4, 2.0, 14))
+        axes = [SearchAxis("yield_displacement", amplitude * 1e-5, amplitude * 10, ladder, log=True)]
+        if "gamma" in free:
+            axes.append(SearchAxis("asymmetry", -0.98, 0.98, (-0.8, 0.0, 0.8)))
+        if "n" in free:
+            axes.append(SearchAxis("n", 1.0, 10.0, (1.0, 2.0, 4.0)))
+        return tuple(axes)
+
+    @classmethod
+    def map_forms(cls) -> Mapping[str, tuple[str, ...]]:
+        """Yield force and yield displacement are mapped: alpha and beta alone hang together too closely."""
+        yielding = ("decaying-current", "current-decay-frequency")
+        return {
+            "c": GENERAL_FORMS,
+            "yield_force": (*GENERAL_FORMS, "saturating-current"),
+            "yield_displacement": (*GENERAL_FORMS, *yielding),
+            "k1": GENERAL_FORMS,
+            "f0": GENERAL_FORMS,
+        }
+
+    @classmethod
+    def log_coordinates(cls) -> frozenset[str]:
+        return frozenset({"beta", "yield_displacement"})
+
+    @classmethod
+    def build(cls, values: Mapping[str, float]) -> Self:
+        """Make the model from its parameters, or from physical coordinates in their place.
+
+        `yield_displacement` [m] with `asymmetry` (default 0: gamma = beta) stands for beta and
+        gamma; `yield_force` [N] for alpha.
+        """
+        given = dict(values)
+        n = given.get("n", 2.0)
+        if (length := given.pop("yield_displacement", None)) is not None:
+            if "gamma" in given:
+                given["beta"] = length**-n - given["gamma"]
+            else:
+                shape = Shape(1 / length, given.pop("asymmetry", 0.0), n)
+                given["beta"], given["gamma"] = shape.to_bouc_wen()
+        elif "gamma" not in given:
+            given["gamma"] = given["beta"]
+        if (force := given.pop("yield_force", None)) is not None:
+            given["alpha"] = force * (given["beta"] + given["gamma"]) ** (1 / n)
+        return cls(**given)

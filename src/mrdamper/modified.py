@@ -1,0 +1,135 @@
+"""The modified model: identified run by run, every parameter then a function of I, f and A.
+
+[Qian et al. 2024, Eq. 23–43], with the functions fitted to identifications that do not count
+the hysteretic force twice, and each form chosen by how it predicts conditions left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+
+from mrdamper.damper import Damper, Envelope
+from mrdamper.data import Condition, Floats
+from mrdamper.errors import IdentificationError
+from mrdamper.excitation import Excitation
+from mrdamper.identification import Identification
+from mrdamper.loop_analysis import same_motion
+from mrdamper.parameter_functions import FunctionFit, ParameterMap, choose_function
+from mrdamper.simulation import Response, simulate, steady_loop
+
+
+@dataclass(frozen=True, eq=False)
+class ModifiedModel(Damper):
+    """A model whose parameters are functions of current, frequency and amplitude.
+
+    Attributes
+    ----------
+    rig : str
+    parameters : ParameterMap
+    envelope : Envelope
+    provenance : mapping
+        What it was made from.
+    """
+
+    kind: ClassVar[str] = "modified"
+
+    rig: str
+    parameters: ParameterMap
+    envelope: Envelope
+    provenance: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def title(self) -> str:
+        return f"modified {self.parameters.model_type.title}"
+
+    @property
+    def parameter_count(self) -> int:
+        return self.parameters.parameter_count
+
+    def loop(self, condition: Condition) -> Response:
+        return steady_loop(self.parameters.at(condition), condition)
+
+    def force_along(self, motion: Excitation, condition: Condition) -> Floats:
+        return simulate(self.parameters.at(condition), motion).force
+
+
+@dataclass(frozen=True, eq=False)
+class ModifiedFit:
+    """A modified model and how each of its functions was found.
+
+    Attributes
+    ----------
+    damper : ModifiedModel
+    functions : mapping of str to FunctionFit
+    values : mapping of str to (N,) array
+        The identified values behind each function.
+    conditions : tuple of Condition
+    """
+
+    damper: ModifiedModel
+    functions: Mapping[str, FunctionFit]
+    values: Mapping[str, Floats]
+    conditions: tuple[Condition, ...]
+
+    @property
+    def few_motions(self) -> bool:
+        """Whether the conditions repeat few enough motions to draw a curve for each."""
+        return len(same_motion(self.conditions, tolerance=0.08)) <= 10
+
+
+def fit_modified(
+    identifications: Sequence[Identification],
+    forms: Mapping[str, Sequence[str]] | None = None,
+    provenance: Mapping[str, str] | None = None,
+) -> ModifiedFit:
+    """Turn identifications over a test matrix into one model.
+
+    Parameters
+    ----------
+    identifications : sequence of Identification
+        Of one rig and one model type.
+    forms : mapping, optional
+        Candidate forms by parameter. Default: the model's own candidates.
+
+    Raises
+    ------
+    IdentificationError
+        If there is nothing to fit, or the identifications mix models or rigs.
+    """
+    if not identifications:
+        raise IdentificationError("no identifications", mend="identify at least one run")
+    types = {type(i.model) for i in identifications}
+    rigs = {i.rig for i in identifications}
+    if len(types) > 1 or len(rigs) > 1:
+        raise IdentificationError(
+            f"identifications of {len(types)} models and {len(rigs)} rigs", mend="fit one model of one rig at a time"
+        )
+    model_type, rig = types.pop(), rigs.pop()
+    conditions = tuple(i.condition for i in identifications)
+    candidates = dict(model_type.map_forms() if forms is None else forms)
+    values = {name: np.array([_coordinate(i, name) for i in identifications]) for name in candidates}
+    fits = {
+        name: choose_function(candidates[name], conditions, values[name], log=name in model_type.log_coordinates())
+        for name in candidates
+    }
+    damper = ModifiedModel(
+        rig=rig,
+        parameters=ParameterMap(model_type, {name: fit.function for name, fit in fits.items()}),
+        envelope=Envelope.of(conditions),
+        provenance=dict(provenance or {}),
+    )
+    return ModifiedFit(damper, fits, values, conditions)
+
+
+def _coordinate(identification: Identification, name: str) -> float:
+    return float(getattr(identification.model, name))
+
+
+def without(identifications: Sequence[Identification], run_ids: set[str]) -> list[Identification]:
+    """The identifications of all other runs."""
+    return [i for i in identifications if i.run_id not in run_ids]
+

@@ -1,0 +1,1 @@
+"""Searches over a few nonlinear coordinates."""

@@ -1,0 +1,72 @@
+"""`param()`: a model parameter's unit, bounds, scale and meaning, written once, on the field.
+
+Fitting, the command line, reports, exports and the documentation all ask the field.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import MISSING, Field, dataclass, field, fields
+from typing import Any, Literal
+
+Scale = Literal["linear", "log"]
+_KEY = "mrdamper.parameter"
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterInfo:
+    """What is known of one parameter.
+
+    Attributes
+    ----------
+    name, unit, meaning : str
+        Field name, SI unit, one phrase a damper engineer understands.
+    bounds : (float, float)
+        Physical limits [unit]; searches stay inside them.
+    scale : "linear" or "log"
+        Scale on which a search moves.
+    linear : bool
+        The force is linear in it, so it is solved for and not searched.
+    preset : bool
+        Held at its default unless the user frees it.
+    default : float or None
+        Value when none is given.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    bounds: tuple[float, float]
+    scale: Scale
+    linear: bool
+    preset: bool
+    default: float | None
+
+
+def param(
+    unit: str,
+    meaning: str,
+    *,
+    bounds: tuple[float, float] = (-math.inf, math.inf),
+    scale: Scale = "linear",
+    linear: bool = False,
+    preset: bool = False,
+    default: float | None = None,
+) -> Any:
+    """Declare a model parameter as a dataclass field (see `ParameterInfo` for the meanings)."""
+    metadata = {
+        _KEY: dict(unit=unit, meaning=meaning, bounds=bounds, scale=scale, linear=linear, preset=preset)
+    }
+    if default is None:
+        return field(metadata=metadata)
+    return field(default=default, metadata=metadata)
+
+
+def parameters_of(owner: Any) -> tuple[ParameterInfo, ...]:
+    """Parameters of a model class or instance, in the order they were declared."""
+    return tuple(_info(f) for f in fields(owner) if _KEY in f.metadata)
+
+
+def _info(f: Field[Any]) -> ParameterInfo:
+    default = None if f.default is MISSING else float(f.default)
+    return ParameterInfo(name=f.name, default=default, **f.metadata[_KEY])

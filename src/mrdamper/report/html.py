@@ -1,0 +1,46 @@
+"""The study as one HTML file: no script, no network, prints well."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Mapping
+from importlib.resources import files
+
+import jinja2
+import numpy as np
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+_ENVIRONMENT = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined)
+
+
+def render_report(title: str, chapters: list[Mapping[str, object]], footer: str) -> str:
+    """The report's HTML.
+
+    Parameters
+    ----------
+    title : str
+    chapters : list of mapping
+        One a rig: what the template shows, figures included.
+    footer : str
+        How it was made.
+    """
+    template = _ENVIRONMENT.from_string((files("mrdamper.report") / "report.html.j2").read_text(encoding="utf-8"))
+    helpers = {"svg": inline_svg, "mm": lambda v: 1e3 * v, "percent": _percent, "median": lambda v: float(np.median(v))}
+    return template.render(title=title, chapters=chapters, footer=footer, **helpers)
+
+
+def inline_svg(figure: Figure, alt: str) -> Markup:
+    """A figure as an image inside the page."""
+    from mrdamper.plots.style import house_style
+
+    buffer = io.BytesIO()
+    with house_style():
+        figure.savefig(buffer, format="svg", metadata={"Date": None})
+    data = base64.b64encode(buffer.getvalue()).decode("ascii")
+    return Markup('<img alt="{}" src="data:image/svg+xml;base64,{}">').format(alt, data)
+
+
+def _percent(value: float | None, digits: int = 1) -> str:
+    return "–" if value is None or not np.isfinite(value) else f"{100 * value:.{digits}f}"

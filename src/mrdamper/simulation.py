@@ -1,0 +1,68 @@
+"""The force of a model for a motion: the only place that steps time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrdamper.data import Condition, Floats
+from mrdamper.errors import ExcitationError
+from mrdamper.excitation import Excitation, sine
+from mrdamper.models.base import Model
+
+_CLOSURE = 1e-9  # relative gap at which a loop counts as closed
+_MOST_CYCLES = 512
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """A model's answer to an excitation.
+
+    Attributes
+    ----------
+    excitation : Excitation
+    force, state : (N,) arrays
+        Force [N] and internal state of the model.
+    """
+
+    excitation: Excitation
+    force: Floats
+    state: Floats
+
+
+def simulate(model: Model, excitation: Excitation) -> Response:
+    """Force of a model along any motion, starting at rest with no memory."""
+    state = model.state(excitation)
+    return Response(excitation, model.force(excitation, state), state)
+
+
+def steady_loop(model: Model, condition: Condition, samples_per_cycle: int = 1000) -> Response:
+    """One closed loop of the steady response to a sine.
+
+    Cycles are run until the state closes on itself to 1e-9 of its range.
+
+    Raises
+    ------
+    ExcitationError
+        If it does not close within 512 cycles.
+    """
+    cycles = 2
+    while cycles <= _MOST_CYCLES:
+        motion = sine(condition, cycles, samples_per_cycle)
+        response = simulate(model, motion)
+        last = slice(-samples_per_cycle - 1, None)
+        state = response.state[last]
+        if abs(state[-1] - state[0]) <= _CLOSURE * max(float(np.ptp(state)), np.finfo(float).tiny):
+            loop = motion.part(last)
+            return Response(_from_zero(loop), response.force[last], state)
+        cycles *= 4
+    raise ExcitationError(
+        f"the loop does not close within {_MOST_CYCLES} cycles",
+        where=str(condition),
+        mend="raise the amplitude: it is far below the yield displacement",
+    )
+
+
+def _from_zero(loop: Excitation) -> Excitation:
+    return Excitation(loop.time - loop.time[0], loop.displacement, loop.velocity, loop.acceleration, loop.current)

@@ -1,0 +1,129 @@
+"""Scores on conditions a damper has not seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrdamper.damper import Damper, Prediction
+from mrdamper.data import Condition, Run
+from mrdamper.metrics import Scores, score
+
+_SAME = 0.03  # frequencies and amplitudes this close are one condition of the test matrix
+
+
+@dataclass(frozen=True, eq=False)
+class RunScore:
+    """How one run was predicted, inside its steady window.
+
+    Attributes
+    ----------
+    run_id : str
+    rig : str
+    condition : Condition
+        That the run's measured motion amounts to.
+    scores : Scores
+    floor : float or None
+        Cycle-to-cycle scatter of the run as nrmse_pp.
+    extrapolation : tuple of str
+        Quantities outside the envelope of the tests the damper was identified from.
+    """
+
+    run_id: str
+    rig: str
+    condition: Condition
+    scores: Scores
+    floor: float | None
+    extrapolation: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """Scores of several runs.
+
+    Attributes
+    ----------
+    title : str
+        What was validated.
+    runs : tuple of RunScore
+    """
+
+    title: str
+    runs: tuple[RunScore, ...]
+
+    def median(self, name: str = "nrmse_pp") -> float:
+        """Median of a score over the runs; signed errors count by magnitude."""
+        return float(np.median([abs(getattr(run.scores, name)) for run in self.runs])) if self.runs else float("nan")
+
+    def worst(self, name: str = "nrmse_pp") -> RunScore:
+        """The run with the largest magnitude of a score."""
+        return max(self.runs, key=lambda run: abs(getattr(run.scores, name)))
+
+
+def validate(damper: Damper, runs: Iterable[Run], title: str | None = None) -> Validation:
+    """Predict runs from their measured motion and score them inside their steady windows."""
+    return Validation(title or damper.title, tuple(score_run(damper, run) for run in runs))
+
+
+def score_run(damper: Damper, run: Run) -> RunScore:
+    """Predict and score one run."""
+    prediction = damper.predict_run(run)
+    return RunScore(
+        run.id, run.rig, prediction.condition, _scores(run, prediction), run.repeatability, prediction.extrapolation
+    )
+
+
+def leave_one_condition_out(
+    runs: Sequence[Run],
+    conditions: Sequence[Condition],
+    fit: Callable[[list[int]], Damper],
+    title: str,
+) -> Validation:
+    """Score every run with a damper identified without any run at its condition.
+
+    Parameters
+    ----------
+    runs : sequence of Run, length N
+    conditions : sequence of Condition, length N
+        Measured conditions of the runs.
+    fit : callable
+        Makes a damper from the runs at the given indices.
+    title : str
+    """
+    scored: dict[int, RunScore] = {}
+    for group in same_condition(conditions):
+        rest = [i for i in range(len(runs)) if i not in group]
+        if not rest:
+            continue
+        damper = fit(rest)
+        scored |= {i: score_run(damper, runs[i]) for i in group}
+    return Validation(title, tuple(scored[i] for i in sorted(scored)))
+
+
+def same_condition(conditions: Sequence[Condition]) -> list[list[int]]:
+    """Group the indices of conditions that agree in current and, to 3 %, in frequency and amplitude."""
+    groups: list[list[int]] = []
+    for index, condition in enumerate(conditions):
+        for group in groups:
+            if _agree(condition, conditions[group[0]]):
+                group.append(index)
+                break
+        else:
+            groups.append([index])
+    return groups
+
+
+def _agree(a: Condition, b: Condition) -> bool:
+    return (
+        abs(a.current_A - b.current_A) <= 1e-3 + _SAME * abs(b.current_A)
+        and abs(a.frequency_Hz / b.frequency_Hz - 1) <= _SAME
+        and abs(a.amplitude_m / b.amplitude_m - 1) <= _SAME
+    )
+
+
+def _scores(run: Run, prediction: Prediction) -> Scores:
+    inside = run.in_window
+    motion = prediction.motion
+    return score(run.force[inside], prediction.force[inside], motion.velocity[inside], run.time[inside])

@@ -1,0 +1,220 @@
+"""The whole method, in order: identify every run, map the parameters, validate what was held out.
+
+`run_study` reads like the methods section of a paper; everything it returns is a result
+object that plots, reports and files take from there.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrdamper.damper import Damper
+from mrdamper.data import Dataset, Run
+from mrdamper.errors import IdentificationError
+from mrdamper.excitation import equivalent_sine
+from mrdamper.identification import Identification, identify
+from mrdamper.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, dynamic_ranges
+from mrdamper.modified import ModifiedFit, fit_modified
+from mrdamper.validation import Validation, leave_one_condition_out, validate
+
+Progress = Callable[[str, float], None]
+STUDIED = ("bouc-wen", "bingham")  # the model of the method, and the one everybody compares with
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One model of a rig: identified per run, mapped, validated.
+
+    Attributes
+    ----------
+    model : str
+        Name of the model type.
+    identifications : tuple of Identification
+        Of the train runs; the model is made from these alone.
+    fit : ModifiedFit
+    left_out : Validation
+        Train runs, each predicted without its condition.
+    held_out : Validation
+        Validate runs.
+    seconds : float
+        Spent on identification, mapping and leave-one-out.
+    """
+
+    model: str
+    identifications: tuple[Identification, ...]
+    fit: ModifiedFit
+    left_out: Validation
+    held_out: Validation
+    seconds: float
+
+    @property
+    def per_run_median(self) -> float:
+        """Median nrmse_pp of the identifications themselves: what one run allows this model."""
+        return float(np.median([i.scores.nrmse_pp for i in self.identifications]))
+
+    @property
+    def damper(self) -> Damper:
+        """What predicts."""
+        return self.fit.damper
+
+
+@dataclass(frozen=True, eq=False)
+class RigStudy:
+    """The study of one rig.
+
+    Attributes
+    ----------
+    rig : str
+    dataset : Dataset
+    loops : tuple of LoopAnalysis
+        Of every sine run.
+    ranges : tuple of DynamicRange
+    candidates : tuple of Candidate
+        Best leave-one-condition-out score first.
+    not_identified : mapping of run id to the reason
+    """
+
+    rig: str
+    dataset: Dataset
+    loops: tuple[LoopAnalysis, ...]
+    ranges: tuple[DynamicRange, ...]
+    candidates: tuple[Candidate, ...]
+    not_identified: dict[str, str]
+
+    @property
+    def chosen(self) -> Candidate:
+        """The candidate that predicts left-out conditions best."""
+        return self.candidates[0]
+
+    @property
+    def damper(self) -> Damper:
+        """The chosen damper."""
+        return self.chosen.damper
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """A study of a dataset, rig by rig.
+
+    Attributes
+    ----------
+    dataset : Dataset
+    rigs : tuple of RigStudy
+    seconds : float
+    """
+
+    dataset: Dataset
+    rigs: tuple[RigStudy, ...]
+    seconds: float
+
+    @property
+    def model(self) -> Damper:
+        """The damper, where the dataset holds one rig.
+
+        Raises
+        ------
+        IdentificationError
+            If it holds several: take `study.rig(name).damper`.
+        """
+        if len(self.rigs) > 1:
+            names = ", ".join(r.rig for r in self.rigs)
+            raise IdentificationError(f"the dataset holds {len(self.rigs)} rigs", mend=f"use study.rig(name): {names}")
+        return self.rigs[0].damper
+
+    def rig(self, name: str) -> RigStudy:
+        """The study of one rig."""
+        self.dataset.rig(name)
+        return next(r for r in self.rigs if r.rig == name)
+
+
+def run_study(dataset: Dataset, progress: Progress = lambda what, share: None) -> Study:
+    """Study a dataset: identify, map, validate, rig by rig.
+
+    Parameters
+    ----------
+    dataset : Dataset
+    progress : callable
+        Told what is being done and the share done, 0...1.
+
+    Raises
+    ------
+    IdentificationError
+        If a rig has too few runs to identify anything from.
+    """
+    begin = time.perf_counter()
+    count = len(dataset.rigs)
+    rigs = []
+    for number, name in enumerate(dataset.rigs):
+
+        def tell(what: str, share: float, number: int = number, name: str = name) -> None:
+            progress(f"{name or 'rig'}: {what}", (number + share) / count)
+
+        rigs.append(study_rig(dataset.rig(name), tell))
+    progress("studied", 1.0)
+    return Study(dataset, tuple(rigs), time.perf_counter() - begin)
+
+
+def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None) -> RigStudy:
+    """Study the runs of one rig."""
+    rig = dataset.rigs[0]
+    progress("loops", 0.0)
+    sines, refused = usable_sines(dataset)
+    loops = tuple(analyse_loop(run) for run in sines)
+    train = [run for run in sines if run.split == "train"]
+    if len(train) < 2:
+        raise IdentificationError(
+            f"{len(train)} train runs with a steady sine",
+            where=f"rig {rig or dataset.name}",
+            mend="a model over conditions needs at least two; check the split column of runs.csv",
+        )
+    candidates = []
+    for number, model in enumerate(STUDIED):
+
+        def tell(what: str, share: float, number: int = number, model: str = model) -> None:
+            progress(f"{model} {what}", (number + share) / len(STUDIED))
+
+        candidates.append(_candidate(model, dataset, train, tell))
+    candidates.sort(key=lambda c: c.left_out.median())
+    return RigStudy(rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), refused)
+
+
+def usable_sines(dataset: Dataset) -> tuple[list[Run], dict[str, str]]:
+    """The runs whose motion is a sine at one current, and why the others are not used."""
+    sines, refused = [], {}
+    for run in dataset:
+        try:
+            run.current_A  # noqa: B018
+            found = equivalent_sine(run)
+        except ValueError as error:
+            refused[run.id] = str(error)
+            continue
+        if found.is_sine:
+            sines.append(run)
+        else:
+            refused[run.id] = "the motion is no sine: it is predicted, but not identified from"
+    return sines, refused
+
+
+def _candidate(model: str, dataset: Dataset, train: Sequence[Run], progress: Progress) -> Candidate:
+    begin = time.perf_counter()
+    identifications = []
+    for number, run in enumerate(train):
+        progress(f"run {run.id}", 0.8 * number / len(train))
+        identifications.append(identify(run, model))
+    progress("over all conditions", 0.8)
+    provenance = {"dataset": dataset.name, "method": identifications[0].method, "train runs": str(len(train))}
+    fit = fit_modified(identifications, provenance=provenance)
+    left_out = leave_one_condition_out(
+        train,
+        [i.condition for i in identifications],
+        lambda rest: fit_modified([identifications[i] for i in rest]).damper,
+        title=fit.damper.title,
+    )
+    seconds = time.perf_counter() - begin
+    progress("validation", 0.9)
+    held_out = validate(fit.damper, dataset.split("validate"))
+    return Candidate(model, tuple(identifications), fit, left_out, held_out, seconds)
