@@ -7,10 +7,12 @@ code further up trusts it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import wraps
 from types import MappingProxyType
-from typing import Literal
+from typing import Literal, TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +20,9 @@ from numpy.typing import ArrayLike, NDArray
 from mrdamper.errors import NonFiniteError, RunError, TimeOrderError, UnknownNameError
 
 Floats = NDArray[np.float64]
+T = TypeVar("T")
 Split = Literal["train", "validate"]
+_SAME = 0.03  # frequencies and amplitudes this close are one condition of the test matrix
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -46,6 +50,27 @@ class Condition:
 
     def __str__(self) -> str:
         return f"{self.current_A:g} A, {self.frequency_Hz:.3g} Hz, {1e3 * self.amplitude_m:.3g} mm"
+
+
+def same_condition(conditions: Sequence[Condition]) -> list[list[int]]:
+    """Group the indices of conditions that agree in current and, to 3 %, in frequency and amplitude."""
+    groups: list[list[int]] = []
+    for index, condition in enumerate(conditions):
+        for group in groups:
+            if _agree(condition, conditions[group[0]]):
+                group.append(index)
+                break
+        else:
+            groups.append([index])
+    return groups
+
+
+def _agree(a: Condition, b: Condition) -> bool:
+    return (
+        abs(a.current_A - b.current_A) <= 1e-3 + _SAME * abs(b.current_A)
+        and abs(a.frequency_Hz / b.frequency_Hz - 1) <= _SAME
+        and abs(a.amplitude_m / b.amplitude_m - 1) <= _SAME
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,6 +222,23 @@ class Run:
         array = array.view()
         array.flags.writeable = False
         return array
+
+
+def once_per_run(function: Callable[[Run], T]) -> Callable[[Run], T]:
+    """Remember what a function of a run found for as long as the run lives.
+
+    A study asks for the same run's motion dozens of times; runs are frozen, so the answer
+    cannot change.
+    """
+    known: WeakKeyDictionary[Run, T] = WeakKeyDictionary()
+
+    @wraps(function)
+    def remembered(run: Run) -> T:
+        if run not in known:
+            known[run] = function(run)
+        return known[run]
+
+    return remembered
 
 
 @dataclass(frozen=True, eq=False)

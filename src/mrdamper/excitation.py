@@ -10,16 +10,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mrdamper.data import Condition, Floats, Run
+from mrdamper.data import Condition, Floats, Run, once_per_run
 from mrdamper.errors import ExcitationError
 from mrdamper.harmonics import HarmonicSeries, dominant_frequency, fit_harmonics
+from mrdamper.hysteresis import Path
 
 SINE_DISTORTION_LIMIT = 0.05  # above it a motion is no sine for harmonic balance
 _SAMPLES_PER_CYCLE = 1000
+_ORDERS = 7  # harmonics a measured motion is described by
 _STILL = 1e-9  # a displacement that moves less does not move [m]
 
 
@@ -48,6 +51,11 @@ class Excitation:
     def __len__(self) -> int:
         return self.time.size
 
+    @cached_property
+    def path(self) -> Path:
+        """The motion cut into strokes."""
+        return Path.of(self.displacement)
+
     def part(self, mask: ArrayLike) -> Excitation:
         """The samples selected by a mask, slice or index."""
         pick = {name: getattr(self, name)[mask] for name in self.__dataclass_fields__}
@@ -70,6 +78,7 @@ class Excitation:
         )
 
 
+@once_per_run
 def measured_motion(run: Run) -> Excitation:
     """Smooth motion of a run, from its measured displacement.
 
@@ -128,7 +137,8 @@ class MotionAnalysis:
         return self.distortion <= SINE_DISTORTION_LIMIT
 
 
-def analyse_motion(run: Run, orders: int = 7) -> MotionAnalysis:
+@once_per_run
+def analyse_motion(run: Run) -> MotionAnalysis:
     """Frequency, amplitude, distortion and drift of the run's steady motion.
 
     Harmonic regression on the samples of the steady window, so the record need not hold a
@@ -144,7 +154,7 @@ def analyse_motion(run: Run, orders: int = 7) -> MotionAnalysis:
     if np.ptp(run.displacement) < _STILL:
         raise ExcitationError("the displacement does not move", where=where, mend="check the channel")
     guess = dominant_frequency(run.time, run.displacement)
-    series = fit_harmonics(run.time, run.displacement, orders, frequency=guess, refine=True)
+    series = fit_harmonics(run.time, run.displacement, _ORDERS, frequency=guess, refine=True)
     cycles = float(np.ptp(run.time) * series.frequency)
     if cycles < 0.95:
         raise ExcitationError(
@@ -181,6 +191,7 @@ class EquivalentSine:
     is_sine: bool
 
 
+@once_per_run
 def equivalent_sine(run: Run) -> EquivalentSine:
     """Measure the sine, or for any other motion the sine of the same RMS displacement and velocity.
 

@@ -6,19 +6,20 @@ the hysteretic force twice, and each form chosen by how it predicts conditions l
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 
 from mrdamper.damper import Damper, Envelope
-from mrdamper.data import Condition, Floats
+from mrdamper.data import Condition, Floats, Run, same_condition
 from mrdamper.errors import IdentificationError
 from mrdamper.excitation import Excitation
 from mrdamper.identification import Identification
+from mrdamper.joint import Condensed, choose_forms, condense, fit_jointly
 from mrdamper.loop_analysis import same_motion
-from mrdamper.parameter_functions import FunctionFit, ParameterMap, choose_function
+from mrdamper.parameter_functions import FORMS, FunctionFit, ParameterMap, assess, choose_function
 from mrdamper.simulation import Response, simulate, steady_loop
 
 
@@ -113,7 +114,13 @@ def fit_modified(
     candidates = dict(model_type.map_forms() if forms is None else forms)
     values = {name: np.array([_coordinate(i, name) for i in identifications]) for name in candidates}
     fits = {
-        name: choose_function(candidates[name], conditions, values[name], log=name in model_type.log_coordinates())
+        name: choose_function(
+            candidates[name],
+            conditions,
+            values[name],
+            log=name in model_type.log_coordinates(),
+            uncertainty=_uncertainty(identifications, name, name in model_type.log_coordinates()),
+        )
         for name in candidates
     }
     damper = ModifiedModel(
@@ -123,6 +130,56 @@ def fit_modified(
         provenance=dict(provenance or {}),
     )
     return ModifiedFit(damper, fits, values, conditions)
+
+
+def fit_modified_jointly(
+    runs: Sequence[Run], identifications: Sequence[Identification], provenance: Mapping[str, str] | None = None
+) -> tuple[ModifiedFit, Callable[[Sequence[int]], ModifiedModel]]:
+    """Fit all parameter functions to the forces of all runs at once.
+
+    Parameters
+    ----------
+    runs : sequence of Run, length R
+    identifications : sequence of Identification, length R
+        Of these runs, in this order: where the shape coordinate starts.
+    provenance : mapping, optional
+
+    Returns
+    -------
+    fit : ModifiedFit
+    refit : callable
+        Makes the model from the runs of some indices only, with the same forms.
+
+    Raises
+    ------
+    IdentificationError
+        If the model has more than one shape coordinate, or there are too few runs.
+    """
+    model_type = type(identifications[0].model)
+    data = condense(runs, model_type)
+    shapes = np.array([_coordinate(i, data.shape) if data.shape else 1.0 for i in identifications])
+    candidates = {name: [f for f in forms if name == data.shape or not FORMS[f].rate_bounds] for name, forms in model_type.map_forms().items()}
+    forms, joint = choose_forms(data, candidates, same_condition(data.conditions), shapes)
+    start = joint.parameters.functions.get(data.shape)
+
+    def model(part: Condensed, parameters: ParameterMap) -> ModifiedModel:
+        return ModifiedModel(identifications[0].rig, parameters, Envelope.of(part.conditions), dict(provenance or {}))
+
+    def refit(rows: Sequence[int]) -> ModifiedModel:
+        part = data.only(rows)
+        return model(part, fit_jointly(part, forms, start).parameters)
+
+    values = {name: np.array([_coordinate(i, name) for i in identifications]) for name in forms}
+    fits = {
+        name: assess(function, data.conditions, values[name])
+        for name, function in joint.parameters.functions.items()
+    }
+    return ModifiedFit(model(data, joint.parameters), fits, values, data.conditions), refit
+
+
+def _uncertainty(identifications: Sequence[Identification], name: str, log: bool) -> Floats:
+    errors = np.array([i.standard_errors.get(name, np.inf) for i in identifications])
+    return errors / np.array([abs(_coordinate(i, name)) or 1.0 for i in identifications]) if log else errors
 
 
 def _coordinate(identification: Identification, name: str) -> float:

@@ -222,7 +222,12 @@ class FunctionFit:
 
 
 def fit_function(
-    form: str | Form, conditions: Sequence[Condition], values: ArrayLike, *, log: bool = False
+    form: str | Form,
+    conditions: Sequence[Condition],
+    values: ArrayLike,
+    *,
+    log: bool = False,
+    uncertainty: ArrayLike | None = None,
 ) -> FunctionFit:
     """Fit one form to a parameter's identified values.
 
@@ -234,6 +239,9 @@ def fit_function(
         Identified values of the parameter.
     log : bool
         Fit the logarithm.
+    uncertainty : (N,) array, optional
+        Standard errors of the values (of the logarithm, with `log`): certain values count more,
+        up to those of the most certain quarter.
 
     Raises
     ------
@@ -248,32 +256,38 @@ def fit_function(
         target = np.log(target)
     if target.size < len(chosen.terms) + len(chosen.rate_bounds):
         raise _undetermined(chosen, f"{target.size} conditions", I, f, A)
-    starts = product(*(np.geomspace(low, high, 12) for low, high in chosen.rate_bounds))
-    best: tuple[float, Floats, tuple[float, ...]] | None = None
-    for start in starts:
-        for rates in _refined(chosen, I, f, A, target, start) if start else [()]:
-            columns = chosen.columns(I, f, A, rates)
-            if not _determined(columns):
-                continue
-            coefficients = _solve(columns, target)
-            cost = float(np.sum((columns @ coefficients - target) ** 2))
-            if best is None or cost < best[0]:
-                best = (cost, coefficients, rates)
-    if best is None:
-        raise _undetermined(chosen, "they do not tell its terms apart", I, f, A)
-    cost, coefficients, rates = best
+    weight = _weights(uncertainty, target)
+    rates = _best_rates(chosen, I, f, A, target, weight)
     columns = chosen.columns(I, f, A, rates)
+    if not _determined(columns):
+        raise _undetermined(chosen, "they do not tell its terms apart", I, f, A)
+    coefficients = _solve(columns * weight[:, None], target * weight)
+    cost = float(np.sum((columns @ coefficients - target) ** 2))
     spread = float(np.sum((target - target.mean()) ** 2))
     function = ParameterFunction(chosen.name, tuple(coefficients.tolist()), tuple(float(r) for r in rates), log)
     return FunctionFit(
         function,
         r2=1.0 - cost / spread if spread > 0 else 1.0,
-        left_out=_left_out(columns, target, len(rates)) / (np.sqrt(spread / target.size) or 1.0),
+        left_out=_left_out(columns, target, weight, len(rates)) / (np.sqrt(spread / target.size) or 1.0),
     )
 
 
+def assess(function: ParameterFunction, conditions: Sequence[Condition], values: ArrayLike) -> FunctionFit:
+    """How a function found otherwise, by a joint fit, describes values identified run by run."""
+    target, found = np.asarray(values, dtype=float), function(*features(conditions))
+    if function.log:
+        target, found = np.log(target), np.log(found)
+    spread = float(np.sum((target - target.mean()) ** 2))
+    return FunctionFit(function, 1.0 - float(np.sum((found - target) ** 2)) / spread if spread else 1.0, float("nan"))
+
+
 def choose_function(
-    forms: Iterable[str], conditions: Sequence[Condition], values: ArrayLike, *, log: bool = False
+    forms: Iterable[str],
+    conditions: Sequence[Condition],
+    values: ArrayLike,
+    *,
+    log: bool = False,
+    uncertainty: ArrayLike | None = None,
 ) -> FunctionFit:
     """The form that predicts left-out conditions best; a longer one must win by a tenth.
 
@@ -289,7 +303,7 @@ def choose_function(
     refusal: IdentificationError | None = None
     for form in sorted((form_named(name) for name in forms), key=lambda f: len(f.terms) + len(f.rate_bounds)):
         try:
-            fit = fit_function(form, conditions, values, log=log)
+            fit = fit_function(form, conditions, values, log=log, uncertainty=uncertainty)
         except IdentificationError as error:
             refusal = error
             continue
@@ -339,17 +353,23 @@ def features(conditions: Sequence[Condition]) -> tuple[Floats, Floats, Floats]:
     return table[:, 0], table[:, 1], table[:, 2]
 
 
-def _refined(
-    form: Form, I: Floats, f: Floats, A: Floats, target: Floats, start: tuple[float, ...]  # noqa: E741
-) -> list[tuple[float, ...]]:
+def _best_rates(
+    form: Form, I: Floats, f: Floats, A: Floats, target: Floats, weight: Floats  # noqa: E741
+) -> tuple[float, ...]:
+    """Search the rates in their logarithm: a grid, then refinement from its three best points."""
+    if not form.rate_bounds:
+        return ()
     bounds = np.log(np.array(form.rate_bounds))
 
     def residual(u: Floats) -> Floats:
-        columns = form.columns(I, f, A, tuple(np.exp(u)))
-        return columns @ _solve(columns, target) - target
+        columns = form.columns(I, f, A, tuple(np.exp(u))) * weight[:, None]
+        return columns @ _solve(columns, target * weight) - target * weight
 
-    found = least_squares(residual, np.log(start), bounds[:, 0], bounds[:, 1])
-    return [tuple(np.exp(found.point).tolist())]
+    grid = [np.array(u) for u in product(*(np.linspace(low, high, 6) for low, high in bounds))]
+    grid.sort(key=lambda u: float(np.sum(residual(u) ** 2)))
+    found = [least_squares(residual, u, bounds[:, 0], bounds[:, 1], most_steps=15) for u in grid[:3]]
+    best = min(found, key=lambda minimum: minimum.cost)
+    return tuple(np.exp(best.point).tolist())
 
 
 def _solve(columns: Floats, target: Floats) -> Floats:
@@ -366,15 +386,42 @@ def _determined(columns: Floats) -> bool:
     return columns.shape[0] >= columns.shape[1] and bool(singular[-1] > _RANK_LIMIT * singular[0])
 
 
-def _left_out(columns: Floats, target: Floats, rates: int) -> float:
-    """RMS of leave-one-out errors, exact for the linear part through the hat matrix."""
-    scale = np.linalg.norm(columns, axis=0)
-    q, _ = np.linalg.qr(columns / scale)
+def require_determined(form: str, conditions: Sequence[Condition]) -> None:
+    """Refuse a form without rates whose terms the conditions cannot tell apart.
+
+    Raises
+    ------
+    IdentificationError
+        Also where the form has rates, which only a fit can settle.
+    """
+    chosen = form_named(form)
+    I, f, A = features(conditions)  # noqa: E741
+    if chosen.rate_bounds:
+        raise IdentificationError(f"{form} has rates to search", mend="choose a form without")
+    if len(conditions) < len(chosen.terms) or not _determined(chosen.columns(I, f, A, ())):
+        raise _undetermined(chosen, f"{len(conditions)} conditions do not tell its terms apart", I, f, A)
+
+
+def _left_out(columns: Floats, target: Floats, weight: Floats, rates: int) -> float:
+    """Weighted RMS of leave-one-out errors, exact for the linear part through the hat matrix."""
+    weighted = columns * weight[:, None]
+    q, _ = np.linalg.qr(weighted / np.linalg.norm(weighted, axis=0))
     leverage = np.sum(q**2, axis=1)
-    residual = target - q @ (q.T @ target)
+    residual = target * weight - q @ (q.T @ (target * weight))
     spare = np.maximum(1.0 - leverage, 1e-9)
     penalty = target.size / max(target.size - rates, 1)
-    return float(np.sqrt(np.mean((residual / spare) ** 2)) * penalty)
+    return float(np.sqrt(np.sum((residual / spare) ** 2) / np.sum(weight**2)) * penalty)
+
+
+def _weights(uncertainty: ArrayLike | None, target: Floats) -> Floats:
+    if uncertainty is None:
+        return np.ones(target.size)
+    errors = np.asarray(uncertainty, dtype=float)
+    known = errors[np.isfinite(errors)]
+    if not known.size:
+        return np.ones(target.size)
+    floor = float(np.quantile(known, 0.25)) or 1.0
+    return floor / np.maximum(np.where(np.isfinite(errors), errors, known.max()), floor)
 
 
 def _undetermined(form: Form, found: str, I: Floats, f: Floats, A: Floats) -> IdentificationError:  # noqa: E741

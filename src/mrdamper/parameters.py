@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import MISSING, Field, dataclass, field, fields
+from functools import cache
 from typing import Any, Literal
 
 Scale = Literal["linear", "log"]
@@ -62,8 +63,9 @@ def param(
     return field(default=default, metadata=metadata)
 
 
-def parameters_of(owner: Any) -> tuple[ParameterInfo, ...]:
-    """Parameters of a model class or instance, in the order they were declared."""
+@cache
+def parameters_of(owner: type) -> tuple[ParameterInfo, ...]:
+    """Parameters of a model class, in the order they were declared."""
     return tuple(_info(f) for f in fields(owner) if _KEY in f.metadata)
 
 

@@ -56,10 +56,11 @@ def write_study(study: Study, folder: str | Path, progress: Progress = lambda wh
             progress(f"{rig.rig or 'rig'}: report", number / len(study.rigs))
             figures = _figures(rig)
             suffix = f"-{rig.rig}" if len(study.rigs) > 1 else ""
-            for name, figure in figures.items():
-                save_figure(figure, work / "figures" / f"{name}{suffix}")
+            pictures = {
+                name: save_figure(figure, work / "figures" / f"{name}{suffix}") for name, figure in figures.items()
+            }
             save_model(rig.damper, work / f"model{suffix}.json")
-            chapters.append(_chapter(rig, figures))
+            chapters.append(_chapter(rig, pictures))
         footer = (
             f"mrdamper {version('mrdamper')}; dataset: {study.dataset.name}, {len(study.dataset)} runs; "
             f"identified and validated in {study.seconds:.1f} s."
@@ -156,7 +157,7 @@ def _validation_table(study: Study) -> str:
         for candidate in rig.candidates:
             for split, validation in (("left out", candidate.left_out), ("held out", candidate.held_out)):
                 for run in validation.runs:
-                    rows.append({"rig": rig.rig, "model": candidate.model, "set": split, **score_row(run)})
+                    rows.append({"rig": rig.rig, "model": candidate.model, "way": candidate.way, "set": split, **score_row(run)})
     return table_text(rows)
 
 
@@ -164,9 +165,9 @@ def _figures(rig: RigStudy) -> dict[str, Figure]:
     chosen = rig.chosen
     scores = {}
     for candidate in rig.candidates:
-        scores[f"{candidate.model}, left out"] = candidate.left_out
+        scores[f"{candidate.title}, left out"] = candidate.left_out
         if candidate.held_out.runs:
-            scores[f"{candidate.model}, held out"] = candidate.held_out
+            scores[f"{candidate.title}, held out"] = candidate.held_out
     train = [rig.dataset[i.run_id] for i in chosen.identifications]
     return {
         "matrix": test_matrix(rig.loops),
@@ -190,7 +191,7 @@ def _shown(rig: RigStudy) -> list[Any]:
     return [ordered[i] for i in picks]
 
 
-def _chapter(rig: RigStudy, figures: Mapping[str, Figure]) -> dict[str, Any]:
+def _chapter(rig: RigStudy, pictures: Mapping[str, bytes]) -> dict[str, Any]:
     chosen = rig.chosen
     floors = [run.repeatability for run in rig.dataset if run.repeatability is not None]
     held = any(run.id in {loop.run_id for loop in rig.loops} for run in rig.dataset.split("validate"))
@@ -215,7 +216,7 @@ def _chapter(rig: RigStudy, figures: Mapping[str, Figure]) -> dict[str, Any]:
             if held
             else "Train runs, last cycle of the steady window: the dataset holds no validate runs."
         ),
-        "figures": figures,
+        "figures": pictures,
     }
 
 
@@ -234,12 +235,12 @@ def _verdict(rig: RigStudy) -> str:
 def _choice(rig: RigStudy) -> str:
     chosen, others = rig.candidates[0], rig.candidates[1:]
     text = (
-        f"Chosen by the error on conditions left out of the identification: {chosen.damper.title} with "
-        f"{100 * chosen.left_out.median():.1f} %"
+        f"Chosen by the error on conditions left out of the identification: {chosen.title} with "
+        f"{100 * chosen.left_out.median():.1f} % and {chosen.damper.parameter_count} numbers"
     )
     if others:
-        text += " against " + ", ".join(f"{o.damper.title} with {100 * o.left_out.median():.1f} %" for o in others)
-    return text + ". Held-out runs confirm; they choose nothing."
+        text += " against " + ", ".join(f"{o.title} with {100 * o.left_out.median():.1f} % and {o.damper.parameter_count}" for o in others)
+    return text + ". Within a tenth of the best, fewer numbers win. Held-out runs confirm; they choose nothing."
 
 
 def _tests(rig: RigStudy) -> str:

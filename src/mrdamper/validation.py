@@ -8,10 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrdamper.damper import Damper, Prediction
-from mrdamper.data import Condition, Run
+from mrdamper.data import Condition, Run, same_condition
 from mrdamper.metrics import Scores, score
-
-_SAME = 0.03  # frequencies and amplitudes this close are one condition of the test matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +76,7 @@ def score_run(damper: Damper, run: Run) -> RunScore:
 def leave_one_condition_out(
     runs: Sequence[Run],
     conditions: Sequence[Condition],
-    fit: Callable[[list[int]], Damper],
+    fit: Callable[[Sequence[int]], Damper],
     title: str,
 ) -> Validation:
     """Score every run with a damper identified without any run at its condition.
@@ -100,27 +98,6 @@ def leave_one_condition_out(
         damper = fit(rest)
         scored |= {i: score_run(damper, runs[i]) for i in group}
     return Validation(title, tuple(scored[i] for i in sorted(scored)))
-
-
-def same_condition(conditions: Sequence[Condition]) -> list[list[int]]:
-    """Group the indices of conditions that agree in current and, to 3 %, in frequency and amplitude."""
-    groups: list[list[int]] = []
-    for index, condition in enumerate(conditions):
-        for group in groups:
-            if _agree(condition, conditions[group[0]]):
-                group.append(index)
-                break
-        else:
-            groups.append([index])
-    return groups
-
-
-def _agree(a: Condition, b: Condition) -> bool:
-    return (
-        abs(a.current_A - b.current_A) <= 1e-3 + _SAME * abs(b.current_A)
-        and abs(a.frequency_Hz / b.frequency_Hz - 1) <= _SAME
-        and abs(a.amplitude_m / b.amplitude_m - 1) <= _SAME
-    )
 
 
 def _scores(run: Run, prediction: Prediction) -> Scores:

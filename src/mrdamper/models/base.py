@@ -9,9 +9,10 @@ solves for those instead of searching.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import ClassVar, Self
 
 import numpy as np
@@ -69,7 +70,7 @@ class Model(ABC):
         for info in self.parameters():
             value = getattr(self, info.name)
             low, high = info.bounds
-            if not (np.isfinite(value) and low <= value <= high):
+            if not (low <= value <= high and math.isfinite(value)):
                 raise ParameterError(
                     f"{info.name} = {value:g} {info.unit}",
                     where=self.title,
@@ -119,4 +120,4 @@ class Model(ABC):
 
     def values(self) -> dict[str, float]:
         """Parameter values by name."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
+        return {info.name: getattr(self, info.name) for info in self.parameters()}

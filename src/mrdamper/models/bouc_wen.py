@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.excitation import Excitation
-from mrdamper.hysteresis import Path, Shape, follow
+from mrdamper.hysteresis import Shape, follow
 from mrdamper.models.base import GENERAL_FORMS, Model, SearchAxis
 from mrdamper.parameters import param
 
@@ -46,7 +46,7 @@ class BoucWen(Model):
     f0: float = param("N", "offset force", linear=True, default=0.0)
     k1: float = param("N/m", "stiffness", linear=True, default=0.0)
     k2: float = param("N/m^2", "quadratic stiffness", linear=True, preset=True, default=0.0)
-    k3: float = param("N/m^3", "cubic stiffness", linear=True, preset=True, default=0.0)
+    k3: float = param("N/m^3", "cubic stiffness", linear=True, default=0.0)
     m: float = param("kg", "equivalent mass", linear=True, preset=True, default=0.0)
 
     @property
@@ -66,11 +66,11 @@ class BoucWen(Model):
 
     def state(self, motion: Excitation) -> Floats:
         """z [m] along the motion, from z = 0."""
-        return self.yield_displacement * follow(self.shape, Path.of(motion.displacement))
+        return self.yield_displacement * follow(self.shape, motion.path)
 
     def force(self, motion: Excitation, state: Floats) -> Floats:
         x, v, a = motion.displacement, motion.velocity, motion.acceleration
-        spring = self.k1 * x + self.k2 * x**2 + self.k3 * x**3
+        spring = x * (self.k1 + x * (self.k2 + x * self.k3))
         return spring + self.c * v + self.m * a + self.alpha * state + self.f0
 
     @classmethod
@@ -93,6 +93,7 @@ class BoucWen(Model):
             "yield_force": (*GENERAL_FORMS, "saturating-current"),
             "yield_displacement": (*GENERAL_FORMS, *yielding),
             "k1": GENERAL_FORMS,
+            "k3": ("constant",),
             "f0": GENERAL_FORMS,
         }
 

@@ -14,7 +14,7 @@ import numpy as np
 from mrdamper.data import Floats
 
 _STEP = 1e-6  # forward difference, relative to the width of the box
-_TOLERANCE = 1e-10
+_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from mrdamper.damper import Damper
 from mrdamper.data import Run
-from mrdamper.excitation import equivalent_sine, measured_motion
+from mrdamper.excitation import equivalent_sine
 from mrdamper.loop_analysis import same_motion
 from mrdamper.modified import ModifiedFit
 from mrdamper.plots.style import MEASURED, MM, PALETTE, PREDICTED, current_colours, house_style, label, new_figure, thin
@@ -95,7 +95,7 @@ def parameter_curves(fit: ModifiedFit) -> Figure:
 def score_strip(validations: Mapping[str, Validation]) -> Figure:
     """nrmse_pp of every run, one row a model and split; the bar is the median, the tick the run's floor."""
     with house_style():
-        figure, (axes,) = new_figure(1, 1, 0.7 + 0.42 * len(validations))
+        figure, (axes,) = new_figure(1, 1, 0.8 + 0.3 * len(validations), left=2.6)
         for row, (name, validation) in enumerate(validations.items()):
             colour = PALETTE[1 + row % (len(PALETTE) - 2)]
             values = 100 * np.array([run.scores.nrmse_pp for run in validation.runs])
@@ -156,13 +156,3 @@ def force_in_time(run: Run, damper: Damper) -> Figure:
         label(above, "", "Force (N)", f"{run.id}")
         label(below, "Time (s)", "Residual (N)")
         return figure
-
-
-__all__ = [
-    "force_in_time",
-    "measured_motion",
-    "parameter_curves",
-    "predicted_loops",
-    "residual_map",
-    "score_strip",
-]

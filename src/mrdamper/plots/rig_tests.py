@@ -17,7 +17,7 @@ from mrdamper.plots.style import KN, MM, current_colours, house_style, label, ne
 def test_matrix(loops: Sequence[LoopAnalysis]) -> Figure:
     """Measured frequency against amplitude, one colour a current; hollow marks are held out."""
     with house_style():
-        figure, (axes,) = new_figure(1, 1, 3.0)
+        figure, (axes,) = new_figure(1, 1, 3.0, right=1.7)
         colours = current_colours([loop.condition.current_A for loop in loops])
         for current, colour in colours.items():
             for split, face in (("train", colour), ("validate", "none")):

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import base64
-import io
 from collections.abc import Mapping
 from importlib.resources import files
 
 import jinja2
 import numpy as np
 from markupsafe import Markup
-from matplotlib.figure import Figure
 
 _ENVIRONMENT = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined)
 
@@ -31,14 +29,9 @@ def render_report(title: str, chapters: list[Mapping[str, object]], footer: str)
     return template.render(title=title, chapters=chapters, footer=footer, **helpers)
 
 
-def inline_svg(figure: Figure, alt: str) -> Markup:
-    """A figure as an image inside the page."""
-    from mrdamper.plots.style import house_style
-
-    buffer = io.BytesIO()
-    with house_style():
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
-    data = base64.b64encode(buffer.getvalue()).decode("ascii")
+def inline_svg(picture: bytes, alt: str) -> Markup:
+    """An SVG as an image inside the page."""
+    data = base64.b64encode(picture).decode("ascii")
     return Markup('<img alt="{}" src="data:image/svg+xml;base64,{}">').format(alt, data)
 
 

@@ -38,7 +38,7 @@ def register(app: typer.Typer) -> None:
             print(f"{rig.rig or dataset.name}: {rig.damper.title} ({rig.damper.parameter_count} numbers)")
             for candidate in rig.candidates:
                 print(
-                    f"  {candidate.damper.title:32} nrmse_pp  per run {100 * candidate.per_run_median:5.2f} %"
+                    f"  {candidate.title:36} nrmse_pp  per run {100 * candidate.per_run_median:5.2f} %"
                     f"  left out {100 * candidate.left_out.median():5.2f} %"
                     + (f"  held out {100 * candidate.held_out.median():5.2f} %" if candidate.held_out.runs else "")
                 )

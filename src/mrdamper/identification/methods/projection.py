@@ -36,7 +36,7 @@ class Projection(Method):
     name: ClassVar[str] = "projection"
     summary: ClassVar[str] = "least squares on the force in time, linear parameters eliminated"
 
-    refine_best: int = 2
+    refine_best: int = 2  # where more than one coordinate is searched; one alone has one valley
 
     def solve(self, problem: Problem) -> Solution:
         """Determine the free parameters of a problem."""
@@ -44,7 +44,7 @@ class Projection(Method):
         if not axes:
             projected = _project(problem, {})
             return Solution(projected.model, 0.0, projected.at_bounds, {}, {}, 1, "solved: every parameter is linear")
-        starts, evaluated = _best_of_grid(problem, axes, self.refine_best)
+        starts, evaluated = _best_of_grid(problem, axes, self.refine_best if len(axes) > 1 else 1)
         lower = np.array([_to_search(axis, axis.lower) for axis in axes])
         upper = np.array([_to_search(axis, axis.upper) for axis in axes])
 

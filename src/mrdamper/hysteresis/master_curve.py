@@ -1,0 +1,278 @@
+"""The one curve that every Bouc–Wen stroke is a piece of, for n = 1, n = 2 and any other n >= 1.
+
+In a monotone stroke, with w the state in the direction of motion in units of z_max and phi
+the distance in units of the yield displacement,
+
+    dw/dphi = 1 − w^n  (w >= 0, climb)        dw/dphi = 1 − rho |w|^n  (w < 0, release).
+
+n = 1 and n = 2 have closed forms. Any other n is tabulated, once for each n: the factor
+|rho|^(1/n) scales every release onto dy/dphi = 1 ∓ y^n, so three curves without a parameter
+besides n serve all rho (rising to 1, growing without bound, falling to 1 from above).
+
+The tables hold r = −ln|1 − y| (or ln(1 + y) on the growing curve) over distance. In r the
+curves are nearly straight, also where y is within rounding of 1, and dr/dphi and its
+derivative are known exactly; quintic Hermite cells then reach 1e-11. Nodes crowd towards 0
+because y^n is not smooth there.
+
+This is a file of its own because it is the numerics of a function; `hysteresis` is the
+mechanics and knows only the methods of `MasterCurve`. Each takes floats with `xp=math`, or
+arrays with `xp=numpy`, and a single rho.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from bisect import bisect_right
+from collections.abc import Callable
+from functools import cached_property, lru_cache
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from mrdamper.data import Floats
+
+CEILING = 11.0  # largest |w| a motion may start from
+STEEPEST = 1e6  # largest |rho| |w|^n: a shorter release than this drowns in rounding
+SATURATED = 38.0  # in r: 1 − e^−38 rounds to 1
+_BELOW_ONE = 1 - 2**-50  # holds a state of 1 off the pole of a logarithm; moves it by a rounding error
+
+Value = Any  # float or array, as `xp` says
+
+
+@lru_cache(maxsize=128)
+def master_curve(n: float) -> MasterCurve:
+    """The curve for an exponent, made once."""
+    if n == 1:
+        return _Exponential()
+    if n == 2:
+        return _Tangent()
+    return _Tabulated(n)
+
+
+def approach_rate(r: Floats, n: float) -> Floats:
+    """(1 − y^n)/(1 − y) at y = 1 − e^−r: the rate dr/dphi of the climb, all digits kept as y → 1."""
+    gap = np.exp(-np.minimum(r, SATURATED))
+    return -np.expm1(n * np.log1p(-gap)) / gap
+
+
+class MasterCurve(ABC):
+    """Climb and release for one exponent n."""
+
+    @abstractmethod
+    def rise(self, phi: Value, xp: ModuleType) -> Value:
+        """State reached from w = 0 after a distance phi."""
+
+    @abstractmethod
+    def climb(self, w: Value, phi: Value, xp: ModuleType) -> Value:
+        """State reached from w >= 0, also from above 1, after a distance phi."""
+
+    @abstractmethod
+    def climb_distance(self, r: float) -> float:
+        """Distance from w = 0 to w = 1 − e^−r."""
+
+    @abstractmethod
+    def release(self, phi: Value, rho: float, xp: ModuleType) -> Value:
+        """|w| at a distance phi before the state passes zero."""
+
+    @abstractmethod
+    def release_distance(self, size: Value, rho: float, xp: ModuleType) -> Value:
+        """Distance in which a state w = −size gets to zero."""
+
+
+class _Exponential(MasterCurve):
+    """n = 1."""
+
+    def rise(self, phi: Value, xp: ModuleType) -> Value:
+        return -xp.expm1(-phi)
+
+    def climb(self, w: Value, phi: Value, xp: ModuleType) -> Value:
+        return w - (1.0 - w) * xp.expm1(-phi)
+
+    def climb_distance(self, r: float) -> float:
+        return r
+
+    def release(self, phi: Value, rho: float, xp: ModuleType) -> Value:
+        return -xp.expm1(-rho * phi) / rho if rho else phi
+
+    def release_distance(self, size: Value, rho: float, xp: ModuleType) -> Value:
+        return -xp.log1p(-rho * size * _BELOW_ONE) / rho if rho else size
+
+
+class _Tangent(MasterCurve):
+    """n = 2."""
+
+    def rise(self, phi: Value, xp: ModuleType) -> Value:
+        return xp.tanh(phi)
+
+    def climb(self, w: Value, phi: Value, xp: ModuleType) -> Value:
+        # The addition theorem of tanh is also that of coth, so w > 1 needs no case of its own.
+        t = xp.tanh(phi)
+        return (w + t) / (1.0 + w * t)
+
+    def climb_distance(self, r: float) -> float:
+        return 0.5 * (r + math.log1p(-math.expm1(-r)))
+
+    def release(self, phi: Value, rho: float, xp: ModuleType) -> Value:
+        root = math.sqrt(abs(rho))
+        if rho > 0:
+            return xp.tanh(root * phi) / root
+        return xp.tan(root * phi) / root if rho else phi
+
+    def release_distance(self, size: Value, rho: float, xp: ModuleType) -> Value:
+        root = math.sqrt(abs(rho))
+        if rho > 0:
+            return xp.atanh(root * size * _BELOW_ONE) / root
+        return xp.atan(root * size) / root if rho else size
+
+
+class _Tabulated(MasterCurve):
+    """Any n >= 1, from tables."""
+
+    def __init__(self, n: float):
+        self.n = n
+
+    def rise(self, phi: Value, xp: ModuleType) -> Value:
+        return -xp.expm1(-self._rising.coordinate(phi, xp))
+
+    def climb(self, w: Value, phi: Value, xp: ModuleType) -> Value:
+        if xp is math:
+            return self._fall_from(w, phi, xp) if w > 1 else self._climb_from(w, phi, xp)
+        above = w > 1
+        reached = np.empty_like(phi)
+        reached[above] = self._fall_from(w[above], phi[above], xp)
+        reached[~above] = self._climb_from(w[~above], phi[~above], xp)
+        return reached
+
+    def climb_distance(self, r: float) -> float:
+        # Past the table (1 − w^n)/(1 − w) is n.
+        return self._rising.distance(min(r, SATURATED), math) + max(r - SATURATED, 0.0) / self.n
+
+    def release(self, phi: Value, rho: float, xp: ModuleType) -> Value:
+        scale = abs(rho) ** (1 / self.n)
+        if rho > 0:
+            return -xp.expm1(-self._rising.coordinate(scale * phi, xp)) / scale
+        return xp.expm1(self._growing.coordinate(scale * phi, xp)) / scale if rho else phi
+
+    def release_distance(self, size: Value, rho: float, xp: ModuleType) -> Value:
+        scale = abs(rho) ** (1 / self.n)
+        if rho > 0:
+            return self._rising.distance(-xp.log1p(-scale * size * _BELOW_ONE), xp) / scale
+        return self._growing.distance(xp.log1p(scale * size), xp) / scale if rho else size
+
+    def _climb_from(self, w: Value, phi: Value, xp: ModuleType) -> Value:
+        start = -xp.log1p(-w * _BELOW_ONE)
+        return -xp.expm1(-self._rising.coordinate(self._rising.distance(start, xp) + phi, xp))
+
+    def _fall_from(self, w: Value, phi: Value, xp: ModuleType) -> Value:
+        start = self._falling.distance(-xp.log(w - 1.0), xp)
+        return 1.0 + xp.exp(-self._falling.coordinate(start + phi, xp))
+
+    @cached_property
+    def _rising(self) -> _Table:
+        """dy/dphi = 1 − y^n from 0 to 1; y = 1 − e^−r."""
+
+        def rate(r: Floats) -> tuple[Floats, Floats]:
+            with np.errstate(divide="ignore"):  # at r = 0 a logarithm of 0, which ends up as y^n = 0
+                speed = approach_rate(r, self.n)
+            return speed, speed - self.n * (-np.expm1(-r)) ** (self.n - 1)
+
+        return _Table(_crowded_nodes(SATURATED), rate)
+
+    @cached_property
+    def _growing(self) -> _Table:
+        """dy/dphi = 1 + y^n from 0 on; y = e^r − 1."""
+
+        def rate(r: Floats) -> tuple[Floats, Floats]:
+            y = np.expm1(r)
+            speed = (1 + y**self.n) / (1 + y)
+            return speed, self.n * y ** (self.n - 1) - speed
+
+        return _Table(_crowded_nodes(math.log1p(STEEPEST ** (1 / self.n))), rate)
+
+    @cached_property
+    def _falling(self) -> _Table:
+        """dy/dphi = 1 − y^n from the ceiling down to 1; y = 1 + e^−r."""
+
+        def rate(r: Floats) -> tuple[Floats, Floats]:
+            gap = np.exp(-r)
+            speed = np.expm1(self.n * np.log1p(gap)) / gap
+            return speed, speed - self.n * (1 + gap) ** (self.n - 1)
+
+        return _Table(np.linspace(-math.log(CEILING - 1), SATURATED, 4097), rate)
+
+
+def _crowded_nodes(end: float) -> Floats:
+    return end * np.linspace(0, 1, 641) ** 3
+
+
+class _Table:
+    """r over distance and distance over r, for dr/dphi = rate(r).
+
+    Parameters
+    ----------
+    r : (K,) array
+        Nodes, increasing.
+    rate : function
+        r -> dr/dphi and the derivative of that with respect to r.
+    """
+
+    def __init__(self, r: Floats, rate: Callable[[Floats], tuple[Floats, Floats]]):
+        node, weight = np.polynomial.legendre.leggauss(8)
+        width = np.diff(r)
+        inside = r[:-1, None] + 0.5 * width[:, None] * (1 + node)
+        phi = np.concatenate([[0.0], np.cumsum(0.5 * width * ((1 / rate(inside)[0]) @ weight))])
+        speed, change = rate(r)
+        self._r_of_phi = _Quintics(phi, r, speed, change * speed)
+        self._phi_of_r = _Quintics(r, phi, 1 / speed, -change / speed**2)
+
+    def coordinate(self, phi: Value, xp: ModuleType) -> Value:
+        """Coordinate r at a distance."""
+        return self._r_of_phi.at_float(phi) if xp is math else self._r_of_phi.at(phi)
+
+    def distance(self, r: Value, xp: ModuleType) -> Value:
+        """Distance at r."""
+        return self._phi_of_r.at_float(r) if xp is math else self._phi_of_r.at(r)
+
+
+class _Quintics:
+    """Piecewise quintic with given values and two derivatives at its nodes; constant beyond them."""
+
+    def __init__(self, x: Floats, y: Floats, slope: Floats, bend: Floats):
+        step = np.diff(x)
+        c0, c1, c2 = y[:-1], step * slope[:-1], 0.5 * step**2 * bend[:-1]
+        value = y[1:] - c0 - c1 - c2
+        rise = step * slope[1:] - c1 - 2 * c2
+        curve = 0.5 * step**2 * bend[1:] - c2
+        self._nodes, self._inverse_step = x, 1 / step
+        self._coefficients = (
+            c0,
+            c1,
+            c2,
+            10 * value - 4 * rise + curve,
+            -15 * value + 7 * rise - 2 * curve,
+            6 * value - 3 * rise + curve,
+        )
+
+    def at(self, x: Floats) -> Floats:
+        x = np.clip(x, self._nodes[0], self._nodes[-1])
+        cell = np.clip(np.searchsorted(self._nodes, x, side="right") - 1, 0, self._nodes.size - 2)
+        t = (x - self._nodes[cell]) * self._inverse_step[cell]
+        result = self._coefficients[5][cell]
+        for coefficient in self._coefficients[4::-1]:
+            result = result * t + coefficient[cell]
+        return result
+
+    def at_float(self, x: float) -> float:
+        nodes, cells = self._lists
+        cell = min(max(bisect_right(nodes, x) - 1, 0), len(cells) - 1)
+        c0, c1, c2, c3, c4, c5, inverse_step = cells[cell]
+        t = (min(max(x, nodes[0]), nodes[-1]) - nodes[cell]) * inverse_step
+        return c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5))))
+
+    @cached_property
+    def _lists(self) -> tuple[list[float], list[tuple[float, ...]]]:
+        # Plain floats: taking one number out of an array costs more than the arithmetic here.
+        rows = zip(*(c.tolist() for c in (*self._coefficients, self._inverse_step)), strict=True)
+        return self._nodes.tolist(), list(rows)

@@ -1,0 +1,141 @@
+"""A sampled motion cut into strokes at its reversals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mrdamper.data import Floats
+from mrdamper.errors import ExcitationError
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """A sampled motion cut into strokes. Make it with `Path.of`, once for all shapes.
+
+    Attributes
+    ----------
+    stroke : (N,) int array
+        Stroke each sample lies in.
+    distance : (N,) array
+        Distance since the reversal that began the stroke [m].
+    direction : (N,) array
+        +1 or −1, the sign of the velocity in that stroke.
+    lengths : tuple of float
+        Length of every stroke but the last [m].
+    first_direction : float
+        Direction of the first stroke.
+    """
+
+    stroke: np.ndarray
+    distance: Floats
+    direction: Floats
+    lengths: tuple[float, ...]
+    first_direction: float
+
+    @classmethod
+    def of(
+        cls,
+        displacement: ArrayLike,
+        time: ArrayLike | None = None,
+        *,
+        peaks: Literal["parabola", "samples"] = "parabola",
+    ) -> Self:
+        """Cut a motion at its reversals.
+
+        Parameters
+        ----------
+        displacement : (N,) array
+            [m]
+        time : (N,) array, optional
+            [s], increasing. Needed only if the sampling is not uniform.
+        peaks : {"parabola", "samples"}
+            A smooth motion turns between two samples, beyond both. "parabola" puts the peak where
+            the parabola through the three samples at the reversal has its vertex, "samples" at the
+            outermost sample. At 1000 samples a cycle that is an error of zeta of 1e-9 against 1e-4.
+
+        Raises
+        ------
+        ExcitationError
+            If the arrays do not fit together or hold anything but finite numbers.
+        """
+        x, t = _checked_motion(displacement, time)
+        arrival, departure = _reversals(x)
+        peak, begin = x[arrival], arrival + 1
+        if peaks == "parabola":
+            beyond, is_early = _vertex(x, t, arrival, departure)
+            peak, begin = peak + beyond, np.where(is_early, arrival, begin)
+
+        counts = np.diff(np.concatenate([[0], begin, [x.size]]))
+        stroke = np.repeat(np.arange(counts.size), counts)
+        origin = np.concatenate([x[:1], peak])
+        moves = np.diff(x)
+        leaving = moves[np.flatnonzero(moves)[:1]]
+        first = -1.0 if leaving.size and leaving[0] < 0 else 1.0
+        return cls(
+            stroke=stroke,
+            distance=np.abs(x - origin[stroke]),
+            direction=np.where(stroke % 2, -first, first),
+            lengths=tuple(np.abs(np.diff(origin)).tolist()),
+            first_direction=first,
+        )
+
+    def __len__(self) -> int:
+        return self.distance.size
+
+
+def _checked_motion(displacement: ArrayLike, time: ArrayLike | None) -> tuple[Floats, Floats | None]:
+    x = np.asarray(displacement, dtype=float)
+    if x.ndim != 1 or x.size == 0:
+        raise ExcitationError(f"displacement has shape {x.shape}", mend="give one channel, samples in a row")
+    if not np.isfinite(x).all():
+        raise ExcitationError("displacement holds NaN or infinity", mend="cut or repair the record")
+    if time is None:
+        return x, None
+    t = np.asarray(time, dtype=float)
+    if t.shape != x.shape:
+        raise ExcitationError(f"displacement has shape {x.shape}, time {t.shape}", mend="trim or resample the run")
+    if not np.all(np.diff(t) > 0):
+        raise ExcitationError("time does not increase", mend="sort the samples and drop the repeated ones")
+    return x, t
+
+
+def _reversals(x: Floats) -> tuple[np.ndarray, np.ndarray]:
+    """Samples where the motion arrives at its turning points, and where it departs from them.
+
+    They differ where the motion rests there.
+    """
+    moves = np.diff(x)
+    moving = np.flatnonzero(moves)
+    rising = moves[moving] > 0
+    turn = np.flatnonzero(rising[1:] != rising[:-1])
+    return moving[turn] + 1, moving[turn + 1]
+
+
+def _vertex(x: Floats, t: Floats | None, arrival: np.ndarray, departure: np.ndarray) -> tuple[Floats, np.ndarray]:
+    """How far beyond the outermost sample the motion turned (signed), and whether it did so before that sample.
+
+    The vertex of the parabola through the sample and its neighbours. Two equal outermost
+    samples straddle the peak, and the parabola knows; three or more are a rest or the
+    resolution of the sensor, and the motion turned there. The vertex lies beyond the sample by
+    at most an eighth of the larger neighbouring move if sampling is uniform; next to a gap
+    the parabola could shoot further, so that move is the bound.
+    """
+    before, here, after = x[arrival - 1], x[arrival], x[arrival + 1]
+    came, leaves = here - before, here - after  # of one sign; `leaves` may be 0
+    if t is None:
+        lead, lag = np.ones_like(here), np.ones_like(here)
+    else:
+        lead, lag = t[arrival] - t[arrival - 1], t[arrival + 1] - t[arrival]
+    slope = came * lag / lead - leaves * lead / lag  # velocity at the sample times lead + lag
+    bend = came / lead + leaves / lag  # half the deceleration times lead + lag
+    beyond = slope**2 / (4 * bend * (lead + lag))
+    bound = np.maximum(np.abs(came), np.abs(leaves))
+    beyond = np.clip(beyond, -bound, bound)
+    beyond[departure > arrival + 1] = 0.0
+    # Still slower on the far side means the motion turned after the sample.
+    is_early = (slope * came < 0) & (beyond != 0)
+    return beyond, is_early

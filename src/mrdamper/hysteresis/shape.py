@@ -1,0 +1,142 @@
+"""Shape of the hysteresis: three numbers, how they follow from Bouc–Wen parameters, and what bounds them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal, Self
+
+import numpy as np
+
+from mrdamper.data import Floats
+from mrdamper.errors import ParameterError
+from mrdamper.hysteresis.master_curve import STEEPEST
+
+HIGHEST_N = 20.0  # the tabulated curves hold 1e-8 up to here
+BoundednessClass = Literal["I", "II", "III", "IV", "V", "unstable"]
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """Shape of the hysteresis, without its force scale. One, or P of them with a common n.
+
+    Attributes
+    ----------
+    kappa : float or (P,) array
+        Initial slope dzeta/dx = A/z_max [1/m].
+    rho : float or (P,) array
+        (gamma − beta)/(gamma + beta) [-], at most 1. 0: beta = gamma; −1: gamma = 0; 1: beta = 0,
+        an elastic spring, which forgets where it is once zeta rounds to 1. Above 0, gamma > beta: still dissipating, but bounded only for states
+        that start within rho^(−1/n), see `boundedness_class`.
+    n : float
+        Sharpness of the yield [-], from 1 to 20.
+
+    Raises
+    ------
+    ParameterError
+        If a value lies outside these ranges.
+    """
+
+    kappa: float | Floats
+    rho: float | Floats
+    n: float = 2.0
+
+    def __post_init__(self) -> None:
+        if not np.all((np.asarray(self.kappa) > 0) & np.isfinite(self.kappa)):
+            raise ParameterError(f"kappa is {self.kappa}", mend="A/z_max must be positive and finite")
+        if not np.all((np.asarray(self.rho) >= -STEEPEST) & (np.asarray(self.rho) <= 1)):
+            raise ParameterError(
+                f"(gamma − beta)/(gamma + beta) is {self.rho}", mend=f"it lies between {-STEEPEST:g} and 1"
+            )
+        if not 1 <= self.n <= HIGHEST_N:
+            raise ParameterError(f"n is {self.n}", mend=f"n lies between 1 and {HIGHEST_N:g}")
+
+    @classmethod
+    def from_bouc_wen(cls, beta: float | Floats, gamma: float | Floats, n: float = 2.0, A: float = 1.0) -> Self:
+        """Shape of dz/dt = A v − beta |v| |z|^(n−1) z − gamma v |z|^n.
+
+        Parameters
+        ----------
+        beta, gamma : float or (P,) array
+            Coefficients of |v| and of v [m^−n for z in m].
+        n, A : float
+            [-]
+
+        Raises
+        ------
+        ParameterError
+            If energy would be created (beta < 0) or z has no bound (beta + gamma <= 0 or A <= 0).
+        """
+        if not (np.all(dissipates(beta, gamma)) and A > 0):
+            raise ParameterError(
+                f"A = {A}, beta = {beta}, gamma = {gamma} is no damper",
+                mend="A > 0, beta >= 0 and beta + gamma > 0 are needed (beta belongs to |v|)",
+            )
+        return cls(A / z_max(beta, gamma, n, A), (gamma - beta) / (gamma + beta), n)
+
+    @classmethod
+    def from_ikhouane_rodellar(cls, rho: float | Floats, sigma: float | Floats, n: float = 2.0) -> Self:
+        """Shape from the normalised form dw/dt = rho (v − sigma |v| |w|^(n−1) w + (sigma − 1) v |w|^n).
+
+        Their rho [1/m] is kappa here; sigma = beta/(beta + gamma) [-].
+        """
+        return cls(rho, 1 - 2 * sigma, n)
+
+    def to_bouc_wen(self, A: float = 1.0) -> tuple[float | Floats, float | Floats]:
+        """(beta, gamma) [m^−n] that give this shape for an A."""
+        total = A * (self.kappa / A) ** self.n
+        return self.sigma * total, (1 - self.sigma) * total
+
+    @property
+    def sigma(self) -> float | Floats:
+        """beta/(beta + gamma) [-], the sigma of Ikhouane and Rodellar."""
+        return (1 - self.rho) / 2
+
+    @property
+    def yield_displacement(self) -> float | Floats:
+        """1/kappa = z_max/A: distance in which the initial slope would spend z_max [m]."""
+        return 1 / self.kappa
+
+    @property
+    def is_many(self) -> bool:
+        """Whether this holds P shapes rather than one."""
+        return np.ndim(self.kappa) > 0 or np.ndim(self.rho) > 0
+
+    def __iter__(self) -> Iterator[Shape]:
+        for kappa, rho in np.broadcast(self.kappa, self.rho):
+            yield Shape(float(kappa), float(rho), self.n)
+
+
+def z_max(beta: float | Floats, gamma: float | Floats, n: float = 2.0, A: float = 1.0) -> float | Floats:
+    """Ultimate hysteretic displacement (A/(beta + gamma))^(1/n) [m if A has no unit]."""
+    return (A / (beta + gamma)) ** (1 / n)
+
+
+def dissipates(beta: float | Floats, gamma: float | Floats) -> np.bool | np.ndarray:
+    """Whether no motion gets energy out of the model, for A > 0: beta >= 0 and beta + gamma > 0.
+
+    The condition usually quoted, beta >= |gamma|, is sufficient only. Derived, with the storage
+    ∫ y/(A − gamma y^n) dy. gamma > beta deserves a warning all the same: see class II of `boundedness_class`.
+    """
+    return np.logical_and(np.greater_equal(beta, 0), np.greater(np.add(beta, gamma), 0))
+
+
+def boundedness_class(A: float, beta: float, gamma: float) -> BoundednessClass:
+    """Class of bounded input, bounded state. n has no influence.
+
+    I: bounded from any start. II: from |z| <= (A/(gamma − beta))^(1/n). III: from any start,
+    A < 0. IV: from |z| <= z_max, A < 0. V: A = 0, |z| never grows. Otherwise "unstable".
+    [Ikhouane and Rodellar 2007, recalled and derived again]
+    """
+    total, difference = beta + gamma, beta - gamma
+    if A > 0 and total > 0 and difference >= 0:
+        return "I"
+    if A > 0 and total > 0 and beta >= 0:
+        return "II"
+    if A < 0 and difference > 0 and total >= 0:
+        return "III"
+    if A < 0 and total < 0 and beta >= 0:
+        return "IV"
+    if A == 0 and total > 0 and difference >= 0:
+        return "V"
+    return "unstable"

@@ -1,0 +1,230 @@
+"""The steady loop of a sine: its peak, its curve, its harmonics and its area."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mrdamper.data import Floats
+from mrdamper.errors import ExcitationError
+from mrdamper.hysteresis.master_curve import SATURATED, MasterCurve, approach_rate, master_curve
+from mrdamper.hysteresis.response import on_curve
+from mrdamper.hysteresis.shape import Shape
+
+
+def steady_peak(shape: Shape, amplitude: ArrayLike) -> float | Floats:
+    """Peak of zeta on the steady loop between −amplitude and +amplitude.
+
+    Parameters
+    ----------
+    shape : Shape
+        One shape, or P of them.
+    amplitude : float or array
+        Displacement amplitude [m]; broadcasts with the shapes.
+
+    Returns
+    -------
+    float or array
+        Z/z_max [-]: kappa · amplitude far below yield, 1 far beyond. Derived: the distances from −Z to 0
+        and from 0 to Z add up to the stroke.
+    """
+    peaks = [-math.expm1(-_SteadyLoop.of(one, x).saturation) for one, x in _pairs(shape, amplitude)]
+    return _like_pairs(peaks, shape, amplitude)
+
+
+def steady_loop(shape: Shape, amplitude: float, theta: ArrayLike) -> Floats:
+    """State on the steady loop of x = amplitude · sin(theta).
+
+    Parameters
+    ----------
+    shape : Shape
+        One shape, or P of them.
+    amplitude : float
+        [m]
+    theta : (N,) array
+        Phase [rad].
+
+    Returns
+    -------
+    (N,) array, or (P, N)
+        zeta [-].
+    """
+    if shape.is_many:
+        return np.stack([steady_loop(one, amplitude, theta) for one in shape])
+    half_cycle, since_reversal = np.divmod(np.asarray(theta, dtype=float) + np.pi / 2, np.pi)
+    sign = 1.0 - 2.0 * (half_cycle % 2)
+    return sign * _SteadyLoop.of(shape, amplitude).loading(since_reversal)
+
+
+def loop_harmonics(shape: Shape, amplitude: ArrayLike, orders: Sequence[int] = (1, 3, 5, 7)) -> tuple[Floats, Floats]:
+    """Fourier coefficients of the steady loop, zeta = Σ_k sine_k sin(k theta) + cosine_k cos(k theta).
+
+    Parameters
+    ----------
+    shape : Shape
+        One shape, or P of them.
+    amplitude : float or array
+        Of x = amplitude · sin(theta) [m]; broadcasts with the shapes.
+    orders : sequence of K int
+        Orders k >= 1. Even ones are zero.
+
+    Returns
+    -------
+    sine, cosine : (K,) arrays, or (P, K)
+        [-], to 1e-13 for n = 1 and 2. The first cosine is loop_area/(π · amplitude).
+    """
+    pairs = [_SteadyLoop.of(one, x).harmonics(np.asarray(orders)) for one, x in _pairs(shape, amplitude)]
+    sine, cosine = (np.array(side) for side in zip(*pairs, strict=True))
+    return (sine, cosine) if len(_pair_shape(shape, amplitude)) else (sine[0], cosine[0])
+
+
+def loop_area(shape: Shape, amplitude: ArrayLike) -> float | Floats:
+    """Area ∮ zeta dx of the steady loop; times alpha · z_max the energy dissipated in a cycle.
+
+    Parameters
+    ----------
+    shape : Shape
+        One shape, or P of them.
+    amplitude : float or array
+        Displacement amplitude [m]; broadcasts with the shapes.
+
+    Returns
+    -------
+    float or array
+        [m]. Derived: 2 (1 − rho)/kappa · ∫_0^Z y^(n+1)/((1 − y^n)(1 − rho y^n)) dy. Every term is
+        positive, so the digits stay both in tiny and in saturated loops.
+    """
+    areas = [_SteadyLoop.of(one, x).area() / float(one.kappa) for one, x in _pairs(shape, amplitude)]
+    return _like_pairs(areas, shape, amplitude)
+
+
+def saturated_area_deficit(rho: float, n: float) -> float:
+    """C [-] in ∮ zeta dx → 4 X − 2 C/kappa for X ≫ 1/kappa: what the loop lacks to a rectangle.
+
+    Derived: C = ∫_0^1 (1 + t)/(1 − rho t^n) + (1 − t)/(1 − t^n) dt. Infinite for rho = 1.
+    """
+    if rho == 1:
+        return math.inf
+    r, weight = _gauss_points(_R_PIECES)
+    gap, rate = np.exp(-r), approach_rate(r, n)
+    return float(weight @ (gap * ((2 - gap) / ((1 - rho) + rho * gap * rate) + 1 / rate)))
+
+
+@dataclass(frozen=True)
+class _SteadyLoop:
+    """The loading half of the loop of one shape, from −Z to Z.
+
+    Attributes
+    ----------
+    curve, n, rho
+        Of the shape.
+    reach : float
+        kappa · amplitude: amplitude in yield displacements.
+    saturation : float
+        r = −ln(1 − Z), which keeps its digits where Z is 1 to rounding.
+    """
+
+    curve: MasterCurve
+    n: float
+    rho: float
+    reach: float
+    saturation: float
+
+    @classmethod
+    def of(cls, shape: Shape, amplitude: float) -> Self:
+        """Solve for the peak.
+
+        Distance −Z → 0 plus distance 0 → Z is the stroke. Both grow ever slower with r, so
+        Newton's steps from the left never overshoot, and no bracket is needed.
+        """
+        if not (amplitude > 0 and math.isfinite(amplitude)):
+            raise ExcitationError(f"the amplitude is {amplitude:g} m", mend="give a positive amplitude")
+        n, rho, curve = shape.n, float(shape.rho), master_curve(shape.n)
+        reach = float(shape.kappa) * amplitude
+        r = reach  # the first step from r = 0
+        for _ in range(100):
+            miss = 2 * reach - curve.climb_distance(r) - _to_zero(curve, rho, r)
+            gap, rate = math.exp(-min(r, SATURATED)), float(approach_rate(np.array(r), n))
+            step = miss / (1 / rate + gap / ((1 - rho) + rho * gap * rate))
+            r += max(step, 0.0)
+            if step <= 4e-16 * r:
+                break
+        return cls(curve, n, rho, reach, r)
+
+    @cached_property
+    def to_zero(self) -> float:
+        """Distance from the reversal to zeta = 0 [yield displacements]."""
+        return _to_zero(self.curve, self.rho, self.saturation)
+
+    def loading(self, since_reversal: Floats) -> Floats:
+        """State at phases 0...pi after the lower reversal."""
+        distance = 2 * self.reach * np.sin(since_reversal / 2) ** 2  # = 1 − cos, without its cancellation
+        return on_curve(self.curve, self.rho, distance - self.to_zero)
+
+    def harmonics(self, orders: np.ndarray) -> tuple[Floats, Floats]:
+        """Fourier coefficients, by Gauss points on pieces of the phase on which the loop is smooth.
+
+        The pieces crowd where the loop bends: after the reversal, about zeta = 0, where a
+        power n loses its higher derivatives, and in the approach to saturation.
+        """
+        distance = np.concatenate([self.to_zero * _RELEASE_PIECES, self.to_zero + _CLIMB_PIECES])
+        share = np.clip(np.append(distance, 2 * self.reach) / (2 * self.reach), 0.0, 1.0)
+        share[-1] = 1.0
+        phase, weight = _gauss_points(2 * np.arcsin(np.sqrt(share)), 16 + int(orders.max(initial=1)))
+        loading = self.loading(phase)
+        angle = np.multiply.outer(orders, phase - np.pi / 2)
+        odd = np.where(orders % 2, 2 / np.pi, 0.0)
+        return odd * (np.sin(angle) @ (weight * loading)), odd * (np.cos(angle) @ (weight * loading))
+
+    def area(self) -> float:
+        """∮ zeta dphi over both halves [yield displacements]."""
+        if self.rho == 1:
+            return 0.0
+        r, weight = _gauss_points(np.minimum(_R_PIECES, self.saturation))
+        gap, rate = np.exp(-r), approach_rate(r, self.n)
+        loss = (-np.expm1(-r)) ** (self.n + 1) / (rate * ((1 - self.rho) + self.rho * gap * rate))
+        saturated = max(self.saturation - SATURATED, 0.0) / self.n
+        return 2 * ((1 - self.rho) * float(weight @ loss) + saturated)
+
+
+def _to_zero(curve: MasterCurve, rho: float, r: float) -> float:
+    # An elastic spring (rho = 1) goes back the way it came; the logarithm would lose it near Z = 1.
+    return curve.climb_distance(r) if rho == 1 else curve.release_distance(-math.expm1(-r), rho, math)
+
+
+# Ends of the pieces that Gauss points are put on. Each is short against the distance to the
+# nearest singularity of what is integrated: in r the poles stay pi off the real axis.
+_R_PIECES = np.array([0, 1e-4, 1e-3, 0.01, 0.03, 0.1, 0.25, 0.5, 1, 2, *range(4, 38, 3), SATURATED])
+_RELEASE_PIECES = np.array([0, 1e-3, 0.01, 0.03, 0.1, 0.25, 0.5, 0.75, 0.9, 0.99, 0.9999, 1])
+_CLIMB_PIECES = np.array([1e-4, 0.01, 0.1, 0.25, 0.5, 1, 1.5, 2, 4, 8, 16, 40])
+
+
+def _gauss_points(ends: Floats, points: int = 16) -> tuple[Floats, Floats]:
+    """Nodes and weights of Gauss–Legendre rules on consecutive pieces."""
+    node, weight = _legendre(points)
+    half = 0.5 * np.diff(ends)[:, None]
+    return (ends[:-1, None] + half * (1 + node)).ravel(), (half * weight).ravel()
+
+
+@lru_cache
+def _legendre(points: int) -> tuple[Floats, Floats]:
+    return np.polynomial.legendre.leggauss(points)
+
+
+def _pair_shape(shape: Shape, amplitude: ArrayLike) -> tuple[int, ...]:
+    return np.broadcast(shape.kappa, shape.rho, np.asarray(amplitude)).shape
+
+
+def _pairs(shape: Shape, amplitude: ArrayLike) -> Iterator[tuple[Shape, float]]:
+    for kappa, rho, x in np.broadcast(shape.kappa, shape.rho, np.asarray(amplitude)):
+        yield Shape(float(kappa), float(rho), shape.n), float(x)
+
+
+def _like_pairs(values: list[float], shape: Shape, amplitude: ArrayLike) -> float | Floats:
+    return np.array(values).reshape(_pair_shape(shape, amplitude))[()]
