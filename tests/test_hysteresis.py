@@ -32,8 +32,9 @@ from mrdamper.hysteresis import (
 
 # Rounding of closed forms, and of tables whose own error is near 1e-14 for these n.
 ROUNDING = 1e-12
-# Leaving a reversal at −1 multiplies an error by up to 1/(1 − rho) or 1 + |rho|, 31 in these tests.
-LEAVING = 2e-11
+# Leaving a reversal at −1 multiplies an error by up to 1/(1 − rho) or 1 + |rho|, 31 in these tests,
+# and the tables of n = 7.3 hold 3e-12 there.
+LEAVING = 1e-10
 # What other n promise over the whole range of n and rho.
 TABLE = 1e-8
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from mrdamper.data import Condition, Floats, Run, once_per_run
 from mrdamper.errors import ExcitationError
-from mrdamper.harmonics import HarmonicSeries, dominant_frequency, fit_harmonics
+from mrdamper.harmonics import HarmonicSeries, fit_harmonics, fundamental_frequency
 from mrdamper.hysteresis import Path
 
 SINE_DISTORTION_LIMIT = 0.05  # above it a motion is no sine for harmonic balance
@@ -153,8 +153,9 @@ def analyse_motion(run: Run) -> MotionAnalysis:
     where = f"run {run.id}"
     if np.ptp(run.displacement) < _STILL:
         raise ExcitationError("the displacement does not move", where=where, mend="check the channel")
-    guess = dominant_frequency(run.time, run.displacement)
-    series = fit_harmonics(run.time, run.displacement, _ORDERS, frequency=guess, refine=True)
+    frequency = fundamental_frequency(run.time, run.displacement)
+    orders = _ORDERS if np.ptp(run.time) * frequency > 2 else 3  # harmonics of a short record overlap its drift
+    series = fit_harmonics(run.time, run.displacement, orders, frequency=frequency)
     cycles = float(np.ptp(run.time) * series.frequency)
     if cycles < 0.95:
         raise ExcitationError(

@@ -61,16 +61,8 @@ class HarmonicSeries:
         return float(np.ptp(wave) / 2)
 
 
-def fit_harmonics(
-    time: Floats,
-    signal: Floats,
-    orders: int,
-    *,
-    frequency: float,
-    refine: bool = False,
-    drift: bool = True,
-) -> HarmonicSeries:
-    """Least-squares harmonic series.
+def fit_harmonics(time: Floats, signal: Floats, orders: int, *, frequency: float, drift: bool = True) -> HarmonicSeries:
+    """Least-squares harmonic series at a known fundamental.
 
     Parameters
     ----------
@@ -78,28 +70,14 @@ def fit_harmonics(
     orders : int
         Number of harmonics; lowered where the record cannot resolve them.
     frequency : float
-        Fundamental [Hz]; with `refine` a start value that Gauss–Newton improves.
+        Fundamental [Hz].
     drift : bool
         Fit a linear drift of the mean.
     """
     origin = float(time[0])
-    t = time - origin
     nyquist = 0.5 / float(np.median(np.diff(time)))
     orders = int(np.clip(nyquist / frequency, 1, orders))
-    for _ in range(20 if refine else 1):
-        columns = _columns(t, frequency, orders, drift)
-        # Without refinement the first pass is the answer; with it, the last column is the
-        # derivative of the previous estimate with respect to frequency.
-        if not refine:
-            coefficients = _solve(columns, signal)
-            break
-        coefficients = _solve(columns, signal)
-        slope = _frequency_derivative(t, frequency, coefficients, orders, drift)
-        step = _solve(np.column_stack([columns, slope]), signal)[-1]
-        frequency += float(np.clip(step, -0.2 * frequency, 0.2 * frequency))
-        if abs(step) < 1e-12 * frequency:
-            break
-    coefficients = _solve(_columns(t, frequency, orders, drift), signal)
+    coefficients = _solve(_columns(time - origin, frequency, orders, drift), signal)
     lead = 2 if drift else 1
     return HarmonicSeries(
         frequency=frequency,
@@ -111,17 +89,43 @@ def fit_harmonics(
     )
 
 
-def dominant_frequency(time: Floats, signal: Floats) -> float:
-    """Frequency [Hz] of the strongest spectral line, to a fraction of a line.
+def fundamental_frequency(time: Floats, signal: Floats, orders: int = 3) -> float:
+    """Fundamental frequency [Hz] of a record of about one cycle or more.
 
-    The spectrum is zero-padded and windowed; a half-cycle of drift does not win over the
-    oscillation because a line through the record's ends is taken out first.
+    The strongest spectral line is where a search of the best single sine begins; Gauss–Newton
+    on frequency and coefficients then finds it to rounding. Harmonics join only from three
+    cycles on: a shorter record could be explained by the harmonics of a slower motion.
     """
+    t = time - time[0]
+    guess = _spectral_line(time, signal)
+    few = slice(None, None, max(1, t.size // 400))
+    if guess * t[-1] < 4:
+        ladder = guess * np.geomspace(0.4, 2.5, 45)
+        guess = min(ladder, key=lambda f: float(np.sum(_residual(t[few], signal[few], f) ** 2)))
+    orders = orders if guess * t[-1] >= 3 else 1
+    frequency = float(guess)
+    for _ in range(30):
+        columns = _columns(t, frequency, orders, drift=True)
+        coefficients = _solve(columns, signal)
+        slope = _frequency_derivative(t, frequency, coefficients, orders)
+        step = float(_solve(np.column_stack([columns, slope]), signal)[-1])
+        frequency += float(np.clip(step, -0.1 * frequency, 0.1 * frequency))
+        if abs(step) < 1e-11 * frequency:
+            break
+    return frequency
+
+
+def _residual(t: Floats, signal: Floats, frequency: float) -> Floats:
+    columns = _columns(t, frequency, 1, drift=True)
+    return columns @ _solve(columns, signal) - signal
+
+
+def _spectral_line(time: Floats, signal: Floats) -> float:
+    """Find the strongest line of the detrended, zero-padded spectrum [Hz]."""
     size = time.size
-    uniform = np.linspace(time[0], time[-1], size)
-    wave = np.interp(uniform, time, signal)
-    wave = wave - np.mean(wave)
-    window = np.hanning(size + 2)[1:-1] if size * _crossings(wave) > 4 * size else np.ones(size)
+    wave = np.interp(np.linspace(time[0], time[-1], size), time, signal)
+    wave = wave - np.polynomial.Polynomial.fit(np.arange(size), wave, 1)(np.arange(size))
+    window = np.hanning(size + 2)[1:-1] if _crossings(wave) > 4 else np.ones(size)
     padded = 8 * size
     power = np.abs(np.fft.rfft(wave * window, padded)) ** 2
     power[: padded // size // 2] = 0.0
@@ -139,11 +143,10 @@ def _columns(t: Floats, frequency: float, orders: int, drift: bool) -> Floats:
     return np.column_stack([*trend, np.sin(angle), np.cos(angle)])
 
 
-def _frequency_derivative(t: Floats, frequency: float, coefficients: Floats, orders: int, drift: bool) -> Floats:
-    lead = 2 if drift else 1
+def _frequency_derivative(t: Floats, frequency: float, coefficients: Floats, orders: int) -> Floats:
     k = np.arange(1, orders + 1)
     angle = np.outer(t, 2 * np.pi * frequency * k)
-    sine, cosine = coefficients[lead : lead + orders], coefficients[lead + orders :]
+    sine, cosine = coefficients[2 : 2 + orders], coefficients[2 + orders :]
     return 2 * np.pi * t * (np.cos(angle) @ (k * sine) - np.sin(angle) @ (k * cosine))
 
 

@@ -204,7 +204,7 @@ class _Tabulated(MasterCurve):
 
 
 def _crowded_nodes(end: float) -> Floats:
-    return end * np.linspace(0, 1, 641) ** 3
+    return end * np.linspace(0, 1, 769) ** 4
 
 
 class _Table:

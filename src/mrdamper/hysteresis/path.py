@@ -64,10 +64,10 @@ class Path:
         """
         x, t = _checked_motion(displacement, time)
         arrival, departure = _reversals(x)
-        peak, begin = x[arrival], arrival + 1
+        peak, begin = x[arrival], departure + 1  # a rest belongs to the stroke it ends
         if peaks == "parabola":
             beyond, is_early = _vertex(x, t, arrival, departure)
-            peak, begin = peak + beyond, np.where(is_early, arrival, begin)
+            peak, begin = peak + beyond, np.where(beyond == 0, begin, arrival + 1 - is_early)
 
         counts = np.diff(np.concatenate([[0], begin, [x.size]]))
         stroke = np.repeat(np.arange(counts.size), counts)

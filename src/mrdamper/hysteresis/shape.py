@@ -12,7 +12,7 @@ from mrdamper.data import Floats
 from mrdamper.errors import ParameterError
 from mrdamper.hysteresis.master_curve import STEEPEST
 
-HIGHEST_N = 20.0  # the tabulated curves hold 1e-8 up to here
+HIGHEST_N = 20.0  # the tabulated curves hold 1e-8 up to here (for rho >= −30)
 BoundednessClass = Literal["I", "II", "III", "IV", "V", "unstable"]
 
 
@@ -25,9 +25,10 @@ class Shape:
     kappa : float or (P,) array
         Initial slope dzeta/dx = A/z_max [1/m].
     rho : float or (P,) array
-        (gamma − beta)/(gamma + beta) [-], at most 1. 0: beta = gamma; −1: gamma = 0; 1: beta = 0,
-        an elastic spring, which forgets where it is once zeta rounds to 1. Above 0, gamma > beta: still dissipating, but bounded only for states
-        that start within rho^(−1/n), see `boundedness_class`.
+        (gamma − beta)/(gamma + beta) [-], at most 1. 0: beta = gamma; −1: gamma = 0; 1: beta = 0, an
+        elastic spring, which forgets where it is once zeta rounds to 1. Above 0, gamma > beta: still
+        dissipating, but bounded only for states that start within rho^(−1/n), see
+        `boundedness_class`.
     n : float
         Sharpness of the yield [-], from 1 to 20.
 

@@ -21,15 +21,17 @@ _AXES = {
     "yield_force": ("Yield force (N)", 1.0),
     "yield_displacement": ("Yield displacement (µm)", 1e6),
     "k1": ("Stiffness k1 (N/m)", 1.0),
+    "k3": ("Cubic stiffness k3 (N/m³)", 1.0),
     "f0": ("Offset force f0 (N)", 1.0),
     "m": ("Equivalent mass m (kg)", 1.0),
 }
 
 
-def predicted_loops(damper: Damper, runs: Sequence[Run], columns: int = 3) -> Figure:
+def predicted_loops(damper: Damper, runs: Sequence[Run]) -> Figure:
     """Measured and predicted force–velocity and force–displacement loops, last cycle in the window."""
+    columns = 2 if len(runs) in (1, 2, 4) else 3
     with house_style():
-        figure, axes = new_figure(2 * -(-len(runs) // columns), columns, 4.4 * -(-len(runs) // columns))
+        figure, axes = new_figure(2 * -(-len(runs) // columns), columns, 4.6 * -(-len(runs) // columns))
         for number, run in enumerate(runs):
             row, column = divmod(number, columns)
             over_x, over_v = axes[2 * row * columns + column], axes[(2 * row + 1) * columns + column]
@@ -48,7 +50,7 @@ def predicted_loops(damper: Damper, runs: Sequence[Run], columns: int = 3) -> Fi
             row, column = divmod(unused, columns)
             axes[2 * row * columns + column].set_visible(False)
             axes[(2 * row + 1) * columns + column].set_visible(False)
-        axes[0].legend(loc="upper left")
+        axes[0].legend(loc="center")
         return figure
 
 
@@ -59,7 +61,9 @@ def parameter_curves(fit: ModifiedFit) -> Figure:
         columns = 2
         rows = -(-len(names) // columns)
         figure, axes = new_figure(rows, columns, 2.5 * rows)
-        groups = same_motion(fit.conditions, tolerance=0.08)
+        groups = sorted(
+            same_motion(fit.conditions, tolerance=0.08), key=lambda g: fit.conditions[g[0]].peak_velocity
+        )
         shades = current_colours([fit.conditions[g[0]].peak_velocity for g in groups])
         dense = np.linspace(0, fit.damper.envelope.current_A[1], 60)
         for panel, name in zip(axes, names, strict=False):
@@ -84,7 +88,7 @@ def parameter_curves(fit: ModifiedFit) -> Figure:
                 panel.plot(dense, scale * curve, lw=1.0, color=MEASURED)
             if fit.functions[name].function.log:
                 panel.set_yscale("log")
-            label(panel, "Current (A)", text, f"{fit.functions[name].function.form}, R² = {fit.functions[name].r2:.2f}")
+            label(panel, "Current (A)", text, fit.functions[name].function.form)
         for panel in axes[len(names) :]:
             panel.set_visible(False)
         if len(groups) <= 10:

@@ -76,6 +76,7 @@ def test_analysis(loops: Sequence[LoopAnalysis], ranges: Sequence[DynamicRange])
             ("Equivalent damping (kN s/m)", lambda loop: KN * loop.equivalent_damping),
         ]
         groups = [[loops[i] for i in g] for g in same_motion([loop.condition for loop in loops])]
+        groups.sort(key=lambda g: g[0].condition.peak_velocity)
         shades = current_colours([g[0].condition.peak_velocity for g in groups])
         for panel, (name, value) in zip(axes, quantities, strict=False):
             for group in groups:

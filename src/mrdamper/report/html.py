@@ -25,7 +25,7 @@ def render_report(title: str, chapters: list[Mapping[str, object]], footer: str)
         How it was made.
     """
     template = _ENVIRONMENT.from_string((files("mrdamper.report") / "report.html.j2").read_text(encoding="utf-8"))
-    helpers = {"svg": inline_svg, "mm": lambda v: 1e3 * v, "percent": _percent, "median": lambda v: float(np.median(v))}
+    helpers = {"svg": inline_svg, "mm": lambda v: 1e3 * v, "number": _number, "percent": _percent}
     return template.render(title=title, chapters=chapters, footer=footer, **helpers)
 
 
@@ -33,6 +33,10 @@ def inline_svg(picture: bytes, alt: str) -> Markup:
     """An SVG as an image inside the page."""
     data = base64.b64encode(picture).decode("ascii")
     return Markup('<img alt="{}" src="data:image/svg+xml;base64,{}">').format(alt, data)
+
+
+def _number(value: float) -> str:
+    return f"{value:.2f}" if np.isfinite(value) else "–"
 
 
 def _percent(value: float | None, digits: int = 1) -> str:

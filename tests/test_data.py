@@ -1,0 +1,69 @@
+import numpy as np
+import pytest
+
+from mrdamper.data import Condition, Dataset, Run, same_condition
+from mrdamper.errors import NonFiniteError, RunError, TimeOrderError, UnknownNameError
+
+
+def run(**changes):
+    t = np.linspace(0, 1, 11)
+    fields = {"id": "a", "time": t, "displacement": np.sin(t), "force": np.cos(t), "current": 0.5, **changes}
+    return Run(**fields)
+
+
+def test_scalar_current_holds_for_the_whole_run():
+    assert run().current.shape == (11,)
+    assert run().current_A == 0.5
+
+
+def test_channels_are_read_only():
+    with pytest.raises(ValueError, match="read-only"):
+        run().force[0] = 1.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "text"),
+    [
+        ({"force": np.zeros(10)}, RunError, "force has 10 samples, time has 11"),
+        ({"time": np.zeros(11)}, TimeOrderError, "at sample 1"),
+        ({"time": np.linspace(1, 0, 11)}, TimeOrderError, "sort the samples"),
+        ({"force": np.full(11, np.nan)}, NonFiniteError, "11 values"),
+        ({"displacement": np.zeros((11, 2))}, RunError, "2 dimensions"),
+        ({"split": "test"}, RunError, "use train or validate"),
+    ],
+)
+def test_what_does_not_fit_is_refused_with_the_run_and_the_remedy(changes, error, text):
+    with pytest.raises(error) as caught:
+        run(**changes)
+    assert text in str(caught.value)
+    assert "run a" in str(caught.value)
+    assert caught.value.code in str(caught.value)
+
+
+def test_varying_current_has_no_single_value():
+    with pytest.raises(RunError, match="current varies"):
+        _ = run(current=np.linspace(0, 1, 11)).current_A
+
+
+def test_a_part_keeps_its_segments():
+    whole = run(segments=((0, 4), (4, 11)))
+    assert whole.part(2, 9).segments == ((0, 2), (2, 7))
+
+
+def test_an_empty_window_is_said():
+    with pytest.raises(RunError, match="correct steady_t0_s"):
+        run(window=(5.0, 6.0)).steady()
+
+
+def test_dataset_refuses_twins_and_offers_near_names():
+    with pytest.raises(RunError, match="two runs are called a"):
+        Dataset((run(), run()))
+    with pytest.raises(UnknownNameError, match="did you mean run_1"):
+        _ = Dataset((run(id="run_1"),))["run_l"]
+    with pytest.raises(RunError, match="no runs"):
+        Dataset(())
+
+
+def test_conditions_agree_to_three_per_cent():
+    a, b, c = Condition(0.5, 1.0, 0.01), Condition(0.5, 1.02, 0.0102), Condition(0.5, 1.2, 0.01)
+    assert same_condition([a, b, c]) == [[0, 1], [2]]
