@@ -1,18 +1,12 @@
-"""What tests share: the bundled data, the vectors, and a damper whose truth is known."""
+"""What tests share: the bundled data and the vectors."""
 
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from mrdamper.data import Condition, Run
-from mrdamper.excitation import sine
+from mrdamper.data import Condition
 from mrdamper.io.dataset import load_dataset
-from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.simulation import simulate
-
-TRUTH = {"c": 1440.0, "alpha": 9e5, "beta": 2e5, "gamma": 2e5, "n": 2.0, "f0": 120.0, "k1": 1381.0, "k3": 8000.0}
 
 
 @pytest.fixture(scope="session")
@@ -23,22 +17,6 @@ def bundled():
 @pytest.fixture(scope="session")
 def vectors():
     return json.loads((Path(__file__).parent / "vectors.json").read_text(encoding="utf-8"))
-
-
-def synthetic_run(condition, noise=0.0, seed=1, cycles=4, samples_per_cycle=800, model=None, **options):
-    """A run of a Bouc–Wen damper with known parameters, from rest, window without the first cycle."""
-    motion = sine(condition, cycles, samples_per_cycle)
-    model = model or BoucWen(**TRUTH)
-    force = simulate(model, motion).force + noise * np.random.default_rng(seed).standard_normal(len(motion))
-    return Run(
-        options.pop("id", f"{condition}"),
-        motion.time,
-        motion.displacement,
-        force,
-        condition.current_A,
-        window=(1 / condition.frequency_Hz, float(motion.time[-1])),
-        **options,
-    )
 
 
 @pytest.fixture

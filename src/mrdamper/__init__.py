@@ -1,8 +1,8 @@
 """mrdamper: from magnetorheological damper test records to a validated model.
 
-    >>> from mrdamper import load_dataset, run_study
-    >>> study = run_study(load_dataset())
-    >>> study.rig("utfsm").damper.predict(Condition(0.5, 2.0, 0.01)).force
+>>> from mrdamper import load_dataset, run_study
+>>> study = run_study(load_dataset())
+>>> study.rig("utfsm").damper.predict(Condition(0.5, 2.0, 0.01)).force
 """
 
 from __future__ import annotations

@@ -57,9 +57,7 @@ class Envelope:
             ("velocity", condition.peak_velocity, self.peak_velocity_m_s),
         )
         return tuple(
-            name
-            for name, value, (low, high) in checks
-            if value < low - _SLACK * high or value > high * (1 + _SLACK)
+            name for name, value, (low, high) in checks if value < low - _SLACK * high or value > high * (1 + _SLACK)
         )
 
 

@@ -259,7 +259,7 @@ def _characteristic_period(time: Floats, signal: Floats) -> float:
 
 
 def sine(condition: Condition, cycles: float = 1.0, samples_per_cycle: int = _SAMPLES_PER_CYCLE) -> Excitation:
-    """x = X sin(2πft) at constant current; the last sample closes the last cycle."""
+    """X = X sin(2πft) at constant current; the last sample closes the last cycle."""
     _require_positive(frequency_Hz=condition.frequency_Hz, amplitude_m=condition.amplitude_m, cycles=cycles)
     omega = 2 * np.pi * condition.frequency_Hz
     time = np.arange(round(cycles * samples_per_cycle) + 1) / (samples_per_cycle * condition.frequency_Hz)

@@ -201,7 +201,9 @@ def fit_jointly(
     return _finish(design, solution, {data.shape: function})
 
 
-def leave_out_errors(data: Condensed, fit: JointFit, groups: Sequence[Sequence[int]], forms: Mapping[str, str]) -> Floats:
+def leave_out_errors(
+    data: Condensed, fit: JointFit, groups: Sequence[Sequence[int]], forms: Mapping[str, str]
+) -> Floats:
     """(R,) nrmse_pp of runs whose group was left out of the linear coefficients.
 
     The shape function stays that of the whole fit: quick, for choosing forms, not a final score.

@@ -126,8 +126,6 @@ def dynamic_ranges(loops: Sequence[LoopAnalysis]) -> tuple[DynamicRange, ...]:
         lowest = members[0].peak_force
         first = members[0].condition
         ranges.append(
-            DynamicRange(
-                first.frequency_Hz, first.amplitude_m, currents, tuple(m.peak_force / lowest for m in members)
-            )
+            DynamicRange(first.frequency_Hz, first.amplitude_m, currents, tuple(m.peak_force / lowest for m in members))
         )
     return tuple(ranges)

@@ -158,7 +158,10 @@ def fit_modified_jointly(
     model_type = type(identifications[0].model)
     data = condense(runs, model_type)
     shapes = np.array([_coordinate(i, data.shape) if data.shape else 1.0 for i in identifications])
-    candidates = {name: [f for f in forms if name == data.shape or not FORMS[f].rate_bounds] for name, forms in model_type.map_forms().items()}
+    candidates = {
+        name: [f for f in forms if name == data.shape or not FORMS[f].rate_bounds]
+        for name, forms in model_type.map_forms().items()
+    }
     forms, joint = choose_forms(data, candidates, same_condition(data.conditions), shapes)
     start = joint.parameters.functions.get(data.shape)
 
@@ -171,8 +174,7 @@ def fit_modified_jointly(
 
     values = {name: np.array([_coordinate(i, name) for i in identifications]) for name in forms}
     fits = {
-        name: assess(function, data.conditions, values[name])
-        for name, function in joint.parameters.functions.items()
+        name: assess(function, data.conditions, values[name]) for name, function in joint.parameters.functions.items()
     }
     return ModifiedFit(model(data, joint.parameters), fits, values, data.conditions), refit
 
@@ -189,4 +191,3 @@ def _coordinate(identification: Identification, name: str) -> float:
 def without(identifications: Sequence[Identification], run_ids: set[str]) -> list[Identification]:
     """The identifications of all other runs."""
     return [i for i in identifications if i.run_id not in run_ids]
-

@@ -354,7 +354,12 @@ def features(conditions: Sequence[Condition]) -> tuple[Floats, Floats, Floats]:
 
 
 def _best_rates(
-    form: Form, I: Floats, f: Floats, A: Floats, target: Floats, weight: Floats  # noqa: E741
+    form: Form,
+    I: Floats,
+    f: Floats,
+    A: Floats,
+    target: Floats,
+    weight: Floats,
 ) -> tuple[float, ...]:
     """Search the rates in their logarithm: a grid, then refinement from its three best points."""
     if not form.rate_bounds:

@@ -55,9 +55,7 @@ def param(
     default: float | None = None,
 ) -> Any:
     """Declare a model parameter as a dataclass field (see `ParameterInfo` for the meanings)."""
-    metadata = {
-        _KEY: dict(unit=unit, meaning=meaning, bounds=bounds, scale=scale, linear=linear, preset=preset)
-    }
+    metadata = {_KEY: dict(unit=unit, meaning=meaning, bounds=bounds, scale=scale, linear=linear, preset=preset)}
     if default is None:
         return field(metadata=metadata)
     return field(default=default, metadata=metadata)

@@ -21,7 +21,7 @@ from mrdamper.plots.rig_tests import measured_loops, test_analysis, test_matrix
 from mrdamper.plots.style import save_figure
 from mrdamper.report import render_report
 from mrdamper.report.distrust import doubts
-from mrdamper.validation import RunScore, Validation
+from mrdamper.validation import RunScore
 from mrdamper.workflow import Progress, RigStudy, Study
 
 _LOOPS_SHOWN = 6
@@ -67,7 +67,9 @@ def write_study(study: Study, folder: str | Path, progress: Progress = lambda wh
         )
         title = f"MR damper study: {', '.join(r.rig for r in study.rigs) or study.dataset.name}"
         (work / "report.html").write_text(render_report(title, chapters, footer), encoding="utf-8")
-        (work / "identifications.csv").write_text(table_text(identification_rows(_all_identifications(study))), encoding="utf-8")
+        (work / "identifications.csv").write_text(
+            table_text(identification_rows(_all_identifications(study))), encoding="utf-8"
+        )
         (work / "validation.csv").write_text(_validation_table(study), encoding="utf-8")
         written = sorted(p.relative_to(work) for p in work.rglob("*") if p.is_file())
     progress("written", 1.0)
@@ -139,7 +141,9 @@ def table_text(rows: Sequence[Mapping[str, Any]]) -> str:
     text = io.StringIO()
     writer = csv.DictWriter(text, names, lineterminator="\n", restval="")
     writer.writeheader()
-    writer.writerows({k: ("" if v is None else repr(v) if isinstance(v, float) else v) for k, v in r.items()} for r in rows)
+    writer.writerows(
+        {k: ("" if v is None else repr(v) if isinstance(v, float) else v) for k, v in r.items()} for r in rows
+    )
     return text.getvalue()
 
 
@@ -157,7 +161,9 @@ def _validation_table(study: Study) -> str:
         for candidate in rig.candidates:
             for split, validation in (("left out", candidate.left_out), ("held out", candidate.held_out)):
                 for run in validation.runs:
-                    rows.append({"rig": rig.rig, "model": candidate.model, "way": candidate.way, "set": split, **score_row(run)})
+                    rows.append(
+                        {"rig": rig.rig, "model": candidate.model, "way": candidate.way, "set": split, **score_row(run)}
+                    )
     return table_text(rows)
 
 
@@ -239,7 +245,9 @@ def _choice(rig: RigStudy) -> str:
         f"{100 * chosen.left_out.median():.1f} % and {chosen.damper.parameter_count} numbers"
     )
     if others:
-        text += " against " + ", ".join(f"{o.title} with {100 * o.left_out.median():.1f} % and {o.damper.parameter_count}" for o in others)
+        text += " against " + ", ".join(
+            f"{o.title} with {100 * o.left_out.median():.1f} % and {o.damper.parameter_count}" for o in others
+        )
     return text + ". Within a tenth of the best, fewer numbers win. Held-out runs confirm; they choose nothing."
 
 

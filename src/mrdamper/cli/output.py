@@ -16,7 +16,11 @@ Rows = Sequence[Mapping[str, Any]]
 
 def put(rows: Rows, out: Path | None, as_json: bool, as_csv: Callable[[Rows], str]) -> None:
     """Write rows where they were asked for; a file appears whole or not at all."""
-    text = json.dumps([{k: _plain(v) for k, v in row.items()} for row in rows], indent=1) + "\n" if as_json else as_csv(rows)
+    text = (
+        json.dumps([{k: _plain(v) for k, v in row.items()} for row in rows], indent=1) + "\n"
+        if as_json
+        else as_csv(rows)
+    )
     if out is None:
         print(text, end="")
         return

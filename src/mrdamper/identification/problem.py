@@ -84,9 +84,7 @@ class Problem:
         for name in (*wanted, *held):
             if name not in infos:
                 raise UnknownNameError.of(f"parameter of {model_type.name}", name, infos)
-        chosen = tuple(
-            name for name, info in infos.items() if name not in held and (not info.preset or name in wanted)
-        )
+        chosen = tuple(name for name, info in infos.items() if name not in held and (not info.preset or name in wanted))
         if {"m", "k1"} <= set(chosen):
             raise IdentificationError(
                 "m and k1 are both free, and at one frequency a = −ω² x makes them one parameter",

@@ -71,7 +71,9 @@ def save_dataset(dataset: Dataset, folder: str | Path, *, extra_files: dict[str,
 
     with write_folder(folder) as target:
         pl.DataFrame([_row(run) for run in dataset], infer_schema_length=None).write_csv(target / "runs.csv")
-        pl.concat(_samples(dataset)).write_parquet(target / "samples.parquet", compression="zstd", statistics=False)
+        pl.concat(_samples(dataset), how="diagonal").write_parquet(
+            target / "samples.parquet", compression="zstd", statistics=False
+        )
         for name, text in (extra_files or {}).items():
             (target / name).write_text(text, encoding="utf-8")
 
@@ -129,7 +131,9 @@ def _samples_table(folder: Path) -> dict[str, pl.DataFrame]:
         if path.suffix == ".parquet":
             table = pl.read_parquet(path)
         else:
-            table = pl.read_csv(path, schema_overrides={"run_id": pl.String}, infer_schema_length=10_000)
+            header = pl.read_csv(path, n_rows=0, infer_schema_length=0).columns
+            numbers = {c: pl.Float64 for c in (*_REQUIRED, *_OPTIONAL) if c in header}
+            table = pl.read_csv(path, schema_overrides={"run_id": pl.String, **numbers})
     except (pl.exceptions.PolarsError, OSError) as error:
         raise DatasetError(_first_line(error), where=str(path), mend="write the file again") from error
     for column in ("run_id", *_REQUIRED):
@@ -163,7 +167,11 @@ def _run(row: dict[str, Any], samples: pl.DataFrame, folder: Path) -> Run:
             raise ColumnError(f"{column} is {text!r}", where=where, mend="give a number or leave the cell empty")
         return value
 
-    channels = {name: samples[name].to_numpy() for name in samples.columns if name != "run_id"}
+    channels = {
+        name: samples[name].to_numpy()
+        for name in samples.columns
+        if name != "run_id" and (name in _REQUIRED or samples[name].null_count() < samples.height)
+    }
     current = channels.get("current_A", number("current_A"))
     if current is None:
         raise ColumnError("no current_A", where=where, mend="add the column current_A to runs.csv or to the samples")

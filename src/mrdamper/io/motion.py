@@ -35,19 +35,31 @@ def load_motion(path: str | Path, current: float | None = None) -> Run:
     try:
         table = pl.read_csv(path, infer_schema_length=10_000)
     except (pl.exceptions.PolarsError, OSError) as error:
-        raise DatasetError(str(error).splitlines()[0], where=str(path), mend="write it as comma-separated UTF-8") from error
+        raise DatasetError(
+            str(error).splitlines()[0], where=str(path), mend="write it as comma-separated UTF-8"
+        ) from error
     for name in _NAMES:
         if name not in table.columns:
             near = [c for c in table.columns if c.lower().startswith(name.split("_")[0])]
             if near:
-                raise UnitError(f"column {near[0]!r} where {name!r} is expected", where=str(path), mend="convert it to SI and rename it")
-            raise ColumnError(f"column {name} is missing (found {', '.join(table.columns)})", where=str(path), mend="add it")
+                raise UnitError(
+                    f"column {near[0]!r} where {name!r} is expected",
+                    where=str(path),
+                    mend="convert it to SI and rename it",
+                )
+            raise ColumnError(
+                f"column {name} is missing (found {', '.join(table.columns)})", where=str(path), mend="add it"
+            )
     wanted = [*_NAMES, *(["current_A"] if current is None and "current_A" in table.columns else [])]
     for name in wanted:
         if not table.schema[name].is_numeric():
-            raise ColumnError(f"column {name} holds text", where=str(path), mend="write plain numbers with a decimal point")
+            raise ColumnError(
+                f"column {name} holds text", where=str(path), mend="write plain numbers with a decimal point"
+            )
         if table[name].null_count():
-            raise ColumnError(f"column {name} has {table[name].null_count()} empty cells", where=str(path), mend="remove those rows")
+            raise ColumnError(
+                f"column {name} has {table[name].null_count()} empty cells", where=str(path), mend="remove those rows"
+            )
     columns = {name: table[name].cast(pl.Float64).to_numpy() for name in wanted}
     if current is None and "current_A" not in columns:
         raise ColumnError("no current", where=str(path), mend="give --current A, or a column current_A")

@@ -22,7 +22,6 @@ from mrdamper.errors import ParameterError
 from mrdamper.excitation import Excitation
 from mrdamper.parameters import ParameterInfo, parameters_of
 
-
 GENERAL_FORMS = (
     "constant",
     "linear-current",

@@ -61,11 +61,11 @@ class BoucWen(Model):
 
     @property
     def yield_force(self) -> float:
-        """alpha · z_max, the hysteretic force after yield [N]."""
+        """Alpha · z_max, the hysteretic force after yield [N]."""
         return self.alpha * self.yield_displacement
 
     def state(self, motion: Excitation) -> Floats:
-        """z [m] along the motion, from z = 0."""
+        """Z [m] along the motion, from z = 0."""
         return self.yield_displacement * follow(self.shape, motion.path)
 
     def force(self, motion: Excitation, state: Floats) -> Floats:

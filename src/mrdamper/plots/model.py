@@ -61,9 +61,7 @@ def parameter_curves(fit: ModifiedFit) -> Figure:
         columns = 2
         rows = -(-len(names) // columns)
         figure, axes = new_figure(rows, columns, 2.5 * rows)
-        groups = sorted(
-            same_motion(fit.conditions, tolerance=0.08), key=lambda g: fit.conditions[g[0]].peak_velocity
-        )
+        groups = sorted(same_motion(fit.conditions, tolerance=0.08), key=lambda g: fit.conditions[g[0]].peak_velocity)
         shades = current_colours([fit.conditions[g[0]].peak_velocity for g in groups])
         dense = np.linspace(0, fit.damper.envelope.current_A[1], 60)
         for panel, name in zip(axes, names, strict=False):

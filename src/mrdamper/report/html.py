@@ -10,7 +10,9 @@ import jinja2
 import numpy as np
 from markupsafe import Markup
 
-_ENVIRONMENT = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined)
+_ENVIRONMENT = jinja2.Environment(
+    autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+)
 
 
 def render_report(title: str, chapters: list[Mapping[str, object]], footer: str) -> str:

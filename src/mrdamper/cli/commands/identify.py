@@ -11,7 +11,7 @@ import typer
 def register(app: typer.Typer) -> None:
     """Add the command."""
 
-    @app.command(help="Identify a model from every sine run of a dataset, run by run.")
+    @app.command(epilog="Example: mrdamper identify rig/ --model bouc-wen --free n --out identifications.csv")
     def identify(
         data: Optional[Path] = typer.Argument(None, help="Dataset folder; default: the bundled tests."),  # noqa: UP045
         model: str = typer.Option("bouc-wen", "--model", help="Name of the model."),
@@ -23,7 +23,7 @@ def register(app: typer.Typer) -> None:
         out: Optional[Path] = typer.Option(None, "--out", help="CSV to write; default: standard output."),  # noqa: UP045
         as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
     ) -> None:
-        """Example: mrdamper identify rig/ --model bouc-wen --free n --out identifications.csv"""
+        """Identify a model from every sine run of a dataset, run by run."""
         from mrdamper import identification, workflow
         from mrdamper.cli.output import parse_fixed, put
         from mrdamper.cli.progress import progress_on_stderr

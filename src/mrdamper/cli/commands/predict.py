@@ -11,7 +11,9 @@ import typer
 def register(app: typer.Typer) -> None:
     """Add the command."""
 
-    @app.command(help="Predict the force of a saved model at a condition, or along a motion from a file.")
+    @app.command(
+        epilog="Example: mrdamper predict model.json --current 0.5 --frequency 2 --amplitude 10 --out force.csv"
+    )
     def predict(
         model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
         current: Optional[float] = typer.Option(None, "--current", help="Coil current [A]."),  # noqa: UP045
@@ -23,7 +25,7 @@ def register(app: typer.Typer) -> None:
         out: Optional[Path] = typer.Option(None, "--out", help="CSV to write; default: standard output."),  # noqa: UP045
         as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
     ) -> None:
-        """Example: mrdamper predict model.json --current 0.5 --frequency 2 --amplitude 10 --out force.csv"""
+        """Predict the force of a saved model at a condition, or along a motion from a file."""
         from mrdamper.cli.output import put
         from mrdamper.data import Condition
         from mrdamper.errors import InputError

@@ -11,13 +11,13 @@ import typer
 def register(app: typer.Typer) -> None:
     """Add the command."""
 
-    @app.command(help="Study a dataset: identify every run, map the parameters, validate; write report and models.")
+    @app.command(epilog="Example: mrdamper study rig/ --out result/")
     def study(
         data: Optional[Path] = typer.Argument(None, help="Dataset folder; default: the bundled tests of two dampers."),  # noqa: UP045
         out: Path = typer.Option(..., "--out", help="Folder for report.html, model.json, tables and figures."),
         as_json: bool = typer.Option(False, "--json", help="Print a summary a program can read."),
     ) -> None:
-        """Example: mrdamper study rig/ --out result/"""
+        """Study a dataset: identify every run, map the parameters, validate; write report and models."""
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.io.atomic import require_writable
         from mrdamper.io.dataset import load_dataset

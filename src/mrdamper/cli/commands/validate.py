@@ -11,7 +11,7 @@ import typer
 def register(app: typer.Typer) -> None:
     """Add the command."""
 
-    @app.command(help="Score a saved model on the runs of its rig: nrmse, wape, peak force and energy.")
+    @app.command(epilog="Example: mrdamper validate model.json rig/ --out scores.csv")
     def validate(
         model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
         data: Optional[Path] = typer.Argument(None, help="Dataset folder; default: the bundled tests."),  # noqa: UP045
@@ -20,7 +20,7 @@ def register(app: typer.Typer) -> None:
         out: Optional[Path] = typer.Option(None, "--out", help="CSV to write; default: standard output."),  # noqa: UP045
         as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
     ) -> None:
-        """Example: mrdamper validate model.json rig/ --out scores.csv"""
+        """Score a saved model on the runs of its rig: nrmse, wape, peak force and energy."""
         from mrdamper.cli.output import put
         from mrdamper.errors import InputError, UnknownNameError
         from mrdamper.io.atomic import require_writable

@@ -1,0 +1,225 @@
+"""The paper's genetic algorithm: its settings, its operators, and boxes that narrow step by step.
+
+[Qian et al. 2024, section 4.3] states population, crossover fraction, mutation probability,
+selection, generations and bounds. What it leaves open follows the program whose default
+selection it names: rank scaling, five per cent elite, scattered crossover. pymoo keeps the
+population and runs the generations; the operators are here, so that they can be read and
+tested.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mrdamper.data import Floats
+from mrdamper.errors import MissingExtraError, ParameterError
+
+Cost = Callable[[Floats], Floats]
+Report = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class GeneticSettings:
+    """Settings of the search; the defaults are the paper's.
+
+    Attributes
+    ----------
+    population, generations : int
+    crossover_fraction : float
+        Share of the children, elite apart, that are crossed; the others are mutated.
+    mutation : float
+        Probability with which each number of a mutated child is drawn anew from the box.
+    elite : float
+        Share of the population that survives unchanged.
+    narrowings : int
+        Further searches, each in a box about the best so far ("progressively narrower").
+    narrow_to : float
+        Width of each box over that of the one before.
+    seed : int
+
+    Raises
+    ------
+    ParameterError
+        If a share lies outside 0...1 or a count is too small.
+    """
+
+    population: int = 100
+    generations: int = 500
+    crossover_fraction: float = 0.8
+    mutation: float = 0.2
+    elite: float = 0.05
+    narrowings: int = 6
+    narrow_to: float = 0.2
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.population < 4 or self.generations < 1 or self.narrowings < 0:
+            raise ParameterError(
+                f"population {self.population}, generations {self.generations}, narrowings {self.narrowings}",
+                mend="use a population of 4 or more, at least one generation, and no negative count",
+            )
+        for name in ("crossover_fraction", "mutation", "elite", "narrow_to"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise ParameterError(f"{name} is {getattr(self, name)}", mend="give a share between 0 and 1")
+
+    @property
+    def children(self) -> tuple[int, int, int]:
+        """How many of a generation are elite, crossed and mutated."""
+        elite = max(1, round(self.elite * self.population))
+        crossed = round(self.crossover_fraction * (self.population - elite))
+        return elite, crossed, self.population - elite - crossed
+
+
+@dataclass(frozen=True, eq=False)
+class GeneticMinimum:
+    """Where the search ended.
+
+    Attributes
+    ----------
+    point : (D,) array
+    cost : float
+    evaluations : int
+    history : (G,) array
+        Lowest cost after every generation, over all boxes.
+    boxes : tuple of (lower, upper)
+        Searched one after the other, (D,) arrays.
+    message : str
+    """
+
+    point: Floats
+    cost: float
+    evaluations: int
+    history: Floats
+    boxes: tuple[tuple[Floats, Floats], ...]
+    message: str
+
+
+def genetic(
+    cost: Cost,
+    lower: ArrayLike,
+    upper: ArrayLike,
+    settings: GeneticSettings | None = None,
+    progress: Report = lambda what, share: None,
+) -> GeneticMinimum:
+    """Minimise a cost inside a box, then inside ever narrower ones about the best point.
+
+    Parameters
+    ----------
+    cost : callable
+        (P, D) points -> (P,) costs: a whole generation at once.
+    lower, upper : (D,) arrays
+        Linear scale, as the paper searches.
+    settings : GeneticSettings, optional
+    progress : callable
+        Told what is being done and the share done, 0...1.
+
+    Raises
+    ------
+    ParameterError
+        If a lower bound is not below its upper bound.
+    MissingExtraError
+        If pymoo is not installed.
+    """
+    chosen = settings or GeneticSettings()
+    low, high = np.array(lower, dtype=float), np.array(upper, dtype=float)
+    reversed_at = np.flatnonzero(~(low < high))
+    if reversed_at.size:
+        i = int(reversed_at[0])
+        raise ParameterError(
+            f"bounds of coordinate {i} run from {low[i]:g} to {high[i]:g}", mend="give the lower bound first"
+        )
+    generations = _generations()
+    outer, boxes, history = (low, high), [], []
+    best, best_cost = (low + high) / 2, np.inf
+    rng = np.random.default_rng(chosen.seed)
+    for round_number in range(chosen.narrowings + 1):
+        boxes.append((low, high))
+        progress(
+            f"genetic search, box {round_number + 1} of {chosen.narrowings + 1}", round_number / (chosen.narrowings + 1)
+        )
+        point, found, costs = generations(cost, low, high, chosen, int(rng.integers(2**31)))
+        history.append(np.minimum(costs, best_cost))
+        if found < best_cost:
+            best, best_cost = point, found
+        half = chosen.narrow_to * (high - low) / 2
+        # The box moves with the best point but stays inside the first one, at full width.
+        centre = np.clip(best, outer[0] + half, outer[1] - half)
+        low, high = centre - half, centre + half
+    total = chosen.population * chosen.generations * len(boxes)
+    message = f"ended after {chosen.generations} generations in each of {len(boxes)} boxes"
+    return GeneticMinimum(best, float(best_cost), total, np.concatenate(history), tuple(boxes), message)
+
+
+def rank_scaling(costs: ArrayLike, parents: int) -> Floats:
+    """Expected number of times each point is chosen, ∝ 1/√rank, summing to the number of parents."""
+    values = np.asarray(costs, dtype=float)
+    rank = np.empty(values.size)
+    rank[np.argsort(values, kind="stable")] = np.arange(1, values.size + 1)
+    expectation = 1 / np.sqrt(rank)
+    return parents * expectation / expectation.sum()
+
+
+def stochastic_uniform(expectation: Floats, parents: int, draw: float) -> np.ndarray:
+    """Choose parents by equal steps along a line on which each point takes its expectation.
+
+    Parameters
+    ----------
+    expectation : (P,) array
+        Summing to `parents`.
+    parents : int
+    draw : float
+        One random number in 0...1: where in the first step to begin.
+
+    Returns
+    -------
+    (parents,) int array
+        Indices, ascending.
+    """
+    wheel = np.cumsum(expectation) / parents
+    pointers = (draw + np.arange(parents)) / parents
+    return np.minimum(np.searchsorted(wheel, pointers, side="right"), expectation.size - 1)
+
+
+def scattered_crossover(mothers: Floats, fathers: Floats, rng: np.random.Generator) -> Floats:
+    """Take every number of a child from either parent, at even odds."""
+    return np.where(rng.random(mothers.shape) < 0.5, mothers, fathers)
+
+
+def uniform_mutation(
+    points: Floats, lower: Floats, upper: Floats, probability: float, rng: np.random.Generator
+) -> Floats:
+    """Draw every number anew from the box with a probability."""
+    return np.where(rng.random(points.shape) < probability, rng.uniform(lower, upper, points.shape), points)
+
+
+def next_generation(
+    points: Floats, costs: Floats, lower: Floats, upper: Floats, settings: GeneticSettings, rng: np.random.Generator
+) -> tuple[Floats, Floats]:
+    """Elite points and children that follow a generation.
+
+    Returns
+    -------
+    elite, children : arrays
+        Together as many as `points`.
+    """
+    elite, crossed, mutated = settings.children
+    needed = 2 * crossed + mutated
+    parents = rng.permutation(stochastic_uniform(rank_scaling(costs, needed), needed, float(rng.random())))
+    pairs = points[parents[: 2 * crossed]]
+    children = scattered_crossover(pairs[::2], pairs[1::2], rng)
+    mutants = uniform_mutation(points[parents[2 * crossed :]], lower, upper, settings.mutation, rng)
+    return points[np.argsort(costs, kind="stable")[:elite]], np.concatenate([children, mutants])
+
+
+def _generations() -> Callable[[Cost, Floats, Floats, GeneticSettings, int], tuple[Floats, float, Floats]]:
+    try:
+        from mrdamper.optimizers.pymoo_scheme import run_generations
+    except ModuleNotFoundError as error:
+        raise MissingExtraError(
+            "the genetic algorithm needs pymoo, which is not installed", mend="pip install 'mrdamper[ga]'"
+        ) from error
+    return run_generations

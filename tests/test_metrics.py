@@ -1,0 +1,36 @@
+import numpy as np
+import pytest
+
+from mrdamper import metrics
+
+
+def test_scores_match_the_vectors(vectors):
+    case = vectors["V15_metrics"]
+    measured, predicted = np.array(case["F_exp"]), np.array(case["F_pred"])
+    expected = {
+        "mean_relative_error": case["mean_rel"],
+        "wape": case["wape"],
+        "rmse": case["rmse"],
+        "nrmse_pp": case["nrmse_range"],
+        "nrmse_std": case["nrmse_std"],
+        "r_squared": case["r2"],
+    }
+    for name, value in expected.items():
+        assert getattr(metrics, name)(measured, predicted) == pytest.approx(value, rel=1e-12), name
+
+
+def test_a_perfect_prediction_scores_zero_and_a_scaled_one_its_scale():
+    t = np.linspace(0, 1, 1001)
+    force, velocity = np.cos(2 * np.pi * t), np.cos(2 * np.pi * t)
+    perfect = metrics.score(force, force, velocity, t)
+    assert (perfect.nrmse_pp, perfect.wape, perfect.peak_error, perfect.energy_error) == (0, 0, 0, 0)
+    scaled = metrics.score(force, 1.1 * force, velocity, t)
+    assert scaled.wape == pytest.approx(0.1)
+    assert scaled.peak_error == pytest.approx(0.1)
+    assert scaled.energy_error == pytest.approx(0.1)
+
+
+def test_dissipated_power_of_a_dashpot():
+    t = np.linspace(0, 2, 4001)
+    velocity = 0.3 * np.cos(2 * np.pi * t)
+    assert metrics.dissipated_power(1000 * velocity, velocity, t) == pytest.approx(1000 * 0.3**2 / 2, rel=1e-6)
