@@ -22,7 +22,7 @@ bench: $(VENV)/.dev  ## timings beside the peers that are installed
 	$(BIN)/python -m benchmarks
 
 lint: $(VENV)/.dev  ## format check, lint, types, import order of the layers
-	$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/pyright && $(BIN)/lint-imports
+	$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/pyright --pythonpath $(BIN)/python && $(BIN)/lint-imports
 
 format: $(VENV)/.dev  ## format and mend what ruff can mend
 	$(BIN)/ruff format . && $(BIN)/ruff check --fix .

@@ -56,7 +56,7 @@ class Excitation:
         """The motion cut into strokes."""
         return Path.of(self.displacement)
 
-    def part(self, mask: ArrayLike) -> Excitation:
+    def part(self, mask: ArrayLike | slice) -> Excitation:
         """The samples selected by a mask, slice or index."""
         pick = {name: getattr(self, name)[mask] for name in self.__dataclass_fields__}
         return Excitation(**pick)

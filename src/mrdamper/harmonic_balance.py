@@ -119,7 +119,8 @@ def read_force(
     offset : {"extremes", "mean"}
         f0 is the mid-point of maximum and minimum (the paper's), or the mean over the cycles.
     """
-    series = fit_harmonics(record.theta, record.force, 25, frequency=1 / (2 * np.pi))
+    # No drift: over a few cycles a line is not orthogonal to the sines and would take part of them.
+    series = fit_harmonics(record.theta, record.force, 25, frequency=1 / (2 * np.pi), drift=False)
     top, bottom = _extremes(record)
     sizes = {
         "first-harmonic": series.amplitude(1),

@@ -88,7 +88,7 @@ class Condensed:
             ]
         )
         rows = np.arange(t.size)
-        return sum(w[:, None, None] * self.gram[rows, first + j] for j, w in enumerate(weights))
+        return np.sum([w[:, None, None] * self.gram[rows, first + j] for j, w in enumerate(weights)], axis=0)
 
 
 def condense(runs: Sequence[Run], model_type: type[Model]) -> Condensed:
@@ -188,6 +188,7 @@ def fit_jointly(
     centre = np.array(start.coefficients) * scale
     reach = np.full(centre.size, 6.0)
     weights = np.ones(data.scale.size)
+    solution = design.solve(data.at(shape_values(centre)), weights)
     for _ in range(reweightings):
 
         def residual(u: Floats, weights: Floats = weights) -> Floats:

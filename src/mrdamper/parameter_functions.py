@@ -39,7 +39,7 @@ class Term:
     decay_f: int | None = None
     power_f: int | None = None
 
-    def __call__(self, I: Floats, f: Floats, A: Floats, rates: Sequence[float]) -> Floats:  # noqa: E741
+    def __call__(self, I: Floats, f: Floats, A: Floats, rates: Sequence[float]) -> Floats:
         value = I**self.current * f**self.frequency * A**self.amplitude
         if self.decay_I is not None:
             value = value * np.exp(-rates[self.decay_I] * I)
@@ -81,7 +81,7 @@ class Form:
     rate_bounds: tuple[tuple[float, float], ...] = ()
     source: str = ""
 
-    def columns(self, I: Floats, f: Floats, A: Floats, rates: Sequence[float]) -> Floats:  # noqa: E741
+    def columns(self, I: Floats, f: Floats, A: Floats, rates: Sequence[float]) -> Floats:
         """(N, terms) array of the terms."""
         return np.column_stack([term(I, f, A, rates) for term in self.terms])
 
@@ -169,9 +169,9 @@ class ParameterFunction:
 
     def __call__(self, current: ArrayLike, frequency: ArrayLike, amplitude: ArrayLike) -> Floats:
         """Parameter at currents [A], frequencies [Hz] and amplitudes [m], broadcast together."""
-        arrays = np.broadcast_arrays(*(np.asarray(a, dtype=float) for a in (current, frequency, amplitude)))
-        columns = form_named(self.form).columns(*(a.ravel() for a in arrays), self.rates)
-        value = (columns @ np.array(self.coefficients)).reshape(arrays[0].shape)
+        I, f, A = np.broadcast_arrays(*(np.asarray(a, dtype=float) for a in (current, frequency, amplitude)))
+        columns = form_named(self.form).columns(I.ravel(), f.ravel(), A.ravel(), self.rates)
+        value = (columns @ np.array(self.coefficients)).reshape(I.shape)
         return np.exp(value) if self.log else value
 
     @property
@@ -250,7 +250,7 @@ def fit_function(
         amplitudes.
     """
     chosen = form_named(form) if isinstance(form, str) else form
-    I, f, A = features(conditions)  # noqa: E741
+    I, f, A = features(conditions)
     target = np.asarray(values, dtype=float)
     if log:
         target = np.log(target)
@@ -400,7 +400,7 @@ def require_determined(form: str, conditions: Sequence[Condition]) -> None:
         Also where the form has rates, which only a fit can settle.
     """
     chosen = form_named(form)
-    I, f, A = features(conditions)  # noqa: E741
+    I, f, A = features(conditions)
     if chosen.rate_bounds:
         raise IdentificationError(f"{form} has rates to search", mend="choose a form without")
     if len(conditions) < len(chosen.terms) or not _determined(chosen.columns(I, f, A, ())):
@@ -429,7 +429,7 @@ def _weights(uncertainty: ArrayLike | None, target: Floats) -> Floats:
     return floor / np.maximum(np.where(np.isfinite(errors), errors, known.max()), floor)
 
 
-def _undetermined(form: Form, found: str, I: Floats, f: Floats, A: Floats) -> IdentificationError:  # noqa: E741
+def _undetermined(form: Form, found: str, I: Floats, f: Floats, A: Floats) -> IdentificationError:
     levels = [len(np.unique(np.round(column, 3))) for column in (I, f, 1e3 * A)]
     return IdentificationError(
         f"{form.name} has {len(form.terms) + len(form.rate_bounds)} coefficients and {found}: "

@@ -133,7 +133,7 @@ class Study:
         if len(self.rigs) > 1:
             names = ", ".join(r.rig for r in self.rigs)
             raise IdentificationError(f"the dataset holds {len(self.rigs)} rigs", mend=f"use study.rig(name): {names}")
-        return self.rigs[0].damper
+        return next(iter(self.rigs)).damper
 
     def rig(self, name: str) -> RigStudy:
         """The study of one rig."""

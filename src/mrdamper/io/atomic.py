@@ -30,7 +30,7 @@ def write_folder(folder: str | Path) -> Iterator[Path]:
         yield work
         if final.exists():
             final.rmdir()
-        os.replace(work, final)
+        work.replace(final)
 
 
 @contextmanager
@@ -51,7 +51,7 @@ def write_into(folder: str | Path) -> Iterator[Path]:
             for source in sorted(p for p in work.rglob("*") if p.is_file()):
                 target = final / source.relative_to(work)
                 target.parent.mkdir(parents=True, exist_ok=True)
-                os.replace(source, target)
+                source.replace(target)
         except OSError as error:
             raise OutputError(error.strerror or str(error), where=str(final), mend="choose another folder") from error
 
@@ -71,7 +71,7 @@ def write_file(path: str | Path) -> Iterator[Path]:
     with _temporary_beside(final) as work:
         inner = work / final.name
         yield inner
-        os.replace(inner, final)
+        inner.replace(final)
 
 
 def require_writable(path: str | Path) -> None:

@@ -185,7 +185,7 @@ def _run(row: dict[str, Any], samples: pl.DataFrame, folder: Path) -> Run:
         time=channels["time_s"],
         displacement=channels["displacement_m"],
         force=channels["force_N"],
-        current=current,
+        current=np.asarray(current, dtype=float),
         velocity=channels.get("velocity_m_s"),
         rig=row.get("rig") or "",
         excitation=row.get("excitation") or "sine",

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from mrdamper.damper import Damper, Envelope
+from mrdamper.data import Condition
 from mrdamper.errors import InputError, ModelFileError
 from mrdamper.io.atomic import write_file
 from mrdamper.models import model_type
@@ -66,7 +67,7 @@ class _Document(_Strict):
     units: dict[str, str]
     envelope: _Envelope
     provenance: dict[str, str]
-    damper: Annotated[_Modified, Field(discriminator="kind")] if False else _Modified  # one kind so far
+    damper: _Modified
 
 
 def save_model(damper: Damper, path: str | Path) -> None:
@@ -164,13 +165,7 @@ def _restore(document: _Document) -> Damper:
     )
     middle = {name: (low + high) / 2 for name, (low, high) in document.envelope.model_dump().items()}
     try:
-        damper.parameters.at(_condition(middle))
+        damper.parameters.at(Condition(middle["current_A"], middle["frequency_Hz"], middle["amplitude_m"]))
     except TypeError as error:
         raise ModelFileError(f"functions do not fit the model: {error}", mend="write the model again") from error
     return damper
-
-
-def _condition(middle: dict[str, float]):
-    from mrdamper.data import Condition
-
-    return Condition(middle["current_A"], middle["frequency_Hz"], middle["amplitude_m"])

@@ -115,9 +115,10 @@ class BoucWen(Model):
                 given["beta"] = length**-n - given["gamma"]
             else:
                 shape = Shape(1 / length, given.pop("asymmetry", 0.0), n)
-                given["beta"], given["gamma"] = shape.to_bouc_wen()
+                beta, gamma = shape.to_bouc_wen()
+                given["beta"], given["gamma"] = float(beta), float(gamma)
         elif "gamma" not in given:
             given["gamma"] = given["beta"]
         if (force := given.pop("yield_force", None)) is not None:
-            given["alpha"] = force * (given["beta"] + given["gamma"]) ** (1 / n)
+            given["alpha"] = float(force * (given["beta"] + given["gamma"]) ** (1 / n))
         return cls(**given)

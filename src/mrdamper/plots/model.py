@@ -98,7 +98,7 @@ def score_strip(validations: Mapping[str, Validation]) -> Figure:
     """nrmse_pp of every run, one row a model and split; the bar is the median, the tick the run's floor."""
     with house_style():
         figure, (axes,) = new_figure(1, 1, 0.8 + 0.3 * len(validations), left=2.6)
-        for row, (name, validation) in enumerate(validations.items()):
+        for row, validation in enumerate(validations.values()):
             colour = PALETTE[1 + row % (len(PALETTE) - 2)]
             values = 100 * np.array([run.scores.nrmse_pp for run in validation.runs])
             floors = [100 * run.floor for run in validation.runs if run.floor is not None]

@@ -6,6 +6,7 @@ import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -20,7 +21,7 @@ MEASURED, PREDICTED = PALETTE[0], PALETTE[2]
 WIDTH = 7.2  # inches, two journal columns
 MM, KN = 1e3, 1e-3
 
-_RC = {
+_RC: dict[Any, Any] = {
     "font.size": 9,
     "font.family": "sans-serif",
     "font.sans-serif": ["Arial", "Helvetica", "DejaVu Sans"],
@@ -80,11 +81,11 @@ def new_figure(
     return figure, list(axes.ravel())
 
 
-def current_colours(currents: Sequence[float]) -> dict[float, tuple[float, ...]]:
+def current_colours(currents: Sequence[float]) -> dict[float, tuple[float, float, float, float]]:
     """One colour a current, dark to light with rising current."""
     levels = sorted(set(currents))
     shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, max(len(levels), 2)))
-    return {level: tuple(shades[i]) for i, level in enumerate(levels)}
+    return {level: tuple(shades[i]) for i, level in enumerate(levels)}  # type: ignore[misc]
 
 
 def label(axes: Axes, x: str, y: str, title: str = "") -> None:

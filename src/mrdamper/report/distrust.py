@@ -101,7 +101,8 @@ def _tests(loops: Sequence[LoopAnalysis]) -> list[str]:
     if distorted:
         worst = max(loop.motion.distortion for loop in distorted)
         sentences.append(
-            f"In {len(distorted)} of {len(loops)} runs the motion is no pure sine (distortion up to {100 * worst:.0f} %): "
+            f"In {len(distorted)} of {len(loops)} runs the motion is no pure sine "
+            f"(distortion up to {100 * worst:.0f} %): "
             "identification in time allows for it, harmonic balance would not."
         )
     drifting = [loop.run_id for loop in loops if abs(loop.motion.drift) > 1e-4]

@@ -134,7 +134,7 @@ class Paper(Method):
         """Grid over the yield displacement, then refinement; alpha is linear and solved for."""
         (low, high), (_, steepest) = self.bounds
         X = rest.record.condition.amplitude_m
-        edge = np.log([max(rest.length(steepest), 1e-6 * X), 20 * X])
+        edge = np.log([max(rest.length(steepest), 1e-6 * X), min(20 * X, rest.longest)])
 
         def residual(u: Floats) -> Floats:
             z = rest.state(rest.beta(float(np.exp(u[0]))))
@@ -203,6 +203,12 @@ class _Rest:
     def length(self, beta: float) -> float:
         """Yield displacement [m] of a beta."""
         return self._model(beta).yield_displacement
+
+    @property
+    def longest(self) -> float:
+        """Yield displacement [m] at which a gamma that is held leaves nothing for beta."""
+        gamma = self.problem.fixed.get("gamma", 0.0)
+        return 0.999 * gamma ** (-1 / self.problem.fixed["n"]) if gamma > 0 else np.inf
 
     def _model(self, beta: float) -> BoucWen:
         fixed = {name: self.problem.fixed[name] for name in ("gamma", "n") if name in self.problem.fixed}

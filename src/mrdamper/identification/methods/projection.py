@@ -141,8 +141,8 @@ def _least_norm(columns: Floats, right: Floats) -> Floats:
     # this is several times faster than an orthogonal factorisation of N rows.
     normal = columns.T @ columns
     if normal.size and np.linalg.cond(normal) < 1e10:
-        return np.linalg.solve(normal, columns.T @ right)
-    return np.linalg.lstsq(columns, right, rcond=None)[0]
+        return np.asarray(np.linalg.solve(normal, columns.T @ right), dtype=float)
+    return np.asarray(np.linalg.lstsq(columns, right, rcond=None)[0], dtype=float)
 
 
 def _axes(problem: Problem) -> tuple[SearchAxis, ...]:
