@@ -1,333 +1,313 @@
-"""One identification over all runs at once, for models whose loop has one shape coordinate.
+"""Joint identification: one model of a whole damper, from all its runs at once.
 
-Given the shape coordinate (the yield displacement), a run's squared error is a quadratic
-form in the linear parameters. Each run is therefore condensed once into small Gram matrices
-on a ladder of shape values; after that, fits over all runs, other parameter functions and
-leave-one-condition-out cost milliseconds, because no sample is touched again.
-
-Runs count by their own force scale, and the sum of run RMSEs is minimised, not of squares:
-a run from a drifting session then pulls less (iteratively reweighted least squares).
+The model takes the current as an input and neither frequency nor amplitude, so every run
+informs every parameter, and the result predicts any motion. Linear parameters are projected
+out; the others are refined by Levenberg–Marquardt from the model's start. Each run counts by
+its own peak-to-peak force, and the sum of the run errors is minimised, not of their squares,
+so that one drifting session cannot bend the model (iteratively reweighted).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 
+from mrdamper.damper import Damper, Envelope
 from mrdamper.data import Condition, Floats, Run
-from mrdamper.errors import IdentificationError
-from mrdamper.identification import Problem
-from mrdamper.models import Model
+from mrdamper.errors import IdentificationError, RunError
+from mrdamper.excitation import Excitation, equivalent_sine, measured_motion
+from mrdamper.identification.linear import bounded_linear, bounds_of, linear_table
+from mrdamper.models import Model, SearchAxis, model_type
 from mrdamper.optimizers.levenberg_marquardt import least_squares
-from mrdamper.parameter_functions import (
-    FORMS,
-    ParameterFunction,
-    ParameterMap,
-    features,
-    fit_function,
-    require_determined,
-)
+from mrdamper.simulation import Response, simulate, steady_loop
 
-_LADDER = np.geomspace(2e-6, 3e-3, 41)  # yield displacements [m]; between them Gram matrices are interpolated
-_RIDGE = 1e-7  # interpolated Gram matrices of nearly parallel columns may lose positivity by less
+_ROWS = 400  # samples of a run that enter the least squares; its motion is followed in full
+_CYCLES = 4  # of a sine that enter: more repeat the same
+_WARM_UP = 1.5  # cycles before the scored samples in which the model forgets its start
+_SETTLED = 1e-6  # relative gain of a step at which the search ends
+_BEST = 1e-3  # nrmse_pp below which a run gains no more weight
 
 
 @dataclass(frozen=True, eq=False)
-class Condensed:
-    """Runs of one rig, condensed for one model type.
+class JointDamper(Damper):
+    """One model for all currents and motions of a damper.
 
     Attributes
     ----------
-    model_type : type of Model
-    linear : tuple of str
-        Coordinates the force is linear in, in the order of the Gram matrices.
-    shape : str
-        The one shape coordinate.
-    run_ids : tuple of str, length R
-    conditions : tuple of Condition, length R
-    scale : (R,) array
-        Peak-to-peak force [N].
-    gram : (R, K, L+1, L+1) array
-        Mean products of the columns and, last, the measured force over its peak-to-peak
-        value, at each value of the ladder.
+    rig : str
+    model : Model
+        Takes the current from the motion.
+    free : tuple of str
+        Parameters determined from the data.
+    envelope : Envelope
+    provenance : mapping
     """
 
-    model_type: type[Model]
-    linear: tuple[str, ...]
-    shape: str
-    run_ids: tuple[str, ...]
-    conditions: tuple[Condition, ...]
-    scale: Floats
-    gram: Floats
+    kind: ClassVar[str] = "joint"
 
-    def only(self, rows: Sequence[int]) -> Condensed:
-        """The same for some of the runs."""
-        index = list(rows)
-        return replace(
-            self,
-            run_ids=tuple(self.run_ids[i] for i in index),
-            conditions=tuple(self.conditions[i] for i in index),
-            scale=self.scale[index],
-            gram=self.gram[index],
-        )
+    rig: str
+    model: Model
+    free: tuple[str, ...]
+    envelope: Envelope
+    provenance: Mapping[str, str] = field(default_factory=dict)
 
-    def at(self, shape_values: Floats) -> Floats:
-        """(R, L+1, L+1) Gram matrices at one shape value a run: cubic in its logarithm."""
-        logs = np.log(_LADDER)
-        u = np.clip((np.log(shape_values) - logs[0]) / (logs[1] - logs[0]), 0, _LADDER.size - 1)
-        first = np.clip(np.floor(u).astype(int) - 1, 0, _LADDER.size - 4)
-        t = u - first
-        weights = np.stack(
-            [
-                -(t - 1) * (t - 2) * (t - 3) / 6,
-                t * (t - 2) * (t - 3) / 2,
-                -t * (t - 1) * (t - 3) / 2,
-                t * (t - 1) * (t - 2) / 6,
-            ]
-        )
-        rows = np.arange(t.size)
-        return np.sum([w[:, None, None] * self.gram[rows, first + j] for j, w in enumerate(weights)], axis=0)
+    @property
+    def title(self) -> str:
+        return self.model.title
 
+    @property
+    def parameter_count(self) -> int:
+        return len(self.free)
 
-def condense(runs: Sequence[Run], model_type: type[Model]) -> Condensed:
-    """Condense runs for a model type whose search has one axis.
+    def loop(self, condition: Condition) -> Response:
+        return steady_loop(self.model, condition)
 
-    Raises
-    ------
-    IdentificationError
-        If the model has no such single axis, or there are no runs.
-    """
-    if not runs:
-        raise IdentificationError("no runs", mend="give at least one")
-    problems = [Problem.of(run, model_type) for run in runs]
-    axes = model_type.search_axes(1.0, problems[0].free)
-    coordinates = tuple(model_type.map_forms())
-    if len(axes) > 1 or not {axis.name for axis in axes} <= set(coordinates):
-        raise IdentificationError(
-            f"{model_type.title} is searched along {len(axes)} axes", mend="fix all shape parameters but one"
-        )
-    shape = axes[0].name if axes else ""
-    linear = tuple(name for name in coordinates if name != shape)
-    gram = np.stack([_gram(problem, linear, shape) for problem in problems])
-    return Condensed(
-        model_type,
-        linear,
-        shape,
-        tuple(run.id for run in runs),
-        tuple(problem.analysis.condition for problem in problems),
-        np.array([np.ptp(problem.force) for problem in problems]),
-        gram,
-    )
-
-
-def _gram(problem: Problem, linear: tuple[str, ...], shape: str) -> Floats:
-    seen = problem.motion.part(problem.scored)
-    target = problem.force / np.ptp(problem.force)
-    matrices = []
-    for value in _LADDER if shape else _LADDER[:1]:
-        point = {**problem.fixed, **({shape: float(value)} if shape else {}), **dict.fromkeys(linear, 0.0)}
-        bare = problem.model_type.build(point)
-        state = bare.state(problem.motion)[problem.scored]
-        base = bare.force(seen, state)
-        columns = [problem.model_type.build({**point, name: 1.0}).force(seen, state) - base for name in linear]
-        table = np.column_stack([*columns, target])
-        matrices.append(table.T @ table / target.size)
-    if not shape:
-        matrices *= _LADDER.size
-    return np.stack(matrices)
+    def force_along(self, motion: Excitation, condition: Condition) -> Floats:
+        return simulate(self.model, motion).force
 
 
 @dataclass(frozen=True, eq=False)
 class JointFit:
-    """A parameter map fitted to all runs at once.
+    """A joint identification.
 
     Attributes
     ----------
-    parameters : ParameterMap
+    damper : JointDamper
     nrmse_pp : (R,) array
-        Error of each run (of the condensed runs; the linear parameters unbounded).
+        Error of each run, on the samples that entered.
+    at_bounds : tuple of str
+    point : (D,) array
+        Where the search ended, on its axes.
+    message : str
+    evaluations : int
+    seconds : float
     """
 
-    parameters: ParameterMap
+    damper: JointDamper
     nrmse_pp: Floats
+    at_bounds: tuple[str, ...]
+    point: Floats
+    message: str
+    evaluations: int
+    seconds: float
 
 
-def fit_jointly(
-    data: Condensed,
-    forms: Mapping[str, str],
-    start: ParameterFunction | None,
-    *,
-    reweightings: int = 6,
-    most_steps: int = 12,
-) -> JointFit:
-    """Fit the coefficients of all parameter functions to all runs at once.
+class JointProblem:
+    """Runs of one rig prepared for one model type.
+
+    All runs are strung into one motion: a model with fading memory forgets one run while it
+    follows the next from 1.5 cycles before its scored samples, and one long array is followed
+    faster than many short ones.
 
     Parameters
     ----------
-    data : Condensed
-    forms : mapping of str to str
-        Form of each coordinate.
-    start : ParameterFunction or None
-        Of the shape coordinate, to start from; its form and rates are used. None for models
-        without one.
-    reweightings, most_steps : int
-        Effort: rounds of robust weights, steps of the search in each.
+    runs : sequence of Run
+        Of one rig; any motion, any current.
+    model : str or type of Model
+    fixed : mapping, optional
+        Parameters held at a value.
+
+    Raises
+    ------
+    IdentificationError
+        If there are no runs, or runs of several rigs.
     """
-    design = _Design(data, forms)
-    if start is None:
-        solution = _reweighted(design, data.at(np.full(data.scale.size, _LADDER[0])), reweightings)
-        return _finish(design, solution, {})
-    columns = FORMS[start.form].columns(*features(data.conditions), start.rates)
-    scale = np.linalg.norm(columns, axis=0) / np.sqrt(columns.shape[0])
 
-    def shape_values(u: Floats) -> Floats:
-        return np.exp(np.clip(columns @ (u / scale), np.log(_LADDER[0]), np.log(_LADDER[-1])))
+    def __init__(self, runs: Sequence[Run], model: str | type[Model], fixed: Mapping[str, float] | None = None):
+        if not runs:
+            raise IdentificationError("no runs", mend="give at least one")
+        rigs = {run.rig for run in runs}
+        if len(rigs) > 1:
+            raise IdentificationError(f"runs of {len(rigs)} rigs", mend="identify one rig at a time")
+        self.rig = rigs.pop()
+        self.model_type = model_type(model) if isinstance(model, str) else model
+        self.fixed = dict(fixed or {})
+        infos = self.model_type.parameters()
+        self.free = tuple(info.name for info in infos if info.name not in self.fixed)
+        self.linear = [info for info in infos if info.linear and info.name in self.free]
+        self.axes: tuple[SearchAxis, ...] = self.model_type.search_axes(1e-2, self.free)
+        self.parts = [_Part.of(run) for run in runs]
 
-    centre = np.array(start.coefficients) * scale
-    reach = np.full(centre.size, 6.0)
-    weights = np.ones(data.scale.size)
-    solution = design.solve(data.at(shape_values(centre)), weights)
-    for _ in range(reweightings):
+    @property
+    def start(self) -> Floats:
+        """(D,) the model's start on the search axes."""
+        return np.array([axis.coordinate(axis.grid[0]) for axis in self.axes])
 
-        def residual(u: Floats, weights: Floats = weights) -> Floats:
-            return design.solve(data.at(shape_values(u)), weights).residual
+    def fit(
+        self, rows: Sequence[int] | None = None, start: Floats | None = None, rounds: int = 3, most_steps: int = 15
+    ) -> JointFit:
+        """Identify from all runs, or from those at some indices.
 
-        found = least_squares(residual, centre, centre - reach, centre + reach, most_steps=most_steps)
-        centre = found.point
-        solution = design.solve(data.at(shape_values(centre)), weights)
-        weights = 1.0 / np.sqrt(np.maximum(solution.nrmse_pp, 1e-4))
-    function = ParameterFunction(start.form, tuple((centre / scale).tolist()), start.rates, log=True)
-    return _finish(design, solution, {data.shape: function})
+        Parameters
+        ----------
+        rows : sequence of int, optional
+        start : (D,) array, optional
+            Where to begin on the search axes: the result of a fit to more runs, say.
+        rounds, most_steps : int
+            Rounds of robust weights, and steps of the search in each.
+        """
+        begin = time.perf_counter()
+        table = _Table(self, self.parts if rows is None else [self.parts[i] for i in rows])
+        lower, upper = self._box()
+        point = self.start if start is None else start
+        evaluations, message = 0, "solved: every parameter is linear"
+        for _ in range(rounds):
+            if self.axes:
+                found = least_squares(lambda u: table.solve(u).residual, point, lower, upper, most_steps, _SETTLED)
+                point, message = found.point, found.message
+                evaluations += found.evaluations
+            table.weights = 1.0 / np.sqrt(np.maximum(table.solve(point).nrmse_pp, _BEST))
+        solved = table.solve(point)
+        at_bounds = [axis.name for axis, u in zip(self.axes, point, strict=True) if axis.at_bound(float(u))]
+        return JointFit(
+            self._damper(solved.model, table.parts),
+            solved.nrmse_pp,
+            (*at_bounds, *solved.held),
+            point,
+            message,
+            evaluations,
+            time.perf_counter() - begin,
+        )
+
+    def without(self, fit: JointFit, rows: Sequence[int]) -> JointDamper:
+        """The damper had some runs been missing: one Gauss–Newton step from the fit to all.
+
+        Leaving out one condition of many moves the parameters little, and one step from the
+        full fit then lands where a new search would, at no cost worth counting.
+
+        Parameters
+        ----------
+        fit : JointFit
+            To all runs of this problem.
+        rows : sequence of int
+            Runs to keep.
+        """
+        residual, jacobian, owner = self._linearised(fit)
+        kept = np.isin(owner, list(rows))
+        step = np.linalg.lstsq(jacobian[kept], -residual[kept], rcond=1e-12)[0]
+        lower, upper = self._box()
+        table = _Table(self, [self.parts[i] for i in rows])
+        table.weights = 1.0 / np.sqrt(np.maximum(fit.nrmse_pp[list(rows)], _BEST))
+        solved = table.solve(np.clip(fit.point + step[: len(self.axes)], lower, upper))
+        return self._damper(solved.model, table.parts)
+
+    def _linearised(self, fit: JointFit) -> tuple[Floats, Floats, Floats]:
+        """Residual at a fit, its derivatives by all free parameters, and the run of each row."""
+        if self._linearisation is None or self._linearisation[0] is not fit:
+            table = _Table(self, self.parts)
+            table.weights = 1.0 / np.sqrt(np.maximum(fit.nrmse_pp, _BEST))
+            self._linearisation = (fit, *table.linearise(fit.point, fit.damper.model))
+        return self._linearisation[1:]
+
+    _linearisation: tuple[JointFit, Floats, Floats, Floats] | None = None
+
+    def _damper(self, model: Model, parts: Sequence[_Part]) -> JointDamper:
+        about = {"runs": str(len(parts)), "fit": "joint, all runs at once"}
+        return JointDamper(self.rig, model, self.free, Envelope.of([p.condition for p in parts]), about)
+
+    def _box(self) -> tuple[Floats, Floats]:
+        return (
+            np.array([axis.coordinate(axis.lower) for axis in self.axes]),
+            np.array([axis.coordinate(axis.upper) for axis in self.axes]),
+        )
+
+    def bare(self, point: Floats) -> Model:
+        """The model at a point of the search axes, its linear parameters zero."""
+        values = {axis.name: axis.value(float(u)) for axis, u in zip(self.axes, point, strict=True)}
+        return self.model_type.build({**self.fixed, **values, **{info.name: 0.0 for info in self.linear}})
 
 
-def leave_out_errors(
-    data: Condensed, fit: JointFit, groups: Sequence[Sequence[int]], forms: Mapping[str, str]
-) -> Floats:
-    """(R,) nrmse_pp of runs whose group was left out of the linear coefficients.
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A run's motion from shortly before its steady window on, and the samples that are scored."""
 
-    The shape function stays that of the whole fit: quick, for choosing forms, not a final score.
-    """
-    design = _Design(data, forms)
-    shapes = (
-        fit.parameters.functions[data.shape](*features(data.conditions))
-        if data.shape
-        else np.full(data.scale.size, _LADDER[0])
-    )
-    gram = data.at(shapes)
-    weights = 1.0 / np.sqrt(np.maximum(fit.nrmse_pp, 1e-4))
-    errors = np.zeros(data.scale.size)
-    for group in groups:
-        kept = weights.copy()
-        kept[list(group)] = 0.0
-        solution = design.solve(gram, kept)
-        errors[list(group)] = solution.nrmse_pp[list(group)]
-    return errors
+    motion: Excitation
+    picked: Floats
+    target: Floats
+    condition: Condition
+    scale: float
+
+    @classmethod
+    def of(cls, run: Run) -> _Part:
+        found = equivalent_sine(run)
+        motion = measured_motion(run).about(found.centre)
+        first, last = (int(i) for i in np.flatnonzero(run.in_window)[[0, -1]])
+        period = 1 / found.condition.frequency_Hz
+        if found.is_sine:
+            first = max(first, int(np.searchsorted(run.time, run.time[last] - _CYCLES * period)))
+        begin = int(np.searchsorted(run.time, run.time[first] - _WARM_UP * period))
+        picked = np.arange(first, last + 1, max(1, (last + 1 - first) // _ROWS))
+        scale = float(np.ptp(run.force[first : last + 1]))
+        if scale == 0:
+            raise RunError("the force does not change", where=f"run {run.id}", mend="leave the run out")
+        return cls(motion.part(slice(begin, last + 1)), picked - begin, run.force[picked], found.condition, scale)
 
 
-@dataclass(frozen=True)
-class _Solution:
-    coefficients: Floats
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    model: Model
     residual: Floats
     nrmse_pp: Floats
+    held: tuple[str, ...]
 
 
-class _Design:
-    """Linear coordinates of every run as a matrix times the coefficients of all functions."""
+class _Table:
+    """Some runs strung together, with the weight of each."""
 
-    def __init__(self, data: Condensed, forms: Mapping[str, str]):
-        self.data = data
-        self.forms = {name: FORMS[forms[name]] for name in data.linear}
-        blocks = [form.columns(*features(data.conditions), ()) for form in self.forms.values()]
-        self.sizes = [block.shape[1] for block in blocks]
-        runs, total = data.scale.size, sum(self.sizes)
-        self.matrix = np.zeros((runs, len(blocks) + 1, total + 1))
-        at = 0
-        for row, block in enumerate(blocks):
-            # The Gram matrices hold forces over each run's peak-to-peak value.
-            self.matrix[:, row, at : at + block.shape[1]] = block / data.scale[:, None]
-            at += block.shape[1]
-        self.matrix[:, -1, -1] = 1.0
+    def __init__(self, problem: JointProblem, parts: Sequence[_Part]):
+        self.problem, self.parts = problem, parts
+        self.motion = string(part.motion for part in parts)
+        offsets = np.cumsum([0, *(len(part.motion) for part in parts)])
+        self.picked = np.concatenate([part.picked + at for part, at in zip(parts, offsets[:-1], strict=True)])
+        self.seen = self.motion.part(self.picked)
+        self.target = np.concatenate([part.target for part in parts])
+        self.owner = np.repeat(np.arange(len(parts)), [part.target.size for part in parts])
+        # Divides residuals so that their squares sum to each run's nrmse_pp².
+        self.size = np.array([part.scale * np.sqrt(part.target.size) for part in parts])
+        self.weights = np.ones(len(parts))
 
-    def solve(self, gram: Floats, weights: Floats) -> _Solution:
-        """Coefficients of least weighted squares; residuals are those of the condensed runs."""
-        size = np.sqrt(np.maximum(np.einsum("rii->ri", gram), 1e-300))
-        scaled = gram / size[:, :, None] / size[:, None, :]
-        factor = np.linalg.cholesky(scaled + _RIDGE * np.eye(gram.shape[1])).transpose(0, 2, 1) * size[:, None, :]
-        table = factor @ self.matrix
-        weighted = (weights[:, None, None] * table).reshape(-1, table.shape[2])
-        norm = np.linalg.norm(weighted[:, :-1], axis=0)
-        norm[norm == 0] = 1.0
-        solution = np.linalg.lstsq(weighted[:, :-1] / norm, weighted[:, -1], rcond=1e-10)[0] / norm
-        error = table[:, :, :-1] @ solution - table[:, :, -1]
-        return _Solution(solution, (weights[:, None] * error).ravel(), np.sqrt(np.sum(error**2, axis=1)))
+    def solve(self, point: Floats) -> _Solved:
+        """Linear parameters of least weighted squares at a point of the search axes."""
+        linear = self.problem.linear
+        bare = self.problem.bare(point)
+        base, columns = linear_table(bare, linear, self.seen, bare.state(self.motion)[self.picked])
+        factor = (self.weights / self.size)[self.owner]
+        columns, right = columns * factor[:, None], (self.target - base) * factor
+        solution, held = bounded_linear(columns, right, *bounds_of(linear))
+        residual = columns @ solution - right
+        errors = np.sqrt(np.bincount(self.owner, residual**2)) / self.weights
+        model = replace(bare, **{i.name: float(s) for i, s in zip(linear, solution, strict=True)})
+        return _Solved(model, residual, errors, tuple(i.name for i, h in zip(linear, held, strict=True) if h))
 
+    def linearise(self, point: Floats, model: Model) -> tuple[Floats, Floats, Floats]:
+        """Weighted residual of a model, derivatives by search axes and linear parameters, owners."""
+        factor = (self.weights / self.size)[self.owner]
+        linear = {info.name: getattr(model, info.name) for info in self.problem.linear}
 
-def _reweighted(design: _Design, gram: Floats, reweightings: int) -> _Solution:
-    weights = np.ones(gram.shape[0])
-    solution = design.solve(gram, weights)
-    for _ in range(reweightings):
-        weights = 1.0 / np.sqrt(np.maximum(solution.nrmse_pp, 1e-4))
-        solution = design.solve(gram, weights)
-    return solution
+        def residual(u: Floats) -> Floats:
+            moved = replace(self.problem.bare(u), **linear)
+            return (moved.force(self.seen, moved.state(self.motion)[self.picked]) - self.target) * factor
 
-
-def _finish(design: _Design, solution: _Solution, functions: dict[str, ParameterFunction]) -> JointFit:
-    parts = np.split(solution.coefficients, np.cumsum(design.sizes)[:-1])
-    for (name, form), values in zip(design.forms.items(), parts, strict=True):
-        functions[name] = ParameterFunction(form.name, tuple(values.tolist()))
-    ordered = {name: functions[name] for name in design.data.model_type.map_forms()}
-    return JointFit(ParameterMap(design.data.model_type, ordered), solution.nrmse_pp)
-
-
-def choose_forms(
-    data: Condensed, candidates: Mapping[str, Sequence[str]], groups: Sequence[Sequence[int]], shape_values: Floats
-) -> tuple[dict[str, str], JointFit]:
-    """Choose every coordinate's form by how well left-out conditions are predicted.
-
-    Starting from the shortest forms, one coordinate at a time tries its candidates; a change
-    must lower the mean left-out error by a fiftieth. Two passes.
-
-    Parameters
-    ----------
-    data : Condensed
-    candidates : mapping of str to sequence of str
-        Forms by coordinate, shortest first.
-    groups : sequence of sequences of int
-        Runs that are left out together.
-    shape_values : (R,) array
-        Shape coordinate identified run by run, to start from.
-
-    Returns
-    -------
-    forms : dict
-    fit : JointFit
-    """
-    forms = {name: options[0] for name, options in candidates.items()}
-    fit, best = _tried(data, forms, groups, shape_values)
-    for _ in range(2):
-        before = dict(forms)
-        for name, options in candidates.items():
-            for option in options:
-                if option == forms[name]:
-                    continue
-                try:
-                    trial_fit, error = _tried(data, {**forms, name: option}, groups, shape_values)
-                except IdentificationError:
-                    continue  # the tests cannot tell this form's terms apart
-                if error < 0.98 * best:
-                    forms, fit, best = {**forms, name: option}, trial_fit, error
-        if forms == before:
-            break
-    return forms, fit_jointly(data, forms, fit.parameters.functions.get(data.shape))
+        r = residual(point)
+        lower, upper = self.problem._box()
+        steps = 1e-6 * (upper - lower)
+        slopes = [(residual(point + s) - r) / d for s, d in zip(np.diag(steps), steps, strict=True)]
+        bare = self.problem.bare(point)
+        state = bare.state(self.motion)[self.picked]
+        columns = linear_table(bare, self.problem.linear, self.seen, state)[1] * factor[:, None]
+        return r, np.column_stack([*slopes, columns]), self.owner
 
 
-def _tried(
-    data: Condensed, forms: Mapping[str, str], groups: Sequence[Sequence[int]], shape_values: Floats
-) -> tuple[JointFit, float]:
-    for name in data.linear:
-        require_determined(forms[name], data.conditions)
-    start = fit_function(forms[data.shape], data.conditions, shape_values, log=True).function if data.shape else None
-    fit = fit_jointly(data, forms, start, reweightings=2, most_steps=5)
-    return fit, float(np.mean(leave_out_errors(data, fit, groups, forms)))
+def string(motions: Iterable[Excitation]) -> Excitation:
+    """Several motions one after the other, a second apart."""
+    parts = list(motions)
+    time, clock = [], 0.0
+    for part in parts:
+        time.append(part.time - part.time[0] + clock)
+        clock = float(time[-1][-1]) + 1.0
+    names = ("displacement", "velocity", "acceleration", "current")
+    return Excitation(np.concatenate(time), *(np.concatenate([getattr(p, n) for p in parts]) for n in names))

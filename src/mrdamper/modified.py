@@ -17,7 +17,7 @@ from mrdamper.data import Condition, Floats, Run, same_condition
 from mrdamper.errors import IdentificationError
 from mrdamper.excitation import Excitation
 from mrdamper.identification import Identification
-from mrdamper.joint import Condensed, choose_forms, condense, fit_jointly
+from mrdamper.condensed import Condensed, choose_forms, condense, fit_jointly
 from mrdamper.loop_analysis import same_motion
 from mrdamper.parameter_functions import FORMS, FunctionFit, ParameterMap, assess, choose_function
 from mrdamper.simulation import Response, simulate, steady_loop

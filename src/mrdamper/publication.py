@@ -16,13 +16,15 @@ from mrdamper.damper import Prediction
 from mrdamper.identification import Identification
 from mrdamper.io.atomic import write_into
 from mrdamper.io.model_file import save_model
+from mrdamper.joint import JointFit
+from mrdamper.modified import ModifiedFit
 from mrdamper.plots.model import parameter_curves, predicted_loops, residual_map, score_strip
 from mrdamper.plots.rig_tests import measured_loops, test_analysis, test_matrix
 from mrdamper.plots.style import save_figure
 from mrdamper.report import render_report
 from mrdamper.report.distrust import doubts
 from mrdamper.validation import RunScore
-from mrdamper.workflow import Progress, RigStudy, Study
+from mrdamper.workflow import Candidate, Progress, RigStudy, Study
 
 _LOOPS_SHOWN = 6
 
@@ -174,13 +176,13 @@ def _figures(rig: RigStudy) -> dict[str, Figure]:
         scores[f"{candidate.title}, left out"] = candidate.left_out
         if candidate.held_out.runs:
             scores[f"{candidate.title}, held out"] = candidate.held_out
-    train = [rig.dataset[i.run_id] for i in chosen.identifications]
+    train = [rig.dataset[run.run_id] for run in chosen.left_out.runs]
     return {
         "matrix": test_matrix(rig.loops),
         "loops": measured_loops(rig.dataset, rig.loops),
         "analysis": test_analysis(rig.loops, rig.ranges),
         "scores": score_strip(scores),
-        "parameters": parameter_curves(chosen.fit),
+        "parameters": parameter_curves(_mapped(rig).fit),
         "predicted": predicted_loops(chosen.damper, _shown(rig)),
         "residuals": residual_map(chosen.damper, train),
     }
@@ -198,7 +200,7 @@ def _shown(rig: RigStudy) -> list[Any]:
 
 
 def _chapter(rig: RigStudy, pictures: Mapping[str, bytes]) -> dict[str, Any]:
-    chosen = rig.chosen
+    chosen, mapped = rig.chosen, _mapped(rig)
     floors = [run.repeatability for run in rig.dataset if run.repeatability is not None]
     held = any(run.id in {loop.run_id for loop in rig.loops} for run in rig.dataset.split("validate"))
     return {
@@ -214,9 +216,10 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes]) -> dict[str, Any]:
         ),
         "loops": rig.loops,
         "not_identified": rig.not_identified,
-        "identifications": chosen.identifications,
-        "parameter_names": [n for n in chosen.identifications[0].model.values() if n in chosen.identifications[0].free],
-        "parameters": chosen.fit,
+        "identifications": mapped.identifications,
+        "parameter_names": [n for n in mapped.identifications[0].model.values() if n in mapped.identifications[0].free],
+        "mapped": mapped,
+        "joint": _joint_table(chosen.fit) if isinstance(chosen.fit, JointFit) else (),
         "predicted_caption": (
             "Held-out runs, last cycle of the steady window: the model has seen none of them."
             if held
@@ -226,9 +229,28 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes]) -> dict[str, Any]:
     }
 
 
+def _mapped(rig: RigStudy) -> Candidate:
+    """The best candidate whose parameters are functions of the condition: its curves are shown."""
+    return next(candidate for candidate in rig.candidates if isinstance(candidate.fit, ModifiedFit))
+
+
+def _joint_table(fit: JointFit) -> list[dict[str, Any]]:
+    model = fit.damper.model
+    return [
+        {
+            "name": info.name,
+            "value": getattr(model, info.name),
+            "unit": info.unit,
+            "meaning": info.meaning,
+            "at_bound": info.name in fit.at_bounds,
+        }
+        for info in model.parameters()
+    ]
+
+
 def _verdict(rig: RigStudy) -> str:
     chosen, best = rig.chosen, rig.chosen.damper
-    train, validate = len(chosen.identifications), len(chosen.held_out.runs)
+    train, validate = len(chosen.left_out.runs), len(chosen.held_out.runs)
     text = f"The {best.title} predicts this damper's force best. It was identified from {train} train runs"
     if validate:
         text += (

@@ -53,7 +53,8 @@ def steady_loop(model: Model, condition: Condition, samples_per_cycle: int = 100
         response = simulate(model, motion)
         last = slice(-samples_per_cycle - 1, None)
         state = response.state[last]
-        if abs(state[-1] - state[0]) <= _CLOSURE * max(float(np.ptp(state)), np.finfo(float).tiny):
+        gap, span = np.abs(state[-1] - state[0]), np.ptp(state, axis=0)
+        if np.all(gap <= _CLOSURE * np.maximum(span, np.finfo(float).tiny)):
             loop = motion.part(last)
             return Response(_from_zero(loop), response.force[last], state)
         cycles *= 4

@@ -59,20 +59,22 @@ class VirtualRig:
     friction_high: float = param("N", "largest seal friction along the stroke", default=80.0)
     friction_wave: float = param("m", "distance over which seal friction repeats", default=0.037)
     friction_knee: float = param("m", "displacement in which the seal breaks away", default=6e-5)
-    cavity_time: float = param("s", "cavity length over the peak speed of the stroke before", default=2e-3)
-    cavity_depth: float = param("-", "share of the yield force missing until it closes", bounds=(0, 1), default=0.5)
+    cavity_time: float = param("s", "cavity length over the peak speed of the stroke before", default=6e-3)
+    cavity_depth: float = param("-", "share of the yield force missing until it closes", bounds=(0, 1), default=0.4)
     force_noise: float = param("N", "standard deviation of the load cell", bounds=(0, np.inf), default=6.0)
     force_step: float = param("N", "resolution of the load cell channel", bounds=(0, np.inf), default=0.5)
     force_delay: float = param("s", "delay of the force channel", bounds=(0, np.inf), default=5e-4)
     displacement_noise: float = param("m", "standard deviation of the gauge", bounds=(0, np.inf), default=5e-6)
     displacement_step: float = param("m", "resolution of the gauge channel", bounds=(0, np.inf), default=2e-6)
-    sample_rate: float = param("Hz", "samples per second", bounds=(0, np.inf), default=1000.0)
+    sample_rate: float = param("Hz", "samples per second", bounds=(0, np.inf), default=500.0)
 
     def __post_init__(self) -> None:
         for info in self.parameters():
             value = getattr(self, info.name)
             if not info.bounds[0] <= value <= info.bounds[1]:
-                raise ParameterError(f"{info.name} is {value:g} {info.unit}", where="virtual rig", mend="see its bounds")
+                raise ParameterError(
+                    f"{info.name} is {value:g} {info.unit}", where="virtual rig", mend="see its bounds"
+                )
 
     @classmethod
     def parameters(cls) -> tuple[ParameterInfo, ...]:
@@ -167,7 +169,9 @@ def virtual_dataset(
     return noisy_dataset(chosen, true_runs(chosen, currents, cycles), seed)
 
 
-def true_runs(rig: VirtualRig, currents: Sequence[float], cycles: int = 4) -> list[tuple[Condition, Excitation, Floats]]:
+def true_runs(
+    rig: VirtualRig, currents: Sequence[float], cycles: int = 4
+) -> list[tuple[Condition, Excitation, Floats]]:
     """Condition, motion and true force of every run of the matrix, hold-out last."""
     runs = []
     for amplitude, frequency in (*MOTIONS, HELD_OUT):

@@ -28,6 +28,11 @@ def put(rows: Rows, out: Path | None, as_json: bool, as_csv: Callable[[Rows], st
         target.write_text(text, encoding="utf-8")
 
 
+def percent(share: float) -> str:
+    """A share in per cent, or a dash where there is none."""
+    return f"{100 * share:.2f} %" if math.isfinite(share) else "–"
+
+
 def parse_fixed(pairs: Sequence[str]) -> dict[str, float]:
     """NAME=VALUE arguments as a mapping.
 

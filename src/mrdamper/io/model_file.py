@@ -9,12 +9,13 @@ import json
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from mrdamper.damper import Damper, Envelope
 from mrdamper.data import Condition
 from mrdamper.errors import InputError, ModelFileError
 from mrdamper.io.atomic import write_file
+from mrdamper.joint import JointDamper
 from mrdamper.models import model_type
 from mrdamper.modified import ModifiedModel
 from mrdamper.parameter_functions import ParameterFunction, ParameterMap
@@ -60,6 +61,14 @@ class _Modified(_Strict):
     functions: dict[str, _Function]
 
 
+class _Joint(_Strict):
+    kind: Literal["joint"]
+    model: str
+    parameters: dict[str, float]
+    parameter_units: dict[str, str]  # for the reader
+    free: tuple[str, ...]
+
+
 class _Document(_Strict):
     format: Literal["mrdamper-model"]
     version: str
@@ -67,7 +76,7 @@ class _Document(_Strict):
     units: dict[str, str]
     envelope: _Envelope
     provenance: dict[str, str]
-    damper: _Modified
+    damper: _Modified | _Joint = Field(discriminator="kind")
 
 
 def save_model(damper: Damper, path: str | Path) -> None:
@@ -134,7 +143,7 @@ def parse_model(text: str, where: str = "model") -> Damper:
         document = _Document.model_validate_json(text)
     except ValidationError as error:
         first = error.errors()[0]
-        field = ".".join(str(part) for part in first["loc"])
+        field = ".".join(str(part) for part in first["loc"] if part not in ("modified", "joint"))
         raise ModelFileError(f"{field}: {first['msg']}", where=where, mend="write the model again") from error
     try:
         return _restore(document)
@@ -142,7 +151,15 @@ def parse_model(text: str, where: str = "model") -> Damper:
         raise ModelFileError(error.found, where=where, mend=error.mend) from error
 
 
-def _describe(damper: Damper) -> _Modified:
+def _describe(damper: Damper) -> _Modified | _Joint:
+    if isinstance(damper, JointDamper):
+        return _Joint(
+            kind="joint",
+            model=damper.model.name,
+            parameters=damper.model.values(),
+            parameter_units={info.name: info.unit for info in damper.model.parameters()},
+            free=damper.free,
+        )
     if isinstance(damper, ModifiedModel):
         functions = {
             name: _Function(form=f.form, coefficients=f.coefficients, rates=f.rates, log=f.log, formula=f.formula)
@@ -153,14 +170,20 @@ def _describe(damper: Damper) -> _Modified:
 
 
 def _restore(document: _Document) -> Damper:
-    described = document.damper
+    described, envelope = document.damper, Envelope(**document.envelope.model_dump())
+    if isinstance(described, _Joint):
+        try:
+            model = model_type(described.model)(**described.parameters)
+        except TypeError as error:
+            raise ModelFileError(f"parameters do not fit the model: {error}", mend="write the model again") from error
+        return JointDamper(document.rig, model, described.free, envelope, document.provenance)
     functions = {
         name: ParameterFunction(f.form, f.coefficients, f.rates, f.log) for name, f in described.functions.items()
     }
     damper = ModifiedModel(
         rig=document.rig,
         parameters=ParameterMap(model_type(described.model), functions),
-        envelope=Envelope(**document.envelope.model_dump()),
+        envelope=envelope,
         provenance=document.provenance,
     )
     middle = {name: (low + high) / 2 for name, (low, high) in document.envelope.model_dump().items()}

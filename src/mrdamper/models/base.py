@@ -55,6 +55,19 @@ class SearchAxis:
     grid: tuple[float, ...]
     log: bool = False
 
+    def coordinate(self, value: float) -> float:
+        """Where on the axis a value lies."""
+        return math.log(value) if self.log else value
+
+    def value(self, coordinate: float) -> float:
+        """The value at a place on the axis."""
+        return math.exp(coordinate) if self.log else coordinate
+
+    def at_bound(self, coordinate: float) -> bool:
+        """Whether a place lies within a thousandth of the axis from one of its ends."""
+        low, high = self.coordinate(self.lower), self.coordinate(self.upper)
+        return min(coordinate - low, high - coordinate) < 1e-3 * (high - low)
+
 
 @dataclass(frozen=True)
 class Model(ABC):
@@ -101,6 +114,25 @@ class Model(ABC):
             Names of the parameters to be determined.
         """
         return ()
+
+    @classmethod
+    def guess(
+        cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]
+    ) -> tuple[SearchAxis, ...]:
+        """Search coordinates with start values read off the data.
+
+        Parameters
+        ----------
+        motion : Excitation
+            Smooth measured motion about mid-stroke.
+        force : (N,) array
+            Measured force there [N].
+        amplitude : float
+            Displacement amplitude [m].
+        free : sequence of str
+            Names of the parameters to be determined.
+        """
+        return cls.search_axes(amplitude, free)
 
     @classmethod
     def build(cls, values: Mapping[str, float]) -> Self:

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from mrdamper.data import Floats
 
 _STEP = 1e-6  # forward difference, relative to the width of the box
-_TOLERANCE = 1e-9
 _STIFFEST = 1e12  # damping at which no step is left to try
 
 
@@ -42,9 +41,14 @@ class Minimum:
 
 
 def least_squares(
-    residual: Callable[[Floats], Floats], start: Floats, lower: Floats, upper: Floats, most_steps: int = 40
+    residual: Callable[[Floats], Floats],
+    start: Floats,
+    lower: Floats,
+    upper: Floats,
+    most_steps: int = 40,
+    tolerance: float = 1e-9,
 ) -> Minimum:
-    """Minimise |residual(point)|² inside a box.
+    """Minimise |residual(point)|² inside a box, until a step gains less than `tolerance` of it.
 
     Coordinates at a bound whose gradient points outwards are held there for the step.
     """
@@ -76,7 +80,7 @@ def least_squares(
         moved = float(np.max(np.abs(better[0] - point) / width))
         before, (point, r) = cost, better
         cost = float(r @ r)
-        if before - cost <= _TOLERANCE * cost or moved < _TOLERANCE:
+        if before - cost <= tolerance * cost or moved < tolerance:
             message = "converged: the cost changes no more"
             break
     return Minimum(point, r, cost, evaluations, message)

@@ -8,6 +8,7 @@ import numpy as np
 
 from mrdamper.damper import Damper
 from mrdamper.identification import Identification
+from mrdamper.joint import JointFit
 from mrdamper.loop_analysis import LoopAnalysis
 from mrdamper.modified import ModifiedFit
 from mrdamper.validation import Validation
@@ -17,7 +18,7 @@ _WEAK_FUNCTION = 0.9  # left-out error over spread from which a function hardly 
 
 def doubts(
     damper: Damper,
-    fit: ModifiedFit | None,
+    fit: ModifiedFit | JointFit,
     identifications: Sequence[Identification],
     loops: Sequence[LoopAnalysis],
     left_out: Validation,
@@ -27,7 +28,7 @@ def doubts(
     return [
         *_outside(damper),
         *_runs(left_out, held_out),
-        *(_functions(fit) if fit else []),
+        *(_functions(fit) if isinstance(fit, ModifiedFit) else _joint(fit)),
         *_identifications(identifications),
         *_tests(loops),
     ]
@@ -79,6 +80,18 @@ def _functions(fit: ModifiedFit) -> list[str]:
     levels = len({round(c.current_A, 3) for c in fit.conditions})
     if levels < 4:
         sentences.append(f"Only {levels} currents were tested: what happens between them is an assumption of the form.")
+    return sentences
+
+
+def _joint(fit: JointFit) -> list[str]:
+    sentences = []
+    if fit.at_bounds:
+        sentences.append(f"Parameters at a limit of their range: {', '.join(fit.at_bounds)}.")
+    if not fit.message.startswith(("converged", "solved")):
+        sentences.append(f"The search {fit.message}.")
+    ratio = float(np.max(fit.nrmse_pp) / np.median(fit.nrmse_pp))
+    if ratio > 2:
+        sentences.append(f"The run described worst has {ratio:.1f} times the median error.")
     return sentences
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Optional
 
@@ -18,6 +19,7 @@ def register(app: typer.Typer) -> None:
         as_json: bool = typer.Option(False, "--json", help="Print a summary a program can read."),
     ) -> None:
         """Study a dataset: identify every run, map the parameters, validate; write report and models."""
+        from mrdamper.cli.output import percent
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.io.atomic import require_writable
         from mrdamper.io.dataset import load_dataset
@@ -36,12 +38,11 @@ def register(app: typer.Typer) -> None:
             return
         for rig in result.rigs:
             print(f"{rig.rig or dataset.name}: {rig.damper.title} ({rig.damper.parameter_count} numbers)")
+            print(f"  {'nrmse_pp, median over runs':38}{'left out':>10}{'held out':>10}{'one by one':>12}")
             for candidate in rig.candidates:
-                print(
-                    f"  {candidate.title:36} nrmse_pp  per run {100 * candidate.per_run_median:5.2f} %"
-                    f"  left out {100 * candidate.left_out.median():5.2f} %"
-                    + (f"  held out {100 * candidate.held_out.median():5.2f} %" if candidate.held_out.runs else "")
-                )
+                held_out = percent(candidate.held_out.median() if candidate.held_out.runs else math.nan)
+                one_by_one = percent(candidate.per_run_median)
+                print(f"  {candidate.title:38}{percent(candidate.left_out.median()):>10}{held_out:>10}{one_by_one:>12}")
         print(f"report: {written[0]}")
 
 
@@ -53,7 +54,7 @@ def _summary(result, written: list[str]) -> dict:
                 "candidates": {
                     c.title: {
                         "parameters": c.damper.parameter_count,
-                        "per_run_nrmse_pp": c.per_run_median,
+                        "per_run_nrmse_pp": c.per_run_median if c.identifications else None,
                         "left_out_nrmse_pp": c.left_out.median(),
                         "held_out_nrmse_pp": c.held_out.median() if c.held_out.runs else None,
                     }

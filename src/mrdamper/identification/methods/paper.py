@@ -29,7 +29,7 @@ from mrdamper.hysteresis import steady_loop
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.identification.problem import Method, Problem, Solution
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.optimizers.genetic import GeneticSettings, genetic
+from mrdamper.optimizers.genetic import GeneticMinimum, GeneticSettings, genetic
 from mrdamper.optimizers.levenberg_marquardt import least_squares
 
 _SEARCH_SAMPLES = 400  # two numbers are searched; more samples change them by less than the search does
@@ -56,6 +56,8 @@ class Paper(Method):
     genetic : GeneticSettings
     bounds : ((float, float), (float, float))
         Of alpha [N/m] and beta [m^-n], the paper's [0, 1e8].
+    explain : bool
+        Say how much of c is hysteretic; takes a consistent balance besides.
     """
 
     name: ClassVar[str] = "paper"
@@ -68,6 +70,7 @@ class Paper(Method):
     search: Literal["genetic", "optimum"] = "genetic"
     genetic: GeneticSettings = field(default_factory=GeneticSettings)
     bounds: tuple[tuple[float, float], tuple[float, float]] = ((0.0, 1e8), (0.0, 1e8))
+    explain: bool = True
 
     def solve(self, problem: Problem) -> Solution:
         """Determine the free parameters of a problem.
@@ -98,8 +101,19 @@ class Paper(Method):
             evaluations=searched.evaluations,
             message=searched.message,
             seed=self.genetic.seed if self.search == "genetic" else None,
-            notes=(*notes, *_counted_twice(problem, known)),
+            notes=(*notes, *(_counted_twice(problem, known) if self.explain else ())),
         )
+
+    def genetic_search(self, problem: Problem) -> GeneticMinimum:
+        """Run the genetic search alone: its history and its boxes."""
+        _require_bouc_wen(problem)
+        record = SineRecord.of(problem.run)
+        return self._genetic(_Rest.of(problem, record, self._closed_forms(problem, record)[0]))
+
+    def cost(self, problem: Problem) -> Callable[[Floats], Floats]:
+        """RMS error [N] over all samples of (P, 2) points (alpha, beta), once c, m and f0 are known [Eq. 21]."""
+        record = SineRecord.of(problem.run)
+        return _Rest.of(problem, record, self._closed_forms(problem, record)[0]).costs
 
     def _closed_forms(self, problem: Problem, record: SineRecord) -> tuple[dict[str, float], tuple[str, ...]]:
         """Every parameter but alpha and beta."""
@@ -124,10 +138,12 @@ class Paper(Method):
             known["f0"] = reading.offset - lift
         return known, notes
 
-    def _by_genetic(self, rest: _Rest) -> _Searched:
-        thin = rest.thinned(_SEARCH_SAMPLES)
+    def _genetic(self, rest: _Rest) -> GeneticMinimum:
         lower, upper = zip(*self.bounds, strict=True)
-        found = genetic(thin.costs, lower, upper, self.genetic)
+        return genetic(rest.thinned(_SEARCH_SAMPLES).costs, lower, upper, self.genetic)
+
+    def _by_genetic(self, rest: _Rest) -> _Searched:
+        found = self._genetic(rest)
         return _Searched(float(found.point[0]), float(found.point[1]), found.evaluations, found.message)
 
     def _by_optimum(self, rest: _Rest) -> _Searched:

@@ -1,0 +1,74 @@
+"""Algebraic model: an arctangent over velocity, shifted to either side of the loop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from mrdamper.data import Floats
+from mrdamper.excitation import Excitation
+from mrdamper.models.base import Model, SearchAxis
+from mrdamper.models.sides import side
+from mrdamper.parameters import param
+
+
+@dataclass(frozen=True)
+class Guo(Model):
+    """F = (2/pi) f_y arctan[kappa (v + v0 sgn x)] + c v + f0.
+
+    Memoryless: sgn(x) stands in for the branch of the loop, so the form holds for sines about
+    mid-stroke. Just before a reversal at positive x the damper still pushes back, which fixes
+    the sign of the shift.
+
+    References
+    ----------
+    Guo, Yang and Pan (2006), "Dynamical modeling of magneto-rheological damper behaviors",
+    J. Intelligent Material Systems and Structures 17, 3–14. The form is recalled, not seen in
+    print.
+    """
+
+    name: ClassVar[str] = "guo"
+    title: ClassVar[str] = "algebraic (arctangent)"
+    equation: ClassVar[str] = r"F = \tfrac{2}{\pi} f_y \arctan[\kappa (v + v_0\,\mathrm{sgn}\,x)] + c\,v + f_0"
+    source: ClassVar[str] = "Guo, Yang and Pan 2006"
+
+    fy: float = param("N", "yield force", bounds=(0, np.inf), linear=True)
+    c: float = param("N s/m", "post-yield viscous damping", bounds=(0, np.inf), linear=True)
+    kappa: float = param("s/m", "steepness of the pre-yield curve", bounds=(1e-3, 1e7), scale="log")
+    v0: float = param("m/s", "velocity at which the force changes sign", bounds=(0, 10))
+    f0: float = param("N", "offset force", linear=True, default=0.0)
+    xs: float = param(
+        "m", "displacement in which the loop changes side; 0: at once", bounds=(0, 1), preset=True, default=0.0
+    )
+
+    def state(self, motion: Excitation) -> Floats:
+        """Share of the yield force, −1...1, at the samples."""
+        shifted = motion.velocity + self.v0 * side(motion.displacement, self.xs)
+        return 2 / np.pi * np.arctan(self.kappa * shifted)
+
+    def force(self, motion: Excitation, state: Floats) -> Floats:
+        return self.fy * state + self.c * motion.velocity + self.f0
+
+    @classmethod
+    def search_axes(cls, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
+        """Steepness and shift for a motion of 1 Hz; `guess` knows the velocity."""
+        return _axes(2 * np.pi * amplitude, amplitude, free)
+
+    @classmethod
+    def guess(
+        cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]
+    ) -> tuple[SearchAxis, ...]:
+        """The curve yields somewhere between a thousandth and all of the peak velocity."""
+        return _axes(float(np.max(np.abs(motion.velocity))), amplitude, free)
+
+
+def _axes(speed: float, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
+    axes = {
+        "kappa": SearchAxis("kappa", 0.1 / speed, 1e5 / speed, tuple(np.geomspace(2, 2e3, 6) / speed), log=True),
+        "v0": SearchAxis("v0", 0.0, speed, (0.003 * speed, 0.03 * speed, 0.2 * speed)),
+        "xs": SearchAxis("xs", 1e-4 * amplitude, amplitude, (0.05 * amplitude,), log=True),
+    }
+    return tuple(axis for name, axis in axes.items() if name in free)

@@ -1,0 +1,24 @@
+"""Which side of a hysteresis loop a memoryless model is on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mrdamper.data import Floats
+
+
+def side(displacement: Floats, width: float = 0.0) -> Floats:
+    """+1 on the way back from a positive displacement, −1 from a negative one.
+
+    Memoryless models shift their curve over velocity by sgn(x), which on a sine about
+    mid-stroke equals −sgn(a). As published the shift changes side at once, and the force
+    jumps a little at x = 0.
+
+    Parameters
+    ----------
+    displacement : (N,) array
+        From mid-stroke [m].
+    width : float
+        Displacement in which the shift changes side, tanh(x/width) [m]; 0: at once.
+    """
+    return np.tanh(displacement / width) if width > 0 else np.sign(displacement)

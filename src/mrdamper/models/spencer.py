@@ -1,0 +1,179 @@
+"""Spencer's modified Bouc–Wen: a damper in series with a Bouc–Wen element, beside a spring."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from mrdamper.data import Floats
+from mrdamper.errors import ParameterError
+from mrdamper.excitation import Excitation
+from mrdamper.integrator import integrate
+from mrdamper.models.base import Model, SearchAxis
+from mrdamper.parameters import param
+
+
+@dataclass(frozen=True)
+class Spencer(Model):
+    """F = c1 dy/dt + k1 x + f0, dy/dt = [alpha z + c0 v + k0 (x − y)]/(c0 + c1).
+
+    z is a Bouc–Wen element driven by r = x − y. All forces over c1 are velocities, so that c1
+    scales the force and enters linearly; the published letters come back as properties and go
+    in through `from_letters`. Beware: the publication's gamma multiplies |v| and its beta v,
+    the reverse of the letters used here for Bouc–Wen. A is 1, absorbed in the others; x0 is
+    part of the offset, f0 = −k1 x0. Integrated with error control.
+
+    References
+    ----------
+    Spencer, Dyke, Sain and Carlson (1997), "Phenomenological model for magnetorheological
+    dampers", J. Engineering Mechanics 123, 230–238. The equations agree in several public
+    implementations.
+    """
+
+    name: ClassVar[str] = "spencer"
+    title: ClassVar[str] = "Spencer's modified Bouc–Wen"
+    equation: ClassVar[str] = (
+        r"F = c_1 \dot y + k_1 (x - x_0),\quad \dot y = \frac{\alpha z + c_0 \dot x + k_0 (x - y)}{c_0 + c_1},"
+        r"\quad \dot z = A\dot r - \gamma |\dot r| z |z|^{n-1} - \beta \dot r |z|^n,\ r = x - y"
+    )
+    source: ClassVar[str] = "Spencer et al. 1997"
+
+    c1: float = param("N s/m", "viscous damping in series, seen at low velocity", bounds=(0, np.inf), linear=True)
+    c0_ratio: float = param("-", "c0/c1, viscous damping at high velocity", bounds=(1e-6, 1e3), scale="log")
+    k0_rate: float = param("1/s", "k0/c1, stiffness at high velocity", bounds=(0, 1e4))
+    creep: float = param(
+        "m/s", "velocity of the series damper under the full hysteretic force", bounds=(1e-9, 1e2), scale="log"
+    )
+    yield_displacement: float = param(
+        "m", "displacement in which the hysteretic force is spent", bounds=(1e-9, 1), scale="log"
+    )
+    k1: float = param("N/m", "stiffness of the accumulator", linear=True, default=0.0)
+    f0: float = param("N", "offset force, −k1 x0", linear=True, default=0.0)
+    asymmetry: float = param(
+        "-", "(coefficient of v − of |v|)/(their sum)", bounds=(-1, 1), preset=True, default=0.0
+    )
+    n: float = param("-", "sharpness of the yield", bounds=(1, 10), preset=True, default=2.0)
+
+    @property
+    def c0(self) -> float:
+        """Viscous damping at high velocity [N s/m]."""
+        return self.c0_ratio * self.c1
+
+    @property
+    def k0(self) -> float:
+        """Stiffness at high velocity [N/m]."""
+        return self.k0_rate * self.c1
+
+    @property
+    def yield_force(self) -> float:
+        """Alpha z_max, the hysteretic force after yield [N]."""
+        return self.creep * self.c1
+
+    @classmethod
+    def from_letters(
+        cls,
+        *,
+        c0: float,
+        c1: float,
+        k0: float,
+        k1: float,
+        alpha: float,
+        gamma: float,
+        beta: float,
+        A: float,
+        n: float = 2.0,
+        x0: float = 0.0,
+    ) -> Self:
+        """Make the model from the letters of the publication.
+
+        Parameters
+        ----------
+        c0, c1 : float
+            [N s/m]
+        k0, k1, alpha : float
+            [N/m]
+        gamma : float
+            Coefficient of |v| [1/m^n], as the publication has it.
+        beta : float
+            Coefficient of v [1/m^n], as the publication has it.
+        A, n : float
+            [-]
+        x0 : float
+            Rest position of the accumulator [m].
+
+        Raises
+        ------
+        ParameterError
+            If the hysteresis is unbounded or c1 is not positive.
+        """
+        if not (c1 > 0 and A > 0 and gamma >= 0 and beta + gamma > 0):
+            raise ParameterError(
+                f"c1 = {c1:g}, A = {A:g}, gamma = {gamma:g}, beta = {beta:g}",
+                where=cls.title,
+                mend="c1, A and beta + gamma are positive; gamma, the coefficient of |v|, is not negative",
+            )
+        z_max = (A / (beta + gamma)) ** (1 / n)
+        return cls(
+            c1=c1,
+            c0_ratio=c0 / c1,
+            k0_rate=k0 / c1,
+            creep=alpha * z_max / c1,
+            yield_displacement=z_max / A,
+            k1=k1,
+            f0=-k1 * x0,
+            asymmetry=(beta - gamma) / (beta + gamma),
+            n=n,
+        )
+
+    def state(self, motion: Excitation) -> Floats:
+        """(N, 2): r = x − y [m] and z/z_max, from 0."""
+        channels = (motion.time, motion.displacement, motion.velocity, motion.current)
+        shape = np.array(
+            [self.c0_ratio, self.k0_rate, self.creep, 1 / self.yield_displacement, self.asymmetry, self.n]
+        )
+        return integrate(series_rate, shape, channels, np.zeros(2), np.array([self.yield_displacement, 1.0]))
+
+    def force(self, motion: Excitation, state: Floats) -> Floats:
+        v = motion.velocity
+        r, zeta = state[:, 0], state[:, 1]
+        slip = (v - self.creep * zeta - self.k0_rate * r) / (1 + self.c0_ratio)
+        return self.c1 * (v - slip) + self.k1 * motion.displacement + self.f0
+
+    @classmethod
+    def search_axes(cls, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
+        """The four ratios for a motion of 1 Hz; `guess` knows the velocity."""
+        return _axes(amplitude, 2 * np.pi * amplitude, free)
+
+    @classmethod
+    def guess(
+        cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]
+    ) -> tuple[SearchAxis, ...]:
+        """The series damper creeps at a hundredth to all of the peak velocity."""
+        return _axes(amplitude, float(np.max(np.abs(motion.velocity))), free)
+
+
+def series_rate(x: float, v: float, current: float, state: Floats, p: Floats, out: Floats) -> None:
+    """d(r, zeta)/dt for p = (c0/c1, k0/c1, creep, 1/yield displacement, asymmetry, n)."""
+    zeta = state[1]
+    slip = (v - p[2] * zeta - p[1] * state[0]) / (1 + p[0])
+    grip = abs(zeta) ** p[5]
+    sign = 1.0 if zeta > 0 else -1.0
+    out[0] = slip
+    out[1] = p[3] * (slip * (1 - 0.5 * (1 + p[4]) * grip) - 0.5 * (1 - p[4]) * abs(slip) * sign * grip)
+
+
+def _axes(amplitude: float, speed: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
+    axes = {
+        "c0_ratio": SearchAxis("c0_ratio", 1e-3, 10.0, (0.05,), log=True),
+        "k0_rate": SearchAxis("k0_rate", 0.0, 20 * speed / amplitude, (0.1,)),
+        "creep": SearchAxis("creep", 1e-4 * speed, 10 * speed, (0.03 * speed, 0.3 * speed), log=True),
+        "yield_displacement": SearchAxis(
+            "yield_displacement", 1e-5 * amplitude, amplitude, (3e-3 * amplitude, 5e-2 * amplitude), log=True
+        ),
+        "asymmetry": SearchAxis("asymmetry", -0.98, 0.98, (0.0,)),
+        "n": SearchAxis("n", 1.0, 10.0, (2.0,)),
+    }
+    return tuple(axis for name, axis in axes.items() if name in free)
