@@ -139,9 +139,9 @@ def residual_map(damper: Damper, runs: Sequence[Run]) -> Figure:
         for current, colour in colours.items():
             over_phase.plot([], [], color=colour, label=f"{current:g} A")
         over_phase.legend(loc="upper right", ncols=len(colours))
-        over_phase.set_xticks([0, 90, 180, 270, 360])
         label(over_v, "Velocity over its peak (–)", "Predicted − measured (% of peak-to-peak)")
         label(over_phase, "Phase of the motion (°)", "")
+        over_phase.set_xticks([0, 90, 180, 270, 360])
         return figure
 
 

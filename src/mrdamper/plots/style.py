@@ -12,6 +12,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from mrdamper.data import Floats
 
@@ -91,6 +92,8 @@ def current_colours(currents: Sequence[float]) -> dict[float, tuple[float, float
 def label(axes: Axes, x: str, y: str, title: str = "") -> None:
     """Name the axes; quantities first, units in brackets."""
     axes.set_xlabel(x)
+    if axes.get_xscale() == "linear":
+        axes.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
     axes.set_ylabel(y)
     if title:
         axes.set_title(title, loc="left")
