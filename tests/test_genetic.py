@@ -77,7 +77,7 @@ def test_the_search_is_seeded_narrows_and_records_its_history():
 def test_reversed_bounds_and_impossible_settings_are_refused():
     with pytest.raises(ParameterError, match="give the lower bound first"):
         genetic(bowl, [0, 1e8], [1e8, 0])
-    with pytest.raises(ParameterError, match="mutation is 1.5"):
+    with pytest.raises(ParameterError, match=r"mutation is 1\.5"):
         GeneticSettings(mutation=1.5)
     with pytest.raises(ParameterError, match="population of 4"):
         GeneticSettings(population=2)

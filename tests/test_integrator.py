@@ -40,8 +40,10 @@ def lagged_spencer(x, v, current, state, p, out):
 
 def exact_lag(rate, time):
     w = 2 * np.pi
-    return 0.01 * (rate * (rate * np.sin(w * time) - w * np.cos(w * time)) + rate * w * np.exp(-rate * time)) / (
-        rate**2 + w**2
+    return (
+        0.01
+        * (rate * (rate * np.sin(w * time) - w * np.cos(w * time)) + rate * w * np.exp(-rate * time))
+        / (rate**2 + w**2)
     )
 
 

@@ -17,7 +17,7 @@ from mrdamper.validation import leave_one_condition_out, validate
 
 TRUTH = PlayBypass(
     f0=50.0, k=900.0, c0=700.0, c1=1500.0, fy0=100.0, fy1=1000.0, d=2e-4, e=2.5e-5, cb=3.5e4, h0=0.4, h1=0.4,
-    vh=3e-3, T=5e-3, m=5.0,
+    vh=3e-3, T=5e-3, asymmetry=0.03, m=5.0,
 )  # fmt: skip
 MATRIX = [Condition(i, f, a) for i in (0.0, 0.25, 0.5, 1.0) for f, a in ((0.5, 0.02), (1.0, 0.01), (2.0, 0.005))]
 

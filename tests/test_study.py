@@ -118,7 +118,7 @@ def test_report_is_one_file_without_scripts_or_links_outside(folder):
     page.feed(text)
     assert page.outside == []
     assert page.scripts == 0
-    assert page.images == 14
+    assert page.images == 16
     assert len(text) < 6_000_000
 
 

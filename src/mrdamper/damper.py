@@ -12,10 +12,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.excitation import Excitation, equivalent_sine, measured_motion
 from mrdamper.simulation import Response
 
+NOT_A_SINE = "not a sine"
+COARSE = "sampling"
+_SAMPLES_IN_KNEE = 2  # below, the knee falls between samples
 _SLACK = 0.02  # a test bench repeats a condition to a few per cent; within that nothing is extrapolated
 
 
@@ -60,6 +65,27 @@ class Envelope:
             name for name, value, (low, high) in checks if value < low - _SLACK * high or value > high * (1 + _SLACK)
         )
 
+    def motion_flags(self, motion: Excitation) -> tuple[str, ...]:
+        """Which quantities of a motion that is no sine lie outside."""
+        moved = float(np.ptp(motion.displacement) / 2)
+        checks = (
+            ("current", float(np.min(motion.current)), float(np.max(motion.current)), self.current_A),
+            ("amplitude", moved, moved, self.amplitude_m),
+            ("velocity", 0.0, float(np.max(np.abs(motion.velocity))), self.peak_velocity_m_s),
+        )
+        return tuple(
+            name
+            for name, lowest, highest, (low, high) in checks
+            if highest > high * (1 + _SLACK) or (name != "velocity" and lowest < low - _SLACK * high)
+        )
+
+
+def samples_in_knee(motion: Excitation, knee: float) -> float:
+    """Samples a motion has, after the median reversal, before it has moved on by `knee` [m]."""
+    path = motion.path
+    inside = np.bincount(path.stroke[path.distance < knee], minlength=path.stroke[-1] + 1)
+    return float(np.median(inside[1:])) if inside.size > 1 else np.inf
+
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
@@ -100,6 +126,11 @@ class Damper(ABC):
     def parameter_count(self) -> int:
         """Numbers determined from the data."""
 
+    @property
+    def knee(self) -> float | None:
+        """Motion after a reversal in which the force turns over [m], where the model has such a length."""
+        return None
+
     @abstractmethod
     def loop(self, condition: Condition) -> Response:
         """Steady loop at a condition, one closed cycle."""
@@ -117,5 +148,9 @@ class Damper(ABC):
         """Force along the measured motion of a run, with its flags. The measured force is not looked at."""
         found = equivalent_sine(run)
         motion = measured_motion(run).about(found.centre)
-        flags = self.envelope.flags(found.condition) + (() if found.is_sine else ("not a sine",))
+        flags = self.envelope.flags(found.condition)
+        if not found.is_sine:
+            flags = (*self.envelope.motion_flags(motion), NOT_A_SINE)
+        if self.knee is not None and samples_in_knee(motion, self.knee) < _SAMPLES_IN_KNEE:
+            flags = (*flags, COARSE)
         return Prediction(motion, self.force_along(motion, found.condition), found.condition, flags)

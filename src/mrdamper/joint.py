@@ -63,6 +63,10 @@ class JointDamper(Damper):
     def parameter_count(self) -> int:
         return len(self.free)
 
+    @property
+    def knee(self) -> float | None:
+        return self.model.knee
+
     def loop(self, condition: Condition) -> Response:
         return steady_loop(self.model, condition)
 

@@ -7,15 +7,15 @@ the hysteretic force twice, and each form chosen by how it predicts conditions l
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
 
-from mrdamper.damper import Damper, Envelope
+from mrdamper.damper import NOT_A_SINE, Damper, Envelope, Prediction
 from mrdamper.data import Condition, Floats, Run, same_condition
 from mrdamper.errors import IdentificationError
-from mrdamper.excitation import Excitation
+from mrdamper.excitation import Excitation, running_sine
 from mrdamper.identification import Identification
 from mrdamper.condensed import Condensed, choose_forms, condense, fit_jointly
 from mrdamper.loop_analysis import same_motion
@@ -56,6 +56,30 @@ class ModifiedModel(Damper):
 
     def force_along(self, motion: Excitation, condition: Condition) -> Floats:
         return simulate(self.parameters.at(condition), motion).force
+
+    def predict_run(self, run: Run) -> Prediction:
+        """Force along a run's motion: at its condition for a sine, at running estimates otherwise.
+
+        The functions ask for a frequency and an amplitude. Other motion gets those of the sine
+        it resembles from moment to moment: an approximation, flagged as such.
+        """
+        prediction = super().predict_run(run)
+        if NOT_A_SINE not in prediction.extrapolation:
+            return prediction
+        return replace(prediction, force=self._running(prediction.motion))
+
+    def _running(self, motion: Excitation) -> Floats:
+        """Blend the forces at a few frequencies and amplitudes, by the running estimate."""
+        frequency, amplitude = running_sine(motion)
+        shares_f, knots_f = _shares(np.clip(frequency, *self.envelope.frequency_Hz))
+        shares_a, knots_a = _shares(np.clip(amplitude, *self.envelope.amplitude_m))
+        current = float(np.mean(motion.current))
+        force = np.zeros(len(motion))
+        for share_f, f in zip(shares_f, knots_f, strict=True):
+            for share_a, a in zip(shares_a, knots_a, strict=True):
+                model = self.parameters.at(Condition(current, float(f), float(a)))
+                force += share_f * share_a * simulate(model, motion).force
+        return force
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,6 +201,15 @@ def fit_modified_jointly(
         name: assess(function, data.conditions, values[name]) for name, function in joint.parameters.functions.items()
     }
     return ModifiedFit(model(data, joint.parameters), fits, values, data.conditions), refit
+
+
+def _shares(values: Floats, most: int = 5) -> tuple[Floats, Floats]:
+    """Knots over the values, and the share of each knot at every value: straight between them."""
+    low, high = float(values.min()), float(values.max())
+    knots = np.geomspace(low, high, most) if high > 1.01 * low else np.array([np.sqrt(low * high)])
+    if knots.size == 1:
+        return np.ones((1, values.size)), knots
+    return np.stack([np.interp(np.log(values), np.log(knots), row) for row in np.eye(knots.size)]), knots
 
 
 def _uncertainty(identifications: Sequence[Identification], name: str, log: bool) -> Floats:

@@ -19,11 +19,12 @@ from mrdamper.io.model_file import save_model
 from mrdamper.joint import JointFit
 from mrdamper.modified import ModifiedFit
 from mrdamper.plots.model import parameter_curves, predicted_loops, residual_map, score_strip
+from mrdamper.plots.reversal import force_since_reversal
 from mrdamper.plots.rig_tests import measured_loops, test_analysis, test_matrix
 from mrdamper.plots.style import save_figure
 from mrdamper.report import render_report
 from mrdamper.report.distrust import doubts
-from mrdamper.validation import RunScore
+from mrdamper.validation import RunScore, session_drift
 from mrdamper.workflow import Candidate, Progress, RigStudy, Study
 
 _LOOPS_SHOWN = 6
@@ -185,6 +186,7 @@ def _figures(rig: RigStudy) -> dict[str, Figure]:
         "parameters": parameter_curves(_mapped(rig).fit),
         "predicted": predicted_loops(chosen.damper, _shown(rig)),
         "residuals": residual_map(chosen.damper, train),
+        "reversal": force_since_reversal(train, chosen.damper),
     }
 
 
@@ -211,9 +213,10 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes]) -> dict[str, Any]:
         "chosen": chosen,
         "candidates": rig.candidates,
         "floor": float(np.median(floors)) if floors else None,
-        "doubts": doubts(
-            chosen.damper, chosen.fit, chosen.identifications, rig.loops, chosen.left_out, chosen.held_out
-        ),
+        "doubts": [
+            *doubts(chosen.damper, chosen.fit, chosen.identifications, rig.loops, chosen.left_out, chosen.held_out),
+            _drift(rig),
+        ],
         "loops": rig.loops,
         "not_identified": rig.not_identified,
         "identifications": mapped.identifications,
@@ -248,10 +251,19 @@ def _joint_table(fit: JointFit) -> list[dict[str, Any]]:
     ]
 
 
+def _drift(rig: RigStudy) -> str:
+    drift = session_drift(rig.damper, [rig.dataset[run.run_id] for run in rig.chosen.left_out.runs])
+    return (
+        f"Between runs the measured force differs from the prediction by gains of {100 * drift.gain:.1f} % and offsets "
+        f"of {drift.offset:.0f} N (standard deviations). A gain and an offset of each run's own would leave "
+        f"{100 * drift.floor:.1f} %: while sessions drift like this, no model of the damper goes below."
+    )
+
+
 def _verdict(rig: RigStudy) -> str:
     chosen, best = rig.chosen, rig.chosen.damper
     train, validate = len(chosen.left_out.runs), len(chosen.held_out.runs)
-    text = f"The {best.title} predicts this damper's force best. It was identified from {train} train runs"
+    text = f"The model “{best.title}” predicts this damper's force best. It was identified from {train} train runs"
     if validate:
         text += (
             f" and predicts {validate} held-out runs with a median error of "
@@ -262,8 +274,9 @@ def _verdict(rig: RigStudy) -> str:
 
 def _choice(rig: RigStudy) -> str:
     chosen, others = rig.candidates[0], rig.candidates[1:]
+    reason = "Asked for; error on" if rig.asked_for else "Chosen by the error on"
     text = (
-        f"Chosen by the error on conditions left out of the identification: {chosen.title} with "
+        f"{reason} conditions left out of the identification: {chosen.title} with "
         f"{100 * chosen.left_out.median():.1f} % and {chosen.damper.parameter_count} numbers"
     )
     if others:

@@ -100,6 +100,41 @@ def leave_one_condition_out(
     return Validation(title, tuple(scored[i] for i in sorted(scored)))
 
 
+@dataclass(frozen=True)
+class SessionDrift:
+    """How much of the error a gain and an offset of each run's own would explain.
+
+    Estimated to be stated, never to correct a score.
+
+    Attributes
+    ----------
+    gain : float
+        Standard deviation of the gains between runs.
+    offset : float
+        Standard deviation of the offsets [N].
+    floor : float
+        Median nrmse_pp that would be left: what no model of the damper can go below while
+        sessions differ like this.
+    """
+
+    gain: float
+    offset: float
+    floor: float
+
+
+def session_drift(damper: Damper, runs: Iterable[Run]) -> SessionDrift:
+    """Regress every run's measured force on its prediction."""
+    gains, offsets, errors = [], [], []
+    for run in runs:
+        inside = run.in_window
+        measured, predicted = run.force[inside], damper.predict_run(run).force[inside]
+        gain, offset = np.polynomial.polynomial.polyfit(predicted, measured, 1)[::-1]
+        gains.append(gain)
+        offsets.append(offset)
+        errors.append(np.sqrt(np.mean((offset + gain * predicted - measured) ** 2)) / np.ptp(measured))
+    return SessionDrift(float(np.std(gains)), float(np.std(offsets)), float(np.median(errors)))
+
+
 def _scores(run: Run, prediction: Prediction) -> Scores:
     inside = run.in_window
     motion = prediction.motion

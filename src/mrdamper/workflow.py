@@ -14,7 +14,7 @@ import numpy as np
 
 from mrdamper.damper import Damper
 from mrdamper.data import Dataset, Run
-from mrdamper.errors import IdentificationError
+from mrdamper.errors import IdentificationError, UnknownNameError
 from mrdamper.excitation import equivalent_sine
 from mrdamper.identification import Identification, identify
 from mrdamper.joint import JointFit, JointProblem
@@ -90,6 +90,8 @@ class RigStudy:
     candidates : tuple of Candidate
         The chosen one first, the others by their error on left-out conditions.
     not_identified : mapping of run id to the reason
+    asked_for : bool
+        The user named the model; the evidence did not choose it.
     """
 
     rig: str
@@ -98,6 +100,7 @@ class RigStudy:
     ranges: tuple[DynamicRange, ...]
     candidates: tuple[Candidate, ...]
     not_identified: dict[str, str]
+    asked_for: bool = False
 
     @property
     def chosen(self) -> Candidate:
@@ -145,7 +148,7 @@ class Study:
         return next(r for r in self.rigs if r.rig == name)
 
 
-def run_study(dataset: Dataset, progress: Progress = lambda what, share: None) -> Study:
+def run_study(dataset: Dataset, progress: Progress = lambda what, share: None, *, model: str | None = None) -> Study:
     """Study a dataset: identify, map, validate, rig by rig.
 
     Parameters
@@ -153,9 +156,13 @@ def run_study(dataset: Dataset, progress: Progress = lambda what, share: None) -
     dataset : Dataset
     progress : callable
         Told what is being done and the share done, 0...1.
+    model : str, optional
+        Choose the best candidate of this model instead of the best of all.
 
     Raises
     ------
+    UnknownNameError
+        If no candidate is of that model.
     IdentificationError
         If a rig has too few runs to identify anything from.
     """
@@ -167,13 +174,15 @@ def run_study(dataset: Dataset, progress: Progress = lambda what, share: None) -
         def tell(what: str, share: float, number: int = number, name: str = name) -> None:
             progress(f"{name or 'rig'}: {what}", (number + share) / count)
 
-        rigs.append(study_rig(dataset.rig(name), tell))
+        rigs.append(study_rig(dataset.rig(name), tell, model=model))
     progress("studied", 1.0)
     return Study(dataset, tuple(rigs), time.perf_counter() - begin)
 
 
-def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None) -> RigStudy:
-    """Study the runs of one rig."""
+def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None, *, model: str | None = None) -> RigStudy:
+    """Study the runs of one rig; arguments as `run_study`."""
+    if model not in (None, *STUDIED, JOINTLY):
+        raise UnknownNameError.of("studied model", str(model), (*STUDIED, JOINTLY))
     rig = dataset.rigs[0]
     progress("loops", 0.0)
     sines, refused = usable_sines(dataset)
@@ -186,20 +195,20 @@ def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None) -
             mend="a model over conditions needs at least two; check the split column of runs.csv",
         )
     candidates = []
-    for number, model in enumerate(STUDIED):
+    for number, name in enumerate(STUDIED):
 
-        def tell(what: str, share: float, number: int = number, model: str = model) -> None:
-            progress(f"{model} {what}", 0.9 * (number + share) / len(STUDIED))
+        def tell(what: str, share: float, number: int = number, name: str = name) -> None:
+            progress(f"{name} {what}", 0.9 * (number + share) / len(STUDIED))
 
-        candidates += _candidates(model, dataset, train, tell)
+        candidates += _candidates(name, dataset, train, tell)
     progress("play-bypass jointly", 0.9)
     candidates.append(_joint_candidate(dataset, train))
     candidates.sort(key=lambda c: c.left_out.median())
-    best = candidates[0].left_out.median()
-    near = [c for c in candidates if c.left_out.median() <= _WORTH * best]
+    eligible = [c for c in candidates if model in (None, c.model)]
+    near = [c for c in eligible if c.left_out.median() <= _WORTH * eligible[0].left_out.median()]
     chosen = min(near, key=lambda c: c.damper.parameter_count)
     candidates.sort(key=lambda c: c is not chosen)
-    return RigStudy(rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), refused)
+    return RigStudy(rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), refused, model is not None)
 
 
 def usable_sines(dataset: Dataset) -> tuple[list[Run], dict[str, str]]:

@@ -7,6 +7,7 @@ Exit status: 0 done, 2 the user's input (one line says what, where and how to me
 from __future__ import annotations
 
 import importlib
+import os
 import pkgutil
 import sys
 import traceback
@@ -19,6 +20,10 @@ from mrdamper.errors import InputError
 
 def main() -> None:
     """Run the command line."""
+    # One thread for linear algebra: the matrices here are small, and the same bits come out
+    # whatever the number of cores.
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
     try:
         application()(prog_name="mrdamper")
     except InputError as error:

@@ -25,7 +25,7 @@ def integrate(
     start: Floats,
     scale: Floats,
     *,
-    tolerance: float = 1e-6,
+    tolerance: float = 1e-5,
 ) -> Floats:
     """State along a motion.
 

@@ -97,6 +97,11 @@ class Model(ABC):
         """Internal state (N,) along a motion; models without memory have none."""
         return np.zeros(len(motion))
 
+    @property
+    def knee(self) -> float | None:
+        """Motion after a reversal in which the force turns over [m]; None without such a length."""
+        return None
+
     @classmethod
     def parameters(cls) -> tuple[ParameterInfo, ...]:
         """What is known of each parameter, in order."""

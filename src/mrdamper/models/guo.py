@@ -17,7 +17,7 @@ from mrdamper.parameters import param
 
 @dataclass(frozen=True)
 class Guo(Model):
-    """F = (2/pi) f_y arctan[kappa (v + v0 sgn x)] + c v + f0.
+    """F = (2/pi) f_y arctan[kappa (v + v0 sgn x)] + c v + k x + f0, k zero unless freed.
 
     Memoryless: sgn(x) stands in for the branch of the loop, so the form holds for sines about
     mid-stroke. Just before a reversal at positive x the damper still pushes back, which fixes
@@ -32,7 +32,7 @@ class Guo(Model):
 
     name: ClassVar[str] = "guo"
     title: ClassVar[str] = "algebraic (arctangent)"
-    equation: ClassVar[str] = r"F = \tfrac{2}{\pi} f_y \arctan[\kappa (v + v_0\,\mathrm{sgn}\,x)] + c\,v + f_0"
+    equation: ClassVar[str] = r"F = \tfrac{2}{\pi} f_y \arctan[\kappa (v + v_0\,\mathrm{sgn}\,x)] + c\,v + k\,x + f_0"
     source: ClassVar[str] = "Guo, Yang and Pan 2006"
 
     fy: float = param("N", "yield force", bounds=(0, np.inf), linear=True)
@@ -40,6 +40,7 @@ class Guo(Model):
     kappa: float = param("s/m", "steepness of the pre-yield curve", bounds=(1e-3, 1e7), scale="log")
     v0: float = param("m/s", "velocity at which the force changes sign", bounds=(0, 10))
     f0: float = param("N", "offset force", linear=True, default=0.0)
+    k: float = param("N/m", "stiffness", linear=True, preset=True, default=0.0)
     xs: float = param(
         "m", "displacement in which the loop changes side; 0: at once", bounds=(0, 1), preset=True, default=0.0
     )
@@ -50,7 +51,7 @@ class Guo(Model):
         return 2 / np.pi * np.arctan(self.kappa * shifted)
 
     def force(self, motion: Excitation, state: Floats) -> Floats:
-        return self.fy * state + self.c * motion.velocity + self.f0
+        return self.fy * state + self.c * motion.velocity + self.k * motion.displacement + self.f0
 
     @classmethod
     def search_axes(cls, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:

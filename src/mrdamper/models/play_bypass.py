@@ -26,7 +26,7 @@ RISE_CURRENT = 0.12  # A; the yield force starts with zero slope in the current 
 
 @dataclass(frozen=True)
 class PlayBypass(Model):
-    """F = f0 + k x (1 − S) + (c0 + c1 I) v + fy(I) S + m a, S the lagged share of the yield force.
+    """F = f0 + k x (1 − S) + (c0 + c1 I) v + fy(I) (S + q |S|) + m a, S the lagged share of the yield force.
 
     With δ the play's position (stop operator, |δ| ≤ d), φ = sgn δ · max(0, |δ| − (d − e))/e is
     how far the seat is loaded and η its loading along the motion; b = r/√(1 + r²) with
@@ -34,7 +34,7 @@ class PlayBypass(Model):
 
     s = (1 − h) φ + sgn v [h |v|/(|v| + vh) η + (1 − η) b],  T dS/dt + S = s,
 
-    fy(I) = fy0 + fy1 I (1 − exp(−I/0.12 A)), h = h0 + h1 I within 0 and 1.
+    fy(I) = fy0 + fy1 I (1 − exp(−I/0.12 A)), h = h0 + h1 I within 0 and 1, q the asymmetry.
 
     References
     ----------
@@ -44,7 +44,7 @@ class PlayBypass(Model):
     name: ClassVar[str] = "play-bypass"
     title: ClassVar[str] = "play and bypass"
     equation: ClassVar[str] = (
-        r"F = f_0 + k x (1 - S) + (c_0 + c_1 I) v + f_y(I) S + m a,\quad T \dot S + S = s(\delta, v, I)"
+        r"F = f_0 + k x (1 - S) + (c_0 + c_1 I) v + f_y(I) (S + q |S|) + m a,\quad T \dot S + S = s(\delta, v, I)"
     )
     source: ClassVar[str] = "derived from the bundled tests"
 
@@ -61,7 +61,15 @@ class PlayBypass(Model):
     h1: float = param("1/A", "rise of that share with current", bounds=(-5, 5))
     vh: float = param("m/s", "velocity at which that share has faded by half", bounds=(1e-5, 1), scale="log")
     T: float = param("s", "lag of the yield force", bounds=(0, 0.2), scale="log")
+    asymmetry: float = param(
+        "-", "surplus of the yield force in extension over the mean", bounds=(-0.5, 0.5), linear=True, default=0.0
+    )
     m: float = param("kg", "inertia", bounds=(0, np.inf), linear=True, default=0.0)
+
+    @property
+    def knee(self) -> float:
+        """Lost motion and seat, 2 d [m]."""
+        return 2 * self.d
 
     def yield_force(self, current: Floats) -> Floats:
         """fy(I) [N]."""
@@ -84,7 +92,8 @@ class PlayBypass(Model):
     def force(self, motion: Excitation, state: Floats) -> Floats:
         x, v, a, current = motion.displacement, motion.velocity, motion.acceleration, motion.current
         viscous = (self.c0 + self.c1 * current) * v
-        return self.f0 + self.k * x * (1 - state) + viscous + self.yield_force(current) * state + self.m * a
+        yielded = self.yield_force(current) * (state + self.asymmetry * np.abs(state))
+        return self.f0 + self.k * x * (1 - state) + viscous + yielded + self.m * a
 
     @classmethod
     def search_axes(cls, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:

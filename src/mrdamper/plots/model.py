@@ -138,8 +138,8 @@ def residual_map(damper: Damper, runs: Sequence[Run]) -> Figure:
                 axes.plot((bins[1:] + bins[:-1]) / 2, mean, color=colour, lw=0.9, alpha=0.8)
         for current, colour in colours.items():
             over_phase.plot([], [], color=colour, label=f"{current:g} A")
-        over_phase.legend(loc="upper right", ncols=len(colours))
-        label(over_v, "Velocity over its peak (–)", "Predicted − measured (% of peak-to-peak)")
+        over_phase.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=len(colours))
+        label(over_v, "Velocity over its peak (–)", "Residual (% of peak-to-peak)")
         label(over_phase, "Phase of the motion (°)", "")
         over_phase.set_xticks([0, 90, 180, 270, 360])
         return figure

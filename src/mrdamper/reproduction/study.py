@@ -156,7 +156,7 @@ def reproduce(
     if with_direct_genetic:
         ways.append(direct_contender(train, held_out, settled, lambda what, share: progress(what, 0.3 + 0.2 * share)))
     checks, missing = _genetic_checks(train, settled, lambda what, share: progress(what, 0.5 + 0.2 * share))
-    spread = _seed_errors(rig, seeds, lambda what, share: progress(what, 0.7 + 0.3 * share)) if rig else {}
+    spread = _seed_errors(rig, seeds, lambda what, share: progress(what, 0.7 + 0.3 * share)) if rig and seeds else {}
     progress("reproduced", 1.0)
     return Reproduction(
         dataset=dataset,
@@ -188,7 +188,9 @@ def _splits(dataset: Dataset) -> tuple[list[Run], list[Run], tuple[str, ...]]:
     for split, runs in (("train", train), ("validate", held_out)):
         if not runs:
             raise IdentificationError(
-                f"no {split} run with a steady sine", where=dataset.name, mend="mark some in the split column of runs.csv"
+                f"no {split} run with a steady sine",
+                where=dataset.name,
+                mend="mark some in the split column of runs.csv",
             )
     return train, held_out, tuple(f"not used: {name}: {why}" for name, why in refused.items())
 

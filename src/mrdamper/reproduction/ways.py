@@ -40,9 +40,9 @@ PAPER_FORMS = {
 _SHORTER = ("quadratic-current", "linear-current", "constant")
 LITERAL, HALF, SAME_FORMS = "paper, literal", "paper, F0 half peak-to-peak", "consistent, the paper's functions"
 CONSISTENT, JOINT = "consistent", "joint"
-TRADITIONAL = "traditional Bouc–Wen, from the motion of nearest speed"
-SLOWEST = "traditional Bouc–Wen, from the slowest motion"
-DIRECT = "traditional Bouc–Wen, direct genetic, nearest speed"
+TRADITIONAL = "traditional, nearest speed"
+SLOWEST = "traditional, slowest motion"
+DIRECT = "direct genetic, nearest speed"
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,9 @@ class Settled:
         try:
             apart = separate_mass([i.condition for i in found], stiffness)
         except IdentificationError as error:
-            return cls(None, notes=(f"the gas spring is unknown and {error}: the mass is left out, k1 holds k1 − m ω²",))
+            return cls(
+                None, notes=(f"the gas spring is unknown and {error}: the mass is left out, k1 holds k1 − m ω²",)
+            )
         note = (
             f"the gas spring is unknown: k1 = {apart.k1:.4g} N/m comes from a regression of the consistent in-phase "
             f"stiffness k1 − m ω² over the frequencies (with m = {apart.m:.3g} kg); k2 = k3 = 0"
@@ -111,6 +113,7 @@ class Settled:
 
 
 def contenders(train: Sequence[Run], held_out: Sequence[Run], settled: Settled, progress: Progress) -> list[Contender]:
+    """Identify, map and validate in every way but the direct genetic one."""
     made = []
     literal = Paper(search="optimum")
     half = Paper(search="optimum", force_amplitude="half-peak-to-peak")
@@ -147,6 +150,7 @@ def contenders(train: Sequence[Run], held_out: Sequence[Run], settled: Settled, 
 
 
 def direct_contender(train: Sequence[Run], held_out: Sequence[Run], settled: Settled, progress: Progress) -> Contender:
+    """All parameters at once by the genetic algorithm, one run a current."""
     begin = time.perf_counter()
     nearest = _one_per_current(train, _peak_velocity(held_out))
     found = []
@@ -208,7 +212,9 @@ def _first_determined(forms: Sequence[str], conditions: Sequence[Condition], val
 def chosen_functions(found: Sequence[Identification]) -> ModifiedFit:
     """Functions chosen by how they predict left-out conditions."""
     forms = {**BoucWen.map_forms(), "k2": ("constant",), "m": ("constant", "quadratic-current")}
-    return fit_modified(found, forms)
+    # What was held has no function to find.
+    held = {name for name in forms if name in BoucWen.__dataclass_fields__ and name not in found[0].free}
+    return fit_modified(found, {name: ("constant",) if name in held else options for name, options in forms.items()})
 
 
 @dataclass(frozen=True, eq=False)

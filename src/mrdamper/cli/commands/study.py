@@ -16,6 +16,7 @@ def register(app: typer.Typer) -> None:
     def study(
         data: Optional[Path] = typer.Argument(None, help="Dataset folder; default: the bundled tests of two dampers."),  # noqa: UP045
         out: Path = typer.Option(..., "--out", help="Folder for report.html, model.json, tables and figures."),
+        model: Optional[str] = typer.Option(None, "--model", help="Save this model instead of the best."),  # noqa: UP045
         as_json: bool = typer.Option(False, "--json", help="Print a summary a program can read."),
     ) -> None:
         """Study a dataset: identify every run, map the parameters, validate; write report and models."""
@@ -29,7 +30,7 @@ def register(app: typer.Typer) -> None:
         require_writable(out)
         dataset = load_dataset(data)
         with progress_on_stderr() as progress:
-            result = run_study(dataset, lambda what, share: progress(what, 0.6 * share))
+            result = run_study(dataset, lambda what, share: progress(what, 0.6 * share), model=model)
             written = write_study(result, out, lambda what, share: progress(what, 0.6 + 0.4 * share))
         if as_json:
             import json

@@ -69,13 +69,13 @@ class DirectGenetic(Method):
         )
         end = dict(zip(names, found.point.tolist(), strict=True))
         at_bounds = tuple(
-            name for name, value in end.items() if min(value - box[name][0], box[name][1] - value) < 1e-3 * np.ptp(box[name])
+            name
+            for name, value in end.items()
+            if min(value - box[name][0], box[name][1] - value) < 1e-3 * np.ptp(box[name])
         )
         model = BoucWen.build({**problem.fixed, **end})
         searched = {name: end[name] for name in ("yield_displacement", "asymmetry", "n") if name in end}
-        return Solution(
-            model, 0.0, at_bounds, {}, searched, found.evaluations, found.message, self.genetic.seed
-        )
+        return Solution(model, 0.0, at_bounds, {}, searched, found.evaluations, found.message, self.genetic.seed)
 
 
 def _thinned(record: SineRecord) -> SineRecord:

@@ -260,6 +260,7 @@ def _counted_twice(problem: Problem, known: dict[str, float]) -> tuple[str, ...]
     if surplus < _SMALL * known["c"]:
         return ()
     return (
-        f"counted twice: {100 * min(surplus / known['c'], 1):.0f} % of c = {known['c']:.4g} N s/m is the first harmonic of "
+        f"counted twice: {100 * min(surplus / known['c'], 1):.0f} % of c = {known['c']:.4g} N s/m is "
+        f"the first harmonic of "
         "the hysteretic force, which alpha z holds too, and m is shifted likewise; method balance separates them",
     )

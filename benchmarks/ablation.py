@@ -1,0 +1,59 @@
+"""What each ingredient of the play-and-bypass model is worth: `python -m benchmarks.ablation`.
+
+Each row refits both bundled rigs with one ingredient switched off, on train runs only, and
+scores conditions left out (refitted, from the full fit) and interior currents left out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mrdamper.io.dataset import load_dataset
+from mrdamper.joint import JointProblem
+from mrdamper.validation import leave_one_condition_out, validate
+
+WITHOUT = {
+    "nothing: the whole model": {},
+    "viscous bypass": {"cb": 1.0},
+    "fading of the seated force with velocity": {"h0": 0.0, "h1": 0.0},
+    "rise of the fading with current": {"h1": 0.0},
+    "lag": {"T": 0.0},
+    "stiffness": {"k": 0.0},
+    "asymmetry": {"asymmetry": 0.0},
+    "inertia": {"m": 0.0},
+    "lost motion (seat as long as the play)": {"d": 2e-5, "e": 2e-5},
+}
+
+
+def main() -> None:
+    dataset = load_dataset()
+    print("| without | " + " | ".join(f"{rig}: train / condition / current left out" for rig in dataset.rigs) + " |")
+    print("|---|" + "---|" * len(dataset.rigs))
+    for name, fixed in WITHOUT.items():
+        print(f"| {name} | " + " | ".join(scores(dataset.rig(rig), fixed) for rig in dataset.rigs) + " |", flush=True)
+
+
+def scores(dataset, fixed) -> str:
+    train = [run for run in dataset.split("train") if run.excitation == "sine"]
+    problem = JointProblem(train, "play-bypass", fixed)
+    fit = problem.fit(most_steps=25)
+    conditions = [part.condition for part in problem.parts]
+    left_out = leave_one_condition_out(
+        train, conditions, lambda rest: problem.fit(rest, fit.point, rounds=2, most_steps=6).damper, name(fixed)
+    )
+    errors = []
+    for current in sorted({c.current_A for c in conditions})[1:-1]:
+        rest = [i for i, c in enumerate(conditions) if c.current_A != current]
+        unseen = [train[i] for i, c in enumerate(conditions) if c.current_A == current]
+        damper = problem.fit(rest, fit.point, rounds=2).damper
+        errors += [run.scores.nrmse_pp for run in validate(damper, unseen).runs]
+    figures = (validate(fit.damper, train).median(), left_out.median(), float(np.median(errors)))
+    return " / ".join(f"{100 * f:.2f}" for f in figures)
+
+
+def name(fixed) -> str:
+    return "play-bypass without " + ", ".join(fixed)
+
+
+if __name__ == "__main__":
+    main()
