@@ -70,8 +70,18 @@ def test_predict_along_a_motion_from_a_file(model, tmp_path):
 def test_extrapolation_is_warned_of_and_flagged(model):
     done = mrdamper("predict", model, "--current", 2, "--frequency", 2, "--amplitude", 10, "--json")
     assert done.returncode == 0
-    assert "extrapolation: current lies outside" in done.stderr
+    assert "warning: current lies outside" in done.stderr
     assert json.loads(done.stdout)[0]["extrapolation"] == "current"
+
+
+def test_a_gap_in_the_motion_and_coarse_sampling_are_said(model, tmp_path):
+    t = np.concatenate([np.linspace(0, 1, 200), np.linspace(3, 4, 200)])
+    rows = "".join(f"{a},{0.01 * np.sin(6 * a)},0.5\n" for a in t)
+    (tmp_path / "gap.csv").write_text("time_s,displacement_m,current_A\n" + rows)
+    done = mrdamper("predict", model, "--motion", tmp_path / "gap.csv")
+    assert done.returncode == 2
+    assert "a gap of 2 s after 1 s" in done.stderr
+    assert "[E_TIME_GAP]" in done.stderr
 
 
 def test_validate_scores_the_models_rig(model):

@@ -3,14 +3,16 @@ import pytest
 from synthetic import TRUTH, synthetic_run
 
 from mrdamper.damper import Envelope
-from mrdamper.data import Condition, same_condition
+from mrdamper.data import Condition, Run, same_condition
 from mrdamper.errors import IdentificationError
+from mrdamper.excitation import sweep
 from mrdamper.identification import identify
 from mrdamper.condensed import choose_forms, condense, fit_jointly, leave_out_errors
 from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.modified import fit_modified, fit_modified_jointly
 from mrdamper.parameter_functions import ParameterFunction
+from mrdamper.simulation import simulate
 from mrdamper.validation import leave_one_condition_out, validate
 
 MATRIX = [Condition(i, f, a) for i in (0.0, 0.5, 1.0, 1.5) for f, a in ((1.0, 0.02), (2.0, 0.02), (0.5, 0.05))]
@@ -123,3 +125,22 @@ def test_envelope_flags_what_lies_outside():
     assert envelope.flags(Condition(3.0, 1.0, 0.03)) == ("current",)
     assert envelope.flags(Condition(1.0, 4.0, 0.1)) == ("frequency", "amplitude", "velocity")
     assert envelope.flags(Condition(1.51, 1.0, 0.03)) == ()  # within the bench's own repeatability
+
+
+def test_a_dead_run_does_not_stop_the_others(runs, identifications):
+    damper = fit_modified(identifications).damper
+    still = Run("still", runs[0].time, np.zeros(runs[0].time.size), runs[0].force, 0.0, rig="s")
+    validation = validate(damper, [runs[0], still])
+    assert [r.run_id for r in validation.runs] == ["r0"]
+    assert "does not move" in validation.refused["still"]
+
+
+def test_other_motion_gets_running_estimates_and_is_flagged(runs, identifications):
+    """On a slow sweep the blended force is near that of the truth at the momentary condition."""
+    damper = fit_modified_jointly(runs, identifications)[0].damper
+    motion = sweep(0.6, 1.9, 30.0, 0.03, 1.0, 400.0)
+    run = Run("sweep", motion.time, motion.displacement, motion.velocity, 1.0, rig="s", excitation="chirp")
+    prediction = damper.predict_run(run)
+    assert "not a sine" in prediction.extrapolation
+    expected = simulate(truth(Condition(1.0, 1.0, 0.03)), motion).force
+    assert np.sqrt(np.mean((prediction.force - expected) ** 2)) < 0.04 * np.ptp(expected)

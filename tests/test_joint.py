@@ -110,6 +110,18 @@ def test_current_may_vary_from_sample_to_sample(runs):
     assert np.sqrt(np.mean((damper.force_along(varied, MATRIX[0]) - truth) ** 2)) < 0.02 * np.ptp(truth)
 
 
+def test_the_coil_follows_a_changed_current_late(runs):
+    damper = JointProblem(runs, "play-bypass").fit(rounds=1).damper
+    motion = sine(Condition(0.0, 1.0, 0.01), 4, 500)
+    current = np.where(motion.time < 2, 0.0, 1.0)
+    run = Run("step", motion.time, motion.displacement, motion.velocity, current)
+    late, prompt = (damper.predict_run(run, coil_lag=lag).force for lag in (0.05, 0.0))
+    before, after, later = motion.time < 2, (motion.time > 2) & (motion.time < 2.05), motion.time > 2.6
+    np.testing.assert_allclose(late[before], prompt[before])
+    assert np.abs(late[after]).mean() < 0.9 * np.abs(prompt[after]).mean()
+    np.testing.assert_allclose(late[later], prompt[later], atol=1e-3 * np.ptp(prompt))
+
+
 def test_one_step_without_a_run_lands_where_a_new_search_does(runs):
     problem = JointProblem(runs, "play-bypass")
     fit = problem.fit()

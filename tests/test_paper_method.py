@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mrdamper.data import Condition, Run
-from mrdamper.errors import IdentificationError
+from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.excitation import sine
 from mrdamper.gas_spring import GasSpring
 from mrdamper.hysteresis import steady_loop
@@ -116,6 +116,12 @@ def test_without_a_gas_spring_the_in_phase_force_is_stiffness_and_the_result_say
     in_phase = k1 + 0.75 * k3 * 0.05**2 - known.model.m * (2 * np.pi) ** 2
     assert unknown.model.k1 == pytest.approx(in_phase, rel=1e-9)
     assert unknown.model.m == 0.0
+
+
+def test_a_motion_that_leaves_no_gas_volume_is_refused():
+    run = steady_run(Condition(1.0, 1.0, 0.05), samples=200)
+    with pytest.raises(ParameterError, match="no gas volume"):
+        identify(run, "bouc-wen", Paper(search="optimum"), gas=GasSpring(1.5e6, 1e-5, np.pi * 1e-4))
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ import numpy as np
 
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.excitation import Excitation, equivalent_sine, measured_motion
+from mrdamper.recursion import first_order_lag
 from mrdamper.simulation import Response
 
 NOT_A_SINE = "not a sine"
@@ -144,10 +145,20 @@ class Damper(ABC):
         response = self.loop(condition)
         return Prediction(response.excitation, response.force, condition, self.envelope.flags(condition))
 
-    def predict_run(self, run: Run) -> Prediction:
-        """Force along the measured motion of a run, with its flags. The measured force is not looked at."""
+    def predict_run(self, run: Run, coil_lag: float = 0.0) -> Prediction:
+        """Force along the measured motion of a run, with its flags. The measured force is not looked at.
+
+        Parameters
+        ----------
+        run : Run
+        coil_lag : float
+            Time constant with which the field follows a changing current [s].
+        """
         found = equivalent_sine(run)
         motion = measured_motion(run).about(found.centre)
+        if coil_lag > 0:
+            start = motion.current[0]
+            motion = motion.with_current(start + first_order_lag(motion.time, motion.current - start, coil_lag))
         flags = self.envelope.flags(found.condition)
         if not found.is_sine:
             flags = (*self.envelope.motion_flags(motion), NOT_A_SINE)

@@ -57,13 +57,13 @@ class ModifiedModel(Damper):
     def force_along(self, motion: Excitation, condition: Condition) -> Floats:
         return simulate(self.parameters.at(condition), motion).force
 
-    def predict_run(self, run: Run) -> Prediction:
+    def predict_run(self, run: Run, coil_lag: float = 0.0) -> Prediction:
         """Force along a run's motion: at its condition for a sine, at running estimates otherwise.
 
         The functions ask for a frequency and an amplitude. Other motion gets those of the sine
         it resembles from moment to moment: an approximation, flagged as such.
         """
-        prediction = super().predict_run(run)
+        prediction = super().predict_run(run, coil_lag)
         if NOT_A_SINE not in prediction.extrapolation:
             return prediction
         return replace(prediction, force=self._running(prediction.motion))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from mrdamper.damper import Damper, Prediction
 from mrdamper.data import Condition, Run, same_condition
+from mrdamper.errors import InputError, RunError
 from mrdamper.metrics import Scores, score
 
 
@@ -46,10 +47,13 @@ class Validation:
     title : str
         What was validated.
     runs : tuple of RunScore
+    refused : mapping of str to str
+        Runs that could not be scored, and why.
     """
 
     title: str
     runs: tuple[RunScore, ...]
+    refused: Mapping[str, str] = field(default_factory=dict)
 
     def median(self, name: str = "nrmse_pp") -> float:
         """Median of a score over the runs; signed errors count by magnitude."""
@@ -61,12 +65,29 @@ class Validation:
 
 
 def validate(damper: Damper, runs: Iterable[Run], title: str | None = None) -> Validation:
-    """Predict runs from their measured motion and score them inside their steady windows."""
-    return Validation(title or damper.title, tuple(score_run(damper, run) for run in runs))
+    """Predict runs from their measured motion and score them inside their steady windows.
+
+    A run that cannot be predicted, for want of motion say, does not stop the others.
+    """
+    scored, refused = [], {}
+    for run in runs:
+        try:
+            scored.append(score_run(damper, run))
+        except InputError as error:
+            refused[run.id] = str(error)
+    return Validation(title or damper.title, tuple(scored), refused)
 
 
 def score_run(damper: Damper, run: Run) -> RunScore:
-    """Predict and score one run."""
+    """Predict and score one run.
+
+    Raises
+    ------
+    InputError
+        If the run does not move, or its force does not change.
+    """
+    if np.ptp(run.force[run.in_window]) == 0:
+        raise RunError("the force does not change", where=f"run {run.id}", mend="check the channel")
     prediction = damper.predict_run(run)
     return RunScore(
         run.id, run.rig, prediction.condition, _scores(run, prediction), run.repeatability, prediction.extrapolation

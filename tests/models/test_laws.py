@@ -22,9 +22,12 @@ EXAMPLES = {
     "biviscous": {"cpo": 1200.0, "fy": 700.0, "vy": 0.02, "vh": 0.008, "f0": 60.0},
     "dahl": {"kappa_x": 1300.0, "kappa_w": 700.0, "yield_displacement": 6e-4, "f0": 60.0},
     "herschel-bulkley": {"fy": 500.0, "vc": 0.05, "m": 0.8, "f0": 60.0},
-    "lugre": {"fc": 600.0, "presliding": 5e-4, "stribeck": 1.3, "vs": 0.01, "sigma1": 300.0, "sigma2": 900.0, "f0": 60.0},
+    "lugre": {
+        "fc": 600.0, "presliding": 5e-4, "stribeck": 1.3, "vs": 0.01, "sigma1": 300.0, "sigma2": 900.0, "f0": 60.0,
+    },
     "spencer": {
-        "c1": 2.6e4, "c0_ratio": 0.06, "k0_rate": 0.15, "creep": 0.03, "yield_displacement": 1e-4, "k1": 800.0, "f0": 60.0,
+        "c1": 2.6e4, "c0_ratio": 0.06, "k0_rate": 0.15, "creep": 0.03, "yield_displacement": 1e-4, "k1": 800.0,
+        "f0": 60.0,
     },
 }  # fmt: skip
 ODD_WITHOUT = {"f0": 0.0}
@@ -86,7 +89,9 @@ def test_a_model_is_recovered_from_its_own_force(name):
     # Where the force jumps with the sign of the smoothed velocity, a sample a cycle falls on the other side.
     assert found.scores.nrmse_pp < (2e-2 if name in JUMPING else 2e-3)
     for parameter in set(EXAMPLES[name]) - WEAK.get(name, set()):
-        assert getattr(found.model, parameter) == pytest.approx(getattr(truth, parameter), rel=0.02, abs=0.05), parameter
+        assert getattr(found.model, parameter) == pytest.approx(getattr(truth, parameter), rel=0.02, abs=0.05), (
+            parameter
+        )
 
 
 JUMPING = {"bingham", "herschel-bulkley"}

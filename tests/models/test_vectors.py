@@ -102,6 +102,18 @@ def test_spencer_at_constant_voltage(vectors):
         np.testing.assert_allclose(found[index], case["F"], atol=1e-6 * np.ptp(found))
 
 
+def test_spencers_letters_come_back_with_any_a():
+    letters = {
+        "c0": 2100.0, "c1": 28300.0, "k0": 4690.0, "k1": 500.0, "alpha": 14000.0, "gamma": 3.63e6, "beta": 2e6,
+        "A": 301.0, "n": 2.0, "x0": 0.143,
+    }  # fmt: skip
+    model = Spencer.from_letters(**letters)
+    assert model.to_letters(301.0) == pytest.approx(letters)
+    motion = sine(Condition(0.0, 1.0, 0.01), 1, 200)
+    again = Spencer.from_letters(**model.to_letters(1.0))
+    np.testing.assert_allclose(force(again, motion), force(model, motion), rtol=1e-6, atol=1e-3)
+
+
 def test_lugre(vectors):
     case = vectors["V13_lugre"]
     p = case["params"]

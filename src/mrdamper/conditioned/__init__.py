@@ -26,9 +26,7 @@ def all_conditioned() -> Mapping[str, type[ConditionedDamper]]:
     """Every condition-dependent damper by its name."""
     for module in pkgutil.iter_modules(__path__):
         importlib.import_module(f"{__name__}.{module.name}")
-    return MappingProxyType(
-        {cls.name: cls for cls in sorted(ConditionedDamper.__subclasses__(), key=lambda c: c.name)}
-    )
+    return MappingProxyType({cls.name: cls for cls in sorted(ConditionedDamper.__subclasses__(), key=lambda c: c.name)})
 
 
 def conditioned_type(name: str) -> type[ConditionedDamper]:

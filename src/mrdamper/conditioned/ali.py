@@ -73,9 +73,7 @@ class AliType(ConditionedDamper):
         return sum(not name.endswith("_floor") for name in self.coefficients)
 
 
-def _power_law(
-    name: str, conditions: Sequence[Condition], values: Floats, reference: Condition
-) -> dict[str, float]:
+def _power_law(name: str, conditions: Sequence[Condition], values: Floats, reference: Condition) -> dict[str, float]:
     """Powers from logarithms with a level for every current, then the quadratic of what is left."""
     currents = np.array([c.current_A for c in conditions])
     amplitude = np.log([c.amplitude_m / reference.amplitude_m for c in conditions])

@@ -84,13 +84,13 @@ class ConditionedDamper(Damper):
         return damper.refined(runs)
 
     @classmethod
-    def regressed(
-        cls, identifications: Sequence[Identification], provenance: Mapping[str, str] | None = None
-    ) -> Self:
+    def regressed(cls, identifications: Sequence[Identification], provenance: Mapping[str, str] | None = None) -> Self:
         """The damper from the identifications alone."""
         if len(identifications) < 3:
             raise IdentificationError(
-                f"{len(identifications)} identifications", where=cls.heading, mend="give runs at three conditions or more"
+                f"{len(identifications)} identifications",
+                where=cls.heading,
+                mend="give runs at three conditions or more",
             )
         if {i.model.name for i in identifications} != {cls.basis}:
             raise IdentificationError(

@@ -51,11 +51,17 @@ class DominguezType(ConditionedDamper):
         scale = np.array([_scale(c, reference, *powers) for c in conditions])
         beta = float(np.quantile(total, 0.9)) / 2
         # Alpha follows from the yield force, which is well determined, and not from the identified alpha.
-        slope = np.polyfit(currents, np.log(total), 1) if np.ptp(currents) > 0 else np.array([0.0, np.mean(np.log(total))])
+        slope = (
+            np.polyfit(currents, np.log(total), 1) if np.ptp(currents) > 0 else np.array([0.0, np.mean(np.log(total))])
+        )
         smooth_total = np.exp(np.polyval(slope, currents))
         gamma = np.polyfit(currents, smooth_total - beta, 1) if np.ptp(currents) > 0 else np.array([0.0, 0.0])
         straight = np.maximum(np.polyval(gamma, currents) + beta, _FLOOR * beta)
-        k = np.polyfit(currents, values["k1"] / scale, 1) if np.ptp(currents) > 0 else np.array([0.0, np.mean(values["k1"])])
+        k = (
+            np.polyfit(currents, values["k1"] / scale, 1)
+            if np.ptp(currents) > 0
+            else np.array([0.0, np.mean(values["k1"])])
+        )
         return {
             "d2": powers[0],
             "d4": powers[1],
@@ -120,5 +126,3 @@ def _law(given: Mapping[str, float], name: str, current: float, knee: float) -> 
     if current > knee:
         return at_break + rise * (1 - np.exp(-max(rate, 0.0) * (current - knee)))
     return at_zero + (at_break - at_zero) * current / knee
-
-

@@ -78,7 +78,11 @@ class KernelBaseline(ConditionedDamper):
         weights = np.linalg.solve(normal, table.T @ ((force - mean) / size * trust) / len(inputs))
         conditions = [piece.condition for piece in pieces]
         names = ("displacement", "velocity", "acceleration", "current")
-        coefficients = {"mean": mean, "size": size, **{f"spread_{n}": float(s) for n, s in zip(names, spread, strict=True)}}
+        coefficients = {
+            "mean": mean,
+            "size": size,
+            **{f"spread_{n}": float(s) for n, s in zip(names, spread, strict=True)},
+        }
         return cls(
             runs[0].rig, coefficients, conditions[0], Envelope.of(conditions), dict(provenance or {}), centres, weights
         )

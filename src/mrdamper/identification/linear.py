@@ -49,9 +49,7 @@ def bounds_of(linear: Sequence[ParameterInfo]) -> tuple[Floats, Floats]:
     return np.array([info.bounds[0] for info in linear]), np.array([info.bounds[1] for info in linear])
 
 
-def bounded_linear(
-    columns: Floats, right: Floats, lower: Floats, upper: Floats
-) -> tuple[Floats, NDArray[np.bool_]]:
+def bounded_linear(columns: Floats, right: Floats, lower: Floats, upper: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     """Least squares with bounds on the coefficients, by holding violated ones at their bound.
 
     Parameters

@@ -72,11 +72,14 @@ class Problem:
             If the model has no such parameter.
         IdentificationError
             If m and k1 are both to be free: on one frequency a = −ω² x, so no data can tell them apart.
+        ParameterError
+            If the motion would compress the gas to no volume at all.
         """
         infos = {info.name: info for info in model_type.parameters()}
         held = dict(fixed or {})
         wanted = list(free)
         if gas is not None:
+            gas.force(np.ptp(run.displacement) / 2)  # refuses a motion that leaves no gas volume
             k1, k2, k3 = gas.stiffnesses("extension")
             held = {"k1": k1, "k2": k2, "k3": k3} | held
             if "m" not in held:

@@ -32,7 +32,7 @@ def compiled(rate: Callable[..., None]) -> Any:
 
 
 @_compile
-def _cubic(piece, width, x0, x1, v0, v1):  # noqa: ANN001, ANN202
+def _cubic(piece, width, x0, x1, v0, v1):
     """Coefficients of the displacement between two samples, as velocities."""
     mean = (x1 - x0) / width
     piece[0], piece[1] = x0, v0
@@ -40,7 +40,7 @@ def _cubic(piece, width, x0, x1, v0, v1):  # noqa: ANN001, ANN202
 
 
 @_compile
-def _rate_at(rate, p, piece, width, t, y, out):  # noqa: ANN001, ANN202
+def _rate_at(rate, p, piece, width, t, y, out):
     s = t / width
     x = piece[0] + width * s * (piece[1] + s * (piece[2] + s * piece[3]))
     v = piece[1] + s * (2 * piece[2] + 3 * s * piece[3])
@@ -48,7 +48,7 @@ def _rate_at(rate, p, piece, width, t, y, out):  # noqa: ANN001, ANN202
 
 
 @_compile
-def _step(rate, p, piece, width, t, h, y, scale, tolerance, new, work):  # noqa: ANN001, ANN202
+def _step(rate, p, piece, width, t, h, y, scale, tolerance, new, work):
     """One step from y at time t into `new`; returns its error over the tolerance."""
     size = y.size
     k, f, slope, here, moved = work[:4], work[4], work[5], work[6], work[7]
@@ -88,7 +88,7 @@ def _step(rate, p, piece, width, t, h, y, scale, tolerance, new, work):  # noqa:
 
 
 @_compile
-def _solve(jacobian, h, right, matrix):  # noqa: ANN001, ANN202
+def _solve(jacobian, h, right, matrix):
     """Solve (2/h − J) k = right in place, by elimination with row exchange."""
     size = right.size
     for m in range(size):
@@ -122,7 +122,7 @@ def _solve(jacobian, h, right, matrix):  # noqa: ANN001, ANN202
     cache=True,
     error_model="numpy",
 )
-def path(rate, p, time, x, v, current, start, scale, tolerance, out):  # noqa: ANN001, ANN201
+def path(rate, p, time, x, v, current, start, scale, tolerance, out):
     """States at all samples into `out`; returns a status and the sample it was met at."""
     size = start.size
     y = start.copy()

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from mrdamper.data import Run
-from mrdamper.errors import ColumnError, DatasetError, UnitError
+from mrdamper.errors import ColumnError, DatasetError, RunError, UnitError
 
 _NAMES = ("time_s", "displacement_m")
 
@@ -63,6 +63,15 @@ def load_motion(path: str | Path, current: float | None = None) -> Run:
     columns = {name: table[name].cast(pl.Float64).to_numpy() for name in wanted}
     if current is None and "current_A" not in columns:
         raise ColumnError("no current", where=str(path), mend="give --current A, or a column current_A")
+    steps = np.diff(columns["time_s"])
+    if steps.size and np.any(steps > 5 * np.median(steps)):
+        at = int(np.argmax(steps > 5 * np.median(steps)))
+        raise RunError(
+            f"a gap of {steps[at]:.4g} s after {columns['time_s'][at]:.6g} s",
+            where=str(path),
+            mend="predict the parts one by one: the damper's state is unknown after a gap",
+            code="E_TIME_GAP",
+        )
     return Run(
         id=path.stem,
         time=columns["time_s"],

@@ -77,6 +77,7 @@ class Model(ABC):
     title: ClassVar[str]
     equation: ClassVar[str]
     source: ClassVar[str]
+    integrated: ClassVar[bool] = False  # the state is stepped: following a motion costs a hundred times more
 
     def __post_init__(self) -> None:
         for info in self.parameters():
@@ -121,9 +122,7 @@ class Model(ABC):
         return ()
 
     @classmethod
-    def guess(
-        cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]
-    ) -> tuple[SearchAxis, ...]:
+    def guess(cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """Search coordinates with start values read off the data.
 
         Parameters

@@ -94,9 +94,7 @@ class Biviscous(Model):
         return _axes(2 * np.pi * amplitude, free)
 
     @classmethod
-    def guess(
-        cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]
-    ) -> tuple[SearchAxis, ...]:
+    def guess(cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """Both widths lie below the peak velocity."""
         return _axes(float(np.max(np.abs(motion.velocity))), free)
 

@@ -98,9 +98,7 @@ class HerschelBulkley(Model):
         return _axes(2 * np.pi * amplitude, free)
 
     @classmethod
-    def guess(
-        cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]
-    ) -> tuple[SearchAxis, ...]:
+    def guess(cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """v_c from a hundredth of the peak velocity (viscous) to a hundred times it (all yield)."""
         return _axes(float(np.max(np.abs(motion.velocity))), free)
 

@@ -58,9 +58,7 @@ class Kwok(Model):
         return _axes(2 * np.pi * amplitude, amplitude, free)
 
     @classmethod
-    def guess(
-        cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]
-    ) -> tuple[SearchAxis, ...]:
+    def guess(cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """The curve yields somewhere between a thousandth and all of the peak velocity."""
         return _axes(float(np.max(np.abs(motion.velocity))), amplitude, free)
 

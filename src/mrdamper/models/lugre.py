@@ -39,6 +39,7 @@ class LuGre(Model):
         r"\ g = 1 + (s-1) e^{-(v/v_s)^2}"
     )
     source: ClassVar[str] = "Canudas de Wit et al. 1995"
+    integrated: ClassVar[bool] = True
 
     fc: float = param("N", "yield force while sliding", bounds=(0, np.inf), linear=True)
     presliding: float = param(
@@ -90,9 +91,7 @@ class LuGre(Model):
         return _axes(amplitude, 2 * np.pi * amplitude, free)
 
     @classmethod
-    def guess(
-        cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]
-    ) -> tuple[SearchAxis, ...]:
+    def guess(cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """The onset force fades well below the peak velocity."""
         return _axes(amplitude, float(np.max(np.abs(motion.velocity))), free)
 

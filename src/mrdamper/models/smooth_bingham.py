@@ -47,9 +47,7 @@ class SmoothBingham(Model):
         return _axes(2 * np.pi * amplitude, free)
 
     @classmethod
-    def guess(
-        cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]
-    ) -> tuple[SearchAxis, ...]:
+    def guess(cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """The yield force builds up between a thousandth and all of the peak velocity."""
         return _axes(float(np.max(np.abs(motion.velocity))), free)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
@@ -12,7 +12,7 @@ from mrdamper.data import Floats
 from mrdamper.errors import ParameterError
 from mrdamper.excitation import Excitation
 from mrdamper.integrator import integrate
-from mrdamper.models.base import Model, SearchAxis
+from mrdamper.models.base import GENERAL_FORMS, Model, SearchAxis
 from mrdamper.parameters import param
 
 
@@ -40,6 +40,7 @@ class Spencer(Model):
         r"\quad \dot z = A\dot r - \gamma |\dot r| z |z|^{n-1} - \beta \dot r |z|^n,\ r = x - y"
     )
     source: ClassVar[str] = "Spencer et al. 1997"
+    integrated: ClassVar[bool] = True
 
     c1: float = param("N s/m", "viscous damping in series, seen at low velocity", bounds=(0, np.inf), linear=True)
     c0_ratio: float = param("-", "c0/c1, viscous damping at high velocity", bounds=(1e-6, 1e3), scale="log")
@@ -52,9 +53,7 @@ class Spencer(Model):
     )
     k1: float = param("N/m", "stiffness of the accumulator", linear=True, default=0.0)
     f0: float = param("N", "offset force, −k1 x0", linear=True, default=0.0)
-    asymmetry: float = param(
-        "-", "(coefficient of v − of |v|)/(their sum)", bounds=(-1, 1), preset=True, default=0.0
-    )
+    asymmetry: float = param("-", "(coefficient of v − of |v|)/(their sum)", bounds=(-1, 1), preset=True, default=0.0)
     n: float = param("-", "sharpness of the yield", bounds=(1, 10), preset=True, default=2.0)
 
     @property
@@ -128,12 +127,30 @@ class Spencer(Model):
             n=n,
         )
 
+    def to_letters(self, A: float = 1.0) -> dict[str, float]:
+        """The letters of the publication for an A [-] of choice: gamma with |v|, beta with v, SI units.
+
+        x0 is 0 where there is no k1 to stand for the offset force.
+        """
+        z_max = A * self.yield_displacement
+        total = A / z_max**self.n
+        return {
+            "c0": self.c0,
+            "c1": self.c1,
+            "k0": self.k0,
+            "k1": self.k1,
+            "alpha": self.yield_force / z_max,
+            "gamma": total * (1 - self.asymmetry) / 2,
+            "beta": total * (1 + self.asymmetry) / 2,
+            "A": A,
+            "n": self.n,
+            "x0": -self.f0 / self.k1 if self.k1 else 0.0,
+        }
+
     def state(self, motion: Excitation) -> Floats:
         """(N, 2): r = x − y [m] and z/z_max, from 0."""
         channels = (motion.time, motion.displacement, motion.velocity, motion.current)
-        shape = np.array(
-            [self.c0_ratio, self.k0_rate, self.creep, 1 / self.yield_displacement, self.asymmetry, self.n]
-        )
+        shape = np.array([self.c0_ratio, self.k0_rate, self.creep, 1 / self.yield_displacement, self.asymmetry, self.n])
         return integrate(series_rate, shape, channels, np.zeros(2), np.array([self.yield_displacement, 1.0]))
 
     def force(self, motion: Excitation, state: Floats) -> Floats:
@@ -148,11 +165,35 @@ class Spencer(Model):
         return _axes(amplitude, 2 * np.pi * amplitude, free)
 
     @classmethod
-    def guess(
-        cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]
-    ) -> tuple[SearchAxis, ...]:
+    def guess(cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """The series damper creeps at a hundredth to all of the peak velocity."""
         return _axes(amplitude, float(np.max(np.abs(motion.velocity))), free)
+
+    @classmethod
+    def map_forms(cls) -> Mapping[str, tuple[str, ...]]:
+        """The published letters are mapped: their ratios mix what depends on the current with what does not."""
+        return {
+            "c1": GENERAL_FORMS,
+            "c0": GENERAL_FORMS,
+            "yield_force": (*GENERAL_FORMS, "saturating-current"),
+            "yield_displacement": GENERAL_FORMS,
+            "k0": ("constant",),
+            "k1": GENERAL_FORMS,
+            "f0": GENERAL_FORMS,
+        }
+
+    @classmethod
+    def log_coordinates(cls) -> frozenset[str]:
+        return frozenset({"c1", "c0", "yield_force", "yield_displacement"})
+
+    @classmethod
+    def build(cls, values: Mapping[str, float]) -> Self:
+        """Make the model from its parameters, or from `c0` [N s/m], `k0` [N/m], `yield_force` [N] in their place."""
+        given = dict(values)
+        for letter, ratio in (("c0", "c0_ratio"), ("k0", "k0_rate"), ("yield_force", "creep")):
+            if letter in given:
+                given[ratio] = given.pop(letter) / given["c1"]
+        return cls(**given)
 
 
 def series_rate(x: float, v: float, current: float, state: Floats, p: Floats, out: Floats) -> None:

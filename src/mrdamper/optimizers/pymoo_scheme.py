@@ -3,15 +3,19 @@
 Apart from `genetic` because it cannot be imported where pymoo is not installed.
 """
 
+# pymoo may be absent, and where it is there its annotations allow None for what it has set.
+# pyright: reportMissingImports=false, reportOptionalMemberAccess=false, reportOptionalSubscript=false
+# pyright: reportArgumentType=false, reportCallIssue=false, reportAttributeAccessIssue=false
+
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from pymoo.core.algorithm import Algorithm  # pyright: ignore[reportMissingImports]
-from pymoo.core.population import Population  # pyright: ignore[reportMissingImports]
-from pymoo.core.problem import Problem  # pyright: ignore[reportMissingImports]
+from pymoo.core.algorithm import Algorithm
+from pymoo.core.population import Population
+from pymoo.core.problem import Problem
 
 from mrdamper.data import Floats
 from mrdamper.optimizers.genetic import GeneticSettings, next_generation
@@ -34,20 +38,19 @@ class _EliteScheme(Algorithm):
     def __init__(self, settings: GeneticSettings, **kwargs: Any):
         super().__init__(**kwargs)
         self._settings = settings
+        self._rng = np.random.default_rng(self.seed)  # pymoo's own is not in every version
         self.lowest: list[float] = []
 
     def _initialize_infill(self) -> Population:
         box = self.problem.xl, self.problem.xu
-        return Population.new("X", self.random_state.uniform(*box, (self._settings.population, box[0].size)))
+        return Population.new("X", self._rng.uniform(*box, (self._settings.population, box[0].size)))
 
     def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
         self._replace_by(infills)
 
     def _infill(self) -> Population:
         points, costs = self.pop.get("X"), self.pop.get("F")[:, 0]
-        _, children = next_generation(
-            points, costs, self.problem.xl, self.problem.xu, self._settings, self.random_state
-        )
+        _, children = next_generation(points, costs, self.problem.xl, self.problem.xu, self._settings, self._rng)
         return Population.new("X", children)
 
     def _advance(self, infills: Population | None = None, **kwargs: Any) -> None:

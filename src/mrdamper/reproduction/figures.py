@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from mrdamper.data import Floats, Run
 from mrdamper.loop_analysis import same_motion
+from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.plots.style import MEASURED, MM, PALETTE, current_colours, house_style, label, new_figure, thin
 from mrdamper.reproduction.claims import friction_along
 from mrdamper.reproduction.study import GeneticCheck, Reproduction
@@ -67,6 +68,7 @@ def functions_figure(contender: Contender, names: Sequence[str]) -> Figure:
     fit = contender.fit
     assert fit is not None
     shown = [name for name in names if name in fit.functions]
+    units = {info.name: info.unit for info in BoucWen.parameters()} | {"yield_force": "N", "yield_displacement": "m"}
     with house_style():
         rows = -(-len(shown) // 2)
         figure, axes = new_figure(rows, 2, 2.5 * rows)
@@ -86,7 +88,12 @@ def functions_figure(contender: Contender, names: Sequence[str]) -> Figure:
             if found.function.log:
                 panel.set_yscale("log")
             varies = np.ptp(fit.values[name]) > 1e-9 * np.max(np.abs(fit.values[name]))
-            label(panel, "Current (A)", name, f"{found.function.form}, R² {found.r2:.3f}" if varies else "held")
+            label(
+                panel,
+                "Current (A)",
+                f"{name} ({units[name]})",
+                f"{found.function.form}, R² {found.r2:.3f}" if varies else "held",
+            )
         for unused in axes[len(shown) :]:
             unused.set_visible(False)
         return figure
@@ -134,7 +141,7 @@ def errors_figure(study: Reproduction) -> Figure:
 def seeds_figure(errors: dict[str, Floats]) -> Figure:
     """Held-out error over noise seeds."""
     with house_style():
-        figure, (axes,) = new_figure(1, 1, 1.8, left=1.5)
+        figure, (axes,) = new_figure(1, 1, 2.4, left=2.2)
         for row, values in enumerate(errors.values()):
             axes.plot(100 * values, np.full(values.size, row), "|", ms=9, color=PALETTE[1])
         axes.set_yticks(range(len(errors)), list(errors))

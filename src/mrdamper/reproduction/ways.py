@@ -140,19 +140,25 @@ def contenders(train: Sequence[Run], held_out: Sequence[Run], settled: Settled, 
         made.append(_contender(JOINT, "joint", fit.damper, plain, fit, held_out, time.perf_counter() - begin))
     except IdentificationError:
         pass  # too few runs; the other verdicts stand
-    aim = _peak_velocity(held_out)
-    for title, speed in ((TRADITIONAL, aim), (SLOWEST, 0.0)):
+    for title, chosen in traditional(found, held_out).items():
         begin = time.perf_counter()
-        found = [settled.identify(run, Balance()) for run in _one_per_current(train, speed)]
-        damper = OnePerCurrent.of(found)
-        made.append(_contender(title, "traditional", damper, found, None, held_out, time.perf_counter() - begin))
+        damper = OnePerCurrent.of(chosen)
+        seconds = spent * len(chosen) / len(found) + time.perf_counter() - begin
+        made.append(_contender(title, "traditional", damper, chosen, None, held_out, seconds))
     return made
+
+
+def traditional(found: Sequence[Identification], held_out: Sequence[Run]) -> dict[str, list[Identification]]:
+    """One identification a current: from the motion nearest in speed to the held-out runs, and from the slowest."""
+    aims = {TRADITIONAL: _peak_velocity(held_out), SLOWEST: 0.0}
+    return {title: [found[i] for i in _one_per_current([f.condition for f in found], v)] for title, v in aims.items()}
 
 
 def direct_contender(train: Sequence[Run], held_out: Sequence[Run], settled: Settled, progress: Progress) -> Contender:
     """All parameters at once by the genetic algorithm, one run a current."""
     begin = time.perf_counter()
-    nearest = _one_per_current(train, _peak_velocity(held_out))
+    conditions = [SineRecord.of(run).condition for run in train]
+    nearest = [train[i] for i in _one_per_current(conditions, _peak_velocity(held_out))]
     found = []
     for number, run in enumerate(nearest):
         progress(f"direct genetic, {run.id}", number / len(nearest))
@@ -267,12 +273,11 @@ def _peak_velocity(runs: Sequence[Run]) -> float:
     return float(np.median([SineRecord.of(run).condition.peak_velocity for run in runs]))
 
 
-def _one_per_current(train: Sequence[Run], speed: float) -> list[Run]:
-    """At every current, the train run whose peak velocity [m/s] is nearest to a speed."""
-    nearest: dict[float, tuple[float, Run]] = {}
-    for run in train:
-        condition = SineRecord.of(run).condition
+def _one_per_current(conditions: Sequence[Condition], speed: float) -> list[int]:
+    """At every current, the index of the condition whose peak velocity [m/s] is nearest to a speed."""
+    nearest: dict[float, tuple[float, int]] = {}
+    for index, condition in enumerate(conditions):
         key, off = round(condition.current_A, 2), abs(condition.peak_velocity - speed)
         if key not in nearest or off < nearest[key][0]:
-            nearest[key] = off, run
+            nearest[key] = off, index
     return [nearest[key][1] for key in sorted(nearest)]

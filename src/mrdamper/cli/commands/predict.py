@@ -8,6 +8,12 @@ from typing import Optional
 import typer
 
 
+WARNINGS = {
+    "not a sine": "the motion is no sine; a model over frequency and amplitude uses running estimates of them",
+    "sampling": "fewer than two samples fall into the knee after a reversal; sample the motion faster",
+}
+
+
 def register(app: typer.Typer) -> None:
     """Add the command."""
 
@@ -22,6 +28,7 @@ def register(app: typer.Typer) -> None:
         motion: Optional[Path] = typer.Option(  # noqa: UP045
             None, "--motion", help="CSV with time_s, displacement_m and optionally current_A."
         ),
+        coil_lag: float = typer.Option(0.0, "--coil-lag", help="Time constant of the coil for a varying current [ms]."),
         out: Optional[Path] = typer.Option(None, "--out", help="CSV to write; default: standard output."),  # noqa: UP045
         as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
     ) -> None:
@@ -40,7 +47,7 @@ def register(app: typer.Typer) -> None:
         if motion is not None:
             if frequency is not None or amplitude is not None:
                 raise InputError("--motion beside --frequency or --amplitude", mend="give one or the other")
-            prediction = damper.predict_run(load_motion(motion, current))
+            prediction = damper.predict_run(load_motion(motion, current), coil_lag=1e-3 * coil_lag)
         else:
             if current is None or frequency is None or amplitude is None:
                 raise InputError(
@@ -48,5 +55,8 @@ def register(app: typer.Typer) -> None:
                 )
             prediction = damper.predict(Condition(current, frequency, 1e-3 * amplitude))
         for flag in prediction.extrapolation:
-            typer.echo(f"extrapolation: {flag} lies outside the tests this model was identified from", err=True)
+            typer.echo(
+                f"warning: {WARNINGS.get(flag, f'{flag} lies outside the tests this model was identified from')}",
+                err=True,
+            )
         put(prediction_rows(prediction), out, as_json, table_text)

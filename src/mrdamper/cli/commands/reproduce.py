@@ -16,9 +16,7 @@ def register(app: typer.Typer) -> None:
     )
     def reproduce(
         out: Path = typer.Option(..., "--out", help="Folder for reproduction.html, tables and figures."),
-        data: Path | None = typer.Option(
-            None, "--data", help="Dataset folder; default: the virtual rig, synthetic."
-        ),
+        data: Path | None = typer.Option(None, "--data", help="Dataset folder; default: the virtual rig, synthetic."),
         rig: Optional[str] = typer.Option(None, "--rig", help="Rig of the dataset; needed where it holds several."),  # noqa: UP045
         with_direct_genetic: bool = typer.Option(
             False,
@@ -45,10 +43,9 @@ def register(app: typer.Typer) -> None:
             raise InputError("--rig without --data", mend="give --data DATASET, or leave --rig out")
         if dataset is not None:
             if rig is None and len(dataset.rigs) > 1:
-                raise InputError(
-                    f"the dataset holds {len(dataset.rigs)} rigs", mend=f"choose --rig {' or '.join(dataset.rigs)}"
-                )
-            dataset = dataset.rig(rig if rig is not None else dataset.rigs[0])
+                names = " or ".join(dataset.rigs)
+                raise InputError(f"the dataset holds {len(dataset.rigs)} rigs", mend=f"choose --rig {names}")
+            dataset = dataset.rig(rig or next(iter(dataset.rigs)))
         with progress_on_stderr() as progress:
             study = run_reproduction(
                 dataset,

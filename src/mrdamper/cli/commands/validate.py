@@ -43,6 +43,10 @@ def register(app: typer.Typer) -> None:
         if not runs:
             raise InputError(f"no {split} runs", where=f"rig {wanted}", mend="leave out --split")
         validation = score(damper, runs)
+        for name, why in validation.refused.items():
+            typer.echo(f"not scored: {name}: {why}", err=True)
+        if not validation.runs:
+            raise InputError("no run could be scored", where=f"rig {wanted}", mend="see the lines above")
         put([score_row(run) for run in validation.runs], out, as_json, table_text)
         floors = [run.floor for run in validation.runs if run.floor is not None]
         outside = sum(bool(run.extrapolation) for run in validation.runs)

@@ -7,7 +7,7 @@ closed form in place of time stepping), and all harmonics up to H are matched at
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import ClassVar
@@ -18,9 +18,9 @@ from mrdamper.data import Floats
 from mrdamper.errors import IdentificationError
 from mrdamper.harmonic_balance import HarmonicProjection, SineRecord
 from mrdamper.hysteresis import steady_loop
-from mrdamper.identification.methods.projection import bounded_linear
+from mrdamper.identification.linear import bounded_linear, bounds_of, linear_table
 from mrdamper.identification.problem import Method, Problem, Solution
-from mrdamper.models import Model, SearchAxis
+from mrdamper.models import Model
 from mrdamper.optimizers.levenberg_marquardt import least_squares
 
 _FEWEST = 3  # one harmonic gives two equations, for at least four unknowns
@@ -61,32 +61,34 @@ class Balance(Method):
             )
         record = SineRecord.of(problem.run)
         balanced = _Balanced(problem, record, HarmonicProjection(record.theta, self.harmonics))
-        axes = problem.model_type.search_axes(record.condition.amplitude_m, problem.free)
+        X = record.condition.amplitude_m
+        axes = problem.model_type.guess(record.motion, record.force, X, problem.free)
         if not axes:
             model, _, held = balanced.at({})
             return Solution(model, 0.0, held, {}, {}, 1, "solved: every parameter is linear")
-        to_search: Callable[[SearchAxis, float], float] = lambda axis, v: float(np.log(v)) if axis.log else v  # noqa: E731
 
         def point(u: Floats) -> dict[str, float]:
-            return {axis.name: float(np.exp(c)) if axis.log else float(c) for axis, c in zip(axes, u, strict=True)}
+            return {axis.name: axis.value(float(c)) for axis, c in zip(axes, u, strict=True)}
 
-        grid = [np.array(u) for u in product(*([to_search(axis, g) for g in axis.grid] for axis in axes))]
-        costs = [float(np.sum(balanced.at(point(u))[1] ** 2)) for u in grid]
-        lower = np.array([to_search(axis, axis.lower) for axis in axes])
-        upper = np.array([to_search(axis, axis.upper) for axis in axes])
+        def residual(u: Floats) -> Floats:
+            return balanced.at(point(u))[1]
+
+        grid = [np.array(u) for u in product(*([axis.coordinate(g) for g in axis.grid] for axis in axes))]
+        costs = [float(np.sum(residual(u) ** 2)) for u in grid]
+        lower = np.array([axis.coordinate(axis.lower) for axis in axes])
+        upper = np.array([axis.coordinate(axis.upper) for axis in axes])
         starts = [grid[i] for i in np.argsort(costs)[: min(len(axes), 2)]]
-        found = [least_squares(lambda u: balanced.at(point(u))[1], start, lower, upper) for start in starts]
-        best = min(found, key=lambda minimum: minimum.cost)
-        start = starts[found.index(best)]
+        found = [(start, least_squares(residual, start, lower, upper)) for start in starts]
+        start, best = min(found, key=lambda pair: pair[1].cost)
         model, _, held = balanced.at(point(best.point))
-        edge = np.minimum(best.point - lower, upper - best.point) < 1e-3 * (upper - lower)
+        edge = tuple(axis.name for axis, u in zip(axes, best.point, strict=True) if axis.at_bound(float(u)))
         return Solution(
             model=model,
             delay=0.0,
-            at_bounds=(*held, *(axis.name for axis, at in zip(axes, edge, strict=True) if at)),
+            at_bounds=(*held, *edge),
             start=point(start),
             end=point(best.point),
-            evaluations=len(grid) + sum(minimum.evaluations for minimum in found),
+            evaluations=len(grid) + sum(minimum.evaluations for _, minimum in found),
             message=best.message,
         )
 
@@ -105,12 +107,9 @@ class _Balanced:
         zero = {i.name: 0.0 for i in self.linear}
         bare = self.problem.model_type.build({**self.problem.fixed, **point, **zero})
         state = steady_state(bare, self.record)
-        base = bare.force(self.motion, state)
-        forces = [replace(bare, **{i.name: 1.0}).force(self.motion, state) - base for i in self.linear]
-        columns = self.project(np.column_stack(forces))
-        right = self.measured - self.project(base)
-        lower, upper = (np.array([i.bounds[side] for i in self.linear]) for side in (0, 1))
-        solution, held = bounded_linear(columns, right, lower, upper)
+        base, forces = linear_table(bare, self.linear, self.motion, state)
+        columns, right = self.project(forces), self.measured - self.project(base)
+        solution, held = bounded_linear(columns, right, *bounds_of(self.linear))
         names = [i.name for i in self.linear]
         model = replace(bare, **dict(zip(names, solution.tolist(), strict=True)))
         return model, columns @ solution - right, tuple(n for n, h in zip(names, held, strict=True) if h)

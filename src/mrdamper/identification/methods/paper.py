@@ -156,7 +156,7 @@ class Paper(Method):
             z = rest.state(rest.beta(float(np.exp(u[0]))))
             return np.clip(z @ rest.force / (z @ z), low, high) * z - rest.force
 
-        grid = np.linspace(*edge, 24)
+        grid = np.linspace(edge[0], edge[1], 24)
         costs = [float(np.sum(residual(np.array([u])) ** 2)) for u in grid]
         best = least_squares(residual, np.array([grid[int(np.argmin(costs))]]), edge[:1], edge[1:])
         beta = rest.beta(float(np.exp(best.point[0])))

@@ -1,0 +1,54 @@
+"""`mrdamper compare`: all models on the same data."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Optional
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+
+    @app.command(epilog="Example: mrdamper compare rig/ --out comparison/ --models bouc-wen --models kwok")
+    def compare(
+        data: Optional[Path] = typer.Argument(None, help="Dataset folder; default: the bundled tests of two dampers."),  # noqa: UP045
+        out: Path = typer.Option(..., "--out", help="Folder for comparison.html, tables and figures."),
+        models: list[str] = typer.Option([], "--models", help="Only this model; may be repeated. Default: all."),
+        genetic: bool = typer.Option(False, "--genetic", help="Also identify by genetic algorithm; takes minutes."),
+        jobs: Optional[int] = typer.Option(None, "--jobs", min=1, help="Processes; default one a core."),  # noqa: UP045
+        as_json: bool = typer.Option(False, "--json", help="Print the table as JSON."),
+    ) -> None:
+        """Compare models: accuracy on train, left-out and held-out runs, numbers, data needed, time."""
+        from mrdamper import comparison as comparing
+        from mrdamper.cli.progress import progress_on_stderr
+        from mrdamper.comparison.publication import summary_rows, text_table, write_comparison
+        from mrdamper.io.atomic import require_writable
+        from mrdamper.io.dataset import load_dataset
+
+        require_writable(out)
+        names = [name.strip() for entry in models for name in entry.split(",") if name.strip()]
+        comparing.contestants(names)
+        dataset = load_dataset(data)
+        with progress_on_stderr() as progress:
+            result = comparing.compare(
+                dataset,
+                names,
+                genetic=genetic,
+                jobs=jobs,
+                progress=lambda what, share: progress(what, 0.9 * share),
+            )
+            written = write_comparison(result, out, lambda what, share: progress(what, 0.9 + 0.1 * share))
+        rows = summary_rows(result)
+        if as_json:
+            import json
+
+            print(json.dumps({"rows": rows, "files": [str(p) for p in written], "seconds": result.seconds}, indent=1))
+            return
+        for rig in result.rigs:
+            print(f"{rig.rig or dataset.name}: median nrmse_pp in %, ranked by conditions left out")
+            print(text_table([row for row in rows if row["rig"] == rig.rig]))
+            for name, why in rig.refused.items():
+                typer.echo(f"not determined: {name}: {why}", err=True)
+        print(f"report: {written[0]}")
