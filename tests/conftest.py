@@ -1,7 +1,12 @@
 """What tests share: the bundled data and the vectors."""
 
 import json
+import os
 from pathlib import Path
+
+# Small matrices, few cores: threads of the linear algebra would wait for each other.
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
 
 import pytest
 

@@ -2,6 +2,9 @@
 
 import csv
 import json
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -189,11 +192,14 @@ def test_the_command_refuses_several_rigs_without_a_choice(tmp_path, bundled):
 
 @pytest.mark.slow
 def test_the_command_writes_the_full_study_within_a_minute(tmp_path):
-    done = CliRunner().invoke(application(), ["reproduce", "--out", str(tmp_path / "out"), "--json"])
-    assert done.exit_code == 0, done.output
+    before = os.times().children_user
+    command = [sys.executable, "-m", "mrdamper.cli", "reproduce", "--out", str(tmp_path / "out"), "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    # Processor time: the machine may have other work.
+    assert os.times().children_user - before < 60
+    assert "noise seed" in done.stderr or "written" in done.stderr
     found = json.loads(done.stdout)
     assert found["synthetic"]
-    assert found["seconds"] < 60
     spread = {row["method"]: row for row in found["verdicts"] if row["seeds"]}
     assert {row["seeds"] for row in spread.values()} == {20}
     # Twenty noise seeds: the methods differ by far more than the noise makes them.
