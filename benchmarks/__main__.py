@@ -38,8 +38,12 @@ def simulation_rows() -> list[tuple[str, float, float]]:
     path = Path.of(x)
     rows = [
         ("mrdamper, strokes at hand", median_time(lambda: follow(shape, path)), error(follow(shape, path), truth)),
-        ("mrdamper, with cutting into strokes", median_time(lambda: follow(shape, Path.of(x))), error(follow(shape, Path.of(x)), truth)),
-    ]  # fmt: skip
+        (
+            "mrdamper, with cutting into strokes",
+            median_time(lambda: follow(shape, Path.of(x))),
+            error(follow(shape, Path.of(x)), truth),
+        ),
+    ]
     if importlib.util.find_spec("scipy"):
         rows += scipy_rows(truth, scale)
     return rows
@@ -85,7 +89,12 @@ def identification_rows() -> list[tuple[str, float]]:
     ]
     for rig in dataset.rigs:
         train = [run for run in dataset.rig(rig).split("train") if run.excitation == "sine"]
-        rows.append((f"{len(train)} runs jointly, play and bypass ({rig})", first_time(lambda train=train: JointProblem(train, "play-bypass").fit())))  # fmt: skip
+        rows.append(
+            (
+                f"{len(train)} runs jointly, play and bypass ({rig})",
+                first_time(lambda train=train: JointProblem(train, "play-bypass").fit()),
+            )
+        )
     return rows
 
 

@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 from synthetic import TRUTH, synthetic_run
 
+from mrdamper.condensed import choose_forms, condense, fit_jointly, leave_out_errors
 from mrdamper.damper import Envelope
 from mrdamper.data import Condition, Run, same_condition
 from mrdamper.errors import IdentificationError
 from mrdamper.excitation import sweep
 from mrdamper.identification import identify
-from mrdamper.condensed import choose_forms, condense, fit_jointly, leave_out_errors
 from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.modified import fit_modified, fit_modified_jointly

@@ -6,8 +6,8 @@ from mrdamper.data import Condition, Run
 from mrdamper.errors import IdentificationError, RunError, UnknownNameError
 from mrdamper.gas_spring import GasSpring
 from mrdamper.identification import identify
-from mrdamper.identification.methods import all_methods
 from mrdamper.identification.linear import bounded_linear
+from mrdamper.identification.methods import all_methods
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.optimizers.levenberg_marquardt import least_squares
 from mrdamper.uncertainty import autocorrelation_time, standard_errors

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import wraps
-from types import MappingProxyType
 from typing import Literal, TypeVar
 from weakref import WeakKeyDictionary
 
@@ -147,7 +146,7 @@ class Run:
         if self.split not in ("train", "validate"):
             raise RunError(f"split is {self.split!r}", where=self._where, mend="use train or validate")
         object.__setattr__(self, "segments", tuple(self.segments) or ((0, size),))
-        object.__setattr__(self, "notes", MappingProxyType(dict(self.notes)))
+        object.__setattr__(self, "notes", dict(self.notes))
 
     @property
     def current_A(self) -> float:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mrdamper.damper import Damper, Envelope
 from mrdamper.data import Condition, Floats, Run
@@ -199,7 +200,7 @@ class JointProblem:
         solved = table.solve(np.clip(fit.point + step[: len(self.axes)], lower, upper))
         return self._damper(solved.model, table.parts)
 
-    def _linearised(self, fit: JointFit) -> tuple[Floats, Floats, Floats]:
+    def _linearised(self, fit: JointFit) -> tuple[Floats, Floats, NDArray[np.intp]]:
         """Residual at a fit, its derivatives by all free parameters, and the run of each row."""
         if self._linearisation is None or self._linearisation[0] is not fit:
             table = _Table(self, self.parts)
@@ -207,7 +208,7 @@ class JointProblem:
             self._linearisation = (fit, *table.linearise(fit.point, fit.damper.model))
         return self._linearisation[1:]
 
-    _linearisation: tuple[JointFit, Floats, Floats, Floats] | None = None
+    _linearisation: tuple[JointFit, Floats, Floats, NDArray[np.intp]] | None = None
 
     def _damper(self, model: Model, parts: Sequence[_Part]) -> JointDamper:
         about = {"runs": str(len(parts)), "fit": "joint, all runs at once"}
@@ -230,7 +231,7 @@ class _Part:
     """A run's motion from shortly before its steady window on, and the samples that are scored."""
 
     motion: Excitation
-    picked: Floats
+    picked: NDArray[np.intp]
     target: Floats
     condition: Condition
     scale: float
@@ -287,7 +288,7 @@ class _Table:
         model = replace(bare, **{i.name: float(s) for i, s in zip(linear, solution, strict=True)})
         return _Solved(model, residual, errors, tuple(i.name for i, h in zip(linear, held, strict=True) if h))
 
-    def linearise(self, point: Floats, model: Model) -> tuple[Floats, Floats, Floats]:
+    def linearise(self, point: Floats, model: Model) -> tuple[Floats, Floats, NDArray[np.intp]]:
         """Weighted residual of a model, derivatives by search axes and linear parameters, owners."""
         factor = (self.weights / self.size)[self.owner]
         linear = {info.name: getattr(model, info.name) for info in self.problem.linear}

@@ -12,12 +12,12 @@ from typing import ClassVar
 
 import numpy as np
 
+from mrdamper.condensed import Condensed, choose_forms, condense, fit_jointly
 from mrdamper.damper import NOT_A_SINE, Damper, Envelope, Prediction
 from mrdamper.data import Condition, Floats, Run, same_condition
 from mrdamper.errors import IdentificationError
 from mrdamper.excitation import Excitation, running_sine
 from mrdamper.identification import Identification
-from mrdamper.condensed import Condensed, choose_forms, condense, fit_jointly
 from mrdamper.loop_analysis import same_motion
 from mrdamper.parameter_functions import FORMS, FunctionFit, ParameterMap, assess, choose_function
 from mrdamper.simulation import Response, simulate, steady_loop

@@ -329,7 +329,7 @@ class ParameterMap:
     functions: Mapping[str, ParameterFunction]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "functions", MappingProxyType(dict(self.functions)))
+        object.__setattr__(self, "functions", dict(self.functions))
 
     def at(self, condition: Condition) -> Model:
         """The model at a condition; values a function drives past a parameter's bounds stop there."""

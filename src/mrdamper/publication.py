@@ -183,7 +183,7 @@ def _figures(rig: RigStudy) -> dict[str, Figure]:
         "loops": measured_loops(rig.dataset, rig.loops),
         "analysis": test_analysis(rig.loops, rig.ranges),
         "scores": score_strip(scores),
-        "parameters": parameter_curves(_mapped(rig).fit),
+        "parameters": parameter_curves(_mapped(rig)[1]),
         "predicted": predicted_loops(chosen.damper, _shown(rig)),
         "residuals": residual_map(chosen.damper, train),
         "reversal": force_since_reversal(train, chosen.damper),
@@ -202,7 +202,7 @@ def _shown(rig: RigStudy) -> list[Any]:
 
 
 def _chapter(rig: RigStudy, pictures: Mapping[str, bytes]) -> dict[str, Any]:
-    chosen, mapped = rig.chosen, _mapped(rig)
+    chosen, (mapped, _) = rig.chosen, _mapped(rig)
     floors = [run.repeatability for run in rig.dataset if run.repeatability is not None]
     held = any(run.id in {loop.run_id for loop in rig.loops} for run in rig.dataset.split("validate"))
     return {
@@ -232,9 +232,9 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes]) -> dict[str, Any]:
     }
 
 
-def _mapped(rig: RigStudy) -> Candidate:
+def _mapped(rig: RigStudy) -> tuple[Candidate, ModifiedFit]:
     """The best candidate whose parameters are functions of the condition: its curves are shown."""
-    return next(candidate for candidate in rig.candidates if isinstance(candidate.fit, ModifiedFit))
+    return next((c, c.fit) for c in rig.candidates if isinstance(c.fit, ModifiedFit))
 
 
 def _joint_table(fit: JointFit) -> list[dict[str, Any]]:

@@ -10,7 +10,7 @@ _FORGOTTEN = 1e-18  # share of the past below which it is rounding
 
 
 def first_order_lag(time: Floats, signal: Floats, time_constant: float) -> Floats:
-    """y with T dy/dt + y = signal, from y = 0 at the first sample.
+    """Y with T dy/dt + y = signal, from y = 0 at the first sample.
 
     y_i = p_i y_(i−1) + g_i with p = exp(−Δt/T). Instead of a loop over samples, spans of 1, 2,
     4, ... samples are joined until the past is forgotten: a few passes over the whole array.

@@ -13,31 +13,19 @@ from mrdamper.damper import Damper, Envelope
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError
 from mrdamper.excitation import Excitation
-from mrdamper.gas_spring import GasSpring
-from mrdamper.harmonic_balance import SineRecord, separate_mass
-from mrdamper.identification import Identification, Method, Problem, identify
+from mrdamper.harmonic_balance import SineRecord
+from mrdamper.identification import Identification, identify
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.identification.methods.direct_genetic import DirectGenetic
 from mrdamper.identification.methods.paper import Paper
 from mrdamper.metrics import mean_relative_error
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.modified import ModifiedFit, ModifiedModel, fit_modified, fit_modified_jointly
-from mrdamper.parameter_functions import FunctionFit, ParameterMap, fit_function
+from mrdamper.modified import ModifiedFit, fit_modified, fit_modified_jointly
+from mrdamper.paper import Settled, paper_functions
 from mrdamper.simulation import Response, simulate, steady_loop
 from mrdamper.validation import Validation, validate
 from mrdamper.workflow import Progress
 
-PAPER_FORMS = {
-    "c": "viscous-paper",
-    "m": "mass-exponential",
-    "alpha": "plane",
-    "beta": "current-decay-frequency",
-    "f0": "constant",
-    "k1": "constant",
-    "k2": "constant",
-    "k3": "constant",
-}
-_SHORTER = ("quadratic-current", "linear-current", "constant")
 LITERAL, HALF, SAME_FORMS = "paper, literal", "paper, F0 half peak-to-peak", "consistent, the paper's functions"
 CONSISTENT, JOINT = "consistent", "joint"
 TRADITIONAL = "traditional, nearest speed"
@@ -76,42 +64,6 @@ class Contender:
     seconds: float
 
 
-@dataclass(frozen=True)
-class Settled:
-    """What is held in every identification: the gas spring, or what stands in for it."""
-
-    gas: GasSpring | None
-    fixed: Mapping[str, float] = field(default_factory=dict)
-    free: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
-
-    @classmethod
-    def of(cls, train: Sequence[Run], gas: GasSpring | None) -> Settled:
-        if gas is not None:
-            longest = max(float(np.ptp(run.displacement)) / 2 for run in train)
-            gas.force([-longest, longest])  # refuses motions that leave no gas volume
-            return cls(gas)
-        found = [identify(run, BoucWen, Balance()) for run in train]
-        stiffness = [float(i.model.k1) for i in found if isinstance(i.model, BoucWen)]
-        try:
-            apart = separate_mass([i.condition for i in found], stiffness)
-        except IdentificationError as error:
-            return cls(
-                None, notes=(f"the gas spring is unknown and {error}: the mass is left out, k1 holds k1 − m ω²",)
-            )
-        note = (
-            f"the gas spring is unknown: k1 = {apart.k1:.4g} N/m comes from a regression of the consistent in-phase "
-            f"stiffness k1 − m ω² over the frequencies (with m = {apart.m:.3g} kg); k2 = k3 = 0"
-        )
-        return cls(None, {"k1": apart.k1, "k2": 0.0, "k3": 0.0}, ("m",), (note,))
-
-    def identify(self, run: Run, method: Method) -> Identification:
-        return identify(run, BoucWen, method, gas=self.gas, fixed=self.fixed, free=self.free)
-
-    def problem(self, run: Run) -> Problem:
-        return Problem.of(run, BoucWen, gas=self.gas, fixed=self.fixed, free=self.free)
-
-
 def contenders(train: Sequence[Run], held_out: Sequence[Run], settled: Settled, progress: Progress) -> list[Contender]:
     """Identify, map and validate in every way but the direct genetic one."""
     made = []
@@ -138,8 +90,8 @@ def contenders(train: Sequence[Run], held_out: Sequence[Run], settled: Settled, 
     try:
         fit, _ = fit_modified_jointly(train, plain)
         made.append(_contender(JOINT, "joint", fit.damper, plain, fit, held_out, time.perf_counter() - begin))
-    except IdentificationError:
-        pass  # too few runs; the other verdicts stand
+    except IdentificationError as error:
+        progress(f"{JOINT}: left out, {error.found}", 0.9)
     for title, chosen in traditional(found, held_out).items():
         begin = time.perf_counter()
         damper = OnePerCurrent.of(chosen)
@@ -184,35 +136,6 @@ def _contender(
 def _relative_error(damper: Damper, run: Run) -> float:
     inside = run.in_window
     return mean_relative_error(run.force[inside], damper.predict_run(run).force[inside])
-
-
-def paper_functions(found: Sequence[Identification]) -> ModifiedFit:
-    """The paper's functions [Qian et al. 2024, Eq. 23–43] by plain least squares.
-
-    Shorter ones where the tests cannot tell the terms apart. beta spans decades and must stay
-    positive: its function gives the logarithm.
-    """
-    conditions = tuple(i.condition for i in found)
-    values = {name: np.array([float(getattr(i.model, name)) for i in found]) for name in PAPER_FORMS}
-    functions = {
-        name: _first_determined((form, *_SHORTER), conditions, values[name], log=name == "beta")
-        for name, form in PAPER_FORMS.items()
-    }
-    damper = ModifiedModel(
-        rig=found[0].rig,
-        parameters=ParameterMap(BoucWen, {name: fit.function for name, fit in functions.items()}),
-        envelope=Envelope.of(conditions),
-    )
-    return ModifiedFit(damper, functions, values, conditions)
-
-
-def _first_determined(forms: Sequence[str], conditions: Sequence[Condition], values: Floats, log: bool) -> FunctionFit:
-    for form in forms[:-1]:
-        try:
-            return fit_function(form, conditions, values, log=log)
-        except IdentificationError:
-            continue
-    return fit_function(forms[-1], conditions, values, log=log)
 
 
 def chosen_functions(found: Sequence[Identification]) -> ModifiedFit:

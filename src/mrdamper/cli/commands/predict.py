@@ -7,7 +7,6 @@ from typing import Optional
 
 import typer
 
-
 WARNINGS = {
     "not a sine": "the motion is no sine; a model over frequency and amplitude uses running estimates of them",
     "sampling": "fewer than two samples fall into the knee after a reversal; sample the motion faster",

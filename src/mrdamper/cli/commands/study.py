@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
 from typing import Optional
 
@@ -30,7 +31,9 @@ def register(app: typer.Typer) -> None:
         require_writable(out)
         dataset = load_dataset(data)
         with progress_on_stderr() as progress:
-            result = run_study(dataset, lambda what, share: progress(what, 0.6 * share), model=model)
+            result = run_study(
+                dataset, lambda what, share: progress(what, 0.6 * share), model=model, workers=os.cpu_count() or 1
+            )
             written = write_study(result, out, lambda what, share: progress(what, 0.6 + 0.4 * share))
         if as_json:
             import json
