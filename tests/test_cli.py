@@ -105,6 +105,16 @@ def test_identify_chosen_runs_with_a_fixed_parameter(tmp_path):
     assert float(row["nrmse_pp"]) < 0.06
 
 
+def test_the_papers_switches_and_a_known_gas_spring():
+    run = ("--run", "utf_5mm4Hz_1A", "--json")
+    switches = ("--method", "paper", "--set", "search=optimum", "--set", "force_amplitude=half-peak-to-peak")
+    (literal,) = json.loads(mrdamper("identify", *run, *switches).stdout)
+    (consistent,) = json.loads(mrdamper("identify", *run, "--method", "balance").stdout)
+    assert literal["c [N s/m]"] > 1.5 * consistent["c [N s/m]"]
+    (tied,) = json.loads(mrdamper("identify", *run, "--gas", "1.5,150,314").stdout)
+    assert tied["k1 [N/m]"] == pytest.approx(1.4 * 1.5e6 * 314e-6**2 / 150e-6)
+
+
 def test_bad_input_is_one_line_and_exit_two(model, tmp_path):
     (tmp_path / "file").write_text("x")
     newer = json.loads(model.read_text()) | {"version": "9.0"}
@@ -116,6 +126,9 @@ def test_bad_input_is_one_line_and_exit_two(model, tmp_path):
         (("identify", "--method", "projecton"), "did you mean projection?"),
         (("identify", "--fix", "n"), "NAME=VALUE"),
         (("identify", "--run", "utf_5mm4Hz_2A"), "did you mean"),
+        (("identify", "--method", "paper", "--set", "phase=peak"), "did you mean peaks?"),
+        (("identify", "--method", "paper", "--set", "phases=peaks"), "did you mean phase?"),
+        (("identify", "--gas", "1.5,150"), "write --gas P,V,A"),
         (("predict", model), "give --current A --frequency Hz --amplitude mm"),
         (("predict", tmp_path / "newer.json", "--current", 1), "update mrdamper"),
         (("predict", model, "--current", 1, "--frequency", 0, "--amplitude", 10), "frequency_Hz is 0"),

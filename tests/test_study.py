@@ -89,7 +89,8 @@ def test_tables_carry_units_and_numbers(folder):
     with (folder / "validation.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert {"run_id", "nrmse_pp", "nrmse_std", "wape", "energy_error", "extrapolation"} <= set(rows[0])
-    assert all(0 < float(row["nrmse_pp"]) < 1 for row in rows)
+    assert all(0 < float(row["nrmse_pp"]) < np.inf for row in rows)
+    assert all(float(row["nrmse_pp"]) < 0.15 for row in rows if row["model"] == "play-bypass")
     with (folder / "identifications.csv").open() as file:
         names = next(csv.reader(file))
     assert "alpha [N/m]" in names

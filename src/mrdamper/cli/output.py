@@ -6,10 +6,13 @@ import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mrdamper.errors import InputError
 from mrdamper.io.atomic import write_file
+
+if TYPE_CHECKING:
+    from mrdamper.gas_spring import GasSpring
 
 Rows = Sequence[Mapping[str, Any]]
 
@@ -42,13 +45,50 @@ def parse_fixed(pairs: Sequence[str]) -> dict[str, float]:
         If one is not of that form.
     """
     fixed = {}
-    for pair in pairs:
-        name, _, text = pair.partition("=")
+    for name, text in parse_pairs(pairs, "--fix").items():
         try:
-            fixed[name.strip()] = float(text)
+            fixed[name] = float(text)
         except ValueError as error:
-            raise InputError(f"--fix {pair}", mend="write --fix NAME=VALUE with a number in SI units") from error
+            raise InputError(f"--fix {name}={text}", mend="write --fix NAME=VALUE with a number in SI units") from error
     return fixed
+
+
+def parse_pairs(pairs: Sequence[str], option: str) -> dict[str, str]:
+    """NAME=VALUE arguments as text.
+
+    Raises
+    ------
+    InputError
+        If one is not of that form.
+    """
+    found = {}
+    for pair in pairs:
+        name, equals, text = pair.partition("=")
+        if not equals or not name.strip():
+            raise InputError(f"{option} {pair}", mend=f"write {option} NAME=VALUE")
+        found[name.strip()] = text.strip()
+    return found
+
+
+def parse_gas(text: str | None) -> GasSpring | None:
+    """P,V,A in MPa, cm³ and mm² as a gas spring.
+
+    Raises
+    ------
+    InputError
+        If it is not three positive numbers.
+    """
+    if text is None:
+        return None
+    from mrdamper.gas_spring import GasSpring
+
+    try:
+        pressure, volume, area = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise InputError(
+            f"--gas {text}", mend="write --gas P,V,A in MPa, cm³ and mm², for example 1.5,150,314"
+        ) from error
+    return GasSpring(1e6 * pressure, 1e-6 * volume, 1e-6 * area)
 
 
 def _plain(value: Any) -> Any:

@@ -15,6 +15,7 @@ from mrdamper.modified import ModifiedFit
 from mrdamper.plots.style import MEASURED, MM, PALETTE, PREDICTED, current_colours, house_style, label, new_figure, thin
 from mrdamper.validation import Validation
 
+_WORST_SHOWN = 25.0  # per cent; a run beyond is drawn as an arrow at the edge
 _AXES = {
     "c": ("Viscous damping c (N s/m)", 1.0),
     "fy": ("Yield force (N)", 1.0),
@@ -95,16 +96,21 @@ def parameter_curves(fit: ModifiedFit) -> Figure:
 
 
 def score_strip(validations: Mapping[str, Validation]) -> Figure:
-    """nrmse_pp of every run, one row a model and split; the bar is the median, the tick the run's floor."""
+    """nrmse_pp of every run, one row a model and split; the bar is the median, the tick the run's floor.
+
+    Errors beyond 25 % are arrows at the edge.
+    """
     with house_style():
         figure, (axes,) = new_figure(1, 1, 0.8 + 0.3 * len(validations), left=2.6)
         for row, validation in enumerate(validations.values()):
             colour = PALETTE[1 + row % (len(PALETTE) - 2)]
             values = 100 * np.array([run.scores.nrmse_pp for run in validation.runs])
             floors = [100 * run.floor for run in validation.runs if run.floor is not None]
-            axes.plot(values, np.full(values.size, row), "o", ms=4, color=colour, alpha=0.65)
+            near, far = values[values <= _WORST_SHOWN], values[values > _WORST_SHOWN]
+            axes.plot(near, np.full(near.size, row), "o", ms=4, color=colour, alpha=0.65)
+            axes.plot(np.full(far.size, _WORST_SHOWN), np.full(far.size, row), ">", ms=5, color=colour, alpha=0.65)
             axes.plot(floors, np.full(len(floors), row - 0.25), "|", ms=5, color="#888888")
-            axes.plot([np.median(values)] * 2, [row - 0.3, row + 0.3], color=colour, lw=2.2)
+            axes.plot([min(np.median(values), _WORST_SHOWN)] * 2, [row - 0.3, row + 0.3], color=colour, lw=2.2)
         axes.set_yticks(range(len(validations)), list(validations))
         axes.invert_yaxis()
         axes.set_xlim(left=0)

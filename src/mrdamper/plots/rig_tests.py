@@ -17,8 +17,9 @@ from mrdamper.plots.style import KN, MM, current_colours, house_style, label, ne
 def test_matrix(loops: Sequence[LoopAnalysis]) -> Figure:
     """Measured frequency against amplitude, one colour a current; hollow marks are held out."""
     with house_style():
-        figure, (axes,) = new_figure(1, 1, 3.0, right=1.7)
         colours = current_colours([loop.condition.current_A for loop in loops])
+        entries = len({(loop.condition.current_A, loop.split) for loop in loops})
+        figure, (axes,) = new_figure(1, 1, max(3.0, 0.8 + 0.16 * entries), right=1.7)
         for current, colour in colours.items():
             for split, face in (("train", colour), ("validate", "none")):
                 chosen = [

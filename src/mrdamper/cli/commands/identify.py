@@ -18,6 +18,10 @@ def register(app: typer.Typer) -> None:
         method: str = typer.Option("projection", "--method", help="Name of the identification method."),
         free: list[str] = typer.Option([], "--free", help="Preset parameter to determine as well; may be repeated."),
         fix: list[str] = typer.Option([], "--fix", help="NAME=VALUE [SI] held fixed; may be repeated."),
+        setting: list[str] = typer.Option([], "--set", help="SWITCH=VALUE of the method; may be repeated."),
+        gas: Optional[str] = typer.Option(  # noqa: UP045
+            None, "--gas", help="Known gas spring: pressure MPa, volume cm3, rod area mm2, as P,V,A."
+        ),
         delay: bool = typer.Option(False, "--delay", help="Also determine a delay of the force, within 3 ms."),
         run: list[str] = typer.Option([], "--run", help="Only this run; may be repeated."),
         out: Optional[Path] = typer.Option(None, "--out", help="CSV to write; default: standard output."),  # noqa: UP045
@@ -25,7 +29,7 @@ def register(app: typer.Typer) -> None:
     ) -> None:
         """Identify a model from every sine run of a dataset, run by run."""
         from mrdamper import identification, workflow
-        from mrdamper.cli.output import parse_fixed, put
+        from mrdamper.cli.output import parse_fixed, parse_gas, parse_pairs, put
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.identification.methods import method_named
         from mrdamper.io.atomic import require_writable
@@ -33,8 +37,8 @@ def register(app: typer.Typer) -> None:
         from mrdamper.models import model_type
         from mrdamper.publication import identification_rows, table_text
 
-        chosen_model, chosen_method = model_type(model), method_named(method)
-        fixed = parse_fixed(fix)
+        chosen_model, chosen_method = model_type(model), method_named(method, parse_pairs(setting, "--set"))
+        fixed, spring = parse_fixed(fix), parse_gas(gas)
         if out is not None:
             require_writable(out)
         dataset = load_dataset(data)
@@ -47,7 +51,7 @@ def register(app: typer.Typer) -> None:
                 progress(f"run {entry.id}", number / len(sines))
                 found.append(
                     identification.identify(
-                        entry, chosen_model, chosen_method, free=free, fixed=fixed, with_delay=delay
+                        entry, chosen_model, chosen_method, free=free, fixed=fixed, gas=spring, with_delay=delay
                     )
                 )
             progress("identified", 1.0)

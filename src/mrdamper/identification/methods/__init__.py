@@ -6,9 +6,9 @@ import importlib
 import pkgutil
 from functools import cache
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, get_args, get_origin, get_type_hints
 
-from mrdamper.errors import UnknownNameError
+from mrdamper.errors import InputError, UnknownNameError
 from mrdamper.identification.problem import Method
 
 if TYPE_CHECKING:
@@ -23,15 +23,42 @@ def all_methods() -> Mapping[str, type[Method]]:
     return MappingProxyType({cls.name: cls for cls in sorted(Method.__subclasses__(), key=lambda c: c.name)})
 
 
-def method_named(name: str) -> Method:
-    """The method of that name, with its default settings.
+def method_named(name: str, settings: Mapping[str, str] | None = None) -> Method:
+    """The method of that name.
+
+    Parameters
+    ----------
+    name : str
+    settings : mapping of str to str, optional
+        Switches and numbers of the method, as text.
 
     Raises
     ------
     UnknownNameError
-        With the near matches.
+        If there is no such method, switch or value; with the near matches.
     """
     methods = all_methods()
     if name not in methods:
         raise UnknownNameError.of("method", name, methods)
-    return methods[name]()
+    chosen = methods[name]
+    kinds = {k: t for k, t in get_type_hints(chosen).items() if _is_simple(t)}
+    values: dict[str, object] = {}
+    for key, text in (settings or {}).items():
+        if key not in kinds:
+            raise UnknownNameError.of(f"setting of {name}", key, kinds)
+        allowed = get_args(kinds[key])
+        if allowed and text not in allowed:
+            raise UnknownNameError.of(f"value of {key}", text, allowed)
+        values[key] = text if allowed else _number(kinds[key], key, text)
+    return chosen(**values)
+
+
+def _is_simple(kind: object) -> bool:
+    return kind in (int, float) or get_origin(kind) is Literal
+
+
+def _number(kind: type, key: str, text: str) -> float:
+    try:
+        return kind(text)
+    except ValueError as error:
+        raise InputError(f"{key} = {text}", mend=f"give a number ({kind.__name__})") from error
