@@ -204,3 +204,17 @@ def test_the_command_writes_the_full_study_within_a_minute(tmp_path):
     assert {row["seeds"] for row in spread.values()} == {20}
     # Twenty noise seeds: the methods differ by far more than the noise makes them.
     assert spread["consistent"]["seed_highest_nrmse_pp"] < 0.05 < spread["paper, literal"]["seed_lowest_nrmse_pp"]
+
+
+@pytest.mark.slow
+def test_other_models_join_the_tables(study):
+    """On a few runs of the study: every contender is validated, and titles differ."""
+    from mrdamper.reproduction.literature import literature
+
+    few = [run for run in study.train if run.current_A in (0.0, 0.5, 1.0, 2.0)]
+    said: list[str] = []
+    made = literature(few, study.held_out[:2], lambda what, share: said.append(what))
+    titles = [c.title for c in made]
+    assert len(set(titles)) == len(titles) >= 8
+    assert all(np.isfinite(c.held_out.median()) for c in made)
+    assert {"play and bypass", "modified hyperbolic tangent"} <= set(titles)

@@ -115,7 +115,7 @@ def score_strip(validations: Mapping[str, Validation]) -> Figure:
         axes.invert_yaxis()
         axes.set_xlim(left=0)
         axes.grid(axis="y", visible=False)
-        label(axes, "nrmse_pp (%): RMS error over peak-to-peak force; grey ticks: cycle-to-cycle scatter", "")
+        label(axes, "nrmse_pp (%); grey ticks: cycle-to-cycle scatter", "")
         return figure
 
 

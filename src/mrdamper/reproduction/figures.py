@@ -120,16 +120,17 @@ def errors_figure(study: Reproduction) -> Figure:
     """Error of every held-out run by contender, over current."""
     with house_style():
         figure, (axes,) = new_figure(1, 1, 3.2, right=2.6)
-        for contender, colour in zip(study.contenders, PALETTE * 2, strict=False):
+        for number, contender in enumerate(study.contenders):
+            again, place = divmod(number, len(PALETTE))
             runs = sorted(contender.held_out.runs, key=lambda r: r.condition.current_A)
             currents = [r.condition.current_A for r in runs]
             axes.plot(
                 currents,
                 [100 * r.scores.nrmse_pp for r in runs],
-                "o-",
+                ("o-", "s--", "^:")[min(again, 2)],
                 ms=3,
                 lw=0.8,
-                color=colour,
+                color=PALETTE[place],
                 label=contender.title,
             )
         axes.set_ylim(bottom=0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
@@ -37,7 +37,13 @@ from mrdamper.reproduction.ways import CONSISTENT, LITERAL, TRADITIONAL
 from mrdamper.sensitivity import OneAtATime, Sobol, one_at_a_time, sobol
 from mrdamper.workflow import Progress
 
-_GROUPS = {"paper": "paper (literal)", "consistent": "consistent", "joint": "joint", "traditional": "traditional"}
+_GROUPS = {
+    "paper": "paper (literal)",
+    "consistent": "consistent",
+    "joint": "joint",
+    "traditional": "traditional",
+    "literature": "literature",
+}
 _SOBOL_SAMPLES = 128
 Rows = list[dict[str, Any]]
 
@@ -103,7 +109,7 @@ def verdicts(study: Reproduction) -> Rows:
                 "nrmse_std": held.median("nrmse_std"),
                 "wape": held.median("wape"),
                 "mean_relative_error": float(np.median(contender.relative_errors)),
-                "per_run_nrmse_pp": float(np.median([i.scores.nrmse_pp for i in contender.identifications])),
+                "per_run_nrmse_pp": _median([i.scores.nrmse_pp for i in contender.identifications]),
                 "seconds": contender.seconds,
                 "seeds": None if spread is None else spread.size,
                 "seed_median_nrmse_pp": None if spread is None else float(np.median(spread)),
@@ -268,3 +274,7 @@ def _page(
             f"computed in {study.seconds:.0f} s."
         ),
     )
+
+
+def _median(values: Sequence[float]) -> float:
+    return float(np.median(values)) if values else float("nan")

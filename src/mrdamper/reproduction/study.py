@@ -24,6 +24,7 @@ from mrdamper.identification.methods.paper import Paper
 from mrdamper.loop_analysis import LoopAnalysis, analyse_loop
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.optimizers.genetic import GeneticMinimum, GeneticSettings
+from mrdamper.reproduction.literature import literature
 from mrdamper.reproduction.ways import (
     CONSISTENT,
     HALF,
@@ -34,7 +35,7 @@ from mrdamper.reproduction.ways import (
     Settled,
     chosen_functions,
     contenders,
-    direct_contender,
+    direct_genetic,
     paper_functions,
     traditional,
 )
@@ -123,6 +124,7 @@ def reproduce(
     gas: GasSpring | None = None,
     *,
     with_direct_genetic: bool = False,
+    with_models: bool = False,
     seeds: int = SEEDS,
     progress: Progress = lambda what, share: None,
 ) -> Reproduction:
@@ -137,6 +139,8 @@ def reproduce(
         in-phase stiffness over the frequencies, k2 = k3 = 0.
     with_direct_genetic : bool
         Also identify all parameters at once by the genetic algorithm; takes minutes.
+    with_models : bool
+        Also the other models of the literature, over the same conditions.
     seeds : int
         Noise seeds of the virtual rig over which held-out errors are spread.
     progress : callable
@@ -157,7 +161,9 @@ def reproduce(
     settled = Settled.of(train, gas)
     ways = contenders(train, held_out, settled, lambda what, share: progress(what, 0.05 + 0.25 * share))
     if with_direct_genetic:
-        ways.append(direct_contender(train, held_out, settled, lambda what, share: progress(what, 0.3 + 0.2 * share)))
+        ways.append(direct_genetic(train, held_out, settled, lambda what, share: progress(what, 0.3 + 0.2 * share)))
+    if with_models:
+        ways += literature(train, held_out, lambda what, share: progress(what, 0.3 + 0.2 * share))
     checks, missing = _genetic_checks(train, settled, lambda what, share: progress(what, 0.5 + 0.2 * share))
     spread = _seed_errors(rig, seeds, lambda what, share: progress(what, 0.7 + 0.3 * share)) if rig and seeds else {}
     progress("reproduced", 1.0)

@@ -74,7 +74,7 @@ def contenders(train: Sequence[Run], held_out: Sequence[Run], settled: Settled, 
         begin = time.perf_counter()
         found = [settled.identify(run, method) for run in train]
         fit = paper_functions(found)
-        made.append(_contender(title, "paper", fit.damper, found, fit, held_out, time.perf_counter() - begin))
+        made.append(contender(title, "paper", fit.damper, found, fit, held_out, time.perf_counter() - begin))
     progress(CONSISTENT, 0.5)
     begin = time.perf_counter()
     found = [settled.identify(run, Balance()) for run in train]
@@ -83,20 +83,20 @@ def contenders(train: Sequence[Run], held_out: Sequence[Run], settled: Settled, 
         begin = time.perf_counter()
         fit = make(found)
         seconds = spent + time.perf_counter() - begin
-        made.append(_contender(title, "consistent", fit.damper, found, fit, held_out, seconds))
+        made.append(contender(title, "consistent", fit.damper, found, fit, held_out, seconds))
     progress(JOINT, 0.75)
     begin = time.perf_counter()
     plain = [identify(run, BoucWen, Balance()) for run in train]
     try:
         fit, _ = fit_modified_jointly(train, plain)
-        made.append(_contender(JOINT, "joint", fit.damper, plain, fit, held_out, time.perf_counter() - begin))
+        made.append(contender(JOINT, "joint", fit.damper, plain, fit, held_out, time.perf_counter() - begin))
     except IdentificationError as error:
         progress(f"{JOINT}: left out, {error.found}", 0.9)
     for title, chosen in traditional(found, held_out).items():
         begin = time.perf_counter()
         damper = OnePerCurrent.of(chosen)
         seconds = spent * len(chosen) / len(found) + time.perf_counter() - begin
-        made.append(_contender(title, "traditional", damper, chosen, None, held_out, seconds))
+        made.append(contender(title, "traditional", damper, chosen, None, held_out, seconds))
     return made
 
 
@@ -106,7 +106,7 @@ def traditional(found: Sequence[Identification], held_out: Sequence[Run]) -> dic
     return {title: [found[i] for i in _one_per_current([f.condition for f in found], v)] for title, v in aims.items()}
 
 
-def direct_contender(train: Sequence[Run], held_out: Sequence[Run], settled: Settled, progress: Progress) -> Contender:
+def direct_genetic(train: Sequence[Run], held_out: Sequence[Run], settled: Settled, progress: Progress) -> Contender:
     """All parameters at once by the genetic algorithm, one run a current."""
     begin = time.perf_counter()
     conditions = [SineRecord.of(run).condition for run in train]
@@ -116,10 +116,10 @@ def direct_contender(train: Sequence[Run], held_out: Sequence[Run], settled: Set
         progress(f"direct genetic, {run.id}", number / len(nearest))
         found.append(settled.identify(run, DirectGenetic()))
     damper = OnePerCurrent.of(found)
-    return _contender(DIRECT, "traditional", damper, found, None, held_out, time.perf_counter() - begin)
+    return contender(DIRECT, "traditional", damper, found, None, held_out, time.perf_counter() - begin)
 
 
-def _contender(
+def contender(
     title: str,
     group: str,
     damper: Damper,
@@ -128,6 +128,7 @@ def _contender(
     held_out: Sequence[Run],
     seconds: float,
 ) -> Contender:
+    """Validate a damper that was made in some way."""
     validation = validate(damper, held_out, title)
     errors = tuple(_relative_error(damper, run) for run in held_out)
     return Contender(title, group, damper, tuple(found), fit, validation, errors, seconds)

@@ -23,6 +23,7 @@ def register(app: typer.Typer) -> None:
             "--with-direct-genetic",
             help="Also identify all parameters at once by the genetic algorithm (minutes).",
         ),
+        with_models: bool = typer.Option(False, "--with-models", help="Also the other models of the literature."),
         seeds: int = typer.Option(20, "--seeds", min=0, help="Noise seeds of the virtual rig."),
         as_json: bool = typer.Option(False, "--json", help="Print the verdicts and claims for a program."),
     ) -> None:
@@ -50,6 +51,7 @@ def register(app: typer.Typer) -> None:
             study = run_reproduction(
                 dataset,
                 with_direct_genetic=with_direct_genetic,
+                with_models=with_models,
                 seeds=seeds,
                 progress=lambda what, share: progress(what, 0.85 * share),
             )
