@@ -3,15 +3,9 @@ import pytest
 
 from mrdamper.data import Condition
 from mrdamper.errors import IdentificationError, UnknownNameError
+from mrdamper.function_fitting import choose_function, fit_function
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.parameter_functions import (
-    FORMS,
-    ParameterFunction,
-    ParameterMap,
-    choose_function,
-    features,
-    fit_function,
-)
+from mrdamper.parameter_functions import FORMS, ParameterFunction, ParameterMap, features
 
 MATRIX = [
     Condition(i, f, a)

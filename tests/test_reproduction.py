@@ -13,12 +13,13 @@ from typer.testing import CliRunner
 from mrdamper.cli import application
 from mrdamper.data import Condition
 from mrdamper.errors import IdentificationError, ParameterError
+from mrdamper.function_fitting import fit_function
 from mrdamper.gas_spring import GasSpring
 from mrdamper.identification import identify
 from mrdamper.identification.methods.direct_genetic import DirectGenetic
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.optimizers.genetic import GeneticSettings
-from mrdamper.parameter_functions import ParameterFunction, fit_function
+from mrdamper.parameter_functions import ParameterFunction
 from mrdamper.reproduction import reproduce
 from mrdamper.reproduction import study as study_module
 from mrdamper.reproduction.claims import friction_along, judge, lost_length

@@ -18,17 +18,11 @@ import numpy as np
 
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError
+from mrdamper.function_fitting import fit_function, require_determined
 from mrdamper.identification import Problem
 from mrdamper.models import Model
 from mrdamper.optimizers.levenberg_marquardt import least_squares
-from mrdamper.parameter_functions import (
-    FORMS,
-    ParameterFunction,
-    ParameterMap,
-    features,
-    fit_function,
-    require_determined,
-)
+from mrdamper.parameter_functions import FORMS, ParameterFunction, ParameterMap, features
 
 _LADDER = np.geomspace(2e-6, 3e-3, 41)  # yield displacements [m]; between them Gram matrices are interpolated
 _RIDGE = 1e-7  # interpolated Gram matrices of nearly parallel columns may lose positivity by less

@@ -17,9 +17,10 @@ from mrdamper.damper import NOT_A_SINE, Damper, Envelope, Prediction
 from mrdamper.data import Condition, Floats, Run, same_condition
 from mrdamper.errors import IdentificationError
 from mrdamper.excitation import Excitation, running_sine
+from mrdamper.function_fitting import FunctionFit, assess, choose_function
 from mrdamper.identification import Identification
 from mrdamper.loop_analysis import same_motion
-from mrdamper.parameter_functions import FORMS, FunctionFit, ParameterMap, assess, choose_function
+from mrdamper.parameter_functions import FORMS, ParameterMap
 from mrdamper.simulation import Response, simulate, steady_loop
 
 

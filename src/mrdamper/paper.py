@@ -14,13 +14,14 @@ import numpy as np
 from mrdamper.damper import Envelope
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError
+from mrdamper.function_fitting import FunctionFit, fit_function
 from mrdamper.gas_spring import GasSpring
 from mrdamper.harmonic_balance import separate_mass
 from mrdamper.identification import Identification, Method, Problem, identify
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.modified import ModifiedFit, ModifiedModel
-from mrdamper.parameter_functions import FunctionFit, ParameterMap, fit_function
+from mrdamper.parameter_functions import ParameterMap
 
 PAPER_FORMS = {
     "c": "viscous-paper",

@@ -6,13 +6,11 @@ reading of descriptions, not a reproduction.
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from functools import cache
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from mrdamper.conditioned.base import ConditionedDamper
+from mrdamper.discovery import subclasses_in
 from mrdamper.errors import UnknownNameError
 
 if TYPE_CHECKING:
@@ -24,9 +22,7 @@ __all__ = ["ConditionedDamper", "all_conditioned", "conditioned_type"]
 @cache
 def all_conditioned() -> Mapping[str, type[ConditionedDamper]]:
     """Every condition-dependent damper by its name."""
-    for module in pkgutil.iter_modules(__path__):
-        importlib.import_module(f"{__name__}.{module.name}")
-    return MappingProxyType({cls.name: cls for cls in sorted(ConditionedDamper.__subclasses__(), key=lambda c: c.name)})
+    return subclasses_in(__name__, __path__, ConditionedDamper)
 
 
 def conditioned_type(name: str) -> type[ConditionedDamper]:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from functools import cache
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from mrdamper.discovery import subclasses_in
 from mrdamper.errors import UnknownNameError
 from mrdamper.models.base import Model, SearchAxis
 
@@ -20,9 +18,7 @@ __all__ = ["Model", "SearchAxis", "all_models", "model_type"]
 @cache
 def all_models() -> Mapping[str, type[Model]]:
     """Every model by its name."""
-    for module in pkgutil.iter_modules(__path__):
-        importlib.import_module(f"{__name__}.{module.name}")
-    return MappingProxyType({cls.name: cls for cls in sorted(Model.__subclasses__(), key=lambda c: c.name)})
+    return subclasses_in(__name__, __path__, Model)
 
 
 def model_type(name: str) -> type[Model]:

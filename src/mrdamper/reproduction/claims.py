@@ -11,8 +11,8 @@ import numpy as np
 from mrdamper.data import Floats, Run
 from mrdamper.errors import IdentificationError
 from mrdamper.excitation import equivalent_sine, measured_motion
+from mrdamper.function_fitting import fit_function
 from mrdamper.loop_analysis import same_motion
-from mrdamper.parameter_functions import fit_function
 from mrdamper.reproduction.study import Reproduction
 from mrdamper.reproduction.ways import CONSISTENT, LITERAL, SLOWEST, TRADITIONAL
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from functools import cache
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal, get_args, get_origin, get_type_hints
 
+from mrdamper.discovery import subclasses_in
 from mrdamper.errors import InputError, UnknownNameError
 from mrdamper.identification.problem import Method
 
@@ -18,9 +16,7 @@ if TYPE_CHECKING:
 @cache
 def all_methods() -> Mapping[str, type[Method]]:
     """Every method by its name."""
-    for module in pkgutil.iter_modules(__path__):
-        importlib.import_module(f"{__name__}.{module.name}")
-    return MappingProxyType({cls.name: cls for cls in sorted(Method.__subclasses__(), key=lambda c: c.name)})
+    return subclasses_in(__name__, __path__, Method)
 
 
 def method_named(name: str, settings: Mapping[str, str] | None = None) -> Method:
