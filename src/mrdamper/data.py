@@ -216,7 +216,7 @@ class Run:
             raise NonFiniteError(
                 f"{name} has {bad.size} values that are not finite, the first at sample {bad[0]}",
                 where=self._where,
-                mend="remove these samples or import the file with mrdamper import",
+                mend="remove these samples",
             )
         array = array.view()
         array.flags.writeable = False

@@ -75,7 +75,7 @@ GOOD = rows("a,0,0,0", "a,1,1,1", "a,2,0,0", "a,3,1,1")
 @pytest.mark.parametrize(
     ("runs", "samples", "error", "text"),
     [
-        (None, GOOD, DatasetError, "runs.csv is missing; make one with: mrdamper import"),
+        (None, GOOD, DatasetError, "runs.csv is missing; write one row a run"),
         (HEADER + "a,1\n", None, DatasetError, "none of samples.parquet"),
         ("name,current_A\na,1\n", GOOD, ColumnError, "column run_id is missing"),
         (HEADER, GOOD, DatasetError, "no rows"),

@@ -105,7 +105,7 @@ def _runs_table(folder: Path) -> list[dict[str, Any]]:
         raise DatasetError("no such folder", where=str(folder), mend="give a folder that holds runs.csv")
     path = folder / "runs.csv"
     if not path.is_file():
-        hint = "make one with: mrdamper import FILES --out DATASET"
+        hint = "write one row a run: run_id, current_A, ... (README, what a dataset is)"
         raise DatasetError("runs.csv is missing", where=str(folder), mend=hint)
     try:
         table = pl.read_csv(path, infer_schema_length=0)
@@ -145,7 +145,7 @@ def _samples_table(folder: Path) -> dict[str, pl.DataFrame]:
             raise ColumnError(
                 f"column {column} holds text",
                 where=str(path),
-                mend="write plain numbers with a decimal point, or use mrdamper import",
+                mend="write plain numbers with a decimal point",
             )
     table = table.select(pl.col("run_id").cast(pl.String), *(pl.col(c).cast(pl.Float64) for c in wanted))
     groups = table.partition_by("run_id", as_dict=True, maintain_order=True)
@@ -241,7 +241,7 @@ def _missing_column(column: str, present: list[str], path: Path) -> ColumnError 
             return UnitError(
                 f"column {other!r} where {column!r} is expected",
                 where=str(path),
-                mend="convert it to SI and rename it, or let mrdamper import do both",
+                mend="convert it to SI and rename it",
             )
     return ColumnError(f"column {column} is missing (found {', '.join(present)})", where=str(path), mend="add it")
 
