@@ -166,6 +166,13 @@ def _compare_rig(
             entries.append(_enter(contestant, rig, sines, found))
         except InputError as error:
             refused[contestant.name] = str(error)
+    if not entries:
+        name, reason = next(iter(refused.items()))
+        raise IdentificationError(
+            f"no model could be compared; {name}: {reason}",
+            where=f"rig {rig.rigs[0] or rig.name}",
+            mend="choose other models with --models, or leave this rig out of the dataset",
+        )
     entries.sort(key=lambda entry: entry.left_out.median())
     return RigComparison(rig.rigs[0], rig, tuple(entries), refused, not_identified)
 

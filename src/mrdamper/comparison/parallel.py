@@ -18,6 +18,8 @@ from mrdamper.errors import InputError
 from mrdamper.excitation import analyse_motion
 from mrdamper.identification import Identification, Problem, conclude
 from mrdamper.identification.methods import method_named
+from mrdamper.identification.methods.direct_genetic import DirectGenetic
+from mrdamper.identification.methods.paper import Paper
 from mrdamper.identification.methods.projection import Projection
 from mrdamper.models import model_type
 from mrdamper.workflow import Progress
@@ -27,6 +29,8 @@ _PER_CYCLE = 200  # samples of a cycle they see
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 Found = dict[tuple[Basis, str], tuple[Identification | str, float]]
+
+GENERATIONS = 60  # of a genetic search here, where the paper takes 500: a comparison has dozens of runs
 
 
 def identify_all(bases: Sequence[Basis], runs: Sequence[Run], workers: int, progress: Progress) -> Found:
@@ -71,6 +75,8 @@ def _identify_one(basis: Basis, run_id: str) -> tuple[Identification | str, floa
     begin = time.perf_counter()
     try:
         method, cls = method_named(basis.method), model_type(basis.model)
+        if isinstance(method, Paper | DirectGenetic):
+            method = replace(method, genetic=replace(method.genetic, generations=GENERATIONS))
         if cls.integrated:
             method = Projection(refine_best=1)
         seen = shortened(run) if basis.costly else run

@@ -16,7 +16,9 @@ def register(app: typer.Typer) -> None:
         data: Optional[Path] = typer.Argument(None, help="Dataset folder; default: the bundled tests of two dampers."),  # noqa: UP045
         out: Path = typer.Option(..., "--out", help="Folder for comparison.html, tables and figures."),
         models: list[str] = typer.Option([], "--models", help="Only this model; may be repeated. Default: all."),
-        genetic: bool = typer.Option(False, "--genetic", help="Also identify by genetic algorithm; takes minutes."),
+        genetic: bool = typer.Option(
+            False, "--genetic", help="Also by genetic algorithm, 60 generations; takes minutes."
+        ),
         jobs: Optional[int] = typer.Option(None, "--jobs", min=1, help="Processes; default one a core."),  # noqa: UP045
         as_json: bool = typer.Option(False, "--json", help="Print the table as JSON."),
     ) -> None:
