@@ -22,7 +22,7 @@ from mrdamper.simulation import Response
 NOT_A_SINE = "not a sine"
 COARSE = "sampling"
 _SAMPLES_IN_KNEE = 2  # below, the knee falls between samples
-_SLACK = 0.02  # a test bench repeats a condition to a few per cent; within that nothing is extrapolated
+SLACK = 0.02  # a test bench repeats a condition to a few per cent; within that nothing is extrapolated
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Envelope:
             ("velocity", condition.peak_velocity, self.peak_velocity_m_s),
         )
         return tuple(
-            name for name, value, (low, high) in checks if value < low - _SLACK * high or value > high * (1 + _SLACK)
+            name for name, value, (low, high) in checks if value < low - SLACK * high or value > high * (1 + SLACK)
         )
 
     def motion_flags(self, motion: Excitation) -> tuple[str, ...]:
@@ -77,7 +77,7 @@ class Envelope:
         return tuple(
             name
             for name, lowest, highest, (low, high) in checks
-            if highest > high * (1 + _SLACK) or (name != "velocity" and lowest < low - _SLACK * high)
+            if highest > high * (1 + SLACK) or (name != "velocity" and lowest < low - SLACK * high)
         )
 
 

@@ -11,13 +11,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import IdentificationError, UnknownNameError
 from mrdamper.models import Model
+from mrdamper.tracing import Expression, plain
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,11 +164,12 @@ class ParameterFunction:
                 mend=f"it takes {len(form.terms)} and {len(form.rate_bounds)}",
             )
 
-    def __call__(self, current: ArrayLike, frequency: ArrayLike, amplitude: ArrayLike) -> Floats:
+    def __call__(self, current: Any, frequency: Any, amplitude: Any) -> Any:
         """Parameter at currents [A], frequencies [Hz] and amplitudes [m], broadcast together."""
-        I, f, A = np.broadcast_arrays(*(np.asarray(a, dtype=float) for a in (current, frequency, amplitude)))
-        columns = form_named(self.form).columns(I.ravel(), f.ravel(), A.ravel(), self.rates)
-        value = (columns @ np.array(self.coefficients)).reshape(I.shape)
+        point = (_numbers(current), _numbers(frequency), _numbers(amplitude))
+        value: Any = 0.0
+        for coefficient, term in zip(self.coefficients, form_named(self.form).terms, strict=True):
+            value = value + coefficient * term(*point, self.rates)
         return np.exp(value) if self.log else value
 
     @property
@@ -183,6 +185,10 @@ class ParameterFunction:
         slope = np.sign(np.diff(self(currents, frequency, amplitude)))
         turns = np.flatnonzero(slope[1:] * slope[:-1] < 0)
         return float(currents[turns[0] + 1]) if turns.size else None
+
+
+def _numbers(value: Any) -> Any:
+    return value if isinstance(value, Expression) else np.asarray(value, dtype=float)
 
 
 def form_named(name: str) -> Form:
@@ -222,7 +228,7 @@ class ParameterMap:
         values = {}
         for name, function in self.functions.items():
             low, high = bounds.get(name, (-np.inf, np.inf))
-            values[name] = float(np.clip(function(*point), low, high))
+            values[name] = plain(np.clip(function(*point), low, high))
         return self.model_type.build(values)
 
     @property

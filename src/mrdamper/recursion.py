@@ -2,13 +2,34 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.tracing import Tape, choose, streamed
 
+_SHORT = 1e-4  # step over time constant below which a series loses fewer digits
 _FORGOTTEN = 1e-18  # share of the past below which it is rounding
 
 
+def lag_step(tape: Tape, time: Any, signal: Any, time_constant: Any) -> Any:
+    """`first_order_lag` for one sample."""
+    held, last = tape.remember("lagged"), tape.previous(signal, "signal")
+
+    def lagged() -> Any:
+        step = time.step / time_constant
+        keep = np.exp(-step)
+        gain = choose(step > _SHORT, lambda: -np.expm1(-step) / step, lambda: 1 - step / 2 + step**2 / 6)
+        moved = keep * held + ((gain - keep) * last + (1 - gain) * signal)
+        return tape.select(tape.first, 0.0, moved)
+
+    value = choose(time_constant > 0, lagged, lambda: signal)
+    tape.update(held, value)
+    return value
+
+
+@streamed(lag_step)
 def first_order_lag(time: Floats, signal: Floats, time_constant: float) -> Floats:
     """Y with T dy/dt + y = signal, from y = 0 at the first sample.
 
@@ -27,7 +48,7 @@ def first_order_lag(time: Floats, signal: Floats, time_constant: float) -> Float
     step = np.diff(time) / time_constant
     keep = np.concatenate([[0.0], np.exp(-step)])
     # Weights of the two ends of a straight piece; the series where their difference would cancel.
-    gain = np.where(step > 1e-4, -np.expm1(-step) / np.where(step > 0, step, 1.0), 1 - step / 2 + step**2 / 6)
+    gain = np.where(step > _SHORT, -np.expm1(-step) / np.where(step > 0, step, 1.0), 1 - step / 2 + step**2 / 6)
     value = np.concatenate([[0.0], (gain - keep[1:]) * signal[:-1] + (1 - gain) * signal[1:]])
     span = 1
     while span < value.size and keep.max() > _FORGOTTEN:

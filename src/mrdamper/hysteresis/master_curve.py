@@ -32,6 +32,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.tracing import Expression, choose, functions, settled
 
 CEILING = 11.0  # largest |w| a motion may start from
 STEEPEST = 1e6  # largest |rho| |w|^n: a shorter release than this drowns in rounding
@@ -41,13 +42,17 @@ _BELOW_ONE = 1 - 2**-50  # holds a state of 1 off the pole of a logarithm; moves
 Value = Any  # float or array, as `xp` says
 
 
-@lru_cache(maxsize=128)
 def master_curve(n: float) -> MasterCurve:
     """The curve for an exponent, made once."""
     if n == 1:
         return _Exponential()
     if n == 2:
         return _Tangent()
+    return _tabulated(settled(n))
+
+
+@lru_cache(maxsize=128)
+def _tabulated(n: float) -> MasterCurve:
     return _Tabulated(n)
 
 
@@ -94,10 +99,10 @@ class _Exponential(MasterCurve):
         return r
 
     def release(self, phi: Value, rho: float, xp: ModuleType) -> Value:
-        return -xp.expm1(-rho * phi) / rho if rho else phi
+        return choose(rho != 0, lambda: -xp.expm1(-rho * phi) / rho, lambda: phi)
 
     def release_distance(self, size: Value, rho: float, xp: ModuleType) -> Value:
-        return -xp.log1p(-rho * size * _BELOW_ONE) / rho if rho else size
+        return choose(rho != 0, lambda: -xp.log1p(-rho * size * _BELOW_ONE) / rho, lambda: size)
 
 
 class _Tangent(MasterCurve):
@@ -115,16 +120,23 @@ class _Tangent(MasterCurve):
         return 0.5 * (r + math.log1p(-math.expm1(-r)))
 
     def release(self, phi: Value, rho: float, xp: ModuleType) -> Value:
-        root = math.sqrt(abs(rho))
-        if rho > 0:
-            return xp.tanh(root * phi) / root
-        return xp.tan(root * phi) / root if rho else phi
+        root = xp.sqrt(abs(rho))
+        return _by_sign(rho, lambda: xp.tanh(root * phi) / root, lambda: xp.tan(root * phi) / root, lambda: phi)
 
     def release_distance(self, size: Value, rho: float, xp: ModuleType) -> Value:
-        root = math.sqrt(abs(rho))
-        if rho > 0:
-            return xp.atanh(root * size * _BELOW_ONE) / root
-        return xp.atan(root * size) / root if rho else size
+        root = xp.sqrt(abs(rho))
+        return _by_sign(
+            rho,
+            lambda: xp.atanh(root * size * _BELOW_ONE) / root,
+            lambda: xp.atan(root * size) / root,
+            lambda: size,
+        )
+
+
+def _by_sign(
+    rho: Value, positive: Callable[[], Value], negative: Callable[[], Value], zero: Callable[[], Value]
+) -> Value:
+    return choose(rho > 0, positive, lambda: choose(rho < 0, negative, zero))
 
 
 class _Tabulated(MasterCurve):
@@ -139,6 +151,8 @@ class _Tabulated(MasterCurve):
     def climb(self, w: Value, phi: Value, xp: ModuleType) -> Value:
         if xp is math:
             return self._fall_from(w, phi, xp) if w > 1 else self._climb_from(w, phi, xp)
+        if xp is functions:  # a stream starts at rest and never gets above 1
+            return self._climb_from(w, phi, xp)
         above = w > 1
         reached = np.empty_like(phi)
         reached[above] = self._fall_from(w[above], phi[above], xp)
@@ -151,15 +165,21 @@ class _Tabulated(MasterCurve):
 
     def release(self, phi: Value, rho: float, xp: ModuleType) -> Value:
         scale = abs(rho) ** (1 / self.n)
-        if rho > 0:
-            return -xp.expm1(-self._rising.coordinate(scale * phi, xp)) / scale
-        return xp.expm1(self._growing.coordinate(scale * phi, xp)) / scale if rho else phi
+        return _by_sign(
+            rho,
+            lambda: -xp.expm1(-self._rising.coordinate(scale * phi, xp)) / scale,
+            lambda: xp.expm1(self._growing.coordinate(scale * phi, xp)) / scale,
+            lambda: phi,
+        )
 
     def release_distance(self, size: Value, rho: float, xp: ModuleType) -> Value:
         scale = abs(rho) ** (1 / self.n)
-        if rho > 0:
-            return self._rising.distance(-xp.log1p(-scale * size * _BELOW_ONE), xp) / scale
-        return self._growing.distance(xp.log1p(scale * size), xp) / scale if rho else size
+        return _by_sign(
+            rho,
+            lambda: self._rising.distance(-xp.log1p(-scale * size * _BELOW_ONE), xp) / scale,
+            lambda: self._growing.distance(xp.log1p(scale * size), xp) / scale,
+            lambda: size,
+        )
 
     def _climb_from(self, w: Value, phi: Value, xp: ModuleType) -> Value:
         start = -xp.log1p(-w * _BELOW_ONE)
@@ -229,11 +249,17 @@ class _Table:
 
     def coordinate(self, phi: Value, xp: ModuleType) -> Value:
         """Coordinate r at a distance."""
-        return self._r_of_phi.at_float(phi) if xp is math else self._r_of_phi.at(phi)
+        return _evaluate(self._r_of_phi, phi, xp)
 
     def distance(self, r: Value, xp: ModuleType) -> Value:
         """Distance at r."""
-        return self._phi_of_r.at_float(r) if xp is math else self._phi_of_r.at(r)
+        return _evaluate(self._phi_of_r, r, xp)
+
+
+def _evaluate(table: _Quintics, x: Value, xp: ModuleType) -> Value:
+    if isinstance(x, Expression):
+        return x.tape.lookup(table, x)
+    return table.at_float(x) if xp is math else table.at(x)
 
 
 class _Quintics:
@@ -245,7 +271,7 @@ class _Quintics:
         value = y[1:] - c0 - c1 - c2
         rise = step * slope[1:] - c1 - 2 * c2
         curve = 0.5 * step**2 * bend[1:] - c2
-        self._nodes, self._inverse_step = x, 1 / step
+        self.nodes, self._inverse_step = x, 1 / step
         self._coefficients = (
             c0,
             c1,
@@ -254,11 +280,13 @@ class _Quintics:
             -15 * value + 7 * rise - 2 * curve,
             6 * value - 3 * rise + curve,
         )
+        # (K − 1, 7): coefficients of each cell, lowest first, and one over its width
+        self.cells: Floats = np.column_stack([*self._coefficients, self._inverse_step])
 
     def at(self, x: Floats) -> Floats:
-        x = np.clip(x, self._nodes[0], self._nodes[-1])
-        cell = np.clip(np.searchsorted(self._nodes, x, side="right") - 1, 0, self._nodes.size - 2)
-        t = (x - self._nodes[cell]) * self._inverse_step[cell]
+        x = np.clip(x, self.nodes[0], self.nodes[-1])
+        cell = np.clip(np.searchsorted(self.nodes, x, side="right") - 1, 0, self.nodes.size - 2)
+        t = (x - self.nodes[cell]) * self._inverse_step[cell]
         result = self._coefficients[5][cell]
         for coefficient in self._coefficients[4::-1]:
             result = result * t + coefficient[cell]
@@ -274,5 +302,4 @@ class _Quintics:
     @cached_property
     def _lists(self) -> tuple[list[float], list[tuple[float, ...]]]:
         # Plain floats: taking one number out of an array costs more than the arithmetic here.
-        rows = zip(*(c.tolist() for c in (*self._coefficients, self._inverse_step)), strict=True)
-        return self._nodes.tolist(), list(rows)
+        return self.nodes.tolist(), [tuple(row) for row in self.cells.tolist()]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,8 +14,18 @@ from mrdamper.errors import ExcitationError, ParameterError
 from mrdamper.hysteresis.master_curve import CEILING, STEEPEST, MasterCurve, master_curve
 from mrdamper.hysteresis.path import Path
 from mrdamper.hysteresis.shape import Shape
+from mrdamper.tracing import Tape, choose, functions, streamed
 
 
+def follow_step(tape: Tape, shape: Shape, path: Any, zeta0: ArrayLike = 0.0) -> Any:
+    """`follow` for one sample."""
+    zeta = tape.remember("zeta", float(zeta0))  # type: ignore[arg-type]
+    reached = step(shape, zeta, path.step)
+    tape.update(zeta, reached)
+    return reached
+
+
+@streamed(follow_step)
 def follow(shape: Shape, path: Path, zeta0: ArrayLike = 0.0) -> Floats:
     """Hysteretic state along a motion.
 
@@ -48,8 +60,8 @@ def follow(shape: Shape, path: Path, zeta0: ArrayLike = 0.0) -> Floats:
     return np.stack(rows) if shape.is_many else rows[0]
 
 
-def step(shape: Shape, zeta: float, dx: float) -> float:
-    """State after a displacement dx: the streaming form of `follow`, plain floats.
+def step(shape: Shape, zeta: Any, dx: Any) -> Any:
+    """State after a displacement dx: `follow` for one number, plain or traced.
 
     Parameters
     ----------
@@ -65,9 +77,11 @@ def step(shape: Shape, zeta: float, dx: float) -> float:
     float
         State after [z_max]. The caller vouches for the start: nothing is checked here.
     """
-    if dx < 0:
-        return -_advance(master_curve(shape.n), float(shape.rho), -zeta, -float(shape.kappa) * dx)
-    return _advance(master_curve(shape.n), float(shape.rho), zeta, float(shape.kappa) * dx)
+    curve, back = master_curve(shape.n), dx < 0
+    xp = math if isinstance(back, bool) else functions
+    w = choose(back, lambda: -zeta, lambda: zeta)
+    reached = _advance(curve, shape.rho, w, shape.kappa * abs(dx), xp)
+    return choose(back, lambda: -reached, lambda: reached)
 
 
 def stroke(shape: Shape, zeta0: ArrayLike, distance: ArrayLike) -> Floats:
@@ -139,14 +153,18 @@ def _states(curve: MasterCurve, rho: float, starts: Floats, stroke: np.ndarray |
     return w
 
 
-def _advance(curve: MasterCurve, rho: float, w: float, phi: float) -> float:
-    """One stroke in plain floats."""
-    if w < 0:
-        to_zero = curve.release_distance(-w, rho, math)
-        if phi < to_zero:
-            return -curve.release(to_zero - phi, rho, math)
-        return curve.rise(phi - to_zero, math)
-    return curve.climb(w, phi, math)
+def _advance(curve: MasterCurve, rho: Any, w: Any, phi: Any, xp: ModuleType = math) -> Any:
+    """One stroke of one number."""
+
+    def released() -> Any:
+        to_zero = curve.release_distance(-w, rho, xp)
+        return choose(
+            phi < to_zero,
+            lambda: -curve.release(to_zero - phi, rho, xp),
+            lambda: curve.rise(phi - to_zero, xp),
+        )
+
+    return choose(w < 0, released, lambda: curve.climb(w, phi, xp))
 
 
 def _check_start(shape: Shape, zeta0: ArrayLike) -> None:

@@ -8,22 +8,23 @@ tolerance, and what cannot be kept below it is refused, never returned.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 
 import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, ParameterError
+from mrdamper.integrator.streamed import Rate, integrate_step
+from mrdamper.tracing import streamed
 
-Rate = Callable[[float, float, float, Floats, Floats, Floats], None]
 
-
+@streamed(integrate_step)
 def integrate(
     rate: Rate,
-    parameters: Floats,
+    parameters: Sequence[float],
     motion: tuple[Floats, Floats, Floats, Floats],
-    start: Floats,
-    scale: Floats,
+    start: Sequence[float],
+    scale: Sequence[float],
     *,
     tolerance: float = 1e-5,
 ) -> Floats:
@@ -37,13 +38,13 @@ def integrate(
     rate : function (x, v, current, state, parameters, out)
         Writes d(state)/dt into `out`. A plain module-level function of numbers and arrays: it
         is compiled.
-    parameters : (P,) array
+    parameters : P numbers
         Passed on to `rate`.
     motion : four (N,) arrays
         Time [s], displacement [m], velocity [m/s], current [A].
-    start : (S,) array
+    start : S numbers
         State at the first sample.
-    scale : (S,) array
+    scale : S numbers
         A usual size of each state; errors are measured against the larger of it and the state.
     tolerance : float
         Error allowed per step, relative.

@@ -83,7 +83,7 @@ class Model(ABC):
         for info in self.parameters():
             value = getattr(self, info.name)
             low, high = info.bounds
-            if not (low <= value <= high and math.isfinite(value)):
+            if not (low <= value <= high and -math.inf < value < math.inf):
                 raise ParameterError(
                     f"{info.name} = {value:g} {info.unit}",
                     where=self.title,

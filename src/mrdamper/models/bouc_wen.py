@@ -13,6 +13,7 @@ from mrdamper.excitation import Excitation
 from mrdamper.hysteresis import Shape, follow
 from mrdamper.models.base import GENERAL_FORMS, Model, SearchAxis
 from mrdamper.parameters import param
+from mrdamper.tracing import plain
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class BoucWen(Model):
     @property
     def yield_displacement(self) -> float:
         """z_max: the displacement in which the hysteretic force is spent [m]."""
-        return float(self.shape.yield_displacement)
+        return self.shape.yield_displacement  # type: ignore[return-value]
 
     @property
     def yield_force(self) -> float:
@@ -116,9 +117,9 @@ class BoucWen(Model):
             else:
                 shape = Shape(1 / length, given.pop("asymmetry", 0.0), n)
                 beta, gamma = shape.to_bouc_wen()
-                given["beta"], given["gamma"] = float(beta), float(gamma)
+                given["beta"], given["gamma"] = plain(beta), plain(gamma)
         elif "gamma" not in given:
             given["gamma"] = given["beta"]
         if (force := given.pop("yield_force", None)) is not None:
-            given["alpha"] = float(force * (given["beta"] + given["gamma"]) ** (1 / n))
+            given["alpha"] = plain(force * (given["beta"] + given["gamma"]) ** (1 / n))
         return cls(**given)

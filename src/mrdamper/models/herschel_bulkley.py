@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -14,9 +14,11 @@ from mrdamper.errors import ParameterError
 from mrdamper.excitation import Excitation
 from mrdamper.models.base import Model, SearchAxis
 from mrdamper.parameters import param
+from mrdamper.tracing import Tape, choose, streamed
 
 _KNOTS = 4000  # of the table the flow curve is inverted with; Newton's method finishes the digits
 _NEWTON = 3
+_NEWTON_FROM_AFAR = 8
 
 
 @dataclass(frozen=True)
@@ -103,6 +105,22 @@ class HerschelBulkley(Model):
         return _axes(float(np.max(np.abs(motion.velocity))), free)
 
 
+def flow_step(tape: Tape, speed: Any, m: Any) -> Any:
+    """`flow_curve` for one sample: the curve bends one way, so Newton's method comes in from below."""
+
+    def flowing() -> Any:
+        y = np.log(speed)
+        level = np.log(m / (2 * m + 1))
+        u = np.minimum((y - level - np.log(1 + m / (m + 1))) / (1 + 1 / m), m * (y - level))
+        for _ in range(_NEWTON_FROM_AFAR):
+            value, slope = _log_speed(u, m)
+            u = u - (value - y) / slope
+        return 1 + np.exp(u)
+
+    return choose(speed > 0, flowing, lambda: 1.0)
+
+
+@streamed(flow_step)
 def flow_curve(speed: Floats, m: float) -> Floats:
     """Force over yield force at a speed.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Self
@@ -76,8 +75,8 @@ class LuGre(Model):
     def state(self, motion: Excitation) -> Floats:
         """(N,) u, the deflection of the bristles over that while sliding, from 0."""
         channels = (motion.time, motion.displacement, motion.velocity, motion.current)
-        shape = np.array([self.presliding, self.stribeck, self.vs])
-        return integrate(bristle_rate, shape, channels, np.zeros(1), np.ones(1))[:, 0]
+        shape = (self.presliding, self.stribeck, self.vs)
+        return integrate(bristle_rate, shape, channels, (0.0,), (1.0,))[:, 0]
 
     def force(self, motion: Excitation, state: Floats) -> Floats:
         v = motion.velocity
@@ -98,7 +97,7 @@ class LuGre(Model):
 
 def bristle_rate(x: float, v: float, current: float, state: Floats, p: Floats, out: Floats) -> None:
     """du/dt for p = (z_c, s, v_s)."""
-    onset = 1 + (p[1] - 1) * math.exp(-((v / p[2]) ** 2))
+    onset = 1 + (p[1] - 1) * np.exp(-((v / p[2]) ** 2))
     out[0] = (v - abs(v) * state[0] / onset) / p[0]
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from mrdamper.hysteresis import Path
 from mrdamper.models.base import Model, SearchAxis
 from mrdamper.parameters import param
 from mrdamper.recursion import first_order_lag
+from mrdamper.tracing import Tape, streamed
 
 RISE_CURRENT = 0.12  # A; the yield force starts with zero slope in the current and is straight beyond
 
@@ -79,7 +80,7 @@ class PlayBypass(Model):
         """S (N,), the lagged share of the yield force."""
         v, speed = motion.velocity, np.abs(motion.velocity)
         play = play_position(motion.path, self.d)
-        seat = min(self.e, self.d)
+        seat = np.minimum(self.e, self.d)
         loaded = np.sign(play) * np.maximum(0.0, np.abs(play) - (self.d - seat)) / seat
         along = np.maximum(0.0, loaded * np.sign(v))
         ratio = self.cb * speed / self.yield_force(motion.current)
@@ -117,6 +118,15 @@ class PlayBypass(Model):
         )
 
 
+def play_step(tape: Tape, path: Any, limit: Any, start: float = 0.0) -> Any:
+    """`play_position` for one sample."""
+    held = tape.remember("play", start)
+    moved = np.clip(held + path.step, -limit, limit)
+    tape.update(held, moved)
+    return moved
+
+
+@streamed(play_step)
 def play_position(path: Path, limit: float, start: float = 0.0) -> Floats:
     """Position δ of a stop operator along a path: it moves with the motion and stops at ±limit.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.tracing import choose
 
 
 def side(displacement: Floats, width: float = 0.0) -> Floats:
@@ -21,4 +22,4 @@ def side(displacement: Floats, width: float = 0.0) -> Floats:
     width : float
         Displacement in which the shift changes side, tanh(x/width) [m]; 0: at once.
     """
-    return np.tanh(displacement / width) if width > 0 else np.sign(displacement)
+    return choose(width > 0, lambda: np.tanh(displacement / width), lambda: np.sign(displacement))

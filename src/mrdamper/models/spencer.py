@@ -150,8 +150,8 @@ class Spencer(Model):
     def state(self, motion: Excitation) -> Floats:
         """(N, 2): r = x − y [m] and z/z_max, from 0."""
         channels = (motion.time, motion.displacement, motion.velocity, motion.current)
-        shape = np.array([self.c0_ratio, self.k0_rate, self.creep, 1 / self.yield_displacement, self.asymmetry, self.n])
-        return integrate(series_rate, shape, channels, np.zeros(2), np.array([self.yield_displacement, 1.0]))
+        shape = (self.c0_ratio, self.k0_rate, self.creep, 1 / self.yield_displacement, self.asymmetry, self.n)
+        return integrate(series_rate, shape, channels, (0.0, 0.0), (self.yield_displacement, 1.0))
 
     def force(self, motion: Excitation, state: Floats) -> Floats:
         v = motion.velocity
@@ -201,9 +201,8 @@ def series_rate(x: float, v: float, current: float, state: Floats, p: Floats, ou
     zeta = state[1]
     slip = (v - p[2] * zeta - p[1] * state[0]) / (1 + p[0])
     grip = abs(zeta) ** p[5]
-    sign = 1.0 if zeta > 0 else -1.0
     out[0] = slip
-    out[1] = p[3] * (slip * (1 - 0.5 * (1 + p[4]) * grip) - 0.5 * (1 - p[4]) * abs(slip) * sign * grip)
+    out[1] = p[3] * (slip * (1 - 0.5 * (1 + p[4]) * grip) - 0.5 * (1 - p[4]) * abs(slip) * np.sign(zeta) * grip)
 
 
 def _axes(amplitude: float, speed: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:

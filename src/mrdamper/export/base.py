@@ -1,0 +1,73 @@
+"""What an export format is: files by name, made of a damper, written whole or not at all."""
+
+from __future__ import annotations
+
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from mrdamper.damper import Damper
+from mrdamper.errors import InputError
+
+_NAME = re.compile(r"[a-z][a-z0-9_]{0,40}", re.IGNORECASE)
+_RESERVED = re.compile(
+    r"auto|break|case|char|const|continue|default|do|double|else|enum|extern|float|for|goto|if|inline|int"
+    r"|long|register|return|short|signed|sizeof|static|struct|switch|typedef|union|unsigned|void|volatile|while|main"
+)
+
+
+@dataclass(frozen=True)
+class Written:
+    """What an export made.
+
+    Attributes
+    ----------
+    files : mapping of str to bytes
+        Contents by file name.
+    notes : tuple of str
+        What the user should know: limits, platforms left out.
+    """
+
+    files: Mapping[str, bytes]
+    notes: tuple[str, ...] = field(default=())
+
+
+class Exporter(ABC):
+    """An export format. Subclasses are final and found by their file."""
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    suffix: ClassVar[str] = ""  # of the one file it makes; empty: a folder of files
+
+    @abstractmethod
+    def export(self, damper: Damper, name: str) -> Written:
+        """Make the files.
+
+        Parameters
+        ----------
+        damper : Damper
+        name : str
+            Begins the names of files and symbols; an identifier in C.
+        """
+
+
+def identifier(text: str) -> str:
+    """A name for files and symbols out of any text.
+
+    Raises
+    ------
+    InputError
+        E_EXPORT_NAME if nothing usable is left.
+    """
+    made = re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_").lower()
+    if made and made[0].isdigit():
+        made = f"damper_{made}"
+    if not _NAME.fullmatch(made) or _RESERVED.fullmatch(made):
+        raise InputError(
+            f"{text!r} makes no name in C",
+            mend="give --name: a letter, then up to 40 letters, digits and underscores",
+            code="E_EXPORT_NAME",
+        )
+    return made

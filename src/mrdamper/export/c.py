@@ -1,0 +1,174 @@
+"""C99: one header, one source, and a self-test with reference vectors."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+
+from mrdamper.damper import Damper
+from mrdamper.export.base import Exporter, Written, identifier
+from mrdamper.export.c_writer import CWriter
+from mrdamper.export.templates import render
+from mrdamper.streaming import FLAGS, Stepper, Stream, stream
+from mrdamper.tracing import Program
+
+TOLERANCE = 1e-9  # of the largest force: the self-test forgives other compilers and libraries this much
+_SAMPLES = 400
+
+
+class CExporter(Exporter):
+    """C99 for simulation and for real-time targets."""
+
+    name: ClassVar[str] = "c"
+    title: ClassVar[str] = "C99 source"
+
+    def export(self, damper: Damper, name: str) -> Written:
+        made = stream(damper)
+        files = {**c_sources(made, name, damper.rig), f"{name}_test.c": self_test(made, name)}
+        return Written({file: text.encode() for file, text in files.items()})
+
+
+def c_sources(made: Stream, name: str, rig: str) -> dict[str, str]:
+    """Header and source of a damper, by file name.
+
+    Parameters
+    ----------
+    made : Stream
+    name : str
+        Prefix of files and symbols.
+    rig : str
+        For the comment at the top.
+    """
+    facts = _facts(made, identifier(name), rig)
+    return {f"{name}.h": render("model.h.j2", **facts), f"{name}.c": render("model.c.j2", **facts)}
+
+
+def self_test(made: Stream, name: str) -> str:
+    """A program that steps the model through a motion and compares with forces computed here."""
+    x, current, dt = reference_motion(made)
+    steps = Stepper(made)
+    force = [steps.step(*sample, dt) for sample in zip(x.tolist(), current.tolist(), strict=True)]
+    rows = [f"{{{x!r}, {i!r}, {f!r}}}" for x, i, f in zip(x.tolist(), current.tolist(), force, strict=True)]
+    return render("model_test.c.j2", name=name, upper=name.upper(), rows=rows, dt=repr(dt), tolerance=TOLERANCE)
+
+
+def reference_motion(made: Stream, samples: int = _SAMPLES) -> tuple[np.ndarray, np.ndarray, float]:
+    """Displacement [m] and current [A] (N,) of a growing sine inside the tested ranges, and its time step [s]."""
+    envelope = made.envelope
+    amplitude, frequency, (low, high) = 0.01, 1.0, (0.0, 1.0)
+    if envelope is not None:
+        amplitude, (low, high) = envelope.amplitude_m[1], envelope.current_A
+        frequency = min(envelope.frequency_Hz[1], 0.5 * envelope.peak_velocity_m_s[1] / (2 * np.pi * amplitude))
+    turns = np.linspace(0, 2, samples)
+    x = amplitude * np.minimum(1.0, 0.2 + turns / 2) * np.sin(2 * np.pi * turns)
+    current = np.where(turns % 1 < 0.6, low + 0.5 * (high - low), low + 0.8 * (high - low))
+    return x, current, float(2 / (frequency * (samples - 1)))
+
+
+def _facts(made: Stream, name: str, rig: str) -> dict[str, Any]:
+    """What the templates say of a damper."""
+    main = CWriter(made.step)
+    drives = {quantity: CWriter(drive, f"from_{quantity}_") for quantity, drive in made.drives.items()}
+    setup, infos = main.setup(), made.model.parameters() if made.model else ()
+    derived = [("int" if e.logical else f"{name}_real", main.name(e).removeprefix("d->")) for e in made.step.derived]
+    arguments = [(f"const {name}_parameters *p", "&m->p")] if infos else []
+    arguments += [(f"const {name}_derived *d", "&m->d")] if derived else []
+    described = _program("model", main, made.step, [*arguments, (f"{name}_state *s", "next")])
+    described_drives = [
+        {
+            **_program(f"from_{quantity}", writer, writer.program, [(f"{name}_state *s", "&next")]),
+            "quantity": quantity,
+            "suffix": "" if quantity == "displacement" else f"_{quantity}",
+        }
+        for quantity, writer in drives.items()
+    ]
+    starts = [
+        (writer.memory_prefix + member, repr(start))
+        for writer in (main, *drives.values())
+        for member, start in writer.program.tape.starts.items()
+    ]
+    text = setup + "".join(d["body"] + d["results"] for d in (described, *described_drives))
+    return {
+        "name": name,
+        "upper": name.upper(),
+        "rig": _comment(rig),
+        "title": _comment(made.title),
+        "version": _version(),
+        "equation": textwrap.wrap(_comment((type(made.model).__doc__ or "").split("\n\n")[0]), 96)
+        if made.model
+        else [],
+        "flags": FLAGS,
+        "envelope": _envelope(made),
+        "parameters": [_parameter(info, getattr(made.model, info.name)) for info in infos],
+        "derived": derived,
+        "members": [member for member, _ in starts],
+        "starts": starts,
+        "main": described,
+        "drives": described_drives,
+        "setup": setup,
+        "has_setup": bool(setup),
+        "helpers": {word: f"{word}(" in text for word in ("signum", "lesser", "greater")},
+        "tables": [
+            {"nodes": [_number(v) for v in t.nodes], "cells": [[_number(v) for v in row] for row in t.cells]}
+            for t in made.step.tape.tables
+        ],
+    }
+
+
+def _program(key: str, writer: CWriter, program: Program, arguments: list[tuple[str, str]]) -> dict[str, Any]:
+    body, results = writer.sample(), writer.results()
+    words = [argument.split("*")[1] for argument, _ in arguments] + ["u"]
+    return {
+        "key": key,
+        "body": body,
+        "results": results,
+        "inputs": list(program.tape.inputs),
+        "outputs": list(program.outputs),
+        "arguments": ", ".join(argument for argument, _ in arguments),
+        "call": ", ".join(value for _, value in arguments),
+        "unused": [word for word in words if not re.search(rf"\b{word}->", body + results)],
+    }
+
+
+def _parameter(info: Any, value: float) -> Mapping[str, str]:
+    low, high = (f"{bound:g}" for bound in info.bounds)
+    return {
+        "name": info.name,
+        "meaning": info.meaning,
+        "unit": info.unit,
+        "low": low,
+        "high": high,
+        "value": repr(value),
+    }
+
+
+def _envelope(made: Stream) -> list[tuple[str, str, str]]:
+    if made.envelope is None:
+        return []
+    return [
+        (name.upper(), repr(float(low)), repr(float(high)))
+        for name, (low, high) in (
+            (name, getattr(made.envelope, name))
+            for name in ("current_A", "frequency_Hz", "amplitude_m", "peak_velocity_m_s")
+        )
+    ]
+
+
+def _number(value: float) -> str:
+    return f"R({float(value)!r})"
+
+
+def _comment(text: str) -> str:
+    """Text that cannot end a comment or leave its line; ASCII, as C99 sources are."""
+    plain = text.replace("–", "-").replace("\n", " ").encode("ascii", "replace").decode()
+    return plain.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?").replace("\\", "/")
+
+
+def _version() -> str:
+    from importlib.metadata import version
+
+    return version("mrdamper")

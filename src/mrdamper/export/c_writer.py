@@ -1,0 +1,142 @@
+"""A traced program as C99: structures for parameters, derived numbers and memory, functions on them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from mrdamper.tracing import Expression, Program
+from mrdamper.tracing.expression import PARAMETER, SAMPLE
+from mrdamper.tracing.program import Branch, Let, Repeat, Statement
+from mrdamper.tracing.text import Writer
+
+_FUNCTIONS = {"power": "pow", "absolute": "fabs", "arctan": "atan", "arctanh": "atanh"} | {
+    name: name for name in ("sqrt", "exp", "expm1", "log", "log1p", "tan", "tanh")
+}
+
+
+class CWriter(Writer):
+    """C's words. Library functions and constants go through macros, so that one source serves both precisions.
+
+    Parameters
+    ----------
+    program : Program
+    memory_prefix : str
+        Of the names in the common state.
+    """
+
+    def __init__(self, program: Program, memory_prefix: str = ""):
+        super().__init__(program)
+        self.memory_prefix = memory_prefix
+
+    formats: ClassVar[Mapping[str, str]] = {
+        "add": "({} + {})",
+        "subtract": "({} - {})",
+        "multiply": "({} * {})",
+        "divide": "({} / {})",
+        "negative": "(-{})",
+        "sign": "signum({})",
+        "minimum": "lesser({}, {})",
+        "maximum": "greater({}, {})",
+        "less": "({} < {})",
+        "less_equal": "({} <= {})",
+        "greater": "({} > {})",
+        "greater_equal": "({} >= {})",
+        "equal": "({} == {})",
+        "not_equal": "({} != {})",
+        "logical_and": "({} && {})",
+        "logical_or": "({} || {})",
+        "logical_not": "(!{})",
+        "isfinite": "(isfinite({}) != 0)",
+        **{op: f"M({function})({{}})" for op, function in _FUNCTIONS.items()},
+        "power": "M(pow)({}, {})",
+    }
+
+    def number(self, value: float) -> str:
+        return f"R({float(value)!r})"
+
+    def name(self, expression: Expression) -> str:
+        name = super().name(expression)
+        if expression.op == "memory":
+            return f"s->{self.memory_prefix}{name}"
+        owner = {"parameter": "p", "input": "u"}.get(expression.op)
+        if owner is None and any(expression is d for d in self.program.derived):
+            owner = "d"
+        return f"{owner}->{name}" if owner else name
+
+    def block(self, statements: list[Statement], indent: int = 1) -> str:
+        """Text of a block."""
+        return "".join(f"{line}\n" for line in self._lines(statements, indent))
+
+    def setup(self) -> str:
+        """What is computed once, and the questions asked of parameters."""
+        return self.block(self.program.setup) + self._guards(PARAMETER)
+
+    def sample(self) -> str:
+        """What is computed at a sample, and the questions asked there."""
+        return self.block(self.program.step) + self._guards(SAMPLE)
+
+    def results(self) -> str:
+        """Outputs, then the new memory: all of it is computed before any of it is stored."""
+        tape = self.program.tape
+        lines = [f"out->{name} = {self.text(value)};" for name, value in self.program.outputs.items()]
+        lines += [f"const real next_{name} = {self.text(value)};" for name, value in tape.updates.items()]
+        lines += [f"s->{self.memory_prefix}{name} = next_{name};" for name in tape.updates]
+        return "".join(f"    {line}\n" for line in lines)
+
+    def _guards(self, stage: int) -> str:
+        lines = []
+        for question, answer in self.program.guards(stage):
+            text = self.text(question)
+            lines.append(f"    if ({'!' if answer else ''}{text}) {{\n        return 0;\n    }}\n")
+        return "".join(lines)
+
+    def _lines(self, statements: list[Statement], indent: int) -> list[str]:
+        pad, lines = "    " * indent, []
+        for statement in statements:
+            if isinstance(statement, Let):
+                lines.append(f"{pad}{self._declared(statement.expression)} = {self.formula(statement.expression)};")
+            elif isinstance(statement, Branch):
+                lines += self._branch(statement, indent)
+            else:
+                lines += self._repeat(statement, indent)
+        return lines
+
+    def _declared(self, expression: Expression) -> str:
+        name = self.name(expression)
+        if "->" in name:
+            return name
+        return f"const {'int' if expression.logical else 'real'} {name}"
+
+    def _branch(self, statement: Branch, indent: int) -> list[str]:
+        pad = "    " * indent
+        condition, then, otherwise = statement.select.args
+        name = self.name(statement.select)
+        lines = [] if "->" in name else [f"{pad}real {name};"]
+        if not (statement.then or statement.otherwise):
+            lines.clear()
+            kind = "" if "->" in name else "const real "
+            return [f"{pad}{kind}{name} = {self.text(condition)} ? {self.text(then)} : {self.text(otherwise)};"]
+        lines.append(f"{pad}if ({self.text(condition)}) {{")
+        lines += [*self._lines(statement.then, indent + 1), f"{pad}    {name} = {self.text(then)};", f"{pad}}} else {{"]
+        lines += [
+            *self._lines(statement.otherwise, indent + 1),
+            f"{pad}    {name} = {self.text(otherwise)};",
+            f"{pad}}}",
+        ]
+        return lines
+
+    def _repeat(self, statement: Repeat, indent: int) -> list[str]:
+        pad, loop = "    " * indent, statement.loop
+        carried = [self.carry(loop, i) for i in range(len(loop.start))]
+        counter = f"{carried[0]}_count"
+        lines = [f"{pad}int {counter};"]
+        lines += [f"{pad}real {name} = {self.text(value)};" for name, value in zip(carried, loop.start, strict=True)]
+        lines.append(f"{pad}for ({counter} = 0; {counter} < {loop.most}; {counter}++) {{")
+        lines += self._lines(statement.body, indent + 1)
+        lines.append(f"{pad}    const int going = {self.text(loop.going)};")
+        for name, value in zip(carried, loop.updates, strict=True):
+            lines.append(f"{pad}    const real next_{name} = {self.text(value)};")
+        lines += [f"{pad}    {name} = next_{name};" for name in carried]
+        lines += [f"{pad}    if (!going) {{", f"{pad}        break;", f"{pad}    }}", f"{pad}}}"]
+        return lines

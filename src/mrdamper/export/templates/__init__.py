@@ -1,0 +1,23 @@
+"""Text with gaps, and `render`, which fills them."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+
+def render(template: str, **facts: Any) -> str:
+    """Fill a template of this folder; a gap without a fact is an error."""
+    return _environment().get_template(template).render(**facts)
+
+
+@cache
+def _environment() -> Any:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    return Environment(
+        loader=PackageLoader("mrdamper.export", "templates"),
+        undefined=StrictUndefined,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )

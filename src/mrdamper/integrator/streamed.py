@@ -1,0 +1,134 @@
+"""`integrate` for one sample: the same linearly implicit steps, written on a tape.
+
+The sample interval is walked in steps whose error is estimated and kept below the tolerance,
+at most a fixed number of them; what is left over then is refused by a guard.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from mrdamper.tracing import Tape, TraceError
+
+Rate = Callable[[Any, Any, Any, Any, Any, Any], None]
+MOST_STEPS = 400  # between two samples; a sound model takes a handful
+_NUDGE, _LATER = 1e-7, 1e-5  # for derivatives by differences
+
+
+class _Columns(list):
+    """States by column, as `state[:, j]` asks for them."""
+
+    def __getitem__(self, index: Any) -> Any:
+        return super().__getitem__(index[1] if isinstance(index, tuple) else index)
+
+
+def integrate_step(
+    tape: Tape,
+    rate: Rate,
+    parameters: Sequence[Any],
+    motion: tuple[Any, Any, Any, Any],
+    start: Sequence[float],
+    scale: Sequence[Any],
+    *,
+    tolerance: float = 1e-5,
+) -> Any:
+    """States after one sample, from those before; a model of one or two states."""
+    if len(start) > 2:
+        raise TraceError(f"a model of {len(start)} integrated states has no form for one sample yet")
+    held = [tape.remember(f"state{i}", value) for i, value in enumerate(start)]
+    size = tape.remember("substep", 1.0)
+    time, *channels = motion
+    width = tape.select(tape.first, 1.0, time.step)  # the first sample has no interval; what is walked there is dropped
+    ends = [(tape.previous(channel, name), channel) for channel, name in zip(channels, "xvi", strict=True)]
+    between = _between(ends, width)
+
+    def slopes(t: Any, y: Sequence[Any]) -> list[Any]:
+        out: list[Any] = [0.0] * len(y)
+        rate(*between(t), y, parameters, out)
+        return out
+
+    def advance(done: Any, share: Any, *y: Any) -> tuple[Any, list[Any]]:
+        h = np.minimum(share * width, width - done)
+        new, worst = _rodas3(tape, slopes, done, h, y, scale, tolerance)
+        good = worst <= 1.0
+        factor = np.minimum(5.0, np.maximum(0.1, 0.9 * np.maximum(worst, 1e-6) ** (-1 / 3)))
+        after = tape.select(good, done + h, done)
+        kept = [tape.select(good, n, o) for n, o in zip(new, y, strict=True)]
+        next_share = np.minimum(tape.select(worst < 1e9, h * factor, h * 0.1) / width, 1.0)
+        return after < width * (1 - 1e-12), [after, next_share, *kept]
+
+    walked, share, *reached = tape.loop([0.0, tape.apply("maximum", size, 1e-3), *held], advance, MOST_STEPS)
+    later = [tape.select(tape.first, h, r) for h, r in zip(held, reached, strict=True)]
+    for memory, value in zip((*held, size), (*later, tape.select(tape.first, size, share)), strict=True):
+        tape.update(memory, value)
+    tape.require(tape.first | (walked >= width * (1 - 1e-12)))
+    return _Columns(later)
+
+
+def _between(ends: Sequence[tuple[Any, Any]], width: Any) -> Callable[[Any], tuple[Any, Any, Any]]:
+    """Displacement, velocity and current between two samples: a cubic, its slope, a straight line."""
+    (x0, x1), (v0, v1), (i0, i1) = ends
+    mean = (x1 - x0) / width
+    square, cube = 3 * mean - 2 * v0 - v1, v0 + v1 - 2 * mean
+
+    def at(t: Any) -> tuple[Any, Any, Any]:
+        s = t / width
+        x = x0 + width * s * (v0 + s * (square + s * cube))
+        return x, v0 + s * (2 * square + 3 * s * cube), i0 + s * (i1 - i0)
+
+    return at
+
+
+def _rodas3(
+    tape: Tape,
+    slopes: Callable[[Any, Sequence[Any]], list[Any]],
+    t: Any,
+    h: Any,
+    y: Sequence[Any],
+    scale: Sequence[Any],
+    tolerance: float,
+) -> tuple[list[Any], Any]:
+    """One step, and its error over the tolerance. [Sandu et al. 1997, as in `rosenbrock`]"""
+    order = range(len(y))
+    sizes = [np.maximum(abs(y[j]), scale[j]) for j in order]
+    f = slopes(t, y)
+    columns = []
+    for j in order:
+        nudge = _NUDGE * sizes[j]
+        moved = slopes(t, [y[i] + nudge if i == j else y[i] for i in order])
+        columns.append([(moved[i] - f[i]) / nudge for i in order])
+    later = slopes(t + _LATER * h, y)
+    slope = [(later[i] - f[i]) / _LATER for i in order]
+    solve = _solver([[columns[j][i] for j in order] for i in order], h)
+    k0 = solve([f[i] + 0.5 * slope[i] for i in order])
+    k1 = solve([f[i] + 4 / h * k0[i] + 1.5 * slope[i] for i in order])
+    here = [y[i] + 2 * k0[i] for i in order]
+    f2 = slopes(t + h, here)
+    k2 = solve([f2[i] + (k0[i] - k1[i]) / h for i in order])
+    here = [here[i] + k2[i] for i in order]
+    f3 = slopes(t + h, here)
+    k3 = solve([f3[i] + (k0[i] - k1[i] - 8 / 3 * k2[i]) / h for i in order])
+    new = [here[i] + k3[i] for i in order]
+    worst: Any = 0.0
+    for i in order:
+        error = np.maximum(abs(k3[i]) / (tolerance * sizes[i]), abs(new[i] - y[i]) / sizes[i])
+        worst = error if isinstance(worst, float) else np.maximum(worst, error)
+    # A number that is none compares false: such a step is never good.
+    return new, worst
+
+
+def _solver(jacobian: list[list[Any]], h: Any) -> Callable[[list[Any]], list[Any]]:
+    """Solutions of (2/h − J) k = right, for one or two states."""
+    if len(jacobian) == 1:
+        pivot = 2 / h - jacobian[0][0]
+        return lambda right: [right[0] / pivot]
+    (a, b), (c, d) = jacobian
+    p, q = 2 / h - a, 2 / h - d
+    determinant = p * q - b * c
+    return lambda right: [
+        (q * right[0] + b * right[1]) / determinant,
+        (c * right[0] + p * right[1]) / determinant,
+    ]

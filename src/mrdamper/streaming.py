@@ -1,0 +1,363 @@
+"""One sample after the other: the force of a damper in closed loop.
+
+`stepper(damper)` traces the damper's own array code into a program for one sample and runs
+it, in the interpreter or compiled. The same program is what leaves as C.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mrdamper.damper import SLACK, Damper, Envelope
+from mrdamper.data import Condition, Floats
+from mrdamper.errors import ExcitationError, ParameterError, UnknownNameError
+from mrdamper.joint import JointDamper
+from mrdamper.models import Model
+from mrdamper.modified import ModifiedModel
+from mrdamper.tracing import Program, Tape, Traced, program
+from mrdamper.tracing.python import python_functions, python_source
+
+FLAGS = ("current", "amplitude", "velocity", "frequency")  # bit 0, 1, 2, 3
+_STEADY = 1e-18  # mean square displacement under which nothing moves [m²]
+
+
+@dataclass(frozen=True, eq=False)
+class TracedStep(Traced):
+    """A channel that enters by its step from sample to sample only: the path, or time."""
+
+    tape: Tape
+    step: Any
+
+
+@dataclass(frozen=True, eq=False)
+class TracedMotion(Traced):
+    """What an `Excitation` is for one sample."""
+
+    tape: Tape
+    displacement: Any
+    velocity: Any
+    acceleration: Any
+    current: Any
+    time: TracedStep
+    path: TracedStep
+
+    def __len__(self) -> int:
+        return 1
+
+
+@dataclass(frozen=True, eq=False)
+class Stream:
+    """A damper as programs for one sample.
+
+    Attributes
+    ----------
+    title : str
+        What it is, for people.
+    step : Program
+        From displacement [m], velocity [m/s], acceleration [m/s²], current [A] and the step of
+        time [s] to force [N] and extrapolation flags (bits in the order of `FLAGS`).
+    drives : mapping of str to Program
+        How a motion is made of "displacement" or "velocity" alone.
+    envelope : Envelope or None
+        Ranges of the tests behind it.
+    model : Model or None
+        The model whose parameters can be set; None where they are functions.
+    """
+
+    title: str
+    step: Program
+    drives: Mapping[str, Program]
+    envelope: Envelope | None
+    model: Model | None
+
+
+def stream(damper: Damper | Model) -> Stream:
+    """Trace a damper, or a model, into programs for one sample.
+
+    A model and a joint damper keep their parameters free to be set. The modified model takes
+    frequency and amplitude from the motion so far, averaged over about a cycle of the slowest
+    tested frequency, and stays inside the tested ranges with both.
+
+    Raises
+    ------
+    ParameterError
+        If the damper is of a kind that has no form for one sample.
+    """
+    tape = Tape()
+    envelope = None if isinstance(damper, Model) else damper.envelope
+    motion = _motion(tape, float(np.mean(envelope.current_A)) if envelope else 0.0)
+    extra: Any = 0.0
+    if isinstance(damper, ModifiedModel):
+        model, extra, free = *_running_model(damper, motion), None
+    elif isinstance(damper, Model | JointDamper):
+        free = damper if isinstance(damper, Model) else damper.model
+        model = type(free)(
+            **{info.name: tape.parameter(info.name, getattr(free, info.name)) for info in free.parameters()}
+        )
+    else:
+        raise ParameterError(
+            "no form for one sample",
+            where=damper.title,
+            mend="stream a model, a joint damper or a modified model",
+        )
+    force = model.force(motion, model.state(motion))  # type: ignore[arg-type]
+    flags = _flags(motion, envelope) + extra if envelope else 0.0
+    drives = {"displacement": _from_displacement(), "velocity": _from_velocity()}
+    return Stream(damper.title, program(tape, {"force": force, "flags": flags}), drives, envelope, free)
+
+
+def _motion(tape: Tape, current: float) -> TracedMotion:
+    x, v, a = (tape.input(name) for name in ("displacement", "velocity", "acceleration"))
+    I, dt = tape.input("current", current), tape.input("dt")
+    moved = x - tape.previous(x, "displacement")
+    return TracedMotion(tape, x, v, a, I, TracedStep(tape, dt), TracedStep(tape, moved))
+
+
+def _from_displacement() -> Program:
+    """Velocity and acceleration as backward differences, zero until they are known."""
+    tape = Tape()
+    x, dt = tape.input("displacement"), tape.input("dt")
+    count = tape.remember("count")
+    tape.update(count, np.minimum(count + 1, 2.0))
+    v = tape.select(count < 0.5, 0.0, (x - tape.previous(x, "displacement")) / dt)
+    a = tape.select(count < 1.5, 0.0, (v - tape.previous(v, "velocity")) / dt)
+    return program(tape, {"displacement": x, "velocity": v, "acceleration": a})
+
+
+def _from_velocity() -> Program:
+    """Displacement by the trapezoidal rule from zero, acceleration as a backward difference."""
+    tape = Tape()
+    v, dt = tape.input("velocity"), tape.input("dt")
+    last = tape.previous(v, "velocity")
+    held = tape.remember("displacement")
+    x = tape.select(tape.first, 0.0, held + 0.5 * dt * (v + last))
+    tape.update(held, x)
+    return program(tape, {"displacement": x, "velocity": v, "acceleration": (v - last) / dt})
+
+
+def _running_model(damper: ModifiedModel, motion: TracedMotion) -> tuple[Model, Any]:
+    """The model at the sine the motion has resembled so far, and whether its frequency was tested.
+
+    ω² is the mean square velocity over the mean square displacement, A² twice the latter; the
+    means fade in two lags of one slowest period each, and are freed of their start.
+    """
+    tape, envelope = motion.tape, damper.envelope
+    low, high = envelope.frequency_Hz
+    keep = np.exp(-low * motion.time.step)
+
+    def faded(value: Any, name: str) -> Any:
+        for stage in ("once", "twice"):
+            held = tape.remember(f"{name}_{stage}")
+            value = keep * held + (1 - keep) * value
+            tape.update(held, value)
+        return value
+
+    weight = faded(1.0, "weight")
+    x2 = faded(motion.displacement**2, "displacement_squared") / weight
+    v2 = faded(motion.velocity**2, "velocity_squared") / weight
+    moving = x2 > _STEADY
+    frequency = tape.select(moving, np.sqrt(v2 / x2) / (2 * math.pi), math.sqrt(low * high))
+    amplitude = tape.select(moving, np.sqrt(2 * x2), math.sqrt(math.prod(envelope.amplitude_m)))
+    flag = tape.select((frequency < low * (1 - SLACK)) | (frequency > high * (1 + SLACK)), 8.0, 0.0)
+    middle = [math.sqrt(low * high), math.sqrt(math.prod(envelope.amplitude_m))]
+    f = tape.assume(np.clip(frequency, low, high), middle[0])
+    A = tape.assume(np.clip(amplitude, *envelope.amplitude_m), middle[1])
+    return damper.parameters.at(Condition(motion.current, f, A)), flag
+
+
+def _flags(motion: TracedMotion, envelope: Envelope) -> Any:
+    """Extrapolation in current, amplitude and velocity as bits 0 to 2."""
+    tape, (low, high) = motion.tape, envelope.current_A
+    outside = (
+        (motion.current < low - SLACK * high) | (motion.current > high * (1 + SLACK)),
+        abs(motion.displacement) > envelope.amplitude_m[1] * (1 + SLACK),
+        abs(motion.velocity) > envelope.peak_velocity_m_s[1] * (1 + SLACK),
+    )
+    total: Any = 0.0
+    for bit, question in enumerate(outside):
+        total = total + tape.select(question, float(2**bit), 0.0)
+    return total
+
+
+class Stepper:
+    """A damper that is asked sample by sample.
+
+    Made by `stepper`. `step` takes the displacement, `step_velocity` the velocity,
+    `step_motion` the whole motion; all return the force [N]. A sample that cannot be used
+    raises an error and leaves the state as it was.
+
+    Parameters
+    ----------
+    stream : Stream
+    """
+
+    def __init__(self, stream: Stream):
+        self.stream = stream
+        self._prepare, self._advance = python_functions(stream.step)
+        self._drives = {name: python_functions(drive)[1] for name, drive in stream.drives.items()}
+        self._parameters = {name: float(e.value) for name, e in stream.step.tape.parameters.items()}
+        self._given, self._derived = (), ()
+        self.set_parameters()
+        self.reset()
+
+    def reset(self) -> None:
+        """Back to rest, with no memory of a motion."""
+        self._memory = tuple(self.stream.step.tape.starts.values())
+        self._drive_memory = {name: tuple(d.tape.starts.values()) for name, d in self.stream.drives.items()}
+        self._flags = 0
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Parameters by name; empty where they are functions of the condition."""
+        return dict(self._parameters)
+
+    def set_parameters(self, **values: float) -> None:
+        """Change parameters between two samples; the state stays.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no parameter of that name.
+        ParameterError
+            If a value lies outside what its physics allows, or needs another program.
+        """
+        for name in values:
+            if name not in self._parameters:
+                raise UnknownNameError.of("parameter", name, self._parameters)
+        wanted = {**self._parameters, **{name: float(value) for name, value in values.items()}}
+        given = tuple(wanted.values())
+        try:
+            status, derived = self._prepare(given) if all(map(math.isfinite, given)) else (1, ())
+        except (ValueError, ArithmeticError):
+            status, derived = 1, ()
+        if status:
+            raise ParameterError(
+                ", ".join(f"{name} = {value:g}" for name, value in (values or wanted).items()),
+                where=self.stream.title,
+                mend="keep within the bounds and on the branch (n, symmetry) it was traced for, or trace again",
+            )
+        self._parameters, self._given, self._derived = wanted, given, derived
+
+    @property
+    def state(self) -> dict[str, float]:
+        """All that is remembered, by name: set it again to go back to this sample."""
+        names = dict(zip(self.stream.step.tape.memory, self._memory, strict=True))
+        for drive, memory in self._drive_memory.items():
+            names |= {f"{drive}.{n}": m for n, m in zip(self.stream.drives[drive].tape.memory, memory, strict=True)}
+        return names
+
+    @state.setter
+    def state(self, values: Mapping[str, float]) -> None:
+        known = self.state
+        if values.keys() != known.keys() or not all(math.isfinite(v) for v in values.values()):
+            raise ParameterError(
+                "a state of other names, or not finite", where=self.stream.title, mend="set what `state` gave"
+            )
+        self._memory = tuple(float(values[name]) for name in self.stream.step.tape.memory)
+        self._drive_memory = {
+            drive: tuple(float(values[f"{drive}.{name}"]) for name in made.tape.memory)
+            for drive, made in self.stream.drives.items()
+        }
+
+    @property
+    def extrapolation(self) -> tuple[str, ...]:
+        """Quantities of the last sample that lie outside the tested ranges."""
+        return tuple(name for bit, name in enumerate(FLAGS) if self._flags >> bit & 1)
+
+    def step(self, displacement: float, current: float, dt: float) -> float:
+        """Force [N] at the next displacement [m] from mid-stroke, current [A], `dt` [s] later.
+
+        Velocity and acceleration are backward differences: smooth a noisy displacement first,
+        or use `step_motion`.
+        """
+        return self._driven("displacement", displacement, current, dt)
+
+    def step_velocity(self, velocity: float, current: float, dt: float) -> float:
+        """Force [N] at the next velocity [m/s]; the displacement is integrated from zero."""
+        return self._driven("velocity", velocity, current, dt)
+
+    def step_motion(
+        self, displacement: float, velocity: float, acceleration: float, current: float, dt: float
+    ) -> float:
+        """Force [N] at the next sample of a motion that is known.
+
+        Raises
+        ------
+        ExcitationError
+            If a value is not finite, dt is not positive, or the model has no answer there.
+        """
+        inputs = (float(displacement), float(velocity), float(acceleration), float(current), float(dt))
+        self._check(inputs)
+        try:
+            status, (force, flags), memory = self._advance(self._given, self._derived, self._memory, inputs)
+        except (ValueError, ArithmeticError):
+            status, force, flags, memory = 1, math.nan, 0.0, self._memory
+        if status or not (math.isfinite(force) and all(map(math.isfinite, memory))):
+            raise ExcitationError(
+                f"no force at x = {inputs[0]:g} m, v = {inputs[1]:g} m/s, I = {inputs[3]:g} A, dt = {inputs[4]:g} s",
+                where=self.stream.title,
+                mend="bring the sample nearer to the last one and into the tested ranges",
+            )
+        self._memory, self._flags = memory, int(flags)
+        return force
+
+    def _driven(self, drive: str, value: float, current: float, dt: float) -> float:
+        inputs = (float(value), float(dt))
+        self._check((*inputs, float(current)), dt=inputs[1])
+        _, (x, v, a), memory = self._drives[drive]((), (), self._drive_memory[drive], inputs)
+        force = self.step_motion(x, v, a, current, dt)
+        self._drive_memory[drive] = memory
+        return force
+
+    def _check(self, inputs: Sequence[float], dt: float | None = None) -> None:
+        dt = inputs[-1] if dt is None else dt
+        if not (all(map(math.isfinite, inputs)) and dt > 0):
+            raise ExcitationError(
+                f"sample {tuple(inputs)}, time step {dt:g} s",
+                where=self.stream.title,
+                mend="give finite numbers and a positive time step",
+            )
+
+    def run(
+        self, time: Floats, displacement: Floats, velocity: Floats, acceleration: Floats, current: Floats
+    ) -> Floats:
+        """Force [N] along a sampled motion, from the state at hand, compiled where numba allows.
+
+        Parameters
+        ----------
+        time, displacement, velocity, acceleration, current : (N,) arrays
+            [s], [m], [m/s], [m/s²], [A].
+        """
+        channels = [np.ascontiguousarray(c, dtype=float) for c in (displacement, velocity, acceleration, current)]
+        steps = np.diff(time, prepend=2 * time[0] - time[1])
+        force, flags = np.empty(steps.size), np.empty(steps.size)
+        memory = np.array(self._memory)
+        failed = self._compiled(self._given, self._derived, memory, *channels, steps, force, flags)
+        if failed >= 0 or not np.isfinite(force).all():
+            raise ExcitationError(
+                f"no force at sample {failed}", where=self.stream.title, mend="check the motion there"
+            )
+        self._memory, self._flags = tuple(memory.tolist()), int(flags[-1])
+        return force
+
+    @cached_property
+    def _compiled(self) -> Any:
+        from mrdamper.tracing.compiled import compiled_run
+
+        return compiled_run(self.stream.step)
+
+    @property
+    def source(self) -> str:
+        """The program as Python."""
+        return python_source(self.stream.step)
+
+
+def stepper(damper: Damper | Model) -> Stepper:
+    """A damper or model to be asked sample by sample; raises as `stream`."""
+    return Stepper(stream(damper))

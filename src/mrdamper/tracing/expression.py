@@ -1,0 +1,232 @@
+"""Expressions: what a model's arithmetic leaves behind when it runs on symbols instead of arrays.
+
+An `Expression` stands for one number at one sample. Python's operators and NumPy's functions
+work on it and write down what they did. Where it is known, an expression carries the value it
+has for the model at hand, so that a question about parameters ("is this width positive?") can
+be answered while tracing; the answer is kept as a guard, because the program that comes out
+holds for that answer only. A question about the motion has no answer while tracing and is
+refused: it must be written as a choice (`choose`, `numpy.where`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from mrdamper.tracing.tape import Tape
+
+CONSTANT, PARAMETER, SAMPLE = 0, 1, 2  # when a value is known: always, once the parameters are, at each sample
+
+
+class TraceError(TypeError):
+    """A model's code cannot be turned into a program; our fault, not the user's."""
+
+
+class Traced:
+    """What a traced function can be given in place of arrays."""
+
+    tape: Tape
+
+
+@dataclass(frozen=True)
+class Operation:
+    """An operation on numbers: its plain value, and whether it answers yes or no."""
+
+    value: Callable[..., Any]
+    logical: bool = False
+
+
+def sign(x: float) -> float:
+    """−1, 0 or 1."""
+    return 1.0 if x > 0 else (-1.0 if x < 0 else 0.0)
+
+
+OPERATIONS: dict[str, Operation] = {
+    "add": Operation(lambda a, b: a + b),
+    "subtract": Operation(lambda a, b: a - b),
+    "multiply": Operation(lambda a, b: a * b),
+    "divide": Operation(lambda a, b: a / b),
+    "power": Operation(math.pow),
+    "negative": Operation(lambda a: -a),
+    "absolute": Operation(abs),
+    "sign": Operation(sign),
+    "sqrt": Operation(math.sqrt),
+    "exp": Operation(math.exp),
+    "expm1": Operation(math.expm1),
+    "log": Operation(math.log),
+    "log1p": Operation(math.log1p),
+    "tan": Operation(math.tan),
+    "arctan": Operation(math.atan),
+    "tanh": Operation(math.tanh),
+    "arctanh": Operation(math.atanh),
+    "minimum": Operation(lambda a, b: a if a < b else b),
+    "maximum": Operation(lambda a, b: a if a > b else b),
+    "less": Operation(lambda a, b: a < b, logical=True),
+    "less_equal": Operation(lambda a, b: a <= b, logical=True),
+    "greater": Operation(lambda a, b: a > b, logical=True),
+    "greater_equal": Operation(lambda a, b: a >= b, logical=True),
+    "equal": Operation(lambda a, b: a == b, logical=True),
+    "not_equal": Operation(lambda a, b: a != b, logical=True),
+    "logical_and": Operation(lambda a, b: bool(a) and bool(b), logical=True),
+    "logical_or": Operation(lambda a, b: bool(a) or bool(b), logical=True),
+    "logical_not": Operation(lambda a: not a, logical=True),
+    "isfinite": Operation(math.isfinite, logical=True),
+}
+_ALIASES = {"true_divide": "divide", "bitwise_and": "logical_and", "bitwise_or": "logical_or", "invert": "logical_not"}
+
+
+class Expression(Traced):
+    """One number at one sample; made by a `Tape`, never by hand.
+
+    Attributes
+    ----------
+    op : str
+        An operation, or "parameter", "input", "memory", "select", "carry", "result".
+    args : tuple
+        Expressions and floats.
+    stage : int
+        When it is known: CONSTANT, PARAMETER or SAMPLE.
+    value : float or bool, optional
+        What it is for the model at hand, where that is known while tracing.
+    """
+
+    __slots__ = ("args", "name", "op", "stage", "tape", "value")
+
+    def __init__(self, tape: Tape, op: str, args: tuple[Any, ...], stage: int, value: Any = None, name: str = ""):
+        self.tape, self.op, self.args, self.stage, self.value, self.name = tape, op, args, stage, value, name
+
+    def __repr__(self) -> str:
+        def short(part: Any) -> str:
+            return (part.name or f"{part.op}(...)") if isinstance(part, Expression) else repr(part)
+
+        return self.name or f"{self.op}({', '.join(map(short, self.args))})"
+
+    @property
+    def logical(self) -> bool:
+        """Whether it answers yes or no."""
+        return self.op in OPERATIONS and OPERATIONS[self.op].logical
+
+    def __bool__(self) -> bool:
+        if self.value is None:
+            raise TraceError(f"{self!r} differs from sample to sample: write the branch with choose or numpy.where")
+        return self.tape.settle(self)
+
+    def __float__(self) -> float:
+        raise TraceError(f"{self!r} is turned into a plain number; use NumPy's functions, not math's")
+
+    def __add__(self, other: Any) -> Any:
+        return self.tape.apply("add", self, other)
+
+    def __radd__(self, other: Any) -> Any:
+        return self.tape.apply("add", other, self)
+
+    def __sub__(self, other: Any) -> Any:
+        return self.tape.apply("subtract", self, other)
+
+    def __rsub__(self, other: Any) -> Any:
+        return self.tape.apply("subtract", other, self)
+
+    def __mul__(self, other: Any) -> Any:
+        return self.tape.apply("multiply", self, other)
+
+    def __rmul__(self, other: Any) -> Any:
+        return self.tape.apply("multiply", other, self)
+
+    def __truediv__(self, other: Any) -> Any:
+        return self.tape.apply("divide", self, other)
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return self.tape.apply("divide", other, self)
+
+    def __pow__(self, other: Any) -> Any:
+        return self.tape.apply("power", self, other)
+
+    def __rpow__(self, other: Any) -> Any:
+        return self.tape.apply("power", other, self)
+
+    def __neg__(self) -> Any:
+        return self.tape.apply("negative", self)
+
+    def __abs__(self) -> Any:
+        return self.tape.apply("absolute", self)
+
+    def __lt__(self, other: Any) -> Any:
+        return self.tape.apply("less", self, other)
+
+    def __le__(self, other: Any) -> Any:
+        return self.tape.apply("less_equal", self, other)
+
+    def __gt__(self, other: Any) -> Any:
+        return self.tape.apply("greater", self, other)
+
+    def __ge__(self, other: Any) -> Any:
+        return self.tape.apply("greater_equal", self, other)
+
+    def __eq__(self, other: Any) -> Any:
+        return self.tape.apply("equal", self, other)
+
+    def __ne__(self, other: Any) -> Any:
+        return self.tape.apply("not_equal", self, other)
+
+    __hash__ = object.__hash__
+
+    def __and__(self, other: Any) -> Any:
+        return self.tape.apply("logical_and", self, other)
+
+    __rand__ = __and__
+
+    def __or__(self, other: Any) -> Any:
+        return self.tape.apply("logical_or", self, other)
+
+    __ror__ = __or__
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
+        name = _ALIASES.get(ufunc.__name__, ufunc.__name__)
+        if name == "clip":
+            return _clip(*inputs)
+        if method != "__call__" or options or name not in OPERATIONS:
+            raise TraceError(f"numpy.{ufunc.__name__} has no scalar form here; add it to OPERATIONS")
+        return self.tape.apply(name, *(plain(value) for value in inputs))
+
+    def __array_function__(self, func: Callable, types: Iterable[type], args: tuple, options: dict) -> Any:
+        if func is np.where and len(args) == 3:
+            return self.tape.select(*args)
+        if func is np.clip:
+            return _clip(*args)
+        if func is np.all:
+            return args[0]
+        raise TraceError(f"numpy.{func.__name__} has no scalar form here")
+
+
+def plain(value: Any) -> Any:
+    """A NumPy scalar or array of one element as what is in it."""
+    return value.item() if isinstance(value, np.ndarray | np.generic) and np.ndim(value) == 0 else value
+
+
+def choose(condition: Any, then: Callable[[], Any], otherwise: Callable[[], Any]) -> Any:
+    """`then()` if the condition holds, `otherwise()` if not: a branch for floats and for expressions alike."""
+    if isinstance(condition, Expression):
+        return condition.tape.select(condition, then(), otherwise())
+    return then() if condition else otherwise()
+
+
+def settled(value: Any) -> Any:
+    """The plain number at hand: the program that comes out holds for this value only."""
+    if not isinstance(value, Expression):
+        return value
+    if value.value is None:
+        raise TraceError(f"{value!r} differs from sample to sample")
+    return value.value if value == value.value else None
+
+
+def _clip(value: Any, low: Any, high: Any) -> Any:
+    if not (isinstance(low, float | int) and low == -math.inf):
+        value = np.maximum(value, low)
+    if not (isinstance(high, float | int) and high == math.inf):
+        value = np.minimum(value, high)
+    return value

@@ -1,0 +1,198 @@
+"""A traced model in the order in which it is computed: blocks, branches and loops, in no language yet.
+
+Every operation lands in the innermost block that all its users share, so a branch that is not
+taken costs nothing and cannot fail. What depends on parameters alone is computed once, before
+the first sample.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from mrdamper.tracing.expression import PARAMETER, Expression
+from mrdamper.tracing.tape import Loop, Tape
+
+_LEAVES = ("parameter", "input", "memory", "carry")
+Scope = tuple[tuple[int, int], ...]
+
+
+@dataclass
+class Let:
+    """Give an expression a name."""
+
+    expression: Expression
+
+
+@dataclass
+class Branch:
+    """Compute one of two values."""
+
+    select: Expression
+    then: list[Statement]
+    otherwise: list[Statement]
+
+
+@dataclass
+class Repeat:
+    """Do a block until it says that it is enough."""
+
+    loop: Loop
+    body: list[Statement]
+
+
+Statement = Let | Branch | Repeat
+
+
+@dataclass
+class Program:
+    """What is computed before the first sample, and at each sample.
+
+    Attributes
+    ----------
+    tape : Tape
+    outputs : mapping of str to Expression or float
+    setup, step : list of Statement
+    derived : list of Expression
+        What `setup` hands to `step`.
+    names : dict of int to str
+        Name of an expression, by its id; expressions without one are written where they are used.
+    """
+
+    tape: Tape
+    outputs: Mapping[str, Any]
+    setup: list[Statement] = field(default_factory=list)
+    step: list[Statement] = field(default_factory=list)
+    derived: list[Expression] = field(default_factory=list)
+    names: dict[int, str] = field(default_factory=dict)
+
+    def guards(self, stage: int) -> list[tuple[Expression, bool]]:
+        """Settled questions that can be asked again at a stage."""
+        return [(question, answer) for question, answer in self.tape.guards if question.stage == stage]
+
+
+def program(tape: Tape, outputs: Mapping[str, Any]) -> Program:
+    """Order what a tape holds into a program with these outputs."""
+    made = Program(tape, outputs)
+    roots = [(value, False) for value in (*outputs.values(), *tape.updates.values())]
+    roots += [(question, question.stage <= PARAMETER) for question, _ in tape.guards]
+    order = _postorder([root for root, _ in roots])
+    scopes, uses = _scopes(roots, order)
+    _name(made, order, scopes, uses)
+    _fill(made, order, scopes)
+    return made
+
+
+@dataclass(frozen=True)
+class _Use:
+    """Where a node is needed, and whether that is before the first sample."""
+
+    scope: Scope
+    early: bool
+
+
+def dependencies(node: Expression | Loop) -> Iterator[tuple[Any, int | None]]:
+    """What a node is computed from; a number marks the inner block of the node it is needed in."""
+    if isinstance(node, Loop):
+        yield from ((value, None) for value in node.start)
+        yield node.going, 0
+        yield from ((value, 0) for value in node.updates)
+    elif node.op == "select":
+        yield from zip(node.args, (None, 0, 1), strict=True)
+    elif node.op == "result":
+        yield node.args[0], None
+    elif node.op != "carry":
+        yield from ((arg, None) for arg in node.args)
+
+
+def _postorder(roots: list[Any]) -> list[Any]:
+    """Nodes, each after what it is computed from."""
+    seen: set[int] = set()
+    order: list[Any] = []
+    stack: list[tuple[Any, bool]] = [(root, False) for root in reversed(roots)]
+    while stack:
+        node, done = stack.pop()
+        if not isinstance(node, Expression | Loop):
+            continue
+        if done:
+            order.append(node)
+        elif id(node) not in seen:
+            seen.add(id(node))
+            stack.append((node, True))
+            stack.extend((part, False) for part, _ in reversed(list(dependencies(node))))
+    return order
+
+
+def _scopes(roots: list[tuple[Any, bool]], order: list[Any]) -> tuple[dict[int, Scope], dict[int, list[_Use]]]:
+    """The innermost block that all users of a node share, and the uses."""
+    scopes: dict[int, Scope] = {}
+    uses: dict[int, list[_Use]] = defaultdict(list)
+
+    def used(part: Any, use: _Use) -> None:
+        if isinstance(part, Expression | Loop):
+            uses[id(part)].append(use)
+            scopes[id(part)] = _common(scopes.get(id(part), use.scope), use.scope)
+
+    for root, early in roots:
+        used(root, _Use((), early))
+    for node in reversed(order):
+        here = scopes[id(node)]
+        early = all(use.early for use in uses[id(node)]) if here else _early(node)
+        for part, block in dependencies(node):
+            used(part, _Use(here if block is None else (*here, (id(node), block)), early))
+    return scopes, uses
+
+
+def _common(a: Scope, b: Scope) -> Scope:
+    length = 0
+    while length < min(len(a), len(b)) and a[length] == b[length]:
+        length += 1
+    return a[:length]
+
+
+def _early(node: Any) -> bool:
+    return isinstance(node, Expression) and node.stage <= PARAMETER
+
+
+def _name(made: Program, order: list[Any], scopes: dict[int, Scope], uses: dict[int, list[_Use]]) -> None:
+    """Name leaves, branches, loops, and what is used more than once or in another block.
+
+    What is computed early and used late is derived from the parameters; what is used once, in
+    the block it is computed in, is written where it is used.
+    """
+    stored = {id(value) for value in made.tape.updates.values()}
+    for node in order:
+        if isinstance(node, Loop):
+            continue
+        if node.op in ("parameter", "input", "memory"):
+            made.names[id(node)] = node.name
+            continue
+        users, scope = uses[id(node)], scopes[id(node)]
+        derived = not scope and _early(node) and any(not use.early for use in users)
+        if derived:
+            made.derived.append(node)
+        elsewhere = len(users) > 1 or users[0].scope != scope
+        if derived or elsewhere or node.op in ("select", "carry", "result") or id(node) in stored:
+            made.names[id(node)] = f"{'d' if derived else 't'}{len(made.names)}"
+
+
+def _fill(made: Program, order: list[Any], scopes: dict[int, Scope]) -> None:
+    """Put what is named into blocks."""
+    blocks: dict[tuple[Scope, bool], list[Statement]] = defaultdict(list)
+    early_blocks: set[int] = set()
+    for node in reversed(order):  # outer before inner: an inner block is early if the branch around it is
+        scope = scopes[id(node)]
+        if scope[0][0] in early_blocks if scope else _early(node):
+            early_blocks.add(id(node))
+    for node in order:
+        scope, early = scopes[id(node)], id(node) in early_blocks
+        home = blocks[scope, early]
+        if isinstance(node, Loop):
+            home.append(Repeat(node, blocks[(*scope, (id(node), 0)), early]))
+        elif node.op == "select":
+            home.append(Branch(node, *(blocks[(*scope, (id(node), side)), early] for side in (0, 1))))
+        elif id(node) in made.names and node.op not in (*_LEAVES, "result"):
+            home.append(Let(node))
+    made.setup, made.step = blocks[(), True], blocks[(), False]

@@ -1,0 +1,131 @@
+"""A program as Python source: what streams in the interpreter, and what numba compiles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
+
+from mrdamper.tracing.expression import PARAMETER, SAMPLE, sign
+from mrdamper.tracing.program import Branch, Let, Program, Repeat, Statement
+from mrdamper.tracing.text import Writer
+
+DONE, OUTSIDE = 0, 1  # outside: a question the trace settled has another answer here
+
+
+class PythonWriter(Writer):
+    """Python's words."""
+
+    formats: ClassVar[Mapping[str, str]] = {
+        "add": "({} + {})",
+        "subtract": "({} - {})",
+        "multiply": "({} * {})",
+        "divide": "({} / {})",
+        "power": "math.pow({}, {})",
+        "negative": "(-{})",
+        "absolute": "abs({})",
+        "sign": "sign({})",
+        "sqrt": "math.sqrt({})",
+        "exp": "math.exp({})",
+        "expm1": "math.expm1({})",
+        "log": "math.log({})",
+        "log1p": "math.log1p({})",
+        "tan": "math.tan({})",
+        "arctan": "math.atan({})",
+        "tanh": "math.tanh({})",
+        "arctanh": "math.atanh({})",
+        "minimum": "min({}, {})",
+        "maximum": "max({}, {})",
+        "less": "({} < {})",
+        "less_equal": "({} <= {})",
+        "greater": "({} > {})",
+        "greater_equal": "({} >= {})",
+        "equal": "({} == {})",
+        "not_equal": "({} != {})",
+        "logical_and": "({} and {})",
+        "logical_or": "({} or {})",
+        "logical_not": "(not {})",
+        "isfinite": "math.isfinite({})",
+    }
+
+    def number(self, value: float) -> str:
+        return repr(float(value))
+
+    def statements(self, block: list[Statement], indent: int) -> list[str]:
+        """Lines of a block."""
+        pad, lines = "    " * indent, []
+        for statement in block:
+            if isinstance(statement, Let):
+                lines.append(f"{pad}{self.name(statement.expression)} = {self.formula(statement.expression)}")
+            elif isinstance(statement, Branch):
+                condition, then, otherwise = statement.select.args
+                target = self.name(statement.select)
+                lines.append(f"{pad}if {self.text(condition)}:")
+                lines += [*self.statements(statement.then, indent + 1), f"{pad}    {target} = {self.text(then)}"]
+                lines.append(f"{pad}else:")
+                lines += self.statements(statement.otherwise, indent + 1)
+                lines.append(f"{pad}    {target} = {self.text(otherwise)}")
+            else:
+                lines += self._repeat(statement, indent)
+        return lines
+
+    def _repeat(self, statement: Repeat, indent: int) -> list[str]:
+        pad, loop = "    " * indent, statement.loop
+        carried = [self.carry(loop, i) for i in range(len(loop.start))]
+        lines = [f"{pad}{name} = {self.text(value)}" for name, value in zip(carried, loop.start, strict=True)]
+        lines += [f"{pad}for _ in range({loop.most}):", *self.statements(statement.body, indent + 1)]
+        lines.append(f"{pad}    going = {self.text(loop.going)}")
+        lines.append(f"{pad}    {', '.join(carried)} = {', '.join(self.text(value) for value in loop.updates)}")
+        lines += [f"{pad}    if not going:", f"{pad}        break"]
+        return lines
+
+
+def python_source(program: Program) -> str:
+    """Two functions: `prepare(p)` gives (status, derived), `step(p, derived, memory, inputs)` the rest.
+
+    The rest is (status, outputs, memory); a status of 0 is good.
+    """
+    writer, tape = PythonWriter(program), program.tape
+    derived = [writer.name(node) for node in program.derived]
+    updates = [tape.updates.get(name, memory) for name, memory in tape.memory.items()]
+    lines = ["def prepare(_p):", *_unpack("_p", list(tape.parameters))]
+    lines += writer.statements(program.setup, 1)
+    lines += _guards(writer, program, PARAMETER, f"(0.0,){f' * {len(derived)}' if derived else '[:0]'}")
+    lines.append(f"    return 0, {_tuple(derived)}")
+    lines += ["", "", "def step(_p, _d, _s, _u):"]
+    for name, members in (
+        ("_p", list(tape.parameters)),
+        ("_d", derived),
+        ("_s", list(tape.memory)),
+        ("_u", list(tape.inputs)),
+    ):
+        lines += _unpack(name, members)
+    lines += writer.statements(program.step, 1)
+    lines += _guards(writer, program, SAMPLE, f"(0.0,) * {len(program.outputs)}, _s")
+    outputs = [writer.text(value) for value in program.outputs.values()]
+    lines.append(f"    return 0, {_tuple(outputs)}, {_tuple([writer.text(value) for value in updates])}")
+    return "\n".join(lines) + "\n"
+
+
+def python_functions(program: Program) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """`prepare` and `step` as functions of the interpreter."""
+    room: dict[str, Any] = {"math": math, "sign": sign}
+    room |= {f"lookup{i}": table.at_float for i, table in enumerate(program.tape.tables)}
+    exec(compile(python_source(program), "<traced model>", "exec"), room)  # our own words and numbers only
+    return room["prepare"], room["step"]
+
+
+def _guards(writer: Writer, program: Program, stage: int, rest: str) -> list[str]:
+    lines = []
+    for question, answer in program.guards(stage):
+        text = writer.text(question)
+        lines += [f"    if {'not ' if answer else ''}{text}:", f"        return {OUTSIDE}, {rest}"]
+    return lines
+
+
+def _unpack(name: str, members: list[str]) -> list[str]:
+    return [f"    {', '.join(members)}{',' if len(members) == 1 else ''} = {name}"] if members else []
+
+
+def _tuple(values: list[str]) -> str:
+    return f"({', '.join(values)}{',' if len(values) == 1 else ''})"

@@ -1,0 +1,237 @@
+"""The tape a traced model writes on: inputs, parameters, memory, and every operation once.
+
+`streamed` gives a function of whole arrays its form for one sample. Given arrays it runs as
+it is; given expressions it writes its step on the tape: what it remembers from sample to
+sample, and how that changes. So a model is written once, for arrays, and its C comes out of
+the same lines.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import wraps
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mrdamper.tracing.expression import CONSTANT, OPERATIONS, PARAMETER, SAMPLE, Expression, Traced, TraceError, plain
+
+Floats = NDArray[np.float64]
+F = TypeVar("F", bound=Callable[..., Any])
+_WITH_INFINITY = {op: OPERATIONS[op].value for op in ("less", "less_equal", "greater", "greater_equal")}
+_UNROLLED = 6  # highest integer power written as products
+
+
+class Table(Protocol):
+    """Piecewise polynomials: what a traced lookup needs of them."""
+
+    @property
+    def nodes(self) -> Floats:
+        """(K,) ends of the pieces."""
+        ...
+
+    @property
+    def cells(self) -> Floats:
+        """(K − 1, 7): six coefficients, lowest first, and one over the width."""
+        ...
+
+    def at_float(self, x: float) -> float:
+        """The value at x; constant beyond the ends."""
+        ...
+
+
+class Loop:
+    """A bounded repetition: carried values change until the condition fails."""
+
+    def __init__(self, start: Sequence[Any], most: int):
+        self.start, self.most = tuple(start), most
+        self.carries: tuple[Expression, ...] = ()
+        self.going: Any = None
+        self.updates: tuple[Any, ...] = ()
+
+
+class Tape:
+    """What tracing writes down.
+
+    Attributes
+    ----------
+    parameters, inputs, memory : dict of str to Expression
+        In the order they appeared.
+    updates : dict of str to Expression
+        What each memory becomes after the sample.
+    guards : list of (Expression, bool)
+        Questions that were settled while tracing, with their answers.
+    """
+
+    def __init__(self) -> None:
+        self.parameters: dict[str, Expression] = {}
+        self.inputs: dict[str, Expression] = {}
+        self.memory: dict[str, Expression] = {}
+        self.starts: dict[str, float] = {}
+        self.updates: dict[str, Any] = {}
+        self.guards: list[tuple[Expression, bool]] = []
+        self.tables: list[Table] = []
+        self._known: dict[tuple[Any, ...], Expression] = {}
+        self._previous: dict[int, Any] = {}
+
+    def parameter(self, name: str, value: float) -> Expression:
+        """A number that is set before the first sample."""
+        self.parameters[name] = Expression(self, "parameter", (), PARAMETER, value, name)
+        return self.parameters[name]
+
+    def input(self, name: str, example: float | None = None) -> Expression:
+        """A number given at every sample; an example answers questions about its range."""
+        self.inputs[name] = Expression(self, "input", (), SAMPLE, example, name)
+        return self.inputs[name]
+
+    def remember(self, name: str, start: float = 0.0) -> Expression:
+        """A number kept from one sample to the next."""
+        name = self._free(name)
+        self.memory[name] = Expression(self, "memory", (), SAMPLE, None, name)
+        self.starts[name] = start
+        return self.memory[name]
+
+    def update(self, memory: Expression, value: Any) -> None:
+        """What a memory becomes after the sample."""
+        self.updates[memory.name] = value
+
+    @property
+    def first(self) -> Expression:
+        """Whether this is the first sample."""
+        if "started" not in self.memory:
+            self.update(self.remember("started"), 1.0)
+        return self.memory["started"] < 0.5
+
+    def previous(self, value: Any, name: str) -> Any:
+        """What an expression was at the sample before; at the first sample, what it is."""
+        if not isinstance(value, Expression):
+            return value
+        if id(value) not in self._previous:
+            held = self.remember(f"last_{name}")
+            self.update(held, value)
+            self._previous[id(value)] = self.select(self.first, value, held)
+        return self._previous[id(value)]
+
+    def assume(self, value: Any, example: float) -> Any:
+        """Give an expression an example by which questions about its range are answered."""
+        value.value = example
+        return value
+
+    def settle(self, question: Expression) -> bool:
+        """Answer a question by the value at hand, and keep the answer."""
+        answer = bool(question.value)
+        if not any(known is question for known, _ in self.guards):
+            self.guards.append((question, answer))
+        return answer
+
+    def require(self, question: Any) -> None:
+        """A question that must be answered yes at every sample; the program says where it is not."""
+        if isinstance(question, Expression):
+            self.guards.append((question, True))
+
+    def apply(self, op: str, *args: Any) -> Any:
+        """Write an operation down, once; powers of small integers as products."""
+        args = tuple(plain(a) for a in args)
+        if op == "power" and isinstance(args[1], int | float) and args[1] in range(_UNROLLED + 1):
+            return self._product(args[0], int(args[1]))
+        if (simple := _simplified(op, args)) is not None:
+            return simple
+        return self._note(op, args)
+
+    def select(self, condition: Any, then: Any, otherwise: Any) -> Any:
+        """One of two values; only the one that is chosen is computed."""
+        then, otherwise = plain(then), plain(otherwise)
+        if not isinstance(condition, Expression):
+            return then if condition else otherwise
+        return self._note("select", (condition, then, otherwise))
+
+    def lookup(self, table: Table, x: Any) -> Expression:
+        """Value of a table at an expression."""
+        found = [i for i, known in enumerate(self.tables) if known is table]
+        if not found:
+            self.tables.append(table)
+        return self._note("lookup", (found[0] if found else len(self.tables) - 1, x))
+
+    def loop(
+        self,
+        start: Sequence[Any],
+        body: Callable[..., tuple[Any, Sequence[Any]]],
+        most: int,
+    ) -> tuple[Expression, ...]:
+        """Do `body(*carried) -> (whether to go on, new values)`, and again, at most so often."""
+        loop = Loop([plain(value) for value in start], most)
+        loop.carries = tuple(Expression(self, "carry", (loop, i), SAMPLE) for i in range(len(loop.start)))
+        loop.going, updates = body(*loop.carries)
+        loop.updates = tuple(plain(value) for value in updates)
+        return tuple(Expression(self, "result", (loop, i), SAMPLE) for i in range(len(loop.start)))
+
+    def _product(self, base: Any, power: int) -> Any:
+        result: Any = base if power else 1.0
+        for _ in range(power - 1):
+            result = result * base
+        return result
+
+    def _note(self, op: str, args: tuple[Any, ...]) -> Expression:
+        for arg in args:
+            if not isinstance(arg, Expression | float | int):
+                raise TraceError(f"{type(arg).__name__} in {op}")
+        key = (op, *(("#", float(a)) if not isinstance(a, Expression) else id(a) for a in args))
+        if key not in self._known:
+            stage = max((a.stage for a in args if isinstance(a, Expression)), default=CONSTANT)
+            self._known[key] = Expression(self, op, args, stage, _value(op, args))
+        return self._known[key]
+
+    def _free(self, name: str) -> str:
+        taken = self.memory.keys() | self.parameters.keys() | self.inputs.keys()
+        if name not in taken:
+            return name
+        return next(f"{name}_{i}" for i in range(2, 1000) if f"{name}_{i}" not in taken)
+
+
+def streamed(step: Callable[..., Any]) -> Callable[[F], F]:
+    """Give a function of arrays its form for one sample, `step(tape, *arguments)`."""
+
+    def decorate(of_arrays: F) -> F:
+        @wraps(of_arrays)
+        def either(*args: Any, **options: Any) -> Any:
+            for arg in args:
+                one = arg[0] if isinstance(arg, tuple) and arg else arg
+                if isinstance(one, Traced):
+                    return step(one.tape, *args, **options)
+            return of_arrays(*args, **options)
+
+        return either  # type: ignore[return-value]
+
+    return decorate
+
+
+def _simplified(op: str, args: tuple[Any, ...]) -> Any:
+    """Neutral elements x + 0, x · 1, x / 1; comparisons with infinity, which finite numbers all pass."""
+    if op in _WITH_INFINITY and isinstance(args[1], float) and math.isinf(args[1]):
+        return _WITH_INFINITY[op](0.0, args[1])
+    if op == "logical_and" and not isinstance(args[0], Expression):
+        return args[1] if args[0] else False
+    if op == "add" and isinstance(args[0], float | int) and args[0] == 0:
+        return args[1]
+    if op in ("add", "subtract") and isinstance(args[1], float | int) and args[1] == 0:
+        return args[0]
+    if op == "multiply" and isinstance(args[0], float | int) and args[0] == 1:
+        return args[1]
+    if op in ("multiply", "divide") and isinstance(args[1], float | int) and args[1] == 1:
+        return args[0]
+    return None
+
+
+def _value(op: str, args: tuple[Any, ...]) -> Any:
+    """Value for the model at hand, where every argument has one."""
+    values = [a.value if isinstance(a, Expression) else a for a in args]
+    if op == "select":
+        return values[1 if values[0] else 2] if values[0] is not None else None
+    if op == "lookup" or any(v is None for v in values):
+        return None
+    try:
+        return OPERATIONS[op].value(*values)
+    except (ValueError, OverflowError, ZeroDivisionError):
+        return None
