@@ -6,10 +6,13 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import ClassVar
 
 from mrdamper.damper import Damper
 from mrdamper.errors import InputError
+from mrdamper.io.atomic import write_file, write_into
+from mrdamper.models import Model
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,40}", re.IGNORECASE)
 _RESERVED = re.compile(
@@ -42,15 +45,39 @@ class Exporter(ABC):
     suffix: ClassVar[str] = ""  # of the one file it makes; empty: a folder of files
 
     @abstractmethod
-    def export(self, damper: Damper, name: str) -> Written:
+    def export(self, damper: Damper | Model, name: str) -> Written:
         """Make the files.
 
         Parameters
         ----------
-        damper : Damper
+        damper : Damper or Model
         name : str
             Begins the names of files and symbols; an identifier in C.
         """
+
+
+def write_export(written: Written, out: str | Path, suffix: str) -> list[Path]:
+    """Write what an export made, whole or not at all: one file at `out`, or several into the folder `out`.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    """
+    out = Path(out)
+    if suffix and not out.is_dir():
+        with write_file(out) as target:
+            target.write_bytes(next(iter(written.files.values())))
+        return [out]
+    with write_into(out) as folder:
+        for name, content in written.files.items():
+            (folder / name).write_bytes(content)
+    return [out / name for name in written.files]
+
+
+def rig_of(damper: Damper | Model) -> str:
+    """The rig a damper was tested on; a bare model has none."""
+    return "" if isinstance(damper, Model) else damper.rig
 
 
 def identifier(text: str) -> str:

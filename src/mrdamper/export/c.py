@@ -10,14 +10,19 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mrdamper.damper import Damper
-from mrdamper.export.base import Exporter, Written, identifier
+from mrdamper.export.base import Exporter, Written, identifier, rig_of
 from mrdamper.export.c_writer import CWriter
 from mrdamper.export.templates import render
+from mrdamper.models import Model
 from mrdamper.streaming import FLAGS, Stepper, Stream, stream
 from mrdamper.tracing import Program
 
 TOLERANCE = 1e-9  # of the largest force: the self-test forgives other compilers and libraries this much
 _SAMPLES = 400
+_SPELLED = str.maketrans(
+    {"−": "-", "–": "-", "·": "*", "²": "^2", "³": "^3", "√": "sqrt", "≤": "<=", "≥": ">=", "∈": " in "}
+    | {"α": "alpha", "β": "beta", "γ": "gamma", "δ": "delta", "η": "eta", "φ": "phi", "ζ": "zeta", "ω": "omega"}
+)
 
 
 class CExporter(Exporter):
@@ -26,9 +31,9 @@ class CExporter(Exporter):
     name: ClassVar[str] = "c"
     title: ClassVar[str] = "C99 source"
 
-    def export(self, damper: Damper, name: str) -> Written:
+    def export(self, damper: Damper | Model, name: str) -> Written:
         made = stream(damper)
-        files = {**c_sources(made, name, damper.rig), f"{name}_test.c": self_test(made, name)}
+        files = {**c_sources(made, name, rig_of(damper)), f"{name}_test.c": self_test(made, name)}
         return Written({file: text.encode() for file, text in files.items()})
 
 
@@ -138,8 +143,8 @@ def _parameter(info: Any, value: float) -> Mapping[str, str]:
     low, high = (f"{bound:g}" for bound in info.bounds)
     return {
         "name": info.name,
-        "meaning": info.meaning,
-        "unit": info.unit,
+        "meaning": _comment(info.meaning),
+        "unit": _comment(info.unit),
         "low": low,
         "high": high,
         "value": repr(value),
@@ -164,7 +169,7 @@ def _number(value: float) -> str:
 
 def _comment(text: str) -> str:
     """Text that cannot end a comment or leave its line; ASCII, as C99 sources are."""
-    plain = text.replace("–", "-").replace("\n", " ").encode("ascii", "replace").decode()
+    plain = " ".join(text.translate(_SPELLED).split()).encode("ascii", "replace").decode()
     return plain.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?").replace("\\", "/")
 
 

@@ -1,0 +1,39 @@
+"""`mrdamper export`: hand a model on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Optional
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+
+    @app.command(epilog="Example: mrdamper export model.json --to fmu --out damper.fmu")
+    def export(
+        model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
+        to: str = typer.Option(..., "--to", help="c, fmu, latex, markdown, table, adams."),
+        out: Path = typer.Option(..., "--out", help="Folder to write into, or the file for fmu, latex, markdown."),
+        name: Optional[str] = typer.Option(None, "--name", help="Of files and symbols; default: the rig."),  # noqa: UP045
+        fmi: int = typer.Option(2, "--fmi", help="Version of the FMI standard, 2 or 3."),
+    ) -> None:
+        """Export a saved model: C99 source, FMU, LaTeX or Markdown equations, force–velocity tables."""
+        from mrdamper.errors import InputError
+        from mrdamper.export import exporter
+        from mrdamper.export.base import identifier, write_export
+        from mrdamper.io.atomic import require_writable
+        from mrdamper.io.model_file import load_model
+
+        kind = exporter(to)
+        if fmi not in (2, 3):
+            raise InputError(f"--fmi {fmi}", mend="give 2 or 3")
+        require_writable(out)
+        damper = load_model(model)
+        options = {"fmi": fmi} if to == "fmu" else {}
+        written = kind(**options).export(damper, identifier(name or damper.rig or "damper"))
+        for path in write_export(written, out, kind.suffix):
+            typer.echo(path)
+        for note in written.notes:
+            typer.echo(f"note: {note}", err=True)
