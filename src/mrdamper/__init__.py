@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from mrdamper.io.dataset import load_dataset, save_dataset
     from mrdamper.io.model_file import load_model, save_model
     from mrdamper.simulation import simulate
+    from mrdamper.streaming import stepper
     from mrdamper.validation import validate
     from mrdamper.workflow import run_study
 
@@ -34,6 +35,7 @@ _HOME = {
     "save_dataset": "io.dataset",
     "save_model": "io.model_file",
     "simulate": "simulation",
+    "stepper": "streaming",
     "validate": "validation",
 }
 __all__ = [
@@ -49,6 +51,7 @@ __all__ = [
     "save_dataset",
     "save_model",
     "simulate",
+    "stepper",
     "validate",
 ]
 

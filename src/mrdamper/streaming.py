@@ -33,6 +33,7 @@ class TracedStep(Traced):
 
     tape: Tape
     step: Any
+    rate: Any = None
 
 
 @dataclass(frozen=True, eq=False)

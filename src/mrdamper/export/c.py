@@ -48,7 +48,7 @@ def c_sources(made: Stream, name: str, rig: str) -> dict[str, str]:
     rig : str
         For the comment at the top.
     """
-    facts = _facts(made, identifier(name), rig)
+    facts = c_facts(made, identifier(name), rig)
     return {f"{name}.h": render("model.h.j2", **facts), f"{name}.c": render("model.c.j2", **facts)}
 
 
@@ -74,7 +74,7 @@ def reference_motion(made: Stream, samples: int = _SAMPLES) -> tuple[np.ndarray,
     return x, current, float(2 / (frequency * (samples - 1)))
 
 
-def _facts(made: Stream, name: str, rig: str) -> dict[str, Any]:
+def c_facts(made: Stream, name: str, rig: str) -> dict[str, Any]:
     """What the templates say of a damper."""
     main = CWriter(made.step)
     drives = {quantity: CWriter(drive, f"from_{quantity}_") for quantity, drive in made.drives.items()}

@@ -14,11 +14,11 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, ParameterError
-from mrdamper.integrator.streamed import Rate, integrate_step
+from mrdamper.integrator.streamed import Rate, integrate_law, integrate_step
 from mrdamper.tracing import streamed
 
 
-@streamed(integrate_step)
+@streamed(integrate_step, integrate_law)
 def integrate(
     rate: Rate,
     parameters: Sequence[float],

@@ -126,7 +126,12 @@ def play_step(tape: Tape, path: Any, limit: Any, start: float = 0.0) -> Any:
     return moved
 
 
-@streamed(play_step)
+def play_law(tape: Tape, path: Any, limit: Any, start: float = 0.0) -> Any:
+    """What `play_position` follows."""
+    return tape.law("stop", tape.symbol("delta"), path.rate, limit)
+
+
+@streamed(play_step, play_law)
 def play_position(path: Path, limit: float, start: float = 0.0) -> Floats:
     """Position δ of a stop operator along a path: it moves with the motion and stops at ±limit.
 

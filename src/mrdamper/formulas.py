@@ -1,0 +1,89 @@
+"""The equations of a damper, read off its own code: the force, the laws of its state, its parameters.
+
+The model's array code runs on symbols, as for streams, but writes laws instead of steps. So
+what a report prints is what is computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from mrdamper.damper import Damper
+from mrdamper.data import Condition
+from mrdamper.errors import ParameterError
+from mrdamper.joint import JointDamper
+from mrdamper.models import Model
+from mrdamper.modified import ModifiedModel
+from mrdamper.parameters import ParameterInfo
+from mrdamper.streaming import TracedMotion, TracedStep
+from mrdamper.tracing import Expression, Tape
+from mrdamper.tracing.tape import Law
+
+MOTION = ("x", "v", "a", "I")
+
+
+@dataclass(frozen=True, eq=False)
+class Formulas:
+    """Equations of a damper.
+
+    Attributes
+    ----------
+    title, source : str
+    laws : tuple of Law
+        In the order in which they are needed.
+    force : Expression
+    parameters : mapping of ParameterInfo to float
+        Parameters with their values; those that are functions are among the laws.
+    """
+
+    title: str
+    source: str
+    laws: tuple[Law, ...]
+    force: Any
+    parameters: Mapping[ParameterInfo, float]
+
+
+def formulas(damper: Damper | Model) -> Formulas:
+    """Equations of a model, a joint damper or a modified model.
+
+    Raises
+    ------
+    ParameterError
+        If the damper is of another kind.
+    """
+    tape = Tape(readable=True)
+    x, v, a, I = (tape.input(name, 0.0 if name == "I" else None) for name in MOTION)
+    motion = TracedMotion(tape, x, v, a, I, TracedStep(tape, None), TracedStep(tape, None, v))
+    if isinstance(damper, ModifiedModel):
+        kind, parameters = damper.parameters.model_type, {}
+        model = _of_functions(tape, damper, I)
+    elif isinstance(damper, Model | JointDamper):
+        given = damper if isinstance(damper, Model) else damper.model
+        kind = type(given)
+        parameters = {info: getattr(given, info.name) for info in given.parameters()}
+        model = kind(**{info.name: _shown(tape, info, value) for info, value in parameters.items()})
+    else:
+        raise ParameterError("no equations to print", where=damper.title, mend="export a joint or a modified model")
+    force = model.force(motion, model.state(motion))  # type: ignore[arg-type]
+    return Formulas(damper.title, kind.source, tuple(tape.laws), force, parameters)
+
+
+def _shown(tape: Tape, info: ParameterInfo, value: float) -> Any:
+    """A symbol, or the number where the parameter is preset: terms that are off do not show."""
+    return value if info.preset and value == info.default else tape.parameter(info.name, value)
+
+
+def _of_functions(tape: Tape, damper: ModifiedModel, current: Expression) -> Model:
+    """The model of symbols, each defined by its function of current, frequency and amplitude."""
+    envelope = damper.envelope
+    middle = Condition(*(sum(span) / 2 for span in (envelope.current_A, envelope.frequency_Hz, envelope.amplitude_m)))
+    current.value = middle.current_A
+    f, A = tape.input("f", middle.frequency_Hz), tape.input("A", middle.amplitude_m)
+    made = {}
+    for name, function in damper.parameters.functions.items():
+        value = function(current, f, A)
+        symbol = tape.symbol(name, float(function(middle.current_A, middle.frequency_Hz, middle.amplitude_m)))
+        made[name] = tape.law("is", symbol, value)
+    return damper.parameters.model_type.build(made)
