@@ -1,8 +1,10 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from synthetic import TRUTH, synthetic_run
 
-from mrdamper.data import Condition, Run
+from mrdamper.data import Condition, Dataset, Run
 from mrdamper.errors import IdentificationError, RunError, UnknownNameError
 from mrdamper.gas_spring import GasSpring
 from mrdamper.identification import identify
@@ -11,6 +13,7 @@ from mrdamper.identification.methods import all_methods
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.optimizers.levenberg_marquardt import least_squares
 from mrdamper.uncertainty import autocorrelation_time, standard_errors
+from mrdamper.workflow import usable_sines
 
 
 @pytest.mark.parametrize("current_frequency", [(0.0, 0.5), (1.0, 1.0), (2.0, 2.0)])
@@ -137,3 +140,11 @@ def test_real_runs_are_described_at_least_as_well_as_by_the_reference_fits(bundl
     runs = [run for run in bundled.rig(rig) if run.excitation == "sine"]
     errors = [identify(run, model).scores.nrmse_pp for run in runs]
     assert np.median(errors) <= bound
+
+
+def test_a_clipped_record_is_refused_unless_wanted(bundled):
+    run = replace(bundled["utf_5mm4Hz_1A"], notes={"findings": "W_DRIFT W_CLIPPED"})
+    with pytest.raises(IdentificationError, match="clipped"):
+        identify(run)
+    assert identify(run, clipped=True).scores.nrmse_pp < 0.1
+    assert usable_sines(Dataset((run,)))[1].keys() == {run.id}

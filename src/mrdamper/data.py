@@ -167,6 +167,11 @@ class Run:
         return round(mean, 9)
 
     @property
+    def findings(self) -> tuple[str, ...]:
+        """Codes of what the import noticed, for example W_CLIPPED."""
+        return tuple(self.notes.get("findings", "").split())
+
+    @property
     def in_window(self) -> NDArray[np.bool_]:
         """(N,) mask of the samples inside the steady window."""
         if self.window is None:

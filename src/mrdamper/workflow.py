@@ -18,7 +18,7 @@ from mrdamper.damper import Damper
 from mrdamper.data import Dataset, Run
 from mrdamper.errors import IdentificationError, UnknownNameError
 from mrdamper.excitation import analyse_motion, equivalent_sine
-from mrdamper.identification import Identification, identify
+from mrdamper.identification import Identification, identify, refuse_clipped
 from mrdamper.identification.methods.paper import Paper
 from mrdamper.joint import JointFit, JointProblem
 from mrdamper.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, dynamic_ranges
@@ -243,11 +243,12 @@ def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None, *
     return RigStudy(rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), refused, model is not None)
 
 
-def usable_sines(dataset: Dataset) -> tuple[list[Run], dict[str, str]]:
+def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], dict[str, str]]:
     """The runs whose motion is a sine at one current, and why the others are not used."""
     sines, refused = [], {}
     for run in dataset:
         try:
+            refuse_clipped(run, clipped)
             run.current_A  # noqa: B018
             found = equivalent_sine(run)
         except ValueError as error:

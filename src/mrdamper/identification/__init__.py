@@ -27,6 +27,7 @@ def identify(
     fixed: Mapping[str, float] | None = None,
     gas: GasSpring | None = None,
     with_delay: bool = False,
+    clipped: bool = False,
 ) -> Identification:
     """Identify a model from one run, inside its steady window.
 
@@ -44,6 +45,8 @@ def identify(
         Known gas spring: fixes k1, k2, k3 and lets the mass be determined.
     with_delay : bool
         Determine a delay of the force channel too, within ±3 ms.
+    clipped : bool
+        Identify also from a record whose import found a channel cut off at its extreme.
 
     Returns
     -------
@@ -58,6 +61,7 @@ def identify(
     IdentificationError
         If the run cannot determine what is asked for.
     """
+    refuse_clipped(run, clipped)
     chosen_model = model_type(model) if isinstance(model, str) else model
     chosen_method = method_named(method) if isinstance(method, str) else method
     problem = Problem.of(run, chosen_model, free=free, fixed=fixed, gas=gas, with_delay=with_delay)
@@ -65,6 +69,22 @@ def identify(
     if np.ptp(problem.force) == 0:
         raise IdentificationError("the force does not change", where=f"run {run.id}", mend="check the channel")
     return conclude(problem, chosen_method, chosen_method.solve(problem))
+
+
+def refuse_clipped(run: Run, clipped: bool = False) -> None:
+    """Refuse a run with a channel cut off at its extreme: its peaks are not the damper's.
+
+    Raises
+    ------
+    IdentificationError
+        Unless `clipped` runs are wanted.
+    """
+    if "W_CLIPPED" in run.findings and not clipped:
+        raise IdentificationError(
+            "a channel is cut off at its extreme (W_CLIPPED)",
+            where=f"run {run.id}",
+            mend="record it again with a wider range, or identify with clipped=True (--clipped)",
+        )
 
 
 def conclude(problem: Problem, method: Method, solution: Solution) -> Identification:

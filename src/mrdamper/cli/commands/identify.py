@@ -23,6 +23,7 @@ def register(app: typer.Typer) -> None:
             None, "--gas", help="Known gas spring: pressure MPa, volume cm3, rod area mm2, as P,V,A."
         ),
         delay: bool = typer.Option(False, "--delay", help="Also determine a delay of the force, within 3 ms."),
+        clipped: bool = typer.Option(False, "--clipped", help="Use records with a channel cut off at its extreme too."),
         run: list[str] = typer.Option([], "--run", help="Only this run; may be repeated."),
         out: Optional[Path] = typer.Option(None, "--out", help="CSV to write; default: standard output."),  # noqa: UP045
         as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
@@ -44,14 +45,21 @@ def register(app: typer.Typer) -> None:
         dataset = load_dataset(data)
         if run:
             dataset = dataset.only([dataset[name] for name in run])
-        sines, refused = workflow.usable_sines(dataset)
+        sines, refused = workflow.usable_sines(dataset, clipped)
         found = []
         with progress_on_stderr() as progress:
             for number, entry in enumerate(sines):
                 progress(f"run {entry.id}", number / len(sines))
                 found.append(
                     identification.identify(
-                        entry, chosen_model, chosen_method, free=free, fixed=fixed, gas=spring, with_delay=delay
+                        entry,
+                        chosen_model,
+                        chosen_method,
+                        free=free,
+                        fixed=fixed,
+                        gas=spring,
+                        with_delay=delay,
+                        clipped=clipped,
                     )
                 )
             progress("identified", 1.0)
