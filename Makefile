@@ -4,7 +4,7 @@ VENV   ?= .venv
 BIN    := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help study test test-all bench lint format clean
+.PHONY: help study test test-all bench fuzz lint format clean
 
 help:  ## show this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -20,6 +20,10 @@ test-all: $(VENV)/.dev  ## the tests, slow ones too
 
 bench: $(VENV)/.dev  ## timings beside the peers that are installed
 	$(BIN)/python -m benchmarks
+
+MUTANTS ?= 20000
+fuzz: $(VENV)/.dev  ## damage rig files at random: each is read, or refused with a code (MUTANTS=200000)
+	$(BIN)/python -m fuzz.fuzz_import --mutants $(MUTANTS)
 
 lint: $(VENV)/.dev  ## format check, lint, types, import order of the layers
 	$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/pyright --pythonpath $(BIN)/python && $(BIN)/lint-imports

@@ -75,6 +75,12 @@ class NonFiniteError(RunError):
     code = "E_NONFINITE"
 
 
+class QualityError(InputError):
+    """A record's channels contradict each other or physics; the code says how."""
+
+    code = "E_QUALITY"
+
+
 class UnknownNameError(InputError):
     """A model, method, rig or run of that name does not exist."""
 

@@ -106,6 +106,8 @@ def _runs_table(folder: Path) -> list[dict[str, Any]]:
     path = folder / "runs.csv"
     if not path.is_file():
         hint = "write one row a run: run_id, current_A, ... (README, what a dataset is)"
+        if _holds_rig_files(folder):
+            hint = f"are these files of a rig? mrdamper import {folder.name or folder} --out DATASET makes a dataset"
         raise DatasetError("runs.csv is missing", where=str(folder), mend=hint)
     try:
         table = pl.read_csv(path, infer_schema_length=0)
@@ -116,6 +118,12 @@ def _runs_table(folder: Path) -> list[dict[str, Any]]:
     if not table.height:
         raise DatasetError("no rows", where=str(path), mend="add one row a run")
     return table.to_dicts()
+
+
+def _holds_rig_files(folder: Path) -> bool:
+    from mrdamper.io.readers import suffixes
+
+    return any(p.suffix.lower() in suffixes() and p.name not in SAMPLE_FILES for p in folder.iterdir() if p.is_file())
 
 
 def _samples_table(folder: Path) -> dict[str, pl.DataFrame]:

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import overload
 
 import numpy as np
 
-from mrdamper.data import Floats, Run
+from mrdamper.data import Floats
 
 REQUIRED = ("time", "displacement", "force")
 OPTIONAL = ("velocity", "acceleration", "current", "voltage", "temperature")
@@ -36,6 +37,52 @@ class Finding:
         return f"{self.text} [{self.code}]"
 
 
+@dataclass(frozen=True, slots=True)
+class LineNumbers:
+    """Line of every sample in its file, kept as the few places where lines were skipped.
+
+    Attributes
+    ----------
+    size : int
+        Samples.
+    starts : tuple of int
+        First sample of every stretch of adjacent lines, increasing from 0.
+    lines : tuple of int
+        Line of that sample, counted from one.
+    """
+
+    size: int
+    starts: tuple[int, ...]
+    lines: tuple[int, ...]
+
+    def __len__(self) -> int:
+        return self.size
+
+    @overload
+    def __getitem__(self, sample: int | np.integer) -> int: ...
+    @overload
+    def __getitem__(self, sample: slice | np.ndarray) -> np.ndarray: ...
+
+    def __getitem__(self, sample):
+        """The line of one sample, or of several."""
+        index = np.arange(self.size)[sample] if isinstance(sample, slice) else np.asarray(sample)
+        if index.dtype == bool:
+            index = np.flatnonzero(index)
+        index = np.where(index < 0, index + self.size, index)
+        stretch = np.searchsorted(self.starts, index, side="right") - 1
+        line = np.asarray(self.lines)[stretch] + index - np.asarray(self.starts)[stretch]
+        return int(line) if np.ndim(line) == 0 else line
+
+    def part(self, start: int, stop: int) -> LineNumbers:
+        """The lines of the samples start..stop-1."""
+        inner = [i for i, at in enumerate(self.starts) if start < at < stop]
+        starts = (0, *(self.starts[i] - start for i in inner))
+        return LineNumbers(stop - start, starts, (self[start], *(self.lines[i] for i in inner)))
+
+    def __array__(self, dtype=None, copy=None):
+        return np.asarray(self[:], dtype=dtype)
+
+
 @dataclass(frozen=True, eq=False)
 class Record:
     """One test as a rig's file holds it.
@@ -56,6 +103,8 @@ class Record:
         As for `Run`.
     segments : tuple of (int, int)
         Half-open sample ranges without a gap in time; empty before the checks looked.
+    lines : LineNumbers, optional
+        Line of every sample, where the file is text.
     """
 
     id: str
@@ -73,6 +122,7 @@ class Record:
     excitation: str = "sine"
     split: str = "train"
     segments: tuple[tuple[int, int], ...] = ()
+    lines: LineNumbers | None = None
 
     @property
     def present(self) -> np.ndarray:

@@ -1,0 +1,1 @@
+"""Fuzz targets: what comes from outside may be refused, but never surprise."""

@@ -1,0 +1,104 @@
+"""`mrdamper check`: the quality verdicts on a stored dataset."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Optional
+
+import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from mrdamper.cli.output import Rows
+    from mrdamper.io.quality.table import Quality
+
+_HEADINGS = {
+    "run_id": "run",
+    "current_A": "A",
+    "frequency_Hz": "Hz",
+    "amplitude_mm": "mm",
+    "cycles": "cycles",
+    "sample_rate_Hz": "samples/s",
+    "repeatability_percent": "scatter %",
+    "offset_force_N": "offset N",
+    "centre_mm": "centre mm",
+    "drift_mm": "drift mm",
+    "verdict": "verdict",
+    "findings": "findings",
+}
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+
+    @app.command(epilog="Example: mrdamper check rig/ --figure loops.png")
+    def check(
+        data: Optional[Path] = typer.Argument(None, help="Dataset folder; default: the bundled tests."),  # noqa: UP045
+        figure: Optional[Path] = typer.Option(None, "--figure", help="Loops with flagged samples: PNG, SVG or PDF."),  # noqa: UP045
+        as_json: bool = typer.Option(False, "--json", help="Print JSON instead of a table."),
+    ) -> None:
+        """Judge every run of a dataset again: sign, lag, clipping, distortion, drift; exit 2 if one is refused."""
+        from mrdamper.cli.output import put
+        from mrdamper.io.atomic import require_writable
+        from mrdamper.io.dataset import load_dataset
+        from mrdamper.io.quality.table import quality_table, record_of, row
+
+        if figure is not None:
+            require_writable(figure)
+            _require_format(figure)
+        verdicts = quality_table(record_of(run) for run in load_dataset(data))
+        put([row(verdict) for verdict in verdicts], None, as_json, _text_table)
+        for verdict in verdicts:
+            if verdict.refusal is not None:
+                typer.echo(f"refused: {verdict.refusal}", err=True)
+            for finding in verdict.findings:
+                typer.echo(f"{verdict.record.id}: {finding}", err=True)
+        if figure is not None:
+            _draw(verdicts, figure)
+        if any(verdict.refusal is not None for verdict in verdicts):
+            raise typer.Exit(2)
+
+
+def _text_table(rows: Rows) -> str:
+    """Columns of a width, the first and the last two to the left."""
+    cells = [list(_HEADINGS.values())]
+    cells += [["–" if row[name] is None else str(row[name]) for name in _HEADINGS] for row in rows]
+    widths = [max(len(line[i]) for line in cells) for i in range(len(_HEADINGS))]
+    words = {0, len(widths) - 2, len(widths) - 1}
+    lines = [
+        "  ".join(cell.ljust(width) if i in words else cell.rjust(width) for i, (cell, width) in enumerate(pairs))
+        for pairs in (zip(line, widths, strict=True) for line in cells)
+    ]
+    return "".join(line.rstrip() + "\n" for line in lines)
+
+
+def _require_format(figure: Path) -> None:
+    from mrdamper.errors import OutputError
+
+    if figure.suffix.lower() not in (".png", ".svg", ".pdf"):
+        raise OutputError(
+            f"{figure.suffix or 'no suffix'}", where=str(figure), mend="end the name in .png, .svg or .pdf"
+        )
+
+
+def _draw(verdicts: Sequence[Quality], path: Path) -> None:
+    from mrdamper.io.atomic import write_file
+    from mrdamper.io.quality.flat import flagged_samples
+    from mrdamper.io.quality.view import View
+    from mrdamper.plots.quality import LoopPanel, quality_figure
+    from mrdamper.plots.style import house_style
+
+    panels = [
+        LoopPanel(
+            verdict.record.id,
+            " ".join(verdict.codes),
+            verdict.record.displacement,
+            verdict.record.force,
+            flagged_samples(View(verdict.record)),
+            verdict.refusal is not None,
+        )
+        for verdict in verdicts
+    ]
+    with house_style(), write_file(path) as target:
+        quality_figure(panels).savefig(target)

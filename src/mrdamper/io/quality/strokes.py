@@ -1,0 +1,117 @@
+"""Reversals of a recorded motion, and the stretch in which the strokes are regular."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrdamper.data import Floats
+
+_PROMINENCE = 0.1  # of the peak-to-peak motion: smaller turns are noise or a ramp
+_ALIKE = 0.2  # strokes of a steady motion agree in length and duration to this share
+_RAMP = 0.03  # a stroke at the end that is off by more belongs to a ramp
+_SHARE = 0.5  # of the strokes must be steady for a motion to be called periodic
+
+
+@dataclass(frozen=True, eq=False)
+class Strokes:
+    """Monotone motions between reversals.
+
+    Attributes
+    ----------
+    reversals : (K,) int array
+        Samples of the reversals.
+    lengths, durations : (K−1,) arrays
+        Of the strokes between them [m], [s].
+    steady : (int, int) or None
+        Half-open sample range of regular strokes, where most strokes are.
+    period : float or None
+        Twice the median duration of a stroke [s]; None without two reversals.
+    """
+
+    reversals: np.ndarray
+    lengths: Floats
+    durations: Floats
+    steady: tuple[int, int] | None
+    period: float | None
+
+
+def find_strokes(time: Floats, displacement: Floats) -> Strokes:
+    """Cut a motion at its reversals.
+
+    Parameters
+    ----------
+    time, displacement : (N,) arrays
+        [s], [m].
+    """
+    reversals = _reversals(displacement)
+    lengths = np.abs(np.diff(displacement[reversals]))
+    durations = np.diff(time[reversals])
+    period = float(2 * np.median(durations)) if durations.size else None
+    steady = _steady(time, displacement, reversals, lengths, durations)
+    return Strokes(reversals, lengths, durations, steady, period)
+
+
+def _reversals(x: Floats) -> np.ndarray:
+    from scipy.signal import find_peaks
+
+    least = _PROMINENCE * float(np.ptp(x))
+    if least <= 0:
+        return np.empty(0, dtype=int)
+    tops, bottoms = find_peaks(x, prominence=least)[0], find_peaks(-x, prominence=least)[0]
+    both = np.concatenate([tops, bottoms])
+    kind = np.concatenate([np.ones(tops.size), np.zeros(bottoms.size)])
+    order = np.argsort(both, kind="stable")
+    both, kind = both[order], kind[order]
+    # Of two tops in a row (noise, a dwell) the first counts.
+    alternate = np.concatenate([[True], kind[1:] != kind[:-1]]) if kind.size else np.empty(0, dtype=bool)
+    return both[alternate]
+
+
+def _steady(
+    time: Floats, x: Floats, reversals: np.ndarray, lengths: Floats, durations: Floats
+) -> tuple[int, int] | None:
+    """Find the longest stretch of like strokes, with the part strokes at its ends that belong to it."""
+    if lengths.size < 3:
+        return None  # too few to tell a ramp from the motion
+    length, duration = np.median(lengths), np.median(durations)
+    alike = (np.abs(lengths / length - 1) < _ALIKE) & (np.abs(durations / duration - 1) < _ALIKE)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], alike.astype(int), [0]])))
+    starts, stops = edges[::2], edges[1::2]
+    if not starts.size:
+        return None
+    longest = int(np.argmax(stops - starts))
+    first, last = int(starts[longest]), int(stops[longest])
+    if last - first < max(3, _SHARE * lengths.size):
+        return None
+    first, last = _without_ramps(lengths, first, last)
+    start, stop = int(reversals[first]), int(reversals[last]) + 1
+    if first == 0:
+        start = _reach(time, x, start, -1, duration)
+    if last == lengths.size:
+        stop = _reach(time, x, stop - 1, 1, duration) + 1
+    return start, stop
+
+
+def _without_ramps(lengths: Floats, first: int, last: int) -> tuple[int, int]:
+    """Leave out strokes at the ends that differ from the others by more than these among themselves.
+
+    A motion that drifts differs as much in its middle; a ramp only at the ends.
+    """
+    middle = np.median(lengths[first:last])
+    usual = max(_RAMP * middle, 4 * np.median(np.abs(lengths[first:last] - middle)))
+    while last - first > 3 and abs(lengths[first] - middle) > usual:
+        first += 1
+    while last - first > 3 and abs(lengths[last - 1] - middle) > usual:
+        last -= 1
+    return first, last
+
+
+def _reach(time: Floats, x: Floats, reversal: int, direction: int, duration: float) -> int:
+    """Go on from an outermost reversal to the record's end, if that is about a stroke away.
+
+    About: a reversal close to the record's end does not stand out and is not found.
+    """
+    end = 0 if direction < 0 else time.size - 1
+    return end if abs(time[end] - time[reversal]) <= 1.25 * duration else reversal

@@ -1,0 +1,1 @@
+"""Delimited text as machines write it: encoding, form, numbers, blocks."""

@@ -1,0 +1,82 @@
+"""One cell of text: a number, a missing value, a time stamp, or none of them.
+
+Strict on purpose: what only some programs take for a number (1_000.5, 0x1F, other
+scripts' digits, thousands separators) is refused, so that no two programs read
+different values from one file.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import unicodedata
+from datetime import date
+from functools import lru_cache
+
+NUMBER = {
+    mark: re.compile(rf"[+-]?(?:[0-9]+(?:{re.escape(mark)}[0-9]*)?|{re.escape(mark)}[0-9]+)(?:[eE][+-]?[0-9]+)?")
+    for mark in ".,"
+}
+MISSING = frozenset(("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "-nan", "+nan", "nan(ind)"))
+_INFINITE = re.compile(r"[+-]?(?:inf(?:inity)?|1\.#inf|∞)", re.IGNORECASE)
+_STAMP = re.compile(
+    r"(?:([0-9]{4})-([0-9]{2})-([0-9]{2})[T ])?([0-9]{2}):([0-9]{2}):([0-9]{2})(?:[.,]([0-9]{1,9}))?"
+    r"(Z|[+-][0-9]{2}:?[0-9]{2})?",
+    re.IGNORECASE,
+)
+_SPACE = " \t"
+
+
+def number(token: str, mark: str) -> float | None:
+    """Value of a stripped cell: NaN if it is missing, None if it is no number.
+
+    Infinity and numbers beyond the range of a double come back as infinity.
+    """
+    if NUMBER[mark].fullmatch(token):
+        return float(token if mark == "." else token.replace(",", "."))
+    if token.lower() in MISSING:
+        return math.nan
+    return math.inf if _INFINITE.fullmatch(token) else None
+
+
+def looks_numeric(token: str) -> bool:
+    """Whether a cell is meant as a value, in whatever writing: tells rows of data from headers."""
+    token = token.strip(_SPACE)
+    if token.lower() in MISSING or stamp(token) is not None or _INFINITE.fullmatch(token):
+        return True
+    if len(token) > 40 or not any(unicodedata.decimal(c, None) is not None for c in token):
+        return False
+    return all(unicodedata.decimal(c, None) is not None or c in "+-.,eE_'’ \u00a0\u202f−xX\ufffd" for c in token)
+
+
+def stamp(token: str) -> tuple[int, bool] | None:
+    """Nanoseconds of an ISO-8601 time stamp or a clock time, and whether it states its zone.
+
+    Integers, as doubles would round the nanoseconds of a date. A zone's offset is taken
+    off, so that the change to summer time does not bend a record.
+    """
+    match = _STAMP.fullmatch(token)
+    if match is None:
+        return None
+    year, month, day, hour, minute, second, fraction, zone = match.groups()
+    if int(hour) > 23 or int(minute) > 59 or int(second) > 59:
+        return None
+    days = _day(year, month, day) if year else 0
+    if days is None:
+        return None
+    seconds = ((days * 24 + int(hour)) * 60 + int(minute)) * 60 + int(second)
+    if zone and zone not in "Zz":
+        digits = zone[1:].replace(":", "")
+        if int(digits[:2]) > 23 or int(digits[2:]) > 59:
+            return None
+        offset = 3600 * int(digits[:2]) + 60 * int(digits[2:])
+        seconds -= offset if zone[0] == "+" else -offset
+    return seconds * 10**9 + int((fraction or "0").ljust(9, "0")), zone is not None
+
+
+@lru_cache(maxsize=64)
+def _day(year: str, month: str, day: str) -> int | None:
+    try:
+        return date(int(year), int(month), int(day)).toordinal()
+    except ValueError:
+        return None
