@@ -122,7 +122,7 @@ def flow_step(tape: Tape, speed: Any, m: Any) -> Any:
 
 def flow_law(tape: Tape, speed: Any, m: Any) -> Any:
     """The flow curve, the way it is published: the speed at a force."""
-    u = tape.symbol("u")
+    u: Any = tape.symbol("u")
     tape.law("equals", u, _log_speed(u, m)[0], np.log(speed))
     return 1 + np.exp(u)
 

@@ -1,0 +1,234 @@
+"""FMI 2.0 and 3.0: a co-simulation FMU with sources, binaries, and a reference to check it by."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import math
+import uuid
+import zipfile
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from mrdamper.damper import Damper
+from mrdamper.data import Floats
+from mrdamper.errors import InputError
+from mrdamper.export.base import Exporter, Written, identifier
+from mrdamper.export.c import c_facts, c_sources, reference_motion
+from mrdamper.export.fmu_description import c_bounds, description_facts, parameters_of_stream, plain, serial_fields
+from mrdamper.export.templates import render
+from mrdamper.export.toolchain import PLATFORMS, Platform, build_library
+from mrdamper.models import Model
+from mrdamper.streaming import FLAGS, Stepper, Stream, stream
+
+_SAMPLES_A_CYCLE = 200
+_INTERNAL_STEP = 2.0**-9  # s; two milliseconds, so that the usual communication step of one is taken whole
+_MOST_STEPS = 1_000_000  # internal ones, in a communication step
+_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest a zip file knows: the same FMU has the same bytes
+_TESTED = (
+    ("current", "current_A", 1.0, "A"),
+    ("frequency", "frequency_Hz", 1.0, "Hz"),
+    ("amplitude", "amplitude_m", 1e3, "mm"),
+    ("peak velocity", "peak_velocity_m_s", 1e3, "mm/s"),
+)
+
+
+@dataclass(frozen=True)
+class FMUExporter(Exporter):
+    """An FMU for co-simulation.
+
+    Parameters
+    ----------
+    fmi : 2 or 3
+        Version of the standard.
+    platforms : tuple of str, optional
+        Names of the platforms to compile for, as FMI 3.0 calls them. Default: all that a
+        compiler on this machine can make; none gives sources alone.
+    """
+
+    name: ClassVar[str] = "fmu"
+    title: ClassVar[str] = "FMU for co-simulation"
+    suffix: ClassVar[str] = ".fmu"
+
+    fmi: Literal[2, 3] = 2
+    platforms: tuple[str, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if self.fmi not in (2, 3):
+            raise InputError(f"FMI {self.fmi}", mend="give 2 or 3", code="E_FMI_VERSION")
+        unknown = set(self.platforms or ()) - {p.name for p in PLATFORMS}
+        if unknown:
+            known = ", ".join(p.name for p in PLATFORMS)
+            raise InputError(f"no platform {', '.join(sorted(unknown))}", mend=f"known: {known}", code="E_PLATFORM")
+
+    def export(self, damper: Damper | Model, name: str) -> Written:
+        files = fmu_texts(damper, identifier(name), self.fmi)
+        binaries, notes = self._binaries(files, identifier(name))
+        return Written({f"{name}{self.suffix}": zipped({**files, **binaries})}, tuple(notes))
+
+    def _binaries(self, files: Mapping[str, bytes], name: str) -> tuple[dict[str, bytes], list[str]]:
+        sources = {path.removeprefix("sources/"): text for path, text in files.items() if path.startswith("sources/")}
+        binaries: dict[str, bytes] = {}
+        left_out: dict[str, list[str]] = {}
+        for platform in self._wanted():
+            built = build_library(sources, platform)
+            if built.library is None:
+                left_out.setdefault(built.reason, []).append(platform.name)
+            else:
+                folder = platform.fmi2 if self.fmi == 2 else platform.name
+                binaries[f"binaries/{folder}/{name}{platform.suffix}"] = built.library
+        notes = [f"no binary for {', '.join(names)}: {reason}" for reason, names in left_out.items()]
+        if not binaries:
+            notes.append("the FMU holds sources alone; the importer has to compile them")
+        return binaries, notes
+
+    def _wanted(self) -> list[Platform]:
+        known = [p for p in PLATFORMS if self.fmi == 3 or p.fmi2]
+        return [p for p in known if self.platforms is None or p.name in self.platforms]
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A motion and what the model answers, sample by sample.
+
+    Attributes
+    ----------
+    step : float
+        Communication step [s], a power of two: times and their differences are exact.
+    internal_step : float
+        [s], a power of two.
+    displacement, velocity, current : (N,) arrays
+        Inputs set at the samples [m], [m/s], [A].
+    force : (N,) array
+        Output read at the samples [N]: at rest, then of the inputs set one sample before.
+    flags : (N,) array of int
+        Bits in the order of `FLAGS`.
+    """
+
+    step: float
+    internal_step: float
+    displacement: Floats
+    velocity: Floats
+    current: Floats
+    force: Floats
+    flags: np.ndarray
+
+
+def reference(made: Stream) -> Reference:
+    """Two growing cycles inside the tested ranges, stepped here; the displacement drives."""
+    _, _, dt = reference_motion(made)
+    turn = dt * 399 / 2  # of that motion's 400 samples
+    step = 2.0 ** math.floor(math.log2(turn / _SAMPLES_A_CYCLE))
+    internal_step = min(step, _INTERNAL_STEP)
+    x, current, _ = reference_motion(made, round(2 * turn / step) + 1)
+    samples = [*zip(x.tolist(), current.tolist(), strict=True)]
+    rest = _walk(Stepper(made), samples[:1], internal_step, 1)
+    moved = _walk(Stepper(made), samples[:-1], step, round(step / internal_step))
+    force, flags = (np.array(column) for column in zip(*rest, *moved, strict=True))
+    return Reference(step, internal_step, x, np.gradient(x, step), current, force, flags)
+
+
+def _walk(steps: Stepper, samples: list[tuple[float, float]], step: float, count: int) -> list[tuple[float, int]]:
+    """Force and flags after each sample, reached in equal internal steps on a straight line."""
+    last, answers = samples[0], []
+    for sample in samples:
+        force, flags = 0.0, 0
+        for k in range(1, count + 1):
+            x, current = (b if k == count else a + (b - a) * (k / count) for a, b in zip(last, sample, strict=True))
+            force = steps.step(x, current, step / count)
+            flags |= sum(1 << FLAGS.index(flag) for flag in steps.extrapolation)
+        last = sample
+        answers.append((force, flags))
+    return answers
+
+
+def fmu_texts(damper: Damper | Model, name: str, fmi: int) -> dict[str, bytes]:
+    """All of an FMU but its binaries, by path. The token is a hash of the rest."""
+    made = stream(damper)
+    known = reference(made)
+    rig = damper.rig if isinstance(damper, Damper) else ""
+    facts = _facts(made, name, rig, fmi, known)
+    draft = _texts(made, facts, known, rig, token="")
+    token = token_of(draft)
+    return _texts(made, facts, known, rig, token=token)
+
+
+def token_of(files: Mapping[str, bytes]) -> str:
+    """The GUID of an FMU whose texts hold none yet."""
+    digest = hashlib.sha256()
+    for path in sorted(files):
+        for part in (path.encode(), files[path]):
+            digest.update(len(part).to_bytes(8, "little") + part)
+    return f"{{{uuid.UUID(bytes=digest.digest()[:16], version=4)}}}"
+
+
+def zipped(files: Mapping[str, bytes]) -> bytes:
+    """A zip archive whose bytes depend on nothing but the files."""
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w") as archive:
+        for path in sorted(files, key=lambda p: (p != "modelDescription.xml", p)):
+            entry = zipfile.ZipInfo(path, _DATE)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.create_system = 3
+            entry.external_attr = (0o755 if path.startswith("binaries/") else 0o644) << 16
+            archive.writestr(entry, files[path])
+    return made.getvalue()
+
+
+def _facts(made: Stream, name: str, rig: str, fmi: int, known: Reference) -> dict[str, Any]:
+    facts = c_facts(made, name, rig)
+    infos = parameters_of_stream(made)
+    envelope = made.envelope
+    facts |= description_facts(made, fmi, known.internal_step, envelope.current_A[0] if envelope else 0.0)
+    facts |= serial_fields(facts["members"], [info.name for info, _ in infos])
+    facts["parameters"] = [{"name": i.name, "tunable": tunable, "bounds": c_bounds(i)} for i, tunable in infos]
+    facts["envelope"] = [
+        (text, *(f"{factor * bound:.4g}" for bound in getattr(envelope, field)), unit)
+        for text, field, factor, unit in _TESTED
+        if envelope
+    ]
+    return facts | {
+        "fmi": fmi,
+        "most_steps": _MOST_STEPS,
+        "stop_time": repr(known.step * (known.force.size - 1)),
+        "about": plain(f"{made.title}{f' of rig {rig}' if rig else ''}, made by mrdamper.".replace("\n", " ")),
+    }
+
+
+def _texts(made: Stream, facts: Mapping[str, Any], known: Reference, rig: str, token: str) -> dict[str, bytes]:
+    name, fmi = facts["name"], facts["fmi"]
+    sources = {
+        **c_sources(made, name, rig),
+        f"{name}_fmu.h": render("fmu_instance.h.j2", **facts, token=token),
+        f"{name}_fmu.c": render("fmu_instance.c.j2", **facts),
+        f"{name}_fmi{fmi}.c": render(f"fmi{fmi}_functions.c.j2", **facts),
+    }
+    listed = sorted(file for file in sources if file.endswith(".c"))
+    if fmi == 3:
+        sources["buildDescription.xml"] = render("buildDescription.xml.j2", **facts, source_files=listed)
+    texts = {
+        "modelDescription.xml": render(f"modelDescription_fmi{fmi}.xml.j2", **facts, token=token, source_files=listed),
+        **{f"sources/{file}": text for file, text in sources.items()},
+        "documentation/index.html": render("fmu_documentation.html.j2", **facts),
+        "resources/reference_in.csv": _table(
+            ("time", "displacement", "velocity", "current"),
+            (_times(known), known.displacement, known.velocity, known.current),
+        ),
+        "resources/reference_out.csv": _table(
+            ("time", "force", *(f"outside_{flag}" for flag in FLAGS)),
+            (_times(known), known.force, *(known.flags >> bit & 1 for bit in range(len(FLAGS)))),
+        ),
+    }
+    return {path: text.encode() for path, text in texts.items()}
+
+
+def _times(known: Reference) -> Floats:
+    return known.step * np.arange(known.force.size, dtype=np.float64)
+
+
+def _table(head: Iterable[str], columns: Iterable[np.ndarray]) -> str:
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    return "".join(f"{','.join(row)}\n" for row in [head, *(map(repr, row) for row in rows)])

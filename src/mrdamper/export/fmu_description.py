@@ -1,0 +1,251 @@
+"""What an FMU says of itself: its variables, their units, its serialized state."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from mrdamper.errors import ParameterError
+from mrdamper.parameters import ParameterInfo
+from mrdamper.streaming import FLAGS, Stepper, Stream
+
+DRIVES = (
+    ("displacement", 1, "displacement; its differences are the velocity"),
+    ("velocity", 2, "velocity; integrated from zero it is the displacement"),
+    ("motion", 3, "displacement and velocity, both as given"),
+)
+STATUSES = (  # the numbers of the C source's status
+    ("ok", 0, "a force was found"),
+    ("not_ready", 1, "the model was not started"),
+    ("bad_input", 2, "an input is not finite"),
+    ("bad_time_step", 3, "the step is not positive, or holds too many internal steps"),
+    ("bad_parameter", 4, "parameters outside their bounds, or off the branch the source was made for"),
+    ("bad_state", 5, "a state that is not finite"),
+    ("no_answer", 6, "the model has no finite force there"),
+)
+SHORTEST = 1e-6  # s; the least an internal step may be set to
+_DISPLAY = {"m": (("mm", "1000"),), "m/s": (("mm/s", "1000"),), "N": (("kN", "0.001"),), "s": (("ms", "1000"),)}
+_SHOWN = {"m": "mm", "m/s": "mm/s"}  # N stays N: loops are read in newtons
+_BASE = {"[mass]": "kg", "[length]": "m", "[time]": "s", "[current]": "A"}
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One variable of the model description.
+
+    Attributes
+    ----------
+    name, description, unit : str
+    symbol : str
+        Of its value reference in the C source.
+    reference, index : int
+        Value reference; place among the variables, from one.
+    causality, variability, initial : str
+        As the standard names them; initial may be empty.
+    kind : "real", "flag" or "choice"
+    attributes : tuple of (str, str)
+        Of its type: unit, start, bounds.
+    """
+
+    name: str
+    description: str
+    symbol: str
+    reference: int
+    index: int
+    causality: str
+    variability: str
+    initial: str
+    kind: str
+    unit: str
+    attributes: tuple[tuple[str, str], ...]
+
+    @property
+    def fmi2_type(self) -> str:
+        return {"real": "Real", "flag": "Boolean", "choice": "Enumeration"}[self.kind]
+
+    @property
+    def fmi3_type(self) -> str:
+        return {"real": "Float64", "flag": "Boolean", "choice": "Enumeration"}[self.kind]
+
+
+def description_facts(made: Stream, fmi: int, internal_step: float, current: float) -> dict[str, Any]:
+    """What the templates of an FMU need to know beside the C source's facts."""
+    variables = _variables(made, fmi, internal_step, current)
+    return {
+        "variables": variables,
+        "units": units_of(v.unit for v in variables if v.unit),
+        "types": (
+            {"name": "Drive", "description": "What makes the motion", "choices": DRIVES},
+            {"name": "Status", "description": "Outcome of the last step", "choices": STATUSES},
+        ),
+        "drive_items": [(word, number) for word, number, _ in DRIVES],
+        "status_texts": [text for _, _, text in STATUSES],
+        "flags": FLAGS,
+        "shortest": repr(SHORTEST),
+        "current_start": repr(current),
+        "internal_step": repr(internal_step),
+    }
+
+
+def _variables(made: Stream, fmi: int, internal_step: float, current: float) -> list[Variable]:
+    """All variables, in the order of their value references; time exists in FMI 3 only."""
+    named: list[dict[str, Any]] = []
+
+    def add(name: str, description: str, kind: str, causality: str, variability: str, **more: Any) -> None:
+        named.append({"name": name, "description": description, "kind": kind, "causality": causality}
+                     | {"variability": variability, "symbol": name} | more)  # fmt: skip
+
+    add("time", "Time", "real", "independent", "continuous", unit="s")
+    add("displacement", "Displacement from mid-stroke", "real", "input", "continuous", unit="m", start=0.0)
+    add("velocity", "Velocity; used with drive 2 and 3", "real", "input", "continuous", unit="m/s", start=0.0)
+    add("current", "Coil current", "real", "input", "continuous", unit="A", start=current)
+    add("force", "Damper force", "real", "output", "continuous", unit="N")
+    for flag in FLAGS:
+        add(f"outside_{flag}", f"The {flag} lies outside the tested range", "flag", "output", "discrete")
+    add("status", "Outcome of the last step", "choice", "output", "discrete", type="Status")
+    add("drive", "What makes the motion", "choice", "parameter", "fixed", type="Drive", start=1)
+    add(
+        "internal_step",
+        "Longest internal step",
+        "real",
+        "parameter",
+        "tunable",
+        unit="s",
+        start=internal_step,
+        low=SHORTEST,
+    )
+    for info, tunable in parameters_of_stream(made):
+        value, unit = getattr(made.model, info.name), unit_name(info, made)
+        kind = ("parameter", "tunable") if tunable else ("local", "constant")
+        bounds = {"low": info.bounds[0], "high": info.bounds[1]} if tunable else {}
+        add(
+            info.name, _sentence(info.meaning), "real", *kind, unit=unit, start=value, symbol=f"p_{info.name}", **bounds
+        )
+    shown = [(reference, v) for reference, v in enumerate(named) if fmi == 3 or v["name"] != "time"]
+    return [_variable(v, reference, index) for index, (reference, v) in enumerate(shown, 1)]
+
+
+def _variable(v: dict[str, Any], reference: int, index: int) -> Variable:
+    attributes = []
+    if "type" in v:
+        attributes.append(("declaredType", v["type"]))
+    unit = v.get("unit", "")
+    if unit:
+        attributes.append(("unit", unit))
+        if unit in _SHOWN:
+            attributes.append(("displayUnit", _SHOWN[unit]))
+    attributes += [
+        (word, repr(float(v[key])))
+        for word, key in (("min", "low"), ("max", "high"))
+        if math.isfinite(v.get(key, math.inf))
+    ]
+    if "start" in v:
+        attributes.append(("start", repr(v["start"])))
+    initial = {"output": "calculated", "parameter": "exact", "local": "exact"}.get(v["causality"], "")
+    own = {key: v[key] for key in ("name", "description", "symbol", "causality", "variability", "kind")}
+    return Variable(**own, reference=reference, index=index, initial=initial, unit=unit, attributes=tuple(attributes))
+
+
+def parameters_of_stream(made: Stream) -> list[tuple[ParameterInfo, bool]]:
+    """The model's parameters, and whether each may change: tracing may have frozen a branch on it."""
+    if made.model is None:
+        return []
+    return [(info, _is_free(made, info.name)) for info in made.model.parameters()]
+
+
+def _is_free(made: Stream, name: str) -> bool:
+    value = getattr(made.model, name)
+    for near in (value * 1.01, value * 0.99) if value else (1e-3, -1e-3):
+        try:
+            Stepper(made).set_parameters(**{name: near})
+        except ParameterError:
+            continue
+        return True
+    return False
+
+
+def unit_name(info: ParameterInfo, made: Stream) -> str:
+    """The unit of a parameter; an exponent that is itself a parameter is filled in where it is whole."""
+    if info.unit == "-":
+        return "1"
+    if info.unit.endswith("^-n"):
+        n = float(getattr(made.model, "n", math.nan))
+        return f"1/m^{n:.0f}" if n.is_integer() else info.unit
+    return info.unit
+
+
+def units_of(names: Iterable[str]) -> list[Mapping[str, Any]]:
+    """Units by name, their powers of SI base units, and what they are shown in."""
+    return [
+        {"name": name, "base": base_powers(name), "displays": _DISPLAY.get(name, ())} for name in dict.fromkeys(names)
+    ]
+
+
+def base_powers(unit: str) -> list[tuple[str, int]] | None:
+    """Powers of the SI base units that make a unit up; None where they are not whole numbers."""
+    from pint.errors import PintError
+
+    if re.search(r"\^-?[a-z]", unit):  # the power is itself a parameter
+        return None
+    try:
+        quantity = _registry().Quantity(1.0, "" if unit == "1" else unit)
+    except (PintError, ValueError):
+        return None
+    return [(_BASE[str(d)], int(power)) for d, power in quantity.dimensionality.items()]
+
+
+@cache
+def _registry() -> Any:
+    from pint import UnitRegistry
+
+    return UnitRegistry()
+
+
+def serial_fields(members: Sequence[str], parameters: Sequence[str]) -> dict[str, Any]:
+    """The serialized state: how each number is read from the state and written into it."""
+    fields: list[tuple[str, str, str]] = []  # get, set to, kept when
+    inputs = [f"{group}.{name}" for group in ("set", "last") for name in ("displacement", "velocity", "current")]
+    fields += [(f"s->{name}", f"s.{name} = #", "") for name in (*inputs, "time")]
+    fields.append(("s->internal_step", "s.internal_step = #", f"# >= {SHORTEST!r}"))
+    choices: list[tuple[str, object, object]] = [
+        ("phase", "PHASE_INSTANTIATED", "PHASE_TERMINATED"),
+        ("drive", "DRIVE_DISPLACEMENT", "DRIVE_MOTION"),
+        ("started", 0, 1),
+        ("status", 0, STATUSES[-1][1]),
+    ]
+    choices += [("changed", 0, 1)] if parameters else []
+    fields += [(f"(double)s->{n}", f"s.{n} = (int)#", f"is_between(#, {low}, {high})") for n, low, high in choices]
+    fields += [(f"s->model.p.{name}", f"p.{name} = #", "") for name in parameters]
+    fields += [(f"s->wanted.{name}", f"s.wanted.{name} = #", "") for name in parameters]
+    fields += [(f"s->model.s.{name}", f"memory.{name} = #", "") for name in (*members, "force")]
+    fields.append(
+        ("(double)s->model.s.flags", "memory.flags = (unsigned)#", f"is_between(#, 0, {2 ** len(FLAGS) - 1})")
+    )
+    placed = [
+        (get, put.replace("#", f"v[{i}]"), kept.replace("#", f"v[{i}]")) for i, (get, put, kept) in enumerate(fields)
+    ]
+    return {
+        "serial": [{"read": get, "write": f"{put};"} for get, put, _ in placed],
+        "serial_count": len(fields),
+        "ranges": " && ".join(kept for _, _, kept in placed if kept),
+    }
+
+
+def c_bounds(info: ParameterInfo) -> str:
+    """The condition a value has to meet, in C; empty without bounds."""
+    low, high = info.bounds
+    checks = [f"value >= {float(low)!r}"] if math.isfinite(low) else []
+    return " && ".join(checks + ([f"value <= {float(high)!r}"] if math.isfinite(high) else []))
+
+
+def plain(text: str) -> str:
+    """Text without the characters XML forbids."""
+    return re.sub(r"[^\t\n\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "?", text)
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:]

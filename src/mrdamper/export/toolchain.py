@@ -1,0 +1,123 @@
+"""Compilers on this machine, and shared libraries made with them."""
+
+from __future__ import annotations
+
+import importlib.util
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+# Results are those of the Python stepper to the last bit: no contraction, no unsafe mathematics.
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared")
+_PATIENCE = 600  # s; a cross compiler builds its C library the first time
+
+
+@dataclass(frozen=True)
+class Platform:
+    """A platform an FMU can carry a binary for.
+
+    Attributes
+    ----------
+    name : str
+        As FMI 3.0 calls it.
+    fmi2 : str
+        As FMI 2.0 calls it; empty where it has no name for it.
+    suffix : str
+        Of its shared libraries.
+    target : str
+        As zig calls it.
+    """
+
+    name: str
+    fmi2: str
+    suffix: str
+    target: str
+
+
+PLATFORMS = (
+    Platform("x86_64-linux", "linux64", ".so", "x86_64-linux-gnu.2.17"),
+    Platform("aarch64-linux", "", ".so", "aarch64-linux-gnu.2.17"),
+    Platform("x86_64-windows", "win64", ".dll", "x86_64-windows-gnu"),
+    Platform("x86_64-darwin", "darwin64", ".dylib", "x86_64-macos"),
+    Platform("aarch64-darwin", "", ".dylib", "aarch64-macos"),
+)
+
+
+@dataclass(frozen=True)
+class Built:
+    """A library, or why there is none."""
+
+    library: bytes | None
+    reason: str = ""
+
+
+def here() -> Platform | None:
+    """The platform this runs on, where FMUs know it."""
+    machine = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}
+    name = f"{machine.get(platform.machine().lower(), '')}-{platform.system().lower()}"
+    return next((p for p in PLATFORMS if p.name == name), None)
+
+
+def compiler_for(wanted: Platform) -> tuple[str, ...]:
+    """The command that compiles for a platform; empty if there is none.
+
+    The system's own compiler comes first where it fits, then zig (`pip install ziglang`), which
+    compiles for all of them.
+    """
+    if wanted == here() and wanted.suffix != ".dll":
+        for name in ("cc", "gcc", "clang"):
+            found = shutil.which(name)
+            if found:
+                return (found,)
+    if importlib.util.find_spec("ziglang"):
+        return (sys.executable, "-m", "ziglang", "cc", "-target", wanted.target)
+    return ()
+
+
+def build_library(sources: Mapping[str, bytes], wanted: Platform, compiler: Sequence[str] | None = None) -> Built:
+    """Compile C sources into a shared library.
+
+    Parameters
+    ----------
+    sources : mapping of str to bytes
+        Headers and sources by file name.
+    wanted : Platform
+    compiler : sequence of str, optional
+        Command; found on this machine by default.
+    """
+    command = tuple(compiler) if compiler is not None else compiler_for(wanted)
+    if not command:
+        return Built(None, "no compiler for it; pip install ziglang")
+    with tempfile.TemporaryDirectory() as folder:
+        for name, text in sources.items():
+            (Path(folder) / name).write_bytes(text)
+        library = Path(folder) / f"library{wanted.suffix}"
+        files = sorted(name for name in sources if name.endswith(".c"))
+        # Without symbols, debug data and build paths the same sources give the same bytes.
+        strip = () if wanted.suffix == ".dylib" and "ziglang" not in command else ("-s",)
+        maths = () if wanted.suffix == ".dll" else ("-lm",)
+        try:
+            done = subprocess.run(
+                [*command, *FLAGS, *strip, *files, "-o", library.name, *maths],
+                cwd=folder,
+                capture_output=True,
+                text=True,
+                errors="replace",
+                timeout=_PATIENCE,
+                check=False,
+            )
+        except (OSError, subprocess.TimeoutExpired) as error:
+            return Built(None, str(error).splitlines()[0])
+        if done.returncode or not library.is_file():
+            return Built(None, _first_error(done.stderr))
+        return Built(library.read_bytes())
+
+
+def _first_error(text: str) -> str:
+    lines = text.strip().splitlines() or ["the compiler failed"]
+    return next((line for line in lines if "error" in line.lower()), lines[0])
