@@ -1,0 +1,152 @@
+"""How fast the live bench is, measured in a browser: `python -m benchmarks.web`.
+
+First page, slider to picture while ten loops of a thousand points are dragged, and twenty
+sessions predicting at once. Needs the web extra, playwright and Chromium.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+import threading
+import time
+import urllib.request
+from pathlib import Path
+
+import numpy as np
+
+from mrdamper.io.dataset import load_dataset
+from mrdamper.io.model_file import dump_model
+from mrdamper.joint import JointProblem
+
+CHROMIUM = os.environ.get("CHROMIUM", "/usr/bin/chromium")
+DRAG_SECONDS = 5.0
+SESSIONS, ASKING_SECONDS = 20, 5.0
+GOALS = "goals: first page 1 s; slider to picture 60 ms median, 20 updates a second; sessions p95 500 ms, no errors"
+
+
+def main() -> None:
+    print(f"{os.cpu_count()} processors, load {os.getloadavg()[0]:.1f} before; {GOALS}")
+    document = model_document()
+    server = subprocess.Popen(
+        [sys.executable, "-m", "mrdamper.cli", "serve", "--port", "0", "--no-browser"],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        address = server.stdout.readline().split()[2]  # type: ignore[union-attr]
+        for line in (*in_browser(address, document), sessions(address, document)):
+            print(line, flush=True)
+    finally:
+        server.terminate()
+        server.wait(timeout=10)
+    print(f"load {os.getloadavg()[0]:.1f} after")
+
+
+def model_document() -> str:
+    """The model of the second bundled rig."""
+    return dump_model(JointProblem(load_dataset().rig("utfsm").split("train"), "play-bypass").fit().damper)
+
+
+def in_browser(address: str, document: str):
+    """First page, then drags of current, amplitude and a parameter."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
+        yield first_page(browser, address)
+        page = browser.new_page(viewport={"width": 1366, "height": 768})
+        page.goto(address)
+        page.locator("html[data-ready]").wait_for()
+        page.get_by_role("button", name="Open the bundled tests", exact=True).click()
+        page.locator(".matrix").wait_for()
+        page.locator("input[type=file]").first.set_input_files(
+            {"name": "model.json", "mimeType": "application/json", "buffer": document.encode()}
+        )
+        page.get_by_label("Loops at all tested currents").check()
+        page.wait_for_timeout(2000)
+        for name in ("current_A", "amplitude_m", "fy1"):
+            yield drag(page, name)
+        browser.close()
+
+
+def first_page(browser, address: str, repeats: int = 5) -> str:
+    """From the address to the first view that can be used, in a fresh browser profile each time."""
+    taken = []
+    for _ in range(repeats):
+        context = browser.new_context()
+        page = context.new_page()
+        begin = time.perf_counter()
+        page.goto(address, wait_until="commit")
+        page.locator("html[data-ready]").wait_for()
+        taken.append(time.perf_counter() - begin)
+        context.close()
+    return f"first page: median {np.median(taken):.2f} s, worst {max(taken):.2f} s of {repeats}"
+
+
+def drag(page, name: str) -> str:
+    """Drag a slider to and fro by the mouse; the page times every picture."""
+    slider = page.locator(f"#slider-{name}")
+    slider.scroll_into_view_if_needed()
+    box = slider.bounding_box()
+    middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.evaluate("performance.clearMeasures()")
+    page.mouse.move(*middle)
+    page.mouse.down()
+    begin = time.perf_counter()
+    while (now := time.perf_counter() - begin) < DRAG_SECONDS:
+        page.mouse.move(middle[0] + 0.35 * box["width"] * math.sin(2 * now), middle[1])
+        time.sleep(0.008)
+    page.wait_for_timeout(200)
+    times = page.evaluate("performance.getEntriesByName('slider-to-picture').map((e) => e.duration)")
+    page.mouse.up()
+    page.wait_for_timeout(1000)
+    return (
+        f"drag {name}, 10 loops x 1000 points: slider to picture median {np.median(times):.0f} ms, "
+        f"p95 {np.percentile(times, 95):.0f} ms, {len(times) / DRAG_SECONDS:.0f} pictures a second"
+    )
+
+
+def sessions(address: str, document: str) -> str:
+    """Twenty sessions, each asking as fast as it is answered."""
+    taken: list[float] = []
+    errors: list[str] = []
+    threads = [threading.Thread(target=_asking, args=(address, document, taken, errors)) for _ in range(SESSIONS)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return (
+        f"{SESSIONS} sessions at once: {len(taken)} answers, p50 {1e3 * np.median(taken):.0f} ms, "
+        f"p95 {1e3 * np.percentile(taken, 95):.0f} ms, {len(errors)} errors"
+    )
+
+
+def _asking(address: str, document: str, taken: list[float], errors: list[str]) -> None:
+    def post(path: str, body: object) -> bytes:
+        headers = {"Origin": address.rstrip("/"), "Content-Type": "application/json"}
+        request = urllib.request.Request(f"{address}api/sessions{path}", json.dumps(body).encode(), headers)
+        with urllib.request.urlopen(request, timeout=30) as answer:
+            return answer.read()
+
+    try:
+        name = json.loads(post("", {}))["session"]
+        key = json.loads(post(f"/{name}/dampers", {"text": document}))["damper"]
+        begin, k = time.perf_counter(), 0
+        while time.perf_counter() - begin < ASKING_SECONDS:
+            k += 1
+            ask = {"current_A": 0.5 + 0.4 * math.sin(k / 9), "frequency_Hz": 1.0, "amplitude_m": 0.012, "currents": 9}
+            sent = time.perf_counter()
+            post(f"/{name}/dampers/{key}/predict", {**ask, "family": True})
+            taken.append(time.perf_counter() - sent)
+    except OSError as error:
+        errors.append(str(error))
+
+
+if __name__ == "__main__":
+    if not Path(CHROMIUM).is_file():
+        sys.exit(f"no browser at {CHROMIUM}; set CHROMIUM")
+    main()

@@ -1,0 +1,28 @@
+"""`mrdamper serve`: the live bench, a local page."""
+
+from __future__ import annotations
+
+import importlib.util
+
+import typer
+
+_NEEDS = ("fastapi", "uvicorn", "plotly")
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+
+    @app.command(epilog="Example: mrdamper serve --port 8765")
+    def serve(
+        port: int = typer.Option(8765, "--port", min=0, max=65535, help="Port on this machine; 0 for any free one."),
+        browser: bool = typer.Option(True, "--browser/--no-browser", help="Open the page in the browser."),
+    ) -> None:
+        """Open the live bench: drop rig files, see loops, identify, move the damper, take the report away."""
+        from mrdamper.errors import MissingExtraError
+
+        missing = [name for name in _NEEDS if importlib.util.find_spec(name) is None]
+        if missing:
+            raise MissingExtraError(f"the live bench needs {', '.join(missing)}", mend="pip install 'mrdamper[web]'")
+        from mrdamper.web import serve as run
+
+        run(port, browser)

@@ -1,0 +1,135 @@
+"""The Compare view: models on runs none of them has seen."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from fastapi import APIRouter
+from fastapi.responses import Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from mrdamper.comparison import Comparison, Entry, RigComparison, contestants
+from mrdamper.comparison.contestants import source
+from mrdamper.data import Dataset
+from mrdamper.errors import InputError
+from mrdamper.validation import RunScore, Validation
+from mrdamper.web.curves import measured_cycle, measured_window, predicted_on_run
+from mrdamper.web.frames import frame, number
+from mrdamper.web.rig_table import condition_on_screen
+from mrdamper.web.sessions import Current, Session
+from mrdamper.web.tasks import compare_models
+from mrdamper.web.work import Job
+from mrdamper.workflow import JOINTLY, STUDIED
+
+router = APIRouter(prefix="/sessions/{session}/compare")
+
+
+class Choice(BaseModel):
+    """What to compare."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    rig: int = Field(ge=0)
+    models: list[str] = Field(min_length=1, max_length=100)
+
+
+@router.get("/choices")
+def choices(session: Current) -> list[dict[str, Any]]:
+    """Models that can be compared; those of a study are chosen at first."""
+    return [
+        {
+            "name": c.name,
+            "source": source(c),
+            "slow": bool(c.basis and c.basis.costly),
+            "studied": c.name.split(":")[0] in (*STUDIED, JOINTLY),
+        }
+        for c in contestants()
+    ]
+
+
+@router.post("")
+def start(choice: Choice, session: Current) -> dict[str, Any]:
+    """Begin a comparison on one rig."""
+    session.cancel()
+    table = session.table(choice.rig)
+    jobs = max(1, (os.cpu_count() or 2) - 1)  # one processor is left to answer the page
+    dataset: Dataset = table.dataset
+    job = Job(
+        session.key("job"),
+        "compare",
+        compare_models,
+        (dataset, choice.models, jobs),
+        lambda found: _conclude(session, choice, found),
+    )
+    session.jobs[job.key] = job.start()
+    return job.report()
+
+
+@router.get("/runs/{key}")
+def overlaid(key: str, session: Current) -> Response:
+    """One run as measured, and as every compared model predicts it."""
+    found: RigComparison | None = session.results.get("compared")
+    table = session.results.get("compared.table")
+    if found is None or table is None:
+        raise InputError("nothing is compared yet", mend="start a comparison", code="E_NO_RESULT")
+    row = table.row(key)
+    measured = measured_cycle(row.run) if row.loop else measured_window(row.run)
+    arrays = {f"measured.{k}": v for k, v in measured.items()}
+    shown = []
+    for number_, entry in enumerate(found.entries):
+        curve, flags = predicted_on_run(entry.damper, row.run)
+        arrays |= {f"model{number_}.{k}": v for k, v in curve.items()}
+        shown.append({"title": entry.title, "extrapolation": flags})
+    return frame({"id": row.run.id, "condition": condition_on_screen(row.condition), "models": shown}, arrays)
+
+
+def _conclude(session: Session, choice: Choice, found: Comparison) -> dict[str, Any]:
+    rig = found.rigs[0]
+    table = session.table(choice.rig)
+    session.results["compared"], session.results["compared.table"] = rig, table
+    keys = {row.run.id: row.key for row in table.rows}
+    entries = []
+    for entry in rig.entries:
+        note = f"left out {100 * entry.left_out.median():.1f} %"
+        entries.append(_entry(entry, session.add(entry.damper, "comparison", note).key, keys))
+    return {
+        "rig": rig.rig,
+        "entries": entries,
+        "refused": dict(rig.refused),
+        "held_out": [{"key": keys[run.id], "id": run.id} for run in rig.dataset.split("validate")],
+        "seconds": round(found.seconds, 1),
+    }
+
+
+def _entry(entry: Entry, key: str, keys: dict[str, str]) -> dict[str, Any]:
+    return {
+        "damper": key,
+        "name": entry.name,
+        "title": entry.title,
+        "source": entry.source,
+        "limits": entry.limits,
+        "numbers": entry.damper.parameter_count,
+        "runs_needed": entry.runs_needed,
+        "train": _median(entry.train),
+        "left_out": _median(entry.left_out),
+        "held_out": _median(entry.held_out),
+        "other": _median(entry.other),
+        "seconds": round(entry.seconds, 2),
+        "scores": [_score(run, keys) for run in (*entry.held_out.runs, *entry.other.runs)],
+    }
+
+
+def _median(validation: Validation) -> float | None:
+    return number(validation.median()) if validation.runs else None
+
+
+def _score(run: RunScore, keys: dict[str, str]) -> dict[str, Any]:
+    return {
+        "key": keys[run.run_id],
+        "nrmse_pp": number(run.scores.nrmse_pp),
+        "energy_error": number(run.scores.energy_error),
+        "peak_error": number(run.scores.peak_error),
+        "floor": number(run.floor),
+        "extrapolation": run.extrapolation,
+    }

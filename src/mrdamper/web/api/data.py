@@ -1,0 +1,167 @@
+"""The Data view: drop files, judge them, see the test matrix and the loops."""
+
+from __future__ import annotations
+
+import shutil
+from typing import Any
+
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import Response
+from pydantic import BaseModel, Field
+
+from mrdamper.errors import UnknownNameError
+from mrdamper.io.quality.table import Quality
+from mrdamper.web.curves import measured_cycle, measured_window, raw_record
+from mrdamper.web.frames import frame
+from mrdamper.web.intake import DROP_LIMIT, FILE_LIMIT, Drop, DropError, Intake, bundled, read_drop
+from mrdamper.web.rig_table import condition_on_screen, describe
+from mrdamper.web.sessions import Current, Session
+
+router = APIRouter(prefix="/sessions/{session}")
+
+
+class Profile(BaseModel):
+    """A rig profile as TOML; empty to guess."""
+
+    toml: str = Field(default="", max_length=100_000)
+
+
+@router.post("/bundled")
+def open_bundled(session: Current) -> dict[str, Any]:
+    """Put the bundled tests on the bench."""
+    session.put(bundled())
+    return _overview(session)
+
+
+@router.post("/drops")
+def begin_drop(session: Current) -> dict[str, str]:
+    """Make a place for files; an earlier place goes."""
+    for old in session.drops.values():
+        shutil.rmtree(old.folder, ignore_errors=True)
+    key = session.key("drop")
+    folder = session.folder / key
+    folder.mkdir(mode=0o700)
+    session.drops = {key: Drop(key, folder)}
+    return {"drop": key}
+
+
+@router.put("/drops/{key}/files")
+async def take_file(
+    key: str, session: Current, request: Request, name: str = Query(min_length=1, max_length=1000)
+) -> dict[str, int]:
+    """Take one file as it streams in; stops at the limit, whatever the length it announced."""
+    drop = _drop(session, key)
+    announced = request.headers.get("content-length", "0")
+    if announced.isdecimal() and int(announced) > FILE_LIMIT:
+        raise _too_large(name)
+    path, size = drop.place(name), 0
+    try:
+        with path.open("xb") as file:
+            async for piece in request.stream():
+                size += len(piece)
+                if size > FILE_LIMIT:
+                    raise _too_large(name)
+                if drop.size + size > DROP_LIMIT:
+                    raise DropError("the files together exceed 1 GB", mend="drop fewer at once, or use mrdamper import")
+                file.write(piece)
+    except BaseException:  # also a connection that breaks off: half a file is none
+        path.unlink(missing_ok=True)
+        drop.names.pop(path, None)
+        raise
+    drop.size += size
+    return {"bytes": size}
+
+
+@router.post("/drops/{key}/read")
+def read(key: str, profile: Profile, session: Current) -> dict[str, Any]:
+    """Read what was dropped and put it on the bench."""
+    session.put(read_drop(_drop(session, key), profile.toml))
+    return _overview(session)
+
+
+@router.get("/data")
+def overview(session: Current) -> dict[str, Any]:
+    """What is on the bench, rig by rig."""
+    return _overview(session)
+
+
+@router.get("/data/rigs/{number}")
+def rig(number: int, session: Current) -> dict[str, Any]:
+    """The runs of a rig and its test matrix."""
+    table = session.table(number)
+    motions = table.motions()
+    currents = sorted({round(row.condition.current_A, 3) for g in motions for row in g if row.condition})
+    return {
+        "rig": table.dataset.rigs[0],
+        "runs": [describe(row) for row in table.rows],
+        "matrix": {
+            "currents_A": currents,
+            "motions": [_motion(group, currents) for group in motions],
+        },
+    }
+
+
+@router.get("/data/rigs/{number}/quality")
+def quality(number: int, session: Current) -> dict[str, Any]:
+    """The verdict on every run of a rig."""
+    table = session.table(number)
+    return {
+        row.key: {"verdict": found.verdict, "findings": _findings(found)}
+        for row, found in zip(table.rows, table.quality, strict=True)
+    }
+
+
+@router.get("/data/rigs/{number}/runs/{key}/{part}")
+def loop(number: int, key: str, part: str, session: Current) -> Response:
+    """A run's last whole cycle ("cycle") or its steady window ("window")."""
+    row = session.table(number).row(key)
+    if row.condition is None:
+        arrays = raw_record(row.run)
+    elif part == "cycle" and row.loop is not None:
+        arrays = measured_cycle(row.run)
+    else:
+        arrays = measured_window(row.run)
+    return frame({"key": key, "id": row.run.id, "condition": condition_on_screen(row.condition)}, arrays)
+
+
+def _overview(session: Session) -> dict[str, Any]:
+    intake: Intake = session.intake or bundled()
+    data = session.dataset
+    return {
+        "name": data.name,
+        "source": intake.source,
+        "rigs": [{"name": name, "runs": len(data.rig(name))} for name in data.rigs],
+        "runs": len(data),
+        "verdicts": [v.on_screen() for v in intake.verdicts],
+        "profile": intake.profile,
+    }
+
+
+def _findings(found: Quality) -> list[dict[str, str]]:
+    refusal = [] if found.refusal is None else [{"code": found.refusal.code, "text": found.refusal.found}]
+    return refusal + [{"code": finding.code, "text": finding.text} for finding in found.findings]
+
+
+def _motion(group: list[Any], currents: list[float]) -> dict[str, Any]:
+    first = condition_on_screen(group[0].condition)
+    assert first is not None  # only moving runs are grouped
+    cells: list[list[str]] = [[] for _ in currents]
+    for row in group:
+        nearest = min(range(len(currents)), key=lambda i: abs(currents[i] - row.condition.current_A))
+        cells[nearest].append(row.key)
+    return {"frequency_Hz": first["frequency_Hz"], "amplitude_mm": first["amplitude_mm"], "cells": cells}
+
+
+def _drop(session: Session, key: str) -> Drop:
+    if key not in session.drops:
+        raise UnknownNameError("that drop is over", mend="drop the files again")
+    return session.drops[key]
+
+
+def _too_large(name: str) -> DropError:
+    return DropError(
+        f"the file is over {FILE_LIMIT // 1_000_000} MB",
+        where=name,
+        mend="read it with mrdamper import, which has no such limit, and drop the dataset folder",
+        code="E_DROP_SIZE",
+    )

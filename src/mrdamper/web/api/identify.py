@@ -1,0 +1,203 @@
+"""The Identify view: the whole study, or one model and method."""
+
+from __future__ import annotations
+
+from inspect import signature
+from typing import Any
+
+from fastapi import APIRouter
+from fastapi.responses import Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from mrdamper.errors import InputError
+from mrdamper.identification import Identification, all_methods, identify
+from mrdamper.models import all_models
+from mrdamper.validation import Validation
+from mrdamper.web.curves import measured_cycle, modelled_cycle, predicted_on_run
+from mrdamper.web.frames import frame, number
+from mrdamper.web.rig_table import condition_on_screen
+from mrdamper.web.sessions import Current, Session
+from mrdamper.web.tasks import ALL_AT_ONCE, RUN_BY_RUN, Identified, identify_rig, study
+from mrdamper.web.work import Job
+from mrdamper.workflow import JOINTLY, Candidate, Study
+
+router = APIRouter(prefix="/sessions/{session}")
+
+
+class Choice(BaseModel):
+    """What to identify."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    rig: int = Field(ge=0)
+    model: str = Field(max_length=100)
+    method: str = Field(max_length=100)
+    over: str = Field(default=RUN_BY_RUN, pattern=f"^({RUN_BY_RUN}|{ALL_AT_ONCE})$")
+    runs: list[str] = Field(default_factory=list, max_length=10_000)
+
+
+@router.get("/choices")
+def choices(session: Current) -> dict[str, Any]:
+    """Models and methods there are, and those taken unless others are asked for."""
+    defaults = signature(identify).parameters
+    return {
+        "model": defaults["model"].default,
+        "method": defaults["method"].default,
+        "models": [
+            {
+                "name": name,
+                "title": cls.title,
+                "source": cls.source,
+                "equation": cls.equation,
+                "integrated": cls.integrated,
+                "jointly": name == JOINTLY,
+            }
+            for name, cls in all_models().items()
+        ],
+        "methods": [{"name": name, "about": _first_line(method)} for name, method in all_methods().items()],
+    }
+
+
+@router.post("/study")
+def start_study(session: Current) -> dict[str, Any]:
+    """Begin the whole method on all data."""
+    session.cancel()
+    folder = session.folder / session.key("study")
+    job = Job(
+        session.key("job"), "study", study, (session.dataset, folder), lambda found: _conclude_study(session, *found)
+    )
+    session.jobs[job.key] = job.start()
+    return job.report()
+
+
+@router.post("/identify")
+def start_identification(choice: Choice, session: Current) -> dict[str, Any]:
+    """Begin to identify one model of one rig."""
+    session.cancel()
+    table = session.table(choice.rig)
+    names = [table.row(key).run.id for key in choice.runs]
+    job = Job(
+        session.key("job"),
+        "identify",
+        identify_rig,
+        (table.dataset, names, choice.model, choice.method, choice.over),
+        lambda found: _conclude_identification(session, choice, found),
+    )
+    session.jobs[job.key] = job.start()
+    return job.report()
+
+
+@router.get("/identified/runs/{number}")
+def residual(number: int, session: Current) -> Response:
+    """Measured and identified force of one identified run, and the residual."""
+    found: Identified | None = session.results.get("identified")
+    table = session.results.get("identified.table")
+    if found is None or table is None:
+        raise InputError("nothing is identified yet", mend="start an identification", code="E_NO_RESULT")
+    if not 0 <= number < len(found.run_ids):
+        raise InputError("no such run", mend="choose one from the table", code="E_NAME")
+    row = next(row for row in table.rows if row.run.id == found.run_ids[number])
+    if found.identifications:
+        one = found.identifications[number]
+        modelled = modelled_cycle(one.model, row.run, one.delay)
+    else:
+        assert found.joint is not None  # one or the other
+        modelled = predicted_on_run(found.joint.damper, row.run)[0]
+    measured = measured_cycle(row.run)
+    arrays = {f"measured.{k}": v for k, v in measured.items()} | {f"model.{k}": v for k, v in modelled.items()}
+    arrays["residual"] = modelled["F"] - measured["F"]
+    return frame({"id": row.run.id, "condition": condition_on_screen(row.condition)}, arrays)
+
+
+def _conclude_study(session: Session, found: Study, written: list[Any]) -> dict[str, Any]:
+    session.results["study"] = found
+    session.results["study.files"] = written
+    rigs = []
+    for rig in found.rigs:
+        listed = []
+        for candidate in rig.candidates:
+            note = f"left out {_percent(candidate.left_out)}, held out {_percent(candidate.held_out)}"
+            bench = session.add(candidate.damper, "study", note)
+            listed.append(_candidate(candidate, bench.key))
+        rigs.append({"rig": rig.rig, "chosen": listed[0]["damper"], "candidates": listed})
+    return {"rigs": rigs, "seconds": round(found.seconds, 1)}
+
+
+def _candidate(candidate: Candidate, key: str) -> dict[str, Any]:
+    return {
+        "damper": key,
+        "title": candidate.title,
+        "numbers": candidate.damper.parameter_count,
+        "per_run": number(candidate.per_run_median),
+        "left_out": number(candidate.left_out.median()),
+        "held_out": number(candidate.held_out.median()),
+        "seconds": round(candidate.seconds, 2),
+    }
+
+
+def _conclude_identification(session: Session, choice: Choice, found: Identified) -> dict[str, Any]:
+    session.results["identified"] = found
+    session.results["identified.table"] = session.table(choice.rig)
+    bench = None
+    if found.damper is not None:
+        note = f"held out {_percent(found.held_out)}" if found.held_out else ""
+        bench = session.add(found.damper, "identification", note)
+    return {
+        "damper": bench.key if bench else None,
+        "title": found.damper.title if found.damper else None,
+        "numbers": found.damper.parameter_count if found.damper else None,
+        "no_damper": found.no_damper,
+        "held_out": number(found.held_out.median()) if found.held_out else None,
+        "median": number(found.median),
+        "runs": [_identified(i) for i in found.identifications],
+        "joint": _joint(found),
+        "units": _units(found),
+        "refused": found.refused,
+    }
+
+
+def _identified(one: Identification) -> dict[str, Any]:
+    return {
+        "id": one.run_id,
+        "condition": condition_on_screen(one.condition),
+        "nrmse_pp": number(one.scores.nrmse_pp),
+        "floor": number(one.floor),
+        "values": {n: number(v) for n, v in one.model.values().items()},
+        "errors": {n: number(v) for n, v in one.standard_errors.items()},
+        "at_bounds": one.at_bounds,
+        "message": one.message,
+        "notes": one.notes,
+    }
+
+
+def _joint(found: Identified) -> dict[str, Any] | None:
+    if found.joint is None:
+        return None
+    model = found.joint.damper.model
+    return {
+        "values": {n: number(v) for n, v in model.values().items()},
+        "at_bounds": found.joint.at_bounds,
+        "runs": [
+            {"id": name, "nrmse_pp": number(error)}
+            for name, error in zip(found.run_ids, found.joint.nrmse_pp.tolist(), strict=True)
+        ],
+        "message": found.joint.message,
+    }
+
+
+def _units(found: Identified) -> list[dict[str, str]]:
+    if found.identifications:
+        infos, free = found.identifications[0].model.parameters(), found.identifications[0].free
+    elif found.joint is not None:
+        infos, free = found.joint.damper.model.parameters(), found.joint.damper.free
+    else:
+        return []
+    return [{"name": i.name, "unit": i.unit, "meaning": i.meaning} for i in infos if i.name in free]
+
+
+def _percent(validation: Validation | None) -> str:
+    return f"{100 * validation.median():.1f} %" if validation is not None and validation.runs else "–"
+
+
+def _first_line(method: Any) -> str:
+    return (type(method).__doc__ or "").strip().split("\n")[0]

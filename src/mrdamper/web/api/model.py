@@ -1,0 +1,157 @@
+"""The Model view: a damper under sliders, answered fast enough to be dragged."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from fastapi import APIRouter
+from fastapi.responses import Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from mrdamper.damper import Damper
+from mrdamper.data import Condition
+from mrdamper.metrics import dissipated_power, peak_force
+from mrdamper.web.bench_model import held_model, middle, predict_held, sliders
+from mrdamper.web.curves import predicted_cycle
+from mrdamper.web.frames import frame, number
+from mrdamper.web.rig_table import condition_on_screen
+from mrdamper.web.sessions import Bench, Current
+
+router = APIRouter(prefix="/sessions/{session}/dampers")
+_FAMILY = 10  # loops of a family over current
+_BEYOND = 1.25  # sliders and curves reach past the tested conditions, where the answer is flagged
+
+
+class Ask(BaseModel):
+    """What the sliders say, SI."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    current_A: float = Field(ge=0, le=1000)
+    frequency_Hz: float = Field(gt=0, le=10_000)
+    amplitude_m: float = Field(gt=0, le=10)
+    held: dict[str, float] = Field(default_factory=dict, max_length=64)
+    family: bool = False
+    currents: int = Field(default=33, ge=0, le=100)
+
+    @property
+    def condition(self) -> Condition:
+        """The condition asked for."""
+        return Condition(self.current_A, self.frequency_Hz, self.amplitude_m)
+
+
+@router.get("")
+def dampers(session: Current) -> list[dict[str, Any]]:
+    """All dampers on the bench, the newest last."""
+    return [_head(bench) for bench in session.dampers.values()]
+
+
+@router.get("/{key}")
+def damper(key: str, session: Current) -> dict[str, Any]:
+    """A damper's sliders and tested envelope."""
+    bench = session.damper(key)
+    found, e = bench.damper, bench.damper.envelope
+    start = middle(found)
+    table = session.table_of(found.rig)
+    near = table.nearest(start, 1, anywhere=True) if table else []
+    if near and near[0].condition:
+        start = near[0].condition  # one that was measured: there is something to compare with
+    return {
+        **_head(bench),
+        "parameters": sliders(found),
+        "start": {"current_A": start.current_A, "frequency_Hz": start.frequency_Hz, "amplitude_m": start.amplitude_m},
+        "envelope": {
+            "current_A": e.current_A,
+            "frequency_Hz": e.frequency_Hz,
+            "amplitude_m": e.amplitude_m,
+            "peak_velocity_m_s": e.peak_velocity_m_s,
+        },
+        "reach": {
+            "current_A": (0.0, _BEYOND * (e.current_A[1] or 1.0)),
+            "frequency_Hz": (e.frequency_Hz[0] / _BEYOND, e.frequency_Hz[1] * _BEYOND),
+            "amplitude_m": (e.amplitude_m[0] / _BEYOND, e.amplitude_m[1] * _BEYOND),
+        },
+        "provenance": dict(found.provenance),
+    }
+
+
+@router.post("/{key}/predict")
+def predict(key: str, ask: Ask, session: Current) -> Response:
+    """Loops at a condition, the curves over current, and what was measured nearest."""
+    found = session.damper(key).damper
+    arrays: dict[str, Any] = {}
+    loops = []
+    for name, condition in _loops(found, ask):
+        prediction = predict_held(found, condition, ask.held)
+        cycle = predicted_cycle(prediction)
+        arrays |= {f"{name}.{axis}": values for axis, values in cycle.items()}
+        loops.append({"name": name, "current_A": condition.current_A, **_figures(prediction)})
+    if ask.currents:
+        arrays |= _over_current(found, ask)
+    model = held_model(found, ask.condition, ask.held)
+    table = session.table_of(found.rig)
+    head = {
+        "loops": loops,
+        "peak_velocity_m_s": ask.condition.peak_velocity,
+        "extrapolation": found.envelope.flags(ask.condition),
+        "tested_to_A": found.envelope.current_A[1],
+        "parameters": {n: number(v) for n, v in model.values().items()} if model else {},
+        "nearest": [_measured(row) for row in table.nearest(ask.condition)] if table else [],
+        "measured": [_measured(row) for row in table.at_motion(ask.condition)] if table else [],
+    }
+    return frame(head, arrays)
+
+
+def _loops(found: Damper, ask: Ask) -> list[tuple[str, Condition]]:
+    """The loop asked for, and where wished those of the tested range of currents."""
+    loops = [("now", ask.condition)]
+    if ask.family:
+        low, high = found.envelope.current_A
+        spread = np.linspace(low, high, _FAMILY - 1)
+        loops += [(f"family{i}", Condition(float(I), ask.frequency_Hz, ask.amplitude_m)) for i, I in enumerate(spread)]
+    return loops
+
+
+def _over_current(found: Damper, ask: Ask) -> dict[str, Any]:
+    currents = np.linspace(0.0, _BEYOND * (found.envelope.current_A[1] or 1.0), ask.currents)
+    figures = [
+        _figures(predict_held(found, Condition(float(I), ask.frequency_Hz, ask.amplitude_m), ask.held))
+        for I in currents
+    ]
+    return {
+        "over.current": currents,
+        "over.peak": np.array([f["peak_N"] for f in figures]),
+        "over.energy": np.array([f["energy_J"] for f in figures]),
+    }
+
+
+def _figures(prediction: Any) -> dict[str, float]:
+    motion = prediction.motion
+    power = dissipated_power(prediction.force, motion.velocity, motion.time)
+    return {
+        "peak_N": peak_force(prediction.force),
+        "energy_J": power / prediction.condition.frequency_Hz,
+    }
+
+
+def _measured(row: Any) -> dict[str, Any]:
+    return {
+        "key": row.key,
+        "id": row.run.id,
+        "split": row.run.split,
+        "condition": condition_on_screen(row.condition),
+        "peak_N": number(row.loop.peak_force),
+        "energy_J": number(row.loop.dissipated_energy),
+    }
+
+
+def _head(bench: Bench) -> dict[str, Any]:
+    return {
+        "key": bench.key,
+        "title": bench.damper.title,
+        "rig": bench.damper.rig,
+        "numbers": bench.damper.parameter_count,
+        "origin": bench.origin,
+        "note": bench.note,
+    }

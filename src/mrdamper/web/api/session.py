@@ -1,0 +1,41 @@
+"""Open a session, keep it, end it."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from typing import Any
+
+from fastapi import APIRouter, Request
+
+from mrdamper.web.intake import FILE_COUNT_LIMIT, FILE_LIMIT
+from mrdamper.web.sessions import Current
+
+router = APIRouter(prefix="/sessions")
+
+
+@router.post("")
+def open_session(request: Request) -> dict[str, Any]:
+    """A new session and what the page must know of the bench."""
+    session = request.app.state.sessions.open()
+    return {
+        "session": session.name,
+        "version": version("mrdamper"),
+        "limits": {"file_bytes": FILE_LIMIT, "files": FILE_COUNT_LIMIT},
+    }
+
+
+@router.get("/{session}")
+def keep(session: Current) -> dict[str, Any]:
+    """Say that the page is still open; says what is on the bench."""
+    intake = session.intake
+    return {
+        "data": None if intake is None else {"source": intake.source, "name": intake.dataset.name},
+        "dampers": len(session.dampers),
+    }
+
+
+@router.delete("/{session}")
+def end(session: Current, request: Request) -> dict[str, bool]:
+    """End it and remove its files."""
+    request.app.state.sessions.end(session.name)
+    return {"ended": True}

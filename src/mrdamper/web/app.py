@@ -1,0 +1,147 @@
+"""The application: guard, views, page, and an end that leaves nothing behind."""
+
+from __future__ import annotations
+
+import asyncio
+import importlib.util
+import sys
+import traceback
+from collections.abc import AsyncIterator, Callable, Iterable
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import FileResponse, JSONResponse
+from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from mrdamper.errors import InputError, MissingExtraError
+from mrdamper.web.api import routers
+from mrdamper.web.intake import NothingTakenError
+from mrdamper.web.security import Guard
+from mrdamper.web.sessions import Sessions
+from mrdamper.web.work import refusal
+
+STATIC = Path(__file__).parent / "static"
+_SWEEP_SECONDS = 60.0
+_STATUS = {"E_SESSION": 410, "E_DROP_SIZE": 413}
+
+
+def create_app(hosts: Iterable[str], stopping: Callable[[], bool] = lambda: False) -> FastAPI:
+    """Make the application.
+
+    Parameters
+    ----------
+    hosts : iterable of str
+        Values of the Host header that are this bench, with the port.
+    stopping : callable
+        Says whether the server is about to stop, so that open streams end.
+
+    Raises
+    ------
+    MissingExtraError
+        If the chart library is not installed.
+    """
+    chart_library = plotly_script()
+    sessions = Sessions()
+
+    @asynccontextmanager
+    async def life(app: FastAPI) -> AsyncIterator[None]:
+        sweeper = asyncio.create_task(_sweep(sessions))
+        yield
+        sweeper.cancel()
+        sessions.close()
+
+    app = FastAPI(title="mrdamper live bench", docs_url=None, redoc_url=None, openapi_url=None, lifespan=life)
+    app.state.sessions, app.state.stopping = sessions, stopping
+    app.add_exception_handler(InputError, _refuse)
+    app.add_exception_handler(RequestValidationError, _misunderstand)
+    for router in routers():
+        app.include_router(router, prefix="/api")
+
+    @app.get("/")
+    def page() -> FileResponse:
+        return FileResponse(STATIC / "index.html", headers={"Cache-Control": "no-cache"})
+
+    @app.get("/static/plotly.js")
+    def charts() -> FileResponse:
+        return FileResponse(chart_library, media_type="text/javascript", headers={"Cache-Control": "max-age=3600"})
+
+    app.mount("/static", _Static(directory=STATIC))
+    app.add_middleware(_Faults)
+    app.add_middleware(Guard, hosts=tuple(hosts))
+    return app
+
+
+def plotly_script() -> Path:
+    """The chart library's script inside the plotly package, found without importing it.
+
+    Raises
+    ------
+    MissingExtraError
+        If the package is not installed.
+    """
+    found = importlib.util.find_spec("plotly")
+    script = Path(found.origin).parent / "package_data" / "plotly.min.js" if found and found.origin else None
+    if script is None or not script.is_file():
+        raise MissingExtraError("the live bench needs plotly", mend="pip install 'mrdamper[web]'")
+    return script
+
+
+class _Static(StaticFiles):
+    """Files of the page; a browser asks each time whether they changed, so an update is seen."""
+
+    def file_response(self, *args, **kwargs):
+        response = super().file_response(*args, **kwargs)
+        response.headers["Cache-Control"] = "no-cache"
+        return response
+
+
+async def _sweep(sessions: Sessions) -> None:
+    while True:
+        await asyncio.sleep(_SWEEP_SECONDS)
+        await asyncio.to_thread(sessions.sweep)
+
+
+def _refuse(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, InputError)
+    said: dict[str, Any] = dict(refusal(error))
+    if isinstance(error, NothingTakenError):
+        said |= {"verdicts": [v.on_screen() for v in error.verdicts], "profile": error.profile}
+    return JSONResponse(said, status_code=_STATUS.get(error.code, 422))
+
+
+def _misunderstand(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, RequestValidationError)
+    first = error.errors()[0]
+    where = ".".join(str(part) for part in first["loc"][1:])
+    return JSONResponse(refusal(InputError(first["msg"], where=where, code="E_REQUEST")), status_code=422)
+
+
+class _Faults:
+    """Our own faults: traced on the terminal, admitted on the page, the inside kept in.
+
+    Inside the guard, so that this answer too carries its headers.
+    """
+
+    def __init__(self, app: ASGIApp):
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        begun = False
+
+        async def watched(message: Message) -> None:
+            nonlocal begun
+            begun = begun or message["type"] == "http.response.start"
+            await send(message)
+
+        try:
+            await self.app(scope, receive, watched)
+        except Exception:
+            traceback.print_exc(file=sys.stderr)
+            if scope["type"] != "http" or begun:
+                raise
+            text = "This is our fault, not yours: the terminal shows what happened."
+            await JSONResponse({"text": text, "code": "E_OURS"}, status_code=500)(scope, receive, send)

@@ -1,0 +1,82 @@
+"""Loops as arrays in the units of the screen: measured, predicted, and both over one run."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mrdamper.damper import Damper, Prediction
+from mrdamper.data import Floats, Run
+from mrdamper.excitation import Excitation, analyse_motion, equivalent_sine, measured_motion
+from mrdamper.models import Model
+from mrdamper.simulation import simulate
+
+MM = 1e3
+MOST_POINTS = 1000  # of a curve on the screen
+
+
+def on_screen(
+    motion: Excitation, force: Floats, picked: NDArray[np.intp] | None = None, start: float = 0.0
+) -> dict[str, Floats]:
+    """Time [s] from `start`, displacement [mm], velocity [m/s] and force [N] of some samples, thinned."""
+    picked = np.arange(len(motion)) if picked is None else picked
+    if picked.size > MOST_POINTS:  # evenly, and the last sample closes the loop
+        picked = picked[np.linspace(0, picked.size - 1, MOST_POINTS).round().astype(int)]
+    return {
+        "t": motion.time[picked] - start,
+        "x": MM * motion.displacement[picked],
+        "v": motion.velocity[picked],
+        "F": force[picked],
+    }
+
+
+def measured_cycle(run: Run) -> dict[str, Floats]:
+    """The last whole cycle of a steady sine, from its way up through mid-stroke on."""
+    return on_screen(_motion(run), run.force, *_last_cycle(run))
+
+
+def measured_window(run: Run) -> dict[str, Floats]:
+    """All of a run's steady window."""
+    return on_screen(_motion(run), run.force, np.flatnonzero(run.in_window))
+
+
+def raw_record(run: Run) -> dict[str, Floats]:
+    """A whole record as it stands in the file, for runs without motion."""
+    velocity = np.zeros(run.time.size) if run.velocity is None else run.velocity
+    motion = Excitation(run.time, run.displacement, velocity, np.zeros(run.time.size), run.current)
+    return on_screen(motion, run.force)
+
+
+def predicted_cycle(prediction: Prediction) -> dict[str, Floats]:
+    """A predicted closed loop."""
+    return on_screen(prediction.motion, prediction.force)
+
+
+def modelled_cycle(model: Model, run: Run, delay: float = 0.0) -> dict[str, Floats]:
+    """The force of a model over the samples of `measured_cycle`, its force channel late by `delay` [s]."""
+    motion = _motion(run)
+    force = simulate(model, motion.delayed(delay) if delay else motion).force
+    return on_screen(motion, force, *_last_cycle(run))
+
+
+def predicted_on_run(damper: Damper, run: Run) -> tuple[dict[str, Floats], tuple[str, ...]]:
+    """The force a damper predicts along the measured motion: last cycle of a sine, or the whole window."""
+    prediction = damper.predict_run(run)
+    if equivalent_sine(run).is_sine:
+        return on_screen(prediction.motion, prediction.force, *_last_cycle(run)), prediction.extrapolation
+    return on_screen(prediction.motion, prediction.force, np.flatnonzero(run.in_window)), prediction.extrapolation
+
+
+def _motion(run: Run) -> Excitation:
+    return measured_motion(run).about(equivalent_sine(run).centre)
+
+
+def _last_cycle(run: Run) -> tuple[NDArray[np.intp], float]:
+    """Samples of the last cycle inside the steady window that begins on the way up, and its start [s]."""
+    series = analyse_motion(run).series
+    period = 1.0 / series.frequency
+    crossing = series.origin - series.phase() * period / (2 * np.pi)
+    end = float(run.time[run.in_window][-1])
+    start = float(crossing + np.floor((end - crossing) / period - 1.0 + 1e-6) * period)
+    first, last = np.searchsorted(run.time, (start, start + period))
+    return np.arange(first, min(int(last) + 1, run.time.size)), start  # one sample more closes the loop

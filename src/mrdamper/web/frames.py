@@ -1,0 +1,44 @@
+"""Numbers on their way to the page: a JSON head and 32-bit floats, one after the other.
+
+A screen shows no more than 32 bits of a curve, and the page reads the arrays without parsing.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from starlette.responses import Response
+
+from mrdamper.data import Floats
+
+_STEP = 4  # bytes a float32 takes; a typed array must begin at a multiple
+
+
+def frame(head: Mapping[str, Any], arrays: Mapping[str, Floats]) -> Response:
+    """Answer with named arrays.
+
+    Layout: length of the head (uint32, little endian), the head as JSON padded with blanks to a
+    multiple of four bytes, then the arrays as little-endian float32 in the order of
+    `head["arrays"]`, a list of [name, length].
+
+    Parameters
+    ----------
+    head : mapping
+        What goes with them, ready for JSON.
+    arrays : mapping of str to (N,) array
+    """
+    index = [[name, int(values.size)] for name, values in arrays.items()]
+    text = json.dumps({**head, "arrays": index}, ensure_ascii=False, allow_nan=False).encode()
+    text += b" " * (-len(text) % _STEP)
+    body = b"".join(np.ascontiguousarray(values, dtype="<f4").tobytes() for values in arrays.values())
+    return Response(struct.pack("<I", len(text)) + text + body, media_type="application/octet-stream")
+
+
+def number(value: float | None) -> float | None:
+    """A number JSON can hold: what is not finite becomes nothing."""
+    return float(value) if value is not None and math.isfinite(value) else None

@@ -1,0 +1,178 @@
+"""What the page knows of every run of a rig: condition, figures of its loop, whether it can be used."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from mrdamper.data import Condition, Dataset, Run
+from mrdamper.errors import InputError
+from mrdamper.excitation import equivalent_sine
+from mrdamper.io.quality.table import Quality, quality_table, record_of
+from mrdamper.loop_analysis import LoopAnalysis, analyse_loop, same_motion
+from mrdamper.web.frames import number
+from mrdamper.workflow import usable_sines
+
+MM = 1e3
+_NEAREST = 3  # measured loops laid under a prediction
+_TABLES: WeakKeyDictionary[Dataset, dict[str, RigTable]] = WeakKeyDictionary()
+_MAKING = threading.Lock()
+_FAR, _ALSO = 0.4, 0.2  # beyond, a run says nothing about the condition asked for; further ones must be nearer
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One run.
+
+    Attributes
+    ----------
+    key : str
+        Made here.
+    run : Run
+    condition : Condition or None
+        Measured; None where the run does not move.
+    loop : LoopAnalysis or None
+        Of steady sines.
+    refused : str
+        Why it is not identified from; empty where it can be.
+    """
+
+    key: str
+    run: Run
+    condition: Condition | None
+    loop: LoopAnalysis | None
+    refused: str
+
+
+@dataclass(frozen=True, eq=False)
+class RigTable:
+    """The runs of one rig, in the order of the file."""
+
+    dataset: Dataset
+    rows: tuple[Row, ...]
+
+    @classmethod
+    def of(cls, dataset: Dataset) -> RigTable:
+        """Analyse every run of a rig."""
+        sines, refused = usable_sines(dataset)
+        steady = {run.id for run in sines}
+        rows = [
+            Row(f"run{i}", run, _condition(run), _loop(run) if run.id in steady else None, refused.get(run.id, ""))
+            for i, run in enumerate(dataset)
+        ]
+        return cls(dataset, tuple(rows))
+
+    @cached_property
+    def quality(self) -> tuple[Quality, ...]:
+        """The verdict on every run, in order: judged once, when first asked for."""
+        return quality_table(record_of(row.run) for row in self.rows)
+
+    def row(self, key: str) -> Row:
+        """The row of that key.
+
+        Raises
+        ------
+        InputError
+            If there is none.
+        """
+        for row in self.rows:
+            if row.key == key:
+                return row
+        raise InputError("no such run on the bench", mend="choose one from the table", code="E_NAME")
+
+    def nearest(self, condition: Condition, most: int = _NEAREST, anywhere: bool = False) -> list[Row]:
+        """Steady sines measured nearest to a condition, the nearest first; the far ones only if `anywhere`."""
+        loops = [row for row in self.rows if row.loop and row.condition]
+        reach = max((row.condition.current_A for row in loops if row.condition), default=0.0) or 1.0
+
+        def distance(row: Row) -> float:
+            c = row.condition or condition
+            return max(
+                abs(c.current_A - condition.current_A) / reach,
+                abs(np.log(c.frequency_Hz / condition.frequency_Hz)),
+                abs(np.log(c.amplitude_m / condition.amplitude_m)),
+            )
+
+        ordered = sorted(loops, key=distance)[:most]
+        return [row for i, row in enumerate(ordered) if anywhere or distance(row) <= (_ALSO if i else _FAR)]
+
+    def at_motion(self, condition: Condition) -> list[Row]:
+        """Steady sines of the motion of a condition, at any current."""
+        loops = [row for row in self.rows if row.loop and row.condition]
+        groups = same_motion([condition, *(row.condition for row in loops if row.condition)])
+        return [loops[i - 1] for i in groups[0] if i > 0]
+
+    def motions(self) -> list[list[Row]]:
+        """Steady sines of one motion each, slow and small first: the lines of the test matrix."""
+        moving = [row for row in self.rows if row.condition is not None and row.loop is not None]
+        conditions: list[Condition] = [row.condition for row in moving if row.condition]
+        groups = [[moving[i] for i in group] for group in same_motion(conditions)]
+        return sorted(groups, key=lambda g: (round(_of(g).frequency_Hz, 2), _of(g).amplitude_m))
+
+
+def rig_table(dataset: Dataset, rig: str) -> RigTable:
+    """The table of a rig, made once for as long as the data live."""
+    with _MAKING:
+        tables = _TABLES.setdefault(dataset, {})
+        if rig not in tables:
+            tables[rig] = RigTable.of(dataset.rig(rig))
+        return tables[rig]
+
+
+def describe(row: Row) -> dict[str, Any]:
+    """A row as the page shows it, in its units."""
+    run, loop = row.run, row.loop
+    return {
+        "key": row.key,
+        "id": run.id,
+        "split": run.split,
+        "excitation": run.excitation,
+        "condition": condition_on_screen(row.condition),
+        "samples": int(run.time.size),
+        "duration_s": number(float(run.time[-1] - run.time[0])),
+        "cycles": number(loop.motion.cycles) if loop else None,
+        "peak_N": number(loop.peak_force) if loop else None,
+        "energy_J": number(loop.dissipated_energy) if loop else None,
+        "mean_N": number(loop.mean_force) if loop else None,
+        "damping_Ns_m": number(loop.equivalent_damping) if loop else None,
+        "repeatability": number(run.repeatability),
+        "refused": row.refused,
+        "notes": {name: str(value) for name, value in run.notes.items()},
+    }
+
+
+def condition_on_screen(condition: Condition | None) -> dict[str, float] | None:
+    """A condition in the units of the screen."""
+    if condition is None:
+        return None
+    return {
+        "current_A": condition.current_A,
+        "frequency_Hz": condition.frequency_Hz,
+        "amplitude_mm": MM * condition.amplitude_m,
+    }
+
+
+def _of(rows: Sequence[Row]) -> Condition:
+    first = rows[0].condition
+    assert first is not None  # only moving rows are grouped
+    return first
+
+
+def _condition(run: Run) -> Condition | None:
+    try:
+        return equivalent_sine(run).condition
+    except InputError:
+        return None
+
+
+def _loop(run: Run) -> LoopAnalysis | None:
+    try:
+        return analyse_loop(run)
+    except InputError:
+        return None

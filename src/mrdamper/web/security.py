@@ -1,0 +1,90 @@
+"""Who may talk to the bench, and what the page may load.
+
+The bench listens on the loopback device, but any page in the same browser can reach that:
+a request must name this host (against DNS rebinding) and, if it changes something, come from
+the bench's own page (against forged requests). The page itself may load nothing from
+elsewhere and run no inline script or style.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import PlainTextResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+CONTENT_SECURITY_POLICY = "; ".join(
+    (
+        "default-src 'none'",
+        "script-src 'self'",
+        "style-src 'self'",
+        "img-src 'self' data: blob:",  # the chart library draws its image files through them
+        "connect-src 'self'",
+        "font-src 'self'",
+        "base-uri 'none'",
+        "form-action 'none'",
+        "frame-ancestors 'none'",
+    )
+)
+HEADERS = {
+    "Content-Security-Policy": CONTENT_SECURITY_POLICY,
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Permissions-Policy": "camera=(), microphone=(), geolocation=()",
+}
+_HARMLESS = frozenset({"GET", "HEAD"})
+_OWN_SITES = frozenset({"same-origin", "none"})  # what a browser says of our page, and of a typed address
+
+
+class Guard:
+    """Refuse strangers, and send every answer with the headers above.
+
+    Parameters
+    ----------
+    app : ASGI application
+    hosts : iterable of str
+        Values of the Host header that are this bench, with the port.
+    """
+
+    def __init__(self, app: ASGIApp, hosts: Iterable[str]):
+        self.app = app
+        self.hosts = frozenset(hosts)
+        self.origins = frozenset(f"http://{host}" for host in self.hosts)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            # Nothing here speaks WebSocket; start and stop of the application pass.
+            if scope["type"] == "lifespan":
+                await self.app(scope, receive, send)
+            return
+        refusal = self.refusal(scope["method"], Headers(scope=scope))
+
+        async def send_guarded(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                for name, value in HEADERS.items():
+                    headers[name] = value
+                headers.setdefault("Cache-Control", "no-store")
+            await send(message)
+
+        if refusal:
+            await PlainTextResponse(refusal, status_code=403)(scope, receive, send_guarded)
+        else:
+            await self.app(scope, receive, send_guarded)
+
+    def refusal(self, method: str, headers: Headers) -> str | None:
+        """Why a request is not answered, or None."""
+        if headers.get("host", "").lower() not in self.hosts:
+            return "This host name is not the bench's."
+        if headers.get("sec-fetch-site", "same-origin") not in _OWN_SITES:
+            return "Other pages may not use the bench."
+        origin = headers.get("origin")
+        if method in _HARMLESS and origin is None:
+            return None
+        if origin not in self.origins:
+            return "Changes are taken from the bench's own page only."
+        return None

@@ -1,0 +1,205 @@
+"""What one open page works on, kept apart from every other.
+
+A session's name is made here and cannot be guessed; whoever knows it may use it. Its files
+live in a folder of its own that goes with it.
+"""
+
+from __future__ import annotations
+
+import secrets
+import shutil
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+from fastapi import Depends, Request
+
+from mrdamper.damper import Damper
+from mrdamper.data import Dataset
+from mrdamper.errors import InputError, UnknownNameError
+from mrdamper.web.intake import Drop, Intake
+from mrdamper.web.rig_table import RigTable, rig_table
+from mrdamper.web.work import Job
+
+IDLE_SECONDS = 12 * 3600  # a page that is open says so every minute; a closed one is forgotten after this
+MOST_SESSIONS = 64
+MOST_DAMPERS = 200
+_NAME_BYTES = 16
+_LAST_WAIT = 10.0  # seconds for workers to end when the bench stops
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """A damper on the bench.
+
+    Attributes
+    ----------
+    key : str
+        Made here.
+    damper : Damper
+    origin : str
+        How it came: "study", "identification", "comparison", "file".
+    note : str
+        One line on how good it is, or where it came from.
+    """
+
+    key: str
+    damper: Damper
+    origin: str
+    note: str = ""
+
+
+@dataclass(eq=False)
+class Session:
+    """State of one page on this side: data, dampers, jobs, files."""
+
+    name: str
+    folder: Path
+    seen: float = field(default_factory=time.monotonic)
+    intake: Intake | None = None
+    drops: dict[str, Drop] = field(default_factory=dict)
+    dampers: dict[str, Bench] = field(default_factory=dict)
+    jobs: dict[str, Job] = field(default_factory=dict)
+    results: dict[str, Any] = field(default_factory=dict)
+    lock: threading.Lock = field(default_factory=threading.Lock)
+    _count: int = 0
+
+    def key(self, kind: str) -> str:
+        """A name for something new; never taken from outside."""
+        with self.lock:
+            self._count += 1
+            return f"{kind}{self._count}"
+
+    @property
+    def dataset(self) -> Dataset:
+        """The data on the bench.
+
+        Raises
+        ------
+        InputError
+            If there is none yet.
+        """
+        if self.intake is None:
+            raise InputError("no data on the bench", mend="open the bundled tests, or drop files", code="E_NO_DATA")
+        return self.intake.dataset
+
+    def put(self, intake: Intake) -> None:
+        """Change the data: results that came from other data go."""
+        self.cancel()
+        self.intake = intake
+        self.results.clear()
+
+    def table(self, number: int) -> RigTable:
+        """The runs of the rig of that number, analysed once."""
+        rigs = self.dataset.rigs
+        if not 0 <= number < len(rigs):
+            raise UnknownNameError("no such rig on the bench", mend="choose one from the list")
+        return rig_table(self.dataset, rigs[number])
+
+    def table_of(self, rig: str) -> RigTable | None:
+        """The runs of the rig of that name, where they are on the bench."""
+        if self.intake is None or rig not in self.dataset.rigs:
+            return None
+        return rig_table(self.dataset, rig)
+
+    def add(self, damper: Damper, origin: str, note: str = "") -> Bench:
+        """Put a damper on the bench; the oldest go where there are too many."""
+        bench = Bench(self.key("damper"), damper, origin, note)
+        self.dampers[bench.key] = bench
+        while len(self.dampers) > MOST_DAMPERS:
+            del self.dampers[next(iter(self.dampers))]
+        return bench
+
+    def damper(self, key: str) -> Bench:
+        """A damper on the bench by its key."""
+        if key not in self.dampers:
+            raise UnknownNameError("that damper is no longer on the bench", mend="choose another on the Model page")
+        return self.dampers[key]
+
+    def cancel(self) -> None:
+        """Stop whatever is being worked on."""
+        for job in list(self.jobs.values()):
+            job.cancel()
+
+    def close(self) -> None:
+        """Stop the work and remove the files."""
+        self.cancel()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+class Sessions:
+    """All sessions of one bench."""
+
+    def __init__(self) -> None:
+        self.folder = Path(tempfile.mkdtemp(prefix="mrdamper-bench-"))
+        self._open: dict[str, Session] = {}
+        self._lock = threading.Lock()
+
+    def __iter__(self) -> Iterator[Session]:
+        return iter(list(self._open.values()))
+
+    def __len__(self) -> int:
+        return len(self._open)
+
+    def open(self) -> Session:
+        """Begin a session; the longest unused one goes where there are too many."""
+        self.sweep()
+        name = secrets.token_urlsafe(_NAME_BYTES)
+        with self._lock:
+            while len(self._open) >= MOST_SESSIONS:
+                oldest = min(self._open.values(), key=lambda session: session.seen)
+                del self._open[oldest.name]
+                oldest.close()
+            folder = self.folder / secrets.token_hex(_NAME_BYTES)
+            folder.mkdir(mode=0o700)
+            session = self._open[name] = Session(name, folder)
+        return session
+
+    def find(self, name: str) -> Session:
+        """The session of that name.
+
+        Raises
+        ------
+        InputError
+            If it has ended.
+        """
+        session = self._open.get(name)
+        if session is None:
+            raise InputError("this session has ended", mend="load the page again", code="E_SESSION")
+        session.seen = time.monotonic()
+        return session
+
+    def end(self, name: str) -> None:
+        """End a session, if it is there."""
+        with self._lock:
+            session = self._open.pop(name, None)
+        if session:
+            session.close()
+
+    def sweep(self, idle_seconds: float = IDLE_SECONDS) -> None:
+        """End sessions nobody has used for so long."""
+        now = time.monotonic()
+        for session in self:
+            if now - session.seen > idle_seconds:
+                self.end(session.name)
+
+    def close(self) -> None:
+        """End all and remove every file."""
+        jobs = [job for session in self for job in session.jobs.values()]
+        for session in self:
+            self.end(session.name)
+        deadline = time.monotonic() + _LAST_WAIT
+        for job in jobs:  # a worker that is just being started can be ended only then
+            job.wait(max(0.0, deadline - time.monotonic()))
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def _current(session: str, request: Request) -> Session:
+    return request.app.state.sessions.find(session)
+
+
+Current = Annotated[Session, Depends(_current)]

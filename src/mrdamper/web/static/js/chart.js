@@ -1,0 +1,239 @@
+// Charts: the library of the plotly package, dressed in the page's colours.
+
+import { h } from "./dom.js";
+
+const LOOK = { margin: { l: 62, r: 14, t: 8, b: 44 }, pad: 0.04, growth: 0.25 };
+const VIRIDIS = ["#440154", "#472d7b", "#3b528b", "#2c728e", "#21918c", "#28ae80", "#5ec962", "#addc30"];
+const DARK_VIRIDIS = ["#8a6bd1", "#6f86d6", "#5b9bd0", "#3fb0b8", "#38c192", "#6bd36a", "#b5de2b", "#fde725"];
+const SERIES = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7a5ea8", "#8c6d1f"];
+const DASHES = ["solid", "dash", "dot", "dashdot", "longdash"];
+
+let loading = null;
+
+/** Load the library once. */
+export function library() {
+  loading ??= new Promise((resolve, reject) => {
+    // The bundle adds a style element for maps, which are not used here and which the content
+    // security policy would refuse: it is not added while the bundle loads.
+    const head = document.head;
+    head.appendChild = (node) => (node instanceof HTMLStyleElement ? node : Node.prototype.appendChild.call(head, node));
+    const script = h("script", { src: "/static/plotly.js" });
+    const done = (end) => () => {
+      delete head.appendChild;
+      end(window.Plotly);
+    };
+    script.addEventListener("load", done(resolve));
+    script.addEventListener("error", done(() => reject(new Error("the chart library did not load"))));
+    head.append(script);
+  });
+  return loading;
+}
+
+/** A colour as curves name it: one of the page's ("measured"), a place on the scale ("shade 0.4"), or itself. */
+export function paint(name) {
+  if (name.startsWith("shade ")) return shade(Number(name.slice(6)));
+  return /^[a-z-]+$/.test(name) ? colour(name) : name;
+}
+
+/** Colour of one of many models; a dash comes in where colours repeat. */
+export function series(index) {
+  return { color: SERIES[index % SERIES.length], dash: DASHES[Math.floor(index / SERIES.length) % DASHES.length] };
+}
+
+/** Colour of a share of a range, dark to light. */
+function shade(share) {
+  const scale = isDark() ? DARK_VIRIDIS : VIRIDIS;
+  return scale[Math.min(scale.length - 1, Math.max(0, Math.round(share * (scale.length - 1))))];
+}
+
+/** A colour of the page. */
+function colour(name) {
+  if (!colours.has(name)) colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
+  return colours.get(name);
+}
+const colours = new Map(); // asked for at every move of a slider
+document.addEventListener("themechange", () => colours.clear());
+
+function isDark() {
+  return document.documentElement.dataset.theme === "dark";
+}
+
+/** One chart in a card. */
+export class Chart {
+  /** `title`, axis titles `x` and `y` with units, `name` of an image file. */
+  constructor({ title, x, y, name, legend = false, zero = false, top, layout = () => ({}) }) {
+    Object.assign(this, { title, x, y, name, legend, zero, top, more: layout, ranges: null, revision: 0 });
+    this.held = false; // while something is dragged: the axes stay, and grow where they must
+    this.plot = h("div", { class: "plot" });
+    this.summary = h("p", { class: "hidden-text" });
+    this.heading = h("h3", {}, title);
+    this.element = h("section", { class: "card chart", "aria-label": title }, this.heading, h("div", { class: "plot" }, this.plot, this.summary));
+    this.plot.parentElement.classList.add("frame");
+    this.plot.setAttribute("role", "img");
+    this.traces = [];
+    new ResizeObserver(() => this.drawn && this.plot.offsetWidth && window.Plotly.Plots.resize(this.plot)).observe(this.plot);
+    document.addEventListener("themechange", () => this.drawn && this.redraw());
+  }
+
+  /** Show curves: [{x, y, name, color, width, dash, mode, ...}]. `summary` is what a screen reader says. */
+  draw(traces, summary = "") {
+    const before = this.traces;
+    this.traces = traces;
+    if (this.held && this.drawn && alike(before, traces) && this.fits(traces)) return this.move(before);
+    this.summary.textContent = summary;
+    this.plot.setAttribute("aria-label", `${this.title}. ${summary}`);
+    return this.redraw();
+  }
+
+  /** Forget zoom and ranges: what is shown is something else now. */
+  reset() {
+    this.ranges = null;
+    this.revision += 1;
+  }
+
+  /** Whether curves stay inside the axes shown, and marks have something drawn to be moved. */
+  fits(traces) {
+    const enough = traces.every((t, i) => t.mode !== "markers" || t.x.length <= this.marks[i]);
+    if (!enough) return false;
+    const wanted = spans(traces, this.ranges, this.zero);
+    return wanted.x === this.ranges.x && wanted.y === this.ranges.y;
+  }
+
+  /**
+   * While a slider is dragged and the axes are held, only lines and marks move: they are moved here
+   * and nothing else is drawn anew. The library draws all of it once the drag ends.
+   */
+  move(before) {
+    const area = this.plot.querySelector(".nsewdrag");
+    const [width, height] = [area.width.baseVal.value, area.height.baseVal.value];
+    const { xaxis, yaxis } = this.plot.layout; // with the reader's zoom in it
+    const place = (range, size) => [size / (range[1] - range[0]), range[0]];
+    const [[sx, x0], [sy, y0]] = [place(xaxis.range, width), place(yaxis.range, height)];
+    this.traces.forEach((t, i) => {
+      if (t.x === before[i].x && t.y === before[i].y) return;
+      const group = this.plot.querySelector(`.scatterlayer .tracecurve${i}`);
+      if (!group) return;
+      if (t.mode === "markers") {
+        group.querySelectorAll(".points path").forEach((mark, k) => {
+          const there = k < t.x.length;
+          mark.setAttribute("visibility", there ? "visible" : "hidden");
+          if (there) mark.setAttribute("transform", `translate(${sx * (t.x[k] - x0)},${height - sy * (t.y[k] - y0)})`);
+        });
+      } else {
+        if (t.x.length) group.querySelector(".js-line")?.setAttribute("d", path(t, sx, x0, sy, y0, height));
+      }
+    });
+  }
+
+  async redraw() {
+    const Plotly = window.Plotly ?? (await library());
+    const data = this.traces.map((t, i) => ({ ...trace(t), uid: `curve${i}` }));
+    this.ranges = spans(this.traces, this.held ? this.ranges : null, this.zero);
+    this.marks = this.traces.map((t) => t.x.length);
+    await Plotly.react(this.plot, data, this.layout(), this.config());
+    this.drawn = true;
+  }
+
+  layout() {
+    const axis = (title, range) => ({
+      title: { text: title, standoff: 8 }, range, gridcolor: colour("grid"), zerolinecolor: colour("line-strong"),
+      linecolor: colour("line-strong"), ticks: "outside", ticklen: 4, tickcolor: colour("line-strong"),
+      automargin: false, hoverformat: ".4~g", exponentformat: "power", separatethousands: false,
+    });
+    const size = parseFloat(getComputedStyle(document.documentElement).fontSize) / 15;
+    return {
+      margin: { l: LOOK.margin.l * size, r: LOOK.margin.r, t: this.top ?? LOOK.margin.t, b: LOOK.margin.b * size },
+      xaxis: axis(this.x, this.ranges.x), yaxis: axis(this.y, this.ranges.y),
+      paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
+      font: { family: getComputedStyle(document.body).fontFamily, size: 12 * size, color: colour("text") },
+      showlegend: this.legend,
+      legend: { orientation: "h", x: 0, y: 1, yanchor: "bottom", font: { size: 11.5 * size }, bgcolor: "rgba(0,0,0,0)" },
+      hovermode: "closest", hoverlabel: { font: { size: 12 * size }, namelength: 40 }, dragmode: "zoom",
+      uirevision: this.revision, autosize: true, ...this.more(),
+    };
+  }
+
+  config() {
+    return {
+      displaylogo: false, responsive: false,
+      modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
+      toImageButtonOptions: { format: "png", scale: 2, filename: `mrdamper-${this.name}` },
+    };
+  }
+}
+
+/**
+ * A curve as an SVG path in pixels. Points that lie on the line through the two kept before them, to an
+ * eighth of a pixel, change no picture and are left out; a curve that turns back keeps its tip.
+ */
+function path(t, sx, x0, sy, y0, height) {
+  const last = t.x.length - 1;
+  let [px, py] = [sx * (t.x[0] - x0), height - sy * (t.y[0] - y0)];
+  let text = `M${px.toFixed(1)},${py.toFixed(1)}`;
+  let [ux, uy, reach] = [0, 0, 0]; // direction from the point kept last, and how far along it the curve has come
+  let [qx, qy] = [px, py]; // the point before
+  for (let k = 1; k <= last; k += 1) {
+    const x = sx * (t.x[k] - x0);
+    const y = height - sy * (t.y[k] - y0);
+    if (reach) {
+      const along = (x - px) * ux + (y - py) * uy;
+      const aside = (x - px) * uy - (y - py) * ux;
+      if (along < reach || aside > 0.125 || aside < -0.125) {
+        text += `L${Math.round(10 * qx) / 10},${Math.round(10 * qy) / 10}`;
+        [px, py, reach] = [qx, qy, 0];
+      } else {
+        reach = along;
+      }
+    }
+    if (!reach) {
+      const size = Math.hypot(x - px, y - py);
+      if (size > 0.5) [ux, uy, reach] = [(x - px) / size, (y - py) / size, size];
+    }
+    qx = x;
+    qy = y;
+  }
+  return `${text}L${Math.round(10 * qx) / 10},${Math.round(10 * qy) / 10}`;
+}
+
+/** Whether two lists of curves differ in their points only, so that what is drawn can be moved. */
+function alike(before, now) {
+  const look = (t) => [t.color, t.dash, t.width, t.mode, t.x.length > 0 || t.mode === "markers"].join("|");
+  return before.length === now.length && now.every((t, i) => look(t) === look(before[i]));
+}
+
+/** A library trace from one of ours. Names are shown as text: the library would read some tags as markup. */
+function trace(t) {
+  const color = paint(t.color);
+  return {
+    type: "scatter", mode: t.mode ?? "lines", x: t.x, y: t.y, name: plain(t.name ?? ""), showlegend: Boolean(t.name) && t.legend !== false,
+    line: { color, width: t.width ?? 2, dash: t.dash ?? "solid", simplify: true, shape: "linear" },
+    marker: { color: t.fill ? paint(t.fill) : color, size: t.size ?? 7, line: { color, width: 1.5 } },
+    text: t.text?.map(plain), hovertemplate: t.hover, hoverinfo: t.hover === undefined && t.quiet ? "skip" : undefined, opacity: t.opacity ?? 1,
+  };
+}
+
+/** Text the library prints as it is: its markup begins with < and its templates with %. */
+export function plain(text) {
+  return String(text).replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;").replaceAll("%{", "% {");
+}
+
+/** Ranges that hold all points, and those shown before where the axes are held. */
+function spans(traces, before, zero) {
+  const range = (name, first) => {
+    let low = before ? before[name][0] : Infinity;
+    let high = before ? before[name][1] : -Infinity;
+    let grown = false;
+    for (const t of traces) {
+      for (const value of t[name]) {
+        if (value < low) { low = value; grown = true; }
+        if (value > high) { high = value; grown = true; }
+      }
+    }
+    if (!Number.isFinite(low)) return [0, 1];
+    if (before && !grown) return before[name];
+    if (first && low > 0) low = 0;
+    const pad = (before ? LOOK.growth : LOOK.pad) * (high - low || Math.abs(high) || 1);
+    return [first && low === 0 ? 0 : low - pad, high + pad];
+  };
+  return { x: range("x", zero), y: range("y", zero) };
+}

@@ -1,0 +1,82 @@
+// Making elements. Text goes in as text nodes only, so no name of a file or run can become markup.
+
+const SVG = "http://www.w3.org/2000/svg";
+
+/** Make an element: `h("button", {class: "primary", onclick: start}, "Start")`. */
+export function h(tag, props = {}, ...children) {
+  return fill(document.createElement(tag), props, children);
+}
+
+/** Make an SVG element. */
+export function svg(tag, props = {}, ...children) {
+  return fill(document.createElementNS(SVG, tag), props, children);
+}
+
+/** Replace what an element holds. */
+export function put(element, ...children) {
+  element.replaceChildren(...children.flat(Infinity).filter(present));
+  return element;
+}
+
+/** A card with a heading. */
+export function card(title, ...children) {
+  return h("section", { class: "card" }, h("div", { class: "head" }, h("h2", {}, title)), ...children);
+}
+
+/** A table: columns are {title, value(row), number?, head?}; `pick(row)` makes rows choosable. */
+export function table(columns, rows, { pick, chosen, caption } = {}) {
+  const cells = (row) =>
+    columns.map((c, i) => h(i === 0 ? "th" : "td", { class: c.number ? "num" : i === 0 ? "name" : "", scope: i === 0 ? "row" : null }, c.value(row)));
+  const line = (row) => {
+    const props = { class: [pick ? "pick" : "", chosen?.(row) ? "chosen" : ""].join(" ").trim() };
+    if (pick) props.onclick = () => pick(row);
+    return h("tr", props, cells(row));
+  };
+  return h(
+    "table", {},
+    caption ? h("caption", { class: "hidden-text" }, caption) : null,
+    h("thead", {}, h("tr", {}, columns.map((c) => h("th", { class: c.number ? "num" : "", scope: "col" }, c.title)))),
+    h("tbody", {}, rows.map(line)),
+  );
+}
+
+/** A bit of line in the colour and dash of a curve. */
+export function swatch(look) {
+  const dash = { dash: "5 3", dot: "2 2", dashdot: "5 2 2 2", longdash: "8 3" }[look.dash] ?? null;
+  return svg("svg", { class: "swatch", viewBox: "0 0 24 10", "aria-hidden": "true" },
+    svg("line", { x1: "0", x2: "24", y1: "5", y2: "5", stroke: look.color, "stroke-width": "3", "stroke-dasharray": dash }));
+}
+
+/** What went wrong, where, and how to mend it. */
+export function problem(error) {
+  const said = error.said ?? { text: String(error.message ?? error) };
+  return h(
+    "div", { class: "message bad", role: "alert" },
+    h("div", {}, said.where ? [h("b", {}, said.where), ": "] : null, said.found ?? said.text),
+    said.mend ? h("div", {}, capital(said.mend), ".") : null,
+    said.code ? h("code", {}, said.code) : null,
+  );
+}
+
+export function note(kind, ...children) {
+  return h("div", { class: `message ${kind}` }, ...children);
+}
+
+function capital(text) {
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}
+
+function fill(element, props, children) {
+  for (const [name, value] of Object.entries(props)) {
+    if (value === null || value === undefined || value === false) continue;
+    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
+    else if (name in element && typeof value !== "string") element[name] = value;
+    else element.setAttribute(name, value === true ? "" : value);
+  }
+  element.append(...children.flat(Infinity).filter(present));
+  return element;
+}
+
+function present(child) {
+  return child !== null && child !== undefined && child !== false;
+}

@@ -1,0 +1,125 @@
+// Taking files: dropped anywhere on the page or chosen, sent one by one, read, and answered for.
+
+import { h, problem, put } from "./dom.js";
+import { collect, isModel, isState } from "./files.js";
+import { bytes } from "./format.js";
+import { imported } from "./state.js";
+
+export class DropZone {
+  constructor(bench) {
+    this.bench = bench;
+    this.drop = null; // the bench's name for what was dropped last
+    this.said = h("div", { "aria-live": "polite" });
+    this.zone = this.makeZone();
+    this.bundled = h("button", { class: "link small", onclick: () => openBundled(bench) }, "Open the bundled tests of two dampers");
+    this.element = h("div", { class: "group" }, this.zone, this.said, this.bundled);
+    this.listen();
+    this.offer();
+  }
+
+  makeZone() {
+    const input = (props, name) => {
+      const chooser = h("input", { type: "file", hidden: true, ...props, onchange: () => {
+        const files = [...chooser.files].map((file) => ({ file, name: name(file) }));
+        chooser.value = "";
+        this.take(files);
+      } });
+      return chooser;
+    };
+    const files = input({ multiple: true, "aria-label": "Files" }, (file) => file.name);
+    const folder = input({ webkitdirectory: "", "aria-label": "Folder" }, (file) => file.webkitRelativePath || file.name);
+    return h(
+      "div", { class: "drop", id: "drop" },
+      h("strong", {}, "Drop rig files, a dataset folder or a model.json"),
+      h("span", { class: "small" }, `up to ${bytes(this.bench.limits.file_bytes)} a file`),
+      h("div", { class: "row" }, h("button", { onclick: () => files.click() }, "Files …"), h("button", { onclick: () => folder.click() }, "Folder …")),
+      files, folder,
+    );
+  }
+
+  listen() {
+    const { classList } = this.zone;
+    for (const kind of ["dragenter", "dragover"]) {
+      document.addEventListener(kind, (event) => {
+        event.preventDefault();
+        classList.add("over");
+      });
+    }
+    document.addEventListener("dragleave", (event) => event.relatedTarget || classList.remove("over"));
+    document.addEventListener("drop", async (event) => {
+      event.preventDefault();
+      classList.remove("over");
+      this.take(await collect(event.dataTransfer));
+    });
+    document.addEventListener("bench:data", () => this.offer());
+  }
+
+  /** Without data the stage offers the bundled tests, with them nobody needs to. */
+  offer() {
+    this.bundled.hidden = !this.bench.overview || this.bench.overview.source === "bundled";
+  }
+
+  async take(files) {
+    if (!files.length) return;
+    put(this.said);
+    try {
+      if (files.length === 1 && files[0].name.toLowerCase().endsWith(".json") && (await this.bring(files[0].file))) return;
+      await this.send(files);
+      await this.read("");
+    } catch (error) {
+      put(this.said, problem(error));
+    }
+  }
+
+  async send(files) {
+    const limit = this.bench.limits.file_bytes;
+    const tooLarge = files.find(({ file }) => file.size > limit);
+    if (tooLarge) throw tooLargeError(tooLarge.name, limit);
+    this.drop = (await this.bench.api.post("/drops")).drop;
+    for (const [i, { file, name }] of files.entries()) {
+      put(this.said, h("p", { class: "small faint" }, `Taking file ${i + 1} of ${files.length} …`));
+      await this.bench.api.upload(`/drops/${this.drop}/files?name=${encodeURIComponent(name)}`, file);
+    }
+  }
+
+  /** Read what was dropped, with a corrected profile or a guessed one. */
+  async read(toml) {
+    put(this.said, h("p", { class: "small faint" }, "Reading …"));
+    try {
+      await this.bench.takeData(await this.bench.api.post(`/drops/${this.drop}/read`, { toml }), { view: "data" });
+      put(this.said);
+    } catch (error) {
+      put(this.said, problem(error));
+      if (error.said?.verdicts) document.dispatchEvent(new CustomEvent("bench:refused", { detail: error.said }));
+    }
+  }
+
+  /** A state or a model brought back; false where the file is something else. */
+  async bring(file) {
+    const text = await file.text();
+    if (isState(text)) {
+      await this.bench.restore(imported(JSON.parse(text)));
+      return true;
+    }
+    if (!isModel(text)) return false;
+    const { damper } = await this.bench.api.post("/dampers", { text });
+    await this.bench.refreshDampers();
+    await this.bench.choose(damper, { view: "model" });
+    return true;
+  }
+}
+
+/** Put the bundled tests on the bench. */
+export async function openBundled(bench) {
+  try {
+    await bench.takeData(await bench.api.post("/bundled"));
+  } catch (error) {
+    bench.fail(error);
+  }
+}
+
+function tooLargeError(name, limit) {
+  const error = new Error("too large");
+  error.said = { where: name, found: `the file is over ${bytes(limit)}`, mend: "read it with mrdamper import, which has no such limit, and drop the dataset folder", code: "E_DROP_SIZE" };
+  return error;
+}

@@ -1,0 +1,49 @@
+// What was dropped: files, and the files of folders, with the path each had.
+
+/** All files of a drop: [{file, name}]. */
+export async function collect(transfer) {
+  const entries = [...transfer.items].map((item) => item.webkitGetAsEntry?.()).filter(Boolean);
+  if (!entries.length) return [...transfer.files].map((file) => ({ file, name: file.name }));
+  const found = [];
+  for (const entry of entries) await walk(entry, "", found);
+  return found;
+}
+
+export function isModel(text) {
+  return format(text) === "mrdamper-model";
+}
+
+export function isState(text) {
+  return format(text) === "mrdamper-bench-state";
+}
+
+/** Save something as a file. */
+export function save(blob, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
+
+function format(text) {
+  try {
+    return JSON.parse(text)?.format;
+  } catch {
+    return undefined;
+  }
+}
+
+async function walk(entry, path, found) {
+  if (entry.isFile) {
+    const file = await new Promise((resolve, reject) => entry.file(resolve, reject));
+    if (!file.name.startsWith(".")) found.push({ file, name: path + file.name });
+    return;
+  }
+  const reader = entry.createReader();
+  for (;;) {
+    const some = await new Promise((resolve, reject) => reader.readEntries(resolve, reject));
+    if (!some.length) return;
+    for (const child of some) await walk(child, `${path}${entry.name}/`, found);
+  }
+}

@@ -1,0 +1,80 @@
+// What to identify: the whole study, or one model by one method from some runs.
+
+import { h, put } from "./dom.js";
+import { condition } from "./format.js";
+
+export class IdentifyForm {
+  /** `start({whole, body})` is called when the reader begins. */
+  constructor(bench, start) {
+    this.bench = bench;
+    this.start = start;
+    this.choices = null;
+    this.whole = h("input", { type: "radio", name: "what", id: "what-study", checked: true, onchange: () => this.toggle() });
+    this.one = h("input", { type: "radio", name: "what", id: "what-one", onchange: () => this.toggle() });
+    this.model = h("select", { id: "model-name", onchange: () => this.about() });
+    this.method = h("select", { id: "method-name" });
+    this.runs = h("select", { id: "which-runs" });
+    this.over = h("select", { id: "over" },
+      h("option", { value: "functions" }, "functions through the values"), h("option", { value: "joint" }, "functions fitted to all forces"));
+    this.source = h("p", { class: "small faint" });
+    this.button = h("button", { class: "primary", onclick: () => this.go() }, "Start");
+    this.details = this.fields();
+    this.element = this.layout();
+  }
+
+  fields() {
+    const field = (name, text, control, ...more) => h("div", { class: "field" }, h("label", { for: name }, text), control, more);
+    return h("div", { class: "group", hidden: true },
+      field("model-name", "Model", this.model, this.source), field("method-name", "Method", this.method),
+      field("which-runs", "From", this.runs), field("over", "Over all conditions", this.over));
+  }
+
+  layout() {
+    const choice = (radio, title, about) => h("label", { class: "check" }, radio, h("span", {}, title, h("br", {}), h("span", { class: "small faint" }, about)));
+    return h("div", { class: "group" },
+      h("h2", {}, "Identify"),
+      h("fieldset", { class: "group" },
+        h("legend", { class: "hidden-text" }, "What to identify"),
+        choice(this.whole, "Whole study", "all candidates, left-out conditions, report"),
+        choice(this.one, "One model", "run by run, with residuals")),
+      this.details, this.button);
+  }
+
+  /** Bring the lists to the data on the bench. */
+  async refresh() {
+    this.button.disabled = !this.bench.overview;
+    if (!this.choices) {
+      this.choices = await this.bench.api.get("/choices");
+      const { models, methods, model, method } = this.choices;
+      put(this.model, models.map((m) => h("option", { value: m.name }, m.title)));
+      put(this.method, methods.map((m) => h("option", { value: m.name, title: m.about }, m.name)));
+      this.model.value = model;
+      this.method.value = method;
+      this.about();
+    }
+    const found = await this.bench.rigTable();
+    const usable = found?.runs.filter((r) => !r.refused) ?? [];
+    put(this.runs, h("option", { value: "" }, `all ${usable.filter((r) => r.split === "train").length} train runs`),
+      usable.map((r) => h("option", { value: r.key }, `${r.id} (${condition(r.condition)})`)));
+  }
+
+  about() {
+    const chosen = this.choices.models.find((m) => m.name === this.model.value);
+    this.source.textContent = `${chosen.source}${chosen.integrated ? ". Stepped in time: takes longer" : ""}`;
+    this.method.disabled = this.over.disabled = chosen.jointly;
+  }
+
+  toggle() {
+    this.details.hidden = this.whole.checked;
+  }
+
+  go() {
+    this.start({
+      whole: this.whole.checked,
+      body: {
+        rig: this.bench.state.rig, model: this.model.value, method: this.method.value, over: this.over.value,
+        runs: this.runs.value ? [this.runs.value] : [],
+      },
+    });
+  }
+}

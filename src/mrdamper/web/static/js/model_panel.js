@@ -1,0 +1,97 @@
+// The panel of the Model view: which damper, its condition, and its parameters under sliders.
+
+import { h, put } from "./dom.js";
+import { slider } from "./slider.js";
+
+const MM = 1000;
+const ORIGIN = { study: "from the study", identification: "identified here", comparison: "from the comparison", file: "from a file" };
+const CONDITION = [
+  { name: "current_A", symbol: "I", meaning: "current", unit: "A", bounds: ([, high]) => [0, 100 * high] },
+  { name: "frequency_Hz", symbol: "f", meaning: "frequency", unit: "Hz", scale: "log", bounds: ([low, high]) => [low / 100, high * 100] },
+  { name: "amplitude_m", symbol: "X", meaning: "amplitude", unit: "mm", factor: MM, bounds: ([low, high]) => [low / 100, high * 100] },
+];
+
+export class ModelPanel {
+  /** `dragging(change, when)` and `settled(change)` hear of the sliders; a change is one of the state. */
+  constructor(bench, { dragging, settled }) {
+    Object.assign(this, { bench, dragging, settled, sliders: {}, damper: null });
+    this.element = h("div", { class: "side" });
+    this.family = h("input", { type: "checkbox", id: "family", onchange: () => bench.store.commit({ family: this.family.checked }) });
+  }
+
+  /** Nothing to move. */
+  empty() {
+    put(this.element, h("p", { class: "faint" }, "No damper on the bench yet."));
+  }
+
+  /** Sliders for a damper as the bench describes it. */
+  build(damper) {
+    this.damper = damper;
+    this.sliders = {};
+    put(this.element, this.chooser(), this.conditions(), this.parameters());
+  }
+
+  /** Bring all sliders to the state, and the parameters that follow to `values`. */
+  set(values = null) {
+    const { condition, held, family } = this.bench.state;
+    const at = condition ?? this.damper.start;
+    for (const { name } of CONDITION) this.sliders[name].set(at[name]);
+    for (const { name } of this.damper.parameters) {
+      const value = held[name] ?? values?.[name] ?? null;
+      if (value !== null) this.sliders[`p.${name}`].set(value, name in held);
+    }
+    this.family.checked = family;
+  }
+
+  chooser() {
+    const { dampers } = this.bench;
+    const { key, numbers, origin, rig } = this.damper;
+    const list = h("select", { id: "damper", onchange: () => this.bench.choose(list.value) },
+      dampers.map((d) => h("option", { value: d.key }, `${d.title} · ${d.rig || "rig"}${d.note ? ` · ${d.note}` : ""}`)));
+    list.value = key;
+    return h("div", { class: "field" }, h("label", { for: "damper" }, "Damper"), list,
+      h("p", { class: "small faint" }, `${numbers} numbers, ${ORIGIN[origin] ?? origin}${rig ? `, rig ${rig}` : ""}.`));
+  }
+
+  conditions() {
+    return h("div", { class: "group" }, h("h2", {}, "Condition"), CONDITION.map((spec) => this.conditionSlider(spec)),
+      h("label", { class: "check" }, this.family, "Loops at all tested currents"));
+  }
+
+  parameters() {
+    const made = this.damper.parameters.map((p) => ({ preset: p.preset, element: this.parameterSlider(p) }));
+    const [main, preset] = [false, true].map((wanted) => made.filter((p) => p.preset === wanted).map((p) => p.element));
+    return h("div", { class: "group" },
+      h("div", { class: "row" }, h("h2", { class: "grow" }, "Parameters"),
+        h("button", { class: "link small", onclick: () => this.bench.store.commit({ held: {}, condition: null }) }, "Reset all")),
+      h("p", { class: "small faint" }, made.length
+        ? "They follow the condition. A slider that is moved holds its value until released."
+        : "This damper's laws give no parameters to move."),
+      main,
+      preset.length ? h("details", {}, h("summary", {}, "Held at their presets in the identification"), h("div", { class: "group" }, preset)) : null);
+  }
+
+  conditionSlider(spec) {
+    const [low, high] = this.damper.reach[spec.name];
+    const full = { ...spec, low, high, value: this.damper.start[spec.name], tested: this.damper.envelope[spec.name], bounds: spec.bounds([low, high]) };
+    return this.listen(spec.name, full, (value) => ({ condition: { ...(this.bench.state.condition ?? this.damper.start), [spec.name]: value } }));
+  }
+
+  parameterSlider(p) {
+    const screen = p.unit === "m" ? { unit: "mm", factor: MM } : {};
+    const change = (value) => ({ held: { ...this.bench.state.held, [p.name]: value } });
+    return this.listen(`p.${p.name}`, { ...p, symbol: p.name, ...screen }, change, () => {
+      const { [p.name]: _gone, ...rest } = this.bench.state.held;
+      this.bench.store.commit({ held: rest });
+    });
+  }
+
+  listen(key, spec, change, release) {
+    this.sliders[key] = slider(spec, {
+      drag: (value, when) => this.dragging(change(value), when),
+      settle: (value) => this.settled(change(value)),
+      release,
+    });
+    return this.sliders[key].element;
+  }
+}

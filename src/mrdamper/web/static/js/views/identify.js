@@ -1,0 +1,163 @@
+// Identify: the whole study, or one model by one method; progress, cancel, results with residuals.
+
+import { Chart } from "../chart.js";
+import { card, h, note, put, table } from "../dom.js";
+import { condition, figures, percent, seconds, unit } from "../format.js";
+import { IdentifyForm } from "../identify_form.js";
+import { workBox } from "../work.js";
+
+export const id = "identify";
+export const label = "Identify";
+
+export function create(bench) {
+  return new IdentifyView(bench);
+}
+
+class IdentifyView {
+  constructor(bench) {
+    this.bench = bench;
+    this.work = workBox(bench);
+    this.form = new IdentifyForm(bench, (choice) => this.start(choice));
+    this.stage = h("div", { class: "stage" });
+    this.charts = {
+      v: new Chart({ title: "Measured and identified, over velocity", x: "Velocity (m/s)", y: "Force (N)", name: "identified-force-velocity", legend: true }),
+      x: new Chart({ title: "Measured and identified, over displacement", x: "Displacement (mm)", y: "Force (N)", name: "identified-force-displacement", legend: true }),
+      r: new Chart({ title: "Residual over time", x: "Time (s)", y: "Residual (N)", name: "residual" }),
+    };
+    this.charts.r.element.classList.add("wide");
+    this.caption = h("h2", {});
+    this.element = h("div", { class: "view" }, h("div", { class: "side" }, this.form.element, this.work.element), this.stage);
+    document.addEventListener("bench:data", () => this.forget());
+    this.forget();
+  }
+
+  shown() {
+    this.safely(this.form.refresh());
+  }
+
+  update(state, before) {
+    if (state.rig !== before.rig) this.shown();
+  }
+
+  safely(promise) {
+    promise.catch((error) => this.bench.fail(error));
+  }
+
+  forget() {
+    const { overview } = this.bench;
+    this.shown();
+    put(this.stage, h("div", { class: "empty" },
+      h("h2", {}, overview ? "Nothing is identified yet" : "No data on the bench"),
+      h("p", {}, overview
+        ? "The whole study identifies every candidate, predicts conditions left out, and chooses. Or identify one model by one method and look at its residuals."
+        : "Open the bundled tests or drop files on the Data page first."),
+      overview ? null : h("button", { class: "primary", onclick: () => this.bench.store.pass({ view: "data" }) }, "Open data")));
+  }
+
+  async start({ whole, body }) {
+    const { form, work, bench } = this;
+    form.button.disabled = true;
+    const answer = await (whole ? work.run("/study", {}) : work.run("/identify", body));
+    form.button.disabled = false;
+    if (!answer) return;
+    const key = whole ? (answer.rigs[bench.state.rig] ?? answer.rigs[0]).chosen : answer.damper;
+    if (key) bench.store.settle({ damper: key, document: null, condition: null, held: {} });
+    await bench.refreshDampers();
+    put(this.stage, whole ? this.studied(answer) : this.identified(answer));
+  }
+
+  go(view) {
+    return () => this.bench.store.pass({ view });
+  }
+
+  studied(answer) {
+    const columns = [
+      { title: "Candidate", value: (c) => c.title },
+      { title: "Left out", number: true, value: (c) => percent(c.left_out) },
+      { title: "Held out", number: true, value: (c) => percent(c.held_out) },
+      { title: "One by one", number: true, value: (c) => percent(c.per_run) },
+      { title: "Numbers", number: true, value: (c) => String(c.numbers) },
+      { title: "Time", number: true, value: (c) => seconds(c.seconds) },
+      { title: "", value: (c) => h("button", { class: "quiet", onclick: () => this.bench.choose(c.damper, { view: "model" }) }, "Move it") },
+    ];
+    return [
+      h("p", { class: "small faint" }, `Median error as a share of the peak-to-peak force. “Left out”: train runs predicted without their condition; it chooses, and within a tenth fewer numbers win. “Held out”: runs no model has seen. Done in ${seconds(answer.seconds)}.`),
+      answer.rigs.map((rig) =>
+        card(["Rig ", h("span", {}, rig.rig || "without name")],
+          h("div", { class: "flush" }, table(columns, rig.candidates, { chosen: (c) => c.damper === rig.chosen, caption: `Candidates of rig ${rig.rig}` })))),
+      h("div", { class: "row" },
+        h("button", { class: "primary", onclick: this.go("model") }, "See it move"),
+        h("button", { onclick: this.go("takeaway") }, "Take report and model away")),
+    ];
+  }
+
+  identified(answer) {
+    const runs = answer.joint ? answer.joint.runs : answer.runs;
+    const { v, x, r } = this.charts;
+    queueMicrotask(() => this.safely(this.pick(runs, 0)));
+    const notes = [...new Set(runs.flatMap((run) => run.notes ?? []))];
+    return [
+      this.boundsNote(answer, runs),
+      answer.no_damper ? note("warn", h("div", {}, h("b", {}, "No model over conditions: "), answer.no_damper)) : null,
+      answer.joint ? jointCard(answer) : null,
+      this.runsCard(answer, runs),
+      this.caption,
+      h("div", { class: "figures" }, v.element, x.element, r.element),
+      notes.length ? h("ul", { class: "small faint" }, notes.map((text) => h("li", {}, text))) : null,
+      answer.damper ? h("div", { class: "row" }, h("button", { class: "primary", onclick: this.go("model") }, "See it move")) : null,
+    ];
+  }
+
+  boundsNote(answer, runs) {
+    const names = answer.joint ? answer.joint.at_bounds : [...new Set(runs.flatMap((run) => run.at_bounds))];
+    if (!names.length) return null;
+    return note("warn", h("div", {}, h("b", {}, "At a bound: "), `${names.join(", ")}. The data do not determine ${names.length > 1 ? "them" : "it"}, or the bound is too narrow.`));
+  }
+
+  runsCard(answer, runs) {
+    const pick = (run) => this.safely(this.pick(runs, runs.indexOf(run)));
+    const columns = [
+      { title: "Run", value: (run) => h("button", { class: "link" }, run.id) }, // its click is the row's
+      { title: "Error", number: true, value: (run) => percent(run.nrmse_pp) },
+    ];
+    if (!answer.joint) {
+      const value = (p) => (run) => [figures(run.values[p.name]), run.at_bounds.includes(p.name) ? h("span", { class: "badge warn" }, "at bound") : null];
+      columns.push({ title: "Scatter", number: true, value: (run) => percent(run.floor) });
+      columns.push(...answer.units.map((p) => ({ title: p.unit === "-" ? p.name : `${p.name} (${unit(p.unit)})`, number: true, value: value(p) })));
+      columns.push({ title: "At bounds", value: (run) => run.at_bounds.join(", ") || "–" });
+    }
+    const held = answer.held_out === null ? "" : `; held-out runs ${percent(answer.held_out)} with ${answer.numbers} numbers over all conditions`;
+    return h("section", { class: "card" },
+      h("div", { class: "head" }, h("h2", {}, `${runs.length} runs identified`),
+        h("span", { class: "small faint" }, `median error ${percent(answer.median)} of the peak-to-peak force${held}`)),
+      h("div", { class: "flush short" }, table(columns, runs, { pick, caption: "Identified runs" })));
+  }
+
+  /** Show measured and identified force of one run. */
+  async pick(runs, index) {
+    const run = runs[index];
+    this.caption.textContent = `Run ${run.id}`;
+    const { arrays, head } = await this.bench.api.frame(`/identified/runs/${index}`);
+    const said = `${run.id}, ${condition(head.condition)}: error ${percent(run.nrmse_pp)} of the peak-to-peak force.`;
+    const two = (axis) => [
+      { x: arrays[`measured.${axis}`], y: arrays["measured.F"], color: "measured", width: 1.6, name: "measured" },
+      { x: arrays[`model.${axis}`], y: arrays["model.F"], color: "predicted", width: 2, name: "identified" },
+    ];
+    const { v, x, r } = this.charts;
+    for (const chart of [v, x, r]) chart.reset();
+    v.draw(two("v"), said);
+    x.draw(two("x"), said);
+    r.draw([{ x: arrays["measured.t"], y: arrays.residual, color: "predicted", width: 1.5, name: "residual" }], said);
+  }
+}
+
+function jointCard(answer) {
+  const { values, at_bounds: bounds } = answer.joint;
+  const columns = [
+    { title: "Parameter", value: (p) => p.name },
+    { title: "Value", number: true, value: (p) => `${figures(values[p.name])} ${unit(p.unit)}` },
+    { title: "Meaning", value: (p) => p.meaning },
+    { title: "", value: (p) => (bounds.includes(p.name) ? h("span", { class: "badge warn" }, "at bound") : "") },
+  ];
+  return card(answer.title, h("div", { class: "flush short" }, table(columns, answer.units, { caption: "Parameters" })));
+}

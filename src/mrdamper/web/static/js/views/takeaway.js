@@ -1,0 +1,141 @@
+// Take away: report, tables and models as files, and the state of the bench itself.
+
+import { card, h, note, problem, put } from "../dom.js";
+import { save } from "../files.js";
+import { bytes, condition, figures } from "../format.js";
+import { portable } from "../state.js";
+import { workBox } from "../work.js";
+
+export const id = "takeaway";
+export const label = "Take away";
+
+const MM = 1000;
+
+export function create(bench) {
+  return new TakeAwayView(bench);
+}
+
+class TakeAwayView {
+  constructor(bench) {
+    this.bench = bench;
+    this.studying = workBox(bench);
+    this.exporting = workBox(bench);
+    this.report = h("div", { class: "body" });
+    this.model = h("div", { class: "body" });
+    this.said = h("div", { "aria-live": "polite" });
+    this.element = h("div", { class: "stage" }, h("div", { class: "cards" },
+      card("Report and tables", this.report), card("Model", this.model), card("This bench", this.stateBody())));
+    for (const what of ["dampers", "data"]) document.addEventListener(`bench:${what}`, () => this.shown());
+  }
+
+  shown() {
+    if (this.bench.state.view === id) this.safely(this.refresh());
+  }
+
+  update(state, before) {
+    if (["damper", "held", "condition"].some((name) => state[name] !== before[name])) this.shown();
+  }
+
+  safely(promise) {
+    promise.catch((error) => this.bench.fail(error));
+  }
+
+  async refresh() {
+    await Promise.all([this.showReport(), this.showModel()]);
+  }
+
+  async showReport() {
+    if (!this.bench.overview) {
+      put(this.report, h("p", { class: "faint" }, "No data on the bench: open some on the Data page."));
+      return;
+    }
+    const files = await this.bench.api.get("/files");
+    const button = h("button", { class: files.length ? "" : "primary", onclick: () => this.safely(this.study(button)) }, files.length ? "Make it again" : "Make the report");
+    put(this.report, files.length
+      ? this.fileList(files)
+      : h("p", {}, "The whole study of the data on the bench: one report.html that needs nothing else, the models, and the tables as CSV."),
+    h("div", {}, button), this.studying.element);
+  }
+
+  fileList(files) {
+    const { api } = this.bench;
+    const row = (f) => h("li", {}, h("a", { href: api.url(`/files/${f.number}`), download: f.name }, f.name), h("span", { class: "faint" }, bytes(f.bytes)));
+    const [main, pictures] = [false, true].map((wanted) => files.filter((f) => f.folder === wanted).map(row));
+    return [
+      h("a", { class: "button", href: api.url("/files.zip"), download: "mrdamper-study.zip" }, "Everything as one zip"),
+      h("ul", { class: "filelist" }, main),
+      h("details", {}, h("summary", {}, `${pictures.length} figures`), h("ul", { class: "filelist" }, pictures)),
+    ];
+  }
+
+  async study(button) {
+    button.disabled = true;
+    const answer = await this.studying.run("/study", {});
+    button.disabled = false;
+    if (!answer) return;
+    await this.bench.refreshDampers();
+  }
+
+  async showModel() {
+    const { bench } = this;
+    const { held, damper, condition: c } = bench.state;
+    if (!bench.dampers.length) {
+      put(this.model, h("p", { class: "faint" }, "No damper on the bench: identify one, or drop a model.json on the Data page."));
+      return;
+    }
+    const exports = await bench.api.get("/exports");
+    this.chooser = h("select", { id: "take-damper" }, bench.dampers.map((d) => h("option", { value: d.key }, `${d.title} · ${d.rig || "rig"}${d.note ? ` · ${d.note}` : ""}`)));
+    this.chooser.value = damper ?? bench.dampers.at(-1).key;
+    const names = Object.entries(held).map(([name, value]) => `${name} = ${figures(value)}`);
+    const action = (title, work, kind = "") => h("button", { class: kind, onclick: () => this.trying(work) }, title);
+    put(this.model,
+      h("div", { class: "field" }, h("label", { for: "take-damper" }, "Damper"), this.chooser),
+      names.length ? note("", `Held by hand: ${names.join(", ")}.`) : null,
+      h("div", { class: "row" }, action("model.json", () => this.document(), "primary"), action("Loop as CSV", () => this.csv())),
+      exports.length ? h("div", { class: "row" }, h("span", { class: "small faint" }, "Export:"), exports.map((e) => action(e.title, () => this.export(e)))) : null,
+      h("p", { class: "small faint" }, c ? `The loop is that at ${condition({ ...c, amplitude_mm: MM * c.amplitude_m })}.` : "The loop is that of the condition the Model page begins with."),
+      this.exporting.element, this.said);
+  }
+
+  async trying(work) {
+    put(this.said);
+    try {
+      await work();
+    } catch (error) {
+      put(this.said, problem(error));
+    }
+  }
+
+  /** Parameters held by hand belong to the damper on the Model page. */
+  get held() {
+    return this.chooser.value === this.bench.state.damper ? this.bench.state.held : {};
+  }
+
+  async document() {
+    const { text } = await this.bench.api.post(`/dampers/${this.chooser.value}/document`, { held: this.held });
+    save(new Blob([text], { type: "application/json" }), "model.json");
+  }
+
+  async csv() {
+    const key = this.chooser.value;
+    const at = this.bench.state.condition ?? (await this.bench.api.get(`/dampers/${key}`)).start;
+    const { blob, name } = await this.bench.api.file(`/dampers/${key}/csv`, { ...at, held: this.held });
+    save(blob, name);
+  }
+
+  async export(form) {
+    const answer = await this.exporting.run(`/dampers/${this.chooser.value}/export/${form.name}`, { held: this.held });
+    if (!answer) return;
+    const link = h("a", { href: this.bench.api.url(`/exported/${answer.exported}`), download: "" }, "Save it again");
+    link.click();
+    put(this.said, h("p", { class: "small faint" }, `${form.title} saved. `, answer.notes.map((n) => `${n}. `), link, "."));
+  }
+
+  stateBody() {
+    const keep = () => save(new Blob([JSON.stringify(portable(this.bench.state), null, 1)], { type: "application/json" }), "bench-state.json");
+    return h("div", { class: "body" },
+      h("p", {}, "A state file brings back what you see: data where they are bundled, the model, and every slider. Drop it on the Data page."),
+      h("div", {}, h("button", { onclick: keep }, "Save the state")),
+      h("p", { class: "small faint" }, "“Copy link” in the header does the same in a link. Everything stays on this machine: the bench sends nothing anywhere, and its files go when it stops."));
+  }
+}

@@ -1,0 +1,206 @@
+"""Long work in a process of its own: told apart, watched, and stopped when nobody wants it.
+
+The page stays answered while a study runs, and a cancelled one costs nothing more. A task is
+a module-level function `task(tell, *arguments)` of `tasks.py`; `tell(what, share)` reports.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from typing import Any
+
+from mrdamper.errors import InputError
+
+_AT_ONCE = max(1, os.cpu_count() or 1)  # processes of all sessions together
+_BETWEEN = 0.05  # seconds between two reports: a page shows no more
+_FREE = threading.BoundedSemaphore(_AT_ONCE)
+
+
+@dataclass(eq=False)
+class Job:
+    """One piece of long work.
+
+    Attributes
+    ----------
+    key, kind : str
+        Name made by the session, and what it is about.
+    state : str
+        "waiting", "running", "done", "refused" (by the input), "failed" (our fault) or "cancelled".
+    what, share : str, float
+        What is being done, and how much of it, 0...1.
+    error : mapping, optional
+        As the page shows it.
+    answer : mapping, optional
+        What the page is told at the end.
+    """
+
+    key: str
+    kind: str
+    task: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    conclude: Callable[[Any], dict[str, Any]]
+    state: str = "waiting"
+    what: str = "waiting for a free processor"
+    share: float = 0.0
+    error: dict[str, str] | None = None
+    answer: dict[str, Any] | None = None
+    began: float = field(default_factory=time.monotonic)
+    seconds: float = 0.0
+    _process: Any = None
+    _thread: threading.Thread | None = None
+    _stop: threading.Event = field(default_factory=threading.Event)
+
+    def start(self) -> Job:
+        """Begin; returns at once."""
+        self._thread = threading.Thread(target=self._watch, name=f"bench-{self.kind}", daemon=True)
+        self._thread.start()
+        return self
+
+    def wait(self, seconds: float) -> None:
+        """Until it has ended, but no longer than so."""
+        if self._thread is not None:
+            self._thread.join(seconds)
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing more will come."""
+        return self.state not in ("waiting", "running")
+
+    def cancel(self) -> None:
+        """Stop the process; harmless where it has ended."""
+        self._stop.set()
+        process = self._process
+        if process is not None and process.is_alive():
+            _end_group(process)
+
+    def report(self) -> dict[str, Any]:
+        """What the page shows of it."""
+        seconds = self.seconds if self.ended else time.monotonic() - self.began
+        return {
+            "key": self.key,
+            "kind": self.kind,
+            "state": self.state,
+            "what": self.what,
+            "share": round(self.share, 4),
+            "seconds": round(seconds, 1),
+            "error": self.error,
+            "answer": self.answer,
+        }
+
+    def _watch(self) -> None:
+        while not _FREE.acquire(timeout=0.1):
+            if self._stop.is_set():
+                self._end("cancelled")
+                return
+        try:
+            if self._stop.is_set():
+                self._end("cancelled")
+            else:
+                self._run()
+        finally:
+            _FREE.release()
+
+    def _run(self) -> None:
+        self.state, self.what = "running", "starting"
+        context = get_context("spawn")  # a fork of a process that runs threads can hang
+        here, there = context.Pipe(duplex=False)
+        self._process = context.Process(target=_work, args=(there, self.task, self.arguments))
+        self._process.start()
+        there.close()
+        if self._stop.is_set():  # cancelled while it was being started
+            _end_group(self._process)
+        try:
+            self._listen(here)
+        finally:
+            here.close()
+            self._process.join()
+
+    def _listen(self, here: Connection) -> None:
+        while True:
+            try:
+                kind, *said = here.recv()
+            except EOFError:
+                if self._stop.is_set():
+                    return self._end("cancelled")
+                return self._fail("the worker process ended early")
+            if kind == "tell":
+                self.what, self.share = said
+            elif kind == "done":
+                return self._conclude(said[0])
+            elif kind == "refused":
+                self.error = said[0]
+                return self._end("refused")
+            else:
+                return self._fail(said[0])
+
+    def _conclude(self, result: Any) -> None:
+        if self._stop.is_set():
+            return self._end("cancelled")
+        try:
+            self.answer = self.conclude(result)
+        except Exception:
+            return self._fail(traceback.format_exc())
+        self.share = 1.0
+        return self._end("done")
+
+    def _fail(self, trace: str) -> None:
+        print(trace, flush=True)
+        self.error = {
+            "text": "The work stopped on an error of ours, not yours. The terminal shows the details.",
+            "code": "E_OURS",
+        }
+        self._end("failed")
+
+    def _end(self, state: str) -> None:
+        self.seconds = time.monotonic() - self.began
+        self.state = state  # last: whoever sees it finds the rest in place
+
+
+def refusal(error: InputError) -> dict[str, str]:
+    """An error of the input in the parts the page shows."""
+    return {
+        "text": str(error),
+        "found": error.found,
+        "where": error.where,
+        "mend": error.mend,
+        "code": error.code,
+    }
+
+
+def _end_group(process: Any) -> None:
+    """End a worker and the processes it started; a task may run a pool of its own."""
+    try:
+        os.killpg(process.pid, signal.SIGTERM)
+    except (AttributeError, ProcessLookupError, PermissionError):
+        process.terminate()  # no process groups here, or not yet one of its own
+
+
+def _work(pipe: Connection, task: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
+    """Run a task and send what comes of it: the body of the worker process."""
+    if hasattr(os, "setsid"):
+        os.setsid()  # a group of its own, so that cancelling reaches the processes a task starts
+    last = 0.0
+
+    def tell(what: str, share: float) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last > _BETWEEN:
+            last = now
+            pipe.send(("tell", what, float(share)))
+
+    try:
+        pipe.send(("done", task(tell, *arguments)))
+    except InputError as error:
+        pipe.send(("refused", refusal(error)))
+    except (BrokenPipeError, KeyboardInterrupt):
+        return  # the bench has gone
+    except Exception:
+        pipe.send(("failed", traceback.format_exc()))

@@ -1,0 +1,35 @@
+"""Tasks for the tests of worker processes; a spawned process imports them by name."""
+
+import multiprocessing
+import time
+from pathlib import Path
+
+from mrdamper.errors import IdentificationError
+
+
+def count(tell, steps):
+    for step in range(steps):
+        tell(f"step {step}", step / steps)
+        time.sleep(0.06)
+    return steps
+
+
+def refuse(tell):
+    raise IdentificationError("too few runs", where="rig x", mend="record more")
+
+
+def break_down(tell):
+    raise RuntimeError("a fault of ours")
+
+
+def sleep_with_child(tell, folder):
+    """Start a process of its own and sleep; both write down who they are."""
+    child = multiprocessing.get_context("spawn").Process(target=_sleep)
+    child.start()
+    (Path(folder) / "child").write_text(str(child.pid))
+    tell("sleeping", 0.5)
+    time.sleep(60)
+
+
+def _sleep():
+    time.sleep(60)

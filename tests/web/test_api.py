@@ -1,0 +1,256 @@
+"""What the bench answers is what the package computes."""
+
+import io
+import json
+import struct
+import time
+import zipfile
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from mrdamper.data import Condition
+from mrdamper.export import exporter
+from mrdamper.export.base import identifier
+from mrdamper.identification import identify
+from mrdamper.io.model_file import dump_model, parse_model
+from mrdamper.joint import JointProblem
+from mrdamper.loop_analysis import analyse_loop
+from mrdamper.modified import fit_modified
+from mrdamper.web.frames import frame
+
+SCREEN = 1e-6  # arrays travel as 32-bit floats: 6e-8 of each value, and sums of two
+
+
+def opened(content):
+    """Head and arrays of a frame."""
+    (length,) = struct.unpack_from("<I", content)
+    head = json.loads(content[4 : 4 + length])
+    at, found = 4 + length, {}
+    for name, size in head["arrays"]:
+        found[name] = np.frombuffer(content, "<f4", size, at)
+        at += 4 * size
+    assert at == len(content)
+    return head, found
+
+
+@pytest.fixture(scope="module")
+def joint(bundled):
+    runs = [run for run in bundled.rig("utfsm").split("train")][:6]
+    return JointProblem(runs, "play-bypass").fit(rounds=1, most_steps=4).damper
+
+
+@pytest.fixture(scope="module")
+def modified(bundled):
+    runs = [run for run in bundled.rig("utfsm").split("train") if run.excitation == "sine"][:6]
+    return fit_modified([identify(run, "bingham") for run in runs]).damper
+
+
+def put_on(client, bench, damper):
+    return client.post(f"{bench}/dampers", json={"text": dump_model(damper)}).json()["damper"]
+
+
+@given(
+    st.dictionaries(
+        st.text(max_size=8),
+        arrays(np.float32, st.integers(0, 30), elements=st.floats(width=32, allow_nan=False)),
+        max_size=4,
+    )
+)
+def test_frames_keep_every_array(named):
+    head, found = opened(frame({"a": "β"}, named).body)
+    assert head["a"] == "β"
+    assert list(found) == list(named)
+    for name, values in named.items():
+        np.testing.assert_array_equal(found[name], values)
+
+
+def test_the_bundled_data_are_one_call_away(client, session, bundled):
+    overview = client.post(f"{session}/bundled").json()
+    assert [rig["name"] for rig in overview["rigs"]] == list(bundled.rigs)
+    assert overview["runs"] == len(bundled)
+
+
+def test_the_matrix_holds_every_steady_sine_once(client, bench):
+    table = client.get(f"{bench}/data/rigs/1").json()
+    in_matrix = [key for m in table["matrix"]["motions"] for cell in m["cells"] for key in cell]
+    sines = [run["key"] for run in table["runs"] if run["peak_N"] is not None]
+    assert sorted(in_matrix) == sorted(sines)
+    assert len(set(in_matrix)) == len(in_matrix)
+
+
+def test_figures_of_a_run_are_the_loop_analysis(client, bench, bundled):
+    table = client.get(f"{bench}/data/rigs/1").json()
+    shown = next(run for run in table["runs"] if run["peak_N"] is not None)
+    found = analyse_loop(bundled[shown["id"]])
+    assert shown["peak_N"] == found.peak_force
+    assert shown["energy_J"] == found.dissipated_energy
+    assert shown["condition"]["amplitude_mm"] == pytest.approx(1e3 * found.condition.amplitude_m, rel=1e-12)
+
+
+def test_a_measured_cycle_closes_and_begins_on_the_way_up(client, bench):
+    table = client.get(f"{bench}/data/rigs/1").json()
+    for run in table["runs"][:6]:
+        if run["peak_N"] is None:
+            continue
+        _, curve = opened(client.get(f"{bench}/data/rigs/1/runs/{run['key']}/cycle").content)
+        amplitude = run["condition"]["amplitude_mm"]
+        # A twentieth of the amplitude is how far a cycle's start is off by harmonics and drift.
+        assert abs(curve["x"][0]) < 0.1 * amplitude
+        assert abs(curve["x"][-1] - curve["x"][0]) < 0.1 * amplitude
+        assert curve["v"][0] > 0
+        assert curve["t"][-1] == pytest.approx(1 / run["condition"]["frequency_Hz"], rel=0.03)
+
+
+@pytest.mark.parametrize("kind", ["joint", "modified"])
+def test_a_prediction_is_the_dampers(client, bench, request, kind):
+    damper = request.getfixturevalue(kind)
+    key = put_on(client, bench, damper)
+    condition = Condition(0.4, 1.1, 0.012)
+    ask = {"current_A": 0.4, "frequency_Hz": 1.1, "amplitude_m": 0.012, "family": True, "currents": 5}
+    head, curves = opened(client.post(f"{bench}/dampers/{key}/predict", json=ask).content)
+    expected = damper.predict(condition)
+    picked = np.linspace(0, expected.force.size - 1, curves["now.F"].size).round().astype(int)
+    scale = np.ptp(expected.force)
+    np.testing.assert_allclose(curves["now.F"], expected.force[picked], atol=SCREEN * scale)
+    np.testing.assert_allclose(curves["now.x"], 1e3 * expected.motion.displacement[picked], atol=SCREEN * 12)
+    assert head["extrapolation"] == list(expected.extrapolation)
+    assert len(head["loops"]) == 10
+    at_zero = damper.predict(Condition(0.0, 1.1, 0.012))
+    assert curves["over.peak"][0] == pytest.approx(np.ptp(at_zero.force) / 2, rel=SCREEN)
+
+
+def test_a_held_parameter_replaces_the_models(client, bench, joint):
+    key = put_on(client, bench, joint)
+    condition = Condition(0.4, 1.1, 0.012)
+    ask = {"current_A": 0.4, "frequency_Hz": 1.1, "amplitude_m": 0.012, "held": {"f0": 100.0}}
+    head, curves = opened(client.post(f"{bench}/dampers/{key}/predict", json=ask).content)
+    moved = replace(joint, model=replace(joint.model, f0=100.0)).predict(condition).force
+    assert head["parameters"]["f0"] == 100.0
+    assert np.mean(curves["now.F"]) == pytest.approx(np.mean(moved), abs=1e-3 * np.ptp(moved))  # thinned by a sample
+    text = client.post(f"{bench}/dampers/{key}/document", json={"held": {"f0": 100.0}}).json()["text"]
+    assert parse_model(text).model.f0 == 100.0
+    assert "held by hand" in parse_model(text).provenance
+
+
+def test_a_function_can_be_held_in_a_saved_model(client, bench, modified):
+    key = put_on(client, bench, modified)
+    text = client.post(f"{bench}/dampers/{key}/document", json={"held": {"c": 1234.5}}).json()["text"]
+    model = parse_model(text).parameters.at(Condition(0.3, 2.0, 0.01))
+    assert model.c == pytest.approx(1234.5, rel=1e-12)
+
+
+def test_documents_come_back_bit_for_bit(client, bench, joint, modified):
+    for damper in (joint, modified):
+        key = put_on(client, bench, damper)
+        assert client.post(f"{bench}/dampers/{key}/document", json={}).json()["text"] == dump_model(damper)
+
+
+@pytest.mark.parametrize(
+    ("ask", "code"),
+    [
+        ({"current_A": 0.1, "frequency_Hz": 0, "amplitude_m": 0.01}, "E_REQUEST"),
+        ({"current_A": 0.1, "frequency_Hz": 1, "amplitude_m": 0.01, "held": {"nothing": 1.0}}, "E_PARAMETER"),
+        ({"current_A": 0.1, "frequency_Hz": 1, "amplitude_m": 0.01, "held": {"d": -1.0}}, "E_PARAMETER"),
+        ({"current_A": 0.1, "frequency_Hz": 1, "amplitude_m": 0.01, "other": 1}, "E_REQUEST"),
+    ],
+)
+def test_questions_out_of_bounds_are_refused(client, bench, joint, ask, code):
+    key = put_on(client, bench, joint)
+    answer = client.post(f"{bench}/dampers/{key}/predict", json=ask)
+    assert answer.status_code == 422
+    assert answer.json()["code"] == code
+
+
+def test_sliders_reach_around_their_values_inside_the_bounds(client, bench, joint, modified):
+    for damper in (joint, modified):
+        shown = client.get(f"{bench}/dampers/{put_on(client, bench, damper)}").json()
+        assert shown["parameters"]
+        for p in shown["parameters"]:
+            low, high = p["bounds"]
+            assert p["low"] <= p["value"] <= p["high"]
+            assert p["low"] < p["high"]
+            assert low is None or p["low"] >= low
+            assert high is None or p["high"] <= high
+
+
+def test_the_loop_leaves_as_csv_(client, bench, joint):
+    key = put_on(client, bench, joint)
+    ask = {"current_A": 0.4, "frequency_Hz": 1.1, "amplitude_m": 0.012}
+    table = client.post(f"{bench}/dampers/{key}/csv", json=ask)
+    assert table.text.splitlines()[0].startswith("time_s,displacement_m,velocity_m_s,current_A,force_N")
+
+
+@pytest.mark.parametrize("form", ["c", "latex"])
+def test_exports_are_made_in_a_worker(client, bench, joint, form):
+    assert form in {f["name"] for f in client.get(f"{bench}/exports").json()}
+    key = put_on(client, bench, joint)
+    report = wait(client, bench, client.post(f"{bench}/dampers/{key}/export/{form}", json={}).json())
+    assert report["state"] == "done", report
+    answer = client.get(f"{bench}/exported/{report['answer']['exported']}")
+    assert "attachment" in answer.headers["content-disposition"]
+    expected = exporter(form)().export(joint, identifier(joint.rig)).files
+    if len(expected) == 1:
+        assert answer.content == next(iter(expected.values()))
+    else:
+        packed = zipfile.ZipFile(io.BytesIO(answer.content))
+        assert {name: packed.read(name) for name in packed.namelist()} == dict(expected)
+
+
+def wait(client, session, job):
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline:
+        report = client.get(f"{session}/jobs/{job['key']}").json()
+        if report["state"] not in ("waiting", "running"):
+            return report
+        time.sleep(0.05)
+    raise AssertionError(report)
+
+
+def test_a_study_leaves_dampers_and_files(client, app, session, small_rig):
+    from mrdamper.web.intake import Intake
+
+    next(iter(app.state.sessions)).put(Intake(small_rig, "drop"))
+    report = wait(client, session, client.post(f"{session}/study").json())
+    assert report["state"] == "done", report
+    (rig,) = report["answer"]["rigs"]
+    listed = {d["key"] for d in client.get(f"{session}/dampers").json()}
+    assert {c["damper"] for c in rig["candidates"]} <= listed
+    names = [f["name"] for f in client.get(f"{session}/files").json()]
+    assert names[0] == "report.html"
+    report_file = client.get(f"{session}/files/0")
+    assert "attachment" in report_file.headers["content-disposition"]
+    packed = zipfile.ZipFile(io.BytesIO(client.get(f"{session}/files.zip").content))
+    assert packed.testzip() is None
+    assert len(packed.namelist()) == len(names)
+
+
+def test_identified_values_are_those_of_identify(client, app, session, small_rig):
+    from mrdamper.web.intake import Intake
+
+    next(iter(app.state.sessions)).put(Intake(small_rig, "drop"))
+    choice = {"rig": 0, "model": "bingham", "method": "projection", "runs": ["run0", "run1", "run2"]}
+    report = wait(client, session, client.post(f"{session}/identify", json=choice).json())
+    assert report["state"] == "done", report
+    for shown in report["answer"]["runs"]:
+        assert shown["values"] == pytest.approx(identify(small_rig[shown["id"]], "bingham").model.values(), rel=1e-12)
+    head, curves = opened(client.get(f"{session}/identified/runs/0").content)
+    assert head["id"] == report["answer"]["runs"][0]["id"]
+    np.testing.assert_allclose(
+        curves["residual"], curves["model.F"] - curves["measured.F"], atol=SCREEN * np.ptp(curves["measured.F"])
+    )
+    # The residual over one cycle is what the error of the whole window says, to the drift between cycles.
+    share = np.sqrt(np.mean(curves["residual"] ** 2)) / np.ptp(curves["measured.F"])
+    assert share == pytest.approx(report["answer"]["runs"][0]["nrmse_pp"], rel=0.5)
+
+
+def test_input_a_model_cannot_use_is_told_with_its_remedy(client, bench):
+    choice = {"rig": 0, "model": "bing-ham", "method": "projection"}
+    report = wait(client, bench, client.post(f"{bench}/identify", json=choice).json())
+    assert report["state"] == "refused"
+    assert report["error"]["code"] == "E_NAME"
+    assert "bingham" in report["error"]["mend"]

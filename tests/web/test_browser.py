@@ -1,0 +1,293 @@
+"""The page as a browser shows it: from drop to report, sliders, bad files, hostile names, links."""
+
+import base64
+import json
+import zipfile
+from dataclasses import replace
+
+import pytest
+from web.rig_files import csv_of
+
+from mrdamper.io.dataset import save_dataset
+from mrdamper.io.model_file import dump_model
+from mrdamper.joint import JointProblem
+
+HOSTILE = [
+    "<img src=x onerror=alert(1)>",
+    "<script>alert(1)</script>",
+    '"><svg onload=alert(1)>',
+    "<b>bold</b>",
+    "<a href='javascript:alert(1)'>x</a>",
+    "=cmd|' /C calc'!A0",
+    '=HYPERLINK("http://evil.example")',
+    "+1+1",
+    "-2+3",
+    "@SUM(A1)",
+    "\u202egnp.exe",
+    "\u2066left\u2069",
+    "e\u0301\u0327\u0328",
+    "名前 ダンパ",
+    "a\u0000b".replace("\u0000", "␀"),
+    "%{x}<extra></extra>",
+    "{{7*7}}${7*7}",
+    "../../etc/passwd",
+    "con",
+    "x" * 120,
+]
+
+
+def drop(page, files):
+    """Drop files on the page as a hand would: {name: bytes}."""
+    packed = [[name, base64.b64encode(content).decode()] for name, content in files.items()]
+    page.evaluate(
+        """(files) => {
+            const transfer = new DataTransfer();
+            for (const [name, text] of files) {
+                const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+                transfer.items.add(new File([bytes], name));
+            }
+            document.dispatchEvent(new DragEvent("drop", { dataTransfer: transfer, bubbles: true, cancelable: true }));
+        }""",
+        packed,
+    )
+
+
+def drop_dataset(page, dataset, folder):
+    save_dataset(dataset, folder)
+    drop(page, {path.name: path.read_bytes() for path in sorted(folder.iterdir())})
+
+
+def open_tab(page, name):
+    page.get_by_role("tab", name=name).click()
+
+
+def curve(page, chart):
+    """Path of the predicted loop in a chart, as drawn."""
+    return page.locator(f"section[aria-label='{chart}'] .scatterlayer .js-line").last.get_attribute("d")
+
+
+def settled(page, what, tries=100):
+    """Ask until two answers in a row agree; the page's policy forbids polling inside it."""
+    last = what()
+    for _ in range(tries):
+        page.wait_for_timeout(150)
+        now = what()
+        if now == last and now is not None:
+            return now
+        last = now
+    raise AssertionError("it does not come to rest")
+
+
+def charts_fill_their_cards(page):
+    """True once every chart is as wide as its place; None before, so that one waits on."""
+    return page.evaluate(
+        """() => [...document.querySelectorAll(".plot.frame > .plot")].every((place) =>
+            Math.abs(place.querySelector(".main-svg").getBoundingClientRect().width - place.clientWidth) < 2) || null"""
+    )
+
+
+def test_from_drop_to_report(page, small_rig, tmp_path, shoot):
+    shoot(page, "1-empty")
+    drop_dataset(page, small_rig, tmp_path / "rig")
+    page.locator(".matrix .cell").first.wait_for()
+    assert page.locator(".matrix .cell").count() == len(small_rig)
+    assert page.locator(".cell.validate").count() == len(small_rig.split("validate"))
+    page.locator("section[aria-label='Force over displacement'] .js-line").first.wait_for(state="attached")
+    shoot(page, "2-data")
+
+    open_tab(page, "Identify")
+    page.get_by_label("One model").check()
+    page.get_by_label("Model", exact=True).select_option("bouc-wen")
+    page.get_by_role("button", name="Start").click()
+    page.get_by_role("heading", name="runs identified").wait_for()
+    page.locator("section[aria-label='Residual over time'] .js-line").wait_for(state="attached")
+    shoot(page, "3-identified")
+
+    open_tab(page, "Compare")
+    page.locator("input[name=contestant]").first.wait_for()
+    for box in page.locator("input[name=contestant]").all():
+        box.set_checked(box.get_attribute("value") in ("bingham", "play-bypass"))
+    page.get_by_role("button", name="Compare", exact=True).click()
+    page.locator("#compare-run").wait_for()
+    page.locator("section[aria-label='Force over velocity'] .js-line").first.wait_for(state="attached")
+    assert page.locator("tbody tr").count() == 2
+    shoot(page, "4-compared")
+
+    open_tab(page, "Take away")
+    page.get_by_role("button", name="Make the report").click()
+    page.get_by_role("progressbar").wait_for()
+    page.get_by_role("link", name="report.html").wait_for(timeout=60_000)
+    shoot(page, "5-take-away")
+    with page.expect_download() as waiting:
+        page.get_by_role("link", name="report.html").click()
+    report = tmp_path / "report.html"
+    waiting.value.save_as(report)
+    assert "MR damper study" in report.read_text(encoding="utf-8")
+    with page.expect_download() as waiting:
+        page.get_by_role("link", name="Everything as one zip").click()
+    waiting.value.save_as(tmp_path / "all.zip")
+    assert "mrdamper-study/model.json" in zipfile.ZipFile(tmp_path / "all.zip").namelist()
+    with page.expect_download() as waiting:
+        page.get_by_role("button", name="model.json").click()
+    waiting.value.save_as(tmp_path / "model.json")
+    assert json.loads((tmp_path / "model.json").read_text())["format"] == "mrdamper-model"
+
+
+@pytest.fixture(scope="module")
+def document(small_rig):
+    """A saved model of the rig."""
+    return dump_model(JointProblem(small_rig.split("train"), "play-bypass").fit(rounds=1, most_steps=6).damper)
+
+
+@pytest.fixture
+def on_model(page, document):
+    """The Model view with a damper of one of the bundled rigs, dropped as a file."""
+    page.get_by_role("button", name="Open the bundled tests", exact=True).click()
+    page.locator(".matrix").wait_for()
+    drop(page, {"model.json": document.encode()})
+    page.locator("section[aria-label='Force over displacement'] .js-line").nth(1).wait_for(state="attached")
+    settled(page, lambda: curve(page, "Force over displacement"))
+    return page
+
+
+def number(page, name):
+    return float(page.locator(f".slider[data-name={name}] input[type=number]").input_value())
+
+
+def test_sliders_move_the_loops_and_undo_takes_it_back(on_model, shoot):
+    page = on_model
+    shoot(page, "6-model")
+    before, at_first = curve(page, "Force over displacement"), number(page, "current_A")
+    slider = page.locator("#slider-current_A")
+    slider.focus()
+    for _ in range(12):
+        slider.press("ArrowRight")
+    assert number(page, "current_A") > at_first
+    assert settled(page, lambda: curve(page, "Force over displacement")) != before
+    for _ in range(12):
+        page.keyboard.press("Control+z")
+    assert number(page, "current_A") == at_first
+    assert settled(page, lambda: curve(page, "Force over displacement")) == before
+
+    page.get_by_label("Loops at all tested currents").check()
+    paths = page.locator("section[aria-label='Force over displacement'] .js-line")
+    assert settled(page, paths.count) >= 10
+    shoot(page, "7-family")
+
+
+def test_a_parameter_is_held_until_released(on_model):
+    page = on_model
+    row = page.locator(".slider[data-name=f0]")
+    at_first = number(page, "f0")
+    row.locator("input[type=number]").fill(str(at_first + 50))
+    row.locator("input[type=number]").press("Enter")
+    row.get_by_role("button", name="Release f0").wait_for()
+    assert number(page, "f0") == pytest.approx(at_first + 50)
+    row.get_by_role("button", name="Release f0").click()
+    settled(page, lambda: number(page, "f0"))
+    assert number(page, "f0") == pytest.approx(at_first, rel=1e-4)  # the field shows five figures
+
+
+def test_extrapolation_is_said(on_model, shoot):
+    page = on_model
+    box = page.locator(".slider[data-name=current_A] input[type=number]")
+    box.fill("1.2")
+    box.press("Enter")
+    page.locator(".message.warn").filter(has_text="current 1.2 A, tested 0–1 A").wait_for()
+    shoot(page, "8-extrapolation")
+
+
+def test_a_link_brings_the_state_back(on_model, browser, address):
+    page = on_model
+    box = page.locator(".slider[data-name=current_A] input[type=number]")
+    box.fill("0.31")
+    box.press("Enter")
+    shown = settled(page, lambda: curve(page, "Force over velocity"))
+    page.wait_for_timeout(800)  # the address follows the state a moment later
+    link = page.evaluate("location.href")
+    assert "#s=" in link
+    context = browser.new_context(viewport={"width": 1366, "height": 768})
+    other = context.new_page()
+    other.goto(link)
+    other.locator("html[data-ready]").wait_for()
+    other.locator("section[aria-label='Force over velocity'] .js-line").first.wait_for(state="attached")
+    assert settled(other, lambda: curve(other, "Force over velocity")) == shown
+    assert number(other, "current_A") == pytest.approx(0.31)
+    context.close()
+
+
+def test_rig_files_are_read_and_bad_ones_named(page, small_rig, shoot):
+    files = {f"{run.id}.csv": csv_of(run) for run in list(small_rig)[:3]}
+    drop(page, {**files, "<b>notes of the rig.csv": b"hello\nworld\n"})
+    page.locator(".matrix .cell").first.wait_for()
+    assert page.locator(".matrix .cell").count() == 3
+    refused = page.locator(".message.bad").filter(has_text="<b>notes of the rig").first
+    refused.wait_for()
+    assert "E_" in refused.inner_text()
+    shoot(page, "9-verdicts")
+
+
+def test_a_bad_file_says_what_where_and_how_to_mend_it(page, shoot):
+    drop(page, {"runs.csv": b"run_id,rig\n", "samples.csv": b"run_id,time_s\n"})
+    message = page.locator(".message.bad")
+    message.wait_for()
+    assert "no rows" in message.inner_text()
+    assert "Add one row a run" in message.inner_text()
+    assert "E_DATASET" in message.inner_text()
+    assert "mrdamper-bench" not in message.inner_text()  # no path of this machine
+    shoot(page, "10-bad-file")
+    page.complaints[:] = [c for c in page.complaints if "422" not in c]  # the browser notes the refused request
+
+
+def test_hostile_names_are_text(page, small_rig, tmp_path, shoot):
+    one = next(iter(small_rig))
+    dataset = small_rig.only([replace(one, id=name, rig=HOSTILE[0]) for name in HOSTILE], name="hostile")
+    page.on("dialog", lambda dialog: pytest.fail(f"a script ran: {dialog.message}"))
+    drop_dataset(page, dataset, tmp_path / "hostile")
+    page.locator(".cell").first.wait_for()
+    assert page.locator(".cell").count() == len(HOSTILE)
+    for cell, name in zip(page.locator(".cell").all(), HOSTILE, strict=True):
+        assert cell.get_attribute("title").startswith(name)
+    for i in (0, 1, 10, 15):
+        page.locator(".cell").nth(i).click()
+        page.get_by_role("heading", name=f"Run {HOSTILE[i]}", exact=True).wait_for()
+    assert page.locator("main img, main script, main a[href^=javascript]").count() == 0
+    assert page.evaluate("document.title") == "mrdamper live bench"
+    shoot(page, "11-hostile-names")
+
+
+def test_dark_projector_and_narrow(on_model, shoot):
+    page = on_model
+    page.get_by_role("button", name="Use dark colours").click()
+    assert page.evaluate("document.documentElement.dataset.theme") == "dark"
+    for size, name in (((1920, 1080), "12-dark-projector"), ((700, 1000), "13-narrow")):
+        page.set_viewport_size({"width": size[0], "height": size[1]})
+        assert settled(page, lambda: charts_fill_their_cards(page))
+        shoot(page, name)
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_work_can_be_cancelled(page):
+    page.get_by_role("button", name="Open the bundled tests", exact=True).click()
+    page.locator(".matrix").wait_for()
+    open_tab(page, "Identify")
+    page.get_by_role("button", name="Start").click()
+    page.get_by_role("button", name="Cancel").click()
+    page.get_by_text("Cancelled. Nothing was changed.").wait_for()
+    assert page.get_by_role("button", name="Start").is_enabled()
+
+
+def test_everything_has_a_name_and_the_keyboard_reaches_it(on_model):
+    page = on_model
+    nameless = page.evaluate(
+        """() => [...document.querySelectorAll("button, input, select, textarea, a[href]")]
+            .filter((e) => e.offsetParent !== null)
+            .filter((e) => !(e.getAttribute("aria-label") || e.labels?.length || e.textContent.trim() || e.title))
+            .map((e) => e.outerHTML)"""
+    )
+    assert nameless == []
+    page.get_by_role("tab", name="Model").focus()
+    page.keyboard.press("ArrowRight")
+    assert page.get_by_role("tab", name="Compare").get_attribute("aria-selected") == "true"
+    page.keyboard.press("ArrowLeft")
+    assert page.get_by_role("tab", name="Model").get_attribute("aria-selected") == "true"

@@ -1,0 +1,118 @@
+"""Dropped files become data on the bench, or an answer that says what to do."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from web.rig_files import csv_of
+
+from mrdamper.errors import InputError
+from mrdamper.io.dataset import save_dataset
+from mrdamper.web.intake import FILE_COUNT_LIMIT, Drop, DropError, NothingTakenError, bundled, read_drop
+
+
+@pytest.fixture
+def drop(tmp_path):
+    return Drop("drop1", tmp_path)
+
+
+def put(drop, name, content):
+    drop.place(name).write_bytes(content)
+
+
+def test_a_dataset_folder_comes_back_as_it_was(drop, small_rig, tmp_path):
+    folder = tmp_path / "saved"
+    save_dataset(small_rig, folder)
+    for path in folder.iterdir():
+        put(drop, f"my rig/{path.name}", path.read_bytes())
+    found = read_drop(drop)
+    assert found.dataset.name == "my rig"
+    assert [run.id for run in found.dataset] == [run.id for run in small_rig]
+    for there, here in zip(found.dataset, small_rig, strict=True):
+        np.testing.assert_array_equal(there.force, here.force)
+
+
+def test_rig_files_are_read_with_the_current_of_their_names(drop, small_rig):
+    runs = list(small_rig)[:3]
+    for run in runs:
+        put(drop, f"{run.id}.csv", csv_of(run))
+    found = read_drop(drop)
+    assert [run.current_A for run in found.dataset] == [round(run.current_A, 3) for run in runs]
+    for there, here in zip(found.dataset, runs, strict=True):
+        # Written with six figures behind the point of millimetres.
+        np.testing.assert_allclose(there.displacement, here.displacement, atol=1e-9)
+    assert {v.state for v in found.verdicts} <= {"taken", "noticed"}
+
+
+def test_the_profile_shown_reads_the_same(drop, small_rig):
+    run = next(iter(small_rig))
+    put(drop, f"{run.id}.csv", csv_of(run))
+    first = read_drop(drop)
+    again = read_drop(drop, first.profile)
+    np.testing.assert_array_equal(again.dataset.runs[0].force, first.dataset.runs[0].force)
+    assert again.profile == first.profile
+
+
+def test_a_refused_drop_brings_the_profile_that_mends_it(drop, small_rig):
+    run = next(iter(small_rig))
+    put(drop, "no current in this name.csv", csv_of(run))
+    with pytest.raises(NothingTakenError) as caught:
+        read_drop(drop)
+    (verdict,) = caught.value.verdicts
+    assert verdict.name == "no current in this name.csv"
+    assert verdict.findings[0][0] == "E_CURRENT_MISSING"
+    mended = read_drop(drop, f"{caught.value.profile}\n[current]\nvalue = 0.25\n")
+    assert mended.dataset.runs[0].current_A == 0.25
+
+
+def test_a_wrong_profile_is_told(drop, small_rig):
+    put(drop, "run_1A.csv", csv_of(next(iter(small_rig))))
+    with pytest.raises(InputError) as caught:
+        read_drop(drop, "rig = [")
+    assert caught.value.code == "E_PROFILE"
+
+
+@pytest.mark.parametrize(
+    ("files", "code"),
+    [
+        ({}, "E_DROP"),
+        ({"runs.csv": b"run_id,rig\n"}, "E_DATASET"),
+        ({"runs.csv": b"run_id,rig\na,b\n", "samples.csv": b"run_id,time_s\na,0\n"}, "E_COLUMN"),
+        ({"runs.csv": b"\xff\xfe\x00"}, "E_COLUMN"),
+        ({"photo.png": b"\x89PNG\r\n\x1a\n\x00"}, "E_DROP_REFUSED"),
+    ],
+)
+def test_what_cannot_be_read_is_refused_by_name(drop, files, code):
+    for name, content in files.items():
+        put(drop, name, content)
+    with pytest.raises(InputError) as caught:
+        read_drop(drop)
+    assert caught.value.code == code
+    assert caught.value.mend
+    assert str(drop.folder) not in str(caught.value)
+
+
+def test_too_many_files_are_refused(drop):
+    drop.names.update({drop.folder / str(i): "x" for i in range(FILE_COUNT_LIMIT)})
+    with pytest.raises(DropError, match=str(FILE_COUNT_LIMIT)):
+        drop.place("one more.csv")
+
+
+def test_the_bundled_tests_are_read_once():
+    assert bundled() is bundled()
+
+
+def test_runs_that_do_not_move_are_shown_and_not_used(client, app, session, small_rig):
+    from mrdamper.web.intake import Intake
+
+    one = next(iter(small_rig))
+    still = replace(one, id="still", displacement=np.zeros(one.time.size))
+    next(iter(app.state.sessions)).put(Intake(small_rig.only([*small_rig, still]), "drop"))
+    table = client.get(f"{session}/data/rigs/0").json()
+    shown = next(run for run in table["runs"] if run["id"] == "still")
+    assert shown["condition"] is None
+    assert "does not move" in shown["refused"]
+    assert client.get(f"{session}/data/rigs/0/runs/{shown['key']}/cycle").status_code == 200
+    verdict = client.get(f"{session}/data/rigs/0/quality").json()[shown["key"]]
+    assert verdict["verdict"] == "refused"
+    assert verdict["findings"][0]["code"] == "E_NO_EXCITATION"

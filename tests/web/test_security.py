@@ -1,0 +1,165 @@
+"""Who is answered, and what every answer forbids."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from starlette.datastructures import Headers
+
+from mrdamper.web.intake import FILE_LIMIT
+from mrdamper.web.security import HEADERS, Guard
+
+GUARD = Guard(None, ["127.0.0.1:8765", "localhost:8765"])
+GOOD = {"host": "127.0.0.1:8765", "origin": "http://127.0.0.1:8765"}
+LATIN = st.text(st.characters(codec="latin-1"), max_size=40)  # what a header can carry
+METHODS = st.sampled_from(["GET", "HEAD", "POST", "PUT", "DELETE", "PATCH", "OPTIONS"])
+
+
+@given(METHODS, LATIN)
+@settings(max_examples=200, deadline=None)
+def test_a_strange_host_is_never_answered(method, host):
+    strange = host.lower() not in GUARD.hosts
+    assert bool(GUARD.refusal(method, Headers({**GOOD, "host": host}))) == strange
+
+
+@given(METHODS, LATIN)
+@settings(max_examples=200, deadline=None)
+def test_a_strange_origin_is_never_answered(method, origin):
+    headers = Headers({**GOOD, "origin": origin})
+    assert bool(GUARD.refusal(method, headers)) == (origin not in GUARD.origins)
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "PATCH", "OPTIONS"])
+def test_changes_need_an_origin(method):
+    assert GUARD.refusal(method, Headers({"host": GOOD["host"]}))
+    assert not GUARD.refusal(method, Headers(GOOD))
+
+
+@pytest.mark.parametrize("site", ["cross-site", "same-site"])
+def test_other_sites_may_not_even_read(site):
+    assert GUARD.refusal("GET", Headers({"host": GOOD["host"], "sec-fetch-site": site}))
+    assert not GUARD.refusal("GET", Headers({"host": GOOD["host"], "sec-fetch-site": "none"}))
+
+
+def test_the_guard_stands_before_the_application(client):
+    for headers in ({"host": "evil.example"}, {"origin": "http://evil.example"}, {"origin": "null"}):
+        assert client.post("/api/sessions", headers=headers).status_code == 403
+    assert client.get("/", headers={"host": "bench.test:2"}).status_code == 403
+
+
+@pytest.mark.parametrize(
+    "path", ["/", "/static/js/main.js", "/static/plotly.js", "/nowhere", "/api/sessions/unknown", "/api/sessions"]
+)
+def test_every_answer_forbids_what_is_not_ours(client, path):
+    answer = client.get(path)
+    for name, value in HEADERS.items():
+        assert answer.headers[name] == value
+    policy = answer.headers["content-security-policy"]
+    assert "unsafe" not in policy
+    assert "http" not in policy
+    assert "cache-control" in answer.headers
+
+
+def test_data_are_not_cached(client, bench):
+    for path in (f"{bench}/data", f"{bench}/data/rigs/0", f"{bench}/data/rigs/0/runs/run0/cycle"):
+        assert client.get(path).headers["cache-control"] == "no-store"
+
+
+def test_the_page_holds_no_inline_script_or_style(client):
+    text = client.get("/").text
+    assert "<style" not in text
+    assert " style=" not in text
+    assert text.count("<script") == text.count('<script type="module" src=')
+
+
+@pytest.mark.parametrize("path", ["/static/../app.py", "/static/%2e%2e/app.py", "/static/js/../../app.py", "/app.py"])
+def test_nothing_but_the_page_is_served(client, path):
+    assert client.get(path).status_code == 404
+
+
+def test_a_large_file_is_refused_before_it_is_sent(client, session):
+    drop = client.post(f"{session}/drops").json()["drop"]
+    answer = client.put(f"{session}/drops/{drop}/files?name=big.csv", content=bytes(FILE_LIMIT + 1))
+    assert answer.status_code == 413
+    assert answer.json()["code"] == "E_DROP_SIZE"
+
+
+def test_a_large_file_of_unsaid_length_is_stopped_on_the_way(client, app, session):
+    drop = client.post(f"{session}/drops").json()["drop"]
+    sent = []
+
+    def pieces():
+        for _ in range(100):
+            sent.append(1)
+            yield bytes(1_000_000)
+
+    answer = client.put(f"{session}/drops/{drop}/files?name=big.csv", content=pieces())
+    assert answer.status_code == 413
+    assert not [path for path in app.state.sessions.folder.rglob("*") if path.is_file()]
+
+
+HOSTILE = [
+    "../../etc/passwd",
+    "..\\..\\x.csv",
+    "/abs.csv",
+    "a\u202egnp.csv",
+    "<img src=x>.csv",
+    "con.csv",
+    ".hidden",
+    "a" * 900,
+]
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_files_are_stored_under_names_made_here(client, app, session, name):
+    drop = client.post(f"{session}/drops").json()["drop"]
+    answer = client.put(f"{session}/drops/{drop}/files", params={"name": name}, content=b"1,2,3\n")
+    assert answer.status_code == 200
+    stored = [path for path in app.state.sessions.folder.rglob("*") if path.is_file()]
+    assert len(stored) == 1
+    assert stored[0].parent.name == "0000"
+    assert stored[0].name.isascii()
+    assert not stored[0].name.startswith(".")
+
+
+def test_sessions_do_not_see_each_other(client, bench):
+    other = f"/api/sessions/{client.post('/api/sessions').json()['session']}"
+    assert other != bench
+    assert client.get(f"{other}/data").json()["code"] == "E_NO_DATA"
+    assert client.get(f"{bench}/data").status_code == 200
+
+
+def test_a_session_that_ended_is_gone_with_its_files(client, app, session):
+    drop = client.post(f"{session}/drops").json()["drop"]
+    client.put(f"{session}/drops/{drop}/files?name=a.csv", content=b"1,2,3\n")
+    folder = next(iter(app.state.sessions)).folder
+    assert any(folder.rglob("*"))
+    client.delete(session)
+    assert not folder.exists()
+    assert client.get(session).status_code == 410
+    assert client.get(session).json()["code"] == "E_SESSION"
+
+
+def test_an_unused_session_is_swept(client, app, session):
+    app.state.sessions.sweep(idle_seconds=3600)
+    assert len(app.state.sessions) == 1
+    app.state.sessions.sweep(idle_seconds=-1)
+    assert len(app.state.sessions) == 0
+
+
+def test_stopping_leaves_nothing_behind(app):
+    from fastapi.testclient import TestClient
+
+    with TestClient(app, base_url="http://bench.test:1", headers={"origin": "http://bench.test:1"}) as client:
+        client.post("/api/sessions")
+        assert app.state.sessions.folder.is_dir()
+    assert not app.state.sessions.folder.exists()
+
+
+def test_a_fault_of_ours_shows_no_inside(client, session, monkeypatch, capsys):
+    monkeypatch.setattr("mrdamper.web.api.data._overview", lambda session: 1 / 0)
+    answer = client.get(f"{session}/data")
+    assert answer.status_code == 500
+    assert answer.json()["code"] == "E_OURS"
+    assert "division" not in answer.text
+    assert "division" in capsys.readouterr().err
+    assert answer.headers["content-security-policy"] == HEADERS["Content-Security-Policy"]

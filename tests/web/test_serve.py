@@ -1,0 +1,115 @@
+"""The command: starts, answers on this machine only, stops cleanly, and says what it lacks."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+from web.processes import alive
+
+from mrdamper.cli import application
+from mrdamper.errors import InputError, MissingExtraError
+from mrdamper.web import server
+from mrdamper.web.app import plotly_script
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="looks into /proc for what is left running")
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_it_starts_answers_and_stops_cleanly(tmp_path, name):
+    stop = getattr(signal, name)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "mrdamper.cli", "serve", "--port", "0", "--no-browser"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "TMPDIR": str(tmp_path)},
+    )
+    address = process.stdout.readline().split()[2]
+    assert address.startswith("http://127.0.0.1:")
+    with urllib.request.urlopen(address, timeout=10) as answer:
+        assert b"live bench" in answer.read()
+    workers = workers_of_a_study(process.pid, address)
+    assert list(tmp_path.glob("mrdamper-bench-*"))
+    process.send_signal(stop)
+    out, err = process.communicate(timeout=20)
+    assert process.returncode == (-stop if stop == signal.SIGTERM else 0)
+    assert "Traceback" not in out + err
+    assert not list(tmp_path.glob("mrdamper-bench-*"))
+    deadline = time.monotonic() + 10
+    while any(map(alive, workers)) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert not [pid for pid in workers if alive(pid)]
+
+
+def workers_of_a_study(server, address):
+    """Begin long work; gives the process ids of the server's children."""
+
+    def post(path):
+        request = urllib.request.Request(f"{address}api/sessions{path}", b"", {"Origin": address.rstrip("/")})
+        with urllib.request.urlopen(request, timeout=20) as answer:
+            return json.load(answer)
+
+    session = post("")["session"]
+    post(f"/{session}/bundled")
+    post(f"/{session}/study")
+    deadline = time.monotonic() + 20
+    while not (found := children(server)) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert found
+    return found
+
+
+def children(pid):
+    tasks = Path(f"/proc/{pid}/task").glob("*/children")
+    return [int(child) for task in tasks for child in task.read_text().split()]
+
+
+def test_it_listens_on_the_loopback_device_only():
+    listener = server._listen(0)
+    host, port = listener.getsockname()
+    listener.close()
+    assert host == "127.0.0.1"
+    assert port > 0
+
+
+def test_a_taken_port_is_said():
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        with pytest.raises(InputError, match=f"port {port} cannot be used") as caught:
+            server._listen(port)
+    assert caught.value.code == "E_PORT"
+    assert "--port" in caught.value.mend
+
+
+@pytest.mark.parametrize("lacking", ["fastapi", "uvicorn", "plotly"])
+def test_a_missing_extra_is_said_with_its_command(monkeypatch, lacking):
+    import importlib.util
+
+    found = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *a: None if name == lacking else found(name, *a))
+    result = CliRunner().invoke(application(), ["serve", "--no-browser"])
+    assert isinstance(result.exception, MissingExtraError)
+    assert lacking in str(result.exception)
+    assert "mrdamper[web]" in str(result.exception)
+
+
+def test_the_chart_library_is_the_packages_own():
+    script = plotly_script()
+    assert script.name == "plotly.min.js"
+    with script.open(encoding="utf-8") as file:
+        assert "plotly.js v" in file.read(200)
+
+
+def test_the_help_shows_an_example():
+    result = CliRunner().invoke(application(), ["serve", "--help"])
+    assert result.exit_code == 0
+    assert "Example: mrdamper serve" in result.output

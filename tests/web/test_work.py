@@ -1,0 +1,100 @@
+"""Worker processes: progress streams, errors keep their kind, cancelling ends everything."""
+
+import json
+import os
+import time
+import urllib.request
+
+import pytest
+from web import slow_tasks
+from web.processes import alive
+
+from mrdamper.web.work import Job
+
+
+def run(task, *arguments, conclude=lambda result: {"result": result}):
+    return Job("job1", "test", task, arguments, conclude).start()
+
+
+def ended(job, seconds=30):
+    deadline = time.monotonic() + seconds
+    while not job.ended and time.monotonic() < deadline:
+        time.sleep(0.01)
+    return job
+
+
+def test_progress_is_told_on_the_way_and_the_result_at_the_end():
+    job, shares = run(slow_tasks.count, 6), []
+    while not job.ended:
+        shares.append(job.share)
+        time.sleep(0.01)
+    assert job.state == "done"
+    assert job.answer == {"result": 6}
+    assert shares == sorted(shares)
+    assert len(set(shares)) > 2
+
+
+def test_a_refusal_keeps_what_where_and_remedy():
+    job = ended(run(slow_tasks.refuse))
+    assert job.state == "refused"
+    assert job.error["code"] == "E_IDENTIFICATION"
+    assert (job.error["found"], job.error["where"], job.error["mend"]) == ("too few runs", "rig x", "record more")
+
+
+def test_a_fault_of_ours_is_said_to_be_ours(capsys):
+    job = ended(run(slow_tasks.break_down))
+    assert job.state == "failed"
+    assert job.error["code"] == "E_OURS"
+    assert "a fault of ours" in capsys.readouterr().out
+
+
+def test_a_result_that_cannot_be_shown_is_a_fault_of_ours(capsys):
+    job = ended(run(slow_tasks.count, 1, conclude=lambda result: result / 0))
+    assert job.state == "failed"
+    assert "ZeroDivisionError" in capsys.readouterr().out
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="needs process groups")
+def test_cancelling_ends_the_worker_and_what_it_started(tmp_path):
+    job = run(slow_tasks.sleep_with_child, str(tmp_path))
+    note = tmp_path / "child"
+    while not (note.is_file() and note.read_text()):
+        time.sleep(0.01)
+    job.cancel()
+    assert ended(job).state == "cancelled"
+    deadline = time.monotonic() + 10
+    while alive(int(note.read_text())) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert not alive(int(note.read_text()))
+
+
+def test_cancelling_before_it_runs_is_enough():
+    job = run(slow_tasks.count, 1000)
+    job.cancel()
+    assert ended(job).state == "cancelled"
+
+
+def test_new_data_end_the_work_on_the_old(client, app, bench):
+    job = client.post(f"{bench}/study").json()
+    client.post(f"{bench}/bundled")
+    session = next(iter(app.state.sessions))
+    assert ended(session.jobs[job["key"]]).state == "cancelled"
+
+
+def test_progress_streams_as_server_sent_events(address):
+    def ask(method, path, body=None):
+        request = urllib.request.Request(f"{address}{path}", method=method, data=body, headers={"Origin": address})
+        request.add_header("Content-Type", "application/json")
+        return urllib.request.urlopen(request, timeout=60)
+
+    session = f"/api/sessions/{json.load(ask('POST', '/api/sessions', b''))['session']}"
+    ask("POST", f"{session}/bundled", b"").close()
+    choice = {"rig": 1, "model": "bingham", "method": "projection"}
+    job = json.load(ask("POST", f"{session}/identify", json.dumps(choice).encode()))
+    with ask("GET", f"{session}/jobs/{job['key']}/events") as stream:
+        assert stream.headers["content-type"].startswith("text/event-stream")
+        reports = [json.loads(line[6:]) for line in stream.read().decode().splitlines() if line.startswith("data: ")]
+    assert reports[-1]["state"] == "done"
+    shares = [report["share"] for report in reports]
+    assert shares == sorted(shares)
+    ask("DELETE", session).close()
