@@ -19,12 +19,16 @@ import numpy as np
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError
 from mrdamper.function_fitting import fit_function, require_determined
+from mrdamper.hysteresis import Shape
+from mrdamper.hysteresis.batch import follow_alike, follow_quickly
 from mrdamper.identification import Problem
 from mrdamper.models import Model
 from mrdamper.optimizers.levenberg_marquardt import least_squares
 from mrdamper.parameter_functions import FORMS, ParameterFunction, ParameterMap, features
+from mrdamper.threads import on_one_blas_thread
 
 _LADDER = np.geomspace(2e-6, 3e-3, 41)  # yield displacements [m]; between them Gram matrices are interpolated
+_AT_ONCE = 2**17  # states held at a time
 _RIDGE = 1e-7  # interpolated Gram matrices of nearly parallel columns may lose positivity by less
 
 
@@ -85,6 +89,7 @@ class Condensed:
         return np.sum([w[:, None, None] * self.gram[rows, first + j] for j, w in enumerate(weights)], axis=0)
 
 
+@on_one_blas_thread
 def condense(runs: Sequence[Run], model_type: type[Model]) -> Condensed:
     """Condense runs for a model type whose search has one axis.
 
@@ -117,20 +122,53 @@ def condense(runs: Sequence[Run], model_type: type[Model]) -> Condensed:
 
 
 def _gram(problem: Problem, linear: tuple[str, ...], shape: str) -> Floats:
-    seen = problem.motion.part(problem.scored)
     target = problem.force / np.ptp(problem.force)
-    matrices = []
-    for value in _LADDER if shape else _LADDER[:1]:
-        point = {**problem.fixed, **({shape: float(value)} if shape else {}), **dict.fromkeys(linear, 0.0)}
-        bare = problem.model_type.build(point)
-        state = bare.state(problem.motion)[problem.scored]
-        base = bare.force(seen, state)
-        columns = [problem.model_type.build({**point, name: 1.0}).force(seen, state) - base for name in linear]
-        table = np.column_stack([*columns, target])
-        matrices.append(table.T @ table / target.size)
     if not shape:
-        matrices *= _LADDER.size
-    return np.stack(matrices)
+        table, _ = _columns(problem, linear, {})
+        table = np.column_stack([table, target])
+        return np.stack([table.T @ table / target.size] * _LADDER.size)
+    ends = [_columns(problem, linear, {shape: float(value)}) for value in _LADDER[[0, -1]]]
+    moving = _moving_column(problem, ends)
+    if moving is not None:
+        return _gram_of_shapes(problem, np.column_stack([ends[0][0], target]), moving, ends[0][1].shape)  # type: ignore[attr-defined]
+    tables = [np.column_stack([_columns(problem, linear, {shape: float(v)})[0], target]) for v in _LADDER]
+    return np.stack([table.T @ table / target.size for table in tables])
+
+
+def _columns(problem: Problem, linear: tuple[str, ...], shape: Mapping[str, float]) -> tuple[Floats, Model]:
+    """(N, L) force per unit of every linear coordinate, and the model without them."""
+    point = {**problem.fixed, **shape, **dict.fromkeys(linear, 0.0)}
+    bare = problem.model_type.build(point)
+    state = bare.state(problem.motion)[problem.scored]
+    base = bare.force(problem.seen, state)
+    columns = [problem.model_type.build({**point, name: 1.0}).force(problem.seen, state) - base for name in linear]
+    return np.column_stack(columns), bare
+
+
+def _moving_column(problem: Problem, ends: Sequence[tuple[Floats, Model]]) -> int | None:
+    """Index of the one column that the ladder changes, if it is the state of a Bouc–Wen shape."""
+    (first, _), (last, _) = ends
+    moving = np.flatnonzero([not np.array_equal(a, b) for a, b in zip(first.T, last.T, strict=True)])
+    if moving.size != 1 or any(getattr(model, "shape", None) is None for _, model in ends):
+        return None
+    for value, (columns, model) in zip(_LADDER[[0, -1]], ends, strict=True):
+        shape = model.shape  # type: ignore[attr-defined]
+        expected = follow_quickly(1 / float(value), float(shape.rho), shape.n, problem.motion.path, problem.scored)
+        if not np.allclose(columns[:, moving[0]], expected, rtol=1e-9, atol=1e-12):
+            return None
+    return int(moving[0])
+
+
+def _gram_of_shapes(problem: Problem, table: Floats, moving: int, shape: Shape) -> Floats:
+    """The same matrices, all shapes followed at once; only the rows of the moving column differ."""
+    grams = np.stack([table.T @ table] * _LADDER.size)
+    few = max(1, _AT_ONCE // len(problem.motion))
+    for begin in range(0, _LADDER.size, few):
+        part = slice(begin, begin + few)
+        zeta = follow_alike(shape.n, float(shape.rho), 1 / _LADDER[part], problem.motion.path)[:, problem.scored]
+        grams[part, moving, :] = grams[part, :, moving] = zeta @ table
+        grams[part, moving, moving] = np.einsum("kn,kn->k", zeta, zeta)
+    return grams / len(table)
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,6 +186,7 @@ class JointFit:
     nrmse_pp: Floats
 
 
+@on_one_blas_thread
 def fit_jointly(
     data: Condensed,
     forms: Mapping[str, str],
@@ -196,6 +235,7 @@ def fit_jointly(
     return _finish(design, solution, {data.shape: function})
 
 
+@on_one_blas_thread
 def leave_out_errors(
     data: Condensed, fit: JointFit, groups: Sequence[Sequence[int]], forms: Mapping[str, str]
 ) -> Floats:
@@ -253,9 +293,19 @@ class _Design:
         weighted = (weights[:, None, None] * table).reshape(-1, table.shape[2])
         norm = np.linalg.norm(weighted[:, :-1], axis=0)
         norm[norm == 0] = 1.0
-        solution = np.linalg.lstsq(weighted[:, :-1] / norm, weighted[:, -1], rcond=1e-10)[0] / norm
+        solution = _least_squares(weighted[:, :-1] / norm, weighted[:, -1]) / norm
         error = table[:, :, :-1] @ solution - table[:, :, -1]
         return _Solution(solution, (weights[:, None] * error).ravel(), np.sqrt(np.sum(error**2, axis=1)))
+
+
+def _least_squares(columns: Floats, right: Floats) -> Floats:
+    # Triangular factors take half the time of singular values, which only dependent columns need.
+    triangle = np.asarray(np.linalg.qr(np.column_stack([columns, right]), mode="r"))
+    count = columns.shape[1]
+    pivots = np.abs(np.diag(triangle)[:count])
+    if triangle.shape[0] > count and pivots.min(initial=1.0) > 1e-6 * pivots.max(initial=0.0):
+        return np.asarray(np.linalg.solve(triangle[:count, :count], triangle[:count, count]), dtype=float)
+    return np.asarray(np.linalg.lstsq(columns, right, rcond=1e-10)[0], dtype=float)
 
 
 def _reweighted(design: _Design, gram: Floats, reweightings: int) -> _Solution:

@@ -25,6 +25,7 @@ from mrdamper.identification.linear import bounded_linear, bounds_of, linear_tab
 from mrdamper.models import Model, SearchAxis, model_type
 from mrdamper.optimizers.levenberg_marquardt import least_squares
 from mrdamper.simulation import Response, simulate, steady_loop
+from mrdamper.threads import on_one_blas_thread
 
 _ROWS = 400  # samples of a run that enter the least squares; its motion is followed in full
 _CYCLES = 4  # of a sine that enter: more repeat the same
@@ -142,6 +143,7 @@ class JointProblem:
         """(D,) the model's start on the search axes."""
         return np.array([axis.coordinate(axis.grid[0]) for axis in self.axes])
 
+    @on_one_blas_thread
     def fit(
         self, rows: Sequence[int] | None = None, start: Floats | None = None, rounds: int = 3, most_steps: int = 15
     ) -> JointFit:
@@ -178,6 +180,7 @@ class JointProblem:
             time.perf_counter() - begin,
         )
 
+    @on_one_blas_thread
     def without(self, fit: JointFit, rows: Sequence[int]) -> JointDamper:
         """The damper had some runs been missing: one Gauss–Newton step from the fit to all.
 

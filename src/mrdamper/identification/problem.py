@@ -118,6 +118,11 @@ class Problem:
         return slice(len(self.motion) - int(np.count_nonzero(self.run.in_window)), None)
 
     @cached_property
+    def seen(self) -> Excitation:
+        """The motion inside the steady window."""
+        return self.motion.part(self.scored)
+
+    @cached_property
     def force(self) -> Floats:
         """Measured force in the steady window [N]."""
         return self.run.force[self.run.in_window]

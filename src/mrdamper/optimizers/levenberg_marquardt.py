@@ -16,6 +16,7 @@ from mrdamper.data import Floats
 
 _STEP = 1e-6  # forward difference, relative to the width of the box
 _STIFFEST = 1e12  # damping at which no step is left to try
+_WORTHLESS = 1e-3  # share of the tolerated gain below which a step is not even tried
 
 
 @dataclass(frozen=True)
@@ -47,27 +48,47 @@ def least_squares(
     upper: Floats,
     most_steps: int = 40,
     tolerance: float = 1e-9,
+    *,
+    curved: bool = False,
 ) -> Minimum:
     """Minimise |residual(point)|² inside a box, until a step gains less than `tolerance` of it.
 
     Coordinates at a bound whose gradient points outwards are held there for the step.
+
+    Parameters
+    ----------
+    residual : callable
+        (D,) point -> (N,) residual.
+    start, lower, upper : (D,) arrays
+    most_steps : int
+    tolerance : float
+    curved : bool
+        Learn from the change of the gradient what curvature the Jacobian alone leaves out. Where
+        much residual remains, Gauss–Newton's steps shrink by the same factor again and again;
+        these do not [Dennis, Gay and Welsch 1981, ACM Trans. Math. Software 7, 348].
     """
     width = upper - lower
     point = np.clip(start, lower, upper)
     r = residual(point)
     cost, evaluations, damping = float(r @ r), 1, 1e-3
+    extra = before = None
     message = f"stopped after {most_steps} steps; the cost was still falling: start nearer or raise most_steps"
     for _ in range(most_steps):
         jacobian = _forward_differences(residual, point, r, upper, width)
         evaluations += point.size
         gradient = jacobian.T @ r
+        if curved and before is not None:
+            extra = _learnt_curvature(extra, point - before[0], gradient - before[1], jacobian)
         free = ~(((point <= lower) & (gradient > 0)) | ((point >= upper) & (gradient < 0)))
         if not free.any():
             message = "every coordinate ended at a bound"
             break
         better = None
         while better is None and damping < _STIFFEST:
-            trial = np.clip(point + _damped_step(jacobian, gradient, free, damping), lower, upper)
+            step, promised = _damped_step(jacobian, extra, gradient, free, damping)
+            if promised <= _WORTHLESS * tolerance * cost:
+                break
+            trial = np.clip(point + step, lower, upper)
             r_trial = residual(trial)
             evaluations += 1
             if float(r_trial @ r_trial) < cost:
@@ -78,9 +99,10 @@ def least_squares(
             message = "converged: no step lowers the cost"
             break
         moved = float(np.max(np.abs(better[0] - point) / width))
-        before, (point, r) = cost, better
+        before, costlier = (point, gradient), cost
+        point, r = better
         cost = float(r @ r)
-        if before - cost <= tolerance * cost or moved < tolerance:
+        if costlier - cost <= tolerance * cost or moved < tolerance:
             message = "converged: the cost changes no more"
             break
     return Minimum(point, r, cost, evaluations, message)
@@ -93,9 +115,37 @@ def _forward_differences(
     return np.column_stack([(residual(point + s) - r) / d for s, d in zip(np.diag(steps), steps, strict=True)])
 
 
-def _damped_step(jacobian: Floats, gradient: Floats, free: NDArray[np.bool_], damping: float) -> Floats:
+def _damped_step(
+    jacobian: Floats, extra: Floats | None, gradient: Floats, free: NDArray[np.bool_], damping: float
+) -> tuple[Floats, float]:
+    """Step of the free coordinates, and what it would gain if the cost were as the matrices say."""
     normal = jacobian[:, free].T @ jacobian[:, free]
-    stiff = np.diag(np.maximum(np.diag(normal), 1e-300))
+    stiff = np.diag(damping * np.maximum(np.diag(normal), 1e-300))
+    if extra is not None:
+        whole = normal + extra[free][:, free]
+        normal = whole if _is_positive(whole + stiff) else normal
+    moved = -np.linalg.solve(normal + stiff, gradient[free])
     step = np.zeros(gradient.size)
-    step[free] = -np.linalg.solve(normal + damping * stiff, gradient[free])
-    return step
+    step[free] = moved
+    return step, -float(2 * (gradient[free] @ moved) + moved @ normal @ moved)
+
+
+def _is_positive(matrix: Floats) -> bool:
+    if matrix.size == 1:
+        return bool(matrix[0, 0] > 0)
+    return bool(np.linalg.eigvalsh(matrix)[0] > 0)
+
+
+def _learnt_curvature(extra: Floats | None, moved: Floats, change: Floats, jacobian: Floats) -> Floats | None:
+    """Update what the second derivatives of the residual add to the normal matrix."""
+    along = float(change @ moved)
+    missing = change - (jacobian @ moved) @ jacobian
+    if not along > 1e-12 * float(np.linalg.norm(change) * np.linalg.norm(moved)):
+        return None
+    if extra is None:
+        extra = np.zeros((moved.size, moved.size))
+    known = float(moved @ extra @ moved)
+    shrunk = extra * min(1.0, abs(float(moved @ missing) / known)) if known else extra
+    off = missing - shrunk @ moved
+    pair = np.multiply.outer(off, change)
+    return shrunk + (pair + pair.T) / along - float(off @ moved) / along**2 * np.multiply.outer(change, change)

@@ -17,6 +17,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import IdentificationError
 from mrdamper.harmonic_balance import SineRecord
+from mrdamper.identification.linear import linear_table
 from mrdamper.identification.methods.balance import steady_state
 from mrdamper.identification.problem import Method, Problem, Solution
 from mrdamper.models.bouc_wen import BoucWen
@@ -62,7 +63,7 @@ class DirectGenetic(Method):
         box = {**_box(problem, record), **self.bounds}
         names = list(box)
         found = genetic(
-            lambda points: np.array([_error(problem, record, names, point) for point in points]),
+            _Errors(problem, record, names),
             [box[name][0] for name in names],
             [box[name][1] for name in names],
             self.genetic,
@@ -96,7 +97,48 @@ def _box(problem: Problem, record: SineRecord) -> dict[str, tuple[float, float]]
     return box | ({"yield_force": (0.0, peak)} if "alpha" in problem.free else {})
 
 
-def _error(problem: Problem, record: SineRecord, names: list[str], point: Floats) -> float:
-    model = BoucWen.build({**problem.fixed, **dict(zip(names, point.tolist(), strict=True))})
-    predicted = model.force(record.motion, steady_state(model, record))
-    return float(np.sqrt(np.mean((predicted - record.force) ** 2)))
+class _Errors:
+    """RMSE of the force of many points at once.
+
+    The error is quadratic in everything but the shape of the loop, so each shape is followed once
+    and leaves a few sums; children inherit most shapes unchanged.
+    """
+
+    def __init__(self, problem: Problem, record: SineRecord, names: list[str]):
+        infos = [info for info in problem.model_type.parameters() if info.linear and info.name in names]
+        self.problem, self.record = problem, record
+        self.linear = [names.index(info.name) for info in infos]
+        self.force = names.index("yield_force") if "yield_force" in names else None
+        self.shape = [i for i in range(len(names)) if i not in (*self.linear, self.force)]
+        self.shape_names = [names[i] for i in self.shape]
+        # The columns do not depend on the shape; any will do to evaluate them.
+        self.zero = {**dict.fromkeys((names[i] for i in self.linear), 0.0), "yield_force": 0.0}
+        bare = self._model({**self.zero, "yield_displacement": record.condition.amplitude_m})
+        base, self.columns = linear_table(bare, infos, record.motion, np.zeros(record.theta.size))
+        self.right = record.force - base
+        self.known: dict[tuple[float, ...], Floats] = {}
+
+    def __call__(self, points: Floats) -> Floats:
+        """(P, D) points -> (P,) errors [N]."""
+        rows = [tuple(row) for row in points[:, self.shape].tolist()]
+        for row in set(rows) - self.known.keys():
+            self.known[row] = self._sums(row)
+        sums = np.array([self.known[row] for row in rows])
+        coefficients = points[:, self.linear]
+        size = np.ones(len(points)) if self.force is None else points[:, self.force]
+        fitted = coefficients @ (self.columns.T @ self.columns) - 2 * (self.right @ self.columns)
+        square = np.sum(coefficients * (fitted + 2 * size[:, None] * sums[:, :-2]), axis=1)
+        square += size * (size * sums[:, -1] - 2 * sums[:, -2]) + self.right @ self.right
+        return np.sqrt(np.maximum(square, 0.0) / self.right.size)
+
+    def _sums(self, row: tuple[float, ...]) -> Floats:
+        """Products of the hysteretic force, or its unit, with the columns, the right side and itself."""
+        shape = dict(zip(self.shape_names, row, strict=True))
+        model = self._model({**self.zero, **shape})
+        scale = 1 / model.yield_displacement if self.force is not None else self.problem.fixed["alpha"]
+        state = scale * steady_state(model, self.record)
+        return np.array([*(state @ self.columns), state @ self.right, state @ state])
+
+    def _model(self, values: Mapping[str, float]) -> BoucWen:
+        given = {**self.problem.fixed, **values}
+        return BoucWen.build({name: value for name, value in given.items() if name != "alpha"})

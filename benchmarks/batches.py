@@ -1,0 +1,136 @@
+"""Many parameter sets, many conditions: samples a second, and how cost grows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from benchmarks import conditions
+from benchmarks.timing import growth, race
+from mrdamper.data import Run
+from mrdamper.hysteresis import Path, Shape
+from mrdamper.hysteresis.batch import Fixed, batch_cost
+from mrdamper.hysteresis.compiled_search import LengthSearch, search_lengths
+from mrdamper.identification import Problem, identify
+from mrdamper.identification.elimination import Elimination
+from mrdamper.identification.methods.projection import Projection, length_search, search_axes
+from mrdamper.models.bouc_wen import BoucWen
+
+SETS = 1000
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Exponent p of time ∝ size^p."""
+
+    name: str
+    sizes: str
+    exponent: float
+
+
+@dataclass(frozen=True)
+class BatchRow:
+    """Time of a batch, and for one sample of it."""
+
+    name: str
+    seconds: float
+    nanoseconds: float
+
+
+def batch_rows(quick: bool) -> list[BatchRow]:
+    """A thousand parameter sets on one loop of 1,000 samples, and on a record of ten cycles."""
+    share = 0.2 if quick else 1.0
+    rows = []
+    for cycles in (1, 10):
+        fixed, many = loop(cycles * 1000, cycles), shapes(SETS)
+        times = race(
+            {
+                "compiled": lambda f=fixed, s=many: batch_cost(f, s, compiled=True),
+                "NumPy": lambda f=fixed, s=many: batch_cost(f, s, compiled=False),
+            },
+            share,
+        )
+        work = SETS * cycles * 1000
+        rows += [
+            BatchRow(f"{name}, {SETS:,} parameter sets × {cycles * 1000:,} samples", t, 1e9 * t / work)
+            for name, t in times.items()
+        ]
+    return rows
+
+
+@dataclass(frozen=True)
+class ManyRow:
+    """Time of many conditions."""
+
+    name: str
+    seconds: float
+
+
+def many_rows(quick: bool) -> list[ManyRow]:
+    """The 48 conditions of the synthetic matrix."""
+    runs = [conditions.run(condition) for condition in conditions.MATRIX]
+    problems = [prepared(run) for run in runs]
+    searches = [search_of(problem) for problem in problems]
+    method = Projection()
+    times = race(
+        {
+            "search compiled": lambda: search_lengths(searches),
+            "search NumPy": lambda: [method.solve(problem) for problem in problems],
+            "identify() NumPy: motion analysis, errors and scores too": lambda: [identify(replace(r)) for r in runs],
+        },
+        0.4 if quick else 3.0,
+    )
+    return [ManyRow(f"{len(runs)} conditions, {name}", t) for name, t in times.items()]
+
+
+def growth_rows(quick: bool) -> list[Growth]:
+    """Samples, conditions, parameter sets."""
+    share, rows = (0.1, []) if quick else (0.4, [])
+    samples = (1000, 3000, 10_000, 30_000)
+    found = [
+        race({"": lambda p=prepared(conditions.run(samples=n)): Projection().solve(p)}, share)[""] for n in samples
+    ]
+    rows.append(Growth("NumPy search over samples", "1,000 … 30,000", growth(samples, found)))
+    searches = [search_of(prepared(conditions.run(samples=n))) for n in samples]
+    found = [race({"": lambda s=s: search_lengths([s])}, share)[""] for s in searches]
+    rows.append(Growth("compiled search over samples", "1,000 … 30,000", growth(samples, found)))
+    many = [search_of(prepared(conditions.run(c))) for c in conditions.MATRIX]
+    counts = (6, 12, 24, 48)
+    found = [race({"": lambda n=n: search_lengths(many[:n])}, share)[""] for n in counts]
+    rows.append(Growth("compiled search over conditions", "6 … 48", growth(counts, found)))
+    sets = (30, 100, 300, 1000)
+    fixed = loop(1000, 1)
+    found = [race({"": lambda n=n: batch_cost(fixed, shapes(n), compiled=True)}, share)[""] for n in sets]
+    rows.append(Growth("compiled batch over parameter sets", "30 … 1,000", growth(sets, found)))
+    return rows
+
+
+def loop(samples: int, cycles: int) -> Fixed:
+    """A sine of some cycles, three columns, and a force that they and a state explain in part."""
+    phase = 2 * np.pi * cycles * np.arange(samples) / samples + 0.3
+    x, v = 0.02 * np.sin(phase), 0.02 * np.cos(phase)
+    force = np.tanh(50 * v) + v + 0.1 * x
+    return Fixed.of(Path.of(x), np.column_stack([v, x, np.ones(samples)]), force)
+
+
+def shapes(count: int) -> Shape:
+    """Shapes from nearly elastic to nearly rigid."""
+    return Shape(np.geomspace(2.0, 200.0, count) / 0.02, 0.0, 2.0)
+
+
+def prepared(run: Run) -> Problem:
+    """A problem whose motion is analysed."""
+    problem = Problem.of(run, BoucWen)
+    _ = problem.motion.path, problem.seen, problem.force, problem.analysis
+    return problem
+
+
+def search_of(problem: Problem) -> LengthSearch:
+    """Its search in machine code."""
+    axes = search_axes(problem)
+    elimination = Elimination.of(problem, axes)
+    assert elimination is not None
+    found = length_search(axes, elimination)
+    assert found is not None
+    return found

@@ -1,0 +1,90 @@
+"""The goals of speed and accuracy the project set itself, each with what this run measured."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Goal:
+    """One goal: `measured` should be at most `limit`, or at least, if `at_least`."""
+
+    name: str
+    limit: float
+    measured: float | None
+    unit: str = ""
+    at_least: bool = False
+
+    @property
+    def met(self) -> bool | None:
+        if self.measured is None:
+            return None
+        return self.measured >= self.limit if self.at_least else self.measured <= self.limit
+
+    @property
+    def verdict(self) -> str:
+        return {True: "met", False: "missed", None: "not measured"}[self.met]
+
+
+def goals(results: Any) -> list[Goal]:
+    """Every goal, from the tables of a run (`page.Results`)."""
+    return [*_of_accuracy(results), *_of_the_main_job(results), *_of_kernels(results), *_of_peers(results)]
+
+
+def _of_accuracy(results: Any) -> list[Goal]:
+    return [
+        Goal("error over z_max for n = 1 and 2", 1e-12, results.accuracy.get("closed")),
+        Goal("error over z_max for other n", 1e-8, results.accuracy.get("tables")),
+    ]
+
+
+def _of_the_main_job(results: Any) -> list[Goal]:
+    # One process: its processor time, which is what it takes on an idle machine. A study uses two: wall time.
+    process = {row.name: row.wall if "study" in row.name else row.seconds for row in results.processes}
+    memory = {row.name: row.megabytes for row in results.processes}
+    many = {row.name: 1e3 * row.seconds for row in results.many}
+    real = [row.seconds for row in results.real]
+    return [
+        Goal("48 conditions from a cold process, NumPy", 0.25, _least(process, "48 conditions, NumPy"), "s"),
+        Goal("48 conditions in process, NumPy, the search", 40, _least(many, "search NumPy"), "ms"),
+        Goal("48 conditions in process, NumPy, all of identify()", 40, _least(many, "identify()"), "ms"),
+        Goal("both bundled rigs run by run, and jointly", 2, sum(real) if real else None, "s"),
+        Goal("mrdamper study, caches empty", 10, _least(process, "study, caches empty"), "s"),
+        Goal("mrdamper study, caches filled", 5, _least(process, "study, caches filled"), "s"),
+        Goal("mrdamper study, peak memory", 500, _least(memory, "mrdamper study"), "MB"),
+        Goal("mrdamper --help", 0.3, _least(process, "--help"), "s"),
+    ]
+
+
+def _of_kernels(results: Any) -> list[Goal]:
+    loop = {row.name: row.nanoseconds for row in results.simulation}
+    batch = _least({row.name: row.nanoseconds for row in results.batches}, "compiled")
+    many = {row.name: 1e3 * row.seconds for row in results.many}
+    return [
+        Goal("one loop compiled", 3, _least(loop, "mrdamper compiled"), "ns a sample"),
+        Goal("streaming compiled", 12, _least(loop, "streaming, compiled"), "ns a sample"),
+        Goal("batch compiled, one core", 1, batch and 1 / batch, "Gsample/s", at_least=True),
+        Goal("48 conditions compiled, the search", 5, _least(many, "search compiled"), "ms"),
+    ]
+
+
+def _of_peers(results: Any) -> list[Goal]:
+    loop = {row.name: row.ratio for row in results.simulation}
+    one = {row.name: row.ratio for row in results.identification}
+    wanted = [
+        ("times faster than solve_ivp at its defaults", 700, _least(loop, "solve_ivp", "defaults")),
+        ("times faster than solve_ivp at rtol 1e-8", 2000, _least(loop, "solve_ivp", "1e-8")),
+        ("times faster than odeint", 200, _least(loop, "odeint")),
+        ("times faster than openseespy", 300, _least(loop, "openseespy")),
+        ("identification: times faster than the GA over compiled RK4", 1e5, _least(one, "GA", "RK4")),
+        ("identification: times faster than the GA over solve_ivp", 1e6, _least(one, "GA", "solve_ivp")),
+    ]
+    return [Goal(name, limit, measured, at_least=True) for name, limit, measured in wanted]
+
+
+def _least(table: dict[str, float], *words: str) -> float | None:
+    """The least of the rows whose names hold all words: the best of several peers, or of several sizes."""
+    found: Iterable[float] = [value for name, value in table.items() if all(word in name for word in words)]
+    return min(found, default=None)

@@ -1,0 +1,48 @@
+"""Timings to keep an eye on, with pytest-benchmark: `python -m pytest benchmarks/regressions.py`.
+
+`--benchmark-autosave` keeps a run, `--benchmark-compare` compares with the last one kept. The
+test suite does not collect this file: a test that is timed fails on a busy machine.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks import batches, conditions
+from benchmarks.simulation import SHAPE, T, X
+from mrdamper.hysteresis import Path, follow
+from mrdamper.hysteresis.batch import batch_cost
+from mrdamper.hysteresis.compiled import follow_compiled
+from mrdamper.hysteresis.compiled_search import search_length
+from mrdamper.identification import identify
+from mrdamper.identification.methods.projection import Projection
+
+MOTION = X * np.sin(2 * np.pi * T + 0.3)
+
+
+def test_cut_into_strokes(benchmark):
+    benchmark(Path.of, MOTION)
+
+
+@pytest.mark.parametrize("way", [follow, follow_compiled])
+def test_follow(benchmark, way):
+    benchmark(way, SHAPE, Path.of(MOTION))
+
+
+@pytest.mark.parametrize("compiled", [False, True], ids=["NumPy", "compiled"])
+def test_batch_cost(benchmark, compiled):
+    benchmark(batch_cost, batches.loop(1000, 1), batches.shapes(100), compiled=compiled)
+
+
+def test_search_numpy(benchmark):
+    benchmark(Projection().solve, batches.prepared(conditions.run()))
+
+
+def test_search_compiled(benchmark):
+    benchmark(search_length, batches.search_of(batches.prepared(conditions.run())))
+
+
+@pytest.mark.parametrize("free", [(), ("gamma",), ("n",)], ids=str)
+def test_identify(benchmark, free):
+    benchmark(identify, conditions.run(), free=free)

@@ -1,0 +1,146 @@
+"""One motion, one hysteresis: the state at 3,000 samples by every way that is installed."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.timing import race
+from mrdamper.hysteresis import Path, Shape, follow
+from mrdamper.hysteresis.compiled import Strokes, states, tables
+from mrdamper.models.bouc_wen import BoucWen
+
+X, F, BETA, PHASE = 0.02, 1.0, 2e5, 0.3  # with this phase every reversal falls between samples
+T = np.arange(3000) / 1000.0
+OMEGA = 2 * np.pi * F
+SHAPE = Shape.from_bouc_wen(BETA, BETA)
+OURS = "mrdamper compiled, closed form per stroke"
+
+
+@dataclass(frozen=True)
+class SimulationRow:
+    """Time a sample and largest error over z_max of one way to the state."""
+
+    name: str
+    ratio: float
+    nanoseconds: float
+    error: float
+
+
+def simulation_rows(quick: bool) -> list[SimulationRow]:
+    """Ours first, then the peers by time."""
+    ways = {**_ours(), **_numba_rk4(), **_scipy(), **(_opensees())}
+    truth = _truth()
+    errors = {name: float(np.abs(way() - truth).max()) for name, way in ways.items()}
+    times = race(ways, 0.15 if quick else 1.0)
+    return [
+        SimulationRow(name, times[name] / times[OURS], 1e9 * times[name] / T.size, errors[name])
+        for name in sorted(times, key=lambda n: times[n])
+    ]
+
+
+def _truth() -> np.ndarray:
+    """The exact map on a grid a thousand times finer, which holds every reversal to 1e-9."""
+    fine = np.arange((T.size - 1) * 1000 + 1) / 1e6
+    return follow(SHAPE, Path.of(X * np.sin(OMEGA * fine + PHASE)))[::1000]
+
+
+def _ours() -> dict[str, Callable[[], np.ndarray]]:
+    x = X * np.sin(OMEGA * T + PHASE)
+    path = Path.of(x)
+    strokes, out = Strokes.of(path), np.empty(T.size)
+    arguments = (float(SHAPE.kappa), 0.0, 2.0, *tables(2.0))
+    arguments += (strokes.distance, strokes.begin, strokes.lengths, strokes.first_direction, 0.0, out)
+
+    def compiled() -> np.ndarray:
+        states(*arguments)
+        return out
+
+    ways = {
+        OURS: compiled,
+        "mrdamper NumPy, closed form per stroke": lambda: follow(SHAPE, path),
+        "mrdamper NumPy, cutting the motion into strokes included": lambda: follow(SHAPE, Path.of(x)),
+    }
+    return ways | _streaming(x)
+
+
+def _streaming(x: np.ndarray) -> dict[str, Callable[[], np.ndarray]]:
+    """The state as force of a model with nothing else in it, one sample after the other."""
+    try:
+        from mrdamper.streaming import stepper
+    except ModuleNotFoundError:
+        return {}
+    scale = float(SHAPE.yield_displacement)
+    stream = stepper(BoucWen(c=0.0, alpha=1 / scale, beta=BETA, gamma=BETA, n=2.0))
+    nothing, dt = np.zeros(T.size), 1e-3
+    samples = x.tolist()
+
+    def compiled() -> np.ndarray:
+        stream.reset()
+        return stream.run(T, x, nothing, nothing, nothing)
+
+    def one_by_one() -> np.ndarray:
+        stream.reset()
+        return np.array([stream.step_motion(value, 0.0, 0.0, 0.0, dt) for value in samples])
+
+    # The first sample only says where the motion starts: a stream knows no peaks between samples.
+    return {"mrdamper streaming, compiled": compiled, "mrdamper streaming, Python, one call a sample": one_by_one}
+
+
+def _numba_rk4() -> dict[str, Callable[[], np.ndarray]]:
+    from benchmarks.rk4 import rk4
+
+    v = X * OMEGA * np.cos(OMEGA * T + PHASE)
+    scale = float(SHAPE.yield_displacement)
+    return {"numba RK4 as usually written": lambda: rk4(v, 1e-3, 1.0, BETA, BETA, 2.0) / scale}
+
+
+def _rate(t: float, z: np.ndarray) -> np.ndarray:
+    v = X * OMEGA * np.cos(OMEGA * t + PHASE)
+    return v - BETA * abs(v) * np.abs(z) * z - BETA * v * z**2
+
+
+def _scipy() -> dict[str, Callable[[], np.ndarray]]:
+    from scipy.integrate import odeint, solve_ivp
+
+    scale = float(SHAPE.yield_displacement)
+    ways = {"scipy odeint, defaults": lambda: odeint(_rate, [0.0], T, tfirst=True)[:, 0] / scale}
+    for method in ("RK45", "LSODA"):
+        for rtol, name in ((1e-3, "defaults"), (1e-8, "rtol 1e-8")):
+
+            def solve(method: str = method, rtol: float = rtol) -> np.ndarray:
+                # An absolute tolerance that fits a state of a millimetre; the default one is the state itself.
+                found = solve_ivp(
+                    _rate, (0, T[-1]), [0.0], method=method, t_eval=T, rtol=rtol, atol=rtol * 1e-3 * scale
+                )
+                return found.y[0] / scale
+
+            ways[f"scipy solve_ivp {method}, {name}"] = solve
+    return ways
+
+
+def _opensees() -> dict[str, Callable[[], np.ndarray]]:
+    if importlib.util.find_spec("openseespy") is None:
+        return {}
+    try:
+        import openseespy.opensees as ops
+    except (ImportError, RuntimeError):  # a wheel whose system libraries are missing
+        return {}
+    scale = float(SHAPE.yield_displacement)
+
+    def walk(substeps: int) -> np.ndarray:
+        fine = np.linspace(T[0], T[-1], (T.size - 1) * substeps + 1)
+        x = X * np.sin(OMEGA * fine + PHASE)
+        ops.wipe()
+        ops.uniaxialMaterial("BoucWen", 1, 0.0, 1.0, 2.0, BETA, BETA, 1.0, 0.0, 0.0, 0.0)
+        ops.testUniaxialMaterial(1)
+        z = np.empty(x.size)
+        for i, displacement in enumerate((x - x[0]).tolist()):
+            ops.setStrain(displacement)
+            z[i] = ops.getStress()
+        return z[::substeps] / scale
+
+    return {f"openseespy BoucWen, {n} step{'s' * (n > 1)} a sample": lambda n=n: walk(n) for n in (1, 20)}

@@ -1,0 +1,71 @@
+"""Least squares in a single number whose derivative is known.
+
+One evaluation a step and no matrix: for searches that are run by the thousand. The curvature
+comes from the change of the gradient (secant), at the first step from the Jacobian; a bracket
+of gradients of either sign catches what overshoots.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from mrdamper.data import Floats
+from mrdamper.optimizers.levenberg_marquardt import Minimum
+
+Evaluation = tuple[Floats, Floats]  # residual, its derivative
+
+
+def least_squares_in_one(
+    evaluate: Callable[[float], Evaluation | None],
+    start: float,
+    lower: float,
+    upper: float,
+    most_steps: int = 40,
+    tolerance: float = 1e-9,
+) -> Minimum | None:
+    """Minimise |residual(u)|² between two bounds, until a step promises less than `tolerance` of it.
+
+    Parameters
+    ----------
+    evaluate : callable
+        u -> (N,) residual and its derivative; None where it cannot be had.
+    start, lower, upper : float
+    most_steps : int
+    tolerance : float
+
+    Returns
+    -------
+    Minimum or None
+        None where `evaluate` gave up.
+    """
+    low, high = -math.inf, math.inf  # places whose gradient points up to, and back to, the minimum
+    u, before, best, evaluations = start, None, None, 0
+    message = f"stopped after {most_steps} steps; the cost was still falling: start nearer or raise most_steps"
+    for _ in range(most_steps):
+        found = evaluate(u)
+        evaluations += 1
+        if found is None:
+            return None
+        residual, slope = found
+        cost, gradient, curvature = (float(a @ b) for a, b in ((residual, residual), (slope, residual), (slope, slope)))
+        if best is None or cost <= best[0]:
+            best = cost, u, residual
+        low, high = (u, high) if gradient < 0 else (low, u)
+        if before is not None and (gradient - before[1]) * (u - before[0]) > 0:
+            curvature = (gradient - before[1]) / (u - before[0])
+        if (u <= lower and gradient > 0) or (u >= upper and gradient < 0):
+            message = "every coordinate ended at a bound"
+            break
+        if gradient**2 <= tolerance * cost * curvature:
+            message = "converged: the cost changes no more"
+            break
+        target = min(max(u - gradient / curvature, lower), upper)
+        if not low < target < high:
+            target = (max(low, lower) + min(high, upper)) / 2
+        before, u = (u, gradient), target
+    if best is None:
+        return None
+    return Minimum(np.array([best[1]]), best[2], best[0], evaluations, message)

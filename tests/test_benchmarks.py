@@ -1,0 +1,100 @@
+"""The benchmarks' own arithmetic, and that every row of the quick tables is there; no time is judged."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
+from benchmarks import accuracy, conditions, goals, page
+from benchmarks.batches import loop, prepared, search_of, shapes
+from benchmarks.genetic import plain_genetic
+from benchmarks.identification import Task
+from benchmarks.rk4 import rk4
+from benchmarks.timing import growth, race
+from mrdamper.hysteresis import Path as Strokes
+from mrdamper.hysteresis import Shape, follow
+from mrdamper.hysteresis.batch import batch_cost
+from mrdamper.hysteresis.compiled_search import search_length
+
+
+def test_growth_is_the_exponent():
+    assert growth([10, 100, 1000], [3e-3, 9e-3, 27e-3]) == pytest.approx(np.log10(3))
+
+
+def test_a_race_calls_everybody_and_ranks_by_work():
+    calls = {"short": 0, "long": 0}
+
+    def work(name, loops):
+        calls[name] += 1
+        return sum(range(loops))
+
+    found = race({"short": lambda: work("short", 10), "long": lambda: work("long", 300_000)}, seconds=0.02)
+    assert min(calls.values()) >= 3
+    assert found["short"] < found["long"]  # thirty thousand times the work
+
+
+def test_rk4_of_the_peer_solves_the_same_equation():
+    """Stepped finely, where it is accurate, it agrees with the exact strokes."""
+    t = np.arange(40_001) / 20_000
+    beta = 0.5 / 2e-3**2
+    x, v = 0.02 * np.sin(2 * np.pi * t), 0.04 * np.pi * np.cos(2 * np.pi * t)
+    exact = follow(Shape.from_bouc_wen(beta, beta), Strokes.of(x))
+    np.testing.assert_allclose(rk4(v, 5e-5, 1.0, beta, beta, 2.0) / 2e-3, exact, atol=1e-4)
+
+
+def test_the_plain_genetic_algorithm_lowers_a_cost():
+    def bowl(points):
+        return np.sum((points - 0.3) ** 2, axis=1)
+
+    found = plain_genetic(bowl, np.zeros(3), np.ones(3), seed=1, generations=60)
+    assert found < 1e-2
+    assert found == plain_genetic(bowl, np.zeros(3), np.ones(3), seed=1, generations=60)
+
+
+def test_peers_and_ours_see_the_same_cost():
+    task = Task(0)
+    found = search_length(task.search)
+    assert found.cost == pytest.approx(float(np.sum(np.square(task.residual(point_of(task, found))))), rel=1e-9)
+    assert task.costs(point_of(task, found)[None])[0] == pytest.approx(found.cost, rel=1e-9)
+    lower, upper = task.box
+    assert np.all((point_of(task, found) > lower) & (point_of(task, found) < upper))
+
+
+def point_of(task, found):
+    # Columns of the search: c, f0, k1 in the order of the model's fields; the peers' c, k1, f0.
+    c, f0, k1, size = found.coefficients
+    return np.array([c, k1, f0, size, np.exp(found.log_length)])
+
+
+def test_the_truth_of_the_conditions_is_found():
+    for condition in conditions.MATRIX[::11]:
+        problem = prepared(conditions.run(condition))
+        found = search_length(search_of(problem))
+        assert np.exp(found.log_length) == pytest.approx(conditions.damper(condition).yield_displacement, rel=0.3)
+        noise = conditions.NOISE * np.std(problem.force)
+        assert np.sqrt(found.cost / problem.force.size) == pytest.approx(noise, rel=0.1)
+
+
+def test_batches_of_the_benchmark_are_right():
+    fixed, many = loop(1000, 1), shapes(50)
+    np.testing.assert_allclose(
+        batch_cost(fixed, many, compiled=True), batch_cost(fixed, many, compiled=False), rtol=1e-9
+    )
+
+
+def test_accuracy_meets_its_goals():
+    found = accuracy.largest_errors()
+    assert found["closed"] <= 1e-12
+    assert found["tables"] <= 1e-8
+
+
+def test_an_empty_page_says_what_was_not_measured():
+    text = page.page(page.Results(quick=True, accuracy={"closed": 1e-15, "tables": None}))
+    assert "| error over z_max for n = 1 and 2 | ≤ 1.0e-12  | 1.0e-15 | met |" in text
+    assert text.count("not measured") >= 15
+    assert "202" not in page.machine().split("Python")[0]  # no date
+    assert goals.Goal("x", 1.0, 2.0, "").verdict == "missed"
+    assert goals.Goal("x", 1.0, 2.0, "", at_least=True).verdict == "met"
