@@ -17,7 +17,7 @@ def register(app: typer.Typer) -> None:
         to: str = typer.Option(..., "--to", help="c, fmu, latex, markdown, table, adams."),
         out: Path = typer.Option(..., "--out", help="Folder to write into, or the file for fmu, latex, markdown."),
         name: Optional[str] = typer.Option(None, "--name", help="Of files and symbols; default: the rig."),  # noqa: UP045
-        fmi: int = typer.Option(2, "--fmi", help="Version of the FMI standard, 2 or 3."),
+        fmi: Optional[int] = typer.Option(None, "--fmi", help="For fmu: version of the standard, 2 (default) or 3."),  # noqa: UP045
     ) -> None:
         """Export a saved model: C99 source, FMU, LaTeX or Markdown equations, force–velocity tables."""
         from mrdamper.errors import InputError
@@ -27,12 +27,13 @@ def register(app: typer.Typer) -> None:
         from mrdamper.io.model_file import load_model
 
         kind = exporter(to)
-        if fmi not in (2, 3):
-            raise InputError(f"--fmi {fmi}", mend="give 2 or 3")
+        if fmi is not None and to != "fmu":
+            raise InputError(f"--fmi {fmi} with --to {to}", mend="leave --fmi out, or export --to fmu", code="E_OPTION")
+        options = {} if fmi is None else {"fmi": fmi}
+        made = kind(**options)
         require_writable(out)
         damper = load_model(model)
-        options = {"fmi": fmi} if to == "fmu" else {}
-        written = kind(**options).export(damper, identifier(name or damper.rig or "damper"))
+        written = made.export(damper, identifier(name or damper.rig or "damper"))
         for path in write_export(written, out, kind.suffix):
             typer.echo(path)
         for note in written.notes:
