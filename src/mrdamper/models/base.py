@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
 import numpy as np
@@ -62,6 +62,14 @@ class SearchAxis:
     def value(self, coordinate: float) -> float:
         """The value at a place on the axis."""
         return math.exp(coordinate) if self.log else coordinate
+
+    def below(self, limit: float) -> SearchAxis:
+        """The part of a logarithmic axis below a value."""
+        if limit >= self.upper:
+            return self
+        lower = min(self.lower, 1e-3 * limit)
+        grid = tuple(value for value in self.grid if lower < value < limit) or (math.sqrt(lower * limit),)
+        return replace(self, lower=lower, upper=limit, grid=grid)
 
     def at_bound(self, coordinate: float) -> bool:
         """Whether a place lies within a thousandth of the axis from one of its ends."""
@@ -137,6 +145,17 @@ class Model(ABC):
             Names of the parameters to be determined.
         """
         return cls.search_axes(amplitude, free)
+
+    @classmethod
+    def within(cls, axes: tuple[SearchAxis, ...], fixed: Mapping[str, float]) -> tuple[SearchAxis, ...]:
+        """Search coordinates cut to where parameters held at a value leave the others inside their bounds.
+
+        Raises
+        ------
+        IdentificationError
+            If that cannot be said beforehand.
+        """
+        return axes
 
     @classmethod
     def build(cls, values: Mapping[str, float]) -> Self:

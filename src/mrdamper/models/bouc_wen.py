@@ -9,6 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.errors import IdentificationError
 from mrdamper.excitation import Excitation
 from mrdamper.hysteresis import Shape, follow
 from mrdamper.models.base import GENERAL_FORMS, Model, SearchAxis
@@ -78,12 +79,29 @@ class BoucWen(Model):
     def search_axes(cls, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """Yield displacement (log), asymmetry (gamma − beta)/(gamma + beta) and n: nearly orthogonal."""
         ladder = tuple(amplitude * np.geomspace(1e-4, 2.0, 14))
-        axes = [SearchAxis("yield_displacement", amplitude * 1e-5, amplitude * 10, ladder, log=True)]
-        if "gamma" in free:
+        axes = []
+        if "beta" in free or "gamma" in free:
+            axes.append(SearchAxis("yield_displacement", amplitude * 1e-5, amplitude * 10, ladder, log=True))
+        if "beta" in free and "gamma" in free:
             axes.append(SearchAxis("asymmetry", -0.98, 0.98, (-0.8, 0.0, 0.8)))
         if "n" in free:
             axes.append(SearchAxis("n", 1.0, 10.0, (1.0, 2.0, 4.0)))
         return tuple(axes)
+
+    @classmethod
+    def within(cls, axes: tuple[SearchAxis, ...], fixed: Mapping[str, float]) -> tuple[SearchAxis, ...]:
+        """A gamma held at a value leaves room for beta >= 0 below a yield displacement of gamma^(−1/n)."""
+        gamma = fixed.get("gamma", 0.0)
+        if gamma <= 0 or "beta" in fixed:
+            return axes
+        if "n" not in fixed:
+            raise IdentificationError(
+                "gamma is held while n is free, and its unit m^-n changes with n",
+                where=cls.title,
+                mend="hold n as well, or free gamma",
+            )
+        limit = (1 - 1e-12) * gamma ** (-1 / fixed["n"])  # rounding must not make beta negative
+        return tuple(axis.below(limit) if axis.name == "yield_displacement" else axis for axis in axes)
 
     @classmethod
     def map_forms(cls) -> Mapping[str, tuple[str, ...]]:
@@ -106,14 +124,16 @@ class BoucWen(Model):
     def build(cls, values: Mapping[str, float]) -> Self:
         """Make the model from its parameters, or from physical coordinates in their place.
 
-        `yield_displacement` [m] with `asymmetry` (default 0: gamma = beta) stands for beta and
-        gamma; `yield_force` [N] for alpha.
+        `yield_displacement` [m] with `asymmetry` (default 0: gamma = beta), or with one of beta and
+        gamma, stands for both; `yield_force` [N] for alpha.
         """
         given = dict(values)
         n = given.get("n", 2.0)
         if (length := given.pop("yield_displacement", None)) is not None:
             if "gamma" in given:
                 given["beta"] = length**-n - given["gamma"]
+            elif "beta" in given:
+                given["gamma"] = length**-n - given["beta"]
             else:
                 shape = Shape(1 / length, given.pop("asymmetry", 0.0), n)
                 beta, gamma = shape.to_bouc_wen()

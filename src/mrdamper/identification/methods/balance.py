@@ -62,7 +62,8 @@ class Balance(Method):
         record = SineRecord.of(problem.run)
         balanced = _Balanced(problem, record, HarmonicProjection(record.theta, self.harmonics))
         X = record.condition.amplitude_m
-        axes = problem.model_type.guess(record.motion, record.force, X, problem.free)
+        kind = problem.model_type
+        axes = kind.within(kind.guess(record.motion, record.force, X, problem.free), problem.fixed)
         if not axes:
             model, _, held = balanced.at({})
             return Solution(model, 0.0, held, {}, {}, 1, "solved: every parameter is linear")

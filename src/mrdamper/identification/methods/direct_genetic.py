@@ -63,7 +63,7 @@ class DirectGenetic(Method):
         box = {**_box(problem, record), **self.bounds}
         names = list(box)
         found = genetic(
-            _Errors(problem, record, names),
+            _Errors(problem, record, box),
             [box[name][0] for name in names],
             [box[name][1] for name in names],
             self.genetic,
@@ -91,9 +91,11 @@ def _box(problem: Problem, record: SineRecord) -> dict[str, tuple[float, float]]
     sizes = {"f0": peak, "k1": peak / X, "k2": peak / X**2, "k3": peak / X**3, "m": peak / (speed * record.omega)}
     box = {"c": (0.0, peak / speed)} if "c" in problem.free else {}
     box |= {name: (-size, size) for name, size in sizes.items() if name in problem.free}
-    axes = problem.model_type.search_axes(X, problem.free)
+    axes = problem.model_type.within(problem.model_type.search_axes(X, problem.free), problem.fixed)
     # The paper searches on a linear scale; a hundredth of an amplitude is a usual yield displacement.
-    box |= {a.name: ((1e-4 * X, 0.5 * X) if a.name == "yield_displacement" else (a.lower, a.upper)) for a in axes}
+    box |= {a.name: (a.lower, a.upper) for a in axes}
+    if "yield_displacement" in box:
+        box["yield_displacement"] = (1e-4 * X, min(0.5 * X, box["yield_displacement"][1]))
     return box | ({"yield_force": (0.0, peak)} if "alpha" in problem.free else {})
 
 
@@ -104,7 +106,8 @@ class _Errors:
     and leaves a few sums; children inherit most shapes unchanged.
     """
 
-    def __init__(self, problem: Problem, record: SineRecord, names: list[str]):
+    def __init__(self, problem: Problem, record: SineRecord, box: Mapping[str, tuple[float, float]]):
+        names = list(box)
         infos = [info for info in problem.model_type.parameters() if info.linear and info.name in names]
         self.problem, self.record = problem, record
         self.linear = [names.index(info.name) for info in infos]
@@ -113,7 +116,7 @@ class _Errors:
         self.shape_names = [names[i] for i in self.shape]
         # The columns do not depend on the shape; any will do to evaluate them.
         self.zero = {**dict.fromkeys((names[i] for i in self.linear), 0.0), "yield_force": 0.0}
-        bare = self._model({**self.zero, "yield_displacement": record.condition.amplitude_m})
+        bare = self._model({**self.zero, **{name: box[name][0] for name in self.shape_names}})
         base, self.columns = linear_table(bare, infos, record.motion, np.zeros(record.theta.size))
         self.right = record.force - base
         self.known: dict[tuple[float, ...], Floats] = {}

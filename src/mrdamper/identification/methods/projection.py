@@ -117,6 +117,7 @@ def search_axes(problem: Problem) -> tuple[SearchAxis, ...]:
     """Coordinates that are searched, with start values read off the data."""
     amplitude = problem.analysis.condition.amplitude_m
     axes = problem.model_type.guess(problem.seen, problem.force, amplitude, problem.free)
+    axes = problem.model_type.within(axes, problem.fixed)
     if problem.with_delay:
         axes = (*axes, SearchAxis(DELAY, -DELAY_LIMIT, DELAY_LIMIT, (0.0,)))
     return axes
