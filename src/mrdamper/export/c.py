@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,9 +16,11 @@ from mrdamper.export.templates import render
 from mrdamper.models import Model
 from mrdamper.streaming import FLAGS, Stepper, Stream, stream
 from mrdamper.tracing import Program
+from mrdamper.tracing.tape import Table
 
 TOLERANCE = 1e-9  # of the largest force: the self-test forgives other compilers and libraries this much
 _SAMPLES = 400
+_SINGLE_STRIDE = 4  # points of a table per point kept for single precision: still within its rounding
 _SPELLED = str.maketrans(
     {"−": "-", "–": "-", "·": "*", "²": "^2", "³": "^3", "√": "sqrt", "≤": "<=", "≥": ">=", "∈": " in "}
     | {"α": "alpha", "β": "beta", "γ": "gamma", "δ": "delta", "η": "eta", "φ": "phi", "ζ": "zeta", "ω": "omega"}
@@ -117,9 +119,24 @@ def c_facts(made: Stream, name: str, rig: str) -> dict[str, Any]:
         "setup": setup,
         "has_setup": bool(setup),
         "helpers": {word: f"{word}(" in text for word in ("signum", "lesser", "greater")},
+        **_tables(made.step.tape.tables),
+    }
+
+
+def _tables(tables: Sequence[Table]) -> dict[str, Any]:
+    """Points at the nodes, shared by the tables that read them forwards and backwards."""
+    shared = list({id(table.points): table.points for table in tables}.values())
+    return {
+        "curves": [
+            {
+                "points": [[_number(v) for v in row] for row in points],
+                "few": [[_number(v) for v in row] for row in points[::_SINGLE_STRIDE]],
+            }
+            for points in shared
+        ],
         "tables": [
-            {"nodes": [_number(v) for v in t.nodes], "cells": [[_number(v) for v in row] for row in t.cells]}
-            for t in made.step.tape.tables
+            {"curve": next(i for i, p in enumerate(shared) if p is table.points), "backwards": table.backwards}
+            for table in tables
         ],
     }
 

@@ -244,8 +244,9 @@ class _Table:
         inside = r[:-1, None] + 0.5 * width[:, None] * (1 + node)
         phi = np.concatenate([[0.0], np.cumsum(0.5 * width * ((1 / rate(inside)[0]) @ weight))])
         speed, change = rate(r)
-        self._r_of_phi = _Quintics(phi, r, speed, change * speed)
-        self._phi_of_r = _Quintics(r, phi, 1 / speed, -change / speed**2)
+        points = np.column_stack([phi, r, speed, change])
+        self._r_of_phi = _Quintics(phi, r, speed, change * speed, points)
+        self._phi_of_r = _Quintics(r, phi, 1 / speed, -change / speed**2, points, backwards=True)
 
     def coordinate(self, phi: Value, xp: ModuleType) -> Value:
         """Coordinate r at a distance."""
@@ -263,9 +264,14 @@ def _evaluate(table: _Quintics, x: Value, xp: ModuleType) -> Value:
 
 
 class _Quintics:
-    """Piecewise quintic with given values and two derivatives at its nodes; constant beyond them."""
+    """Piecewise quintic with given values and two derivatives at its nodes; constant beyond them.
 
-    def __init__(self, x: Floats, y: Floats, slope: Floats, bend: Floats):
+    It is one way to read the `points` (phi, r, dr/dphi, its derivative with respect to r), which
+    it shares with the other way.
+    """
+
+    def __init__(self, x: Floats, y: Floats, slope: Floats, bend: Floats, points: Floats, *, backwards: bool = False):
+        self.points, self.backwards = points, backwards
         step = np.diff(x)
         c0, c1, c2 = y[:-1], step * slope[:-1], 0.5 * step**2 * bend[:-1]
         value = y[1:] - c0 - c1 - c2

@@ -39,6 +39,16 @@ class Table(Protocol):
         """(K − 1, 7): six coefficients, lowest first, and one over the width."""
         ...
 
+    @property
+    def points(self) -> Floats:
+        """(K, 4): u, w, dw/du and the derivative of that with respect to w, at the nodes."""
+        ...
+
+    @property
+    def backwards(self) -> bool:
+        """The table reads u over w, not w over u."""
+        ...
+
     def at_float(self, x: float) -> float:
         """The value at x; constant beyond the ends."""
         ...
