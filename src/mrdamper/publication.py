@@ -13,8 +13,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mrdamper.damper import Prediction
+from mrdamper.data import Dataset
 from mrdamper.identification import Identification
-from mrdamper.io.atomic import write_into
+from mrdamper.io.atomic import publish
 from mrdamper.io.model_file import save_model
 from mrdamper.joint import JointFit
 from mrdamper.modified import ModifiedFit
@@ -51,8 +52,8 @@ def write_study(study: Study, folder: str | Path, progress: Progress = lambda wh
     OutputError
         If the folder cannot be written to.
     """
-    final = Path(folder)
-    with write_into(final) as work:
+
+    def fill(work: Path) -> None:
         (work / "figures").mkdir()
         chapters = []
         for number, rig in enumerate(study.rigs):
@@ -64,19 +65,22 @@ def write_study(study: Study, folder: str | Path, progress: Progress = lambda wh
             }
             save_model(rig.damper, work / f"model{suffix}.json")
             chapters.append(_chapter(rig, pictures))
-        footer = (
-            f"mrdamper {version('mrdamper')}; dataset: {study.dataset.name}, {len(study.dataset)} runs; "
-            f"identified and validated in {study.seconds:.1f} s."
-        )
+        footer = f"{made_from(study.dataset)}; identified and validated in {study.seconds:.1f} s."
         title = f"MR damper study: {', '.join(r.rig for r in study.rigs) or study.dataset.name}"
         (work / "report.html").write_text(render_report(title, chapters, footer), encoding="utf-8")
         (work / "identifications.csv").write_text(
             table_text(identification_rows(_all_identifications(study))), encoding="utf-8"
         )
         (work / "validation.csv").write_text(_validation_table(study), encoding="utf-8")
-        written = sorted(p.relative_to(work) for p in work.rglob("*") if p.is_file())
+
+    written = publish(folder, "report.html", fill)
     progress("written", 1.0)
-    return [final / p for p in sorted(written, key=lambda p: (p.name != "report.html", len(p.parts), str(p)))]
+    return written
+
+
+def made_from(dataset: Dataset) -> str:
+    """How a page's footer begins: this program's version and what was studied."""
+    return f"mrdamper {version('mrdamper')}; dataset: {dataset.name}, {len(dataset)} runs"
 
 
 def identification_rows(identifications: Sequence[Identification]) -> list[dict[str, Any]]:

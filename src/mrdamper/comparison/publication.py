@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +12,10 @@ import numpy as np
 
 from mrdamper.comparison import Comparison, Entry, RigComparison
 from mrdamper.data import Run
-from mrdamper.io.atomic import write_into
+from mrdamper.io.atomic import publish
 from mrdamper.plots.comparison import overlaid_loops, ranking
 from mrdamper.plots.style import save_figure
-from mrdamper.publication import score_row, table_text
+from mrdamper.publication import made_from, score_row, table_text
 from mrdamper.report.comparison import render_comparison
 from mrdamper.workflow import Progress
 
@@ -45,26 +44,25 @@ def write_comparison(
     OutputError
         If the folder cannot be written to.
     """
-    final = Path(folder)
-    with write_into(final) as work:
+
+    def fill(work: Path) -> None:
         (work / "figures").mkdir()
         chapters = []
         for number, rig in enumerate(comparison.rigs):
             progress(f"{rig.rig or 'rig'}: figures", number / len(comparison.rigs))
             chapters.append(_chapter(rig, work / "figures", f"-{rig.rig}" if len(comparison.rigs) > 1 else ""))
-        footer = (
-            f"mrdamper {version('mrdamper')}; dataset: {comparison.dataset.name}, {len(comparison.dataset)} runs; "
-            f"compared in {comparison.seconds:.0f} s on {comparison.jobs} processes."
-        )
+        took = f"compared in {comparison.seconds:.0f} s on {comparison.jobs} processes."
+        footer = f"{made_from(comparison.dataset)}; {took}"
         title = f"MR damper models compared: {', '.join(r.rig for r in comparison.rigs) or comparison.dataset.name}"
         (work / "comparison.html").write_text(render_comparison(title, chapters, footer), encoding="utf-8")
         rows = summary_rows(comparison)
         (work / "comparison.csv").write_text(table_text(rows), encoding="utf-8")
         (work / "runs.csv").write_text(table_text(run_rows(comparison)), encoding="utf-8")
         (work / "comparison.json").write_text(json.dumps(rows, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-        written = sorted(p.relative_to(work) for p in work.rglob("*") if p.is_file())
+
+    written = publish(folder, "comparison.html", fill)
     progress("written", 1.0)
-    return [final / p for p in sorted(written, key=lambda p: (p.name != "comparison.html", len(p.parts), str(p)))]
+    return written
 
 
 def summary_rows(comparison: Comparison) -> list[dict[str, Any]]:

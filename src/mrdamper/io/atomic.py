@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -54,6 +54,33 @@ def write_into(folder: str | Path) -> Iterator[Path]:
                 source.replace(target)
         except OSError as error:
             raise OutputError(error.strerror or str(error), where=str(final), mend="choose another folder") from error
+
+
+def publish(folder: str | Path, first: str, fill: Callable[[Path], None]) -> list[Path]:
+    """Have `fill` write files that move into a folder together, as `write_into`.
+
+    Parameters
+    ----------
+    folder : path
+    first : str
+        Name of the page that comes first in the list.
+    fill : callable
+        Writes into the temporary folder it is given.
+
+    Returns
+    -------
+    list of Path
+        What was written.
+
+    Raises
+    ------
+    OutputError
+        As `write_into`.
+    """
+    with write_into(folder) as work:
+        fill(work)
+        written = [p.relative_to(work) for p in work.rglob("*") if p.is_file()]
+    return [Path(folder) / p for p in sorted(written, key=lambda p: (p.name != first, len(p.parts), str(p)))]
 
 
 @contextmanager

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib.resources import files
 
-import jinja2
-
-from mrdamper.report.html import inline_svg
+from mrdamper.report.html import render_page
 
 
 def render_comparison(title: str, chapters: list[Mapping[str, object]], footer: str) -> str:
@@ -21,11 +19,8 @@ def render_comparison(title: str, chapters: list[Mapping[str, object]], footer: 
     footer : str
         How it was made.
     """
-    environment = jinja2.Environment(
-        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    template = environment.from_string((files("mrdamper.report") / "comparison.html.j2").read_text(encoding="utf-8"))
-    return template.render(title=title, chapters=chapters, footer=footer, svg=inline_svg, percent=_percent)
+    template = files("mrdamper.report") / "comparison.html.j2"
+    return render_page(template, title=title, chapters=chapters, footer=footer, percent=_percent)
 
 
 def _percent(value: float | None) -> str:

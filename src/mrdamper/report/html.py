@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 from collections.abc import Mapping
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 
 import jinja2
 import numpy as np
@@ -26,9 +27,14 @@ def render_report(title: str, chapters: list[Mapping[str, object]], footer: str)
     footer : str
         How it was made.
     """
-    template = _ENVIRONMENT.from_string((files("mrdamper.report") / "report.html.j2").read_text(encoding="utf-8"))
-    helpers = {"svg": inline_svg, "mm": lambda v: 1e3 * v, "number": _number, "percent": _percent}
-    return template.render(title=title, chapters=chapters, footer=footer, **helpers)
+    helpers = {"mm": lambda v: 1e3 * v, "number": _number, "percent": _percent}
+    template = files("mrdamper.report") / "report.html.j2"
+    return render_page(template, title=title, chapters=chapters, footer=footer, **helpers)
+
+
+def render_page(template: Traversable, **facts: object) -> str:
+    """The HTML of a template that is given facts, and `svg` to put figures into the page."""
+    return _ENVIRONMENT.from_string(template.read_text(encoding="utf-8")).render(svg=inline_svg, **facts)
 
 
 def inline_svg(picture: bytes, alt: str) -> Markup:

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 from matplotlib.figure import Figure
 
 from mrdamper.data import Condition
 from mrdamper.errors import MissingExtraError
-from mrdamper.io.atomic import write_into
+from mrdamper.io.atomic import publish
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.plots.model import predicted_loops
 from mrdamper.plots.rig_tests import measured_loops, test_analysis, test_matrix
 from mrdamper.plots.style import save_figure
-from mrdamper.publication import identification_rows, table_text
-from mrdamper.report.html import inline_svg
+from mrdamper.publication import identification_rows, made_from, table_text
+from mrdamper.report.html import render_page
 from mrdamper.reproduction.claims import Claim, judge
 from mrdamper.reproduction.figures import (
     damping_and_mass_figure,
@@ -71,13 +69,13 @@ def write_reproduction(
     OutputError
         If the folder cannot be written to.
     """
-    final = Path(folder)
     progress("claims and sensitivity", 0.0)
     claims = judge(study)
     single, indices, missing = _sensitivity(study)
     figures = _figures(study, single, indices)
     tables = _tables(study, claims, single, indices)
-    with write_into(final) as work:
+
+    def fill(work: Path) -> None:
         (work / "figures").mkdir()
         (work / "tables").mkdir()
         pictures = {}
@@ -88,9 +86,10 @@ def write_reproduction(
             (work / "tables" / f"{name}.csv").write_text(table_text(rows), encoding="utf-8")
         page = _page(study, claims, tables, pictures, (*study.notes, *missing))
         (work / "reproduction.html").write_text(page, encoding="utf-8")
-        written = sorted(p.relative_to(work) for p in work.rglob("*") if p.is_file())
+
+    written = publish(folder, "reproduction.html", fill)
     progress("written", 1.0)
-    return [final / p for p in sorted(written, key=lambda p: (p.name != "reproduction.html", str(p)))]
+    return written
 
 
 def verdicts(study: Reproduction) -> Rows:
@@ -251,28 +250,20 @@ def _page(
     pictures: Mapping[str, bytes],
     notes: tuple[str, ...],
 ) -> str:
-    environment = jinja2.Environment(
-        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    template = environment.from_string((files("mrdamper.reproduction") / "page.html.j2").read_text(encoding="utf-8"))
-    best = study.best
-    return template.render(
+    return render_page(
+        files("mrdamper.reproduction") / "page.html.j2",
         study=study,
         claims=claims,
         tables=tables,
         pictures=pictures,
         notes=notes,
-        best=best,
+        best=study.best,
         literal=study.contender(LITERAL),
         consistent=study.contender(CONSISTENT),
         synthetic=study.rig is not None,
-        svg=inline_svg,
         percent=lambda v, digits=1: "–" if v is None or not np.isfinite(v) else f"{100 * v:.{digits}f}",
         number=lambda v, digits=4: "–" if v is None else f"{v:.{digits}g}",
-        footer=(
-            f"mrdamper {version('mrdamper')}; {study.dataset.name}, {len(study.dataset)} runs; "
-            f"computed in {study.seconds:.0f} s."
-        ),
+        footer=f"{made_from(study.dataset)}; computed in {study.seconds:.0f} s.",
     )
 
 
