@@ -2,6 +2,7 @@
 
 import pytest
 from dampers import joint_damper
+from fmu_files import COMPILERS, fmu_bytes
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
@@ -48,3 +49,15 @@ def test_names_cannot_leave_the_folder_or_the_comment(model, tmp_path):
     )
     assert result.exit_code == 0
     assert {path.name for path in tmp_path.iterdir()} == {"x.h", "x.c", "x_test.c"}
+
+
+@pytest.mark.skipif(not COMPILERS, reason="no C compiler, so no binary to check")
+def test_check_takes_an_fmu(tmp_path):
+    path = tmp_path / "damper.fmu"
+    path.write_bytes(fmu_bytes("joint", 2))
+    good = run.invoke(application(), ["check", str(path)])
+    assert (good.exit_code, good.stdout) == (0, "nothing found\n")
+    path.write_bytes(path.read_bytes()[:3000])
+    broken = run.invoke(application(), ["check", str(path)])
+    assert broken.exit_code == 2
+    assert "E_FMU_ARCHIVE" in broken.stdout

@@ -1,4 +1,4 @@
-"""`mrdamper check`: the quality verdicts on a stored dataset."""
+"""`mrdamper check`: the quality verdicts on a stored dataset, or what an exported FMU is worth."""
 
 from __future__ import annotations
 
@@ -34,16 +34,25 @@ def register(app: typer.Typer) -> None:
 
     @app.command(epilog="Example: mrdamper check rig/ --figure loops.png")
     def check(
-        data: Optional[Path] = typer.Argument(None, help="Dataset folder; default: the bundled tests."),  # noqa: UP045
+        data: Optional[Path] = typer.Argument(None, help="Dataset folder, or an .fmu; default: the bundled tests."),  # noqa: UP045
         figure: Optional[Path] = typer.Option(None, "--figure", help="Loops with flagged samples: PNG, SVG or PDF."),  # noqa: UP045
         as_json: bool = typer.Option(False, "--json", help="Print JSON instead of a table."),
     ) -> None:
-        """Judge every run of a dataset again: sign, lag, clipping, distortion, drift; exit 2 if one is refused."""
+        """Judge every run of a dataset again: sign, lag, clipping, distortion, drift; exit 2 if one is refused.
+
+        An FMU that mrdamper exported is loaded and has to answer its reference motion.
+        """
         from mrdamper.cli.output import put
+        from mrdamper.errors import InputError
         from mrdamper.io.atomic import require_writable
         from mrdamper.io.dataset import load_dataset
         from mrdamper.io.quality.table import quality_table, record_of, row
 
+        if data is not None and data.suffix.lower() == ".fmu":
+            if figure is not None:
+                raise InputError("--figure for an FMU", mend="leave --figure out: it shows tests", code="E_OPTION")
+            _check_fmu(data, as_json)
+            return
         if figure is not None:
             require_writable(figure)
             _require_format(figure)
@@ -58,6 +67,19 @@ def register(app: typer.Typer) -> None:
             _draw(verdicts, figure)
         if any(verdict.refusal is not None for verdict in verdicts):
             raise typer.Exit(2)
+
+
+def _check_fmu(path: Path, as_json: bool) -> None:
+    from dataclasses import asdict
+
+    from mrdamper.cli.output import put
+    from mrdamper.export.fmu_check import check_fmu
+
+    findings = check_fmu(path)
+    rows = [asdict(finding) for finding in findings]
+    put(rows, None, as_json, lambda _: "".join(f"{f.level}: {f}\n" for f in findings) or "nothing found\n")
+    if any(finding.level == "error" for finding in findings):
+        raise typer.Exit(2)
 
 
 def _text_table(rows: Rows) -> str:
