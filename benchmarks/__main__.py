@@ -1,6 +1,6 @@
 """`make bench`: ours beside each peer that is installed, all in one run.
 
-`python -m benchmarks --quick` takes under a minute; `--write docs/benchmarks.md` keeps the page.
+`python -m benchmarks --quick` takes about a minute of an idle machine; `--write docs/benchmarks.md` keeps the page.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 def main() -> None:
     arguments = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    arguments.add_argument("--quick", action="store_true", help="few repetitions, under a minute")
+    arguments.add_argument("--quick", action="store_true", help="few repetitions, about a minute")
     arguments.add_argument("--write", type=Path, metavar="FILE", help="keep the page there")
     chosen = arguments.parse_args()
     text = run(chosen.quick)
@@ -29,19 +29,22 @@ def main() -> None:
 
 def run(quick: bool) -> str:
     """Run every section and return the page."""
-    from benchmarks import accuracy, batches, commands, identification, page, real, simulation
+    from benchmarks import accuracy, batches, commands, identification, page, real, simulation, streams, study
 
     results = page.Results(quick)
     sections = {
         "processes": lambda: commands.process_rows(quick),  # first, while this process is small
         "accuracy": accuracy.largest_errors,
         "simulation": lambda: simulation.simulation_rows(quick),
+        "streams": lambda: streams.stream_rows(quick),
         "identification": lambda: identification.identification_rows(quick),
         "batches": lambda: batches.batch_rows(quick),
         "many": lambda: batches.many_rows(quick),
         "growth": lambda: batches.growth_rows(quick),
         "real": real.real_rows,
     }
+    if not quick:
+        sections["study"] = study.part_rows
     for name, section in sections.items():
         begin = time.perf_counter()
         setattr(results, name, section())

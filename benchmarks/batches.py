@@ -71,12 +71,18 @@ def many_rows(quick: bool) -> list[ManyRow]:
     """The 48 conditions of the synthetic matrix."""
     runs = [conditions.run(condition) for condition in conditions.MATRIX]
     problems = [prepared(run) for run in runs]
+    sharp = [prepared(run, ("n",)) for run in runs]
     searches = [search_of(problem) for problem in problems]
-    method = Projection()
+    method, machine = Projection(), Projection(compiled=True)
     times = race(
         {
             "search compiled": lambda: search_lengths(searches),
             "search NumPy": lambda: [method.solve(problem) for problem in problems],
+            "n free, search compiled": lambda: [machine.solve(problem) for problem in sharp],
+            "n free, search NumPy": lambda: [method.solve(problem) for problem in sharp],
+            "motion analysis alone: frequency, harmonics, smoothing, strokes": lambda: [
+                prepared(replace(r)) for r in runs
+            ],
             "identify() NumPy: motion analysis, errors and scores too": lambda: [identify(replace(r)) for r in runs],
         },
         0.4 if quick else 3.0,
@@ -119,9 +125,9 @@ def shapes(count: int) -> Shape:
     return Shape(np.geomspace(2.0, 200.0, count) / 0.02, 0.0, 2.0)
 
 
-def prepared(run: Run) -> Problem:
+def prepared(run: Run, free: tuple[str, ...] = ()) -> Problem:
     """A problem whose motion is analysed."""
-    problem = Problem.of(run, BoucWen)
+    problem = Problem.of(run, BoucWen, free=free)
     _ = problem.motion.path, problem.seen, problem.force, problem.analysis
     return problem
 

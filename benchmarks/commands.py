@@ -106,7 +106,8 @@ def _environment(caches: Path) -> dict[str, str]:
     kept = {"NUMBA_CACHE_DIR": "numba", "PYTHONPYCACHEPREFIX": "python", "MPLCONFIGDIR": "matplotlib"}
     for folder in kept.values():
         (caches / folder).mkdir(parents=True, exist_ok=True)
-    return {**os.environ, **{name: str(caches / folder) for name, folder in kept.items()}}
+    inherited = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    return {**inherited, **{name: str(caches / folder) for name, folder in kept.items()}}
 
 
 def _process(arguments: list[str], environment: dict[str, str]) -> tuple[float, float, float]:

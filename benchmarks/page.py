@@ -10,6 +10,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from benchmarks.goals import goals
+from mrdamper.hysteresis.batch import WORTH_COMPILING
+
+WHEN_COMPILED = (
+    'The compiled path costs the import of numba, and once on a machine the time to compile: the rows "compiled" and '
+    '"compiled, nothing compiled before" under Whole processes against "NumPy". It is chosen where shapes × samples '
+    f"come to {WORTH_COMPILING:.0e} (`hysteresis.batch.WORTH_COMPILING`): NumPy takes over a second for that, machine "
+    "code a fifth. `Projection(compiled=True)` asks for it where one process identifies hundreds of runs; "
+    "`compiled=False` and a smaller job never import it. The choice depends on the work alone, never on what happens "
+    "to be loaded, so that the same input gives the same bits."
+)
 
 
 @dataclass
@@ -23,7 +33,9 @@ class Results:
     batches: Sequence = ()
     many: Sequence = ()
     growth: Sequence = ()
+    streams: Sequence = ()
     real: Sequence = ()
+    study: Sequence = ()
     processes: Sequence = ()
 
 
@@ -37,11 +49,19 @@ def page(results: Results) -> str:
         f"{os.getloadavg()[1]:.1f} on {os.cpu_count()} processors. Whole processes in wall time too. "
         + ("This was a quick run: few repetitions. " if results.quick else "")
         + "Figures marked * are multiplied up from a part that was measured.",
+        "Reading a large file has a command of its own: `python -m benchmarks.import_large --megabytes 1000`; so has "
+        "the live bench: `python -m benchmarks.web`.",
         "## Goals",
         _table(
-            ("goal", "limit", "measured", ""),
+            ("goal", "limit", "measured", "", "why missed"),
             (
-                (g.name, f"{'≥' if g.at_least else '≤'} {_number(g.limit)} {g.unit}", _number(g.measured), g.verdict)
+                (
+                    g.name,
+                    f"{'≥' if g.at_least else '≤'} {_number(g.limit)} {g.unit}",
+                    _number(g.measured),
+                    g.verdict,
+                    g.why if g.met is False else "",
+                )
                 for g in goals(results)
             ),
         ),
@@ -51,6 +71,23 @@ def page(results: Results) -> str:
         _table(
             ("times ours", "way", "ns a sample", "largest error / z_max"),
             ((_number(r.ratio), r.name, _number(r.nanoseconds), f"{r.error:.0e}") for r in results.simulation),
+        ),
+        "## One sample after the other",
+        "From displacement, current and time step to force, in nanoseconds a step. C is what `mrdamper export --to c` "
+        "writes, at -O3 -march=native; its step makes velocity and acceleration of the displacement itself, checks its "
+        "input and flags extrapolation. Code and tables of its object at -Os.",
+        _table(
+            ("damper", "Python, one call a step", "numba, a whole motion", "C", "bytes, double", "bytes, single"),
+            (
+                (
+                    r.name,
+                    _number(r.python),
+                    _number(r.compiled),
+                    _number(r.c),
+                    *([f"{b:,}" for b in r.bytes] if r.bytes else "--"),
+                )
+                for r in results.streams
+            ),
         ),
         "## One condition identified",
         "1,000 noisy samples (3 % of the standard deviation of the force), five parameters. Reached: within 1 % of the "
@@ -63,6 +100,7 @@ def page(results: Results) -> str:
             ),
         ),
         "## Many",
+        WHEN_COMPILED,
         _table(
             ("what", "ms"),
             ((r.name, _number(1e3 * r.seconds)) for r in results.many),
@@ -77,6 +115,7 @@ def page(results: Results) -> str:
         ),
         "## The bundled rigs",
         _table(("what", "s"), ((r.name, _number(r.seconds)) for r in results.real)),
+        *(_study(results.study) if results.study else ()),
         "## Whole processes",
         _table(
             ("process", "wall s", "processor s, children included", "peak MB of one"),
@@ -84,6 +123,21 @@ def page(results: Results) -> str:
         ),
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def _study(rows: Sequence) -> list[str]:
+    return [
+        "## A study of the bundled rigs, part by part",
+        "Processor seconds, one part after the other in one process. `mrdamper study` studies the rigs in a process "
+        "each at once, so that the slower rig counts.",
+        _table(
+            ("part", "s", "rig by rig"),
+            (
+                (r.name, _number(sum(r.seconds)), " + ".join(map(_number, r.seconds)) if len(r.seconds) > 1 else "")
+                for r in rows
+            ),
+        ),
+    ]
 
 
 def machine() -> str:

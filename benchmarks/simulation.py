@@ -10,7 +10,8 @@ import numpy as np
 
 from benchmarks.timing import race
 from mrdamper.hysteresis import Path, Shape, follow
-from mrdamper.hysteresis.compiled import Strokes, states, tables
+from mrdamper.hysteresis.compiled import Strokes, states
+from mrdamper.hysteresis.compiled_tables import curve_of
 from mrdamper.models.bouc_wen import BoucWen
 
 X, F, BETA, PHASE = 0.02, 1.0, 2e5, 0.3  # with this phase every reversal falls between samples
@@ -52,8 +53,7 @@ def _ours() -> dict[str, Callable[[], np.ndarray]]:
     x = X * np.sin(OMEGA * T + PHASE)
     path = Path.of(x)
     strokes, out = Strokes.of(path), np.empty(T.size)
-    arguments = (float(SHAPE.kappa), 0.0, 2.0, *tables(2.0))
-    arguments += (strokes.distance, strokes.begin, strokes.lengths, strokes.first_direction, 0.0, out)
+    arguments = (float(SHAPE.kappa), 0.0, curve_of(2.0), strokes, 0.0, out)
 
     def compiled() -> np.ndarray:
         states(*arguments)

@@ -1,5 +1,6 @@
 """The benchmarks' own arithmetic, and that every row of the quick tables is there; no time is judged."""
 
+import shutil
 import sys
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from benchmarks import accuracy, conditions, goals, page
+from benchmarks import accuracy, commands, conditions, goals, page, streams, study
 from benchmarks.batches import loop, prepared, search_of, shapes
 from benchmarks.genetic import plain_genetic
 from benchmarks.identification import Task
@@ -91,9 +92,36 @@ def test_accuracy_meets_its_goals():
     assert found["tables"] <= 1e-8
 
 
+@pytest.mark.skipif(not any(map(shutil.which, ("gcc", "clang", "cc"))), reason="needs a C compiler")
+def test_generated_c_is_built_timed_and_weighed():
+    model = streams.dampers()["Bouc–Wen, n = 2"]
+    compiler = next(filter(shutil.which, ("gcc", "clang", "cc")))
+    assert streams._in_c(model, compiler, rounds=3) > 0
+    sizes = streams._sizes(model, compiler)
+    assert sizes is None or 500 < sizes[1] <= sizes[0] < 20_000  # single precision is not larger
+
+
+def test_parts_of_a_study_add_up_run_by_run():
+    clock = study._Clock(["rig_1", "rig_2"])
+    for what in ("loops", "bouc-wen run rig_1", "bouc-wen run rig_2", "bouc-wen over all conditions, joint"):
+        clock.tell(what, 0.0)
+    parts = ["motions and loops", "bouc-wen run by run", "bouc-wen over all conditions, joint"]
+    assert list(clock.stopped()) == parts
+    text = page.page(page.Results(quick=True, study=[study.PartRow(part, (0.5, 1.0)) for part in parts]))
+    assert "| bouc-wen run by run | 1.50 | 0.500 + 1.00 |" in text
+
+
+def test_a_missed_goal_says_why():
+    rows = [commands.ProcessRow("mrdamper study, caches filled", 7.0, 12.0, 200.0)]
+    text = page.page(page.Results(quick=True, processes=rows))
+    assert "| 7.00 | missed | the slower rig" in text
+    met = page.page(page.Results(quick=True, processes=[commands.ProcessRow(rows[0].name, 4.0, 6.0, 200.0)]))
+    assert "| 4.00 | met |  |" in met
+
+
 def test_an_empty_page_says_what_was_not_measured():
     text = page.page(page.Results(quick=True, accuracy={"closed": 1e-15, "tables": None}))
-    assert "| error over z_max for n = 1 and 2 | ≤ 1.0e-12  | 1.0e-15 | met |" in text
+    assert "| error over z_max for n = 1 and 2 | ≤ 1.0e-12  | 1.0e-15 | met |  |" in text
     assert text.count("not measured") >= 15
     assert "202" not in page.machine().split("Python")[0]  # no date
     assert goals.Goal("x", 1.0, 2.0, "").verdict == "missed"

@@ -10,6 +10,8 @@ from mrdamper.hysteresis.batch import Fixed, batch_cost, follow_alike, follow_qu
 from mrdamper.hysteresis.compiled import follow_compiled
 from mrdamper.hysteresis.compiled_math import expm1, tan, tanh
 from mrdamper.hysteresis.compiled_search import GENERAL_WAY, search_length, search_lengths
+from mrdamper.hysteresis.compiled_tables import curve_of
+from mrdamper.hysteresis.master_curve import master_curve
 from mrdamper.identification import Problem, identify
 from mrdamper.identification.elimination import Elimination, kind_of
 from mrdamper.identification.methods.projection import Projection, length_search, search_axes
@@ -55,6 +57,18 @@ def test_machine_code_follows_as_numpy_does(name, n):
             for start in (0.0, 0.7, -1.0):
                 expected = follow(shape, PATHS[name], start)
                 np.testing.assert_allclose(follow_compiled(shape, PATHS[name], start), expected, atol=1e-13)
+
+
+@pytest.mark.parametrize("n", [1.0001, 1.3, 2.7, 10.0])
+def test_tables_made_in_machine_code_are_those_of_numpy(n):
+    """To the rounding of a sum over 769 nodes."""
+    rising, growing = master_curve(n)._rising, master_curve(n)._growing
+    quintics = (rising._r_of_phi, rising._phi_of_r, growing._r_of_phi, growing._phi_of_r)
+    for cells, quintic in zip(curve_of(n).cells, quintics, strict=True):
+        np.testing.assert_allclose(cells[:, 0], quintic.nodes, rtol=1e-13, atol=1e-13)
+        np.testing.assert_allclose(cells[:-1, 1], quintic.cells[:, 6], rtol=1e-11)
+        np.testing.assert_allclose(cells[:-1, 2:], quintic.cells[:, :6], atol=1e-12)
+    assert not curve_of(n, growing=False).cells[2:].any()
 
 
 @pytest.mark.parametrize("n", [1.0, 2.0, 2.7])
@@ -164,6 +178,26 @@ def test_compiled_search_finds_the_minimum_numpy_finds(fixed):
         error = numpy.model.force(problem.seen, numpy.model.state(problem.motion)[problem.scored]) - problem.force
         assert machine.cost == pytest.approx(float(error @ error), rel=1e-8)
     assert general <= (6 if fixed == {"n": 1.0} else 0)
+
+
+@pytest.mark.parametrize("free", [("n",), ("gamma",), ("gamma", "n")], ids=str)
+def test_every_shape_is_searched_in_machine_code_too(free):
+    problem = Problem.of(synthetic_run(CONDITIONS[5], noise=20.0), BoucWen, free=free)
+    machine, numpy = Projection(compiled=True).solve(problem), Projection(compiled=False).solve(problem)
+    for name, value in numpy.end.items():
+        # The same steps; a cost flat to 1e-9 leaves that much of the place open.
+        assert machine.end[name] == pytest.approx(value, rel=1e-4, abs=1e-4)
+    assert machine.message == numpy.message
+
+
+def test_machine_code_is_chosen_by_the_work():
+    """One record of a test matrix is not worth it, one of ten million samples is."""
+    problem, axes = prepared(CONDITIONS[0])[0], (None,)
+    assert not Projection()._is_compiled(problem, axes)
+    assert Projection(compiled=True)._is_compiled(problem, axes)
+    long = type("Long", (), {"motion": range(20_000_000)})()
+    assert Projection()._is_compiled(long, axes)
+    assert not Projection(compiled=False)._is_compiled(long, axes)
 
 
 def test_method_with_machine_code_gives_the_same_model():

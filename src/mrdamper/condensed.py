@@ -85,8 +85,8 @@ class Condensed:
                 t * (t - 1) * (t - 2) / 6,
             ]
         )
-        rows = np.arange(t.size)
-        return np.sum([w[:, None, None] * self.gram[rows, first + j] for j, w in enumerate(weights)], axis=0)
+        nodes = self.gram[np.arange(t.size)[:, None], first[:, None] + np.arange(4)]  # (R, 4, L+1, L+1)
+        return np.einsum("jr,rjkl->rkl", weights, nodes)
 
 
 @on_one_blas_thread
@@ -299,12 +299,15 @@ class _Design:
 
 
 def _least_squares(columns: Floats, right: Floats) -> Floats:
-    # Triangular factors take half the time of singular values, which only dependent columns need.
-    triangle = np.asarray(np.linalg.qr(np.column_stack([columns, right]), mode="r"))
-    count = columns.shape[1]
-    pivots = np.abs(np.diag(triangle)[:count])
-    if triangle.shape[0] > count and pivots.min(initial=1.0) > 1e-6 * pivots.max(initial=0.0):
-        return np.asarray(np.linalg.solve(triangle[:count, :count], triangle[:count, count]), dtype=float)
+    normal = columns.T @ columns
+    try:
+        pivots = np.diag(np.linalg.cholesky(normal))
+    except np.linalg.LinAlgError:
+        pivots = np.zeros(1)
+    if pivots.min(initial=1.0) > 1e-4 * pivots.max(initial=0.0):
+        # Normal equations, and once more for what they left: as good as a factorisation of all rows.
+        solution = np.linalg.solve(normal, columns.T @ right)
+        return np.asarray(solution + np.linalg.solve(normal, columns.T @ (right - columns @ solution)), dtype=float)
     return np.asarray(np.linalg.lstsq(columns, right, rcond=1e-10)[0], dtype=float)
 
 

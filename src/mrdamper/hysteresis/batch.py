@@ -18,11 +18,12 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.hysteresis.master_curve import master_curve
 from mrdamper.hysteresis.path import Path
-from mrdamper.hysteresis.response import _advance, _states, on_curve
+from mrdamper.hysteresis.response import _advance, _states, on_curve, starts_of_strokes
 from mrdamper.hysteresis.shape import Shape
 
-WORTH_COMPILING = 2e8  # shapes × samples: about 3 s in NumPy, as long as compiling takes where nothing is kept yet
-_FULL = {1.0: 37.5, 2.0: 19.1}  # distances past zero at which the closed forms round to 1
+# Shapes × samples from which machine code is worth it: over 1 s in NumPy, a fifth of that compiled, and 0.3 s
+# to import the compiler; where nothing is kept on disk yet, compiling takes a few seconds once.
+WORTH_COMPILING = 2e8
 _AT_ONCE = 2**17  # states held at a time by the NumPy path
 
 
@@ -108,8 +109,8 @@ def batch_cost(
         Coefficients of the columns and, last, of zeta [N]. Without them the best ones are taken:
         least squares, that of zeta not below zero.
     compiled : bool, optional
-        Use machine code; default: if the work is worth it. It depends on the work alone, so that
-        the same input gives the same bits whatever ran before.
+        Use machine code; default: if shapes × samples come to `WORTH_COMPILING`. It depends on the
+        work alone, so that the same input gives the same bits whatever ran before.
 
     Returns
     -------
@@ -136,7 +137,8 @@ def products(fixed: Fixed, shapes: Shape, *, compiled: bool | None = None) -> Pr
     """Sums of zeta times each column, the rest of the force and itself; arguments as `batch_cost`."""
     kappa, rho = (np.array(a, dtype=float) for a in np.broadcast_arrays(shapes.kappa, shapes.rho))
     if compiled or (compiled is None and kappa.size * len(fixed.path) >= WORTH_COMPILING):
-        from mrdamper.hysteresis.compiled_batch import Strokes, batch_products
+        from mrdamper.hysteresis.compiled import Strokes
+        from mrdamper.hysteresis.compiled_batch import batch_products
 
         sums = batch_products(kappa, rho, shapes.n, Strokes.of(fixed.path), fixed.first, *fixed._rows)
         return Products(sums[:, :-2], sums[:, -2], sums[:, -1])
@@ -155,12 +157,7 @@ def products(fixed: Fixed, shapes: Shape, *, compiled: bool | None = None) -> Pr
 def follow_quickly(kappa: float, rho: float, n: float, path: Path, part: slice = slice(None)) -> Floats:
     """States of one shape at a part of the samples, from zero, nothing checked: for inner loops."""
     curve = master_curve(n)
-    w, starts = 0.0, [0.0]
-    full = (curve.release_distance(1.0, rho, math) + _FULL.get(n, math.inf)) / kappa
-    for length in path.lengths:
-        if w != -1.0 or length < full:  # else the stroke goes from saturation to saturation
-            w = -_advance(curve, rho, w, kappa * length)
-        starts.append(w)
+    starts = starts_of_strokes(curve, kappa, rho, path, 0.0)
     return path.direction[part] * _states(curve, rho, np.array(starts), path.stroke[part], kappa * path.distance[part])
 
 
@@ -173,7 +170,7 @@ def follow_with_slope(kappa: float, rho: float, n: float, path: Path, part: slic
     curve = master_curve(n)
     w, slope = 0.0, 0.0
     starts, shifts = [0.0], [0.0]
-    full = (curve.release_distance(1.0, rho, math) + _FULL.get(n, math.inf)) / kappa
+    full = (curve.release_distance(1.0, rho, math) + curve.full) / kappa
     for length in path.lengths:
         if w == -1.0 and length >= full:
             slope = 0.0
@@ -222,7 +219,7 @@ def _starts(n: float, rho: float, kappa: Floats, path: Path) -> Floats:
     if not lengths.size:
         return starts
     # Shapes that every stroke takes from saturation to saturation need no recursion.
-    full = curve.release_distance(1.0, rho, math) + _FULL.get(n, math.inf)
+    full = curve.release_distance(1.0, rho, math) + curve.full
     stepped = np.flatnonzero(kappa * lengths.min() < full)
     kappa, w = kappa[stepped], np.zeros(stepped.size)
     for k, length in enumerate(path.lengths if stepped.size else (), 1):

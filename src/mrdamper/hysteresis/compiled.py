@@ -1,32 +1,41 @@
 """The same strokes in machine code: for batches, fleets and long records.
 
 The NumPy path of `response` does the main job. This one does the same arithmetic at 2 ns a
-sample instead of 30, and costs the import of a compiler. A stroke is cut where the state
-passes zero and where it is saturated to the last bit, so every piece is a loop without a
-branch, which becomes a loop over vector registers. Importing this module imports numba.
+sample instead of 30, and costs the import of a compiler. A first pass goes from reversal to
+reversal and cuts each stroke where the state passes zero and where it is saturated to the last
+bit; every piece is then a loop without a branch, which becomes a loop over vector registers.
+Importing this module imports numba.
+
+For whoever changes this file: numba keeps compiled functions by the date of the file they stand
+in, not of the files they call. `touch` the other `compiled_*.py` too.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import lru_cache
+from typing import NamedTuple, Self
 
 import numpy as np
-from numba import njit
+from numpy.typing import NDArray
 
 from mrdamper.data import Floats
 from mrdamper.hysteresis.compiled_math import expm1, tan, tanh
-from mrdamper.hysteresis.master_curve import _BELOW_ONE, MasterCurve, _Quintics, _Tabulated, master_curve
+from mrdamper.hysteresis.compiled_options import inner, kernel
+from mrdamper.hysteresis.compiled_tables import (
+    GROWING,
+    GROWING_DISTANCE,
+    RISING,
+    RISING_DISTANCE,
+    curve_of,
+)
+from mrdamper.hysteresis.master_curve import _BELOW_ONE, master_curve
 from mrdamper.hysteresis.path import Path
 from mrdamper.hysteresis.shape import Shape
 
-_compile = njit(cache=True, error_model="numpy", nogil=True, fastmath={"contract"})
-_FULL_1, _FULL_2 = 37.5, 19.1  # distances past zero at which 1 − e^−phi and tanh phi round to 1
+_FULL_1, _FULL_2 = master_curve(1.0).full, master_curve(2.0).full
 
 
-@dataclass(frozen=True, eq=False)
-class Strokes:
+class Strokes(NamedTuple):
     """A path as the kernels want it.
 
     Attributes
@@ -41,21 +50,22 @@ class Strokes:
     """
 
     distance: Floats
-    begin: np.ndarray
+    begin: NDArray[np.uint64]
     lengths: Floats
     first_direction: float
 
     @classmethod
-    def of(cls, path: Path) -> Strokes:
+    def of(cls, path: Path) -> Self:
         """Read a path."""
         strokes = len(path.lengths) + 1
         begin = np.searchsorted(path.stroke, np.arange(strokes + 1)).astype(np.uint64)  # no sign, no wrap-around
-        return cls(
-            np.ascontiguousarray(path.distance),
-            begin,
-            np.array([*path.lengths, 0.0]),
-            path.first_direction,
-        )
+        lengths = np.array([*path.lengths, 0.0])
+        return cls(np.ascontiguousarray(path.distance), begin, lengths, path.first_direction)
+
+
+# What the first pass finds for a stroke: the state where it begins, in its direction; the distance
+# from there to zero; the direction; the first sample past zero, and the first whose state rounds to 1.
+CUT = np.dtype([("start", "f8"), ("to_zero", "f8"), ("sign", "f8"), ("zero", "u8"), ("full", "u8")])
 
 
 def follow_compiled(shape: Shape, path: Path, zeta0: float = 0.0) -> Floats:
@@ -75,99 +85,63 @@ def follow_compiled(shape: Shape, path: Path, zeta0: float = 0.0) -> Floats:
     (N,) array
         zeta [-], the same as `follow` to 1e-13 for n = 1 and 2, and to 1e-12 from the tables.
     """
-    strokes = Strokes.of(path)
-    out = np.empty(len(path))
-    states(
-        float(shape.kappa),
-        float(shape.rho),
-        float(shape.n),
-        *tables(float(shape.n)),
-        strokes.distance,
-        strokes.begin,
-        strokes.lengths,
-        strokes.first_direction,
-        zeta0,
-        out,
-    )
+    return follow_strokes(float(shape.kappa), float(shape.rho), float(shape.n), Strokes.of(path), zeta0)
+
+
+def follow_strokes(kappa: float, rho: float, n: float, strokes: Strokes, zeta0: float = 0.0) -> Floats:
+    """The same for strokes that are followed often, and nothing checked."""
+    out = np.empty(strokes.distance.size)
+    states(kappa, rho, curve_of(n, rho < 0), strokes, zeta0, out)
     return out
 
 
-@lru_cache(maxsize=32)
-def tables(n: float) -> tuple[Floats, Floats, Floats, Floats]:
-    """Cells of the tabulated curves for an exponent; n = 1 and 2 have closed forms and need none.
-
-    Returns
-    -------
-    rising, rising_distance, growing, growing_distance : (K, 8) arrays
-        One cell a row, in one line of the cache: node, 1/width, six coefficients. The last row
-        holds the last node alone.
-    """
-    curve: MasterCurve = master_curve(n)
-    if not isinstance(curve, _Tabulated):
-        nothing = np.zeros((2, 8))
-        return nothing, nothing, nothing, nothing
-    rising, growing = curve._rising, curve._growing
-    return (
-        _cells(rising._r_of_phi),
-        _cells(rising._phi_of_r),
-        _cells(growing._r_of_phi),
-        _cells(growing._phi_of_r),
-    )
+@kernel
+def states(kappa, rho, curve, strokes, zeta0, out):
+    """State at every sample, into `out`."""
+    cuts = np.empty(strokes.lengths.size, CUT)
+    cut(kappa, rho, curve, strokes, zeta0, cuts)
+    n, cells, distance, begin = curve.n, curve.cells, strokes.distance, strokes.begin
+    for k in range(cuts.size):
+        fill(kappa, rho, n, cells, cuts[k], distance, begin[k], begin[k + 1], out, np.uint64(0))
 
 
-def _cells(quintics: _Quintics) -> Floats:
-    rows = np.zeros((quintics.nodes.size, 8))
-    rows[:, 0] = quintics.nodes
-    rows[:-1, 1], rows[:-1, 2:] = quintics.cells[:, 6], quintics.cells[:, :6]
-    return rows
+@inner
+def cut(kappa, rho, curve, strokes, zeta0, cuts):
+    """Go from reversal to reversal, from a state zeta0 on; what a stroke needs goes into `cuts`."""
+    n, cells = curve.n, curve.cells
+    distance, begin, lengths, sign = strokes
+    w = sign * zeta0
+    for k in range(lengths.size):
+        to_zero = _release_distance(w, rho, n, cells)
+        one = cuts[k]
+        one.start, one.to_zero, one.sign = w, to_zero, sign
+        one.zero, one.full = _pieces(kappa, n, to_zero, distance, begin[k], begin[k + 1])
+        w, sign = -_advance(rho, n, cells, w, kappa * lengths[k] - to_zero), -sign
 
 
-@_compile
-def states(
-    kappa,
-    rho,
-    n,
-    rising,
-    rising_distance,
-    growing,
-    growing_distance,
-    distance,
-    begin,
-    lengths,
-    first_direction,
-    zeta0,
-    out,
-):
-    """State at every sample; arguments as `Shape`, `tables` and `Strokes` hold them."""
-    w, sign = first_direction * zeta0, first_direction
-    for k in range(begin.size - 1):
-        a, b = begin[k], begin[k + 1]
-        to_zero = release_distance(w, rho, n, rising_distance, growing_distance)
-        zero, full = pieces(kappa, n, to_zero, distance, a, b)
-        if a < zero:
-            release(kappa, rho, n, rising, growing, to_zero, sign, distance, a, zero, out, np.uint64(0))
-        if zero < full:
-            climb(
-                kappa, n, rising, rising_distance, max(w, 0.0), to_zero, sign, distance, zero, full, out, np.uint64(0)
-            )
-        for i in range(full, b):
-            out[i] = sign
-        w = -advance(kappa, rho, n, rising, rising_distance, growing, growing_distance, w, to_zero, lengths[k])
-        sign = -sign
+@inner
+def fill(kappa, rho, n, cells, stroke, distance, a, b, out, origin):
+    """States at samples a...b−1, which are of one stroke, into out[i − origin]."""
+    to_zero, sign = stroke.to_zero, stroke.sign
+    zero, full = min(max(stroke.zero, a), b), min(max(stroke.full, a), b)
+    if a < zero:
+        _release(kappa, rho, n, cells, to_zero, sign, distance, a, zero, out, origin)
+    if zero < full:
+        _climb(kappa, n, cells, max(stroke.start, 0.0), to_zero, sign, distance, zero, full, out, origin)
+    for i in range(full, b):
+        out[i - origin] = sign
 
 
-@_compile
-def pieces(kappa, n, to_zero, distance, a, b):
+@inner
+def _pieces(kappa, n, to_zero, distance, a, b):
     """First sample past zero, and first sample at which the state is 1 to the last bit."""
     zero = _first_from(distance, a, b, kappa, to_zero) if to_zero > 0.0 else a
-    if n == 1.0:
-        return zero, _first_from(distance, zero, b, kappa, to_zero + _FULL_1)
-    if n == 2.0:
-        return zero, _first_from(distance, zero, b, kappa, to_zero + _FULL_2)
-    return zero, b
+    if n != 1.0 and n != 2.0:
+        return zero, b
+    return zero, _first_from(distance, zero, b, kappa, to_zero + (_FULL_1 if n == 1.0 else _FULL_2))
 
 
-@_compile
+@inner
 def _first_from(distance, low, high, kappa, limit):
     """First sample in low...high whose kappa · distance reaches a limit; distances increase.
 
@@ -184,8 +158,8 @@ def _first_from(distance, low, high, kappa, limit):
     return low + np.uint64(kappa * distance[low] < limit)
 
 
-@_compile
-def release_distance(w, rho, n, rising_distance, growing_distance):
+@inner
+def _release_distance(w, rho, n, cells):
     """Distance in which a state w < 0 gets to zero; 0 for w >= 0."""
     if w >= 0.0:
         return 0.0
@@ -199,28 +173,27 @@ def release_distance(w, rho, n, rising_distance, growing_distance):
         return math.atanh(root * size * _BELOW_ONE) / root if rho > 0.0 else math.atan(root * size) / root
     scale = abs(rho) ** (1.0 / n)
     if rho > 0.0:
-        return cell_value(rising_distance, -math.log1p(-scale * size * _BELOW_ONE)) / scale
-    return cell_value(growing_distance, math.log1p(scale * size)) / scale
+        return _cell_value(cells, RISING_DISTANCE, -math.log1p(-scale * size * _BELOW_ONE)) / scale
+    return _cell_value(cells, GROWING_DISTANCE, math.log1p(scale * size)) / scale
 
 
-@_compile
-def advance(kappa, rho, n, rising, rising_distance, growing, growing_distance, w, to_zero, length):
-    """State at the end of a stroke."""
-    phi = kappa * length - to_zero
+@inner
+def _advance(rho, n, cells, w, phi):
+    """State at the end of a stroke from w that goes a distance phi past zero."""
     if phi < 0.0:
-        return _release_end(rho, n, rising, growing, -phi)
+        return _release_end(rho, n, cells, -phi)
     start = max(w, 0.0)
     if n == 1.0:
         return start - (1.0 - start) * math.expm1(-phi)
     if n == 2.0:
         t = math.tanh(phi) if phi < _FULL_2 else 1.0
         return (start + t) / (1.0 + start * t)
-    travelled = cell_value(rising_distance, -math.log1p(-start * _BELOW_ONE)) + phi
-    return -math.expm1(-cell_value(rising, travelled))
+    travelled = _cell_value(cells, RISING_DISTANCE, -math.log1p(-start * _BELOW_ONE)) + phi
+    return -math.expm1(-_cell_value(cells, RISING, travelled))
 
 
-@_compile
-def _release_end(rho, n, rising, growing, before):
+@inner
+def _release_end(rho, n, cells, before):
     """State at a distance before zero."""
     if rho == 0.0:
         return -before
@@ -231,12 +204,12 @@ def _release_end(rho, n, rising, growing, before):
         return -math.tanh(root * before) / root if rho > 0.0 else -math.tan(root * before) / root
     scale = abs(rho) ** (1.0 / n)
     if rho > 0.0:
-        return math.expm1(-cell_value(rising, scale * before)) / scale
-    return -math.expm1(cell_value(growing, scale * before)) / scale
+        return math.expm1(-_cell_value(cells, RISING, scale * before)) / scale
+    return -math.expm1(_cell_value(cells, GROWING, scale * before)) / scale
 
 
-@_compile
-def release(kappa, rho, n, rising, growing, to_zero, sign, distance, a, b, out, origin):
+@inner
+def _release(kappa, rho, n, cells, to_zero, sign, distance, a, b, out, origin):
     """States before zero at samples a...b−1, into out[i − origin], in the direction `sign` of the motion."""
     if rho == 0.0:
         for i in range(a, b):
@@ -256,18 +229,18 @@ def release(kappa, rho, n, rising, growing, to_zero, sign, distance, a, b, out, 
                 out[i - origin] = factor * tan(root * (to_zero - kappa * distance[i]))
     else:
         scale = abs(rho) ** (1.0 / n)
-        cells = rising if rho > 0.0 else growing
-        at = cells.shape[0] - 2
+        table = RISING if rho > 0.0 else GROWING
+        at = cells.shape[1] - 2
         for i in range(a, b):  # the distance to zero shrinks, so the cells pass one after the other
-            x = min(scale * (to_zero - kappa * distance[i]), cells[-1, 0])
-            while at > 0 and cells[at, 0] > x:
+            x = min(scale * (to_zero - kappa * distance[i]), cells[table, -1, 0])
+            while at > 0 and cells[table, at, 0] > x:
                 at -= 1
-            r = _in_cell(cells, at, x)
+            r = _in_cell(cells, table, at, x)
             out[i - origin] = sign * math.expm1(-r) / scale if rho > 0.0 else -sign * math.expm1(r) / scale
 
 
-@_compile
-def climb(kappa, n, rising, rising_distance, w, to_zero, sign, distance, a, b, out, origin):
+@inner
+def _climb(kappa, n, cells, w, to_zero, sign, distance, a, b, out, origin):
     """States from w >= 0 on at samples a...b−1, into out[i − origin], in the direction `sign` of the motion."""
     if n == 1.0:
         for i in range(a, b):
@@ -281,32 +254,33 @@ def climb(kappa, n, rising, rising_distance, w, to_zero, sign, distance, a, b, o
                 t = tanh(kappa * distance[i] - to_zero)
                 out[i - origin] = sign * ((w + t) / (1.0 + w * t))
     else:
-        start = cell_value(rising_distance, -math.log1p(-w * _BELOW_ONE)) - to_zero
-        at, last = 0, rising.shape[0] - 2
+        start = _cell_value(cells, RISING_DISTANCE, -math.log1p(-w * _BELOW_ONE)) - to_zero
+        at, last = 0, cells.shape[1] - 2
         for i in range(a, b):
-            x = min(kappa * distance[i] + start, rising[-1, 0])
-            while at < last and rising[at + 1, 0] <= x:
+            x = min(kappa * distance[i] + start, cells[RISING, -1, 0])
+            while at < last and cells[RISING, at + 1, 0] <= x:
                 at += 1
-            out[i - origin] = -sign * math.expm1(-_in_cell(rising, at, x))
+            out[i - origin] = -sign * math.expm1(-_in_cell(cells, RISING, at, x))
 
 
-@_compile
-def cell_value(cells, x):
-    """Value of tabulated quintics at one place."""
-    x = min(max(x, cells[0, 0]), cells[-1, 0])
-    low, high = 0, cells.shape[0] - 2
+@inner
+def _cell_value(cells, table, x):
+    """Value of a tabulated curve at one place."""
+    x = min(max(x, cells[table, 0, 0]), cells[table, -1, 0])
+    low, high = 0, cells.shape[1] - 2
     while low < high:
         middle = (low + high + 1) >> 1
-        if cells[middle, 0] <= x:
+        if cells[table, middle, 0] <= x:
             low = middle
         else:
             high = middle - 1
-    return _in_cell(cells, low, x)
+    return _in_cell(cells, table, low, x)
 
 
-@_compile
-def _in_cell(cells, at, x):
-    t = (x - cells[at, 0]) * cells[at, 1]
-    return cells[at, 2] + t * (
-        cells[at, 3] + t * (cells[at, 4] + t * (cells[at, 5] + t * (cells[at, 6] + t * cells[at, 7])))
-    )
+@inner
+def _in_cell(cells, table, at, x):
+    t = (x - cells[table, at, 0]) * cells[table, at, 1]
+    value = cells[table, at, 7]
+    for j in range(6, 1, -1):
+        value = value * t + cells[table, at, j]
+    return value

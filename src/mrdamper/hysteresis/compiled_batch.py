@@ -9,10 +9,11 @@ the columns, made once, give the products. Importing this module imports numba.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from mrdamper.data import Floats
-from mrdamper.hysteresis.compiled import Strokes, _compile, advance, climb, pieces, release, release_distance, tables
+from mrdamper.hysteresis.compiled import CUT, Strokes, cut, fill
+from mrdamper.hysteresis.compiled_options import inner_sum, kernel
+from mrdamper.hysteresis.compiled_tables import curve_of
 
 _BLOCK = np.uint64(512)  # samples whose states fit the first cache beside the columns
 
@@ -40,69 +41,32 @@ def batch_products(
     (P, R+1) array
     """
     out = np.zeros((kappa.size, rows.shape[0] + 1))
-    _products(
-        kappa,
-        rho,
-        n,
-        *tables(n),
-        strokes.distance,
-        strokes.begin,
-        strokes.lengths,
-        strokes.first_direction,
-        np.uint64(first),
-        rows,
-        running,
-        out,
-    )
+    add_products(kappa, rho, curve_of(n, bool(np.any(rho < 0))), strokes, np.uint64(first), rows, running, out)
     return out
 
 
-@_compile
-def _products(
-    kappas,
-    rhos,
-    n,
-    rising,
-    rising_distance,
-    growing,
-    growing_distance,
-    distance,
-    begin,
-    lengths,
-    first_direction,
-    first,
-    rows,
-    running,
-    out,
-):
-    buffer, block = np.empty(512), _BLOCK
+@kernel
+def add_products(kappas, rhos, curve, strokes, first, rows, running, out):
+    """Add the sums for every shape to a row of `out`; arguments as `batch_products`."""
+    buffer, block, cuts = np.empty(512), _BLOCK, np.empty(strokes.lengths.size, CUT)
+    n, cells, distance, begin = curve.n, curve.cells, strokes.distance, strokes.begin
     for s in range(kappas.size):
         kappa, rho, sums = kappas[s], rhos[s], out[s]
-        w, sign = 0.0, first_direction
-        for k in range(begin.size - 1):
-            to_zero = release_distance(w, rho, n, rising_distance, growing_distance)
-            if begin[k + 1] > first:
-                a, b = max(begin[k], first), begin[k + 1]
-                zero, full = pieces(kappa, n, to_zero, distance, a, b)
-                start = max(w, 0.0)
-                for i in range(a, zero, block):
-                    end = min(i + block, zero)
-                    release(kappa, rho, n, rising, growing, to_zero, sign, distance, i, end, buffer, i)
-                    _add(buffer, rows, i, end, sums)
-                for i in range(zero, full, block):
-                    end = min(i + block, full)
-                    climb(kappa, n, rising, rising_distance, start, to_zero, sign, distance, i, end, buffer, i)
-                    _add(buffer, rows, i, end, sums)
-                if full < b:
-                    for row in range(rows.shape[0]):
-                        sums[row] += sign * (running[b, row] - running[full, row])
-                    sums[rows.shape[0]] += b - full
-            w = -advance(kappa, rho, n, rising, rising_distance, growing, growing_distance, w, to_zero, lengths[k])
-            sign = -sign
+        cut(kappa, rho, curve, strokes, 0.0, cuts)
+        for k in range(cuts.size):
+            stroke, a, b = cuts[k], max(begin[k], first), max(begin[k + 1], first)
+            full = min(max(stroke.full, a), b)
+            for i in range(a, full, block):
+                end = min(i + block, full)
+                fill(kappa, rho, n, cells, stroke, distance, i, end, buffer, i)
+                _add(buffer, rows, i, end, sums)
+            if full < b:
+                for row in range(rows.shape[0]):
+                    sums[row] += stroke.sign * (running[b, row] - running[full, row])
+                sums[rows.shape[0]] += b - full
 
 
-# Sums may be taken in any order here, or they could not be taken in vector registers.
-@njit(cache=True, error_model="numpy", nogil=True, fastmath={"reassoc", "nsz", "contract"})
+@inner_sum
 def _add(states, rows, a, b, sums):
     size, count = b - a, rows.shape[0]
     row = 0
@@ -126,8 +90,8 @@ def _add(states, rows, a, b, sums):
     sums[count] += one
 
 
-@njit(cache=True, error_model="numpy", nogil=True, fastmath={"reassoc", "nsz", "contract"})
-def _sum(a, b, start, end):
+@inner_sum
+def dot(a, b, start, end):
     """Sum of products of two rows, from a start on."""
     total = 0.0
     for i in range(start, np.uint64(end)):

@@ -14,17 +14,10 @@ from typing import Self
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.hysteresis.compiled import (
-    Strokes,
-    _compile,
-    advance,
-    climb,
-    pieces,
-    release,
-    release_distance,
-    tables,
-)
-from mrdamper.hysteresis.compiled_batch import _products, _sum
+from mrdamper.hysteresis.compiled import CUT, Strokes, cut, fill
+from mrdamper.hysteresis.compiled_batch import add_products, dot
+from mrdamper.hysteresis.compiled_options import inner, kernel
+from mrdamper.hysteresis.compiled_tables import curve_of
 from mrdamper.hysteresis.path import Path
 
 FOUND, AT_END, STEPS_SPENT, GENERAL_WAY = 0, 1, 2, 3
@@ -139,22 +132,16 @@ def search_lengths(searches: list[LengthSearch], *, threads: int = 1) -> list[Le
 
 def search_length(search: LengthSearch) -> LengthFound:
     """Yield displacement of least squared force error, the coefficients solved for at every step."""
-    s = search.strokes
     coefficients = np.zeros(search.columns.shape[0] + 1)
     status, start, end, cost, evaluations = _search(
         search.columns,
         search.force,
-        s.distance,
-        s.begin,
-        s.lengths,
-        s.first_direction,
-        np.uint64(s.distance.size - search.force.size),
+        search.strokes,
         search.grid_stroke,
         search.rho,
-        search.n,
-        *tables(search.n),
+        curve_of(search.n, search.rho < 0),
         search.grid,
-        *search.bounds,
+        search.bounds,
         search.lower,
         search.upper,
         coefficients,
@@ -162,59 +149,59 @@ def search_length(search: LengthSearch) -> LengthFound:
     return LengthFound(status, start, end, coefficients, cost, evaluations)
 
 
-@_compile
-def _search(
-    columns,
-    force,
-    distance,
-    begin,
-    lengths,
-    first_direction,
-    first,
-    grid_stroke,
-    rho,
-    n,
-    rising,
-    rising_distance,
-    growing,
-    growing_distance,
-    grid,
-    lowest,
-    highest,
-    lower,
-    upper,
-    coefficients,
-):
-    count = columns.shape[0]
-    last = np.uint64(distance.size)
-    rows, running = np.zeros((count + 1, distance.size)), np.zeros((distance.size + 1, count + 1))
-    inverse = np.zeros((count, count))
-    along = np.zeros(count)
+@kernel
+def _search(columns, force, strokes, grid_stroke, rho, curve, grid, bounds, lower, upper, coefficients):
+    """Status, start, end, cost and evaluations; the coefficients come back in the last argument."""
+    count, size = columns.shape[0], strokes.distance.size
+    first = np.uint64(size - force.size)
+    rows, inverse, along = np.zeros((count + 1, size)), np.zeros((count, count)), np.zeros(count)
     if not _orthogonalised(columns, force, first, rows, inverse, along):
         return GENERAL_WAY, 0.0, 0.0, 0.0, 0
+    start = _best_of_grid(strokes, first, grid_stroke, rho, curve, grid, rows)
+    z, change, work, cuts = np.zeros(size), np.zeros(size), np.zeros((2, count)), np.empty(strokes.lengths.size, CUT)
+    rest_squared = dot(rows[count], rows[count], first, np.uint64(size))
+    u, low, high = start, -np.inf, np.inf
+    end, least = u, np.inf
+    before_u, before_gradient, status, steps = 0.0, 0.0, STEPS_SPENT, 0
+    while steps < 40:
+        _states_and_slopes(np.exp(-u), rho, curve, strokes, cuts, z, change)
+        steps += 1
+        scale, cost, gradient, curvature = _fit(rows, first, z, change, rest_squared, work)
+        if not scale > -np.inf or not _inside(inverse, along, scale, work[0], lower, upper, coefficients):
+            return GENERAL_WAY, 0.0, 0.0, 0.0, steps
+        if cost <= least:
+            end, least = u, cost
+        low, high = (u, high) if gradient < 0.0 else (low, u)
+        if steps > 1 and (gradient - before_gradient) * (u - before_u) > 0.0:
+            curvature = (gradient - before_gradient) / (u - before_u)
+        if (u <= bounds[0] and gradient > 0.0) or (u >= bounds[1] and gradient < 0.0):
+            status = AT_END
+            break
+        if gradient * gradient <= 1e-9 * cost * curvature:
+            status = FOUND
+            break
+        target = min(max(u - gradient / curvature, bounds[0]), bounds[1])
+        if not (low < target < high):
+            target = 0.5 * (max(low, bounds[0]) + min(high, bounds[1]))
+        before_u, before_gradient, u = u, gradient, target
+    return status, start, end, least, steps + grid.size
+
+
+@inner
+def _best_of_grid(strokes, first, grid_stroke, rho, curve, grid, rows):
+    """Place of the grid that explains the force of the last strokes best."""
+    count, size = rows.shape[0] - 1, np.uint64(rows.shape[1])
+    running = np.zeros((rows.shape[1] + 1, count + 1))
     for row in range(count + 1):
         total = 0.0
-        for i in range(first, last):
+        for i in range(first, size):
             total += rows[row, i]
             running[i + np.uint64(1), row] = total
+    begin, lengths = strokes.begin[grid_stroke:], strokes.lengths[grid_stroke:]
+    direction = strokes.first_direction if grid_stroke % 2 == 0 else -strokes.first_direction
+    last = Strokes(strokes.distance, begin, lengths, direction)
     sums = np.zeros((grid.size, count + 2))
-    _products(
-        np.exp(-grid),
-        np.full(grid.size, rho),
-        n,
-        rising,
-        rising_distance,
-        growing,
-        growing_distance,
-        distance,
-        begin[grid_stroke:],
-        lengths[grid_stroke:],
-        first_direction if grid_stroke % 2 == 0 else -first_direction,
-        max(first, begin[grid_stroke]),
-        rows,
-        running,
-        sums,
-    )
+    add_products(np.exp(-grid), np.full(grid.size, rho), curve, last, max(first, begin[0]), rows, running, sums)
     best, most = 0, -1.0
     for g in range(grid.size):
         left = sums[g, count + 1]
@@ -223,55 +210,10 @@ def _search(
         gain = max(sums[g, count], 0.0) ** 2 / max(left, 1e-12 * sums[g, count + 1] + 1e-300)
         if gain > most:
             best, most = g, gain
-    z, change = np.zeros(distance.size), np.zeros(distance.size)
-    work = np.zeros((2, count))
-    u, low, high = grid[best], -np.inf, np.inf
-    end, least = u, np.inf
-    before_u, before_gradient, steps, status = 0.0, 0.0, 0, STEPS_SPENT
-    rest_squared = _sum(rows[count], rows[count], first, last)
-    while steps < 40:
-        kappa = np.exp(-u)
-        _states_and_slopes(
-            kappa,
-            rho,
-            n,
-            rising,
-            rising_distance,
-            growing,
-            growing_distance,
-            distance,
-            begin,
-            lengths,
-            first_direction,
-            z,
-            change,
-        )
-        steps += 1
-        scale, cost, gradient, curvature = _fit(rows, first, z, change, rest_squared, work)
-        if not scale > -np.inf or not _inside(inverse, along, scale, work[0], lower, upper, coefficients):
-            return GENERAL_WAY, 0.0, 0.0, 0.0, steps
-        if cost <= least:
-            end, least = u, cost
-        if gradient < 0.0:
-            low = u
-        else:
-            high = u
-        if steps > 1 and (gradient - before_gradient) * (u - before_u) > 0.0:
-            curvature = (gradient - before_gradient) / (u - before_u)
-        if (u <= lowest and gradient > 0.0) or (u >= highest and gradient < 0.0):
-            status = AT_END
-            break
-        if gradient * gradient <= 1e-9 * cost * curvature:
-            status = FOUND
-            break
-        target = min(max(u - gradient / curvature, lowest), highest)
-        if not (low < target < high):
-            target = 0.5 * (max(low, lowest) + min(high, highest))
-        before_u, before_gradient, u = u, gradient, target
-    return status, grid[best], end, least, steps + grid.size
+    return grid[best]
 
 
-@_compile
+@inner
 def _orthogonalised(columns, force, first, rows, inverse, along):
     """Orthonormal rows of the columns, and last the rest of the force; false where columns depend on each other.
 
@@ -282,15 +224,15 @@ def _orthogonalised(columns, force, first, rows, inverse, along):
         inverse[j, j] = 1.0
         for i in range(size):
             rows[j, first + i] = columns[j, i]
-        whole = _sum(rows[j], rows[j], first, last)
+        whole = dot(rows[j], rows[j], first, last)
         for _ in range(2):
             for k in range(j):
-                part = _sum(rows[k], rows[j], first, last)
+                part = dot(rows[k], rows[j], first, last)
                 for i in range(first, last):
                     rows[j, i] -= part * rows[k, i]
                 for m in range(count):
                     inverse[j, m] -= part * inverse[k, m]
-        left = _sum(rows[j], rows[j], first, last)
+        left = dot(rows[j], rows[j], first, last)
         if not left > 1e-10 * whole:
             return False
         norm = np.sqrt(left)
@@ -301,28 +243,28 @@ def _orthogonalised(columns, force, first, rows, inverse, along):
     for i in range(size):
         rows[count, first + i] = force[i]
     for j in range(count):
-        along[j] = _sum(rows[j], rows[count], first, last)
+        along[j] = dot(rows[j], rows[count], first, last)
     for j in range(count):
         for i in range(first, last):
             rows[count, i] -= along[j] * rows[j, i]
     return True
 
 
-@_compile
+@inner
 def _fit(rows, first, z, change, rest_squared, work):
     """Best size of the state beside the columns, the cost there, and gradient and curvature of the search."""
     count, end = rows.shape[0] - 1, np.uint64(rows.shape[1])
-    square = _sum(z, z, first, end)
+    square = dot(z, z, first, end)
     whole = square
-    both, moved = _sum(z, change, first, end), _sum(change, change, first, end)
+    both, moved = dot(z, change, first, end), dot(change, change, first, end)
     for row in range(count):
-        work[0, row], work[1, row] = _sum(rows[row], z, first, end), _sum(rows[row], change, first, end)
+        work[0, row], work[1, row] = dot(rows[row], z, first, end), dot(rows[row], change, first, end)
         square -= work[0, row] ** 2
         both -= work[0, row] * work[1, row]
         moved -= work[1, row] ** 2
     if not square > 1e-10 * whole:
         return -np.inf, 0.0, 0.0, 0.0
-    with_force, change_with_force = _sum(rows[count], z, first, end), _sum(rows[count], change, first, end)
+    with_force, change_with_force = dot(rows[count], z, first, end), dot(rows[count], change, first, end)
     size = with_force / square
     growth = (change_with_force - 2.0 * size * both) / square
     gradient = size * (size * both - change_with_force)
@@ -330,7 +272,7 @@ def _fit(rows, first, z, change, rest_squared, work):
     return size, rest_squared - size * with_force, gradient, curvature
 
 
-@_compile
+@inner
 def _inside(inverse, along, size, shared, lower, upper, coefficients):
     """Coefficients of the columns and the state, and whether they lie within their bounds."""
     count = along.size
@@ -346,52 +288,32 @@ def _inside(inverse, along, size, shared, lower, upper, coefficients):
     return inside
 
 
-@_compile
-def _states_and_slopes(
-    kappa,
-    rho,
-    n,
-    rising,
-    rising_distance,
-    growing,
-    growing_distance,
-    distance,
-    begin,
-    lengths,
-    first_direction,
-    z,
-    change,
-):
+@inner
+def _states_and_slopes(kappa, rho, curve, strokes, cuts, z, change):
     """States, and their derivative with respect to the logarithm of the length."""
-    w, sign, shift = 0.0, first_direction, 0.0
-    for k in range(begin.size - 1):
-        a, b = begin[k], begin[k + 1]
-        to_zero = release_distance(w, rho, n, rising_distance, growing_distance)
-        zero, full = pieces(kappa, n, to_zero, distance, a, b)
-        if a < zero:
-            release(kappa, rho, n, rising, growing, to_zero, sign, distance, a, zero, z, np.uint64(0))
-            for i in range(a, zero):
-                rate = 1.0 - rho * _power(abs(z[i]), n)
-                change[i] = -sign * rate * (kappa * distance[i] + shift)
-        if zero < full:
-            start = max(w, 0.0)
-            climb(kappa, n, rising, rising_distance, start, to_zero, sign, distance, zero, full, z, np.uint64(0))
-            for i in range(zero, full):
-                change[i] = -sign * (1.0 - _power(abs(z[i]), n)) * (kappa * distance[i] + shift)
-        for i in range(full, b):
-            z[i] = sign
+    cut(kappa, rho, curve, strokes, 0.0, cuts)
+    n, cells, shift = curve.n, curve.cells, 0.0
+    distance, begin, lengths, _ = strokes
+    for k in range(cuts.size):
+        stroke, a, b = cuts[k], begin[k], begin[k + 1]
+        fill(kappa, rho, n, cells, stroke, distance, a, b, z, np.uint64(0))
+        for i in range(a, stroke.zero):
+            change[i] = -stroke.sign * (1.0 - rho * _power(abs(z[i]), n)) * (kappa * distance[i] + shift)
+        for i in range(stroke.zero, stroke.full):
+            change[i] = -stroke.sign * (1.0 - _power(abs(z[i]), n)) * (kappa * distance[i] + shift)
+        for i in range(stroke.full, b):
             change[i] = 0.0
-        end = advance(kappa, rho, n, rising, rising_distance, growing, growing_distance, w, to_zero, lengths[k])
-        slope = -_rate(end, rho, n) * (kappa * lengths[k] + shift)
-        w, sign = -end, -sign
-        shift = slope / _rate(w, rho, n) if slope != 0.0 else 0.0
+        if k + 1 < cuts.size:
+            w = cuts[k + 1].start
+            slope = -_rate(-w, rho, n) * (kappa * lengths[k] + shift)
+            shift = slope / _rate(w, rho, n) if slope != 0.0 else 0.0
 
 
-@_compile
+@inner
 def _rate(w, rho, n):
     return 1.0 - _power(w, n) if w >= 0.0 else 1.0 - rho * _power(-w, n)
 
 
-@_compile
+@inner
 def _power(w, n):
     return w if n == 1.0 else (w * w if n == 2.0 else w**n)

@@ -26,6 +26,7 @@ from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Callable
 from functools import cached_property, lru_cache
+from struct import Struct
 from types import ModuleType
 from typing import Any
 
@@ -38,6 +39,7 @@ CEILING = 11.0  # largest |w| a motion may start from
 STEEPEST = 1e6  # largest |rho| |w|^n: a shorter release than this drowns in rounding
 SATURATED = 38.0  # in r: 1 − e^−38 rounds to 1
 _BELOW_ONE = 1 - 2**-50  # holds a state of 1 off the pole of a logarithm; moves it by a rounding error
+_CELL = Struct("7d")  # six coefficients and one over the width
 
 Value = Any  # float or array, as `xp` says
 
@@ -63,7 +65,15 @@ def approach_rate(r: Floats, n: float) -> Floats:
 
 
 class MasterCurve(ABC):
-    """Climb and release for one exponent n."""
+    """Climb and release for one exponent n.
+
+    Attributes
+    ----------
+    full : float
+        Distance past zero at which the state rounds to 1; infinite where no closed form says so.
+    """
+
+    full: float = math.inf
 
     @abstractmethod
     def rise(self, phi: Value, xp: ModuleType) -> Value:
@@ -89,6 +99,8 @@ class MasterCurve(ABC):
 class _Exponential(MasterCurve):
     """n = 1."""
 
+    full = 37.5
+
     def rise(self, phi: Value, xp: ModuleType) -> Value:
         return -xp.expm1(-phi)
 
@@ -107,6 +119,8 @@ class _Exponential(MasterCurve):
 
 class _Tangent(MasterCurve):
     """n = 2."""
+
+    full = 19.1
 
     def rise(self, phi: Value, xp: ModuleType) -> Value:
         return xp.tanh(phi)
@@ -198,7 +212,7 @@ class _Tabulated(MasterCurve):
                 speed = approach_rate(r, self.n)
             return speed, speed - self.n * (-np.expm1(-r)) ** (self.n - 1)
 
-        return _Table(_crowded_nodes(SATURATED), rate)
+        return _Table(crowded_nodes(SATURATED), rate)
 
     @cached_property
     def _growing(self) -> _Table:
@@ -209,7 +223,7 @@ class _Tabulated(MasterCurve):
             speed = (1 + y**self.n) / (1 + y)
             return speed, self.n * y ** (self.n - 1) - speed
 
-        return _Table(_crowded_nodes(math.log1p(STEEPEST ** (1 / self.n))), rate)
+        return _Table(crowded_nodes(math.log1p(STEEPEST ** (1 / self.n))), rate)
 
     @cached_property
     def _falling(self) -> _Table:
@@ -223,7 +237,8 @@ class _Tabulated(MasterCurve):
         return _Table(np.linspace(-math.log(CEILING - 1), SATURATED, 4097), rate)
 
 
-def _crowded_nodes(end: float) -> Floats:
+def crowded_nodes(end: float) -> Floats:
+    """Nodes of a table from 0 to an end, close together at 0 where y^n is hardest."""
     return end * np.linspace(0, 1, 769) ** 4
 
 
@@ -299,13 +314,14 @@ class _Quintics:
         return result
 
     def at_float(self, x: float) -> float:
-        nodes, cells = self._lists
-        cell = min(max(bisect_right(nodes, x) - 1, 0), len(cells) - 1)
-        c0, c1, c2, c3, c4, c5, inverse_step = cells[cell]
+        nodes, cells = self._buffers
+        cell = min(max(bisect_right(nodes, x) - 1, 0), len(nodes) - 2)
+        c0, c1, c2, c3, c4, c5, inverse_step = _CELL.unpack_from(cells, _CELL.size * cell)
         t = (min(max(x, nodes[0]), nodes[-1]) - nodes[cell]) * inverse_step
         return c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5))))
 
     @cached_property
-    def _lists(self) -> tuple[list[float], list[tuple[float, ...]]]:
-        # Plain floats: taking one number out of an array costs more than the arithmetic here.
-        return self.nodes.tolist(), [tuple(row) for row in self.cells.tolist()]
+    def _buffers(self) -> tuple[list[float], bytes]:
+        # Numbers read from memory: taking one out of an array costs more than the arithmetic here,
+        # and lists of all of them more than a search over n asks of one curve.
+        return self.nodes.tolist(), self.cells.tobytes()

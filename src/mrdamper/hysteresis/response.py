@@ -127,12 +127,19 @@ def stroke(shape: Shape, zeta0: ArrayLike, distance: ArrayLike) -> Floats:
 
 def _follow_one(curve: MasterCurve, kappa: float, rho: float, path: Path, zeta0: float) -> Floats:
     """One state follows from the other at the reversals only: plain floats there, arrays for the samples."""
-    w = path.first_direction * zeta0
-    starts = [w]
-    for length in path.lengths:
-        w = -_advance(curve, rho, w, kappa * length)
-        starts.append(w)
+    starts = starts_of_strokes(curve, kappa, rho, path, path.first_direction * zeta0)
     return path.direction * _states(curve, rho, np.array(starts), path.stroke, kappa * path.distance)
+
+
+def starts_of_strokes(curve: MasterCurve, kappa: float, rho: float, path: Path, w: float) -> list[float]:
+    """State at the beginning of every stroke, in its direction, from that of the first on."""
+    starts = [w]
+    full = (curve.release_distance(1.0, rho, math) + curve.full) / kappa
+    for length in path.lengths:
+        if w != -1.0 or length < full:  # else the stroke leads from saturation to saturation
+            w = -_advance(curve, rho, w, kappa * length)
+        starts.append(w)
+    return starts
 
 
 def on_curve(curve: MasterCurve, rho: float, phi: Floats) -> Floats:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,9 @@ from mrdamper.identification.linear import bounds_of, linear_table
 from mrdamper.identification.problem import DELAY, Problem
 from mrdamper.models import Model, SearchAxis
 from mrdamper.parameters import ParameterInfo
+
+if TYPE_CHECKING:
+    from mrdamper.hysteresis.compiled import Strokes
 
 _DEPENDENT = 1e-10  # share of a squared column below which the others explain all of it
 _LENGTH, _ASYMMETRY, _SHARPNESS = "yield_displacement", "asymmetry", "n"  # search coordinates of a shape
@@ -40,15 +43,18 @@ class Elimination:
     right : (N,) array
         Measured force less the force without linear parameters [N].
     kind : Kind
+    compiled : bool
+        Follow the states of a shape in machine code.
     """
 
     problem: Problem
     columns: Floats
     right: Floats
     kind: Kind
+    compiled: bool = False
 
     @classmethod
-    def of(cls, problem: Problem, axes: Sequence[SearchAxis]) -> Self | None:
+    def of(cls, problem: Problem, axes: Sequence[SearchAxis], *, compiled: bool = False) -> Self | None:
         """Evaluate the columns that stay; None where the model or the search is of another kind."""
         if any(axis.name == DELAY for axis in axes):
             return None
@@ -56,7 +62,7 @@ class Elimination:
         if kind is None or kind.coordinates != tuple(axis.name for axis in axes):
             return None
         base, columns = linear_table(kind.bare, kind.others, problem.seen, np.zeros(len(problem.seen)))
-        return cls(problem, columns, problem.force - base, kind)
+        return cls(problem, columns, problem.force - base, kind, compiled)
 
     @cached_property
     def projector(self) -> Projector | None:
@@ -90,7 +96,17 @@ class Elimination:
         shape = self.kind.shape(point)
         if shape is None:
             return self._bare(point).state(self.problem.motion)[self.problem.scored]
+        if self.compiled:
+            from mrdamper.hysteresis.compiled import follow_strokes
+
+            return follow_strokes(*shape, self._strokes)[self.problem.scored]
         return follow_quickly(*shape, self.problem.motion.path, self.problem.scored)
+
+    @cached_property
+    def _strokes(self) -> Strokes:
+        from mrdamper.hysteresis.compiled import Strokes
+
+        return Strokes.of(self.problem.motion.path)
 
     def _bare(self, point: Mapping[str, float]) -> Model:
         zero = {i.name: 0.0 for i in (*self.kind.others, self.kind.state)}

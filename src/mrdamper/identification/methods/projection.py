@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from mrdamper.data import Floats
 from mrdamper.errors import IdentificationError
 from mrdamper.hysteresis import Path, Shape
-from mrdamper.hysteresis.batch import Fixed, batch_cost
+from mrdamper.hysteresis.batch import WORTH_COMPILING, Fixed, batch_cost
 from mrdamper.identification.elimination import Elimination
 from mrdamper.identification.linear import bounded_linear, bounds_of, linear_table
 from mrdamper.identification.problem import DELAY, DELAY_LIMIT, Method, Problem, Solution
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from mrdamper.hysteresis.compiled_search import LengthSearch
 
 _GRID_SAMPLES = 1500  # the grid only has to find the valley
+_EVALUATIONS, _EVALUATIONS_OF_MANY = 12, 60  # of a whole record: searching the length alone, and more
 _GRID_SAMPLES_A_CYCLE, _GRID_CYCLES = 100, 3  # where all shapes are tried at once
 
 
@@ -43,17 +44,19 @@ class Projection(Method):
     ----------
     refine_best : int
         Number of grid points from which the refinement starts.
-    compiled : bool
-        Search in machine code where the yield displacement alone is searched: ten times faster,
-        once the compiler is imported (0.2 s) and the code compiled (10 s, kept on disk). For fleets;
-        one test matrix takes less than that without.
+    compiled : bool, optional
+        Search in machine code: 10 times faster where the yield displacement alone is searched, 3
+        times with n; asymmetry gains a third. It costs 0.4 s to import the compiler and the code,
+        and 8 s once to compile it (kept on disk), so say so for fleets: one test matrix takes less
+        without. Left open, it is chosen where samples × evaluations come to `WORTH_COMPILING`,
+        that is for records of millions of samples.
     """
 
     name: ClassVar[str] = "projection"
     summary: ClassVar[str] = "least squares on the force in time, linear parameters eliminated"
 
     refine_best: int = 2  # where more than one coordinate is searched; one alone has one valley
-    compiled: bool = False
+    compiled: bool | None = None
 
     @on_one_blas_thread
     def solve(self, problem: Problem) -> Solution:
@@ -62,8 +65,9 @@ class Projection(Method):
         if not axes:
             projected = _project(problem, {})
             return Solution(projected.model, 0.0, projected.at_bounds, {}, {}, 1, "solved: every parameter is linear")
-        elimination = Elimination.of(problem, axes)
-        if self.compiled and elimination and (solution := _searched_by_machine(axes, elimination)):
+        compiled = self._is_compiled(problem, axes)
+        elimination = Elimination.of(problem, axes, compiled=compiled)
+        if compiled and elimination and (solution := _searched_by_machine(axes, elimination)):
             return solution
         starts, evaluated = _best_of_grid(problem, axes, elimination, self.refine_best if len(axes) > 1 else 1)
         found = [(start, _refined(problem, axes, elimination, start)) for start in starts]
@@ -82,6 +86,11 @@ class Projection(Method):
             evaluations=evaluated + sum(minimum.evaluations for _, minimum in found),
             message=best.message,
         )
+
+    def _is_compiled(self, problem: Problem, axes: tuple[SearchAxis, ...]) -> bool:
+        if self.compiled is not None:
+            return self.compiled
+        return len(problem.motion) * (_EVALUATIONS if len(axes) == 1 else _EVALUATIONS_OF_MANY) >= WORTH_COMPILING
 
 
 @dataclass(frozen=True)
@@ -212,7 +221,9 @@ def _batched_costs(elimination: Elimination, points: list[dict[str, float]]) -> 
     costs = np.empty(len(points))
     for n in set(shapes[:, 2].tolist()):
         alike = shapes[:, 2] == n
-        costs[alike] = batch_cost(fixed, Shape(shapes[alike, 0], shapes[alike, 1], n))
+        costs[alike] = batch_cost(
+            fixed, Shape(shapes[alike, 0], shapes[alike, 1], n), compiled=elimination.compiled or None
+        )
     return costs
 
 
