@@ -23,6 +23,7 @@ from mrdamper.hysteresis import Path
 SINE_DISTORTION_LIMIT = 0.05  # above it a motion is no sine for harmonic balance
 _SAMPLES_PER_CYCLE = 1000
 _ORDERS = 7  # harmonics a measured motion is described by
+_UNIFORM = 1e-8  # spread of the sampling interval, relative, up to which it counts as one
 _STILL = 1e-9  # a displacement that moves less does not move [m]
 
 
@@ -266,6 +267,8 @@ def smooth(time: Floats, signal: Floats, span: float | None = None) -> tuple[Flo
     spacing = float(np.median(np.diff(time)))
     half = int(np.clip(round(span / spacing / 2), 2, max((size - 1) // 2, 1)))
     width = min(2 * half + 1, size)
+    if width == 2 * half + 1 and np.ptp(np.diff(time)) < _UNIFORM * spacing:
+        return _smooth_uniform(signal, half, spacing)
     start = np.clip(np.arange(size) - half, 0, size - width)
     windows = np.lib.stride_tricks.sliding_window_view
     tau = (windows(time, width)[start] - time[:, None]) / spacing
@@ -275,6 +278,28 @@ def smooth(time: Floats, signal: Floats, span: float | None = None) -> tuple[Flo
     right = np.stack([np.sum(p * values, axis=1) for p in moments])
     c0, c1, c2 = np.linalg.solve(normal.transpose(2, 0, 1), right.T[..., None])[..., 0].T
     return signal + c0, c1 / spacing, 2 * c2 / spacing**2
+
+
+def _smooth_uniform(signal: Floats, half: int, spacing: float) -> tuple[Floats, Floats, Floats]:
+    """The same fits where all windows are alike (Savitzky and Golay).
+
+    Windows are taken relative to their sample and the two sides in pairs, so that a signal at rest, or
+    one that turns symmetrically about a sample, has a slope of exactly zero there.
+    """
+    tau = np.arange(-half, half + 1.0)
+    fit = np.linalg.pinv(np.column_stack([np.ones_like(tau), tau, tau**2])).T  # (width, 3)
+    windows = np.lib.stride_tricks.sliding_window_view(signal, tau.size)
+    middle = windows[:, half : half + 1]
+    after, before = windows[:, half + 1 :] - middle, windows[:, half - 1 :: -1] - middle
+    c = np.empty((signal.size, 3))
+    inside = slice(half, signal.size - half)
+    c[inside, 0::2] = (after + before) @ fit[half + 1 :, 0::2]
+    c[inside, 1] = (after - before) @ fit[half + 1 :, 1]
+    for window, away in ((windows[0], slice(0, half)), (windows[-1], slice(signal.size - half, None))):
+        d0, d1, d2 = ((window - signal[away, None]) @ fit).T  # seen away from the middle of the window
+        at = tau[:half] if away.start == 0 else tau[half + 1 :]
+        c[away] = np.stack([d0 + at * (d1 + at * d2), d1 + 2 * at * d2, d2], axis=1)
+    return signal + c[:, 0], c[:, 1] / spacing, 2 * c[:, 2] / spacing**2
 
 
 def _characteristic_period(time: Floats, signal: Floats) -> float:

@@ -6,6 +6,7 @@ Unlike a Fourier transform it needs neither a whole number of cycles nor uniform
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,11 +40,13 @@ class HarmonicSeries:
     def __call__(self, time: ArrayLike, derivative: int = 0) -> Floats:
         """The series (or a derivative with respect to time) at the given times."""
         t = np.asarray(time, dtype=float) - self.origin
-        k_omega = 2 * np.pi * self.frequency * np.arange(1, self.sine.size + 1)
-        angle = np.multiply.outer(t, k_omega) + derivative * np.pi / 2
-        scale = k_omega**derivative
+        omega = 2 * np.pi * self.frequency
+        scale = (omega * np.arange(1, self.sine.size + 1)) ** derivative
         trend = {0: self.mean + self.drift * t, 1: np.full_like(t, self.drift)}.get(derivative, np.zeros_like(t))
-        return trend + np.sin(angle) @ (scale * self.sine) + np.cos(angle) @ (scale * self.cosine)
+        sine, cosine = _waves(omega * t, self.sine.size)
+        for _ in range(derivative % 4):  # a quarter period for each derivative
+            sine, cosine = cosine, -sine
+        return trend + sine @ (scale * self.sine) + cosine @ (scale * self.cosine)
 
     def amplitude(self, order: int = 1) -> float:
         """Amplitude of one harmonic."""
@@ -55,10 +58,8 @@ class HarmonicSeries:
 
     def half_peak_to_peak(self) -> float:
         """Half the difference of maximum and minimum of the periodic part."""
-        theta = np.linspace(0, 2 * np.pi, 2048, endpoint=False)
-        k = np.arange(1, self.sine.size + 1)
-        wave = np.sin(np.outer(theta, k)) @ self.sine + np.cos(np.outer(theta, k)) @ self.cosine
-        return float(np.ptp(wave) / 2)
+        sine, cosine = _cycle(self.sine.size)
+        return float(np.ptp(sine @ self.sine + cosine @ self.cosine) / 2)
 
 
 def fit_harmonics(time: Floats, signal: Floats, orders: int, *, frequency: float, drift: bool = True) -> HarmonicSeries:
@@ -98,33 +99,40 @@ def fundamental_frequency(time: Floats, signal: Floats, orders: int = 3) -> floa
     """
     t = time - time[0]
     guess = _spectral_line(time, signal)
-    few = slice(None, None, max(1, t.size // 400))
+    few = slice(None, None, max(1, t.size // 150))  # for the ladder, of under four cycles
     if guess * t[-1] < 4:
         ladder = guess * np.geomspace(0.4, 2.5, 45)
-        guess = min(ladder, key=lambda f: float(np.sum(_residual(t[few], signal[few], f) ** 2)))
+        guess = ladder[int(np.argmin(_single_sine_costs(t[few], signal[few], ladder)))]
     orders = orders if guess * t[-1] >= 3 else 1
     frequency = float(guess)
+    columns = _columns(t, frequency, orders, drift=True)
+    coefficients = _solve(columns, signal)
     for _ in range(30):
-        columns = _columns(t, frequency, orders, drift=True)
-        coefficients = _solve(columns, signal)
-        slope = _frequency_derivative(t, frequency, coefficients, orders)
-        step = float(_solve(np.column_stack([columns, slope]), signal)[-1])
+        slope = _frequency_derivative(t, columns, coefficients, orders)
+        *coefficients, step = _solve(np.column_stack([columns, slope]), signal)
         frequency += float(np.clip(step, -0.1 * frequency, 0.1 * frequency))
         if abs(step) < 1e-11 * frequency:
             break
+        columns = _columns(t, frequency, orders, drift=True)
     return frequency
 
 
-def _residual(t: Floats, signal: Floats, frequency: float) -> Floats:
-    columns = _columns(t, frequency, 1, drift=True)
-    return columns @ _solve(columns, signal) - signal
+def _single_sine_costs(t: Floats, signal: Floats, frequencies: Floats) -> Floats:
+    """Squared residuals of one sine, a mean and a drift at each frequency."""
+    angle = 2 * np.pi * np.multiply.outer(frequencies, t)
+    trend = np.broadcast_to(np.stack([np.ones_like(t), t / t[-1]]), (frequencies.size, 2, t.size))
+    rows = np.concatenate([trend, np.sin(angle)[:, None], np.cos(angle)[:, None]], axis=1)
+    right = rows @ signal
+    found = np.linalg.solve(rows @ rows.transpose(0, 2, 1), right[..., None])[..., 0]
+    return float(signal @ signal) - np.sum(right * found, axis=1)
 
 
 def _spectral_line(time: Floats, signal: Floats) -> float:
     """Find the strongest line of the detrended, zero-padded spectrum [Hz]."""
     size = time.size
     wave = np.interp(np.linspace(time[0], time[-1], size), time, signal)
-    wave = wave - np.polynomial.Polynomial.fit(np.arange(size), wave, 1)(np.arange(size))
+    place = np.arange(size) - (size - 1) / 2
+    wave = wave - wave.mean() - place * (place @ wave / (place @ place))
     window = np.hanning(size + 2)[1:-1] if _crossings(wave) > 4 else np.ones(size)
     padded = 8 * size
     power = np.abs(np.fft.rfft(wave * window, padded)) ** 2
@@ -137,20 +145,46 @@ def _crossings(wave: Floats) -> int:
     return int(np.count_nonzero(np.diff(np.signbit(wave))))
 
 
+def _waves(angle: Floats, orders: int) -> tuple[Floats, Floats]:
+    """Sines and cosines of 1...orders times an angle, (N, K) each: powers of one complex number."""
+    first = np.exp(1j * angle)
+    powers = np.empty((angle.size, orders), dtype=complex)
+    power = first
+    for k in range(orders):
+        powers[:, k] = power
+        power = power * first
+    return powers.imag, powers.real
+
+
+@lru_cache
+def _cycle(orders: int) -> tuple[Floats, Floats]:
+    return _waves(np.linspace(0, 2 * np.pi, 2048, endpoint=False), orders)
+
+
 def _columns(t: Floats, frequency: float, orders: int, drift: bool) -> Floats:
-    angle = np.outer(t, 2 * np.pi * frequency * np.arange(1, orders + 1))
+    sine, cosine = _waves(2 * np.pi * frequency * t, orders)
     trend = [np.ones_like(t), t] if drift else [np.ones_like(t)]
-    return np.column_stack([*trend, np.sin(angle), np.cos(angle)])
+    return np.column_stack([*trend, sine, cosine])
 
 
-def _frequency_derivative(t: Floats, frequency: float, coefficients: Floats, orders: int) -> Floats:
+def _frequency_derivative(t: Floats, columns: Floats, coefficients: Floats, orders: int) -> Floats:
     k = np.arange(1, orders + 1)
-    angle = np.outer(t, 2 * np.pi * frequency * k)
-    sine, cosine = coefficients[2 : 2 + orders], coefficients[2 + orders :]
-    return 2 * np.pi * t * (np.cos(angle) @ (k * sine) - np.sin(angle) @ (k * cosine))
+    sine, cosine = np.reshape(coefficients[2:], (2, orders))
+    return 2 * np.pi * t * (columns[:, 2 + orders :] @ (k * sine) - columns[:, 2 : 2 + orders] @ (k * cosine))
 
 
 def _solve(columns: Floats, signal: Floats) -> Floats:
-    scale = np.sqrt(np.mean(columns**2, axis=0))
+    scale = np.sqrt(np.einsum("nk,nk->k", columns, columns))
     scale[scale == 0] = 1.0
-    return np.linalg.lstsq(columns / scale, signal, rcond=None)[0] / scale
+    scaled = columns / scale
+    normal = scaled.T @ scaled
+    try:
+        pivots = np.diag(np.linalg.cholesky(normal))
+    except np.linalg.LinAlgError:
+        pivots = np.zeros(1)
+    if pivots.min() > 1e-4:
+        # Normal equations, then once more for what they left: as good as a factorisation of N rows.
+        found = np.linalg.solve(normal, signal @ scaled)
+        found += np.linalg.solve(normal, (signal - scaled @ found) @ scaled)
+        return found / scale
+    return np.linalg.lstsq(scaled, signal, rcond=None)[0] / scale

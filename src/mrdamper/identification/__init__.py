@@ -13,11 +13,13 @@ from mrdamper.identification.methods import all_methods, method_named
 from mrdamper.identification.problem import DELAY, Identification, Method, Problem, Solution
 from mrdamper.metrics import score
 from mrdamper.models import Model, model_type
+from mrdamper.threads import on_one_blas_thread
 from mrdamper.uncertainty import standard_errors
 
 __all__ = ["Identification", "Method", "Problem", "Solution", "all_methods", "identify"]
 
 
+@on_one_blas_thread
 def identify(
     run: Run,
     model: str | type[Model] = "bouc-wen",
@@ -120,18 +122,18 @@ def _standard_errors(problem: Problem, solution: Solution, residual: Floats) -> 
     motion = problem.motion.delayed(solution.delay) if solution.delay else problem.motion
     seen = motion.part(problem.scored)
 
-    def force(model: Model) -> Floats:
-        return model.force(seen, model.state(motion)[problem.scored])
-
+    state = solution.model.state(motion)[problem.scored]  # linear parameters do not change it
     linear = {i.name: getattr(solution.model, i.name) for i in solution.model.parameters() if i.linear}
     searched = {name: value for name, value in solution.end.items() if name != DELAY}
     point = {**problem.fixed, **searched, **linear}
     names = [n for n in (*linear, *searched) if (n in problem.free or n in searched) and n not in solution.at_bounds]
-    base = force(solution.model)
+    base = solution.model.force(seen, state)
     columns = []
     for name in names:
         step = 1e-6 * abs(point[name]) or 1e-6
-        columns.append((force(problem.model_type.build({**point, name: point[name] + step})) - base) / step)
+        moved = problem.model_type.build({**point, name: point[name] + step})
+        there = state if name in linear else moved.state(motion)[problem.scored]
+        columns.append((moved.force(seen, there) - base) / step)
     if not columns:
         return {}
     return dict(zip(names, standard_errors(np.column_stack(columns), residual).tolist(), strict=True))
