@@ -22,7 +22,7 @@ from mrdamper.modified import ModifiedFit
 from mrdamper.plots.model import parameter_curves, predicted_loops, residual_map, score_strip
 from mrdamper.plots.reversal import force_since_reversal
 from mrdamper.plots.rig_tests import measured_loops, test_analysis, test_matrix
-from mrdamper.plots.style import save_figure
+from mrdamper.plots.style import Picture
 from mrdamper.report import render_report
 from mrdamper.report.distrust import doubts
 from mrdamper.validation import RunScore, session_drift
@@ -37,6 +37,7 @@ def write_study(study: Study, folder: str | Path, progress: Progress = lambda wh
     Parameters
     ----------
     study : Study
+        With `finish=draw` its figures are drawn already.
     folder : path
         Made if missing; files of the same names are replaced together at the end.
     progress : callable
@@ -58,11 +59,9 @@ def write_study(study: Study, folder: str | Path, progress: Progress = lambda wh
         chapters = []
         for number, rig in enumerate(study.rigs):
             progress(f"{rig.rig or 'rig'}: report", number / len(study.rigs))
-            figures = _figures(rig)
+            drawn = study.finished[number] if study.finished else draw(rig)
             suffix = f"-{rig.rig}" if len(study.rigs) > 1 else ""
-            pictures = {
-                name: save_figure(figure, work / "figures" / f"{name}{suffix}") for name, figure in figures.items()
-            }
+            pictures = {name: picture.save(work / "figures" / f"{name}{suffix}") for name, picture in drawn.items()}
             save_model(rig.damper, work / f"model{suffix}.json")
             chapters.append(_chapter(rig, pictures))
         footer = f"{made_from(study.dataset)}; identified and validated in {study.seconds:.1f} s."
@@ -81,6 +80,11 @@ def write_study(study: Study, folder: str | Path, progress: Progress = lambda wh
 def made_from(dataset: Dataset) -> str:
     """How a page's footer begins: this program's version and what was studied."""
     return f"mrdamper {version('mrdamper')}; dataset: {dataset.name}, {len(dataset)} runs"
+
+
+def draw(rig: RigStudy) -> dict[str, Picture]:
+    """Every figure of a rig, by name; as `finish` of `run_study` it draws where the rig is studied."""
+    return {name: Picture.of(figure) for name, figure in _figures(rig).items()}
 
 
 def identification_rows(identifications: Sequence[Identification]) -> list[dict[str, Any]]:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from multiprocessing import get_context
+from typing import Any
 
 import numpy as np
 
@@ -127,11 +128,14 @@ class Study:
     dataset : Dataset
     rigs : tuple of RigStudy
     seconds : float
+    finished : tuple
+        What `finish` of `run_study` made of each rig; empty without it.
     """
 
     dataset: Dataset
     rigs: tuple[RigStudy, ...]
     seconds: float
+    finished: tuple[Any, ...] = ()
 
     @property
     def model(self) -> Damper:
@@ -153,12 +157,16 @@ class Study:
         return next(r for r in self.rigs if r.rig == name)
 
 
+Finish = Callable[[RigStudy], Any]
+
+
 def run_study(
     dataset: Dataset,
     progress: Progress = lambda what, share: None,
     *,
     model: str | None = None,
     workers: int = 1,
+    finish: Finish | None = None,
 ) -> Study:
     """Study a dataset: identify, map, validate, rig by rig.
 
@@ -171,6 +179,8 @@ def run_study(
         Choose the best candidate of this model instead of the best of all.
     workers : int
         Rigs studied at once, each in a process of its own; the results are the same bits.
+    finish : callable, optional
+        More to make of a rig in the process that studied it: its figures, say. A function of a module.
 
     Raises
     ------
@@ -182,8 +192,8 @@ def run_study(
     begin = time.perf_counter()
     count = len(dataset.rigs)
     if workers > 1 and count > 1:
-        studied = _in_parallel(dataset, progress, model, min(workers, count))
-        return Study(dataset, studied, time.perf_counter() - begin)
+        rigs, finished = zip(*_in_parallel(dataset, progress, model, min(workers, count), finish), strict=True)
+        return Study(dataset, rigs, time.perf_counter() - begin, finished if finish else ())
     rigs = []
     for number, name in enumerate(dataset.rigs):
 
@@ -192,21 +202,25 @@ def run_study(
 
         rigs.append(study_rig(dataset.rig(name), tell, model=model))
     progress("studied", 1.0)
-    return Study(dataset, tuple(rigs), time.perf_counter() - begin)
+    finished = tuple(finish(rig) for rig in rigs) if finish else ()
+    return Study(dataset, tuple(rigs), time.perf_counter() - begin, finished)
 
 
-def _in_parallel(dataset: Dataset, progress: Progress, model: str | None, workers: int) -> tuple[RigStudy, ...]:
+def _in_parallel(
+    dataset: Dataset, progress: Progress, model: str | None, workers: int, finish: Finish | None
+) -> list[tuple[RigStudy, Any]]:
     # Spawned, not forked: a fork of a process whose libraries run threads can hang.
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        pending = [pool.submit(_study_quietly, dataset.rig(name), model) for name in dataset.rigs]
+        pending = [pool.submit(_study_quietly, dataset.rig(name), model, finish) for name in dataset.rigs]
         for done, future in enumerate(as_completed(pending), 1):
             future.result()
             progress(f"{done} of {len(pending)} rigs studied", done / len(pending))
-        return tuple(future.result() for future in pending)
+        return [future.result() for future in pending]
 
 
-def _study_quietly(dataset: Dataset, model: str | None) -> RigStudy:
-    return study_rig(dataset, model=model)
+def _study_quietly(dataset: Dataset, model: str | None, finish: Finish | None) -> tuple[RigStudy, Any]:
+    rig = study_rig(dataset, model=model)
+    return rig, finish(rig) if finish else None
 
 
 def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None, *, model: str | None = None) -> RigStudy:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import matplotlib
 import numpy as np
@@ -105,11 +106,29 @@ def thin(array: Floats, most: int = 400) -> Floats:
     return array[:: max(1, array.size // most)]
 
 
+@dataclass(frozen=True)
+class Picture:
+    """A figure as the bytes of a PNG and of an SVG."""
+
+    png: bytes
+    svg: bytes
+
+    @classmethod
+    def of(cls, figure: Figure) -> Self:
+        """Draw a figure, once for each."""
+        png, svg = io.BytesIO(), io.BytesIO()
+        with house_style():
+            figure.savefig(png, pil_kwargs={"compress_level": 2})  # a fifth faster, a twentieth larger
+            figure.savefig(svg, format="svg", metadata={"Date": None})
+        return cls(png.getvalue(), svg.getvalue())
+
+    def save(self, stem: Path) -> bytes:
+        """Write both beside each other; returns the SVG."""
+        stem.with_suffix(".png").write_bytes(self.png)
+        stem.with_suffix(".svg").write_bytes(self.svg)
+        return self.svg
+
+
 def save_figure(figure: Figure, stem: Path) -> bytes:
     """Write a figure as PNG and SVG; returns the SVG."""
-    buffer = io.BytesIO()
-    with house_style():
-        figure.savefig(stem.with_suffix(".png"), pil_kwargs={"compress_level": 2})  # a fifth faster, a twentieth larger
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
-    stem.with_suffix(".svg").write_bytes(buffer.getvalue())
-    return buffer.getvalue()
+    return Picture.of(figure).save(stem)

@@ -25,16 +25,20 @@ def register(app: typer.Typer) -> None:
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.io.atomic import require_writable
         from mrdamper.io.dataset import load_dataset
-        from mrdamper.publication import write_study
+        from mrdamper.publication import draw, write_study
         from mrdamper.workflow import run_study
 
         require_writable(out)
         dataset = load_dataset(data)
         with progress_on_stderr() as progress:
             result = run_study(
-                dataset, lambda what, share: progress(what, 0.6 * share), model=model, workers=os.cpu_count() or 1
+                dataset,
+                lambda what, share: progress(what, 0.95 * share),
+                model=model,
+                workers=os.cpu_count() or 1,
+                finish=draw,
             )
-            written = write_study(result, out, lambda what, share: progress(what, 0.6 + 0.4 * share))
+            written = write_study(result, out, lambda what, share: progress(what, 0.95 + 0.05 * share))
         if as_json:
             import json
 
