@@ -103,8 +103,8 @@ def mutate(content: bytes, rng: random.Random) -> bytes:
     return bytes(data)
 
 
-def attempt(path: Path) -> tuple[str, str]:
-    """What came of one file: a code or "read"; and a fault, if it is one."""
+def attempt(path: Path) -> tuple[str, float, str]:
+    """What came of one file: a code or "read"; the seconds it took; and a fault, if it is one."""
     begin = time.perf_counter()
     try:
         read_runs(path)
@@ -114,7 +114,7 @@ def attempt(path: Path) -> tuple[str, str]:
     except Exception:
         outcome, fault = "!", traceback.format_exc()
     seconds = time.perf_counter() - begin
-    return outcome, fault or (f"took {seconds:.2f} s ({outcome})" if seconds > LIMIT else "")
+    return outcome, seconds, fault or (f"took {seconds:.2f} s ({outcome})" if seconds > LIMIT else "")
 
 
 def main() -> int:
@@ -125,7 +125,7 @@ def main() -> int:
     parser.add_argument("--keep", type=Path, help="folder for the mutants that fail")
     arguments = parser.parse_args()
     good = seeds(arguments.format)
-    rng, outcomes, faults = random.Random(arguments.seed), Counter(), 0
+    rng, outcomes, faults, worst = random.Random(arguments.seed), Counter(), 0, 0.0
     with tempfile.TemporaryDirectory() as folder:
         print(f"mutants pass through {folder}", flush=True)
         for name, content in good.items():  # also loads every library before the clock runs
@@ -137,9 +137,12 @@ def main() -> int:
             name = rng.choice(list(good))
             path = Path(folder) / name
             path.write_bytes(mutate(good[name], rng))
-            outcome, fault = attempt(path)
-            if fault.startswith("took"):  # the machine may have been busy elsewhere: a hang comes again
-                outcome, fault = attempt(path)
+            outcome, taken, fault = attempt(path)
+            for pause in (0, 1, 5):  # the machine may have been busy elsewhere: a hang comes again
+                if fault.startswith("took"):
+                    time.sleep(pause)
+                    outcome, taken, fault = attempt(path)
+            worst = max(worst, taken)
             outcomes[outcome] += 1
             if fault:
                 faults += 1
@@ -148,7 +151,7 @@ def main() -> int:
                     arguments.keep.mkdir(parents=True, exist_ok=True)
                     (arguments.keep / f"{number}_{name}").write_bytes(path.read_bytes())
         seconds = time.perf_counter() - begin
-    print(f"{arguments.mutants} mutants in {seconds:.0f} s, {faults} faults")
+    print(f"{arguments.mutants} mutants in {seconds:.0f} s, {faults} faults, the slowest {worst:.2f} s")
     print(", ".join(f"{code} {count}" for code, count in outcomes.most_common()))
     return 1 if faults else 0
 

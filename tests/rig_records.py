@@ -12,7 +12,7 @@ from mrdamper.models import model_type
 from mrdamper.simulation import simulate
 
 
-def clean_record(seed, *, noise=10.0, cycles=None, points=None, velocity=False, sensor=0.0, damper=None):
+def clean_record(seed, *, noise=10.0, cycles=None, points=None, velocity=False, sensor=0.0, damper=None, make=None):
     """A clean record of a random damper: 0.5–2 Hz, 5–50 mm, 1.2–5.3 cycles, 100–400 points a cycle."""
     rng = np.random.default_rng([7, seed])
     frequency, amplitude = rng.uniform(0.5, 2.0), rng.uniform(0.005, 0.05)
@@ -25,7 +25,7 @@ def clean_record(seed, *, noise=10.0, cycles=None, points=None, velocity=False, 
     current = rng.choice([0.0, 0.25, 0.5, 1.0])
     x, v = amplitude * np.sin(angle), amplitude * omega * np.cos(angle)
     motion = Excitation(time, x, v, -(omega**2) * x, np.full(time.size, current))
-    force = simulate(random_damper(rng, damper), motion).force + noise * rng.standard_normal(time.size)
+    force = simulate((make or random_damper)(rng, damper), motion).force + noise * rng.standard_normal(time.size)
     zero = rng.uniform(-0.03, 0.03)
     return Record(
         f"r{seed}",
@@ -59,6 +59,34 @@ def random_damper(rng, name=None):
         "dahl": lambda: {"kappa_x": viscosity, "kappa_w": strength, "yield_displacement": knee, "f0": offset},
         "lugre": lambda: {
             "fc": strength, "presliding": knee, "stribeck": 1.2, "vs": 0.01, "sigma1": 300.0, "sigma2": viscosity,
+            "f0": offset,
+        },
+        "spencer": lambda: {
+            "c1": 2e4 + 4 * viscosity, "c0_ratio": 0.06, "k0_rate": 0.15, "creep": 0.03, "yield_displacement": knee / 3,
+            "k1": 800.0, "f0": offset,
+        },
+    }  # fmt: skip
+    name = name or str(rng.choice(sorted(makers)))
+    return model_type(name).build(makers[name]())
+
+
+def wide_damper(rng, name=None):
+    """A damper whose hysteresis builds up slowly: over 1 to 5 mm, or over a wide band of velocities."""
+    strength, viscosity = rng.uniform(400, 3000), rng.uniform(200, 2000)
+    offset, knee = rng.uniform(-200, 300), 10 ** rng.uniform(-3.0, -2.3)
+    share = rng.choice([0.5, 0.8])  # of beta in beta + gamma: less fullness, rounder corners
+    makers = {
+        "bouc-wen": lambda: {
+            "c": viscosity, "alpha": strength / knee, "beta": share / knee**2, "gamma": (1 - share) / knee**2,
+            "f0": offset, "k1": rng.uniform(0, 8000),
+        },
+        "dahl": lambda: {"kappa_x": viscosity, "kappa_w": strength, "yield_displacement": knee, "f0": offset},
+        "kwok": lambda: {
+            "c": viscosity, "k": rng.uniform(0, 3000), "alpha": strength, "beta": rng.uniform(20, 80),
+            "delta": rng.uniform(0.3, 1.2), "f0": offset,
+        },
+        "lugre": lambda: {
+            "fc": strength, "presliding": knee, "stribeck": 1.5, "vs": 0.01, "sigma1": 300.0, "sigma2": viscosity,
             "f0": offset,
         },
         "spencer": lambda: {

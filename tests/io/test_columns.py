@@ -2,7 +2,7 @@
 
 import pytest
 
-from mrdamper.io.columns import role_of, split_name
+from mrdamper.io.column_names import role_of, split_name
 from mrdamper.io.units import DIMENSION, is_unit, parse_unit
 
 

@@ -67,6 +67,16 @@ def test_one_refused_file_stops_all_unless_told_otherwise(folder, tmp_path):
     assert [entry["run_id"] for entry in summary["runs"]] == [item.id for item in load_dataset(tmp_path / "out")]
 
 
+def test_the_refusal_for_want_of_a_current_says_what_the_file_has_instead(tmp_path):
+    table = np.column_stack([rows(), np.full(600, 0.5)])
+    write(tmp_path, "a.csv", text(table, ("time_s,displacement_mm,force_N,current [V]",)))
+    done = run(tmp_path / "a.csv", "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert "'current [V]' is in V, which is no unit of current" in done.output
+    assert "E_CURRENT_MISSING" in done.output
+    assert "--write-profile rig.toml" in done.output
+
+
 def test_nothing_good_writes_nothing(tmp_path):
     path = write(tmp_path, "a.csv", b"")
     assert run(path, "--out", tmp_path / "out", "--skip-refused").exit_code == 2

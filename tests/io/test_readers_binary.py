@@ -30,7 +30,7 @@ from mrdamper.errors import InputError, MissingExtraError
 from mrdamper.io.profile import parse_profile
 from mrdamper.io.readers import all_readers, room
 from mrdamper.io.readers.hdf5 import Hdf5
-from mrdamper.io.rig_import import read_run, read_runs
+from mrdamper.io.rig_import import guess_profile, read_run, read_runs
 
 CLEAN = text()
 SHORT = dict(zip(("time", "disp", "force"), rows().T, strict=True))
@@ -47,6 +47,16 @@ def zip_bytes(*members, link=False):
             info.compress_type = zipfile.ZIP_DEFLATED
             info.external_attr = 0o120777 << 16 if link else 0
             archive.writestr(info, content)
+    return target.getvalue()
+
+
+def blown_up(book):
+    """A workbook whose sheet is mostly spaces."""
+    target = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(book)) as old, zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as new:
+        for name in old.namelist():
+            content = old.read(name)
+            new.writestr(name, content.replace(b"<sheetData>", b" " * 20_000_000 + b"<sheetData>"))
     return target.getvalue()
 
 
@@ -77,7 +87,9 @@ GOOD = {
     "a.h5": lambda: hdf5_bytes(columns()),
     "group.h5": lambda: hdf5_bytes(SHORT, UNITS, "test/raw"),
     "a.npz": lambda: npz_bytes(**columns()),
+    "stamps.npz": lambda: npz_bytes(**datetimes()),
     "a.tdms": lambda: tdms_bytes(SHORT, UNITS),
+    "stamps.tdms": lambda: tdms_bytes({**SHORT, "time": datetimes()["time"].astype("datetime64[us]")}, UNITS),
     "wave.tdms": lambda: tdms_bytes(MOVED, UNITS, wave=True),
     "a.mf4": lambda: mf4_bytes([(SHORT["time"], MOVED)], UNITS),
     "two_groups.mf4": lambda: mf4_bytes(
@@ -92,15 +104,20 @@ GOOD = {
 
 BAD = {
     "none.xlsx": (lambda: xlsx_bytes([list(NAMES)]), "E_NO_DATA"),
+    "bomb.xlsx": (lambda: blown_up(xlsx_bytes(SHEET)), "E_ARCHIVE_RATIO"),
     "cut.xlsx": (lambda: xlsx_bytes(SHEET)[:-1000], "E_TRUNCATED"),
     "units.xlsx": (lambda: xlsx_bytes([["time", "disp", "force"], *rows().tolist()]), "E_UNITS_MISSING"),
     "error.xlsx": (lambda: xlsx_bytes([*SHEET[:50], ["#DIV/0!", 1.0, 2.0], *SHEET[50:]]), "E_NUMBER"),
     "cut.parquet": (lambda: parquet_bytes(columns())[:-100], "E_TRUNCATED"),
+    "truth.parquet": (lambda: parquet_bytes({**columns(), "force_N": np.ones(600, dtype=bool)}), "E_NUMBER"),
     "text.parquet": (lambda: parquet_bytes({**columns(), "force_N": np.array(["a"] * 600)}), "E_NUMBER"),
     "bomb.parquet": (lambda: parquet_bytes({n: np.zeros(10_000_000) for n in NAMES}), "E_ARCHIVE_RATIO"),
     "cut.mat": (lambda: mat_bytes(columns())[:-1000], "E_TRUNCATED"),
     "cells.mat": (lambda: mat_bytes({**columns(), "force_N": np.array([[1], "a"], dtype=object)}), "E_UNSAFE"),
     "lengths.mat": (lambda: mat_bytes({**columns(), "force_N": np.arange(5.0)}), "E_FIELD_COUNT"),
+    "complex.mat": (lambda: mat_bytes({**columns(), "force_N": SHORT["force"] + 1j}), "E_NUMBER"),
+    "text.h5": (lambda: hdf5_bytes({**columns(), "force_N": np.array([b"12.5"] * 600)}), "E_NUMBER"),
+    "text.npz": (lambda: npz_bytes(**{**columns(), "force_N": np.array(["12.5"] * 600)}), "E_NUMBER"),
     "cut.h5": (lambda: hdf5_bytes(columns())[:-1000], "E_TRUNCATED"),
     "cut.npz": (lambda: npz_bytes(**columns())[:-1000], "E_TRUNCATED"),
     "pickled.npz": (lambda: npz_bytes(**columns(), meta=np.array([{}], dtype=object)), "E_UNSAFE"),
@@ -171,6 +188,42 @@ def test_raw_volts_are_read_with_a_calibration(tmp_path):
     np.testing.assert_allclose(read_run(path, profile).force, channels()["force"], rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("name", "make"),
+    [
+        ("a.mat", lambda: mat_bytes({**columns(), "current_mA": 500.0})),
+        ("struct.mat", lambda: mat_bytes({"data": {**columns(), "current_A": 0.5}})),
+        ("new.mat", lambda: mat73_bytes({**columns(), "current_A": np.array([0.5])})),
+        ("a.h5", lambda: hdf5_bytes({**columns(), "current_A": np.float64(0.5)})),
+        ("a.npz", lambda: npz_bytes(**columns(), current_A=0.5)),
+        ("member.zip", lambda: zip_bytes(("run_0.5A.csv", CLEAN))),
+    ],
+)
+def test_the_current_may_stand_beside_the_columns(tmp_path, name, make):
+    path = write(tmp_path, name, make())
+    record = read_run(path)
+    assert record.current is not None
+    # 500 mA times 1e-3 rounds once.
+    np.testing.assert_allclose(record.current, 0.5, rtol=1e-15, atol=0)
+    np.testing.assert_array_equal(read_run(path, guess_profile(path)).force, record.force)
+
+
+def test_numbers_of_another_meaning_are_no_current(tmp_path):
+    path = write(
+        tmp_path, "a.mat", mat_bytes({**columns(), "amplitude_mm": 20.0, "current": 0.5, "current_set_A": 1.0})
+    )
+    assert read_run(path).current is None
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of processes differ elsewhere")
+def test_a_fresh_reading_process_has_room_for_every_good_file(tmp_path):
+    """Its memory is counted by what is written to: what allocators reserve differs from start to start."""
+    path = write(tmp_path, "a.parquet", GOOD["a.parquet"]())
+    for _ in range(3):
+        room.close()
+        assert read_run(path).time.size == 600
+
+
 def test_several_sheets_are_several_runs(tmp_path):
     path = write(tmp_path, "a.xlsx", xlsx_bytes(SHEET, {"Second": SHEET}))
     assert [record.id for record in read_runs(path)] == ["a_Data", "a_Second"]
@@ -185,8 +238,9 @@ def test_hdf5_does_not_follow_links_out_of_the_file(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["time_s"], file["displacement_mm"] = SHORT["time"], SHORT["disp"]
         file["force_N"] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "/force_N")
-    with pytest.raises(InputError, match="force"):
+    with pytest.raises(InputError, match="'force_N' holds objects or links") as caught:
         read_run(tmp_path / "a.h5")
+    assert caught.value.code == "E_UNSAFE"
 
 
 @pytest.mark.parametrize(("library", "name"), [("h5py", "a.h5"), ("openpyxl", "a.xlsx"), ("nptdms", "a.tdms")])

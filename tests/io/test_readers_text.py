@@ -1,6 +1,7 @@
 """Delimited text: every row of the contract that is the reader's, and the many writings of one test."""
 
 import gzip
+from datetime import datetime, timedelta
 
 import numpy as np
 import pytest
@@ -29,6 +30,13 @@ def quoted(decimal="."):
 
 REFUSED = {
     "no bytes": (b"", "E_EMPTY", None),
+    "remarks only": ("# a\n# b\n", "E_NO_DATA", None),
+    "a machine's head without data": (
+        "MTS793|MPT|ENU|1|0|.|/|:|1|0|0|A\n\nTime\tAxial Displacement\tAxial Force\nSec\tmm\tN\n", "E_NO_DATA", None,
+    ),
+    "decimal commas from line 301 on": (
+        "\n".join([*CLEAN.split("\n")[:300], *text(decimal=",").split("\n")[300:]]), "E_AMBIGUOUS", 301,
+    ),
     "blank": ("\n \n", "E_EMPTY", None),
     "header only": ("time_s,displacement_mm,force_N\n", "E_NO_DATA", None),
     "header without line end": ("time_s,displacement_mm,force_N", "E_NO_DATA", None),
@@ -59,6 +67,11 @@ REFUSED = {
     "hexadecimal": (lines_of({100: "0.49,0x1F,3.0"}), "E_NUMBER", 100),
     "thousands": (lines_of({100: '0.49,"1,234.5",3.0'}), "E_NUMBER", 100),
     "typographic minus": (lines_of({100: "0.49,−1.5,3.0"}), "E_NUMBER", 100),
+    "a decimal comma among points": (lines_of({100: '0.49,"1,5",3.0'}), "E_NUMBER", 100),
+    "no date": ("time,displacement_mm,force_N\n2024-13-01T00:00:00,1,2\n2024-13-01T00:00:01,1,3\n", "E_NUMBER", None),
+    "a date of two readings": (
+        "time,displacement_mm,force_N\n03/04/2024 00:00:00,1,2\n03/04/2024 00:00:01,1,3\n", "E_NUMBER", None,
+    ),
     "two points": (lines_of({100: "0.49,1.5.2,3.0"}), "E_NUMBER", 100),
     "a word": (lines_of({100: "0.49,overload,3.0"}), "E_NUMBER", 100),
     "infinity": (lines_of({100: "0.49,inf,3.0"}), "E_NONFINITE", 100),
@@ -68,10 +81,13 @@ REFUSED = {
     "unknown unit": (text(header=("time_s,displacement_mm,force [blub]",)), "E_UNITS_MISSING", None),
     "no header": (text(header=()), "E_UNITS_MISSING", None),
     "wrong dimension": (text(header=("time_s,displacement_mm,force_mm",)), "E_UNITS_DIMENSION", None),
+    "name and row of units disagree": (text(header=("time,displacement,Force [kN]", "s,mm,N")), "E_AMBIGUOUS", 1),
     "mass for force": (text(header=("time_s,displacement_mm,Force [kg]",)), "E_UNITS_DIMENSION", None),
     "no force": (text(header=("time_s,displacement_mm,temperature_C",)), "E_COLUMN", None),
     "two forces": (text(TWICE, ("time_s,displacement_mm,force left_N,force right_N",)), "E_AMBIGUOUS", 1),
     "one name, two values": (text(DIFFERENT, ("time_s,displacement_mm,force_N,force_N",)), "E_DUPLICATE_COLUMN", 1),
+    "names that differ in capitals only": (text(DIFFERENT, ("time_s,displacement_mm,force_N,Force_N",)),
+                                            "E_DUPLICATE_COLUMN", 1),
     "open quote": (lines_of({100: '0.49,"1.0,3.0'}), "E_QUOTE", 100),
     "open quote in the header": (lines_of({1: 'time_s,"displacement_mm,force_N'}), "E_QUOTE", 1),
     "open quote at the end": (CLEAN + '"3.0,1.0,2.0', "E_QUOTE", 602),
@@ -108,6 +124,7 @@ ACCEPTED = {
     "blank lines": (CLEAN + "\n\n", "utf-8", ""),
     "end-of-file mark": (CLEAN + "\x1a", "utf-8", ""),
     "remark inside": (CLEAN.replace("\n0.5", "\n# half a second\n0.5", 1), "utf-8", ""),
+    "capitals": (text(header=("TIME [S],DISPLACEMENT [MM],FORCE [N]",)), "utf-8", ""),
     "units row": (text(header=("t;x;F", "s;mm;N"), separator=";"), "utf-8", ""),
     "bracketed units row": (text(header=("Time;Position;Load", "[s];[mm];[N]"), separator=";"), "utf-8", ""),
     "brackets": (text(header=("Time (s) , Position (mm) , Axial Load (N)",)), "utf-8", ""),
@@ -211,6 +228,51 @@ def test_acquisition_blocks_are_one_test_if_time_goes_on_and_several_if_not(tmp_
     with pytest.raises(InputError) as caught:
         read_run(again)
     assert caught.value.code == "E_BLOCKS"
+
+
+MTS_HEAD = ["Time\tAxial Displacement\tAxial Force", "Sec\tmm\tN"]
+
+
+def test_a_later_block_in_other_units_is_refused(tmp_path):
+    table = ["\t".join(f"{cell:.6f}" for cell in row) for row in rows()]
+    other = [MTS_HEAD[0], "Sec\tcm\tN"]
+    path = write(tmp_path, "a.dat", "\n".join([*MTS_HEAD, *table[:300], "", *other, *table[300:], ""]))
+    with pytest.raises(InputError, match=r"cm.*mm") as caught:
+        read_run(path)
+    assert (caught.value.code, caught.value.line) == ("E_AMBIGUOUS", 304)  # type: ignore[attr-defined]
+
+
+def test_no_row_is_lost_where_a_repeated_header_has_no_units(tmp_path):
+    table = ["\t".join(f"{cell:.6f}" for cell in row) for row in rows()]
+    path = write(tmp_path, "a.dat", "\n".join([*MTS_HEAD, *table[:300], MTS_HEAD[0], *table[300:], ""]))
+    assert read_run(path).time.size == 600
+
+
+@pytest.mark.parametrize("write_date", ["%d.%m.%Y", "%Y/%m/%d"])
+def test_dates_that_mean_one_thing_are_read(tmp_path, write_date):
+    start = datetime(2024, 3, 31, 23, 59, 59)
+    stamps = [start + timedelta(milliseconds=5 * i) for i in range(600)]
+    lines = [f"{s.strftime(write_date)} {s.strftime('%H:%M:%S.%f')},{x},{f}"
+             for s, (_, x, f) in zip(stamps, rows(), strict=True)]  # fmt: skip
+    record = read_run(write(tmp_path, "a.csv", "\n".join(["time,displacement_mm,force_N", *lines, ""])))
+    assert not record.findings
+    # Microseconds are written, integers of nanoseconds inside.
+    np.testing.assert_allclose(record.time, channels()["time"], rtol=0, atol=1e-9)
+
+
+def test_an_optional_channel_in_a_wrong_unit_is_left_out_and_said(tmp_path):
+    path = write(tmp_path, "a_0.5A.csv", text(TWICE, ("time_s,displacement_mm,force_N,velocity [mm]",)))
+    record = read_run(path)
+    assert record.velocity is None
+    assert [finding.code for finding in record.findings] == ["W_COLUMN"]
+    assert "no unit of velocity" in record.findings[0].text
+
+
+@pytest.mark.parametrize(("name", "codes"), [("a.csv", ["W_COLUMN"]), ("a_0.5A.csv", [])])
+def test_a_current_without_unit_is_said_where_nothing_else_states_the_current(tmp_path, name, codes):
+    record = read_run(write(tmp_path, name, text(TWICE, ("time_s,displacement_mm,force_N,current",))))
+    assert [finding.code for finding in record.findings] == codes
+    assert (record.current is None) == bool(codes)
 
 
 @pytest.mark.parametrize(("say", "codes"), [("join", ["E_TIME_ORDER"]), ("split", ["read", "read"])])

@@ -2,64 +2,23 @@
 
 from __future__ import annotations
 
-import re
-import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import ColumnError, UnitError
+from mrdamper.io.column_names import WORDS, role_of, says_nothing, split_name, unknown_unit
 from mrdamper.io.readers.base import RawTable, RigFileError, printable
 from mrdamper.io.record import OPTIONAL, REQUIRED
-from mrdamper.io.units import DIMENSION, Unit, is_unit, parse_unit
+from mrdamper.io.units import DIMENSION, Unit, parse_unit
 
 if TYPE_CHECKING:
     from mrdamper.io.profile import Channel, Profile
 
 ROLES = (*REQUIRED, *OPTIONAL)
-
-# Words of channel names in the languages rigs are operated in; the longest word that fits wins.
-_WORDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "time": ("time", "zeit", "temps", "tiempo", "tempo", "czas", "tijd", "tid", "timestamp", "zeitstempel",
-                 "elapsed", "время", "时间", "時間"),
-        "displacement": ("displacement", "disp", "displ", "position", "pos", "stroke", "travel", "weg", "hub",
-                         "verschiebung", "auslenkung", "déplacement", "deplacement", "course", "desplazamiento",
-                         "posicion", "posición", "spostamento", "corsa", "deslocamento", "lvdt", "extension",
-                         "przemieszczenie", "перемещение", "位移", "変位"),
-        "force": ("force", "load", "kraft", "fuerza", "forza", "força", "forca", "charge", "carga", "carico", "siła",
-                  "loadcell", "last", "kracht", "effort", "сила", "力", "荷重"),
-        "velocity": ("velocity", "vel", "speed", "geschwindigkeit", "vitesse", "velocidad", "velocità",
-                     "velocidade", "скорость", "速度"),
-        "acceleration": ("acceleration", "accel", "acc", "beschleunigung", "accélération", "aceleracion",
-                         "aceleración", "accelerazione", "加速度"),
-        "current": ("current", "curr", "strom", "stromstärke", "courant", "corriente", "corrente", "amperage", "ток",
-                    "电流", "電流"),
-        "voltage": ("voltage", "spannung", "tension électrique", "voltaje", "tensione", "напряжение", "电压", "電圧"),
-        "temperature": ("temperature", "temp", "temperatur", "température", "temperatura", "температура", "温度"),
-    }
-)  # fmt: skip
-_SYMBOLS = MappingProxyType(
-    {
-        "t": "time", "x": "displacement", "z": "displacement", "d": "displacement", "s": "displacement",
-        "u": "displacement", "F": "force", "f": "force", "v": "velocity", "a": "acceleration", "I": "current",
-        "i": "current", "U": "voltage", "T": "temperature",
-    }
-)  # fmt: skip
-_NOT_MEASURED = frozenset(
-    ("command", "cmd", "commanded", "setpoint", "set", "target", "soll", "reference", "ref", "demand", "desired",
-     "error", "count", "counts", "cycle", "cycles", "segment", "segments", "index", "offset", "limit", "max", "min",
-     "consigne", "consigna", "sollwert", "rate", "id", "status", "state", "flag")
-)  # fmt: skip
-_BRACKETED = re.compile(r"^(?P<name>.*?)\s*[\[({<](?P<unit>[^\[\](){}<>]{1,40})[\])}>]\s*$", re.DOTALL)
-_SLASHED = re.compile(r"^(?P<name>.*\S)\s*(?:\s/\s*|,\s*|\s+in\s+|\s*;\s*)(?P<unit>\S{1,20})$", re.DOTALL)
-_LONGEST_NAME = 200  # beyond, it is no name, and matching it could take long
-_FUSED = re.compile(r"[ _.:-]+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +98,26 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
     return assigned
 
 
+def left_out(table: RawTable, profile: Profile, found: Mapping[str, Assigned]) -> dict[str, str]:
+    """Optional channels that a column is named after but that its unit forbids to use, and why.
+
+    A column without a unit is only told of if it may be the coil current, which no test can do without.
+    """
+    headers = [split_name(name, unit) for name, unit in zip(table.names, table.units, strict=True)]
+    taken = {entry.column for entry in found.values()}
+    reasons = {}
+    for role in OPTIONAL:
+        if role in found or (role == "current" and profile.current_is_given):
+            continue
+        column = _choose(table, headers, role, taken)
+        unit = "" if column is None else headers[column][1]
+        if column is not None and (unit or role == "current"):
+            problem = _unit_problem(table, role, column, unit, parse_unit(unit) if unit else None)
+            if problem is not None:
+                reasons[role] = problem.found
+    return reasons
+
+
 def propose(table: RawTable) -> dict[str, tuple[int | None, str]]:
     """Column and unit of every channel as far as the file says them, for a profile to be completed."""
     headers = [split_name(name, unit) for name, unit in zip(table.names, table.units, strict=True)]
@@ -158,46 +137,6 @@ def propose(table: RawTable) -> dict[str, tuple[int | None, str]]:
     return proposed
 
 
-def split_name(header: str, unit: str = "") -> tuple[str, str]:
-    """Name and unit of a column whose header may hold both: `force_N`, `Force [kN]`, `Kraft in kN`."""
-    if len(header) > _LONGEST_NAME:
-        return header, unit
-    text = unicodedata.normalize("NFKC", header).strip()
-    if unit:
-        match = _BRACKETED.match(text)
-        return (match["name"] if match and parse_unit(match["unit"]) else text), unit
-    for pattern in (_BRACKETED, _SLASHED):
-        match = pattern.match(text)
-        if match and parse_unit(match["unit"].strip()):
-            return match["name"].strip(), match["unit"].strip()
-    # The longest tail that is a unit: velocity_m_s before velocity_m and s.
-    for place in _FUSED.finditer(text):
-        tail = text[place.end() :]
-        if place.start() and is_unit(tail):
-            return text[: place.start()].strip(), tail
-    name, slash, tail = text.partition("/")
-    if slash and name and is_unit(tail) and not is_unit(text):
-        return name.strip(), tail.strip()
-    match = _BRACKETED.match(text)
-    return (match["name"].strip() or text if match else text), ""
-
-
-@lru_cache(maxsize=4096)
-def role_of(name: str) -> str | None:
-    """The channel a name stands for, None if it says nothing or names a command."""
-    if len(name) > _LONGEST_NAME:
-        return None
-    words = [w for w in re.split(r"[^\w]+|_|(?<=[a-zà-ÿ])(?=[A-Z])", name) if w]
-    lower = [w.casefold().rstrip("0123456789") or w for w in words]
-    if any(word in _NOT_MEASURED for word in lower):
-        return None
-    if len(words) == 1 and words[0] in _SYMBOLS:
-        return _SYMBOLS[words[0]]
-    roles = [role for word in lower for role, known in _WORDS.items() if word in known]
-    # "load displacement" is a displacement: the last word is the noun in the languages at hand.
-    return roles[-1] if roles else None
-
-
 def _choose(table: RawTable, headers: Sequence[tuple[str, str]], role: str, taken: set[int]) -> int | None:
     named = [i for i, (name, _) in enumerate(headers) if i not in taken and role_of(name) == role]
     fitting = [i for i in named if _dimension(headers[i][1]) == DIMENSION[role]]
@@ -206,23 +145,17 @@ def _choose(table: RawTable, headers: Sequence[tuple[str, str]], role: str, take
             return None
         # Without a telling name the unit decides, if it is the only one of its kind.
         fitting = [i for i, (_, unit) in enumerate(headers) if _dimension(unit) == DIMENSION[role]]
-        free = [i for i in fitting if i not in taken and _says_nothing(headers[i][0])]
+        free = [i for i in fitting if i not in taken and says_nothing(headers[i][0])]
         return free[0] if len(free) == 1 == len(fitting) else None
     candidates = fitting or named
-    if len({headers[i][0] for i in candidates}) > 1:
-        exact = [i for i in candidates if headers[i][0].casefold() in _WORDS[role]]
-        if len({headers[i][0] for i in exact}) == 1 or (exact and role == "time"):
+    if len({headers[i][0].casefold() for i in candidates}) > 1:
+        exact = [i for i in candidates if headers[i][0].casefold() in WORDS[role]]
+        if len({headers[i][0].casefold() for i in exact}) == 1 or (exact and role == "time"):
             return exact[0]
         if role not in REQUIRED:
             return None
         raise _ambiguous(table, role, [table.names[i] for i in candidates])
     return candidates[0]
-
-
-def _says_nothing(name: str) -> bool:
-    words = [w.casefold().rstrip("0123456789") for w in re.split(r"[^\w]+|_", name) if w]
-    known = {w for words_of in _WORDS.values() for w in words_of}
-    return not any(word in _NOT_MEASURED or word in known for word in words)
 
 
 def _dimension(unit: str) -> str | None:
@@ -266,9 +199,10 @@ def _require_all(
     for role in missing:
         shown = ", ".join(name or f"column {i}" for i, name in enumerate(table.names, 1))
         units = "" if any(unit for _, unit in headers) else ", without units"
+        rate = " or, with a fixed rate, [file] sample_rate_Hz = ..." if role == "time" else ""
         raise _refusal(
             ColumnError, table, f"no column is known to be {role} (found {shown}{units})",
-            f'say [channels.{role}] column = "..." in a profile',
+            f'say [channels.{role}] column = "..."{rate} in a profile',
         )  # fmt: skip
 
 
@@ -294,6 +228,8 @@ def _convert(
             if required:
                 raise problem
             return None
+    if channel is None or not channel.unit:
+        _refuse_two_units(table, role, column, unit)
     si = parse_unit(unit) or Unit("", 1.0)
     sign = channel.sign if channel is not None else 1
     scale, offset = (channel.scale or 1.0, channel.offset) if channel is not None else (1.0, 0.0)
@@ -304,18 +240,38 @@ def _convert(
 
 def _unit_problem(table: RawTable, role: str, column: int, unit: str, parsed: Unit | None) -> UnitError | None:
     named = f"column {table.names[column] or column + 1!r}"
+    if parsed is None and not unit and table.odd and table.odd[column]:
+        stamps = ", or time stamps like 2024-03-31 01:59:59.123" if role == "time" else ""
+        found = f"{named} holds no numbers but {table.odd[column][:40]!r}"
+        return _refusal(UnitError, table, found, f"export it as numbers with a unit{stamps}", "E_NUMBER")
     if parsed is None:
+        unit = unit or unknown_unit(table.names[column])
         found = f"{named} has no unit" if not unit else f"{named} has the unit {unit!r}, which is not known"
         mend = f'write it into the header, or say [channels.{role}] unit = "..." in a profile'
         return _refusal(UnitError, table, found, mend, "E_UNITS_MISSING")
     if parsed.dimension != DIMENSION[role]:
         mend = f'say [channels.{role}] unit = "..." in a profile, or name another column'
+        if parsed.dimension == "mass" and role == "force":
+            mend = f'if kilogram-force is meant, say [channels.force] unit = "{unit}f" in a profile'
         if parsed.dimension == "voltage":
             mend = f"give the calibration: [channels.{role}] unit and scale (unit per {unit}) in a profile"
         return _refusal(
             UnitError, table, f"{named} is in {unit}, which is no unit of {DIMENSION[role]}", mend, "E_UNITS_DIMENSION"
         )
     return None
+
+
+def _refuse_two_units(table: RawTable, role: str, column: int, unit: str) -> None:
+    """A name and a row of units must not say different things."""
+    inner = split_name(table.names[column])[1] if table.units[column] else ""
+    one, other = parse_unit(inner) if inner else None, parse_unit(unit)
+    if one is None or other is None or one == other or one.dimension != DIMENSION[role]:
+        return
+    raise RigFileError(
+        "E_AMBIGUOUS", f"column {table.names[column]!r} is in {inner} by its name and in {unit} by its row of units",
+        file=table.source.name, line=table.line, column=column + 1,
+        mend=f'say which: [channels.{role}] unit = "..." in a profile',
+    )  # fmt: skip
 
 
 def _refuse_two_values(table: RawTable, headers: Sequence[tuple[str, str]], column: int) -> None:

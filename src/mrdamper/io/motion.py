@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mrdamper.data import Run
+from mrdamper.data import Floats, Run
 from mrdamper.errors import ColumnError, DatasetError, RunError, UnitError
+
+if TYPE_CHECKING:
+    import polars as pl
 
 _NAMES = ("time_s", "displacement_m")
 
@@ -27,51 +31,15 @@ def load_motion(path: str | Path, current: float | None = None) -> Run:
     DatasetError, ColumnError, UnitError, RunError
         If the file cannot be read, lacks a column, or its samples do not make a motion.
     """
-    import polars as pl
-
     path = Path(path)
     if not path.is_file():
         raise DatasetError("no such file", where=str(path), mend="give a CSV with time_s and displacement_m")
-    try:
-        table = pl.read_csv(path, infer_schema_length=10_000)
-    except (pl.exceptions.PolarsError, OSError) as error:
-        raise DatasetError(
-            str(error).splitlines()[0], where=str(path), mend="write it as comma-separated UTF-8"
-        ) from error
-    for name in _NAMES:
-        if name not in table.columns:
-            near = [c for c in table.columns if c.lower().startswith(name.split("_")[0])]
-            if near:
-                raise UnitError(
-                    f"column {near[0]!r} where {name!r} is expected",
-                    where=str(path),
-                    mend="convert it to SI and rename it",
-                )
-            raise ColumnError(
-                f"column {name} is missing (found {', '.join(table.columns)})", where=str(path), mend="add it"
-            )
+    table = _table(path)
     wanted = [*_NAMES, *(["current_A"] if current is None and "current_A" in table.columns else [])]
-    for name in wanted:
-        if not table.schema[name].is_numeric():
-            raise ColumnError(
-                f"column {name} holds text", where=str(path), mend="write plain numbers with a decimal point"
-            )
-        if table[name].null_count():
-            raise ColumnError(
-                f"column {name} has {table[name].null_count()} empty cells", where=str(path), mend="remove those rows"
-            )
-    columns = {name: table[name].cast(pl.Float64).to_numpy() for name in wanted}
+    columns = {name: _numbers(table, name, path) for name in wanted}
     if current is None and "current_A" not in columns:
         raise ColumnError("no current", where=str(path), mend="give --current A, or a column current_A")
-    steps = np.diff(columns["time_s"])
-    if steps.size and np.any(steps > 5 * np.median(steps)):
-        at = int(np.argmax(steps > 5 * np.median(steps)))
-        raise RunError(
-            f"a gap of {steps[at]:.4g} s after {columns['time_s'][at]:.6g} s",
-            where=str(path),
-            mend="predict the parts one by one: the damper's state is unknown after a gap",
-            code="E_TIME_GAP",
-        )
+    _refuse_gap(columns["time_s"], path)
     return Run(
         id=path.stem,
         time=columns["time_s"],
@@ -80,3 +48,46 @@ def load_motion(path: str | Path, current: float | None = None) -> Run:
         current=columns.get("current_A", np.array(current)),
         excitation="motion",
     )
+
+
+def _table(path: Path) -> pl.DataFrame:
+    import polars as pl
+
+    try:
+        return pl.read_csv(path, infer_schema_length=10_000)
+    except (pl.exceptions.PolarsError, OSError) as error:
+        raise DatasetError(
+            str(error).splitlines()[0], where=str(path), mend="write it as comma-separated UTF-8"
+        ) from error
+
+
+def _numbers(table: pl.DataFrame, name: str, path: Path) -> Floats:
+    """A column as doubles, none missing."""
+    if name not in table.columns:
+        near = [column for column in table.columns if column.lower().startswith(name.split("_")[0])]
+        if near:
+            found, mend = f"column {near[0]!r} where {name!r} is expected", "convert it to SI and rename it"
+            raise UnitError(found, where=str(path), mend=mend)
+        found = f"column {name} is missing (found {', '.join(table.columns)})"
+        raise ColumnError(found, where=str(path), mend="add it")
+    values = table[name]
+    if not values.dtype.is_numeric():
+        mend = "write plain numbers with a decimal point"
+        raise ColumnError(f"column {name} holds text", where=str(path), mend=mend)
+    if values.null_count():
+        found = f"column {name} has {values.null_count()} empty cells"
+        raise ColumnError(found, where=str(path), mend="remove those rows")
+    return values.to_numpy().astype(np.float64)
+
+
+def _refuse_gap(time: Floats, path: Path) -> None:
+    steps = np.diff(time)
+    wide = steps > 5 * np.median(steps) if steps.size else np.zeros(0, dtype=bool)
+    if wide.any():
+        at = int(np.argmax(wide))
+        raise RunError(
+            f"a gap of {steps[at]:.4g} s after {time[at]:.6g} s",
+            where=str(path),
+            mend="predict the parts one by one: the damper's state is unknown after a gap",
+            code="E_TIME_GAP",
+        )

@@ -17,7 +17,7 @@ from mrdamper.io.long_records import judge_long
 from mrdamper.io.profile import Channel, Profile, current_pattern, load_profile, profile_hash
 from mrdamper.io.readers import RawTable, RigFileError, raw_tables, suffixes
 from mrdamper.io.record import Record
-from mrdamper.io.rig_record import as_data, joined, record_of
+from mrdamper.io.rig_record import as_data, held_current, joined, record_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +111,8 @@ def guess_profile(path: str | Path, profile: Profile | str | Path | None = None)
     form = {**table.form, **profile.file.model_dump(exclude_defaults=True)}
     if not any(table.names):
         form["names"] = tuple(f"column {i + 1}" for i in range(len(table.names)))
-    pattern = None if "current" in channels else current_pattern(Path(path).name)
+    stated = "current" in channels or held_current(table) is not None
+    pattern = None if stated else current_pattern(Path(path).name)
     update = {
         "file": type(profile.file)(**form),  # type: ignore[arg-type]
         "channels": {**profile.channels, **channels},
@@ -254,8 +255,9 @@ def _files(paths: Iterable[str | Path]) -> list[Path]:
 
 def _require_current(records: Sequence[Record], path: Path) -> None:
     if any(record.current is None for record in records):
+        why = [f.text for record in records for f in record.findings if f.text.startswith("the current channel")]
         raise ColumnError(
-            "no coil current in a column or in the file name",
+            why[0] if why else "no coil current in a column or in the file name",
             where=path.name,
             mend='say [current] value = 0.5, [current] pattern = "*_{current}A_*" or '
             '[channels.current] column = "..." in a profile',

@@ -11,12 +11,14 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import ColumnError
-from mrdamper.io.columns import Assigned, assign
+from mrdamper.io.column_names import role_of, split_name
+from mrdamper.io.columns import Assigned, assign, left_out
 from mrdamper.io.profile import Profile, current_in_name
 from mrdamper.io.readers import RawTable, RigFileError, suffixes
 from mrdamper.io.readers.base import printable
 from mrdamper.io.record import OPTIONAL, Finding, Record
 from mrdamper.io.text.spool import rescale
+from mrdamper.io.units import parse_unit
 
 _LENIENT = ("acceleration", "voltage", "temperature")  # a damaged cell there costs the channel, not the run
 
@@ -47,10 +49,13 @@ def record_of(table: RawTable, profile: Profile, path: Path) -> Record:
     channels, lines = _aligned(channels, found, content.lines)
     remarks = _remarks(table, found)
     if "current" not in channels:
-        current, whence = _current(path, profile)
+        current, whence = _current(table, path, profile)
         if current is not None:
             channels["current"] = _constant(current, channels["time"])
             remarks["current_from"] = whence
+    for name, why in left_out(table, profile, found).items():
+        if name != "current" or "current" not in channels:
+            findings.append(Finding("W_COLUMN", f"the {name} channel is left out: {why}"))
     return Record(
         id=_run_id(table, path), findings=tuple(_unique(findings)), provenance=remarks, rig=profile.rig,
         excitation=profile.excitation, split=profile.split, lines=lines, **channels,  # type: ignore[arg-type]
@@ -87,10 +92,26 @@ def _constant(value: float, like: Floats) -> Floats:
     return np.broadcast_to(np.float64(value), like.shape)
 
 
-def _current(path: Path, profile: Profile) -> tuple[float | None, str]:
+def _current(table: RawTable, path: Path, profile: Profile) -> tuple[float | None, str]:
     if profile.current is not None and profile.current.value is not None:
         return profile.current.value, "profile"
-    return current_in_name(path.name, profile), "file name"
+    if profile.current is None and (held := held_current(table)) is not None:
+        return held, "a number in the file"
+    found = current_in_name(path.name, profile)
+    if found is None and profile.current is None:
+        found = current_in_name(table.source.name.removeprefix(f"{path.name}:"), profile)  # of an archive's member
+    return found, "file name"
+
+
+def held_current(table: RawTable) -> float | None:
+    """Coil current [A] that a file holds as one number beside its columns, `current_A = 0.5`; None if it does not."""
+    held = set()
+    for name, value in table.constants.items():
+        name, unit = split_name(name)
+        known = parse_unit(unit) if unit else None
+        if known is not None and known.dimension == "current" and role_of(name) == "current" and np.isfinite(value):
+            held.add(known.factor * value)
+    return held.pop() if len(held) == 1 else None
 
 
 def _remarks(table: RawTable, found: dict[str, Assigned]) -> dict[str, str]:

@@ -54,7 +54,7 @@ _EXACT = {
 _WORDS = {
     "sec": "s", "secs": "s", "second": "s", "seconds": "s", "sekunden": "s", "sekunde": "s", "segundos": "s",
     "msec": "ms", "msecs": "ms", "millisecond": "ms", "milliseconds": "ms", "usec": "us", "microseconds": "us",
-    "minutes": "min", "minute": "min", "hour": "h", "hours": "h", "hr": "h",
+    "minutes": "min", "minute": "min", "hour": "h", "hours": "h", "hr": "h", "sek": "s",
     "meter": "m", "meters": "m", "metre": "m", "metres": "m", "millimeter": "mm", "millimeters": "mm",
     "millimetre": "mm", "millimetres": "mm", "micron": "um", "microns": "um", "micrometer": "um",
     "inch": "in", "inches": "in", "feet": "ft", "foot": "ft",
@@ -63,6 +63,7 @@ _WORDS = {
     "in/sec": "in/s", "kph": "km/h", "gs": "g",
     "amp": "A", "amps": "A", "ampere": "A", "amperes": "A", "milliamps": "mA",
     "volt": "V", "volts": "V", "millivolts": "mV", "celsius": "°C", "deg c": "°C", "grad c": "°C",
+    "mm": "mm", "ms": "ms", "s": "s",  # some programs write all of a header in capitals
     "segment": "segments", "cycle": "cycles", "count": "counts", "degree": "deg", "degrees": "deg",
 }  # fmt: skip
 _OTHER = {

@@ -109,6 +109,11 @@ def _print(result: ImportResult, out: Path | None) -> None:
             print(f"  {finding}")
     for refusal in result.refusals:
         print(f"refused: {refusal.error}")
+    if any("profile" in refusal.error.mend for refusal in result.refusals):
+        print(
+            "a profile answers once for all files: mrdamper import FILE --write-profile rig.toml, "
+            "correct rig.toml, import with --profile rig.toml"
+        )
     if out is not None:
         print(f"dataset: {out} ({len(result.records)} runs)")
     else:

@@ -13,6 +13,7 @@ from mrdamper.io.quality.view import View, place
 from mrdamper.io.record import Finding
 
 GAP = 5.5  # steps this many times the usual one are a gap: up to 4 samples lost are none
+_DAY, _HOUR, _NEAR = 86_400.0, 3600.0, 60.0  # [s]
 _CHUNK = 1_000_000  # samples looked at together, to keep memory small
 
 
@@ -34,9 +35,18 @@ def order_of_time(view: View) -> None:
     raise QualityError(
         f"time runs backwards {where}, from {before:.9g} s to {after:.9g} s{more}",
         where=view.where,
-        mend="sort the rows, or split the file where the logger started again",
+        mend=_turning_back(before - after),
         code="E_TIME_ORDER",
     )
+
+
+def _turning_back(seconds: float) -> str:
+    """What to do about a clock that goes back so far."""
+    if abs(seconds - _DAY) < _NEAR:
+        return "export the time of day with its date: the test went on past midnight"
+    if abs(seconds - _HOUR) < _NEAR:
+        return "export the stamps with their offset from UTC: the clocks were put back an hour"
+    return "sort the rows, or split the file where the logger started again"
 
 
 def gaps_in_time(view: View) -> Iterator[Finding]:

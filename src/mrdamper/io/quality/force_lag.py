@@ -5,6 +5,12 @@ no passive force goes on rising after the motion has turned. So the force is exp
 springs, velocity terms and elastic–plastic elements of several yield displacements (a
 Prandtl–Ishlinskii sum, which can be any hysteresis that does not depend on rate), all
 delayed together, and the delay that explains it best is the lag.
+
+What has no corner cannot be dated: a smooth force that is late is, on one sine, exactly a
+force with a spring. So not every late force is said. Of forces of seven kinds of dampers
+that are late by 5 % of the period about seven in ten are, by 8 % nearly nine in ten, and of 900
+clean ones, a third of them with wide hysteresis, none (benchmarks/import_detection.py). The
+limits below stand where hysteresis that builds up smoothly begins to be accused.
 """
 
 from __future__ import annotations

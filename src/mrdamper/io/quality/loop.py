@@ -29,15 +29,14 @@ def dissipates(view: View) -> None:
     share = damping_share(view)
     if share < GIVING:
         if _exchanged(view):
-            what, mend = "displacement and force look exchanged", "name the columns the other way round"
+            what = "displacement and force look exchanged"
+            mend = "name the columns the other way round: [channels.force] column = ... in a profile"
         else:
-            what, mend = (
-                "force and displacement count in opposite directions",
-                "say [channels.force] sign = -1 in a profile",
-            )
+            what = "force and displacement count in opposite directions"
+            mend = "say [channels.force] sign = -1 in a profile"
         raise QualityError(
-            f"the loop gives energy instead of taking it ({100 * share:.0f} % of the force acts with the motion): "
-            f"{what}",
+            f"the loop gives energy instead of taking it ({-100 * share:.0f} % of the force pushes along with the "
+            f"motion): {what}",
             where=view.where,
             mend=mend,
             code="E_DISSIPATION_SIGN",
@@ -45,8 +44,20 @@ def dissipates(view: View) -> None:
 
 
 def damping_share(view: View) -> float:
-    """Part of the force's standard deviation that opposes the velocity; negative where the loop gives energy."""
-    start, stop = view.strokes.steady or (0, view.run.time.size)
+    """Part of the force's standard deviation that opposes the velocity; negative where the loop gives energy.
+
+    Of a record in segments, which may be tests of their own, the least of all that hold a cycle.
+    """
+    whole = _damping_share(view, *(view.strokes.steady or (0, view.run.time.size)))
+    segments = view.run.segments or ()
+    if len(segments) < 2 or view.strokes.period is None:
+        return whole
+    time = view.run.time
+    cycles = [(a, b) for a, b in segments if time[b - 1] - time[a] >= LEAST_CYCLES * view.strokes.period]
+    return min([whole, *(_damping_share(view, a, b) for a, b in cycles)])
+
+
+def _damping_share(view: View, start: int, stop: int) -> float:
     motion, force = view.moving.part(slice(start, stop)), view.run.force[start:stop]
     t = motion.time - motion.time[0]
     columns = np.column_stack([motion.velocity, motion.displacement, np.ones_like(t), t])
@@ -105,6 +116,10 @@ def repeatability(view: View) -> tuple[float, float] | None:
     end = float(run.time[-1])
     grid = end - cycles * period + period * np.arange(cycles * _POINTS) / _POINTS
     folded = np.interp(grid, run.time, run.force).reshape(cycles, _POINTS)
+    starts = grid[::_POINTS]
+    folded = folded[view.without_leap(starts, starts + period)]
+    if len(folded) < 2:
+        return None
     span = float(np.ptp(folded.mean(axis=0)))
     if span == 0.0:
         return None

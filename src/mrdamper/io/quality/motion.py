@@ -25,7 +25,12 @@ def moves(view: View) -> None:
     """Refuse a record without motion."""
     x = view.run.displacement
     if x.size < 3:
-        raise QualityError(f"{x.size} samples", where=view.where, mend="a record needs more", code="E_NO_EXCITATION")
+        raise QualityError(
+            f"{x.size} samples without gaps",
+            where=view.where,
+            mend="record again: a cycle or more",
+            code="E_NO_EXCITATION",
+        )
     span = float(np.ptp(x))
     # Von Neumann's ratio: one for white noise, near zero for any motion sampled finely enough.
     noise = span < NOISE_MOTION and np.mean(np.diff(x) ** 2) > np.var(x)
@@ -103,7 +108,11 @@ def drift_of(view: View) -> tuple[float, float]:
     length = float(view.run.time[stop - 1] - view.run.time[start])
     centre = (x[:-2] + 2 * x[1:-1] + x[2:]) / 4  # half way between a reversal and the mean of its neighbours
     size = np.abs(x[:-2] - 2 * x[1:-1] + x[2:]) / 4
-    return length * _slope(t[1:-1], centre), length * _slope(t[1:-1], size)
+    sound = view.without_leap(t[:-2], t[2:])  # a reversal may be lost in a gap
+    if np.count_nonzero(sound) < 2:
+        return 0.0, 0.0
+    middle = t[1:-1][sound]
+    return length * _slope(middle, centre[sound]), length * _slope(middle, size[sound])
 
 
 def _slope(t: Floats, y: Floats) -> float:

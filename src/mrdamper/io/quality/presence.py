@@ -21,7 +21,9 @@ def long_enough(view: View) -> None:
     """Refuse a record of a few samples."""
     size = view.record.time.size
     if size < _FEWEST:
-        raise QualityError(f"{size} samples", where=view.where, mend="a record needs more", code="E_NO_DATA")
+        raise QualityError(
+            f"{size} samples", where=view.where, mend="export the whole record: a cycle or more", code="E_NO_DATA"
+        )
 
 
 def finite(view: View) -> Iterator[Finding]:
@@ -30,7 +32,8 @@ def finite(view: View) -> Iterator[Finding]:
         infinite = np.abs(values) > _OVERFLOW
         if infinite.any():
             at = int(np.argmax(infinite))
-            text = f"{name} holds {np.count_nonzero(infinite)} infinite values, the first {place(view.record, at)}"
+            count = int(np.count_nonzero(infinite))
+            text = f"{name} is infinite in {count} sample{'s' * (count > 1)}, first {place(view.record, at)}"
             if name in USED:
                 mend = "export the channel again with a wider number format"
                 raise QualityError(text, where=view.where, mend=mend, code="E_NONFINITE")
@@ -46,7 +49,7 @@ def missing(view: View) -> Iterator[Finding]:
             continue
         longest, start = longest_run(absent)
         share = count / absent.size
-        text = f"{name}: {count} of {absent.size} samples missing ({100 * share:.2g} %), {longest} in a row at most"
+        text = f"{name}: {count} of {absent.size} samples missing ({100 * share:.3g} %), {longest} in a row at most"
         if name in USED and (share > MOST_MISSING or longest > MOST_IN_A_ROW):
             raise QualityError(
                 f"{text}, {place(view.record, start)}",
@@ -55,6 +58,14 @@ def missing(view: View) -> Iterator[Finding]:
                 code="E_MISSING",
             )
         yield Finding("W_MISSING", f"{text}; they are left out, not filled")
+    longest, start = longest_run(~view.record.present)
+    if longest > MOST_IN_A_ROW:
+        raise QualityError(
+            f"{longest} samples in a row of which one channel or another is missing, {place(view.record, start)}",
+            where=view.where,
+            mend=f"record again, or cut the record; up to {MOST_IN_A_ROW} in a row are taken",
+            code="E_MISSING",
+        )
 
 
 def longest_run(mask: np.ndarray) -> tuple[int, int]:

@@ -9,7 +9,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import QualityError
 from mrdamper.io.quality.presence import USED, runs_of
-from mrdamper.io.quality.view import View, place
+from mrdamper.io.quality.view import UNITS, View, place
 from mrdamper.io.record import Finding
 
 # Leading digits of the codes in use: 999, 9999, ..., 999.25, 9.91e37, and the ends of 16-, 24- and 32-bit counts.
@@ -31,8 +31,8 @@ def missing_value_codes(view: View) -> Iterator[Finding]:
         if code is not None:
             at = np.flatnonzero(values == code)
             text = (
-                f"{name} holds {code:g} {at.size} times among samples it does not fit, first "
-                f"{place(view.record, int(at[0]))}: it reads like a logger's code for a missing value"
+                f"{name} is {code:g} {UNITS[name]} in {at.size} sample{'s' * (at.size > 1)} among others it does not "
+                f"fit, first {place(view.record, int(at[0]))}: it reads like a logger's code for a missing value"
             )
             if name in USED:
                 raise QualityError(text, where=view.where, mend="leave these cells empty", code="E_SENTINEL")

@@ -6,7 +6,7 @@ no longer than a short one; counts (missing, repeated, frozen) are of all sample
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -21,6 +21,7 @@ from mrdamper.io.record import OPTIONAL, REQUIRED, Finding, Record
 MOST_SAMPLES = 40_000
 SHORTEST = 5  # samples of a segment; a slope needs as many
 _UNEXPLAINED = 0.3  # of the motion's standard deviation: more is no periodic motion
+_HOLE = 0.03  # of a period without samples: more of a loop may be missing than a line can bridge
 _FINE = 200  # samples per period that are enough for every figure here
 
 
@@ -85,8 +86,16 @@ class View:
 
     @cached_property
     def strokes(self) -> Strokes:
-        """Reversals of the motion, and the part in which they are regular."""
-        return find_strokes(self.run.time, self.run.displacement)
+        """Reversals of the motion, and the part in which they are regular: of segments, in the longest."""
+        time, x, segments = self.run.time, self.run.displacement, self.run.segments or ()
+        found = find_strokes(time, x)
+        if found.steady is not None or len(segments) < 2:
+            return found
+        start, stop = max(segments, key=lambda ends: ends[1] - ends[0])
+        inside = find_strokes(time[start:stop], x[start:stop]).steady
+        if inside is None and found.period is not None and time[stop - 1] - time[start] >= found.period:
+            inside = 0, stop - start
+        return found if inside is None else replace(found, steady=(start + inside[0], start + inside[1]))
 
     @cached_property
     def steady(self) -> Run:
@@ -125,6 +134,15 @@ class View:
         middle = max(0, thinned.size - MOST_SAMPLES) // 2
         return self._in_segments(self._there(thinned[middle : middle + MOST_SAMPLES]))
 
+    def without_leap(self, starts: Floats, stops: Floats) -> np.ndarray:
+        """(K,) mask of the stretches of time in which, ends included, no hole of the motion lies."""
+        time, period = self.run.time, self.strokes.period
+        if len(self.segments) < 2 or period is None:
+            return np.ones(starts.size, dtype=bool)
+        before = np.flatnonzero(np.diff(time) > _HOLE * period)
+        inside = (time[before] <= stops[:, None]) & (time[before + 1] >= starts[:, None])
+        return np.asarray(~inside.any(axis=1))
+
     def _in_segments(self, index: np.ndarray) -> np.ndarray:
         """Leave out segments of so few samples that they have no slope."""
         parts = np.split(index, np.searchsorted(index, [a for a, _ in self.segments[1:]]))
@@ -133,6 +151,12 @@ class View:
     def _there(self, index: np.ndarray) -> np.ndarray:
         channels = (self.record.time, self.record.displacement, self.record.force, self.record.current)
         return index[np.all([np.isfinite(c[index]) for c in channels if c is not None], axis=0)]
+
+
+UNITS = {
+    "time": "s", "displacement": "m", "force": "N", "velocity": "m/s", "acceleration": "m/s²", "current": "A",
+    "voltage": "V", "temperature": "°C",
+}  # fmt: skip
 
 
 def place(record: Record, sample: int) -> str:

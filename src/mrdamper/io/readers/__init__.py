@@ -98,11 +98,13 @@ def reader_of(source: Source) -> Reader:
     if found is None and foreign is None and (named is None or not named.binary):
         return readers["text"]()
     if found is None or (named is not None and found is not named):
-        is_now = found.title if found is not None else foreign or "something else"
+        text = found is None and foreign is None and b"\0" not in head
+        is_now = found.title if found is not None else foreign or ("text" if text else "something else")
+        mend = f"rename it to {found.suffixes[0]}" if found else "rename it to .csv" if text else "export it as CSV"
         raise source.refuse(
             "E_FORMAT",
             f"the name says {named.title if named else source.suffix or 'nothing'}, the content is {is_now}",
-            mend=f"rename it to {found.suffixes[0]}" if found else "export it as CSV",
+            mend=mend,
         )
     return found()
 

@@ -30,16 +30,7 @@ def opened(path: Path) -> Iterator[Source]:
         E_FILE, E_EMPTY, E_TRUNCATED, E_FORMAT, E_ARCHIVE, E_ARCHIVE_PATH, E_ARCHIVE_RATIO.
     """
     name = path.name
-    try:
-        if not path.is_file():
-            found = "is a folder" if path.is_dir() else "no such file"
-            raise RigFileError("E_FILE", found, file=str(path), mend="give a rig's file")
-        size = path.stat().st_size
-        file = path.open("rb")
-    except (OSError, ValueError) as error:
-        raise RigFileError(
-            "E_FILE", getattr(error, "strerror", None) or str(error), file=str(path), mend="give a rig's file"
-        ) from error
+    size, file = _at(path)
     with contextlib.ExitStack() as stack:
         stack.enter_context(file)
         source = Source(path, name, path.suffix.lower(), file, size, stack)
@@ -60,6 +51,17 @@ def opened(path: Path) -> Iterator[Source]:
             source = _unzip(source) if head.startswith(b"PK") else _gunzip(source)
             _refuse_nested(source)
         yield source
+
+
+def _at(path: Path) -> tuple[int, BinaryIO]:
+    """Size of a file, and the file opened."""
+    try:
+        found = "is a folder" if path.is_dir() else "" if path.is_file() else "no such file"
+        if not found:
+            return path.stat().st_size, path.open("rb")
+    except (OSError, ValueError) as error:
+        found = getattr(error, "strerror", None) or str(error)
+    raise RigFileError("E_FILE", found, file=str(path), mend="give the path of a rig's file")
 
 
 def is_plain_zip(source: Source) -> bool:

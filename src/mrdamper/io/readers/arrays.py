@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import importlib
+import re
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import ModuleType
 
@@ -23,6 +24,7 @@ from mrdamper.io.readers.base import (
     Source,
 )
 
+_NO_NUMBERS = {"b": "truth values", "c": "complex numbers", "V": "bytes"}
 _EARLY_END = (
     "truncat", "end of file", "eof", "unexpected end", "could not read", "not enough", "incomplete", "short",
     "requires a buffer", "out of range",
@@ -38,6 +40,7 @@ def array_table(
     label: str = "",
     title: str = "",
     fallback: bool = False,
+    constants: Mapping[str, float] | None = None,
 ) -> RawTable:
     """A table whose columns are loaded as arrays, one by one.
 
@@ -63,7 +66,7 @@ def array_table(
             raise source.refuse("E_NO_DATA", "columns without samples", mend="export the file again")
         return Content(values)
 
-    return RawTable(source, tuple(names), tuple(units), read, label=label, fallback=fallback)
+    return RawTable(source, tuple(names), tuple(units), read, label=label, fallback=fallback, constants=constants or {})
 
 
 def as_floats(source: Source, array: np.ndarray, name: str, column: int) -> Floats:
@@ -78,9 +81,10 @@ def as_floats(source: Source, array: np.ndarray, name: str, column: int) -> Floa
     kind = array.dtype.kind
     place = {"column": column + 1, "mend": "export plain numbers"}
     if kind == "O":
-        raise source.refuse("E_UNSAFE", f"column {name!r} holds objects", **place)
+        raise source.refuse("E_UNSAFE", f"column {name!r} holds objects or links, not numbers", **place)
     if kind not in "iufMm":
-        raise source.refuse("E_NUMBER", f"column {name!r} holds no numbers ({array.dtype})", **place)
+        found = _NO_NUMBERS.get(kind, "text or lists")
+        raise source.refuse("E_NUMBER", f"column {name!r} holds {found}, not plain numbers", **place)
     if array.ndim > 1:
         array = array.squeeze()
     if array.ndim != 1:
@@ -164,6 +168,7 @@ def refusing_damage(source: Source, title: str) -> Iterator[None]:
 def damaged(source: Source, title: str, why: str) -> RigFileError:
     """The refusal of a file that starts as it should and does not go on so."""
     early = any(word in why.lower() for word in _EARLY_END)
+    why = re.sub(r"'?<[^<>]*>'?( is)? ?", "", why)  # objects of the library's own
     reason = "".join(c if c.isprintable() else " " for c in (why.strip().splitlines() or ["unreadable"])[0])[:120]
     return source.refuse(
         "E_TRUNCATED" if early else "E_FORMAT", f"damaged {title} ({reason})", mend="copy or export the file again"

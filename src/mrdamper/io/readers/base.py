@@ -20,7 +20,7 @@ from mrdamper.io.record import Finding, LineNumbers
 MOST_COLUMNS = 1000
 MOST_UNPACKED = 10**9  # bytes
 MOST_RATIO = 100  # unpacked over packed
-RATIO_MATTERS_FROM = 64 * 2**20  # bytes a table of numbers may always unpack to
+RATIO_MATTERS_FROM = 24 * 2**20  # bytes a column of numbers may always unpack to: three copies fit a small file's share
 
 
 class RigFileError(InputError):
@@ -169,6 +169,10 @@ class RawTable:
         What was sniffed, in the words of `Hints`.
     fallback : bool
         Looked at only if no other table of the file holds a test.
+    constants : mapping of str to float
+        Single numbers by name that the file holds beside the columns.
+    odd : tuple of str
+        One a column where it is known: what stands in it instead of numbers, else empty.
     """
 
     source: Source
@@ -179,6 +183,8 @@ class RawTable:
     label: str = ""
     form: Mapping[str, str | int] = field(default_factory=dict)
     fallback: bool = False
+    constants: Mapping[str, float] = field(default_factory=dict)
+    odd: tuple[str, ...] = ()
 
 
 class Reader(ABC):
@@ -190,6 +196,10 @@ class Reader(ABC):
     binary: ClassVar[bool] = True
     library: ClassVar[str] = ""  # that damaged files can crash or hang: read in a process of its own
     seconds_per_byte: ClassVar[float] = 4e-7  # it may take there
+
+    def warm_up(self) -> None:
+        """Start what the library starts once, such as threads, before a file's share of memory is counted."""
+        return
 
     @abstractmethod
     def recognises(self, source: Source) -> bool:

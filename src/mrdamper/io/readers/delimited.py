@@ -61,6 +61,7 @@ class DelimitedText(Reader):
             layout.header_line,
             f"block {index + 1}" if count > 1 else "",
             _form(stream, layout),
+            odd=layout.odd,
         )
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.io.readers.arrays import array_table, check_unpacked, expand, pick, refusing_damage
-from mrdamper.io.readers.base import Hints, RawTable, Reader, Source
+from mrdamper.io.readers.base import MOST_COLUMNS, Hints, RawTable, Reader, Source
 from mrdamper.io.readers.hdf5 import HDF5_MARK, hdf5_tables
 
 _NUMERIC = ("double", "single", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
@@ -46,9 +46,10 @@ class Matlab(Reader):
                 source.file, variable_names=wanted, struct_as_record=True, verify_compressed_data_integrity=True
             )
         tables: dict[str, dict[str, np.ndarray]] = {}
+        single: dict[str, dict[str, float]] = {}
         for name in wanted:
             if name in values:
-                _gather(values[name], name, "", tables, 0)
+                _gather(values[name], name, "", tables, single)
         others = [name for name, _, kind in variables if kind in _OBJECTS]
         if not tables:
             code, found = (
@@ -57,10 +58,15 @@ class Matlab(Reader):
             raise source.refuse(code, found, mend="save the channels as arrays of numbers")
         for name in others:
             tables.setdefault("", {})[name] = np.empty(2, dtype=object)  # never loaded; refused if it is asked for
-        return [_table(source, columns, label, self.title) for label, columns in tables.items()]
+        return [
+            _table(source, columns, label, self.title, {**single.get("", {}), **single.get(label, {})})
+            for label, columns in tables.items()
+        ]
 
 
-def _table(source: Source, columns: dict[str, np.ndarray], label: str, title: str) -> RawTable:
+def _table(
+    source: Source, columns: dict[str, np.ndarray], label: str, title: str, constants: dict[str, float]
+) -> RawTable:
     found = [(name, array, part) for key, array in columns.items() for name, part in expand(key, array.shape)]
     return array_table(
         source,
@@ -69,20 +75,28 @@ def _table(source: Source, columns: dict[str, np.ndarray], label: str, title: st
         lambda column: pick(found[column][1], found[column][2]),
         label=label,
         title=title,
+        constants=constants,
     )
 
 
-def _gather(value: Any, name: str, label: str, tables: dict[str, dict[str, np.ndarray]], depth: int) -> None:
-    """Collect arrays by name; the fields of a struct are a table of their own."""
+def _gather(
+    value: Any,
+    name: str,
+    label: str,
+    tables: dict[str, dict[str, np.ndarray]],
+    single: dict[str, dict[str, float]],
+    depth: int = 0,
+) -> None:
+    """Collect arrays and single numbers by name; the fields of a struct are a table of their own."""
     array = np.asarray(value)
     if array.dtype.names and array.size == 1 and depth < _DEEPEST:
         inner = f"{label}_{name}" if label else name
         for field in array.dtype.names:
-            _gather(array.reshape(-1)[0][field], field, inner, tables, depth + 1)
-    elif array.dtype.kind in "iuf" and array.size > 1:
-        tables.setdefault(label, {})[name] = array
-    elif array.dtype.kind == "O" and array.size > 1:
-        tables.setdefault(label, {})[name] = array  # refused if it is asked for
+            _gather(array.reshape(-1)[0][field], field, inner, tables, single, depth + 1)
+    elif array.dtype.kind in "iufcO" and array.size > 1:
+        tables.setdefault(label, {})[name] = array  # objects and complex numbers are refused if they are asked for
+    elif array.dtype.kind in "iuf" and array.size == 1 and len(single) < MOST_COLUMNS:
+        single.setdefault(label, {})[name] = float(array.reshape(-1)[0])
 
 
 def _is_version_4(head: bytes) -> bool:

@@ -8,7 +8,9 @@ import numpy as np
 
 from mrdamper.io.readers.archive import check_sizes, is_arrays, zipped_names
 from mrdamper.io.readers.arrays import array_table, damaged, expand, pick, refusing_damage
-from mrdamper.io.readers.base import Hints, RawTable, Reader, Source
+from mrdamper.io.readers.base import MOST_COLUMNS, Hints, RawTable, Reader, Source
+
+_Column = tuple[str, str, tuple[str, int | str | None]]
 
 
 class Npz(Reader):
@@ -30,7 +32,9 @@ class Npz(Reader):
     def tables(self, source: Source, hints: Hints) -> list[RawTable]:
         """The arrays as columns; a matrix gives numbered ones, a structured array its fields."""
         with refusing_damage(source, self.title):
-            names, places = _columns(source)
+            columns, single = _columns(source)
+            constants = _numbers(source, single[:MOST_COLUMNS])
+        names, units, places = [c[0] for c in columns], [c[1] for c in columns], [c[2] for c in columns]
 
         def load(column: int) -> np.ndarray:
             member, part = places[column]
@@ -39,17 +43,25 @@ class Npz(Reader):
                 array = archive[member]
             return array[part] if isinstance(part, str) else pick(array, part)
 
-        return [array_table(source, names, [""] * len(names), load, title=self.title)]
+        return [array_table(source, names, units, load, title=self.title, constants=constants)]
 
 
-def _columns(source: Source) -> tuple[list[str], list[tuple[str, int | str | None]]]:
+def _numbers(source: Source, names: list[str]) -> dict[str, float]:
+    source.file.seek(0)
+    with np.load(source.file, allow_pickle=False) as archive:
+        return {name: float(archive[name].reshape(-1)[0]) for name in names}
+
+
+def _columns(source: Source) -> tuple[list[_Column], list[str]]:
+    """Name, unit and place of every column, and the arrays of one number, by the headers of the arrays alone."""
     try:
         archive = zipfile.ZipFile(source.file)
     except (zipfile.BadZipFile, NotImplementedError, OSError, ValueError) as error:
         raise damaged(source, Npz.title, "end of file not found") from error
     with archive:
         check_sizes(source, archive.infolist())
-        found: list[tuple[str, tuple[str, int | str | None]]] = []
+        found: list[_Column] = []
+        single: list[str] = []
         for member in archive.infolist():
             name = member.filename.removesuffix(".npy")
             with archive.open(member) as stream:
@@ -64,9 +76,12 @@ def _columns(source: Source) -> tuple[list[str], list[tuple[str, int | str | Non
             if int(np.prod(shape, dtype=object)) * dtype.itemsize > member.file_size:
                 raise damaged(source, Npz.title, f"array {name!r} is incomplete")
             if dtype.names:
-                found += [(field, (name, field)) for field in dtype.names]
-            elif dtype.kind in "iufMm" and np.prod(shape, dtype=object) > 1:
-                found += [(column, (name, part)) for column, part in expand(name, shape)]
+                found += [(field, "", (name, field)) for field in dtype.names]
+            elif np.prod(shape, dtype=object) > 1:
+                unit = "s" if dtype.kind in "Mm" else ""
+                found += [(column, unit, (name, part)) for column, part in expand(name, shape)]
+            elif dtype.kind in "iuf" and np.prod(shape, dtype=object) == 1:
+                single.append(name)
     if not found:
         raise source.refuse("E_NO_DATA", "no array of numbers", mend="save the channels as arrays")
-    return [name for name, _ in found], [place for _, place in found]
+    return found, single

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+from typing import ClassVar
+
 import numpy as np
 
 from mrdamper.io.readers.arrays import array_table, check_unpacked, damaged, refusing_damage
@@ -17,6 +20,18 @@ class Parquet(Reader):
     title = "Parquet"
     suffixes = (".parquet", ".pq")
     library = "polars"
+    _warm: ClassVar[bool] = False
+
+    def warm_up(self) -> None:
+        """Start the threads and their allocators."""
+        import polars as pl
+
+        if not self._warm:
+            content = io.BytesIO()
+            pl.DataFrame({"x": [0.0]}).write_parquet(content)
+            pl.scan_parquet(content.getvalue()).select(pl.len()).collect()
+            pl.read_parquet(content.getvalue())
+            Parquet._warm = True
 
     def recognises(self, source: Source) -> bool:
         """By the mark at the start."""
@@ -60,4 +75,4 @@ def _plain(values) -> np.ndarray:
         return np.empty(values.len(), dtype=object)
     if kind == pl.Null:
         return np.full(values.len(), np.nan)
-    return np.empty(values.len(), dtype="U1")  # text, truth values, lists: no numbers
+    return np.empty(values.len(), dtype=bool if kind == pl.Boolean else "U1")  # no numbers: never asked for by name

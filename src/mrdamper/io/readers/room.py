@@ -25,11 +25,11 @@ from typing import Any
 import numpy as np
 
 from mrdamper.errors import MissingExtraError
-from mrdamper.io.readers.base import Content, Hints, RawTable, Reader, RigFileError, Source
+from mrdamper.io.readers.base import MOST_RATIO, Content, Hints, RawTable, Reader, RigFileError, Source
 from mrdamper.io.record import Finding, LineNumbers
 
-_SECONDS = 0.5  # processor time of the child for the smallest file
-_BYTES, _BYTES_PER_BYTE = 400 * 2**20, 30  # address space of the child, mostly threads' stacks
+_SECONDS = 0.25  # processor time of the child for the smallest file
+_BYTES, _BYTES_PER_BYTE = 96 * 2**20, 3 * MOST_RATIO  # memory the child may write to beyond what its library holds
 _GLANCE, _GLANCES = 0.15, 4  # seconds between looks at a silent child, looks at which it sleeps until it is ended
 _PATIENCE = 30  # real time over processor time, on a loaded machine
 _START = (
@@ -102,7 +102,7 @@ class _Asked:
 
         return RawTable(
             self._source, tuple(table["names"]), tuple(table["units"]), read,
-            table["line"], table["label"], table["form"], table["fallback"],
+            table["line"], table["label"], table["form"], table["fallback"], table["constants"], tuple(table["odd"]),
         )  # fmt: skip
 
 

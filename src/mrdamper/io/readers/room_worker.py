@@ -52,6 +52,7 @@ def _library(name: str) -> Reader:
     reader = all_readers()[name]()
     _limit(None)
     load(reader.library, reader.title)
+    reader.warm_up()
     return reader
 
 
@@ -66,20 +67,24 @@ def _open(request: dict[str, Any], keep: ExitStack) -> list[RawTable]:
 
 
 def _limit(seconds: float | None, size: float = 0) -> None:
-    """From here on, this much processor time and memory; beyond, the system ends the process. None lifts it."""
+    """From here on, this much processor time and memory; beyond, the system ends the process. None lifts it.
+
+    Memory is what is written to (RLIMIT_DATA). Address space would be the wrong measure:
+    allocators of many threads reserve half a gigabyte of it and use a tenth.
+    """
     if not hasattr(signal, "setitimer"):
         return
     import resource
 
     signal.signal(signal.SIGPROF, signal.SIG_DFL)
     signal.setitimer(signal.ITIMER_PROF, seconds or 0.0)
-    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
-    statm = Path("/proc/self/statm")
-    if seconds is None or not statm.exists():
-        resource.setrlimit(resource.RLIMIT_AS, (hard, hard))
+    hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
+    status = Path("/proc/self/status")
+    if seconds is None or not status.exists():
+        resource.setrlimit(resource.RLIMIT_DATA, (hard, hard))
         return
-    now = int(statm.read_text().split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (now + int(size), hard))
+    now = next(int(line.split()[1]) * 1024 for line in status.read_text().splitlines() if line.startswith("VmData"))
+    resource.setrlimit(resource.RLIMIT_DATA, (now + int(size), hard))
 
 
 def _send(replies: BinaryIO, answer: dict[str, Any]) -> None:
@@ -103,4 +108,7 @@ def _send_columns(replies: BinaryIO, table: RawTable, columns: list[int]) -> Non
 
 
 def _described(table: RawTable) -> dict[str, Any]:
-    return {name: getattr(table, name) for name in ("names", "units", "line", "label", "form", "fallback")}
+    return {
+        name: getattr(table, name)
+        for name in ("names", "units", "line", "label", "form", "fallback", "constants", "odd")
+    }

@@ -71,6 +71,8 @@ def _table(source: Source, group: str, channels: list[Any], title: str) -> RawTa
 
 
 def _unit(channel: Any) -> str:
+    if getattr(channel.dtype, "kind", "") in "Mm":
+        return "s"
     return next((str(channel.properties[n]) for n in _UNIT_NAMES if channel.properties.get(n)), "")
 
 

@@ -40,9 +40,10 @@ class Workbook(Reader):
         """One table a sheet that holds one."""
         try:
             with zipfile.ZipFile(source.file) as archive:
-                check_sizes(source, archive.infolist())
+                members = archive.infolist()
         except (zipfile.BadZipFile, NotImplementedError, OSError, ValueError) as error:
             raise damaged(source, self.title, "end of file not found") from error
+        check_sizes(source, members)
         with refusing_damage(source, self.title):
             sheets = _sheets(source, hints)
         form = replace(hints, separator="\t", encoding="utf-8", decimal=None)

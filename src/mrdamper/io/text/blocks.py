@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from dataclasses import dataclass
 
-from mrdamper.io.text.layout import Layout, is_comment, split
+from mrdamper.io.text.layout import Layout, is_comment, split, units_in
 from mrdamper.io.text.stream import TextStream
 from mrdamper.io.text.tokens import looks_numeric
 
@@ -39,17 +39,41 @@ def find_blocks(stream: TextStream, layout: Layout, start: int, stop: int) -> li
             if chunk[line_start:line_end].strip() == header.strip():
                 before = (tail + chunk[:line_start])[-_LOOK_BACK:]
                 blocks.append(Block(begin, at + line_start - _remarks(before, stream, layout), begin_line))
-                skipped = layout.units_line - layout.header_line if layout.units_line and layout.header_line else 0
-                end = line_end
-                for _ in range(max(0, skipped)):
-                    end = chunk.find(b"\n", end) + 1 or len(chunk)
-                begin, begin_line = at + end, line + chunk.count(b"\n", 0, end)
+                header_line = line + chunk.count(b"\n", 0, line_start)
+                size, skipped = _units_below(stream, layout, at + line_end, header_line)
+                begin, begin_line = at + line_end + size, header_line + 1 + skipped
             found = chunk.find(header, line_end)
         line += chunk.count(b"\n")
         at += len(chunk)
         tail = chunk[-_LOOK_BACK:]
     blocks.append(Block(begin, stop, begin_line))
     return [block for block in blocks if block.stop > block.start]
+
+
+def _units_below(stream: TextStream, layout: Layout, start: int, header_line: int) -> tuple[int, int]:
+    """Bytes and lines between a repeated header and its rows: those of units, which must be the file's.
+
+    Raises
+    ------
+    RigFileError
+        E_AMBIGUOUS if a later block is in other units.
+    """
+    usual = layout.units_line - layout.header_line if layout.units_line and layout.header_line else 0
+    size = lines = 0
+    for raw in stream.lines_at(start, max(0, usual)):
+        text = stream.decode(raw).rstrip("\r\n")
+        if _is_data(text, layout):
+            break
+        units = units_in(text, layout)
+        if units and units != layout.units:
+            raise stream.source.refuse(
+                "E_AMBIGUOUS",
+                f"the block from here on is in {', '.join(units)}, the first is in {', '.join(layout.units)}",
+                line=header_line,
+                mend="split the file here, or export all blocks in one set of units",
+            )
+        size, lines = size + len(raw), lines + 1
+    return size, lines
 
 
 def _remarks(before: bytes, stream: TextStream, layout: Layout) -> int:

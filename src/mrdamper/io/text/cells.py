@@ -113,7 +113,9 @@ def field_count(form: Form, found: int, line: int, final: bool) -> RigFileError:
         "E_FIELD_COUNT",
         f"{found} fields where the other rows have {width}",
         line=line,
-        mend="are decimal commas mixed with commas between fields?" if comma else "correct or remove this line",
+        mend="correct this line; numbers with decimal commas need semicolons between the fields"
+        if comma
+        else "correct or remove this line",
     )
 
 

@@ -23,6 +23,7 @@ _SEPARATORS = (";", "\t", ",", "|", SPACES)
 _COMMENT = re.compile(r"^\s*(#(?!N/A|REF!|VALUE!|DIV/0|NAME\?|NULL!|NUM!)|%|//)+")  # a sheet's errors are cells
 _MARKS = frozenset("#%/")
 _SAMPLE = 60  # rows looked at
+_STRAY = 0.1  # of the sampled numbers: fewer with the other decimal mark are single bad cells
 _GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 
 
@@ -44,6 +45,8 @@ class Layout:
         Whether every row ends with a separator.
     header : str
         The line of names as it stands, to find it again where it is repeated.
+    odd : tuple of str
+        One a column: a sampled cell of a column of kind "text", else empty.
     """
 
     separator: str
@@ -56,6 +59,7 @@ class Layout:
     data_line: int
     trailing: bool
     header: str = ""
+    odd: tuple[str, ...] = ()
 
     @property
     def width(self) -> int:
@@ -92,17 +96,20 @@ def find_layout(lines: Sequence[str], source: Source, hints: Hints) -> Layout:
     if len(names) != width:
         raise _mismatch(source, separator, len(names), width, first, lines)
     units = _cells(lines[unit_row], separator, width) if unit_row is not None else ("",) * width
+    columns = [[row[i] for row in rows if len(row) > i] for i in range(width)]
+    kinds: tuple[Kind, ...] = tuple(_kind(column) for column in columns)
     return Layout(
         separator,
         decimal,
         tuple(name.strip() for name in names),
         tuple(_unbracket(unit) for unit in units),
-        tuple(_kind([row[i] for row in rows if len(row) > i]) for i in range(width)),
+        kinds,
         None if header is None else header + 1,
         None if unit_row is None else unit_row + 1,
         first + 1,
         trailing,
         lines[header] if header is not None and not is_comment(lines[header]) else "",
+        tuple(next(filter(None, c), "") if k == "text" else "" for c, k in zip(columns, kinds, strict=True)),
     )
 
 
@@ -121,6 +128,12 @@ def split(line: str, separator: str) -> list[str]:
     else:
         cells = line.split(separator)
     return [cell.strip(" \t") for cell in cells]
+
+
+def units_in(line: str, layout: Layout) -> tuple[str, ...]:
+    """The units a line states, one a column; empty if it is no row of units."""
+    cells = _cells(line, layout.separator, layout.width)
+    return tuple(map(_unbracket, cells)) if len(cells) == layout.width and _is_units(cells) else ()
 
 
 def is_comment(line: str) -> bool:
@@ -143,7 +156,9 @@ def _separator(lines: Sequence[str], source: Source) -> str:
     """The one under which the last lines at hand split into most numbers, evenly."""
     content = [line for _, line in _content(lines)]
     if not content:
-        raise source.refuse("E_NO_DATA", "no line holds data", mend="export the file again")
+        raise source.refuse(
+            "E_NO_DATA", f"only remarks in the first {len(lines)} lines", mend="remove them, or export the data again"
+        )
     best, most = "", 0.0
     for separator in _SEPARATORS:
         score = _evenness(content[-_SAMPLE:], separator)
@@ -180,9 +195,12 @@ def _first_row(lines: Sequence[str], separator: str, source: Source, hints: Hint
     content = [(i, line) for i, line in _content(lines) if i >= above]
     sample = [_try_split(line, separator) for _, line in content[-_SAMPLE:]]
     rows = [cells for cells in sample if _is_row(cells)]
-    if not rows:
+    named = any(_names_columns(line, mark) for _, line in content[-_SAMPLE:] for mark in _SEPARATORS[:-1])
+    if not rows or (len(rows) == 1 and len(content) > 1 and named and not _is_row(sample[-1])):
         raise source.refuse(
-            "E_NO_DATA", "a header without data" if content else "no data", mend="export the file again"
+            "E_NO_DATA",
+            "names of columns, but no row of numbers below them" if named else "no row of numbers",
+            mend="export the file again, with its data",
         )
     width = Counter(len(cells) for cells in rows).most_common(1)[0][0]
     first, cells = next(
@@ -209,6 +227,11 @@ def _decimal(rows: Sequence[Sequence[str]], separator: str, source: Source, firs
     numbers = [c for row in rows for c in row if c and looks_numeric(c) and stamp(c) is None]
     dots = [c for c in numbers if "." in c and "," not in c]
     commas = [c for c in numbers if "," in c and "." not in c]
+    few = _STRAY * (len(dots) + len(commas))
+    if len(commas) <= few:
+        return "."  # the strict reader refuses the few others, with their place
+    if len(dots) <= few:
+        dots = []
     if dots and commas:
         raise source.refuse(
             "E_AMBIGUOUS",
@@ -251,8 +274,9 @@ def _header_lines(
         if _is_units(_cells(lines[last], separator, width)):
             return (fitting[-2] if len(fitting) > 1 else None), last
         return last, (hints.units_line - 1 if hints.units_line else None)
-    if plain and not hints.names and _names_columns(lines[plain[-1]], separator):
-        raise _mismatch(source, separator, len(_fields(lines[plain[-1]], separator, width)), width, first, lines)
+    naming = [i for i in plain if _names_columns(lines[i], separator)]
+    if naming and not hints.names:
+        raise _mismatch(source, separator, len(_fields(lines[naming[-1]], separator, width)), width, first, lines)
     return None, (hints.units_line - 1 if hints.units_line else None)
 
 

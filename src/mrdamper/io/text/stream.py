@@ -86,6 +86,14 @@ class TextStream:
         if rest:
             yield rest
 
+    def lines_at(self, start: int, count: int) -> list[bytes]:
+        """So many lines from a place on, with their ends; reading goes on afterwards where it stood."""
+        before = self.file.tell()
+        self.file.seek(start)
+        lines = [self.file.readline(LONGEST_LINE) for _ in range(count if start < self.stop else 0)]
+        self.file.seek(before)
+        return lines
+
     def check(self, block: bytes, line: int) -> None:
         """Refuse bytes no text holds; `line` is the line the block starts at."""
         strange = block.translate(None, _TEXT)

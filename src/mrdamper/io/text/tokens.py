@@ -20,7 +20,8 @@ NUMBER = {
 MISSING = frozenset(("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "-nan", "+nan", "nan(ind)"))
 _INFINITE = re.compile(r"[+-]?(?:inf(?:inity)?|1\.#inf|∞)", re.IGNORECASE)
 _STAMP = re.compile(
-    r"(?:([0-9]{4})-([0-9]{2})-([0-9]{2})[T ])?([0-9]{2}):([0-9]{2}):([0-9]{2})(?:[.,]([0-9]{1,9}))?"
+    r"(?:(?:([0-9]{4})([-/])([0-9]{2})\2([0-9]{2})|([0-9]{2})\.([0-9]{2})\.([0-9]{4}))[T ])?"
+    r"([0-9]{2}):([0-9]{2}):([0-9]{2})(?:[.,]([0-9]{1,9}))?"
     r"(Z|[+-][0-9]{2}:?[0-9]{2})?",
     re.IGNORECASE,
 )
@@ -52,13 +53,16 @@ def looks_numeric(token: str) -> bool:
 def stamp(token: str) -> tuple[int, bool] | None:
     """Nanoseconds of an ISO-8601 time stamp or a clock time, and whether it states its zone.
 
+    Dates also as 2024/03/31 and 31.03.2024, which mean one thing everywhere; 03/04/2024 does not.
     Integers, as doubles would round the nanoseconds of a date. A zone's offset is taken
     off, so that the change to summer time does not bend a record.
     """
     match = _STAMP.fullmatch(token)
     if match is None:
         return None
-    year, month, day, hour, minute, second, fraction, zone = match.groups()
+    year, _, month, day, *dotted, hour, minute, second, fraction, zone = match.groups()
+    if dotted[0]:
+        day, month, year = dotted
     if int(hour) > 23 or int(minute) > 59 or int(second) > 59:
         return None
     days = _day(year, month, day) if year else 0
