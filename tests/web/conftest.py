@@ -17,7 +17,8 @@ from mrdamper.web import create_app
 HOST = "bench.test:1"
 ORIGIN = f"http://{HOST}"
 CHROMIUM = Path("/usr/bin/chromium")
-SCREENSHOTS = Path(__file__).parents[2] / "screenshots"
+AUDIT = (Path(__file__).parent / "audit.js").read_text(encoding="utf-8")
+SCREENSHOTS = Path(__file__).parents[2] / "artefacts"
 
 
 @pytest.fixture
@@ -96,6 +97,7 @@ def page(browser, address):
     complaints = []
     page.on("console", lambda m: complaints.append(m.text) if m.type in ("error", "warning") else None)
     page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("dialog", lambda dialog: complaints.append(f"a script ran: {dialog.message}"))
     page.complaints = complaints
     page.goto(address)
     page.locator("html[data-ready]").wait_for()
@@ -106,11 +108,12 @@ def page(browser, address):
 
 @pytest.fixture
 def shoot():
-    """Keep a picture of the page, in a folder that git ignores."""
+    """Keep a picture of the page, in a folder that git ignores, and check what holds for any picture."""
 
     def shoot(page, name):
         SCREENSHOTS.mkdir(exist_ok=True)
         page.screenshot(path=SCREENSHOTS / f"{name}.png")
+        assert page.evaluate(AUDIT) == []
 
     return shoot
 

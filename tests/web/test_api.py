@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 import struct
 import time
 import zipfile
@@ -22,6 +23,7 @@ from mrdamper.joint import JointProblem
 from mrdamper.loop_analysis import analyse_loop
 from mrdamper.modified import fit_modified
 from mrdamper.web.frames import frame
+from mrdamper.web.tasks import export_name
 
 SCREEN = 1e-6  # arrays travel as 32-bit floats: 6e-8 of each value, and sums of two
 
@@ -212,7 +214,7 @@ def wait(client, session, job):
 
 
 def test_a_study_leaves_dampers_and_files(client, app, session, small_rig):
-    from mrdamper.web.intake import Intake
+    from mrdamper.web.drops import Intake
 
     next(iter(app.state.sessions)).put(Intake(small_rig, "drop"))
     report = wait(client, session, client.post(f"{session}/study").json())
@@ -230,7 +232,7 @@ def test_a_study_leaves_dampers_and_files(client, app, session, small_rig):
 
 
 def test_identified_values_are_those_of_identify(client, app, session, small_rig):
-    from mrdamper.web.intake import Intake
+    from mrdamper.web.drops import Intake
 
     next(iter(app.state.sessions)).put(Intake(small_rig, "drop"))
     choice = {"rig": 0, "model": "bingham", "method": "projection", "runs": ["run0", "run1", "run2"]}
@@ -254,3 +256,17 @@ def test_input_a_model_cannot_use_is_told_with_its_remedy(client, bench):
     assert report["state"] == "refused"
     assert report["error"]["code"] == "E_NAME"
     assert "bingham" in report["error"]["mend"]
+
+
+def test_downloads_have_harmless_names(client, bench, joint):
+    key = put_on(client, bench, replace(joint, rig='"\r\nX-Evil: <b>'))
+    report = wait(client, bench, client.post(f"{bench}/dampers/{key}/export/latex", json={}).json())
+    answer = client.get(f"{bench}/exported/{report['answer']['exported']}")
+    assert "x-evil" not in answer.headers
+    assert answer.headers["content-disposition"] == 'attachment; filename="x_evil_b.tex"'
+    assert answer.headers["x-content-type-options"] == "nosniff"
+
+
+@given(st.text())
+def test_any_rig_gives_files_a_name(rig):
+    assert re.fullmatch(r"[a-z_][a-z0-9_]*", export_name(rig), re.ASCII)

@@ -8,7 +8,8 @@ from web.rig_files import csv_of
 
 from mrdamper.errors import InputError
 from mrdamper.io.dataset import save_dataset
-from mrdamper.web.intake import FILE_COUNT_LIMIT, Drop, DropError, NothingTakenError, bundled, read_drop
+from mrdamper.web.drops import FILE_COUNT_LIMIT, Drop, DropError, Intake, NothingTakenError
+from mrdamper.web.intake import bundled, read_drop
 
 
 @pytest.fixture
@@ -33,7 +34,7 @@ def test_a_dataset_folder_comes_back_as_it_was(drop, small_rig, tmp_path):
 
 
 def test_rig_files_are_read_with_the_current_of_their_names(drop, small_rig):
-    runs = list(small_rig)[:3]
+    runs = sorted(list(small_rig)[:3], key=lambda run: run.id)  # files are taken in the order of their names
     for run in runs:
         put(drop, f"{run.id}.csv", csv_of(run))
     found = read_drop(drop)
@@ -41,7 +42,7 @@ def test_rig_files_are_read_with_the_current_of_their_names(drop, small_rig):
     for there, here in zip(found.dataset, runs, strict=True):
         # Written with six figures behind the point of millimetres.
         np.testing.assert_allclose(there.displacement, here.displacement, atol=1e-9)
-    assert {v.state for v in found.verdicts} <= {"taken", "noticed"}
+    assert {v.state for v in found.verdicts} <= {"taken", "noted"}
 
 
 def test_the_profile_shown_reads_the_same(drop, small_rig):
@@ -93,7 +94,7 @@ def test_what_cannot_be_read_is_refused_by_name(drop, files, code):
 
 
 def test_too_many_files_are_refused(drop):
-    drop.names.update({drop.folder / str(i): "x" for i in range(FILE_COUNT_LIMIT)})
+    drop.places = FILE_COUNT_LIMIT
     with pytest.raises(DropError, match=str(FILE_COUNT_LIMIT)):
         drop.place("one more.csv")
 
@@ -103,8 +104,6 @@ def test_the_bundled_tests_are_read_once():
 
 
 def test_runs_that_do_not_move_are_shown_and_not_used(client, app, session, small_rig):
-    from mrdamper.web.intake import Intake
-
     one = next(iter(small_rig))
     still = replace(one, id="still", displacement=np.zeros(one.time.size))
     next(iter(app.state.sessions)).put(Intake(small_rig.only([*small_rig, still]), "drop"))
@@ -116,3 +115,28 @@ def test_runs_that_do_not_move_are_shown_and_not_used(client, app, session, smal
     verdict = client.get(f"{session}/data/rigs/0/quality").json()[shown["key"]]
     assert verdict["verdict"] == "refused"
     assert verdict["findings"][0]["code"] == "E_NO_EXCITATION"
+
+
+def test_a_refused_file_is_mended_while_the_others_stay(drop, small_rig):
+    first, second = list(small_rig)[:2]
+    reversed_force = replace(second, force=-second.force)
+    put(drop, f"day 1/{first.id}.csv", csv_of(first))
+    put(drop, f"day 2/{second.id}.csv", csv_of(reversed_force))
+    found = read_drop(drop)
+    assert (found.verdicts[0].name, found.verdicts[0].state) == (f"day 2/{second.id}.csv", "refused")
+    assert found.verdicts[0].findings[0][0] == "E_DISSIPATION_SIGN"
+    before, force, after = found.profile.partition("[channels.force]")
+    mended = read_drop(drop, before + force + after.replace("sign = 1", "sign = -1", 1), refused_only=True)
+    assert {v.state for v in mended.verdicts} <= {"taken", "noted"}
+    assert len(mended.dataset) == 2
+    for run, there in zip((first, second), mended.dataset, strict=True):
+        assert np.corrcoef(run.force, there.force)[0, 1] > 0.99
+
+
+def test_files_of_one_name_in_two_folders_are_two_runs(drop, small_rig):
+    run = next(iter(small_rig))
+    for day in (1, 2):
+        put(drop, f"day {day}/{run.id}.csv", csv_of(run))
+    found = read_drop(drop)
+    assert len({r.id for r in found.dataset}) == 2
+    assert [v.name for v in found.verdicts] == [f"day 1/{run.id}.csv", f"day 2/{run.id}.csv"]

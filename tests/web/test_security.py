@@ -1,12 +1,14 @@
 """Who is answered, and what every answer forbids."""
 
+import re
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from starlette.datastructures import Headers
 
-from mrdamper.web.intake import FILE_LIMIT
-from mrdamper.web.security import HEADERS, Guard
+from mrdamper.web.drops import FILE_LIMIT
+from mrdamper.web.security import FORM_LIMIT, HEADERS, Guard
 
 GUARD = Guard(None, ["127.0.0.1:8765", "localhost:8765"])
 GOOD = {"host": "127.0.0.1:8765", "origin": "http://127.0.0.1:8765"}
@@ -163,3 +165,28 @@ def test_a_fault_of_ours_shows_no_inside(client, session, monkeypatch, capsys):
     assert "division" not in answer.text
     assert "division" in capsys.readouterr().err
     assert answer.headers["content-security-policy"] == HEADERS["Content-Security-Policy"]
+
+
+def test_a_question_too_long_is_declined(client, session):
+    answer = client.post(f"{session}/dampers", content=b"x" * (FORM_LIMIT + 1))
+    assert answer.status_code == 413
+    assert answer.json()["code"] == "E_413"
+
+
+def test_a_file_that_broke_off_does_not_stop_the_next(client, session):
+    drop = client.post(f"{session}/drops").json()["drop"]
+    path = f"{session}/drops/{drop}/files"
+    client.put(f"{path}?name=a.csv", content=b"1\n")
+    assert client.put(f"{path}?name=big.csv", content=bytes(FILE_LIMIT + 1)).status_code == 413
+    assert client.put(f"{path}?name=b.csv", content=b"1\n").status_code == 200
+    assert client.put(f"{path}?name=c.csv", content=b"1\n").status_code == 200
+
+
+def test_the_page_announces_its_modules_and_no_more(client):
+    text = client.get("/").text
+    announced = re.findall(r'rel="modulepreload" href="([^"]+)"', text)
+    assert "/static/js/main.js" in announced
+    for path in announced:
+        answer = client.get(path)
+        assert answer.status_code == 200
+        assert answer.headers["content-type"].startswith("text/javascript")

@@ -2,8 +2,12 @@
 
 import json
 import os
+import signal
+import subprocess
+import sys
 import time
 import urllib.request
+from pathlib import Path
 
 import pytest
 from web import slow_tasks
@@ -98,3 +102,63 @@ def test_progress_streams_as_server_sent_events(address):
     shares = [report["share"] for report in reports]
     assert shares == sorted(shares)
     ask("DELETE", session).close()
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="needs signals")
+def test_a_worker_that_is_killed_is_told_from_our_faults(capsys):
+    job = run(slow_tasks.count, 1000)
+    while job.share == 0:
+        time.sleep(0.01)
+    os.kill(job._process.pid, signal.SIGKILL)
+    assert ended(job).state == "failed"
+    assert job.error["code"] == "E_WORKER"
+    assert "signal 9" in job.error["found"]
+    assert capsys.readouterr().out == ""
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="looks into /proc for what is left running")
+def test_workers_end_with_a_bench_that_was_killed(tmp_path):
+    """Whatever a worker is doing: it waits for a child here, and would never look at its pipe again."""
+    code = (
+        "from web import slow_tasks; from mrdamper.web.work import Job; import sys, time\n"
+        "if __name__ == '__main__':\n"
+        "    Job('job1', 'test', slow_tasks.sleep_with_child, (sys.argv[1],), lambda r: {}).start(); time.sleep(60)\n"
+    )
+    script = tmp_path / "bench.py"
+    script.write_text(code)
+    tests = Path(__file__).parents[1]
+    bench = subprocess.Popen([sys.executable, str(script), str(tmp_path)], env={**os.environ, "PYTHONPATH": str(tests)})
+    note = tmp_path / "child"
+    while not (note.is_file() and note.read_text()):
+        time.sleep(0.01)
+    bench.kill()
+    bench.wait()
+    child = int(note.read_text())
+    deadline = time.monotonic() + 20
+    while alive(child) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert not alive(child)
+
+
+def test_a_page_loaded_again_finds_the_work(client, bench):
+    choice = {"rig": 1, "model": "bingham", "method": "projection"}
+    job = client.post(f"{bench}/identify", json=choice).json()
+    deadline = time.monotonic() + 60
+    while (found := client.get(f"{bench}/jobs").json())[-1]["state"] != "done" and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert [(report["key"], report["state"]) for report in found] == [(job["key"], "done")]
+    assert found[0]["answer"]["runs"]
+    client.post(f"{bench}/bundled")  # other data: what was found of these is gone
+    assert client.get(f"{bench}/jobs").json() == []
+
+
+def test_work_of_one_kind_takes_the_place_of_the_same_kind_only(client, app, bench):
+    study, first = (
+        client.post(f"{bench}/{path}", json=body).json()
+        for path, body in (("study", None), ("identify", {"rig": 0, "model": "bouc-wen", "method": "projection"}))
+    )
+    second = client.post(f"{bench}/identify", json={"rig": 0, "model": "bingham", "method": "projection"}).json()
+    session = next(iter(app.state.sessions))
+    assert {job.key for job in session.newest.values()} == {study["key"], second["key"]}
+    assert session.newest["study"]._stop.is_set() is False
+    assert ended(session.jobs[first["key"]]).state == "cancelled"

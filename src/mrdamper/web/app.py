@@ -13,23 +13,24 @@ from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import FileResponse, JSONResponse
-from starlette.staticfiles import StaticFiles
+from fastapi.responses import HTMLResponse, JSONResponse, Response
+from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mrdamper.errors import InputError, MissingExtraError
 from mrdamper.web.api import routers
-from mrdamper.web.intake import NothingTakenError
+from mrdamper.web.drops import NothingTakenError
+from mrdamper.web.page import PageFiles
+from mrdamper.web.read_ahead import ReadAhead
 from mrdamper.web.security import Guard
 from mrdamper.web.sessions import Sessions
 from mrdamper.web.work import refusal
 
-STATIC = Path(__file__).parent / "static"
 _SWEEP_SECONDS = 60.0
 _STATUS = {"E_SESSION": 410, "E_DROP_SIZE": 413}
 
 
-def create_app(hosts: Iterable[str], stopping: Callable[[], bool] = lambda: False) -> FastAPI:
+def create_app(hosts: Iterable[str], stopping: Callable[[], bool] = lambda: False, read_ahead: bool = False) -> FastAPI:
     """Make the application.
 
     Parameters
@@ -38,13 +39,15 @@ def create_app(hosts: Iterable[str], stopping: Callable[[], bool] = lambda: Fals
         Values of the Host header that are this bench, with the port.
     stopping : callable
         Says whether the server is about to stop, so that open streams end.
+    read_ahead : bool
+        Whether the first session brings the bundled tests before they are asked for.
 
     Raises
     ------
     MissingExtraError
         If the chart library is not installed.
     """
-    chart_library = plotly_script()
+    chart_library = plotly_script().read_bytes()  # sent in one piece: the first picture waits for it
     sessions = Sessions()
 
     @asynccontextmanager
@@ -54,22 +57,27 @@ def create_app(hosts: Iterable[str], stopping: Callable[[], bool] = lambda: Fals
         sweeper.cancel()
         sessions.close()
 
-    app = FastAPI(title="mrdamper live bench", docs_url=None, redoc_url=None, openapi_url=None, lifespan=life)
+    app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None, redirect_slashes=False, lifespan=life)
     app.state.sessions, app.state.stopping = sessions, stopping
+    app.state.read_ahead = ReadAhead() if read_ahead else None
     app.add_exception_handler(InputError, _refuse)
     app.add_exception_handler(RequestValidationError, _misunderstand)
+    app.add_exception_handler(HTTPException, _decline)
     for router in routers():
         app.include_router(router, prefix="/api")
 
+    files = PageFiles()
+    front = HTMLResponse(files.page(), headers={"Cache-Control": "no-cache"})
+
     @app.get("/")
-    def page() -> FileResponse:
-        return FileResponse(STATIC / "index.html", headers={"Cache-Control": "no-cache"})
+    async def page() -> HTMLResponse:
+        return front
 
     @app.get("/static/plotly.js")
-    def charts() -> FileResponse:
-        return FileResponse(chart_library, media_type="text/javascript", headers={"Cache-Control": "max-age=3600"})
+    async def charts() -> Response:
+        return Response(chart_library, media_type="text/javascript", headers={"Cache-Control": "max-age=3600"})
 
-    app.mount("/static", _Static(directory=STATIC))
+    app.mount("/static", files)
     app.add_middleware(_Faults)
     app.add_middleware(Guard, hosts=tuple(hosts))
     return app
@@ -90,15 +98,6 @@ def plotly_script() -> Path:
     return script
 
 
-class _Static(StaticFiles):
-    """Files of the page; a browser asks each time whether they changed, so an update is seen."""
-
-    def file_response(self, *args, **kwargs):
-        response = super().file_response(*args, **kwargs)
-        response.headers["Cache-Control"] = "no-cache"
-        return response
-
-
 async def _sweep(sessions: Sessions) -> None:
     while True:
         await asyncio.sleep(_SWEEP_SECONDS)
@@ -111,6 +110,11 @@ def _refuse(request: Request, error: Exception) -> JSONResponse:
     if isinstance(error, NothingTakenError):
         said |= {"verdicts": [v.on_screen() for v in error.verdicts], "profile": error.profile}
     return JSONResponse(said, status_code=_STATUS.get(error.code, 422))
+
+
+def _decline(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, HTTPException)
+    return JSONResponse({"text": error.detail, "code": f"E_{error.status_code}"}, status_code=error.status_code)
 
 
 def _misunderstand(request: Request, error: Exception) -> JSONResponse:

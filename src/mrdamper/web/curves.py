@@ -12,16 +12,21 @@ from mrdamper.models import Model
 from mrdamper.simulation import simulate
 
 MM = 1e3
-MOST_POINTS = 1000  # of a curve on the screen
+MOST_POINTS = 1000  # of a loop on the screen
+_MOST_OF_WINDOW = 8000  # of a window of many cycles: fewer would show fast motion as another
 
 
 def on_screen(
-    motion: Excitation, force: Floats, picked: NDArray[np.intp] | None = None, start: float = 0.0
+    motion: Excitation,
+    force: Floats,
+    picked: NDArray[np.intp] | None = None,
+    start: float = 0.0,
+    most: int = MOST_POINTS,
 ) -> dict[str, Floats]:
     """Time [s] from `start`, displacement [mm], velocity [m/s] and force [N] of some samples, thinned."""
     picked = np.arange(len(motion)) if picked is None else picked
-    if picked.size > MOST_POINTS:  # evenly, and the last sample closes the loop
-        picked = picked[np.linspace(0, picked.size - 1, MOST_POINTS).round().astype(int)]
+    if picked.size > most:  # evenly, and the last sample closes the loop
+        picked = picked[np.linspace(0, picked.size - 1, most).round().astype(int)]
     return {
         "t": motion.time[picked] - start,
         "x": MM * motion.displacement[picked],
@@ -37,14 +42,14 @@ def measured_cycle(run: Run) -> dict[str, Floats]:
 
 def measured_window(run: Run) -> dict[str, Floats]:
     """All of a run's steady window."""
-    return on_screen(_motion(run), run.force, np.flatnonzero(run.in_window))
+    return on_screen(_motion(run), run.force, np.flatnonzero(run.in_window), most=_MOST_OF_WINDOW)
 
 
 def raw_record(run: Run) -> dict[str, Floats]:
     """A whole record as it stands in the file, for runs without motion."""
     velocity = np.zeros(run.time.size) if run.velocity is None else run.velocity
     motion = Excitation(run.time, run.displacement, velocity, np.zeros(run.time.size), run.current)
-    return on_screen(motion, run.force)
+    return on_screen(motion, run.force, most=_MOST_OF_WINDOW)
 
 
 def predicted_cycle(prediction: Prediction) -> dict[str, Floats]:
@@ -61,10 +66,11 @@ def modelled_cycle(model: Model, run: Run, delay: float = 0.0) -> dict[str, Floa
 
 def predicted_on_run(damper: Damper, run: Run) -> tuple[dict[str, Floats], tuple[str, ...]]:
     """The force a damper predicts along the measured motion: last cycle of a sine, or the whole window."""
-    prediction = damper.predict_run(run)
+    found = damper.predict_run(run)
     if equivalent_sine(run).is_sine:
-        return on_screen(prediction.motion, prediction.force, *_last_cycle(run)), prediction.extrapolation
-    return on_screen(prediction.motion, prediction.force, np.flatnonzero(run.in_window)), prediction.extrapolation
+        return on_screen(found.motion, found.force, *_last_cycle(run)), found.extrapolation
+    window = np.flatnonzero(run.in_window)
+    return on_screen(found.motion, found.force, window, most=_MOST_OF_WINDOW), found.extrapolation
 
 
 def _motion(run: Run) -> Excitation:
@@ -79,4 +85,5 @@ def _last_cycle(run: Run) -> tuple[NDArray[np.intp], float]:
     end = float(run.time[run.in_window][-1])
     start = float(crossing + np.floor((end - crossing) / period - 1.0 + 1e-6) * period)
     first, last = np.searchsorted(run.time, (start, start + period))
-    return np.arange(first, min(int(last) + 1, run.time.size)), start  # one sample more closes the loop
+    # From the sample before it begins to the one after it ends: the loop is closed as far as the record goes.
+    return np.arange(max(int(first) - 1, 0), min(int(last) + 1, run.time.size)), start

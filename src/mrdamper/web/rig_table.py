@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -56,6 +56,7 @@ class RigTable:
 
     dataset: Dataset
     rows: tuple[Row, ...]
+    _judging: threading.Lock = field(default_factory=threading.Lock, repr=False)
 
     @classmethod
     def of(cls, dataset: Dataset) -> RigTable:
@@ -68,9 +69,14 @@ class RigTable:
         ]
         return cls(dataset, tuple(rows))
 
-    @cached_property
+    @property
     def quality(self) -> tuple[Quality, ...]:
         """The verdict on every run, in order: judged once, when first asked for."""
+        with self._judging:
+            return self._quality
+
+    @cached_property
+    def _quality(self) -> tuple[Quality, ...]:
         return quality_table(record_of(row.run) for row in self.rows)
 
     def row(self, key: str) -> Row:
@@ -118,11 +124,12 @@ class RigTable:
 
 def rig_table(dataset: Dataset, rig: str) -> RigTable:
     """The table of a rig, made once for as long as the data live."""
-    with _MAKING:
-        tables = _TABLES.setdefault(dataset, {})
-        if rig not in tables:
-            tables[rig] = RigTable.of(dataset.rig(rig))
-        return tables[rig]
+    tables = _TABLES.setdefault(dataset, {})
+    if rig not in tables:
+        with _MAKING:  # one at a time; tables that are there are found without waiting
+            if rig not in tables:
+                tables[rig] = RigTable.of(dataset.rig(rig))
+    return tables[rig]
 
 
 def describe(row: Row) -> dict[str, Any]:

@@ -11,7 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.responses import PlainTextResponse
+from starlette.exceptions import HTTPException
+from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 CONTENT_SECURITY_POLICY = "; ".join(
@@ -36,6 +37,7 @@ HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Permissions-Policy": "camera=(), microphone=(), geolocation=()",
 }
+FORM_LIMIT = 5_000_000  # bytes of a question; files come by PUT and stream under a limit of their own
 _HARMLESS = frozenset({"GET", "HEAD"})
 _OWN_SITES = frozenset({"same-origin", "none"})  # what a browser says of our page, and of a typed address
 
@@ -61,7 +63,17 @@ class Guard:
             if scope["type"] == "lifespan":
                 await self.app(scope, receive, send)
             return
-        refusal = self.refusal(scope["method"], Headers(scope=scope))
+        headers = Headers(scope=scope)
+        refusal = self.refusal(scope["method"], headers)
+        received = 0
+
+        async def receive_some() -> Message:
+            nonlocal received
+            message = await receive()
+            received += len(message.get("body", b""))
+            if received > FORM_LIMIT and scope["method"] != "PUT":
+                raise HTTPException(413, "the question is too long")
+            return message
 
         async def send_guarded(message: Message) -> None:
             if message["type"] == "http.response.start":
@@ -72,9 +84,10 @@ class Guard:
             await send(message)
 
         if refusal:
-            await PlainTextResponse(refusal, status_code=403)(scope, receive, send_guarded)
+            said = {"text": refusal, "code": "E_STRANGER"}
+            await JSONResponse(said, status_code=403)(scope, receive, send_guarded)
         else:
-            await self.app(scope, receive, send_guarded)
+            await self.app(scope, receive_some, send_guarded)
 
     def refusal(self, method: str, headers: Headers) -> str | None:
         """Why a request is not answered, or None."""

@@ -35,9 +35,11 @@ def serve(port: int, open_browser: bool = True) -> None:
     listener = _listen(port)
     port = listener.getsockname()[1]
     server: uvicorn.Server
-    app = create_app([f"{LOOPBACK}:{port}", f"localhost:{port}"], lambda: server.should_exit)
+    app = create_app([f"{LOOPBACK}:{port}", f"localhost:{port}"], lambda: server.should_exit, read_ahead=True)
     server = _Server(
-        uvicorn.Config(app, log_level="warning", access_log=False, timeout_graceful_shutdown=3, server_header=False),
+        uvicorn.Config(
+            app, log_level="error", ws="none", access_log=False, timeout_graceful_shutdown=3, server_header=False
+        ),
         f"http://{LOOPBACK}:{port}/",
         open_browser,
     )

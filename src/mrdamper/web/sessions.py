@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import secrets
 import shutil
-import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
@@ -21,7 +20,8 @@ from fastapi import Depends, Request
 from mrdamper.damper import Damper
 from mrdamper.data import Dataset
 from mrdamper.errors import InputError, UnknownNameError
-from mrdamper.web.intake import Drop, Intake
+from mrdamper.web.drops import Drop, Intake
+from mrdamper.web.folders import bench_folder
 from mrdamper.web.rig_table import RigTable, rig_table
 from mrdamper.web.work import Job
 
@@ -64,6 +64,7 @@ class Session:
     drops: dict[str, Drop] = field(default_factory=dict)
     dampers: dict[str, Bench] = field(default_factory=dict)
     jobs: dict[str, Job] = field(default_factory=dict)
+    newest: dict[str, Job] = field(default_factory=dict)  # of each kind, on the data of now
     results: dict[str, Any] = field(default_factory=dict)
     lock: threading.Lock = field(default_factory=threading.Lock)
     _count: int = 0
@@ -90,6 +91,7 @@ class Session:
     def put(self, intake: Intake) -> None:
         """Change the data: results that came from other data go."""
         self.cancel()
+        self.newest.clear()
         self.intake = intake
         self.results.clear()
 
@@ -120,6 +122,34 @@ class Session:
             raise UnknownNameError("that damper is no longer on the bench", mend="choose another on the Model page")
         return self.dampers[key]
 
+    def start(
+        self,
+        kind: str,
+        task: Callable[..., Any],
+        arguments: tuple[Any, ...],
+        conclude: Callable[[Any], dict[str, Any]],
+    ) -> dict[str, Any]:
+        """Begin long work, in place of what is being done of the same kind; gives its report."""
+        if before := self.newest.get(kind):
+            before.cancel()
+        self.jobs = {key: job for key, job in self.jobs.items() if not job.ended}
+        job = Job(self.key("job"), kind, task, arguments, conclude)
+        self.jobs[job.key] = self.newest[kind] = job.start()
+        return job.report()
+
+    def job(self, key: str) -> Job:
+        """Work begun here, by its key.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is none: it was on other data, or other work has taken its place.
+        """
+        for job in (*self.newest.values(), *self.jobs.values()):
+            if job.key == key:
+                return job
+        raise UnknownNameError("that work is not known here", mend="start it again")
+
     def cancel(self) -> None:
         """Stop whatever is being worked on."""
         for job in list(self.jobs.values()):
@@ -135,7 +165,7 @@ class Sessions:
     """All sessions of one bench."""
 
     def __init__(self) -> None:
-        self.folder = Path(tempfile.mkdtemp(prefix="mrdamper-bench-"))
+        self.folder = bench_folder()
         self._open: dict[str, Session] = {}
         self._lock = threading.Lock()
 

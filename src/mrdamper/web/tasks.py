@@ -124,8 +124,16 @@ class Exported:
 def export_damper(tell: Tell, damper: Damper, form: str, folder: Path) -> Exported:
     """A damper in an export format, as files in a folder."""
     tell(f"making {form}", 0.1)
-    kind, name = exporter(form), identifier(damper.rig or "damper")
+    kind, name = exporter(form), export_name(damper.rig)
     written = kind().export(damper, name)
     folder.mkdir()
     out = folder / f"{name}{kind.suffix}" if kind.suffix else folder / f"{name}-{form}"
     return Exported(write_export(written, out, kind.suffix), written.notes)
+
+
+def export_name(rig: str) -> str:
+    """A name for files and symbols: of the rig, where its letters make one."""
+    try:
+        return identifier(rig)
+    except InputError:
+        return "damper"

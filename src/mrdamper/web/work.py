@@ -13,8 +13,8 @@ import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from multiprocessing import get_context
-from multiprocessing.connection import Connection
+from multiprocessing import get_context, parent_process
+from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from mrdamper.errors import InputError
@@ -130,7 +130,7 @@ class Job:
             except EOFError:
                 if self._stop.is_set():
                     return self._end("cancelled")
-                return self._fail("the worker process ended early")
+                return self._lose()
             if kind == "tell":
                 self.what, self.share = said
             elif kind == "done":
@@ -150,6 +150,19 @@ class Job:
             return self._fail(traceback.format_exc())
         self.share = 1.0
         return self._end("done")
+
+    def _lose(self) -> None:
+        """The worker is gone without a word: its system ended it, or somebody did."""
+        self._process.join()
+        code = self._process.exitcode
+        how = f"by signal {-code}" if code and code < 0 else f"with code {code}"
+        lost = InputError(
+            f"the worker process was ended from outside, {how}",
+            mend="start it again; where memory ran short, close other programs or take fewer runs",
+            code="E_WORKER",
+        )
+        self.error = refusal(lost)
+        self._end("failed")
 
     def _fail(self, trace: str) -> None:
         print(trace, flush=True)
@@ -183,10 +196,22 @@ def _end_group(process: Any) -> None:
         process.terminate()  # no process groups here, or not yet one of its own
 
 
+def _end_with_parent() -> None:
+    """End this worker and all it started once the bench is gone, however it went."""
+    parent = parent_process()
+    if parent is None:
+        return
+    wait([parent.sentinel])
+    if hasattr(os, "killpg"):
+        os.killpg(0, signal.SIGKILL)  # the group that `_work` made
+    os._exit(1)
+
+
 def _work(pipe: Connection, task: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
     """Run a task and send what comes of it: the body of the worker process."""
     if hasattr(os, "setsid"):
         os.setsid()  # a group of its own, so that cancelling reaches the processes a task starts
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     last = 0.0
 
     def tell(what: str, share: float) -> None:

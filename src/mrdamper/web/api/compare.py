@@ -19,7 +19,6 @@ from mrdamper.web.frames import frame, number
 from mrdamper.web.rig_table import condition_on_screen
 from mrdamper.web.sessions import Current, Session
 from mrdamper.web.tasks import compare_models
-from mrdamper.web.work import Job
 from mrdamper.workflow import JOINTLY, STUDIED
 
 router = APIRouter(prefix="/sessions/{session}/compare")
@@ -51,29 +50,24 @@ def choices(session: Current) -> list[dict[str, Any]]:
 @router.post("")
 def start(choice: Choice, session: Current) -> dict[str, Any]:
     """Begin a comparison on one rig."""
-    session.cancel()
     table = session.table(choice.rig)
     jobs = max(1, (os.cpu_count() or 2) - 1)  # one processor is left to answer the page
     dataset: Dataset = table.dataset
-    job = Job(
-        session.key("job"),
+    return session.start(
         "compare",
         compare_models,
         (dataset, choice.models, jobs),
         lambda found: _conclude(session, choice, found),
     )
-    session.jobs[job.key] = job.start()
-    return job.report()
 
 
-@router.get("/runs/{key}")
-def overlaid(key: str, session: Current) -> Response:
+@router.get("/rigs/{rig}/runs/{key}")
+def overlaid(rig: int, key: str, session: Current) -> Response:
     """One run as measured, and as every compared model predicts it."""
-    found: RigComparison | None = session.results.get("compared")
-    table = session.results.get("compared.table")
-    if found is None or table is None:
+    found: RigComparison | None = session.results.get(f"compared.{rig}")
+    if found is None:
         raise InputError("nothing is compared yet", mend="start a comparison", code="E_NO_RESULT")
-    row = table.row(key)
+    row = session.table(rig).row(key)
     measured = measured_cycle(row.run) if row.loop else measured_window(row.run)
     arrays = {f"measured.{k}": v for k, v in measured.items()}
     shown = []
@@ -87,7 +81,7 @@ def overlaid(key: str, session: Current) -> Response:
 def _conclude(session: Session, choice: Choice, found: Comparison) -> dict[str, Any]:
     rig = found.rigs[0]
     table = session.table(choice.rig)
-    session.results["compared"], session.results["compared.table"] = rig, table
+    session.results[f"compared.{choice.rig}"] = rig
     keys = {row.run.id: row.key for row in table.rows}
     entries = []
     for entry in rig.entries:
@@ -95,9 +89,11 @@ def _conclude(session: Session, choice: Choice, found: Comparison) -> dict[str, 
         entries.append(_entry(entry, session.add(entry.damper, "comparison", note).key, keys))
     return {
         "rig": rig.rig,
+        "number": choice.rig,
         "entries": entries,
         "refused": dict(rig.refused),
         "held_out": [{"key": keys[run.id], "id": run.id} for run in rig.dataset.split("validate")],
+        "train": [{"key": keys[run.id], "id": run.id} for run in rig.dataset.split("train")],
         "seconds": round(found.seconds, 1),
     }
 

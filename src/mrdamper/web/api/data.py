@@ -7,13 +7,14 @@ from typing import Any
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from mrdamper.errors import UnknownNameError
 from mrdamper.io.quality.table import Quality
 from mrdamper.web.curves import measured_cycle, measured_window, raw_record
+from mrdamper.web.drops import DROP_LIMIT, FILE_LIMIT, Drop, DropError, Intake
 from mrdamper.web.frames import frame
-from mrdamper.web.intake import DROP_LIMIT, FILE_LIMIT, Drop, DropError, Intake, bundled, read_drop
+from mrdamper.web.intake import bundled, read_drop
 from mrdamper.web.rig_table import condition_on_screen, describe
 from mrdamper.web.sessions import Current, Session
 
@@ -21,9 +22,12 @@ router = APIRouter(prefix="/sessions/{session}")
 
 
 class Profile(BaseModel):
-    """A rig profile as TOML; empty to guess."""
+    """A rig profile as TOML; empty to guess. It may be for the refused files alone."""
+
+    model_config = ConfigDict(extra="forbid")
 
     toml: str = Field(default="", max_length=100_000)
+    refused_only: bool = False
 
 
 @router.post("/bundled")
@@ -75,7 +79,7 @@ async def take_file(
 @router.post("/drops/{key}/read")
 def read(key: str, profile: Profile, session: Current) -> dict[str, Any]:
     """Read what was dropped and put it on the bench."""
-    session.put(read_drop(_drop(session, key), profile.toml))
+    session.put(read_drop(_drop(session, key), profile.toml, profile.refused_only))
     return _overview(session)
 
 

@@ -18,7 +18,6 @@ from mrdamper.web.frames import frame, number
 from mrdamper.web.rig_table import condition_on_screen
 from mrdamper.web.sessions import Current, Session
 from mrdamper.web.tasks import ALL_AT_ONCE, RUN_BY_RUN, Identified, identify_rig, study
-from mrdamper.web.work import Job
 from mrdamper.workflow import JOINTLY, Candidate, Study
 
 router = APIRouter(prefix="/sessions/{session}")
@@ -61,30 +60,21 @@ def choices(session: Current) -> dict[str, Any]:
 @router.post("/study")
 def start_study(session: Current) -> dict[str, Any]:
     """Begin the whole method on all data."""
-    session.cancel()
     folder = session.folder / session.key("study")
-    job = Job(
-        session.key("job"), "study", study, (session.dataset, folder), lambda found: _conclude_study(session, *found)
-    )
-    session.jobs[job.key] = job.start()
-    return job.report()
+    return session.start("study", study, (session.dataset, folder), lambda found: _conclude_study(session, *found))
 
 
 @router.post("/identify")
 def start_identification(choice: Choice, session: Current) -> dict[str, Any]:
     """Begin to identify one model of one rig."""
-    session.cancel()
     table = session.table(choice.rig)
     names = [table.row(key).run.id for key in choice.runs]
-    job = Job(
-        session.key("job"),
+    return session.start(
         "identify",
         identify_rig,
         (table.dataset, names, choice.model, choice.method, choice.over),
         lambda found: _conclude_identification(session, choice, found),
     )
-    session.jobs[job.key] = job.start()
-    return job.report()
 
 
 @router.get("/identified/runs/{number}")
@@ -116,7 +106,8 @@ def _conclude_study(session: Session, found: Study, written: list[Any]) -> dict[
     for rig in found.rigs:
         listed = []
         for candidate in rig.candidates:
-            note = f"left out {_percent(candidate.left_out)}, held out {_percent(candidate.held_out)}"
+            errors = {"left out": candidate.left_out, "held out": candidate.held_out}
+            note = ", ".join(f"{name} {_percent(scores)}" for name, scores in errors.items() if scores.runs)
             bench = session.add(candidate.damper, "study", note)
             listed.append(_candidate(candidate, bench.key))
         rigs.append({"rig": rig.rig, "chosen": listed[0]["damper"], "candidates": listed})
@@ -130,7 +121,7 @@ def _candidate(candidate: Candidate, key: str) -> dict[str, Any]:
         "numbers": candidate.damper.parameter_count,
         "per_run": number(candidate.per_run_median),
         "left_out": number(candidate.left_out.median()),
-        "held_out": number(candidate.held_out.median()),
+        "held_out": number(candidate.held_out.median()) if candidate.held_out.runs else None,
         "seconds": round(candidate.seconds, 2),
     }
 
@@ -140,9 +131,10 @@ def _conclude_identification(session: Session, choice: Choice, found: Identified
     session.results["identified.table"] = session.table(choice.rig)
     bench = None
     if found.damper is not None:
-        note = f"held out {_percent(found.held_out)}" if found.held_out else ""
+        note = f"held out {_percent(found.held_out)}" if found.held_out and found.held_out.runs else ""
         bench = session.add(found.damper, "identification", note)
     return {
+        "rig": session.table(choice.rig).dataset.rigs[0],
         "damper": bench.key if bench else None,
         "title": found.damper.title if found.damper else None,
         "numbers": found.damper.parameter_count if found.damper else None,
@@ -195,8 +187,8 @@ def _units(found: Identified) -> list[dict[str, str]]:
     return [{"name": i.name, "unit": i.unit, "meaning": i.meaning} for i in infos if i.name in free]
 
 
-def _percent(validation: Validation | None) -> str:
-    return f"{100 * validation.median():.1f} %" if validation is not None and validation.runs else "–"
+def _percent(validation: Validation) -> str:
+    return f"{100 * validation.median():.1f} %"
 
 
 def _first_line(method: Any) -> str:

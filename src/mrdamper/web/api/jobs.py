@@ -10,8 +10,7 @@ from typing import Any
 from fastapi import APIRouter, Request
 from fastapi.responses import StreamingResponse
 
-from mrdamper.errors import UnknownNameError
-from mrdamper.web.sessions import Current, Session
+from mrdamper.web.sessions import Current
 from mrdamper.web.work import Job
 
 router = APIRouter(prefix="/sessions/{session}/jobs")
@@ -19,23 +18,31 @@ _BETWEEN = 0.1  # seconds between two looks at a job
 _SILENCE = 15.0  # seconds after which a comment keeps the connection open
 
 
+@router.get("")
+def newest(session: Current) -> list[dict[str, Any]]:
+    """The newest work of each kind on the data of now, the last begun last.
+
+    A page that is loaded again finds its results here.
+    """
+    return [job.report() for job in sorted(session.newest.values(), key=lambda job: job.began)]
+
+
 @router.get("/{key}")
 def look(key: str, session: Current) -> dict[str, Any]:
     """How it stands."""
-    return _job(session, key).report()
+    return session.job(key).report()
 
 
 @router.get("/{key}/events")
 async def events(key: str, session: Current, request: Request) -> StreamingResponse:
     """Its progress as server-sent events, until it ends."""
-    job = _job(session, key)
-    return StreamingResponse(_follow(job, request), media_type="text/event-stream")
+    return StreamingResponse(_follow(session.job(key), request), media_type="text/event-stream")
 
 
 @router.delete("/{key}")
 def cancel(key: str, session: Current) -> dict[str, Any]:
     """Stop it."""
-    job = _job(session, key)
+    job = session.job(key)
     job.cancel()
     return job.report()
 
@@ -54,9 +61,3 @@ async def _follow(job: Job, request: Request) -> AsyncIterator[str]:
         silent += _BETWEEN
         if await request.is_disconnected():
             return
-
-
-def _job(session: Session, key: str) -> Job:
-    if key not in session.jobs:
-        raise UnknownNameError("that work is not known here", mend="start it again")
-    return session.jobs[key]

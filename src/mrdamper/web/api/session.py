@@ -7,7 +7,7 @@ from typing import Any
 
 from fastapi import APIRouter, Request
 
-from mrdamper.web.intake import FILE_COUNT_LIMIT, FILE_LIMIT
+from mrdamper.web.drops import FILE_COUNT_LIMIT, FILE_LIMIT
 from mrdamper.web.sessions import Current
 
 router = APIRouter(prefix="/sessions")
@@ -17,6 +17,8 @@ router = APIRouter(prefix="/sessions")
 def open_session(request: Request) -> dict[str, Any]:
     """A new session and what the page must know of the bench."""
     session = request.app.state.sessions.open()
+    if request.app.state.read_ahead:
+        request.app.state.read_ahead.begin()
     return {
         "session": session.name,
         "version": version("mrdamper"),

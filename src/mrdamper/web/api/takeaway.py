@@ -21,7 +21,6 @@ from mrdamper.web.api.model import Ask
 from mrdamper.web.bench_model import as_damper, predict_held
 from mrdamper.web.sessions import Current, Session
 from mrdamper.web.tasks import Exported, export_damper
-from mrdamper.web.work import Job
 
 router = APIRouter(prefix="/sessions/{session}")
 
@@ -76,7 +75,7 @@ def everything(session: Current) -> Response:
 def bring(document: Document, session: Current) -> dict[str, Any]:
     """Put a saved model on the bench."""
     damper = parse_model(document.text, where="the model file")
-    return {"damper": session.add(damper, "file", "from a saved model").key}
+    return {"damper": session.add(damper, "file").key}
 
 
 @router.post("/dampers/{key}/document")
@@ -104,15 +103,7 @@ def start_export(key: str, name: str, held: Held, session: Current) -> dict[str,
     """Begin to make a damper in one of these formats: some compile, and take their time."""
     damper = as_damper(session.damper(key).damper, held.held)
     folder = session.folder / session.key("export")
-    job = Job(
-        session.key("job"),
-        "export",
-        export_damper,
-        (damper, name, folder),
-        lambda made: _conclude(session, folder, made),
-    )
-    session.jobs[job.key] = job.start()
-    return job.report()
+    return session.start("export", export_damper, (damper, name, folder), lambda made: _conclude(session, folder, made))
 
 
 @router.get("/exported/{key}")

@@ -130,6 +130,11 @@ export class Latest {
     Object.assign(this, { ask, show, fail, waiting: null, asking: false });
   }
 
+  /** Whether something is being asked. */
+  get busy() {
+    return this.asking;
+  }
+
   want(question) {
     this.waiting = question;
     if (!this.asking) this.next();

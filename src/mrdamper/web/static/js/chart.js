@@ -1,13 +1,10 @@
 // Charts: the library of the plotly package, dressed in the page's colours.
 
-import { h } from "./dom.js";
+import { paint } from "./colours.js";
+import { h, renew } from "./dom.js";
+import { legend } from "./legend.js";
 
-const LOOK = { margin: { l: 62, r: 14, t: 8, b: 44 }, pad: 0.04, growth: 0.25 };
-const VIRIDIS = ["#440154", "#472d7b", "#3b528b", "#2c728e", "#21918c", "#28ae80", "#5ec962", "#addc30"];
-const DARK_VIRIDIS = ["#8a6bd1", "#6f86d6", "#5b9bd0", "#3fb0b8", "#38c192", "#6bd36a", "#b5de2b", "#fde725"];
-const SERIES = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7a5ea8", "#8c6d1f"];
-const DASHES = ["solid", "dash", "dot", "dashdot", "longdash"];
-
+const LOOK = { margin: { l: 64, r: 16, t: 8, b: 50 }, pad: 0.04, growth: 0.25 };
 let loading = null;
 
 /** Load the library once. */
@@ -29,48 +26,21 @@ export function library() {
   return loading;
 }
 
-/** A colour as curves name it: one of the page's ("measured"), a place on the scale ("shade 0.4"), or itself. */
-export function paint(name) {
-  if (name.startsWith("shade ")) return shade(Number(name.slice(6)));
-  return /^[a-z-]+$/.test(name) ? colour(name) : name;
-}
-
-/** Colour of one of many models; a dash comes in where colours repeat. */
-export function series(index) {
-  return { color: SERIES[index % SERIES.length], dash: DASHES[Math.floor(index / SERIES.length) % DASHES.length] };
-}
-
-/** Colour of a share of a range, dark to light. */
-function shade(share) {
-  const scale = isDark() ? DARK_VIRIDIS : VIRIDIS;
-  return scale[Math.min(scale.length - 1, Math.max(0, Math.round(share * (scale.length - 1))))];
-}
-
-/** A colour of the page. */
-function colour(name) {
-  if (!colours.has(name)) colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
-  return colours.get(name);
-}
-const colours = new Map(); // asked for at every move of a slider
-document.addEventListener("themechange", () => colours.clear());
-
-function isDark() {
-  return document.documentElement.dataset.theme === "dark";
-}
-
 /** One chart in a card. */
 export class Chart {
-  /** `title`, axis titles `x` and `y` with units, `name` of an image file. */
-  constructor({ title, x, y, name, legend = false, zero = false, top, layout = () => ({}) }) {
-    Object.assign(this, { title, x, y, name, legend, zero, top, more: layout, ranges: null, revision: 0 });
+  /** `title`, axis titles `x` and `y` with units, `name` of an image file; `zero` lets x begin there. */
+  constructor({ title, x, y, name, keys = false, zero = false, layout = () => ({}) }) {
+    Object.assign(this, { title, x, y, name, zero, more: layout, ranges: null, revision: 0 });
     this.held = false; // while something is dragged: the axes stay, and grow where they must
     this.plot = h("div", { class: "plot" });
-    this.summary = h("p", { class: "hidden-text" });
-    this.heading = h("h3", {}, title);
-    this.element = h("section", { class: "card chart", "aria-label": title }, this.heading, h("div", { class: "plot" }, this.plot, this.summary));
-    this.plot.parentElement.classList.add("frame");
     this.plot.setAttribute("role", "img");
+    this.keys = keys ? h("div", { class: "keys-place" }) : null;
+    const save = h("button", { class: "quiet save", "aria-label": `Save “${title}” as an image`, title: "Save as an image", onclick: () => this.save() }, "PNG");
+    this.frame = h("div", { class: "frame" }, this.plot);
+    this.element = h("section", { class: "card chart", "aria-label": title },
+      h("div", { class: "chart-head" }, h("h3", {}, title), this.keys, save), this.frame);
     this.traces = [];
+    this.shown = ""; // the keys that stand beside the title
     new ResizeObserver(() => this.drawn && this.plot.offsetWidth && window.Plotly.Plots.resize(this.plot)).observe(this.plot);
     document.addEventListener("themechange", () => this.drawn && this.redraw());
   }
@@ -80,7 +50,6 @@ export class Chart {
     const before = this.traces;
     this.traces = traces;
     if (this.held && this.drawn && alike(before, traces) && this.fits(traces)) return this.move(before);
-    this.summary.textContent = summary;
     this.plot.setAttribute("aria-label", `${this.title}. ${summary}`);
     return this.redraw();
   }
@@ -127,6 +96,7 @@ export class Chart {
 
   async redraw() {
     const Plotly = window.Plotly ?? (await library());
+    this.showKeys();
     const data = this.traces.map((t, i) => ({ ...trace(t), uid: `curve${i}` }));
     this.ranges = spans(this.traces, this.held ? this.ranges : null, this.zero);
     this.marks = this.traces.map((t) => t.x.length);
@@ -134,19 +104,36 @@ export class Chart {
     this.drawn = true;
   }
 
+  showKeys() {
+    if (!this.keys) return;
+    const wanted = legend(this.traces);
+    if (this.shown !== wanted.outerHTML) renew(this.keys, wanted);
+    this.shown = wanted.outerHTML;
+  }
+
+  /** As an image file: with its title and keys, on the page's ground. */
+  async save() {
+    if (!this.drawn) return;
+    const layout = { ...this.layout(), title: { text: plain(this.title), x: 0.02 }, showlegend: this.keys !== null, paper_bgcolor: paint("panel") };
+    const { xaxis, yaxis } = this.plot.layout;
+    const margin = { ...layout.margin, t: 70 };
+    const figure = { data: this.traces.map(trace), layout: { ...layout, margin, xaxis: { ...layout.xaxis, range: xaxis.range }, yaxis: { ...layout.yaxis, range: yaxis.range } } };
+    await window.Plotly.downloadImage(figure, { format: "png", width: 900, height: 600, scale: 2, filename: `mrdamper-${this.name}` });
+  }
+
   layout() {
     const axis = (title, range) => ({
-      title: { text: title, standoff: 8 }, range, gridcolor: colour("grid"), zerolinecolor: colour("line-strong"),
-      linecolor: colour("line-strong"), ticks: "outside", ticklen: 4, tickcolor: colour("line-strong"),
+      title: { text: title, standoff: 8 }, range, gridcolor: paint("grid"), zerolinecolor: paint("line-strong"),
+      linecolor: paint("line-strong"), ticks: "outside", ticklen: 4, tickcolor: paint("line-strong"),
       automargin: false, hoverformat: ".4~g", exponentformat: "power", separatethousands: false,
     });
     const size = parseFloat(getComputedStyle(document.documentElement).fontSize) / 15;
     return {
-      margin: { l: LOOK.margin.l * size, r: LOOK.margin.r, t: this.top ?? LOOK.margin.t, b: LOOK.margin.b * size },
+      margin: { l: LOOK.margin.l * size, r: LOOK.margin.r, t: LOOK.margin.t, b: LOOK.margin.b * size },
       xaxis: axis(this.x, this.ranges.x), yaxis: axis(this.y, this.ranges.y),
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
-      font: { family: getComputedStyle(document.body).fontFamily, size: 12 * size, color: colour("text") },
-      showlegend: this.legend,
+      font: { family: getComputedStyle(document.body).fontFamily, size: 12 * size, color: paint("text") },
+      showlegend: false, // the keys stand beside the title; an image file has them inside
       legend: { orientation: "h", x: 0, y: 1, yanchor: "bottom", font: { size: 11.5 * size }, bgcolor: "rgba(0,0,0,0)" },
       hovermode: "closest", hoverlabel: { font: { size: 12 * size }, namelength: 40 }, dragmode: "zoom",
       uirevision: this.revision, autosize: true, ...this.more(),
@@ -156,8 +143,7 @@ export class Chart {
   config() {
     return {
       displaylogo: false, responsive: false,
-      modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
-      toImageButtonOptions: { format: "png", scale: 2, filename: `mrdamper-${this.name}` },
+      modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "toImage"],
     };
   }
 }
@@ -205,7 +191,7 @@ function alike(before, now) {
 function trace(t) {
   const color = paint(t.color);
   return {
-    type: "scatter", mode: t.mode ?? "lines", x: t.x, y: t.y, name: plain(t.name ?? ""), showlegend: Boolean(t.name) && t.legend !== false,
+    type: "scatter", mode: t.mode ?? "lines", cliponaxis: t.mode !== "markers", x: t.x, y: t.y, name: plain(t.name ?? ""), showlegend: Boolean(t.name) && t.legend !== false,
     line: { color, width: t.width ?? 2, dash: t.dash ?? "solid", simplify: true, shape: "linear" },
     marker: { color: t.fill ? paint(t.fill) : color, size: t.size ?? 7, line: { color, width: 1.5 } },
     text: t.text?.map(plain), hovertemplate: t.hover, hoverinfo: t.hover === undefined && t.quiet ? "skip" : undefined, opacity: t.opacity ?? 1,

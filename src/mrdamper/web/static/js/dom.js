@@ -18,9 +18,27 @@ export function put(element, ...children) {
   return element;
 }
 
+/** Like `put`, for parts that are built anew while the reader is in them: the focus stays where it was. */
+export function renew(element, ...children) {
+  const focused = element.contains(document.activeElement) ? document.activeElement.id : "";
+  put(element, ...children);
+  if (focused) document.getElementById(focused)?.focus({ preventScroll: true });
+  return element;
+}
+
 /** A card with a heading. */
 export function card(title, ...children) {
   return h("section", { class: "card" }, h("div", { class: "head" }, h("h2", {}, title)), ...children);
+}
+
+/** What a stage shows while there is nothing to see: a heading, a sentence, and what can be done. */
+export function empty(title, text, ...actions) {
+  return h("div", { class: "empty" }, h("h2", {}, title), h("p", {}, text), actions.length ? h("div", { class: "row" }, actions) : null);
+}
+
+/** What a stage shows while the bench works on it. */
+export function busy(title, text = "") {
+  return h("div", { class: "empty", role: "status" }, h("span", { class: "spinner", "aria-hidden": "true" }), h("h2", {}, title), text ? h("p", {}, text) : null);
 }
 
 /** A table: columns are {title, value(row), number?, head?}; `pick(row)` makes rows choosable. */
@@ -52,7 +70,7 @@ export function problem(error) {
   const said = error.said ?? { text: String(error.message ?? error) };
   return h(
     "div", { class: "message bad", role: "alert" },
-    h("div", {}, said.where ? [h("b", {}, said.where), ": "] : null, said.found ?? said.text),
+    h("div", {}, said.where ? [h("b", {}, said.where), ": "] : null, said.where ? said.found : capital(said.found ?? said.text)),
     said.mend ? h("div", {}, capital(said.mend), ".") : null,
     said.code ? h("code", {}, said.code) : null,
   );
@@ -62,7 +80,8 @@ export function note(kind, ...children) {
   return h("div", { class: `message ${kind}` }, ...children);
 }
 
-function capital(text) {
+/** A sentence begins with a capital. */
+export function capital(text) {
   return text.charAt(0).toUpperCase() + text.slice(1);
 }
 

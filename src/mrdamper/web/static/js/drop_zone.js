@@ -1,6 +1,6 @@
 // Taking files: dropped anywhere on the page or chosen, sent one by one, read, and answered for.
 
-import { h, problem, put } from "./dom.js";
+import { h, note, problem, put } from "./dom.js";
 import { collect, isModel, isState } from "./files.js";
 import { bytes } from "./format.js";
 import { imported } from "./state.js";
@@ -9,9 +9,9 @@ export class DropZone {
   constructor(bench) {
     this.bench = bench;
     this.drop = null; // the bench's name for what was dropped last
-    this.said = h("div", { "aria-live": "polite" });
+    this.said = h("div", { role: "status" });
     this.zone = this.makeZone();
-    this.bundled = h("button", { class: "link small", onclick: () => openBundled(bench) }, "Open the bundled tests of two dampers");
+    this.bundled = h("button", { class: "link small", onclick: () => bench.openBundled().catch((error) => bench.fail(error)) }, "Open the bundled tests of two dampers");
     this.element = h("div", { class: "group" }, this.zone, this.said, this.bundled);
     this.listen();
     this.offer();
@@ -49,7 +49,7 @@ export class DropZone {
     document.addEventListener("drop", async (event) => {
       event.preventDefault();
       classList.remove("over");
-      this.take(await collect(event.dataTransfer));
+      this.take(await collect(event.dataTransfer).catch((error) => this.refuse(error) ?? []));
     });
     document.addEventListener("bench:data", () => this.offer());
   }
@@ -60,15 +60,41 @@ export class DropZone {
   }
 
   async take(files) {
+    const { bench } = this;
     if (!files.length) return;
+    if (bench.busy) return bench.say(note("warn", "The bench is still reading. Drop these again in a moment."));
     put(this.said);
     try {
       if (files.length === 1 && files[0].name.toLowerCase().endsWith(".json") && (await this.bring(files[0].file))) return;
-      await this.send(files);
-      await this.read("");
     } catch (error) {
-      put(this.said, problem(error));
+      this.refuse(error);
+      return;
     }
+    bench.store.pass({ view: "data" });
+    await this.load(async () => {
+      await this.send(files);
+      return this.read("");
+    });
+  }
+
+  /** Read what was dropped again with a corrected profile: all of it, or what was refused. */
+  readAgain(toml, refusedOnly = false) {
+    return this.load(() => this.read(toml, refusedOnly));
+  }
+
+  async load(bring) {
+    try {
+      await this.bench.takeData(bring, "Reading the files", { view: "data" });
+      put(this.said);
+    } catch (error) {
+      this.refuse(error);
+    }
+  }
+
+  refuse(error) {
+    const { overview } = this.bench;
+    put(this.said, problem(error), overview ? h("p", { class: "small faint" }, `“${overview.name}” stays on the bench.`) : null);
+    if (error.said?.verdicts) document.dispatchEvent(new CustomEvent("bench:refused", { detail: error.said }));
   }
 
   async send(files) {
@@ -82,16 +108,9 @@ export class DropZone {
     }
   }
 
-  /** Read what was dropped, with a corrected profile or a guessed one. */
-  async read(toml) {
-    put(this.said, h("p", { class: "small faint" }, "Reading …"));
-    try {
-      await this.bench.takeData(await this.bench.api.post(`/drops/${this.drop}/read`, { toml }), { view: "data" });
-      put(this.said);
-    } catch (error) {
-      put(this.said, problem(error));
-      if (error.said?.verdicts) document.dispatchEvent(new CustomEvent("bench:refused", { detail: error.said }));
-    }
+  read(toml, refusedOnly = false) {
+    put(this.said, h("p", { class: "small faint" }, "Judging each file …"));
+    return this.bench.api.post(`/drops/${this.drop}/read`, { toml, refused_only: refusedOnly });
   }
 
   /** A state or a model brought back; false where the file is something else. */
@@ -106,15 +125,6 @@ export class DropZone {
     await this.bench.refreshDampers();
     await this.bench.choose(damper, { view: "model" });
     return true;
-  }
-}
-
-/** Put the bundled tests on the bench. */
-export async function openBundled(bench) {
-  try {
-    await bench.takeData(await bench.api.post("/bundled"));
-  } catch (error) {
-    bench.fail(error);
   }
 }
 

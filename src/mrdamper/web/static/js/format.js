@@ -14,6 +14,31 @@ export function figures(value, digits = 4) {
   return sign(String(Number(value.toPrecision(digits))));
 }
 
+/** How many of something: `count(1, "run")`. */
+export function count(number, thing) {
+  return `${number} ${thing}${number === 1 ? "" : "s"}`;
+}
+
+/**
+ * How the numbers of one column are printed, so that they stand under each other: a power of 1000 for
+ * all of them, and as many decimals as give the middle one four figures.
+ */
+export function column(values) {
+  const sizes = values.filter((value) => Number.isFinite(value) && value !== 0).map(Math.abs).sort((a, b) => a - b);
+  if (!sizes.length) return { power: 0, print: (value) => figures(value) };
+  const middle = sizes[Math.floor(sizes.length / 2)];
+  const power = sizes.at(-1) >= 1e5 || sizes.at(-1) < 1e-2 ? 3 * Math.floor(Math.log10(middle) / 3) : 0;
+  const decimals = Math.min(6, Math.max(0, 3 - Math.floor(Math.log10(middle / 10 ** power))));
+  const print = (value) => (Number.isFinite(value) ? sign((value / 10 ** power).toFixed(decimals)) : "–");
+  return { power, print };
+}
+
+/** A name with its unit, and the power its numbers were divided by: "alpha (10⁶ N/m)". */
+export function heading(name, itsUnit, power = 0) {
+  const inside = [power ? `10${superscript(power)}` : "", unit(itsUnit)].filter(Boolean).join(" ");
+  return inside ? `${name} (${inside})` : name;
+}
+
 /** A fraction as per cent. */
 export function percent(value, digits = 1) {
   return value === null || value === undefined || !Number.isFinite(value) ? "–" : `${sign((100 * value).toFixed(digits))} %`;
@@ -22,7 +47,12 @@ export function percent(value, digits = 1) {
 /** A unit as it is printed. */
 export function unit(text) {
   if (text === "-") return "";
-  return text.replace(/\^(-?\d+)/g, (_, power) => superscript(Number(power))).replace(/\^-n/, "⁻ⁿ").replaceAll("/A", "/A");
+  return text.replace(/\^(-?\d+)/g, (_, power) => superscript(Number(power))).replace(/\^-n/, "⁻ⁿ");
+}
+
+/** The unit a quantity has on the screen, and what makes its number of the SI one: lengths are in mm. */
+export function onScreen(itsUnit) {
+  return itsUnit === "m" ? { unit: "mm", factor: 1000 } : { unit: itsUnit, factor: 1 };
 }
 
 /** A condition: current, frequency, amplitude. */

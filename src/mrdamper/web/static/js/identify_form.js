@@ -1,7 +1,8 @@
 // What to identify: the whole study, or one model by one method from some runs.
 
-import { h, put } from "./dom.js";
+import { h, put, renew } from "./dom.js";
 import { condition } from "./format.js";
+import { rigChooser } from "./rig_chooser.js";
 
 export class IdentifyForm {
   /** `start({whole, body})` is called when the reader begins. */
@@ -16,6 +17,7 @@ export class IdentifyForm {
     this.runs = h("select", { id: "which-runs" });
     this.over = h("select", { id: "over" },
       h("option", { value: "functions" }, "functions through the values"), h("option", { value: "joint" }, "functions fitted to all forces"));
+    this.rig = h("div", {});
     this.source = h("p", { class: "small faint" });
     this.button = h("button", { class: "primary", onclick: () => this.go() }, "Start");
     this.details = this.fields();
@@ -25,7 +27,7 @@ export class IdentifyForm {
   fields() {
     const field = (name, text, control, ...more) => h("div", { class: "field" }, h("label", { for: name }, text), control, more);
     return h("div", { class: "group", hidden: true },
-      field("model-name", "Model", this.model, this.source), field("method-name", "Method", this.method),
+      this.rig, field("model-name", "Model", this.model, this.source), field("method-name", "Method", this.method),
       field("which-runs", "From", this.runs), field("over", "Over all conditions", this.over));
   }
 
@@ -42,7 +44,8 @@ export class IdentifyForm {
 
   /** Bring the lists to the data on the bench. */
   async refresh() {
-    this.button.disabled = !this.bench.overview;
+    this.offer();
+    renew(this.rig, rigChooser(this.bench, "identify"));
     if (!this.choices) {
       this.choices = await this.bench.api.get("/choices");
       const { models, methods, model, method } = this.choices;
@@ -54,8 +57,21 @@ export class IdentifyForm {
     }
     const found = await this.bench.rigTable();
     const usable = found?.runs.filter((r) => !r.refused) ?? [];
-    put(this.runs, h("option", { value: "" }, `all ${usable.filter((r) => r.split === "train").length} train runs`),
+    const train = usable.filter((r) => r.split === "train").length;
+    const before = this.runs.value;
+    put(this.runs, h("option", { value: "" }, ["no train run can be used", "the one train run"][train] ?? `all ${train} train runs`),
       usable.map((r) => h("option", { value: r.key }, `${r.id} (${condition(r.condition)})`)));
+    if (usable.some((r) => r.key === before)) this.runs.value = before;
+  }
+
+  /** Whether something is being identified: one thing at a time. */
+  working(on) {
+    this.at = on;
+    this.offer();
+  }
+
+  offer() {
+    this.button.disabled = Boolean(this.at) || !this.bench.overview;
   }
 
   about() {

@@ -1,6 +1,7 @@
 // The panel of the Model view: which damper, its condition, and its parameters under sliders.
 
 import { h, put } from "./dom.js";
+import { onScreen } from "./format.js";
 import { slider } from "./slider.js";
 
 const MM = 1000;
@@ -43,14 +44,18 @@ export class ModelPanel {
     this.family.checked = family;
   }
 
+  /** The dampers to choose from. */
+  list() {
+    put(this.dampers, this.bench.dampers.map((d) => h("option", { value: d.key }, `${d.title} · ${d.rig || "rig"}${d.note ? ` · ${d.note}` : ""}`)));
+    this.dampers.value = this.damper.key;
+  }
+
   chooser() {
-    const { dampers } = this.bench;
-    const { key, numbers, origin, rig } = this.damper;
-    const list = h("select", { id: "damper", onchange: () => this.bench.choose(list.value) },
-      dampers.map((d) => h("option", { value: d.key }, `${d.title} · ${d.rig || "rig"}${d.note ? ` · ${d.note}` : ""}`)));
-    list.value = key;
-    return h("div", { class: "field" }, h("label", { for: "damper" }, "Damper"), list,
-      h("p", { class: "small faint" }, `${numbers} numbers, ${ORIGIN[origin] ?? origin}${rig ? `, rig ${rig}` : ""}.`));
+    const { numbers, origin, rig, note } = this.damper;
+    this.dampers = h("select", { id: "damper", onchange: () => this.bench.choose(this.dampers.value) });
+    this.list();
+    return h("div", { class: "field" }, h("label", { for: "damper" }, "Damper"), this.dampers,
+      h("p", { class: "small faint" }, `${numbers} numbers, ${ORIGIN[origin] ?? origin}${rig ? `, rig ${rig}` : ""}${note ? `; ${note}` : ""}.`));
   }
 
   conditions() {
@@ -78,9 +83,8 @@ export class ModelPanel {
   }
 
   parameterSlider(p) {
-    const screen = p.unit === "m" ? { unit: "mm", factor: MM } : {};
     const change = (value) => ({ held: { ...this.bench.state.held, [p.name]: value } });
-    return this.listen(`p.${p.name}`, { ...p, symbol: p.name, ...screen }, change, () => {
+    return this.listen(`p.${p.name}`, { ...p, symbol: p.name, ...onScreen(p.unit) }, change, () => {
       const { [p.name]: _gone, ...rest } = this.bench.state.held;
       this.bench.store.commit({ held: rest });
     });

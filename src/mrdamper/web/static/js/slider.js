@@ -29,7 +29,7 @@ export function slider(spec, { drag, settle, release }) {
   const free = release ? h("button", { class: "quiet release", hidden: true, title: "Let it follow the model again", "aria-label": `Release ${spec.symbol}`, onclick: release }, "release") : null;
   const element = h(
     "div", { class: "slider", "data-name": spec.name },
-    h("label", { for: id, title: spec.meaning }, h("b", {}, spec.symbol), h("span", {}, spec.meaning), free),
+    h("label", { for: id, title: `${spec.symbol}: ${spec.meaning}` }, h("b", {}, spec.symbol), h("span", {}, spec.meaning), free),
     number,
     h("span", { class: "unit" }, unit(spec.unit)),
     range,

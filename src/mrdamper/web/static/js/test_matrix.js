@@ -1,69 +1,117 @@
-// The test matrix, one button a run, and the facts of a run.
+// The test matrix of a rig: one button a run, in a grid the arrow keys walk.
 
-import { h, note } from "./dom.js";
-import { condition, figures, percent } from "./format.js";
+import { h } from "./dom.js";
+import { condition, figures } from "./format.js";
 
-/** The matrix of a rig's table with the run shown pressed; a click commits another. */
-export function matrixCard(bench, table, shown) {
-  const byKey = new Map(table.runs.map((run) => [run.key, run]));
-  const pick = (key) => bench.store.commit({ run: key });
-  const cell = (key) => {
-    const run = byKey.get(key);
+const STEPS = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowDown: [0, 1], ArrowUp: [0, -1] };
+
+export class TestMatrix {
+  /** `pick(key)` hears which run is chosen. */
+  constructor(table, pick) {
+    this.table = table;
+    this.pick = pick;
+    this.runs = new Map(table.runs.map((run) => [run.key, run]));
+    this.element = h("section", { class: "card tests" }, head(), this.grid(), this.others());
+    this.element.addEventListener("keydown", (event) => this.walk(event));
+  }
+
+  /** Show which run is chosen; the others are reached by the arrow keys. */
+  choose(key) {
+    let chosen = null;
+    for (const button of this.buttons()) {
+      const here = button.dataset.run === key;
+      button.setAttribute("aria-pressed", String(here));
+      button.tabIndex = here ? 0 : -1;
+      if (here) chosen = button;
+    }
+    chosen?.scrollIntoView({ block: "nearest" });
+  }
+
+  /** Mark the runs that have findings. */
+  judge(quality) {
+    for (const button of this.buttons()) {
+      const { verdict, findings } = quality[button.dataset.run];
+      const run = this.runs.get(button.dataset.run);
+      button.classList.toggle("noted", verdict !== "good");
+      button.title = [title(run), ...findings.map((f) => f.text)].join("\n");
+      button.setAttribute("aria-label", `${spoken(run)}${verdict === "good" ? "" : `, ${verdict}`}`);
+    }
+  }
+
+  buttons() {
+    return this.element.querySelectorAll("[data-run]");
+  }
+
+  grid() {
+    const { currents_A: currents, motions } = this.table.matrix;
+    const rows = motions.map((m) =>
+      h("tr", {},
+        h("th", { scope: "row" }, `${figures(m.frequency_Hz, 3)} Hz`),
+        h("th", { scope: "row" }, `${figures(m.amplitude_mm, 3)} mm`),
+        m.cells.map((keys) => h("td", {}, keys.map((key) => this.cell(key))))),
+    );
+    if (!rows.length) return h("p", { class: "faint small none" }, "No run is a steady sine at one current: there is no matrix to show.");
+    return h("div", { class: "flush" },
+      h("table", { class: "matrix" },
+        h("caption", { class: "hidden-text" }, "Test matrix: one button a run; the arrow keys walk it"),
+        h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Frequency"), h("th", { scope: "col" }, "Amplitude"),
+          currents.map((I) => h("th", { scope: "col", class: "num" }, `${figures(I, 3)} A`)))),
+        h("tbody", {}, rows)));
+  }
+
+  cell(key) {
+    const run = this.runs.get(key);
     return h(
       "button",
       {
-        class: `cell ${run.split}`, "data-run": key, "aria-pressed": String(key === shown.key), onclick: () => pick(key),
-        title: `${run.id}, ${run.split === "validate" ? "held out" : "train"}`,
-        "aria-label": `${run.id}: ${condition(run.condition)}, peak force ${figures(run.peak_N, 3)} N${run.split === "validate" ? ", held out" : ""}`,
+        class: `cell ${run.split}`, "data-run": key,
+        onclick: () => this.pick(key), title: title(run), "aria-label": spoken(run),
       },
       `${figures(run.peak_N, 3)} N`,
     );
-  };
-  const { currents_A: currents, motions } = table.matrix;
-  const inMatrix = new Set(motions.flatMap((m) => m.cells.flat()));
-  const others = table.runs.filter((run) => !inMatrix.has(run.key));
-  const rows = motions.map((m) =>
-    h("tr", {},
-      h("th", { scope: "row" }, `${figures(m.frequency_Hz, 3)} Hz`),
-      h("th", { scope: "row" }, `${figures(m.amplitude_mm, 3)} mm`),
-      m.cells.map((keys) => h("td", {}, keys.map(cell)))),
-  );
-  return h(
-    "section", { class: "card" },
-    h("div", { class: "head" },
-      h("h2", {}, "Test matrix"),
-      h("span", { class: "faint small" }, "peak force, as measured"),
-      h("span", { class: "legend" }, h("span", {}, h("i", {}), "train"), h("span", {}, h("i", { class: "dashed" }), "held out"), h("span", {}, h("i", { class: "dot" }), "noticed"))),
-    h("div", { class: "flush short" },
-      h("table", { class: "matrix" },
-        h("caption", { class: "hidden-text" }, "Test matrix: one button a run"),
-        h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Frequency"), h("th", { scope: "col" }, "Amplitude"),
-          currents.map((I) => h("th", { scope: "col", class: "num" }, `${figures(I, 3)} A`)))),
-        h("tbody", {}, rows))),
-    others.length
-      ? h("div", { class: "chips" }, h("span", { class: "faint small" }, "Other motion:"),
-        others.map((run) => h("button", { "data-run": run.key, "aria-pressed": String(run.key === shown.key), title: run.refused, onclick: () => pick(run.key) }, run.id)))
-      : null,
-  );
+  }
+
+  /** Runs that are no steady sine at one current. */
+  others() {
+    const inMatrix = new Set(this.table.matrix.motions.flatMap((m) => m.cells.flat()));
+    const found = this.table.runs.filter((run) => !inMatrix.has(run.key));
+    if (!found.length) return null;
+    return h("div", { class: "chips" }, h("span", { class: "faint small" }, "Other motion:"),
+      found.map((run) => h("button", { "data-run": run.key, title: title(run), onclick: () => this.pick(run.key) }, run.id)));
+  }
+
+  /** The nearest button in the direction of an arrow key takes the focus. */
+  walk(event) {
+    const step = STEPS[event.key];
+    const here = event.target.closest("[data-run]");
+    if (!step || !here) return;
+    event.preventDefault();
+    const from = here.getBoundingClientRect();
+    const along = (box) => (box.x + box.width / 2 - from.x - from.width / 2) * step[0] + (box.y + box.height / 2 - from.y - from.height / 2) * step[1];
+    const aside = (box) => Math.abs((box.x - from.x) * step[1]) + Math.abs((box.y - from.y) * step[0]);
+    let [best, least] = [null, Infinity];
+    for (const button of this.buttons()) {
+      const box = button.getBoundingClientRect();
+      const distance = along(box) + 4 * aside(box); // rather far ahead than far aside
+      if (along(box) > 2 && distance < least) [best, least] = [button, distance];
+    }
+    best?.focus();
+  }
 }
 
-/** What is known of a run. */
-export function runFacts(run) {
-  const fact = (name, value) => h("div", {}, h("dt", {}, name), h("dd", {}, value));
-  const c = run.condition;
-  return [
-    run.refused ? note("", run.refused) : null,
-    h("dl", { class: "facts" },
-      fact("Set", run.split === "validate" ? "held out" : "train"),
-      c ? fact("Current", `${figures(c.current_A, 3)} A`) : null,
-      c ? fact("Frequency", `${figures(c.frequency_Hz, 3)} Hz`) : null,
-      c ? fact("Amplitude", `${figures(c.amplitude_mm, 3)} mm`) : null,
-      run.peak_N === null ? null : fact("Peak force", `${figures(run.peak_N)} N`),
-      run.energy_J === null ? null : fact("Energy a cycle", `${figures(run.energy_J)} J`),
-      run.damping_Ns_m === null ? null : fact("Equivalent damping", `${figures(run.damping_Ns_m)} N s/m`),
-      run.mean_N === null ? null : fact("Mean force", `${figures(run.mean_N, 3)} N`),
-      run.cycles === null ? null : fact("Cycles", figures(run.cycles, 3)),
-      run.repeatability === null ? null : fact("Scatter between cycles", percent(run.repeatability)),
-      fact("Record", `${figures(run.duration_s, 3)} s, ${run.samples} samples`)),
-  ];
+function head() {
+  const key = (kind, text) => h("span", {}, h("i", { class: kind }), text);
+  return h("div", { class: "head" },
+    h("h2", {}, "Test matrix"),
+    h("span", { class: "faint small" }, "half the peak-to-peak force"),
+    h("span", { class: "legend" }, key("", "train"), key("dashed", "held out"), key("dot", "noted")));
+}
+
+function title(run) {
+  return [`${run.id}, ${run.split === "validate" ? "held out" : "train"}`, run.refused].filter(Boolean).join("\n");
+}
+
+function spoken(run) {
+  const force = run.peak_N === null ? "" : `, peak force ${figures(run.peak_N, 3)} N`;
+  return `${run.id}: ${condition(run.condition)}${force}${run.split === "validate" ? ", held out" : ""}`;
 }

@@ -1,6 +1,6 @@
 // Light or dark: as the system says, until the reader says otherwise.
 
-import { h } from "./dom.js";
+import { h, put } from "./dom.js";
 
 const KEY = "mrdamper.theme";
 const system = matchMedia("(prefers-color-scheme: dark)");
@@ -14,7 +14,7 @@ theme.button = () => {
   const button = h("button", { class: "quiet", onclick: toggle });
   const label = () => {
     const dark = document.documentElement.dataset.theme === "dark";
-    button.textContent = dark ? "☀ Light" : "☾ Dark";
+    put(button, dark ? "☀" : "☾", h("span", { class: "word" }, dark ? "Light" : "Dark"));
     button.setAttribute("aria-label", dark ? "Use light colours" : "Use dark colours");
   };
   document.addEventListener("themechange", label);

@@ -3,41 +3,61 @@
 import { h, problem, put, svg } from "./dom.js";
 import { seconds } from "./format.js";
 
-/** A progress box. `run(path, body)` starts work and resolves with its answer, or null if it did not end well. */
+/** A progress box, out of sight until there is something to show. */
 export function workBox(bench) {
   const bar = svg("rect", { width: "0", height: "100%" });
   const what = h("span", { class: "what" });
   const clock = h("span", {});
-  const cancel = h("button", {}, "Cancel");
+  const cancel = h("button", { disabled: true }, "Cancel");
   const box = h(
     "div", { class: "group", hidden: true },
     h("div", { class: "progress", role: "progressbar", "aria-valuemin": "0", "aria-valuemax": "100", "aria-label": "Progress" }, svg("svg", { "aria-hidden": "true" }, bar)),
-    h("div", { class: "progress-text", "aria-live": "polite" }, what, clock),
+    h("div", { class: "progress-text" }, what, clock),
     h("div", {}, cancel),
   );
-  const said = h("div", {});
-  const element = h("div", { class: "field" }, box, said);
-  let running = null;
-  cancel.addEventListener("click", () => running && bench.api.delete(`/jobs/${running}`).catch((error) => bench.fail(error)));
+  const said = h("div", { role: "status" });
+  const element = h("div", { class: "field", hidden: true }, box, said);
+  let [running, quarter] = [null, 0];
+  cancel.addEventListener("click", () => bench.api.delete(`/jobs/${running}`).catch((error) => bench.fail(error)));
 
   function tell(report) {
     const share = Math.round(100 * report.share);
     bar.setAttribute("width", `${share}%`);
     box.firstElementChild.setAttribute("aria-valuenow", share);
+    box.firstElementChild.classList.toggle("waiting", share === 0);
+    if (Math.floor(share / 25) > quarter) bench.speak(`${share} per cent`); // now and then, not at every report
+    quarter = Math.floor(share / 25);
     what.textContent = report.what;
     clock.textContent = seconds(report.seconds);
   }
 
-  async function run(path, body) {
+  /** Begin work; its answer, or null if it did not end well. */
+  const run = (path, body) => attend(() => bench.api.post(path, body));
+
+  /** Go on watching work a page began that was loaded again since. */
+  const resume = (job) => attend(() => job);
+
+  /** Say nothing more of the work that ended. */
+  function clear() {
     put(said);
-    box.hidden = false;
-    tell({ share: 0, what: "starting", seconds: 0 });
-    const began = performance.now();
+    element.hidden = box.hidden;
+  }
+
+  async function attend(begin) {
+    put(said);
+    const opener = document.activeElement;
+    element.hidden = box.hidden = false;
+    bench.speak("Working");
+    tell({ share: 0, what: "starting a worker", seconds: 0 });
+    let began = performance.now();
     const ticking = setInterval(() => (clock.textContent = seconds((performance.now() - began) / 1000)), 200);
     try {
-      const job = await bench.api.post(path, body);
+      const job = await begin();
+      began -= 1000 * job.seconds;
       running = job.key;
+      cancel.disabled = false;
       const last = await bench.api.follow(job.key, tell);
+      bench.speak(last.state === "done" ? "Done" : "");
       if (last.state === "done") return last.answer;
       put(said, last.state === "cancelled" ? h("div", { class: "message" }, "Cancelled. Nothing was changed.") : problem({ said: last.error }));
       return null;
@@ -47,9 +67,18 @@ export function workBox(bench) {
     } finally {
       clearInterval(ticking);
       running = null;
+      cancel.disabled = true;
+      const inside = box.contains(document.activeElement) || document.activeElement === document.body;
+      if (inside && opener) setTimeout(() => opener.isConnected && opener.focus()); // once it can be pressed again
       box.hidden = true;
+      element.hidden = !said.childElementCount;
     }
   }
 
-  return { element, run };
+  return {
+    element, run, resume, clear,
+    get busy() {
+      return !box.hidden;
+    },
+  };
 }

@@ -1,8 +1,11 @@
 // Compare: models on runs none of them has seen.
 
-import { Chart, paint, series } from "../chart.js";
-import { card, h, note, put, swatch, table } from "../dom.js";
+import { Chart } from "../chart.js";
+import { paint, series } from "../colours.js";
+import { busy, card, empty, h, note, put, renew, table } from "../dom.js";
 import { condition, percent, seconds } from "../format.js";
+import { swatch } from "../legend.js";
+import { rigChooser } from "../rig_chooser.js";
 import { workBox } from "../work.js";
 
 export const id = "compare";
@@ -18,12 +21,14 @@ export function create(bench) {
 class CompareView {
   constructor(bench) {
     this.bench = bench;
-    this.answer = null;
+    this.answers = new Map(); // rig number to what came of its comparison
     this.drawn = new Set(); // dampers whose loops are drawn
     this.work = workBox(bench);
+    this.comparing = false;
+    this.rig = h("div", {});
     this.list = h("fieldset", { class: "field" });
     this.button = h("button", { class: "primary", onclick: () => this.start() }, "Compare");
-    this.strip = new Chart({ title: "Error on held-out runs, one mark a run", x: "nrmse_pp (%)", y: "", name: "held-out-errors", zero: true, layout: () => this.rows() });
+    this.strip = new Chart({ title: "Error on held-out runs, one mark a run", x: "Error (% of the peak-to-peak force)", y: "", name: "held-out-errors", zero: true, layout: () => this.rows() });
     this.loops = {
       v: new Chart({ title: "Force over velocity", x: "Velocity (m/s)", y: "Force (N)", name: "compared-force-velocity" }),
       x: new Chart({ title: "Force over displacement", x: "Displacement (mm)", y: "Force (N)", name: "compared-force-displacement" }),
@@ -34,82 +39,123 @@ class CompareView {
     const side = h("div", { class: "side" }, h("div", { class: "group" },
       h("h2", {}, "Compare models"),
       h("p", { class: "small faint" }, "Each is identified from the train runs of the rig and predicts the held-out ones."),
-      this.list, this.button), this.work.element);
+      this.rig, this.list, this.button), this.work.element);
     this.element = h("div", { class: "view" }, side, this.stage);
     document.addEventListener("bench:data", () => this.forget());
     this.forget();
   }
 
+  get answer() {
+    return this.answers.get(this.bench.state.rig) ?? null;
+  }
+
   shown() {
-    this.choices().catch((error) => this.bench.fail(error));
-    if (!this.answer) this.forget();
+    this.safely(this.choices());
   }
 
   update(state, before) {
-    if (state.rig !== before.rig) this.forget();
-    if (this.answer && state.view === id && state.compareRun !== before.compareRun) this.safely(this.drawLoops());
+    if (state.rig !== before.rig) {
+      this.offer();
+      this.show();
+    } else if (this.answer && state.view === id && state.compareRun !== before.compareRun) this.safely(this.drawLoops());
   }
 
   safely(promise) {
     promise.catch((error) => this.bench.fail(error));
   }
 
+  /** Other data. */
   forget() {
-    const { overview } = this.bench;
-    this.answer = null;
-    this.button.disabled = !overview;
-    put(this.stage, h("div", { class: "empty" },
-      h("h2", {}, overview ? "Nothing is compared yet" : "No data on the bench"),
-      h("p", {}, overview ? "Choose models and compare them. Ranked by conditions left out; held-out runs confirm." : "Open the bundled tests or drop files on the Data page first."),
-      overview ? null : h("button", { class: "primary", onclick: () => this.bench.store.pass({ view: "data" }) }, "Open data")));
+    this.answers.clear();
+    this.offer();
+    this.show();
+  }
+
+  offer() {
+    renew(this.rig, rigChooser(this.bench, "compare"));
+    this.button.disabled = this.comparing || !this.bench.overview;
+  }
+
+  nothing() {
+    const { overview, store } = this.bench;
+    if (this.comparing) return busy("Comparing …", "The other views can be used meanwhile.");
+    return overview
+      ? empty("Nothing is compared yet", "Choose models and compare them. They are ranked by conditions left out; held-out runs confirm.")
+      : empty("No data on the bench", "Open the bundled tests or drop files on the Data page first.", h("button", { class: "primary", onclick: () => store.pass({ view: "data" }) }, "Open data"));
   }
 
   async choices() {
     if (this.list.childElementCount) return;
     const found = await this.bench.api.get("/compare/choices");
     const box = (c) => h("input", { type: "checkbox", name: "contestant", value: c.name, checked: c.studied });
+    const check = (which) => () => this.list.querySelectorAll("input").forEach((input, i) => (input.checked = which(found[i])));
+    const link = (text, which) => h("button", { type: "button", class: "link small", onclick: check(which) }, text);
     put(this.list, h("legend", { class: "hidden-text" }, "Models"),
+      h("div", { class: "row" }, link("Those of the study", (c) => c.studied), link("All but slow", (c) => !c.slow), link("None", () => false)),
       found.map((c) => h("label", { class: "check", title: c.source }, box(c), c.name, c.slow ? h("span", { class: "badge" }, "slow") : null)));
   }
 
-  async start() {
+  start() {
     const models = [...this.list.querySelectorAll("input:checked")].map((box) => box.value);
     if (!models.length) return this.bench.say(note("warn", "Choose at least one model."));
-    const rig = this.bench.state.rig;
-    this.button.disabled = true;
-    const found = await this.work.run("/compare", { rig, models });
-    this.button.disabled = false;
-    if (!found || rig !== this.bench.state.rig) return;
-    this.answer = found;
-    this.drawn = new Set(found.entries.slice(0, OVERLAID).map((e) => e.damper));
-    await this.bench.refreshDampers();
-    this.bench.store.settle({ compareRun: found.held_out[0]?.key ?? null });
+    return this.attend(this.work.run("/compare", { rig: this.bench.state.rig, models }));
+  }
+
+  /** A page that was loaded again: go on watching, or show the result. */
+  resume(jobs) {
+    const last = jobs.find((job) => job.kind === "compare");
+    if (last?.state === "done") this.take(last.answer);
+    else if (last && last.state !== "cancelled") this.safely(this.attend(this.work.resume(last)));
+  }
+
+  async attend(work) {
+    const { overview } = this.bench;
+    this.comparing = true;
+    this.offer();
+    if (!this.answer) put(this.stage, this.nothing());
+    const found = await work;
+    this.comparing = false;
+    this.offer();
+    if (overview !== this.bench.overview) return this.work.clear(); // other data lie on the bench by now
+    if (found) await this.bench.refreshDampers();
+    if (found) this.take(found);
+    else if (!this.answer) this.show();
+  }
+
+  take(found) {
+    this.answers.set(found.number, found);
+    if (found.number !== this.bench.state.rig) return;
     this.show();
   }
 
   show() {
-    const { entries, held_out: heldOut, refused, rig } = this.answer;
+    if (!this.answer) {
+      put(this.stage, this.nothing());
+      return;
+    }
+    const { entries, held_out: heldOut, train, refused, rig } = this.answer;
+    this.drawn = new Set(entries.slice(0, OVERLAID).map((e) => e.damper));
+    const known = (name, title) => (entries.some((e) => e[name] !== null) ? [{ title, number: true, value: (e) => percent(e[name]) }] : []);
     const columns = [
       { title: "Model", value: (e) => h("span", { title: e.source }, e.title) },
       { title: "Left out", number: true, value: (e) => percent(e.left_out) },
-      { title: "Held out", number: true, value: (e) => percent(e.held_out) },
-      { title: "Other motion", number: true, value: (e) => percent(e.other) },
+      ...known("held_out", "Held out"),
+      ...known("other", "Other motion"),
       { title: "Numbers", number: true, value: (e) => String(e.numbers) },
       { title: "Runs needed", number: true, value: (e) => String(e.runs_needed) },
       { title: "Time", number: true, value: (e) => seconds(e.seconds) },
-      { title: "", value: (e) => h("button", { class: "quiet", onclick: () => this.bench.choose(e.damper, { view: "model" }) }, "Move it") },
+      { title: "", value: (e) => h("button", { class: "link", "aria-label": `Move ${e.title}`, onclick: () => this.bench.choose(e.damper, { view: "model" }) }, "Move it") },
     ];
     const why = Object.entries(refused).map(([name, reason]) => h("div", {}, `${name}: ${reason}`));
-    put(this.runs, heldOut.map((r) => h("option", { value: r.key }, r.id)));
+    const group = (label, runs) => (runs.length ? h("optgroup", { label }, runs.map((r) => h("option", { value: r.key }, r.id))) : null);
+    put(this.runs, group("Held out", heldOut), group("Train", train));
     put(this.stage,
-      card(["Rig ", h("span", {}, rig || "without name")], h("div", { class: "flush" }, table(columns, entries, { caption: "Models compared" }))),
+      card(["Rig ", h("span", {}, rig || this.bench.overview.name)], h("div", { class: "flush" }, table(columns, entries, { caption: "Models compared" }))),
       why.length ? note("warn", h("b", {}, "Not determined from these data: "), why) : null,
-      heldOut.length
-        ? [this.strip.element,
-          h("div", { class: "row" }, h("label", { for: "compare-run" }, "Held-out run"), h("div", { class: "grow" }, this.runs)),
-          this.legend, h("div", { class: "figures" }, this.loops.v.element, this.loops.x.element)]
-        : note("", "These data hold no held-out runs; the ranking rests on conditions left out."));
-    this.safely(this.drawStrip());
+      heldOut.length ? this.strip.element : note("", "These data hold no held-out runs; the ranking rests on conditions left out."),
+      h("div", { class: "row" }, h("label", { for: "compare-run" }, "Run"), this.runs),
+      this.legend, h("div", { class: "figures" }, this.loops.v.element, this.loops.x.element));
+    if (heldOut.length) this.safely(this.drawStrip());
     this.safely(this.drawLoops());
   }
 
@@ -130,19 +176,21 @@ class CompareView {
     const about = (s) => `${ids.get(s.key) ?? ""}${s.extrapolation.length ? `, outside: ${s.extrapolation.join(", ")}` : ""}`;
     this.strip.element.querySelector(".frame").classList.toggle("tall", entries.length > 6);
     const marks = entries.map((e, i) => ({
-      x: e.scores.map((s) => 100 * s.nrmse_pp), y: e.scores.map(() => -i), mode: "markers", color: series(i).color, fill: "rgba(0,0,0,0)", size: 8,
+      x: e.scores.map((s) => 100 * s.nrmse_pp), y: e.scores.map(() => -i), mode: "markers", color: series(i).color, fill: "panel", size: 8,
       name: e.title, legend: false, text: e.scores.map(about), hover: "%{text}<br>%{x:.2f} %<extra></extra>",
     }));
     await this.strip.draw(marks, entries.map((e) => `${e.title}: ${percent(e.held_out)}`).join("; "));
   }
 
   async drawLoops() {
-    const { entries, held_out: heldOut } = this.answer;
-    const key = heldOut.some((r) => r.key === this.bench.state.compareRun) ? this.bench.state.compareRun : heldOut[0]?.key;
-    if (!key) return;
+    const { entries, held_out: heldOut, train } = this.answer;
+    const runs = [...heldOut, ...train];
+    const key = runs.some((r) => r.key === this.bench.state.compareRun) ? this.bench.state.compareRun : runs[0].key;
     this.runs.value = key;
-    const { head, arrays } = await this.bench.api.frame(`/compare/runs/${key}`);
-    put(this.legend, h("span", { class: "faint" }, `${condition(head.condition)}:`), h("span", { class: "check" }, swatch({ color: "var(--measured)" }), "measured"),
+    const { rig } = this.bench.state;
+    const { head, arrays } = await this.bench.api.frame(`/compare/rigs/${rig}/runs/${key}`);
+    if (rig !== this.bench.state.rig) return;
+    renew(this.legend, h("span", { class: "faint" }, `${condition(head.condition)}:`), h("span", { class: "check" }, swatch({ color: "measured" }), "measured"),
       entries.map((e, i) => this.legendEntry(e, i)));
     for (const [axis, chart] of Object.entries(this.loops)) {
       const shown = entries.map((e, i) => [e, i]).filter(([e]) => this.drawn.has(e.damper));
@@ -159,6 +207,6 @@ class CompareView {
       this.drawn.delete(entry.damper) || this.drawn.add(entry.damper);
       this.safely(this.drawLoops());
     };
-    return h("label", { class: "check" }, h("input", { type: "checkbox", checked: this.drawn.has(entry.damper), onchange: toggle }), swatch(series(index)), entry.title);
+    return h("label", { class: "check" }, h("input", { type: "checkbox", id: `drawn-${index}`, checked: this.drawn.has(entry.damper), onchange: toggle }), swatch(series(index)), entry.title);
   }
 }

@@ -1,10 +1,13 @@
 // Data: drop files, see what was taken and refused, the test matrix, and the loops of a run.
 
 import { Chart } from "../chart.js";
-import { card, h, put } from "../dom.js";
-import { DropZone, openBundled } from "../drop_zone.js";
-import { figures } from "../format.js";
-import { matrixCard, runFacts } from "../test_matrix.js";
+import { busy, empty, h, put, renew } from "../dom.js";
+import { DropZone } from "../drop_zone.js";
+import { figures, count } from "../format.js";
+import { fileList, profilePanel } from "../intake_panels.js";
+import { rigChooser } from "../rig_chooser.js";
+import { RunFacts } from "../run_facts.js";
+import { TestMatrix } from "../test_matrix.js";
 
 export const id = "data";
 export const label = "Data";
@@ -17,24 +20,31 @@ class DataView {
   constructor(bench) {
     this.bench = bench;
     this.drop = new DropZone(bench);
-    this.parts = { rigs: h("div", {}), quality: h("div", {}), verdicts: h("div", {}), profile: h("div", {}) };
-    this.stage = h("div", { class: "stage" });
-    this.facts = h("div", {});
+    this.parts = { files: h("div", {}), profile: h("div", {}), rigs: h("div", {}), quality: h("div", {}) };
+    this.stage = h("div", { class: "stage fill" });
+    this.facts = new RunFacts();
+    this.matrix = null; // of the table shown
+    this.turn = 0; // of several refreshes on their way, the newest counts
     this.charts = {
-      x: new Chart({ title: "Force over displacement", x: "Displacement (mm)", y: "Force (N)", name: "force-displacement" }),
+      x: new Chart({ title: "Force over displacement", x: "Displacement (mm)", y: "Force (N)", name: "force-displacement", keys: true }),
       v: new Chart({ title: "Force over velocity", x: "Velocity (m/s)", y: "Force (N)", name: "force-velocity" }),
       t: new Chart({ title: "Force over time", x: "Time (s)", y: "Force (N)", name: "force-time" }),
       d: new Chart({ title: "Displacement over time", x: "Time (s)", y: "Displacement (mm)", name: "displacement-time" }),
     };
-    const side = h("div", { class: "side" }, this.drop.element, Object.values(this.parts));
-    this.element = h("div", { class: "view" }, side, this.stage);
-    document.addEventListener("bench:data", () => this.shown());
+    this.figures = h("div", { class: "figures" }, Object.values(this.charts).map((c) => c.element));
+    this.element = h("div", { class: "view" }, h("div", { class: "side" }, this.drop.element, Object.values(this.parts)), this.stage);
+    document.addEventListener("bench:data", () => {
+      this.matrix = null;
+      this.showIntake(bench.overview);
+      this.shown();
+    });
+    document.addEventListener("bench:busy", () => this.shown());
     document.addEventListener("bench:refused", (event) => this.showIntake(event.detail));
     this.shown();
   }
 
   shown() {
-    this.refresh().catch((error) => this.bench.fail(error));
+    if (this.bench.state.view === id) this.refresh().catch((error) => this.bench.fail(error));
   }
 
   update(state, before) {
@@ -42,105 +52,86 @@ class DataView {
   }
 
   async refresh() {
-    const { bench } = this;
-    put(this.parts.rigs, rigChooser(bench));
-    this.showIntake(bench.overview);
-    if (!bench.overview) {
-      put(this.parts.quality);
-      put(this.stage, welcome(bench));
+    const { bench, parts } = this;
+    const turn = (this.turn += 1);
+    renew(parts.rigs, whatIsThere(bench));
+    if (bench.busy || !bench.overview) {
+      this.matrix = null;
+      put(parts.quality);
+      put(this.stage, bench.busy ? busy(`${bench.busy} …`) : welcome(bench));
       return;
     }
-    const table = await bench.rigTable();
-    const run = table.runs.find((r) => r.key === bench.state.run) ?? table.runs.find((r) => r.peak_N !== null) ?? table.runs[0];
-    put(this.facts, runFacts(run));
-    put(
-      this.stage,
-      h("div", { class: "bench-top" },
-        matrixCard(bench, table, run),
-        card(["Run ", h("span", {}, run.id)], h("div", { class: "body" }, this.facts))),
-      h("div", { class: "figures" }, Object.values(this.charts).map((c) => c.element)),
-    );
-    this.stage.querySelector(".cell[aria-pressed=true]")?.scrollIntoView({ block: "nearest" });
-    this.showQuality(table, run).catch((error) => bench.fail(error));
-    await this.drawRun(run);
+    const { rig } = bench.state;
+    if (this.matrix?.rig !== rig) put(this.stage, busy(`Analysing ${count(bench.overview.rigs[rig].runs, "run")} …`));
+    const table = await bench.rigTable(rig);
+    if (turn !== this.turn || rig !== bench.state.rig) return;
+    const run = chosen(table, bench.state.run);
+    if (this.matrix?.table !== table) this.layOut(table, rig);
+    this.matrix.choose(run.key);
+    this.facts.show(run);
+    const current = () => turn === this.turn && rig === bench.state.rig;
+    await this.drawRun(run, rig, current);
+    if (current()) await this.showQuality(run, rig, current);
   }
 
-  async drawRun(run) {
-    const cycle = await this.bench.loop(run.key, "cycle");
-    const window = await this.bench.loop(run.key, "window");
-    if (this.bench.state.run && this.bench.state.run !== run.key) return; // another was chosen meanwhile
+  layOut(table, rig) {
+    this.matrix = new TestMatrix(table, (key) => this.bench.store.commit({ run: key }));
+    this.matrix.rig = rig;
+    put(this.stage, h("div", { class: "bench-top" }, this.matrix.element, this.facts.element), this.figures);
+  }
+
+  async drawRun(run, rig, current) {
+    const [cycle, window] = await Promise.all(["cycle", "window"].map((part) => this.bench.loop(run.key, part, rig)));
+    if (!current()) return; // another was chosen meanwhile
     const all = { color: "line-strong", width: 1, name: "steady window", quiet: true };
-    const last = { color: "measured", width: 2, name: run.peak_N === null ? "record" : "last cycle" };
+    const last = run.peak_N === null ? { color: "measured", width: 0.8, name: "record" } : { color: "measured", width: 2, name: "last cycle" };
     const said = run.peak_N === null ? run.refused : `Peak force ${figures(run.peak_N)} newtons, energy ${figures(run.energy_J)} joules a cycle.`;
     const two = (a, b) => [{ ...all, x: window.arrays[a], y: window.arrays[b] }, { ...last, x: cycle.arrays[a], y: cycle.arrays[b] }];
+    const one = (b) => [{ ...last, width: Math.min(last.width, 1.5), x: window.arrays.t, y: window.arrays[b] }];
     const { x, v, t, d } = this.charts;
     for (const chart of Object.values(this.charts)) chart.reset();
-    x.draw(two("x", "F"), said);
-    v.draw(two("v", "F"), said);
-    t.draw([{ ...last, width: 1.5, x: window.arrays.t, y: window.arrays.F }], said);
-    d.draw([{ ...last, width: 1.5, x: window.arrays.t, y: window.arrays.x }], said);
+    await Promise.all([x.draw(two("x", "F"), said), v.draw(two("v", "F"), said), t.draw(one("F"), said), d.draw(one("x"), said)]);
   }
 
-  /** Verdicts come a moment later: judging looks at every sample of every run. */
-  async showQuality(table, run) {
+  /** Verdicts come after the loops: judging looks at every sample of every run. */
+  async showQuality(run, rig, current) {
     const group = (text, faint) => put(this.parts.quality, h("div", { class: "group" }, h("h2", {}, "Quality"), h("p", { class: `small ${faint}` }, text)));
-    group("Judging the runs …", "faint");
-    const found = await this.bench.quality();
-    if ((await this.bench.rigTable()) !== table || !this.facts.isConnected) return;
-    group(`${Object.entries(tally(Object.values(found).map((q) => q.verdict))).map(([word, count]) => `${count} ${word}`).join(", ")}.`, "");
-    for (const mark of this.stage.querySelectorAll("[data-run]")) {
-      const { verdict, findings } = found[mark.dataset.run];
-      mark.classList.toggle("noticed", verdict !== "good");
-      if (findings.length && !mark.title.includes(findings[0].text)) mark.title += `\n${findings.map((f) => f.text).join("\n")}`;
-    }
-    const { verdict, findings } = found[run.key];
-    const kind = verdict === "refused" ? "bad" : "warn";
-    this.facts.querySelectorAll(".finding").forEach((element) => element.remove());
-    this.facts.prepend(...findings.map((f) => h("div", { class: `finding message ${kind}` }, h("div", {}, f.text, " ", h("code", {}, f.code)))));
+    if (!this.parts.quality.childElementCount) group("Judging the runs …", "faint");
+    const found = await this.bench.quality(rig);
+    if (!current()) return;
+    group(`${Object.entries(tally(Object.values(found).map((q) => q.verdict))).map(([word, n]) => `${n} ${word}`).join(", ")}.`, "");
+    this.matrix.judge(found);
+    this.facts.judge(found[run.key]);
   }
 
   showIntake(found) {
-    put(this.parts.verdicts, verdicts(found));
-    put(this.parts.profile, profile(found, this.drop));
+    put(this.parts.files, fileList(found));
+    put(this.parts.profile, profilePanel(found, this.drop));
   }
 }
 
-function rigChooser(bench) {
+/** The run asked for; else the first of the matrix; else the first there is. */
+function chosen(table, key) {
+  const first = table.matrix.motions.flatMap((m) => m.cells.flat())[0];
+  return [key, first].map((name) => table.runs.find((run) => run.key === name)).find(Boolean) ?? table.runs[0];
+}
+
+function whatIsThere(bench) {
   if (!bench.overview) return null;
-  const { rigs } = bench.overview;
+  const { rigs, name, runs } = bench.overview;
   return h("div", { class: "group" },
     h("h2", {}, rigs.length > 1 ? "Rig" : "Data"),
-    h("div", { class: "segmented", role: "group", "aria-label": "Rig" },
-      rigs.map((rig, i) => h("button", { "aria-pressed": String(i === bench.state.rig), onclick: () => bench.store.commit({ rig: i, run: null, compareRun: null }) }, `${rig.name || bench.overview.name} (${rig.runs})`))),
-    h("p", { class: "small faint" }, `${bench.overview.runs} runs in “${bench.overview.name}”.`));
-}
-
-/** What was said of every dropped file. */
-function verdicts(overview) {
-  if (!overview?.verdicts.length) return null;
-  const word = { taken: ["good", "taken"], noticed: ["warn", "noticed"], refused: ["bad", "refused"] };
-  return h("div", { class: "group" }, h("h2", {}, "Files"),
-    overview.verdicts.map((v) => h("div", { class: `message ${v.state === "refused" ? "bad" : v.state === "noticed" ? "warn" : ""}` },
-      h("div", { class: "row" }, h("b", {}, v.name), h("span", { class: `badge ${word[v.state][0]}` }, word[v.state][1])),
-      v.findings.map(([code, text]) => h("div", {}, text, " ", h("code", {}, code))))));
-}
-
-function profile(found, drop) {
-  if (!found?.profile) return null;
-  const text = h("textarea", { "aria-label": "Rig profile, TOML", spellcheck: "false" });
-  text.value = found.profile;
-  const again = h("button", { onclick: () => drop.read(text.value) }, "Read again");
-  return h("details", { class: "group", open: found.verdicts.some((v) => v.state === "refused") }, h("summary", {}, "Guessed rig profile: columns, units, signs"),
-    h("div", { class: "group" }, text, h("div", {}, again)));
+    rigChooser(bench, "data"),
+    h("p", { class: "small faint" }, `${count(runs, "run")} in “${name}”.`));
 }
 
 function welcome(bench) {
-  return h(
-    "div", { class: "empty" },
-    h("h2", {}, "See the damper"),
-    h("p", {}, "Drop the files of a test rig or a dataset folder on the left. Or begin with the bundled tests of two real dampers: 53 runs, ready to look at."),
-    h("button", { class: "primary", onclick: () => openBundled(bench) }, "Open the bundled tests"),
-  );
+  const open = h("button", { class: "primary", onclick: () => bench.openBundled().catch((error) => bench.fail(error)) }, "Open the bundled tests");
+  return h("div", { class: "welcome" },
+    empty("See the damper", "Drop the files of a test rig or a dataset folder anywhere on this page. Or begin with the bundled tests of two real dampers: 53 runs, ready to look at.", open),
+    h("ol", { class: "path" },
+      [["Data", "what was measured, and whether it can be trusted"], ["Identify", "one model, or the whole study"], ["Model", "move current, frequency, amplitude and parameters; watch the loops"], ["Compare", "models on runs none of them has seen"], ["Take away", "report, model, code and tables"]]
+        .map(([what, why]) => h("li", {}, h("b", {}, what), h("span", { class: "faint small" }, why)))));
 }
 
 function tally(words) {

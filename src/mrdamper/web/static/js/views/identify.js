@@ -1,8 +1,8 @@
 // Identify: the whole study, or one model by one method; progress, cancel, results with residuals.
 
 import { Chart } from "../chart.js";
-import { card, h, note, put, table } from "../dom.js";
-import { condition, figures, percent, seconds, unit } from "../format.js";
+import { busy, card, empty, h, note, put, table } from "../dom.js";
+import { column, condition, count, figures, heading, onScreen, percent, seconds, unit } from "../format.js";
 import { IdentifyForm } from "../identify_form.js";
 import { workBox } from "../work.js";
 
@@ -20,19 +20,20 @@ class IdentifyView {
     this.form = new IdentifyForm(bench, (choice) => this.start(choice));
     this.stage = h("div", { class: "stage" });
     this.charts = {
-      v: new Chart({ title: "Measured and identified, over velocity", x: "Velocity (m/s)", y: "Force (N)", name: "identified-force-velocity", legend: true }),
-      x: new Chart({ title: "Measured and identified, over displacement", x: "Displacement (mm)", y: "Force (N)", name: "identified-force-displacement", legend: true }),
+      v: new Chart({ title: "Force over velocity", x: "Velocity (m/s)", y: "Force (N)", name: "identified-force-velocity", keys: true }),
+      x: new Chart({ title: "Force over displacement", x: "Displacement (mm)", y: "Force (N)", name: "identified-force-displacement" }),
       r: new Chart({ title: "Residual over time", x: "Time (s)", y: "Residual (N)", name: "residual" }),
     };
     this.charts.r.element.classList.add("wide");
     this.caption = h("h2", {});
+    this.lines = []; // of the table of runs
     this.element = h("div", { class: "view" }, h("div", { class: "side" }, this.form.element, this.work.element), this.stage);
     document.addEventListener("bench:data", () => this.forget());
     this.forget();
   }
 
   shown() {
-    this.safely(this.form.refresh());
+    if (this.bench.state.view === id) this.safely(this.form.refresh());
   }
 
   update(state, before) {
@@ -46,23 +47,44 @@ class IdentifyView {
   forget() {
     const { overview } = this.bench;
     this.shown();
-    put(this.stage, h("div", { class: "empty" },
-      h("h2", {}, overview ? "Nothing is identified yet" : "No data on the bench"),
-      h("p", {}, overview
-        ? "The whole study identifies every candidate, predicts conditions left out, and chooses. Or identify one model by one method and look at its residuals."
-        : "Open the bundled tests or drop files on the Data page first."),
-      overview ? null : h("button", { class: "primary", onclick: () => this.bench.store.pass({ view: "data" }) }, "Open data")));
+    put(this.stage, overview
+      ? empty("Nothing is identified yet", "The whole study identifies every candidate, predicts conditions left out, and chooses. Or identify one model by one method and look at its residuals.")
+      : empty("No data on the bench", "Open the bundled tests or drop files on the Data page first.", h("button", { class: "primary", onclick: this.go("data") }, "Open data")));
   }
 
-  async start({ whole, body }) {
-    const { form, work, bench } = this;
-    form.button.disabled = true;
-    const answer = await (whole ? work.run("/study", {}) : work.run("/identify", body));
-    form.button.disabled = false;
-    if (!answer) return;
+  start({ whole, body }) {
+    return this.attend(whole, whole ? this.work.run("/study", {}) : this.work.run("/identify", body));
+  }
+
+  /** A page that was loaded again: go on watching, or show the result. */
+  resume(jobs) {
+    const last = jobs.filter((job) => ["study", "identify"].includes(job.kind) && job.state !== "cancelled").at(-1);
+    if (!last) return;
+    if (last.state === "done") this.show(last.kind === "study", last.answer);
+    else this.safely(this.attend(last.kind === "study", this.work.resume(last)));
+  }
+
+  async attend(whole, work) {
+    const { form, bench } = this;
+    const { overview } = bench;
+    form.working(true);
+    if (this.stage.querySelector(".empty")) put(this.stage, busy(whole ? "The study is under way …" : "Identifying …", "The other views can be used meanwhile."));
+    const answer = await work;
+    form.working(false);
+    if (overview !== bench.overview) return this.work.clear(); // other data lie on the bench by now
+    if (!answer) {
+      if (this.stage.querySelector(".spinner")) this.forget();
+      return;
+    }
     const key = whole ? (answer.rigs[bench.state.rig] ?? answer.rigs[0]).chosen : answer.damper;
-    if (key) bench.store.settle({ damper: key, document: null, condition: null, held: {} });
     await bench.refreshDampers();
+    // A damper that is being moved meanwhile stays under the hand.
+    if (key && (bench.state.view !== "model" || !bench.state.damper)) bench.store.settle({ damper: key, document: null, condition: null, held: {} });
+    else if (key) bench.say(note("", "What was identified now stands in the list of dampers."));
+    this.show(whole, answer);
+  }
+
+  show(whole, answer) {
     put(this.stage, whole ? this.studied(answer) : this.identified(answer));
   }
 
@@ -74,16 +96,16 @@ class IdentifyView {
     const columns = [
       { title: "Candidate", value: (c) => c.title },
       { title: "Left out", number: true, value: (c) => percent(c.left_out) },
-      { title: "Held out", number: true, value: (c) => percent(c.held_out) },
+      ...(answer.rigs.some((rig) => rig.candidates.some((c) => c.held_out !== null)) ? [{ title: "Held out", number: true, value: (c) => percent(c.held_out) }] : []),
       { title: "One by one", number: true, value: (c) => percent(c.per_run) },
       { title: "Numbers", number: true, value: (c) => String(c.numbers) },
       { title: "Time", number: true, value: (c) => seconds(c.seconds) },
-      { title: "", value: (c) => h("button", { class: "quiet", onclick: () => this.bench.choose(c.damper, { view: "model" }) }, "Move it") },
+      { title: "", value: (c) => h("button", { class: "link", "aria-label": `Move ${c.title}`, onclick: () => this.bench.choose(c.damper, { view: "model" }) }, "Move it") },
     ];
     return [
-      h("p", { class: "small faint" }, `Median error as a share of the peak-to-peak force. “Left out”: train runs predicted without their condition; it chooses, and within a tenth fewer numbers win. “Held out”: runs no model has seen. Done in ${seconds(answer.seconds)}.`),
+      h("p", { class: "small faint" }, `Median error as a share of the peak-to-peak force. “Left out”: train runs predicted without their condition; it chooses, and within a tenth fewer numbers win. “Held out”: runs no model has seen. “One by one”: each train run identified alone. Done in ${seconds(answer.seconds)}.`),
       answer.rigs.map((rig) =>
-        card(["Rig ", h("span", {}, rig.rig || "without name")],
+        card(["Rig ", h("span", {}, rig.rig || this.bench.overview.name)],
           h("div", { class: "flush" }, table(columns, rig.candidates, { chosen: (c) => c.damper === rig.chosen, caption: `Candidates of rig ${rig.rig}` })))),
       h("div", { class: "row" },
         h("button", { class: "primary", onclick: this.go("model") }, "See it move"),
@@ -103,7 +125,7 @@ class IdentifyView {
       this.runsCard(answer, runs),
       this.caption,
       h("div", { class: "figures" }, v.element, x.element, r.element),
-      notes.length ? h("ul", { class: "small faint" }, notes.map((text) => h("li", {}, text))) : null,
+      notes.length ? h("ul", { class: "small faint notes" }, notes.map((text) => h("li", {}, text))) : null,
       answer.damper ? h("div", { class: "row" }, h("button", { class: "primary", onclick: this.go("model") }, "See it move")) : null,
     ];
   }
@@ -121,22 +143,32 @@ class IdentifyView {
       { title: "Error", number: true, value: (run) => percent(run.nrmse_pp) },
     ];
     if (!answer.joint) {
-      const value = (p) => (run) => [figures(run.values[p.name]), run.at_bounds.includes(p.name) ? h("span", { class: "badge warn" }, "at bound") : null];
       columns.push({ title: "Scatter", number: true, value: (run) => percent(run.floor) });
-      columns.push(...answer.units.map((p) => ({ title: p.unit === "-" ? p.name : `${p.name} (${unit(p.unit)})`, number: true, value: value(p) })));
+      columns.push(...answer.units.map((p) => {
+        const screen = onScreen(p.unit);
+        const value = (run) => screen.factor * (run.values[p.name] ?? NaN);
+        const { power, print } = column(runs.map(value));
+        return { title: heading(p.name, screen.unit, power), number: true, value: (run) => [print(value(run)), run.at_bounds.includes(p.name) ? h("span", { class: "badge warn" }, "at bound") : null] };
+      }));
       columns.push({ title: "At bounds", value: (run) => run.at_bounds.join(", ") || "–" });
     }
     const held = answer.held_out === null ? "" : `; held-out runs ${percent(answer.held_out)} with ${answer.numbers} numbers over all conditions`;
+    const listed = table(columns, runs, { pick, caption: "Identified runs" });
+    this.lines = [...listed.tBodies[0].rows];
     return h("section", { class: "card" },
-      h("div", { class: "head" }, h("h2", {}, `${runs.length} runs identified`),
-        h("span", { class: "small faint" }, `median error ${percent(answer.median)} of the peak-to-peak force${held}`)),
-      h("div", { class: "flush short" }, table(columns, runs, { pick, caption: "Identified runs" })));
+      h("div", { class: "head" }, h("h2", {}, `${count(runs.length, "run")} identified`),
+        h("span", { class: "small faint" }, `${answer.rig ? `Rig ${answer.rig}: ` : ""}median error ${percent(answer.median)} of the peak-to-peak force${held}`)),
+      h("div", { class: "flush short" }, listed));
   }
 
   /** Show measured and identified force of one run. */
   async pick(runs, index) {
     const run = runs[index];
     this.caption.textContent = `Run ${run.id}`;
+    this.lines.forEach((line, i) => {
+      line.classList.toggle("chosen", i === index);
+      line.querySelector("button").setAttribute("aria-pressed", String(i === index));
+    });
     const { arrays, head } = await this.bench.api.frame(`/identified/runs/${index}`);
     const said = `${run.id}, ${condition(head.condition)}: error ${percent(run.nrmse_pp)} of the peak-to-peak force.`;
     const two = (axis) => [
@@ -155,7 +187,7 @@ function jointCard(answer) {
   const { values, at_bounds: bounds } = answer.joint;
   const columns = [
     { title: "Parameter", value: (p) => p.name },
-    { title: "Value", number: true, value: (p) => `${figures(values[p.name])} ${unit(p.unit)}` },
+    { title: "Value", number: true, value: (p) => `${figures(onScreen(p.unit).factor * values[p.name])} ${unit(onScreen(p.unit).unit)}` },
     { title: "Meaning", value: (p) => p.meaning },
     { title: "", value: (p) => (bounds.includes(p.name) ? h("span", { class: "badge warn" }, "at bound") : "") },
   ];

@@ -1,8 +1,8 @@
 // Model: a damper under the sliders. The loops follow while a slider is dragged.
 
 import { Latest } from "../api.js";
-import { h, note, put } from "../dom.js";
-import { figures } from "../format.js";
+import { empty, h, note, put } from "../dom.js";
+import { condition, figures } from "../format.js";
 import { ModelCharts } from "../model_charts.js";
 import { ModelPanel } from "../model_panel.js";
 
@@ -11,7 +11,11 @@ export const label = "Model";
 
 const MM = 1000;
 const SETTLE = 300; // milliseconds after a drag until the axes fit again
-const [COARSE, FINE] = [9, 33]; // points of the curves over current: while dragged, and at rest
+const LATE = 250; // milliseconds after which a picture that is not answered yet is dimmed
+const SLOW = 60; // milliseconds a loop, from which on the curves over current come point by point
+const [COARSE, FINE] = [11, 31]; // points of the curves over current, while dragged and at rest; one lies where tests end
+
+const NO_CURVE = { current: [], peak: [], energy: [] };
 
 export function create(bench) {
   return new ModelView(bench);
@@ -28,16 +32,18 @@ class ModelView {
     this.stage = h("div", { class: "stage fill" });
     this.element = h("div", { class: "view" }, this.panel.element, this.stage);
     this.verdict = h("div", {});
-    this.spoken = h("p", { class: "hidden-text", "aria-live": "polite" });
+    this.spoken = ""; // what a screen reader was told last
     this.damper = null; // as the bench describes it
     this.moved = null; // when the slider was moved that the next question is about
+    this.pace = Infinity; // milliseconds a loop of this damper takes; not known at first
     this.latest = new Latest(
-      ({ key, ask }) => bench.api.frame(`/dampers/${key}/predict`, ask),
+      (question) => this.timed(question),
       (found, question) => this.draw(found, question),
       (error) => bench.fail(error),
     );
     document.addEventListener("bench:dampers", () => {
-      this.damper = null; // the list of dampers is another
+      if (bench.dampers.some((d) => d.key === this.damper?.key)) return this.panel.list(); // what is moved stays
+      this.damper = null;
       this.shown();
     });
   }
@@ -74,27 +80,71 @@ class ModelView {
     const found = await this.bench.api.get(`/dampers/${key}`);
     if (key !== this.bench.state.damper) return false;
     this.damper = found;
+    this.pace = Infinity;
     this.panel.build(found);
     this.charts.reset();
-    put(this.stage, this.verdict, this.charts.element, this.spoken);
-    this.keepDocument(key);
+    put(this.stage, this.verdict, this.charts.element);
     return true;
   }
 
   ask() {
     const { damper, condition, held, family } = this.bench.state;
     if (this.damper?.key !== damper) return;
-    const ask = { ...(condition ?? this.damper.start), held, family, currents: this.charts.held ? COARSE : FINE };
-    this.latest.want({ key: damper, moved: this.moved, ask });
+    const currents = this.pace > SLOW ? 0 : this.charts.held ? COARSE : FINE;
+    this.latest.want({ key: damper, moved: this.moved, ask: { ...(condition ?? this.damper.start), held, family, currents } });
     this.moved = null;
+  }
+
+  /** Ask, and dim the picture of before where the answer takes its time. */
+  async timed({ key, ask }) {
+    const began = performance.now();
+    const waiting = setTimeout(() => this.late(true), LATE);
+    try {
+      const found = await this.bench.api.frame(`/dampers/${key}/predict`, ask);
+      if (key === this.damper?.key) this.pace = (performance.now() - began) / (found.head.loops.length + ask.currents);
+      return found;
+    } finally {
+      clearTimeout(waiting);
+      this.late(false);
+    }
+  }
+
+  late(on) {
+    this.stage.classList.toggle("late", on);
+    this.stage.setAttribute("aria-busy", String(on));
+    if (on) put(this.verdict, note("", h("b", {}, "Calculating …"), h("div", {}, "The picture is that of before.")));
   }
 
   async draw({ head, arrays }, { key, ask, moved }) {
     if (key !== this.damper?.key) return;
     this.panel.set(head.parameters);
     this.judge(head, ask);
-    await this.charts.draw(head, arrays, ask.current_A, this.damper.rig);
+    const curve = ask.currents ? { current: arrays["over.current"], peak: arrays["over.peak"], energy: arrays["over.energy"] } : NO_CURVE;
+    await this.charts.draw(head, arrays, curve, ask.current_A, this.damper.rig);
     if (moved !== null) measure(moved);
+    if (!ask.currents && !this.charts.held) await this.complete(head, key, ask);
+  }
+
+  /** The curves over current after the loop: at once, or point by point until something newer is asked. */
+  async complete(head, key, ask) {
+    const current = () => key === this.damper?.key && !this.latest.busy && this.bench.state.view === id;
+    if (!current()) return;
+    if (this.pace <= SLOW) {
+      this.ask();
+      return;
+    }
+    const curve = { current: [], peak: [], energy: [] };
+    const [low, high] = this.damper.reach.current_A;
+    for (let i = 0; i < COARSE; i += 1) {
+      const at = low + (i / (COARSE - 1)) * (high - low);
+      const found = await this.bench.api.frame(`/dampers/${key}/predict`, { ...ask, current_A: at, family: false });
+      if (!current()) return;
+      const [loop] = found.head.loops;
+      curve.current.push(at);
+      curve.peak.push(loop.peak_N);
+      curve.energy.push(loop.energy_J);
+      await this.charts.drawCurve(head, curve, ask.current_A);
+    }
   }
 
   dragging(change, when) {
@@ -125,21 +175,12 @@ class ModelView {
     const flags = head.extrapolation.map((flag) => tested[flag] ?? [flag, ""]);
     const [now] = head.loops;
     const said = flags.length ? `Extrapolation in ${flags.map(([name]) => name).join(", ")}` : "Inside the tested conditions";
-    if (this.spoken.textContent !== said) this.spoken.textContent = said; // spoken when it changes, not at every move
+    if (this.spoken !== said) this.bench.speak(said); // when it changes, not at every move
+    this.spoken = said;
+    const amounts = `Predicted: peak force ${figures(now.peak_N)} N, energy ${figures(now.energy_J)} J a cycle. ${nearest(head.nearest[0])}`;
     put(this.verdict, flags.length
-      ? note("warn", h("div", {}, h("b", {}, "Extrapolation: "), `${flags.map((f) => f.join(" ")).join("; ")}. Nothing was measured there; the loop is dashed.`))
-      : note("", h("div", {}, h("b", {}, "Inside the tested conditions: "), `peak force ${figures(now.peak_N)} N, energy ${figures(now.energy_J)} J a cycle${head.nearest.length ? "" : "; no run was measured near this condition"}.`)));
-  }
-
-  /** The model's document goes into the state, so that a link carries it. */
-  async keepDocument(key) {
-    try {
-      const { text } = await this.bench.api.post(`/dampers/${key}/document`, { held: {} });
-      if (this.bench.state.damper === key) this.bench.store.settle({ document: JSON.stringify(JSON.parse(text)) });
-    } catch (error) {
-      if (error.status !== 422) return this.bench.fail(error);
-      this.bench.say(note("warn", "This kind of damper has no file format yet: a link brings back the data, not the model."), 6000);
-    }
+      ? note("warn", h("div", {}, h("b", {}, "Extrapolation: "), `${flags.map((f) => f.join(" ")).join("; ")}. The loop is dashed.`), h("div", {}, amounts))
+      : note("", h("div", {}, h("b", {}, "Inside the tested conditions.")), h("div", {}, amounts)));
   }
 }
 
@@ -149,17 +190,20 @@ function measure(moved) {
 }
 
 function span([low, high], factor) {
-  return `${figures(factor * low, 3)}–${figures(factor * high, 3)}`;
+  const [from, to] = [figures(factor * low, 3), figures(factor * high, 3)];
+  return from === to ? `at ${from}` : `${from}–${to}`;
+}
+
+/** What was measured nearest, to hold the prediction against. */
+function nearest(run) {
+  if (!run) return "No run was measured near this condition.";
+  return `Measured nearest, ${condition(run.condition)}: ${figures(run.peak_N)} N, ${figures(run.energy_J)} J.`;
 }
 
 function nothing(bench) {
   const go = (view) => () => bench.store.pass({ view });
-  return h(
-    "div", { class: "empty" },
-    h("h2", {}, "No model to move yet"),
-    h("p", {}, "Identify one from the data, or drop a model.json on the Data page. Then drag current, frequency, amplitude and every parameter, and watch the loops follow."),
-    h("div", { class: "row" },
-      h("button", { class: "primary", onclick: go("identify") }, "Identify a model"),
-      h("button", { onclick: go("data") }, "Open data")),
-  );
+  return empty("No model to move yet",
+    "Identify one from the data, or drop a model.json. Then drag current, frequency, amplitude and every parameter, and watch the loops follow.",
+    h("button", { class: "primary", onclick: go("identify") }, "Identify a model"),
+    h("button", { onclick: go("data") }, "Open data"));
 }

@@ -1,6 +1,6 @@
 // Take away: report, tables and models as files, and the state of the bench itself.
 
-import { card, h, note, problem, put } from "../dom.js";
+import { capital, card, h, note, problem, put, renew } from "../dom.js";
 import { save } from "../files.js";
 import { bytes, condition, figures } from "../format.js";
 import { portable } from "../state.js";
@@ -22,7 +22,7 @@ class TakeAwayView {
     this.exporting = workBox(bench);
     this.report = h("div", { class: "body" });
     this.model = h("div", { class: "body" });
-    this.said = h("div", { "aria-live": "polite" });
+    this.said = h("div", { role: "status" });
     this.element = h("div", { class: "stage" }, h("div", { class: "cards" },
       card("Report and tables", this.report), card("Model", this.model), card("This bench", this.stateBody())));
     for (const what of ["dampers", "data"]) document.addEventListener(`bench:${what}`, () => this.shown());
@@ -50,8 +50,8 @@ class TakeAwayView {
       return;
     }
     const files = await this.bench.api.get("/files");
-    const button = h("button", { class: files.length ? "" : "primary", onclick: () => this.safely(this.study(button)) }, files.length ? "Make it again" : "Make the report");
-    put(this.report, files.length
+    const button = h("button", { id: "make-report", class: files.length ? "" : "primary", disabled: this.studying.busy, onclick: () => this.safely(this.study(button)) }, files.length ? "Make it again" : "Make the report");
+    renew(this.report, files.length
       ? this.fileList(files)
       : h("p", {}, "The whole study of the data on the bench: one report.html that needs nothing else, the models, and the tables as CSV."),
     h("div", {}, button), this.studying.element);
@@ -70,10 +70,10 @@ class TakeAwayView {
 
   async study(button) {
     button.disabled = true;
-    const answer = await this.studying.run("/study", {});
+    const running = (await this.bench.api.get("/jobs")).find((job) => job.kind === "study" && ["waiting", "running"].includes(job.state));
+    const answer = await (running ? this.studying.resume(running) : this.studying.run("/study", {}));
     button.disabled = false;
-    if (!answer) return;
-    await this.bench.refreshDampers();
+    if (answer) await this.bench.refreshDampers();
   }
 
   async showModel() {
@@ -84,16 +84,16 @@ class TakeAwayView {
       return;
     }
     const exports = await bench.api.get("/exports");
-    this.chooser = h("select", { id: "take-damper" }, bench.dampers.map((d) => h("option", { value: d.key }, `${d.title} · ${d.rig || "rig"}${d.note ? ` · ${d.note}` : ""}`)));
+    this.chooser = h("select", { id: "take-damper", onchange: () => bench.choose(this.chooser.value) }, bench.dampers.map((d) => h("option", { value: d.key }, `${d.title} · ${d.rig || "rig"}${d.note ? ` · ${d.note}` : ""}`)));
     this.chooser.value = damper ?? bench.dampers.at(-1).key;
     const names = Object.entries(held).map(([name, value]) => `${name} = ${figures(value)}`);
     const action = (title, work, kind = "") => h("button", { class: kind, onclick: () => this.trying(work) }, title);
-    put(this.model,
+    renew(this.model,
       h("div", { class: "field" }, h("label", { for: "take-damper" }, "Damper"), this.chooser),
       names.length ? note("", `Held by hand: ${names.join(", ")}.`) : null,
       h("div", { class: "row" }, action("model.json", () => this.document(), "primary"), action("Loop as CSV", () => this.csv())),
-      exports.length ? h("div", { class: "row" }, h("span", { class: "small faint" }, "Export:"), exports.map((e) => action(e.title, () => this.export(e)))) : null,
       h("p", { class: "small faint" }, c ? `The loop is that at ${condition({ ...c, amplitude_mm: MM * c.amplitude_m })}.` : "The loop is that of the condition the Model page begins with."),
+      exports.length ? h("div", { class: "forms", role: "group", "aria-label": "Export" }, exports.map((e) => action(capital(e.title), () => this.export(e), "quiet"))) : null,
       this.exporting.element, this.said);
   }
 
@@ -106,25 +106,20 @@ class TakeAwayView {
     }
   }
 
-  /** Parameters held by hand belong to the damper on the Model page. */
-  get held() {
-    return this.chooser.value === this.bench.state.damper ? this.bench.state.held : {};
-  }
-
   async document() {
-    const { text } = await this.bench.api.post(`/dampers/${this.chooser.value}/document`, { held: this.held });
+    const { text } = await this.bench.api.post(`/dampers/${this.chooser.value}/document`, { held: this.bench.state.held });
     save(new Blob([text], { type: "application/json" }), "model.json");
   }
 
   async csv() {
     const key = this.chooser.value;
     const at = this.bench.state.condition ?? (await this.bench.api.get(`/dampers/${key}`)).start;
-    const { blob, name } = await this.bench.api.file(`/dampers/${key}/csv`, { ...at, held: this.held });
+    const { blob, name } = await this.bench.api.file(`/dampers/${key}/csv`, { ...at, held: this.bench.state.held });
     save(blob, name);
   }
 
   async export(form) {
-    const answer = await this.exporting.run(`/dampers/${this.chooser.value}/export/${form.name}`, { held: this.held });
+    const answer = await this.exporting.run(`/dampers/${this.chooser.value}/export/${form.name}`, { held: this.bench.state.held });
     if (!answer) return;
     const link = h("a", { href: this.bench.api.url(`/exported/${answer.exported}`), download: "" }, "Save it again");
     link.click();
@@ -132,7 +127,10 @@ class TakeAwayView {
   }
 
   stateBody() {
-    const keep = () => save(new Blob([JSON.stringify(portable(this.bench.state), null, 1)], { type: "application/json" }), "bench-state.json");
+    const keep = () => {
+      const state = { ...portable(this.bench.state), view: this.bench.state.document ? "model" : "data" };
+      save(new Blob([JSON.stringify(state, null, 1)], { type: "application/json" }), "bench-state.json");
+    };
     return h("div", { class: "body" },
       h("p", {}, "A state file brings back what you see: data where they are bundled, the model, and every slider. Drop it on the Data page."),
       h("div", {}, h("button", { onclick: keep }, "Save the state")),

@@ -1,0 +1,133 @@
+"""What a drop is: files on their way in, what was said of each, and the data that come of them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+
+from mrdamper.data import Dataset
+from mrdamper.errors import InputError
+from mrdamper.io.record import Record
+
+FILE_LIMIT = 20_000_000
+FILE_COUNT_LIMIT = 1000
+DROP_LIMIT = 1_000_000_000
+_NOT_SAFE = re.compile(r"[^A-Za-z0-9.+=_-]+")
+_NAME_LENGTH = 100
+
+
+class DropError(InputError):
+    """Dropped files that cannot be taken."""
+
+    code = "E_DROP"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What was said of one dropped file or run.
+
+    Attributes
+    ----------
+    name : str
+        File or run, as it was called.
+    state : str
+        "taken", "noted" (taken, with findings) or "refused".
+    findings : tuple of (code, text)
+    """
+
+    name: str
+    state: str
+    findings: tuple[tuple[str, str], ...] = ()
+
+    def on_screen(self) -> dict[str, object]:
+        """Ready for JSON."""
+        return {"name": self.name, "state": self.state, "findings": self.findings}
+
+
+class NothingTakenError(DropError):
+    """Every dropped file was refused; the page shows why, and the profile to correct."""
+
+    code = "E_DROP_REFUSED"
+
+    def __init__(self, found: str, verdicts: tuple[Verdict, ...], profile: str):
+        super().__init__(found, mend="see each file below; where the form was guessed wrongly, correct the rig profile")
+        self.verdicts, self.profile = verdicts, profile
+
+
+@dataclass(frozen=True, eq=False)
+class Intake:
+    """Data on the bench, and how it came there.
+
+    Attributes
+    ----------
+    dataset : Dataset
+    source : str
+        "bundled" or "drop".
+    verdicts : tuple of Verdict
+        Of dropped rig files; empty for datasets.
+    profile : str
+        The rig profile the files were read with, as TOML; empty where none was needed.
+    """
+
+    dataset: Dataset
+    source: str
+    verdicts: tuple[Verdict, ...] = ()
+    profile: str = ""
+
+
+@dataclass(eq=False)
+class Drop:
+    """Files on their way in.
+
+    Attributes
+    ----------
+    key : str
+    folder : Path
+        Made for this drop.
+    names : dict of Path to str
+        The name each stored file came with.
+    places : int
+        Made so far.
+    size : int
+        Bytes so far.
+    taken : dict of Path to records
+        Of rig files that were read.
+    refused : dict of Path to InputError
+        Of rig files that were not.
+    """
+
+    key: str
+    folder: Path
+    names: dict[Path, str] = field(default_factory=dict)
+    places: int = 0
+    size: int = 0
+    taken: dict[Path, tuple[Record, ...]] = field(default_factory=dict)
+    refused: dict[Path, InputError] = field(default_factory=dict)
+
+    def place(self, name: str) -> Path:
+        """Where a file of that name is stored.
+
+        Raises
+        ------
+        DropError
+            If there are too many.
+        """
+        if self.places >= FILE_COUNT_LIMIT:
+            raise DropError(
+                f"over {FILE_COUNT_LIMIT} files", mend="drop fewer at once, or use mrdamper import", code="E_DROP_COUNT"
+            )
+        # Run ids and currents are read off file names, so what is harmless of the name is kept.
+        safe = _NOT_SAFE.sub("_", PurePosixPath(name.replace("\\", "/")).name).lstrip(".")[-_NAME_LENGTH:]
+        folder = self.folder / f"{self.places:04d}"
+        self.places += 1  # counted, not looked up: a file that broke off leaves its place unused
+        folder.mkdir()
+        path = folder / (safe or "file")
+        self.names[path] = name
+        return path
+
+    def named(self, text: str) -> str:
+        """A message about stored files in the names they came with."""
+        for path, name in self.names.items():
+            text = text.replace(str(path), name)
+        return text.replace(f"{self.folder}/", "").replace(str(self.folder), "the dropped files")
