@@ -109,7 +109,8 @@ def fundamental_frequency(time: Floats, signal: Floats, orders: int = 3) -> floa
     coefficients = _solve(columns, signal)
     for _ in range(30):
         slope = _frequency_derivative(t, columns, coefficients, orders)
-        *coefficients, step = _solve(np.column_stack([columns, slope]), signal)
+        found = _solve(np.column_stack([columns, slope]), signal)
+        coefficients, step = found[:-1], float(found[-1])
         frequency += float(np.clip(step, -0.1 * frequency, 0.1 * frequency))
         if abs(step) < 1e-11 * frequency:
             break
@@ -153,7 +154,7 @@ def _waves(angle: Floats, orders: int) -> tuple[Floats, Floats]:
     for k in range(orders):
         powers[:, k] = power
         power = power * first
-    return powers.imag, powers.real
+    return np.imag(powers), np.real(powers)
 
 
 @lru_cache
