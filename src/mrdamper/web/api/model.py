@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -16,10 +17,11 @@ from mrdamper.web.bench_model import held_model, middle, predict_held, sliders
 from mrdamper.web.curves import predicted_cycle
 from mrdamper.web.frames import frame, number
 from mrdamper.web.rig_table import condition_on_screen
-from mrdamper.web.sessions import Bench, Current
+from mrdamper.web.sessions import Bench, Current, Session
 
 router = APIRouter(prefix="/sessions/{session}/dampers")
 _FAMILY = 10  # loops of a family over current
+_TURN = Lock()  # answers in turn: small NumPy calls of many threads at once take the interpreter from each other
 _BEYOND = 1.25  # sliders and curves reach past the tested conditions, where the answer is flagged
 
 
@@ -80,6 +82,11 @@ def damper(key: str, session: Current) -> dict[str, Any]:
 def predict(key: str, ask: Ask, session: Current) -> Response:
     """Loops at a condition, the curves over current, and what was measured nearest."""
     found = session.damper(key).damper
+    with _TURN:
+        return _predicted(found, ask, session)
+
+
+def _predicted(found: Damper, ask: Ask, session: Session) -> Response:
     arrays: dict[str, Any] = {}
     loops = []
     for name, condition in _loops(found, ask):
