@@ -210,16 +210,21 @@ def _in_parallel(
     dataset: Dataset, progress: Progress, model: str | None, workers: int, finish: Finish | None
 ) -> list[tuple[RigStudy, Any]]:
     # Spawned, not forked: a fork of a process whose libraries run threads can hang.
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        pending = [pool.submit(_study_quietly, dataset.rig(name), model, finish) for name in dataset.rigs]
+    *others, own = dataset.rigs  # a process that starts has imports to do, so this one studies too
+    with ProcessPoolExecutor(workers - 1, mp_context=get_context("spawn")) as pool:
+        pending = [pool.submit(_study, dataset.rig(name), model, finish) for name in others]
+        share = workers / len(dataset.rigs)  # of the time, until this process is done
+        last = _study(dataset.rig(own), model, finish, lambda what, done: progress(f"{own}: {what}", share * done))
         for done, future in enumerate(as_completed(pending), 1):
             future.result()
-            progress(f"{done} of {len(pending)} rigs studied", done / len(pending))
-        return [future.result() for future in pending]
+            progress(f"{done + 1} of {len(pending) + 1} rigs studied", share + (1 - share) * done / len(pending))
+        return [*(future.result() for future in pending), last]
 
 
-def _study_quietly(dataset: Dataset, model: str | None, finish: Finish | None) -> tuple[RigStudy, Any]:
-    rig = study_rig(dataset, model=model)
+def _study(
+    dataset: Dataset, model: str | None, finish: Finish | None, progress: Progress = lambda what, share: None
+) -> tuple[RigStudy, Any]:
+    rig = study_rig(dataset, progress, model=model)
     return rig, finish(rig) if finish else None
 
 
