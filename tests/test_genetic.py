@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from mrdamper.errors import MissingExtraError, ParameterError
-from mrdamper.optimizers.genetic import (
+from mrdamper.optimizers.generation import (
     GeneticSettings,
-    genetic,
     next_generation,
     rank_scaling,
     scattered_crossover,
     stochastic_uniform,
     uniform_mutation,
 )
+from mrdamper.optimizers.genetic import genetic
 
 VECTOR = json.loads((Path(__file__).parent / "vectors.json").read_text())["V22_sus"]
 

@@ -11,7 +11,7 @@ from mrdamper.hysteresis import steady_loop
 from mrdamper.identification import identify
 from mrdamper.identification.methods.paper import Paper
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.optimizers.genetic import GeneticSettings
+from mrdamper.optimizers.generation import GeneticSettings
 
 GAS = GasSpring(1.5e6, 1.5e-4, np.pi * 1e-4)
 READINGS = ("first-harmonic", "half-peak-to-peak")

@@ -18,7 +18,7 @@ from mrdamper.gas_spring import GasSpring
 from mrdamper.identification import identify
 from mrdamper.identification.methods.direct_genetic import DirectGenetic
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.optimizers.genetic import GeneticSettings
+from mrdamper.optimizers.generation import GeneticSettings
 from mrdamper.parameter_functions import ParameterFunction
 from mrdamper.reproduction import reproduce
 from mrdamper.reproduction import study as study_module

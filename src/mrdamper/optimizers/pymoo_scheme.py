@@ -18,7 +18,7 @@ from pymoo.core.population import Population
 from pymoo.core.problem import Problem
 
 from mrdamper.data import Floats
-from mrdamper.optimizers.genetic import GeneticSettings, next_generation
+from mrdamper.optimizers.generation import GeneticSettings, next_generation
 
 
 class _Batch(Problem):

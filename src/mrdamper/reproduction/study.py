@@ -23,7 +23,8 @@ from mrdamper.identification.methods.balance import Balance
 from mrdamper.identification.methods.paper import Paper
 from mrdamper.loop_analysis import LoopAnalysis, analyse_loop
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.optimizers.genetic import GeneticMinimum, GeneticSettings
+from mrdamper.optimizers.generation import GeneticSettings
+from mrdamper.optimizers.genetic import GeneticMinimum
 from mrdamper.reproduction.literature import literature
 from mrdamper.reproduction.ways import (
     CONSISTENT,

@@ -21,7 +21,8 @@ from mrdamper.identification.linear import linear_table
 from mrdamper.identification.methods.balance import steady_state
 from mrdamper.identification.problem import Method, Problem, Solution
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.optimizers.genetic import GeneticSettings, genetic
+from mrdamper.optimizers.generation import GeneticSettings
+from mrdamper.optimizers.genetic import genetic
 
 _SAMPLES = 200
 

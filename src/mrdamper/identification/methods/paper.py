@@ -29,7 +29,8 @@ from mrdamper.hysteresis import steady_loop
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.identification.problem import Method, Problem, Solution
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.optimizers.genetic import GeneticMinimum, GeneticSettings, genetic
+from mrdamper.optimizers.generation import GeneticSettings
+from mrdamper.optimizers.genetic import GeneticMinimum, genetic
 from mrdamper.optimizers.levenberg_marquardt import least_squares
 
 _SEARCH_SAMPLES = 400  # two numbers are searched; more samples change them by less than the search does
