@@ -32,6 +32,11 @@ def model_at(damper: Damper, condition: Condition) -> Model | None:
     return None
 
 
+def follows_condition(damper: Damper) -> bool:
+    """Whether the parameters differ from condition to condition; a joint damper has one set for all."""
+    return not isinstance(damper, JointDamper)
+
+
 def held_model(damper: Damper, condition: Condition, held: Mapping[str, float]) -> Model | None:
     """The model at a condition with some parameters held.
 

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from mrdamper.damper import Damper
 from mrdamper.data import Condition
 from mrdamper.metrics import dissipated_power, peak_force
-from mrdamper.web.bench_model import held_model, middle, predict_held, sliders
+from mrdamper.web.bench_model import follows_condition, held_model, middle, predict_held, sliders
 from mrdamper.web.curves import predicted_cycle
 from mrdamper.web.frames import frame, number
 from mrdamper.web.rig_table import condition_on_screen
@@ -62,6 +62,7 @@ def damper(key: str, session: Current) -> dict[str, Any]:
     return {
         **_head(bench),
         "parameters": sliders(found),
+        "follows": follows_condition(found),
         "start": {"current_A": start.current_A, "frequency_Hz": start.frequency_Hz, "amplitude_m": start.amplitude_m},
         "envelope": {
             "current_A": e.current_A,

@@ -70,7 +70,7 @@ export class ModelPanel {
       h("div", { class: "row" }, h("h2", { class: "grow" }, "Parameters"),
         h("button", { class: "link small", onclick: () => this.bench.store.commit({ held: {}, condition: null }) }, "Reset all")),
       h("p", { class: "small faint" }, made.length
-        ? "They follow the condition. A slider that is moved holds its value until released."
+        ? `${this.damper.follows ? "They follow the condition" : "One set for every condition"}. A slider that is moved holds its value until released.`
         : "This damper's laws give no parameters to move."),
       main,
       preset.length ? h("details", {}, h("summary", {}, "Held at their presets in the identification"), h("div", { class: "group" }, preset)) : null);
