@@ -3,7 +3,9 @@
 from importlib import util
 from pathlib import Path
 
+from mrdamper.conditioned import conditioned_type
 from mrdamper.damper import Envelope
+from mrdamper.data import Condition
 from mrdamper.joint import JointDamper
 from mrdamper.models import all_models, model_type
 from mrdamper.modified import ModifiedModel
@@ -50,6 +52,19 @@ def modified_damper():
     return ModifiedModel("bench", ParameterMap(model_type("bouc-wen"), functions), ENVELOPE, {})
 
 
+def conditioned_damper():
+    """A published damper whose parameters are laws over the condition."""
+    coefficients = {
+        **{"alpha1": 2e6, "alpha2": 4e6, "alpha3": 2.0, "alpha4": 8e5, "d2": 0.15, "d4": 0.3},
+        **{"beta": 4e6, "gamma1": 3e6, "gamma2": 2e6, "k1": 700.0, "k2": 300.0, "f0": 47.0},
+        **{"c1": 1500.0, "c2": 900.0, "c3": 2.0, "c4": 800.0},
+    }
+    reference = Condition(0.25, 1.0, 0.013)
+    return conditioned_type("dominguez-type")("bench", coefficients, reference, joint_damper().envelope)
+
+
 def all_dampers():
-    """Everything that streams: models, joint dampers, the modified model."""
-    return {**all_bare_models(), "joint": joint_damper(), "modified": modified_damper()}
+    """Everything that streams: models, joint dampers, the modified model, a published one of many conditions."""
+    return {
+        **all_bare_models(), "joint": joint_damper(), "modified": modified_damper(), "conditioned": conditioned_damper()
+    }  # fmt: skip

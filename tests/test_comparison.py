@@ -15,12 +15,23 @@ from mrdamper.comparison.parallel import shortened
 from mrdamper.comparison.publication import summary_rows, write_comparison
 from mrdamper.conditioned import all_conditioned, conditioned_type
 from mrdamper.data import Condition, Dataset
-from mrdamper.errors import IdentificationError, UnknownNameError
+from mrdamper.errors import IdentificationError, ModelFileError, UnknownNameError
+from mrdamper.excitation import sine
+from mrdamper.formulas import formulas
 from mrdamper.identification import identify
+from mrdamper.io.model_file import dump_model, parse_model
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.models.spencer import Spencer
+from mrdamper.streaming import stepper
 from mrdamper.validation import validate
 
+ALI = {  # of a plausible damper; identifying one takes a minute
+    **{"c10": 2e4, "c11": 1e4, "c12": 0.0, "c1_p": -0.1, "c1_q": 0.1, "c1_floor": 1e3},
+    **{"c00": 900.0, "c01": 800.0, "c02": 0.0, "c0_p": 0.0, "c0_q": -0.1, "c0_floor": 100.0},
+    **{"yield_force0": 200.0, "yield_force1": 700.0, "yield_force2": -50.0, "yield_force_p": 0.1},
+    **{"yield_force_q": 0.1, "yield_force_floor": 10.0},
+    **{"k0": 2e3, "k1": 300.0, "f0": 40.0, "yield_displacement_log": float(np.log(2e-4))},
+}
 MOTIONS = [(0.5, 0.02), (1.0, 0.02), (2.0, 0.01), (3.0, 0.005)]
 
 
@@ -186,3 +197,45 @@ def test_the_command_line_lists_and_explains_models():
     assert "Spencer, Dyke, Sain and Carlson" in shown.stdout
     as_json = json.loads(runner.invoke(application(), ["models", "--json"]).stdout)
     assert all(entry["parameters"] and entry["source"] for entry in as_json)
+
+
+@pytest.fixture(scope="module")
+def conditioned(dataset):
+    """One damper of each condition-dependent kind, from single runs."""
+    train, dampers = dataset.split("train"), {}
+    for name, cls in sorted(all_conditioned().items(), reverse=True):
+        if name == "ali-type":
+            dampers[name] = cls("made", ALI, Condition(0.5, 1.0, 0.01), dampers["lei-type"].envelope)
+        elif cls.basis:
+            dampers[name] = cls.regressed([identify(run, cls.basis, free=cls.basis_free) for run in train])
+        else:
+            dampers[name] = cls.fit(train, [])
+    return dampers
+
+
+@pytest.mark.parametrize("name", sorted(all_conditioned()))
+def test_a_condition_dependent_damper_is_saved_whole(conditioned, name):
+    damper = conditioned[name]
+    back = parse_model(dump_model(damper))
+    assert dump_model(back) == dump_model(damper)
+    condition = Condition(0.5, 1.0, 0.01)
+    assert (back.predict(condition).force == damper.predict(condition).force).all()
+
+
+@pytest.mark.parametrize("name", sorted(set(all_conditioned()) - {"kernel"}))
+def test_a_condition_dependent_damper_streams_and_prints(conditioned, name):
+    damper, condition = conditioned[name], Condition(0.5, 1.0, 0.01)
+    loop, motion = damper.loop(condition), sine(condition, 12, 400)
+    stream = stepper(damper)
+    channels = (motion.displacement, motion.velocity, motion.acceleration, motion.current)
+    force = [stream.step_motion(*sample, dt=float(motion.time[1])) for sample in zip(*channels, strict=True)]
+    # Frequency and amplitude are running estimates; they ripple by some tenths of a per cent.
+    assert np.ptp(force[-400:]) == pytest.approx(np.ptp(loop.force), rel=0.01)
+    assert formulas(damper).laws
+
+
+def test_damaged_coefficients_are_refused(conditioned):
+    document = json.loads(dump_model(conditioned["lei-type"]))
+    del document["damper"]["coefficients"]["fy0"]
+    with pytest.raises(ModelFileError, match="do not fit"):
+        parse_model(json.dumps(document))

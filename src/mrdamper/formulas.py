@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from mrdamper.conditioned import ConditionedDamper
 from mrdamper.damper import Damper
 from mrdamper.data import Condition
 from mrdamper.errors import ParameterError
@@ -46,7 +47,7 @@ class Formulas:
 
 
 def formulas(damper: Damper | Model) -> Formulas:
-    """Equations of a model, a joint damper or a modified model.
+    """Equations of a model, a joint damper, a modified model or a published condition-dependent damper.
 
     Raises
     ------
@@ -57,17 +58,20 @@ def formulas(damper: Damper | Model) -> Formulas:
     x, v, a, I = (tape.input(name, 0.0 if name == "I" else None) for name in MOTION)
     motion = TracedMotion(tape, x, v, a, I, TracedStep(tape, None), TracedStep(tape, None, v))
     if isinstance(damper, ModifiedModel):
-        kind, parameters = damper.parameters.model_type, {}
+        source, parameters = damper.parameters.model_type.source, {}
         model = _of_functions(tape, damper, I)
+    elif isinstance(damper, ConditionedDamper) and damper.basis:
+        source, parameters = damper.source, {}
+        model = _of_laws(tape, damper, I)
     elif isinstance(damper, Model | JointDamper):
         given = damper if isinstance(damper, Model) else damper.model
-        kind = type(given)
+        source = given.source
         parameters = {info: getattr(given, info.name) for info in given.parameters()}
-        model = kind(**{info.name: _shown(tape, info, value) for info, value in parameters.items()})
+        model = type(given)(**{info.name: _shown(tape, info, value) for info, value in parameters.items()})
     else:
         raise ParameterError("no equations to print", where=damper.title, mend="export a joint or a modified model")
     force = model.force(motion, model.state(motion))  # type: ignore[arg-type]
-    return Formulas(damper.title, kind.source, tuple(tape.laws), force, parameters)
+    return Formulas(damper.title, source, tuple(tape.laws), force, parameters)
 
 
 def _shown(tape: Tape, info: ParameterInfo, value: float) -> Any:
@@ -77,13 +81,33 @@ def _shown(tape: Tape, info: ParameterInfo, value: float) -> Any:
 
 def _of_functions(tape: Tape, damper: ModifiedModel, current: Expression) -> Model:
     """The model of symbols, each defined by its function of current, frequency and amplitude."""
-    envelope = damper.envelope
-    middle = Condition(*(sum(span) / 2 for span in (envelope.current_A, envelope.frequency_Hz, envelope.amplitude_m)))
-    current.value = middle.current_A
-    f, A = tape.input("f", middle.frequency_Hz), tape.input("A", middle.amplitude_m)
+    middle, condition = _condition(tape, damper, current)
     made = {}
     for name, function in damper.parameters.functions.items():
-        value = function(current, f, A)
+        value = function(condition.current_A, condition.frequency_Hz, condition.amplitude_m)
         symbol = tape.symbol(name, float(function(middle.current_A, middle.frequency_Hz, middle.amplitude_m)))
         made[name] = tape.law("is", symbol, value)
     return damper.parameters.model_type.build(made)
+
+
+def _of_laws(tape: Tape, damper: ConditionedDamper, current: Expression) -> Model:
+    """The same for a damper whose model is written down for every condition."""
+    middle, condition = _condition(tape, damper, current)
+    laws, there = damper.model_at(condition), damper.model_at(middle)
+    return type(laws)(
+        **{
+            name: tape.law("is", tape.symbol(name, float(getattr(there, name))), value)
+            if isinstance(value, Expression)
+            else value
+            for name, value in laws.values().items()
+        }
+    )
+
+
+def _condition(tape: Tape, damper: Damper, current: Expression) -> tuple[Condition, Condition]:
+    """The middle of the tests, and a condition of symbols that have its values."""
+    e = damper.envelope
+    middle = Condition(*(sum(span) / 2 for span in (e.current_A, e.frequency_Hz, e.amplitude_m)))
+    current.value = middle.current_A
+    f, A = tape.input("f", middle.frequency_Hz), tape.input("A", middle.amplitude_m)
+    return middle, Condition(current, f, A)  # type: ignore[arg-type]

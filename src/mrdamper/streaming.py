@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from mrdamper.conditioned import ConditionedDamper
 from mrdamper.damper import SLACK, Damper, Envelope
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import ExcitationError, ParameterError, UnknownNameError
@@ -81,9 +82,9 @@ class Stream:
 def stream(damper: Damper | Model) -> Stream:
     """Trace a damper, or a model, into programs for one sample.
 
-    A model and a joint damper keep their parameters free to be set. The modified model takes
-    frequency and amplitude from the motion so far, averaged over about a cycle of the slowest
-    tested frequency, and stays inside the tested ranges with both.
+    A model and a joint damper keep their parameters free to be set. The modified model, and the
+    published condition-dependent ones, take frequency and amplitude from the motion so far, averaged
+    over about a cycle of the slowest tested frequency, and stay inside the tested ranges with both.
 
     Raises
     ------
@@ -94,7 +95,7 @@ def stream(damper: Damper | Model) -> Stream:
     envelope = None if isinstance(damper, Model) else damper.envelope
     motion = _motion(tape, float(np.mean(envelope.current_A)) if envelope else 0.0)
     extra: Any = 0.0
-    if isinstance(damper, ModifiedModel):
+    if isinstance(damper, ModifiedModel) or (isinstance(damper, ConditionedDamper) and damper.basis):
         model, extra, free = *_running_model(damper, motion), None
     elif isinstance(damper, Model | JointDamper):
         free = damper if isinstance(damper, Model) else damper.model
@@ -105,7 +106,7 @@ def stream(damper: Damper | Model) -> Stream:
         raise ParameterError(
             "no form for one sample",
             where=damper.title,
-            mend="stream a model, a joint damper or a modified model",
+            mend="stream a damper with a model behind it",
         )
     force = model.force(motion, model.state(motion))  # type: ignore[arg-type]
     flags = _flags(motion, envelope) + extra if envelope else 0.0
@@ -142,7 +143,7 @@ def _from_velocity() -> Program:
     return program(tape, {"displacement": x, "velocity": v, "acceleration": (v - last) / dt})
 
 
-def _running_model(damper: ModifiedModel, motion: TracedMotion) -> tuple[Model, Any]:
+def _running_model(damper: ModifiedModel | ConditionedDamper, motion: TracedMotion) -> tuple[Model, Any]:
     """The model at the sine the motion has resembled so far, and whether its frequency was tested.
 
     ω² is the mean square velocity over the mean square displacement, A² twice the latter; the
@@ -169,7 +170,8 @@ def _running_model(damper: ModifiedModel, motion: TracedMotion) -> tuple[Model, 
     middle = [math.sqrt(low * high), math.sqrt(math.prod(envelope.amplitude_m))]
     f = tape.assume(np.clip(frequency, low, high), middle[0])
     A = tape.assume(np.clip(amplitude, *envelope.amplitude_m), middle[1])
-    return damper.parameters.at(Condition(motion.current, f, A)), flag
+    at = damper.parameters.at if isinstance(damper, ModifiedModel) else damper.model_at
+    return at(Condition(motion.current, f, A)), flag
 
 
 def _flags(motion: TracedMotion, envelope: Envelope) -> Any:

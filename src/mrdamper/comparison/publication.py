@@ -1,4 +1,4 @@
-"""A comparison as files: comparison.html, comparison.csv, runs.csv, comparison.json and figures."""
+"""A comparison as files: comparison.html, comparison.csv, runs.csv, comparison.json, models and figures."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 from mrdamper.comparison import Comparison, Entry, RigComparison
 from mrdamper.data import Run
 from mrdamper.io.atomic import publish
+from mrdamper.io.model_file import save_model
 from mrdamper.plots.comparison import overlaid_loops, ranking
 from mrdamper.plots.style import save_figure
 from mrdamper.publication import made_from, score_row, table_text
@@ -47,10 +48,14 @@ def write_comparison(
 
     def fill(work: Path) -> None:
         (work / "figures").mkdir()
+        (work / "models").mkdir()
         chapters = []
         for number, rig in enumerate(comparison.rigs):
             progress(f"{rig.rig or 'rig'}: figures", number / len(comparison.rigs))
-            chapters.append(_chapter(rig, work / "figures", f"-{rig.rig}" if len(comparison.rigs) > 1 else ""))
+            suffix = f"-{rig.rig}" if len(comparison.rigs) > 1 else ""
+            chapters.append(_chapter(rig, work / "figures", suffix))
+            for entry in rig.entries:
+                save_model(entry.damper, work / "models" / f"{entry.name.replace(':', '-')}{suffix}.json")
         took = f"compared in {comparison.seconds:.0f} s on {comparison.jobs} processes."
         footer = f"{made_from(comparison.dataset)}; {took}"
         title = f"MR damper models compared: {', '.join(r.rig for r in comparison.rigs) or comparison.dataset.name}"

@@ -56,13 +56,13 @@ class AliType(ConditionedDamper):
         for name in _VARYING:
             power = (condition.amplitude_m / self.reference.amplitude_m) ** given[f"{name}_p"]
             power *= (condition.frequency_Hz / self.reference.frequency_Hz) ** given[f"{name}_q"]
-            values[name] = max(quadratic(condition.current_A, given, name), given[f"{name}_floor"]) * power
+            values[name] = np.maximum(quadratic(condition.current_A, given, name), given[f"{name}_floor"]) * power
         c1 = values["c1"]
         return Spencer(
             c1=c1,
-            c0_ratio=float(np.clip(values["c0"] / c1, 1e-6, 1e3)),
-            k0_rate=float(np.clip(given["k0"] / c1, 0.0, 1e4)),
-            creep=float(np.clip(values["yield_force"] / c1, 1e-9, 1e2)),
+            c0_ratio=np.clip(values["c0"] / c1, 1e-6, 1e3),
+            k0_rate=np.clip(given["k0"] / c1, 0.0, 1e4),
+            creep=np.clip(values["yield_force"] / c1, 1e-9, 1e2),
             yield_displacement=float(np.exp(given["yield_displacement_log"])),
             k1=given["k1"],
             f0=given["f0"],

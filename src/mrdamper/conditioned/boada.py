@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -55,28 +55,30 @@ class BoadaType(ConditionedDamper):
         return self
 
     def model_at(self, condition: Condition) -> Guo:
-        inputs = (_raw(condition) - self._part("centre", _INPUTS)) / self._part("spread", _INPUTS)
+        scaled = zip(_raw(condition), self._part("centre", _INPUTS), self._part("spread", _INPUTS), strict=True)
         weights = self._part("weight", _weight_count(len(_OUTPUTS)))
-        scaled = _network(weights, inputs[None, :], len(_OUTPUTS))[0]
-        outputs = self._part("middle", len(_OUTPUTS)) + self._part("width", len(_OUTPUTS)) * np.clip(scaled, -4, 4)
-        values = {name: _backward(name, float(value)) for name, value in zip(_OUTPUTS, outputs, strict=True)}
+        found = _network(weights, [(value - centre) / spread for value, centre, spread in scaled], len(_OUTPUTS))
         bounds = {info.name: info.bounds for info in Guo.parameters()}
-        return Guo(**{name: float(np.clip(value, *bounds[name])) for name, value in values.items()})
+        values = {}
+        for i, (name, output) in enumerate(zip(_OUTPUTS, found, strict=True)):
+            middle, width = self.coefficients[f"middle{i}"], self.coefficients[f"width{i}"]
+            values[name] = np.clip(_backward(name, middle + width * np.clip(output, -4, 4)), *bounds[name])
+        return Guo(**values)
 
     def _part(self, name: str, count: int) -> Floats:
         return np.array([self.coefficients[f"{name}{i}"] for i in range(count)])
 
 
-def _raw(condition: Condition) -> Floats:
-    return np.array([condition.current_A, np.log(condition.frequency_Hz), np.log(condition.amplitude_m)])
+def _raw(condition: Condition) -> tuple[Any, Any, Any]:
+    return condition.current_A, np.log(condition.frequency_Hz), np.log(condition.amplitude_m)
 
 
 def _forward(name: str, value: float) -> float:
     return float(np.log(max(value, 1e-6))) if name in _LOGARITHMIC else value
 
 
-def _backward(name: str, value: float) -> float:
-    return float(np.exp(value)) if name in _LOGARITHMIC else value
+def _backward(name: str, value: Any) -> Any:
+    return np.exp(value) if name in _LOGARITHMIC else value
 
 
 def _spread(table: Floats) -> Floats:
@@ -88,12 +90,18 @@ def _weight_count(outputs: int) -> int:
     return _HIDDEN * (_INPUTS + 1) + outputs * (_HIDDEN + 1)
 
 
-def _network(weights: Floats, inputs: Floats, outputs: int) -> Floats:
+def _network(weights: Floats, inputs: Sequence[Any], outputs: int) -> list[Any]:
+    """One value, or one array of values, an output; inputs likewise."""
     cut = _HIDDEN * (_INPUTS + 1)
     first = weights[:cut].reshape(_HIDDEN, _INPUTS + 1)
     second = weights[cut:].reshape(outputs, _HIDDEN + 1)
-    hidden = np.tanh(inputs @ first[:, :-1].T + first[:, -1])
-    return hidden @ second[:, :-1].T + second[:, -1]
+    hidden = [np.tanh(_weighted(row, inputs)) for row in first]
+    return [_weighted(row, hidden) for row in second]
+
+
+def _weighted(row: Floats, values: Sequence[Any]) -> Any:
+    *factors, offset = row.tolist()
+    return sum((factor * value for factor, value in zip(factors, values, strict=True)), offset)
 
 
 def _train(inputs: Floats, targets: Floats) -> Floats:
@@ -101,7 +109,7 @@ def _train(inputs: Floats, targets: Floats) -> Floats:
     begin = 0.3 * np.random.default_rng(_SEED).standard_normal(count)
 
     def residual(weights: Floats) -> Floats:
-        error = _network(weights, inputs, targets.shape[1]) - targets
+        error = np.column_stack(_network(weights, list(inputs.T), targets.shape[1])) - targets
         return np.concatenate([error.ravel(), _DECAY * weights])
 
     return least_squares(residual, begin, np.full(count, -20.0), np.full(count, 20.0), most_steps=60).point

@@ -78,11 +78,11 @@ class DominguezType(ConditionedDamper):
     def model_at(self, condition: Condition) -> BoucWen:
         given, current = self.coefficients, condition.current_A
         scale = _scale(condition, self.reference, given["d2"], given["d4"])
-        beta = max(given["beta"], 1.0)
-        gamma = float(np.clip(given["gamma1"] - given["gamma2"] * current, (_FLOOR - 1) * beta, beta))
+        beta = np.maximum(given["beta"], 1.0)
+        gamma = np.clip(given["gamma1"] - given["gamma2"] * current, (_FLOOR - 1) * beta, beta)
         return BoucWen(
-            c=max(scale * _law(given, "c", current, self.reference.current_A), 0.0),
-            alpha=max(scale * _law(given, "alpha", current, self.reference.current_A), 0.0),
+            c=np.maximum(scale * _law(given, "c", current, self.reference.current_A), 0.0),
+            alpha=np.maximum(scale * _law(given, "alpha", current, self.reference.current_A), 0.0),
             beta=beta,
             gamma=gamma,
             k1=scale * (given["k1"] + given["k2"] * current),
@@ -93,7 +93,7 @@ class DominguezType(ConditionedDamper):
 def _scale(condition: Condition, reference: Condition, d2: float, d4: float) -> float:
     frequency = condition.frequency_Hz / reference.frequency_Hz
     amplitude = condition.amplitude_m / reference.amplitude_m
-    return float(frequency**d2 * amplitude**d4)
+    return frequency**d2 * amplitude**d4
 
 
 def _powers(
@@ -123,6 +123,5 @@ def _rising(name: str, currents: Floats, values: Floats, knee: float) -> dict[st
 
 def _law(given: Mapping[str, float], name: str, current: float, knee: float) -> float:
     at_break, rise, rate, at_zero = (given[f"{name}{i}"] for i in range(1, 5))
-    if current > knee:
-        return at_break + rise * (1 - np.exp(-max(rate, 0.0) * (current - knee)))
-    return at_zero + (at_break - at_zero) * current / knee
+    below, above = np.minimum(current, knee), np.maximum(current - knee, 0.0)
+    return at_zero + (at_break - at_zero) * below / knee + rise * (1 - np.exp(-max(rate, 0.0) * above))

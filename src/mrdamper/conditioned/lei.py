@@ -42,7 +42,7 @@ class LeiType(ConditionedDamper):
         cpo, cpr, fy, v0 = (
             quadratic(condition.current_A, self.coefficients, name) for name in ("cpo", "cpr", "fy", "v0")
         )
-        cpo, fy = max(cpo, 0.0), max(fy, 1.0)
-        cpr = max(cpr, 1.01 * cpo + 1.0)  # quadratics may cross; the branches must still meet
-        v0 = min(max(v0, 0.0), 0.999 * fy / cpr)
+        cpo, fy = np.maximum(cpo, 0.0), np.maximum(fy, 1.0)
+        cpr = np.maximum(cpr, 1.01 * cpo + 1.0)  # quadratics may cross; the branches must still meet
+        v0 = np.minimum(np.maximum(v0, 0.0), 0.999 * fy / cpr)
         return Biviscous.from_wereley(cpo, cpr, fy, v0, self.coefficients["f0"])

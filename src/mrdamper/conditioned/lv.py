@@ -47,7 +47,7 @@ class LvType(ConditionedDamper):
 
     def model_at(self, condition: Condition) -> HerschelBulkley:
         given = self.coefficients
-        force = max(quadratic(condition.current_A, given, "fy"), 1.0)
-        index = float(np.clip(given["m"], 0.1, 2.0))
-        speed = float(np.clip((force / np.exp(given["consistency_log"])) ** (1 / index), 1e-9, 1e6))
+        force = np.maximum(quadratic(condition.current_A, given, "fy"), 1.0)
+        index = np.clip(given["m"], 0.1, 2.0)
+        speed = np.clip((force / np.exp(given["consistency_log"])) ** (1 / index), 1e-9, 1e6)
         return HerschelBulkley(fy=force, vc=speed, m=index, f0=given["f0"])

@@ -6,14 +6,18 @@ Numbers round-trip bit by bit. The document states units and where the model cam
 from __future__ import annotations
 
 import json
+from dataclasses import astuple, fields
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from mrdamper.conditioned import ConditionedDamper, conditioned_type
 from mrdamper.damper import Damper, Envelope
 from mrdamper.data import Condition
 from mrdamper.errors import InputError, ModelFileError
+from mrdamper.excitation import sine
 from mrdamper.io.atomic import write_file
 from mrdamper.joint import JointDamper
 from mrdamper.models import model_type
@@ -21,7 +25,7 @@ from mrdamper.modified import ModifiedModel
 from mrdamper.parameter_functions import ParameterFunction, ParameterMap
 
 FORMAT = "mrdamper-model"
-MAJOR, MINOR = 1, 0
+MAJOR, MINOR = 1, 1
 UNITS = {
     "time": "s",
     "displacement": "m",
@@ -69,6 +73,14 @@ class _Joint(_Strict):
     free: tuple[str, ...]
 
 
+class _Conditioned(_Strict):
+    kind: Literal["conditioned"]
+    model: str
+    coefficients: dict[str, float]
+    reference: tuple[float, float, float]  # current [A], frequency [Hz], amplitude [m]
+    tables: dict[str, list[float] | list[list[float]]] = {}
+
+
 class _Document(_Strict):
     format: Literal["mrdamper-model"]
     version: str
@@ -76,7 +88,7 @@ class _Document(_Strict):
     units: dict[str, str]
     envelope: _Envelope
     provenance: dict[str, str]
-    damper: _Modified | _Joint = Field(discriminator="kind")
+    damper: _Modified | _Joint | _Conditioned = Field(discriminator="kind")
 
 
 def save_model(damper: Damper, path: str | Path) -> None:
@@ -143,7 +155,7 @@ def parse_model(text: str, where: str = "model") -> Damper:
         document = _Document.model_validate_json(text)
     except ValidationError as error:
         first = error.errors()[0]
-        field = ".".join(str(part) for part in first["loc"] if part not in ("modified", "joint"))
+        field = ".".join(str(part) for part in first["loc"] if part not in ("modified", "joint", "conditioned"))
         raise ModelFileError(f"{field}: {first['msg']}", where=where, mend="write the model again") from error
     try:
         return _restore(document)
@@ -151,7 +163,7 @@ def parse_model(text: str, where: str = "model") -> Damper:
         raise ModelFileError(error.found, where=where, mend=error.mend) from error
 
 
-def _describe(damper: Damper) -> _Modified | _Joint:
+def _describe(damper: Damper) -> _Modified | _Joint | _Conditioned:
     if isinstance(damper, JointDamper):
         return _Joint(
             kind="joint",
@@ -166,6 +178,15 @@ def _describe(damper: Damper) -> _Modified | _Joint:
             for name, f in damper.parameters.functions.items()
         }
         return _Modified(kind="modified", model=damper.parameters.model_type.name, functions=functions)
+    if isinstance(damper, ConditionedDamper):
+        values = {field.name: getattr(damper, field.name) for field in fields(damper)}
+        return _Conditioned(
+            kind="conditioned",
+            model=damper.name,
+            coefficients=dict(damper.coefficients),
+            reference=astuple(damper.reference),
+            tables={name: value.tolist() for name, value in values.items() if isinstance(value, np.ndarray)},
+        )
     raise TypeError(f"no document for {type(damper).__name__}")
 
 
@@ -177,6 +198,8 @@ def _restore(document: _Document) -> Damper:
         except TypeError as error:
             raise ModelFileError(f"parameters do not fit the model: {error}", mend="write the model again") from error
         return JointDamper(document.rig, model, described.free, envelope, document.provenance)
+    if isinstance(described, _Conditioned):
+        return _restore_conditioned(document, described, envelope)
     functions = {
         name: ParameterFunction(f.form, f.coefficients, f.rates, f.log) for name, f in described.functions.items()
     }
@@ -191,4 +214,17 @@ def _restore(document: _Document) -> Damper:
         damper.parameters.at(Condition(middle["current_A"], middle["frequency_Hz"], middle["amplitude_m"]))
     except TypeError as error:
         raise ModelFileError(f"functions do not fit the model: {error}", mend="write the model again") from error
+    return damper
+
+
+def _restore_conditioned(document: _Document, described: _Conditioned, envelope: Envelope) -> Damper:
+    reference = Condition(*described.reference)
+    tables = {name: np.array(table) for name, table in described.tables.items()}
+    try:
+        damper = conditioned_type(described.model)(
+            document.rig, described.coefficients, reference, envelope, document.provenance, **tables
+        )
+        damper.force_along(sine(reference, 1, 8), reference)
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise ModelFileError(f"coefficients do not fit the model: {error}", mend="write the model again") from error
     return damper

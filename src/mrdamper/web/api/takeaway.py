@@ -12,7 +12,6 @@ from fastapi import APIRouter
 from fastapi.responses import FileResponse, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from mrdamper.damper import Damper
 from mrdamper.errors import InputError
 from mrdamper.export import all_exporters
 from mrdamper.io.model_file import dump_model, parse_model
@@ -81,7 +80,7 @@ def bring(document: Document, session: Current) -> dict[str, Any]:
 @router.post("/dampers/{key}/document")
 def document(key: str, held: Held, session: Current) -> dict[str, str]:
     """A damper as model.json, with held parameters made its own."""
-    return {"text": _document(as_damper(session.damper(key).damper, held.held))}
+    return {"text": dump_model(as_damper(session.damper(key).damper, held.held))}
 
 
 @router.post("/dampers/{key}/csv")
@@ -121,18 +120,6 @@ def exported(key: str, session: Current) -> Response:
 def _conclude(session: Session, folder: Path, made: Exported) -> dict[str, Any]:
     session.results[f"exported.{folder.name}"] = made.paths
     return {"exported": folder.name, "notes": made.notes}
-
-
-def _document(damper: Damper) -> str:
-    try:
-        return dump_model(damper)
-    except TypeError as error:
-        raise InputError(
-            "dampers of this kind have no file format yet",
-            where=damper.title,
-            mend="take another model of the list",
-            code="E_MODEL_FILE",
-        ) from error
 
 
 def _written(session: Session) -> list[Path]:
