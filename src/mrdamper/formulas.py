@@ -60,7 +60,7 @@ def formulas(damper: Damper | Model) -> Formulas:
     if isinstance(damper, ModifiedModel):
         source, parameters = damper.parameters.model_type.source, {}
         model = _of_functions(tape, damper, I)
-    elif isinstance(damper, ConditionedDamper) and damper.basis:
+    elif isinstance(damper, ConditionedDamper) and damper.has_model:
         source, parameters = damper.source, {}
         model = _of_laws(tape, damper, I)
     elif isinstance(damper, Model | JointDamper):

@@ -20,6 +20,7 @@ from mrdamper.excitation import Excitation, running_sine
 from mrdamper.function_fitting import FunctionFit, assess, choose_function
 from mrdamper.identification import Identification
 from mrdamper.loop_analysis import same_motion
+from mrdamper.models import Model
 from mrdamper.parameter_functions import FORMS, ParameterMap
 from mrdamper.simulation import Response, simulate, steady_loop
 
@@ -52,11 +53,15 @@ class ModifiedModel(Damper):
     def parameter_count(self) -> int:
         return self.parameters.parameter_count
 
+    def model_at(self, condition: Condition) -> Model:
+        """The model at a condition."""
+        return self.parameters.at(condition)
+
     def loop(self, condition: Condition) -> Response:
-        return steady_loop(self.parameters.at(condition), condition)
+        return steady_loop(self.model_at(condition), condition)
 
     def force_along(self, motion: Excitation, condition: Condition) -> Floats:
-        return simulate(self.parameters.at(condition), motion).force
+        return simulate(self.model_at(condition), motion).force
 
     def predict_run(self, run: Run, coil_lag: float = 0.0) -> Prediction:
         """Force along a run's motion: at its condition for a sine, at running estimates otherwise.

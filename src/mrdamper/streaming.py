@@ -95,7 +95,7 @@ def stream(damper: Damper | Model) -> Stream:
     envelope = None if isinstance(damper, Model) else damper.envelope
     motion = _motion(tape, float(np.mean(envelope.current_A)) if envelope else 0.0)
     extra: Any = 0.0
-    if isinstance(damper, ModifiedModel) or (isinstance(damper, ConditionedDamper) and damper.basis):
+    if isinstance(damper, ModifiedModel) or (isinstance(damper, ConditionedDamper) and damper.has_model):
         model, extra, free = *_running_model(damper, motion), None
     elif isinstance(damper, Model | JointDamper):
         free = damper if isinstance(damper, Model) else damper.model
@@ -170,8 +170,7 @@ def _running_model(damper: ModifiedModel | ConditionedDamper, motion: TracedMoti
     middle = [math.sqrt(low * high), math.sqrt(math.prod(envelope.amplitude_m))]
     f = tape.assume(np.clip(frequency, low, high), middle[0])
     A = tape.assume(np.clip(amplitude, *envelope.amplitude_m), middle[1])
-    at = damper.parameters.at if isinstance(damper, ModifiedModel) else damper.model_at
-    return at(Condition(motion.current, f, A)), flag
+    return damper.model_at(Condition(motion.current, f, A)), flag
 
 
 def _flags(motion: TracedMotion, envelope: Envelope) -> Any:

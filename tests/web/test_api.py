@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from mrdamper.conditioned import conditioned_type
 from mrdamper.data import Condition
 from mrdamper.export import exporter
 from mrdamper.export.base import identifier
@@ -270,3 +271,12 @@ def test_downloads_have_harmless_names(client, bench, joint):
 @given(st.text())
 def test_any_rig_gives_files_a_name(rig):
     assert re.fullmatch(r"[a-z_][a-z0-9_]*", export_name(rig), re.ASCII)
+
+
+def test_a_damper_without_a_model_behind_it_moves_too(client, bench, bundled):
+    rig = bundled.rig("utfsm")
+    kernel = conditioned_type("kernel").fit([run for run in rig.split("train")][:4], [])
+    key = put_on(client, bench, kernel)
+    assert client.get(f"{bench}/dampers/{key}").json()["parameters"] == []
+    ask = {"current_A": 0.5, "frequency_Hz": 1.0, "amplitude_m": 0.01, "currents": 3}
+    assert client.post(f"{bench}/dampers/{key}/predict", json=ask).status_code == 200

@@ -10,8 +10,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from mrdamper.conditioned.base import ConditionedDamper
-from mrdamper.discovery import subclasses_in
-from mrdamper.errors import UnknownNameError
+from mrdamper.discovery import named, subclasses_in
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -33,7 +32,4 @@ def conditioned_type(name: str) -> type[ConditionedDamper]:
     UnknownNameError
         With the near matches.
     """
-    known = all_conditioned()
-    if name not in known:
-        raise UnknownNameError.of("condition-dependent damper", name, known)
-    return known[name]
+    return named("condition-dependent damper", name, all_conditioned())

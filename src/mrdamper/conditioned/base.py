@@ -57,6 +57,11 @@ class ConditionedDamper(Damper):
         return self.heading
 
     @property
+    def has_model(self) -> bool:
+        """Whether a model stands behind it at every condition; a regression has none."""
+        return bool(self.basis)
+
+    @property
     def parameter_count(self) -> int:
         return len(self.coefficients)
 

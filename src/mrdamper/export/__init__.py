@@ -5,8 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING
 
-from mrdamper.discovery import subclasses_in
-from mrdamper.errors import UnknownNameError
+from mrdamper.discovery import named, subclasses_in
 from mrdamper.export.base import Exporter, Written
 
 if TYPE_CHECKING:
@@ -29,7 +28,4 @@ def exporter(name: str) -> type[Exporter]:
     UnknownNameError
         With the near matches.
     """
-    known = all_exporters()
-    if name not in known:
-        raise UnknownNameError.of("export format", name, known)
-    return known[name]
+    return named("export format", name, all_exporters())

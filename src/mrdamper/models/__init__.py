@@ -5,8 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING
 
-from mrdamper.discovery import subclasses_in
-from mrdamper.errors import UnknownNameError
+from mrdamper.discovery import named, subclasses_in
 from mrdamper.models.base import Model, SearchAxis
 
 if TYPE_CHECKING:
@@ -29,7 +28,4 @@ def model_type(name: str) -> type[Model]:
     UnknownNameError
         With the near matches.
     """
-    models = all_models()
-    if name not in models:
-        raise UnknownNameError.of("model", name, models)
-    return models[name]
+    return named("model", name, all_models())

@@ -25,9 +25,7 @@ def model_at(damper: Damper, condition: Condition) -> Model | None:
     """The model behind a damper at a condition; None where it has no parameters to move."""
     if isinstance(damper, JointDamper):
         return damper.model
-    if isinstance(damper, ModifiedModel):
-        return damper.parameters.at(condition)
-    if isinstance(damper, ConditionedDamper):
+    if isinstance(damper, ModifiedModel) or (isinstance(damper, ConditionedDamper) and damper.has_model):
         return damper.model_at(condition)
     return None
 

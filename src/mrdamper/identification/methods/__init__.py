@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING, Literal, get_args, get_origin, get_type_hints
 
-from mrdamper.discovery import subclasses_in
+from mrdamper.discovery import named, subclasses_in
 from mrdamper.errors import InputError, UnknownNameError
 from mrdamper.identification.problem import Method
 
@@ -33,10 +33,7 @@ def method_named(name: str, settings: Mapping[str, str] | None = None) -> Method
     UnknownNameError
         If there is no such method, switch or value; with the near matches.
     """
-    methods = all_methods()
-    if name not in methods:
-        raise UnknownNameError.of("method", name, methods)
-    chosen = methods[name]
+    chosen = named("method", name, all_methods())
     kinds = {k: t for k, t in get_type_hints(chosen).items() if _is_simple(t)}
     values: dict[str, object] = {}
     for key, text in (settings or {}).items():

@@ -18,6 +18,8 @@ _PIECE = 2**20
 _GZIP, _ZIP = b"\x1f\x8b", b"PK\x03\x04"
 _PACKED = (_GZIP, b"BZh", b"\xfd7zXZ", b"7z\xbc\xaf", b"Rar!", b"\x28\xb5\x2f\xfd")
 _TAR = slice(257, 262)
+# What zipfile raises for a zip it cannot read; NotImplementedError for a packing method it does not know.
+UNREADABLE_ZIP = (zipfile.BadZipFile, OSError, ValueError, NotImplementedError)
 
 
 @contextlib.contextmanager
@@ -72,7 +74,7 @@ def is_plain_zip(source: Source) -> bool:
         return False
     try:
         names = zipped_names(source)
-    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
+    except UNREADABLE_ZIP:
         return True
     return not is_workbook(names) and not is_arrays(names)
 
@@ -130,15 +132,7 @@ def _unzip(source: Source) -> Source:
         raise
     except EOFError as error:
         raise _cut(source) from error
-    except (
-        zipfile.BadZipFile,
-        zlib.error,
-        NotImplementedError,
-        RuntimeError,
-        OSError,
-        ValueError,
-        struct.error,
-    ) as error:
+    except (*UNREADABLE_ZIP, zlib.error, RuntimeError, struct.error) as error:
         whole = isinstance(error, zipfile.BadZipFile) and _has_directory(source)
         if isinstance(error, zipfile.BadZipFile) and not whole:
             raise _cut(source) from error

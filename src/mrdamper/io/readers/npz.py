@@ -6,7 +6,7 @@ import zipfile
 
 import numpy as np
 
-from mrdamper.io.readers.archive import check_sizes, is_arrays, zipped_names
+from mrdamper.io.readers.archive import UNREADABLE_ZIP, check_sizes, is_arrays, zipped_names
 from mrdamper.io.readers.arrays import array_table, damaged, expand, pick, refusing_damage
 from mrdamper.io.readers.base import MOST_COLUMNS, Hints, RawTable, Reader, Source
 
@@ -26,7 +26,7 @@ class Npz(Reader):
             return False
         try:
             return is_arrays(zipped_names(source))
-        except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
+        except UNREADABLE_ZIP:
             return source.suffix in self.suffixes
 
     def tables(self, source: Source, hints: Hints) -> list[RawTable]:
@@ -56,7 +56,7 @@ def _columns(source: Source) -> tuple[list[_Column], list[str]]:
     """Name, unit and place of every column, and the arrays of one number, by the headers of the arrays alone."""
     try:
         archive = zipfile.ZipFile(source.file)
-    except (zipfile.BadZipFile, NotImplementedError, OSError, ValueError) as error:
+    except UNREADABLE_ZIP as error:
         raise damaged(source, Npz.title, "end of file not found") from error
     with archive:
         check_sizes(source, archive.infolist())

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from mrdamper.errors import InputError
-from mrdamper.io.readers.archive import check_sizes, is_workbook, zipped_names
+from mrdamper.io.readers.archive import UNREADABLE_ZIP, check_sizes, is_workbook, zipped_names
 from mrdamper.io.readers.arrays import damaged, load, refusing_damage
 from mrdamper.io.readers.base import MOST_COLUMNS, Hints, RawTable, Reader, Source
 from mrdamper.io.readers.delimited import DelimitedText
@@ -33,7 +33,7 @@ class Workbook(Reader):
             return False
         try:
             return is_workbook(zipped_names(source))
-        except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
+        except UNREADABLE_ZIP:
             return source.suffix in self.suffixes
 
     def tables(self, source: Source, hints: Hints) -> list[RawTable]:
@@ -41,7 +41,7 @@ class Workbook(Reader):
         try:
             with zipfile.ZipFile(source.file) as archive:
                 members = archive.infolist()
-        except (zipfile.BadZipFile, NotImplementedError, OSError, ValueError) as error:
+        except UNREADABLE_ZIP as error:
             raise damaged(source, self.title, "end of file not found") from error
         check_sizes(source, members)
         with refusing_damage(source, self.title):
