@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mrdamper.io.dataset import load_dataset
-from mrdamper.joint import JointProblem
+from mrdamper.dampers.joint import JointProblem
+from mrdamper.files.dataset import load_dataset
 from mrdamper.validation import leave_one_condition_out, validate
 
 WITHOUT = {

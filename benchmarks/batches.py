@@ -9,13 +9,14 @@ import numpy as np
 from benchmarks import conditions
 from benchmarks.timing import growth, race
 from mrdamper.data import Run
-from mrdamper.hysteresis import Path, Shape
+from mrdamper.hysteresis import Shape
 from mrdamper.hysteresis.batch import Fixed, batch_cost
 from mrdamper.hysteresis.compiled_search import LengthSearch, search_lengths
 from mrdamper.identification import Problem, identify
 from mrdamper.identification.elimination import Elimination
 from mrdamper.identification.methods.projection import Projection, length_search, search_axes
 from mrdamper.models.bouc_wen import BoucWen
+from mrdamper.motion import Path
 
 SETS = 1000
 

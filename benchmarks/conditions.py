@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 
 from mrdamper.data import Condition, Run
-from mrdamper.excitation import sine
 from mrdamper.models.bouc_wen import BoucWen
+from mrdamper.motion import sine
 from mrdamper.simulation import simulate
 
 NOISE = 0.03  # standard deviation over that of the force

@@ -14,10 +14,10 @@ import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
-import rig_detection as rig  # the records are those of the tests
-from rig_records import wide_damper
+from support import rig_detection as rig  # the records are those of the tests
+from support.rig_records import wide_damper
 
-from mrdamper.io.dataset import load_dataset
+from mrdamper.files.dataset import load_dataset
 
 FRESH = 100_000  # seeds from here on are of no test
 

@@ -19,7 +19,7 @@ RATE = 2000.0
 CHILD = """
 import resource, sys, time
 begin = time.perf_counter()
-from mrdamper.io.rig_import import read_run
+from mrdamper.rig_files.rig_import import read_run
 ready = time.perf_counter()
 record = read_run(sys.argv[1])
 peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 
+from mrdamper.dampers.joint import JointProblem
+from mrdamper.files.dataset import load_dataset
 from mrdamper.identification import identify
-from mrdamper.io.dataset import load_dataset
-from mrdamper.joint import JointProblem
 
 
 @dataclass(frozen=True)

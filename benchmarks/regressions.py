@@ -11,12 +11,13 @@ import pytest
 
 from benchmarks import batches, conditions
 from benchmarks.simulation import SHAPE, T, X
-from mrdamper.hysteresis import Path, follow
+from mrdamper.hysteresis import follow
 from mrdamper.hysteresis.batch import batch_cost
 from mrdamper.hysteresis.compiled import follow_compiled
 from mrdamper.hysteresis.compiled_search import search_length
 from mrdamper.identification import identify
 from mrdamper.identification.methods.projection import Projection
+from mrdamper.motion import Path
 
 MOTION = X * np.sin(2 * np.pi * T + 0.3)
 

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.timing import race
-from mrdamper.hysteresis import Path, Shape, follow
+from mrdamper.hysteresis import Shape, follow
 from mrdamper.hysteresis.compiled import Strokes, states
 from mrdamper.hysteresis.compiled_tables import curve_of
 from mrdamper.models.bouc_wen import BoucWen
+from mrdamper.motion import Path
 
 X, F, BETA, PHASE = 0.02, 1.0, 2e5, 0.3  # with this phase every reversal falls between samples
 T = np.arange(3000) / 1000.0

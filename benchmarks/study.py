@@ -10,9 +10,9 @@ from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 
-from mrdamper.io.dataset import load_dataset
+from mrdamper.files.dataset import load_dataset
 
-_IMPORTS = "import time; t = time.process_time(); import mrdamper.publication; print(time.process_time() - t)"
+_IMPORTS = "import time; t = time.process_time(); import mrdamper.report.study_files; print(time.process_time() - t)"
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,9 @@ class PartRow:
 
 def part_rows() -> list[PartRow]:
     """Parts in the order they are done; the command studies the rigs in one process each, at once."""
-    from mrdamper.plots.style import save_figure
-    from mrdamper.publication import _figures, write_study
-    from mrdamper.workflow import Study, study_rig
+    from mrdamper.report.plots.style import save_figure
+    from mrdamper.report.study_files import _figures, write_study
+    from mrdamper.study.workflow import Study, study_rig
 
     rows = [PartRow("imports, in every process", (_imports(),))]
     begin = time.process_time()

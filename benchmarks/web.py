@@ -18,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mrdamper.io.dataset import load_dataset
-from mrdamper.io.model_file import dump_model
-from mrdamper.joint import JointProblem
+from mrdamper.dampers.joint import JointProblem
+from mrdamper.files.dataset import load_dataset
+from mrdamper.files.model_file import dump_model
 
 CHROMIUM = os.environ.get("CHROMIUM", "/usr/bin/chromium")
 DRAG_SECONDS = 5.0

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from mrdamper import Condition, run_study
-from mrdamper.excitation import sine
-from mrdamper.io.quality.table import quality_table
-from mrdamper.io.rig_import import import_files, to_dataset
 from mrdamper.models.bouc_wen import BoucWen
+from mrdamper.motion import sine
+from mrdamper.rig_files.quality.table import quality_table
+from mrdamper.rig_files.rig_import import import_files, to_dataset
 from mrdamper.simulation import simulate
 
 

@@ -7,7 +7,7 @@ target would ask the exported C.
 import math
 
 from mrdamper import load_dataset, stepper
-from mrdamper.joint import JointProblem
+from mrdamper.dampers.joint import JointProblem
 
 runs = load_dataset().rig("labcontrol").split("train")
 damper = stepper(JointProblem(runs, "play-bypass").fit().damper)

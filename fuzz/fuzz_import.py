@@ -21,7 +21,7 @@ from collections import Counter
 from pathlib import Path
 
 from mrdamper.errors import InputError
-from mrdamper.io.rig_import import read_runs
+from mrdamper.rig_files.rig_import import read_runs
 
 LIMIT = 1.0  # seconds a small file may take
 SAMPLES = 240
@@ -36,7 +36,7 @@ TOKENS = (
 def seeds(formats: list[str] | None = None) -> dict[str, bytes]:
     """Small good files by name, of every format whose library is installed."""
     sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
-    import rig_files as rig
+    from support import rig_files as rig
 
     table = rig.rows(SAMPLES)
     named = dict(zip(rig.NAMES, table.T, strict=True))

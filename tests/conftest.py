@@ -11,7 +11,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import pytest
 
 from mrdamper.data import Condition
-from mrdamper.io.dataset import load_dataset
+from mrdamper.files.dataset import load_dataset
 
 
 @pytest.fixture(scope="session")

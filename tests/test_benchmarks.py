@@ -15,10 +15,10 @@ from benchmarks.genetic import plain_genetic
 from benchmarks.identification import Task
 from benchmarks.rk4 import rk4
 from benchmarks.timing import growth, race
-from mrdamper.hysteresis import Path as Strokes
 from mrdamper.hysteresis import Shape, follow
 from mrdamper.hysteresis.batch import batch_cost
 from mrdamper.hysteresis.compiled_search import search_length
+from mrdamper.motion import Path as Strokes
 
 
 def test_growth_is_the_exponent():

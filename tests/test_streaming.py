@@ -4,13 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from dampers import all_bare_models, all_dampers, joint_damper, modified_damper
+from support.dampers import all_bare_models, all_dampers, joint_damper, modified_damper
 
 from mrdamper.data import Condition
 from mrdamper.errors import ExcitationError, ParameterError, UnknownNameError
-from mrdamper.excitation import Excitation, random_motion, sine
-from mrdamper.hysteresis import Path
 from mrdamper.models import model_type
+from mrdamper.motion import Excitation, Path, random_motion, sine
 from mrdamper.simulation import simulate
 from mrdamper.streaming import stepper
 
@@ -163,7 +162,7 @@ def test_the_modified_model_says_when_the_frequency_was_not_tested():
 
 
 def test_a_damper_without_a_form_for_one_sample_says_so():
-    from mrdamper.conditioned.kernel import KernelBaseline
+    from mrdamper.dampers.published.kernel import KernelBaseline
 
     damper = KernelBaseline("bench", {}, Condition(0.5, 1.0, 0.01), joint_damper().envelope)
     with pytest.raises(ParameterError, match="one sample"):

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from mrdamper.data import Condition, Dataset, Run
     from mrdamper.errors import InputError
+    from mrdamper.files.dataset import load_dataset, save_dataset
+    from mrdamper.files.model_file import load_model, save_model
     from mrdamper.gas_spring import GasSpring
     from mrdamper.identification import identify
-    from mrdamper.io.dataset import load_dataset, save_dataset
-    from mrdamper.io.model_file import load_model, save_model
     from mrdamper.simulation import simulate
     from mrdamper.streaming import stepper
+    from mrdamper.study.workflow import run_study
     from mrdamper.validation import validate
-    from mrdamper.workflow import run_study
 
 _HOME = {
     "Condition": "data",
@@ -29,11 +29,11 @@ _HOME = {
     "InputError": "errors",
     "Run": "data",
     "identify": "identification",
-    "load_dataset": "io.dataset",
-    "load_model": "io.model_file",
-    "run_study": "workflow",
-    "save_dataset": "io.dataset",
-    "save_model": "io.model_file",
+    "load_dataset": "files.dataset",
+    "load_model": "files.model_file",
+    "run_study": "study.workflow",
+    "save_dataset": "files.dataset",
+    "save_model": "files.model_file",
     "simulate": "simulation",
     "stepper": "streaming",
     "validate": "validation",

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrdamper.data import Condition, Floats, Run
-from mrdamper.excitation import MotionAnalysis, analyse_motion, measured_motion
 from mrdamper.metrics import dissipated_power
+from mrdamper.motion import MotionAnalysis, analyse_motion, measured_motion
 
 
 @dataclass(frozen=True)

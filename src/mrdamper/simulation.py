@@ -8,8 +8,8 @@ import numpy as np
 
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import ExcitationError
-from mrdamper.excitation import Excitation, sine
 from mrdamper.models.base import Model
+from mrdamper.motion import Excitation, sine
 
 _CLOSURE = 1e-9  # relative gap at which a loop counts as closed
 _MOST_CYCLES = 512

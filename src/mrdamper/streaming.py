@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from mrdamper.conditioned import ConditionedDamper
-from mrdamper.damper import SLACK, Damper, Envelope
+from mrdamper.dampers.base import SLACK, Damper, Envelope
+from mrdamper.dampers.joint import JointDamper
+from mrdamper.dampers.modified import ModifiedModel
+from mrdamper.dampers.published import ConditionedDamper
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import ExcitationError, ParameterError, UnknownNameError
-from mrdamper.joint import JointDamper
 from mrdamper.models import Model
-from mrdamper.modified import ModifiedModel
 from mrdamper.tracing import Program, Tape, Traced, program
 from mrdamper.tracing.python import python_functions, python_source
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mrdamper.damper import Damper, Prediction
+from mrdamper.dampers.base import Damper, Prediction
 from mrdamper.data import Condition, Run, same_condition
 from mrdamper.errors import InputError, RunError
 from mrdamper.metrics import Scores, score

@@ -6,15 +6,15 @@ import subprocess
 
 import numpy as np
 import pytest
-from dampers import ENVELOPE, all_dampers, joint_damper
 from export.c_bench import COMPILERS, STRICT, build, run
+from support.dampers import ENVELOPE, all_dampers, joint_damper
 
 from mrdamper.data import Condition
 from mrdamper.errors import InputError
-from mrdamper.excitation import sine
 from mrdamper.export import all_exporters, exporter
 from mrdamper.export.base import identifier
 from mrdamper.export.c import CExporter
+from mrdamper.motion import sine
 from mrdamper.streaming import stepper
 
 DAMPERS = all_dampers()

@@ -1,13 +1,13 @@
 """`mrdamper export` as its user meets it."""
 
 import pytest
-from dampers import joint_damper
-from fmu_files import COMPILERS, fmu_bytes
+from support.dampers import joint_damper
+from support.fmu_files import COMPILERS, fmu_bytes
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
 from mrdamper.export import all_exporters
-from mrdamper.io.model_file import save_model
+from mrdamper.files.model_file import save_model
 
 run = CliRunner()
 

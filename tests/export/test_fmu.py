@@ -6,8 +6,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from dampers import joint_damper
-from fmu_files import COMPILERS, DAMPERS, FEW, fmu_bytes, unpacked
+from support.dampers import joint_damper
+from support.fmu_files import COMPILERS, DAMPERS, FEW, fmu_bytes, unpacked
 
 from mrdamper.errors import InputError
 from mrdamper.export import all_exporters, toolchain

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from fmu_files import COMPILERS, DAMPERS, FEW, fmu_bytes, unpacked
+from support.fmu_files import COMPILERS, DAMPERS, FEW, fmu_bytes, unpacked
 
 from mrdamper.export import fmu_check
 from mrdamper.export.fmu import token_of, zipped

@@ -5,7 +5,7 @@ import subprocess
 
 import numpy as np
 import pytest
-from fmu_files import COMPILERS, DAMPERS, FEW, drive, driver, fmu_bytes, library, unpacked
+from support.fmu_files import COMPILERS, DAMPERS, FEW, drive, driver, fmu_bytes, library, unpacked
 
 from mrdamper.export.fmu import FMUExporter, reference
 from mrdamper.export.toolchain import PLATFORMS, compiler_for

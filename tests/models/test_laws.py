@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic import synthetic_run
+from support.synthetic import synthetic_run
 
 from mrdamper.data import Condition
-from mrdamper.excitation import sine
 from mrdamper.identification import identify
 from mrdamper.models import all_models, model_type
+from mrdamper.motion import sine
 from mrdamper.simulation import simulate, steady_loop
 
 # Parameters of a plausible damper, in each model's letters.

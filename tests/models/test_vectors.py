@@ -5,7 +5,6 @@ import pytest
 
 from mrdamper.data import Condition
 from mrdamper.errors import ParameterError
-from mrdamper.excitation import Excitation, sine
 from mrdamper.models.bingham import Bingham
 from mrdamper.models.biviscous import Biviscous
 from mrdamper.models.dahl import Dahl
@@ -15,6 +14,7 @@ from mrdamper.models.kwok import Kwok
 from mrdamper.models.lugre import LuGre
 from mrdamper.models.smooth_bingham import SmoothBingham
 from mrdamper.models.spencer import Spencer
+from mrdamper.motion import Excitation, sine
 from mrdamper.simulation import simulate, steady_loop
 
 

@@ -14,15 +14,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from mrdamper.conditioned import conditioned_type
+from mrdamper.dampers.joint import JointProblem
+from mrdamper.dampers.modified import fit_modified
+from mrdamper.dampers.published import conditioned_type
 from mrdamper.data import Condition
 from mrdamper.export import exporter
 from mrdamper.export.base import identifier
+from mrdamper.files.model_file import dump_model, parse_model
 from mrdamper.identification import identify
-from mrdamper.io.model_file import dump_model, parse_model
-from mrdamper.joint import JointProblem
 from mrdamper.loop_analysis import analyse_loop
-from mrdamper.modified import fit_modified
 from mrdamper.web.frames import frame
 from mrdamper.web.tasks import export_name
 

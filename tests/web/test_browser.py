@@ -9,9 +9,9 @@ import pytest
 from web.conftest import AUDIT
 from web.rig_files import csv_of
 
-from mrdamper.io.dataset import save_dataset
-from mrdamper.io.model_file import dump_model
-from mrdamper.joint import JointProblem
+from mrdamper.dampers.joint import JointProblem
+from mrdamper.files.dataset import save_dataset
+from mrdamper.files.model_file import dump_model
 
 HOSTILE = [
     "<img src=x onerror=alert(1)>",

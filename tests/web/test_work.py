@@ -127,7 +127,10 @@ def test_workers_end_with_a_bench_that_was_killed(tmp_path):
     script = tmp_path / "bench.py"
     script.write_text(code)
     tests = Path(__file__).parents[1]
-    bench = subprocess.Popen([sys.executable, str(script), str(tmp_path)], env={**os.environ, "PYTHONPATH": str(tests)})
+    bench = subprocess.Popen(
+        [sys.executable, str(script), str(tmp_path)],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tests), os.environ.get("PYTHONPATH", "")])},
+    )
     note = tmp_path / "child"
     while not (note.is_file() and note.read_text()):
         time.sleep(0.01)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrdamper.errors import InputError
-from mrdamper.io.atomic import write_file
+from mrdamper.files.atomic import write_file
 
 if TYPE_CHECKING:
     from mrdamper.gas_spring import GasSpring

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from mrdamper.damper import Damper
+from mrdamper.dampers.base import Damper
 from mrdamper.export.base import Exporter, Written, rig_of
 from mrdamper.export.curves import force_velocity
 from mrdamper.export.templates import render

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar
 
-from mrdamper.damper import Damper
+from mrdamper.dampers.base import Damper
 from mrdamper.errors import InputError
-from mrdamper.io.atomic import write_file, write_into
+from mrdamper.files.atomic import write_file, write_into
 from mrdamper.models import Model
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,40}", re.IGNORECASE)

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mrdamper.damper import Damper
+from mrdamper.dampers.base import Damper
 from mrdamper.export.base import Exporter, Written, identifier, rig_of
 from mrdamper.export.c_writer import CWriter
 from mrdamper.export.templates import render

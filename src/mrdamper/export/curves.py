@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrdamper.damper import Damper
+from mrdamper.dampers.base import Damper
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import InputError
 from mrdamper.models import Model

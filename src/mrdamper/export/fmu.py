@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from mrdamper.damper import Damper
+from mrdamper.dampers.base import Damper
 from mrdamper.data import Floats
 from mrdamper.errors import InputError
 from mrdamper.export.base import Exporter, Written, identifier

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from mrdamper.damper import Damper
+from mrdamper.dampers.base import Damper
 from mrdamper.export.base import Exporter, Written, rig_of
+from mrdamper.export.formulas import formulas
 from mrdamper.export.latex_writer import equations, number, symbol, unit_text
 from mrdamper.export.templates import render
-from mrdamper.formulas import formulas
 from mrdamper.models import Model
 
 _ESCAPED = str.maketrans(

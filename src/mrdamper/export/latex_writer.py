@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from mrdamper.formulas import Formulas
+from mrdamper.export.formulas import Formulas
 from mrdamper.tracing import Expression
 from mrdamper.tracing.tape import Law
 

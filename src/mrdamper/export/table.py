@@ -6,7 +6,7 @@ import csv
 import io
 from typing import ClassVar
 
-from mrdamper.damper import Damper
+from mrdamper.dampers.base import Damper
 from mrdamper.export.base import Exporter, Written
 from mrdamper.export.curves import force_velocity
 from mrdamper.models import Model

@@ -2,7 +2,7 @@
 
 The model dz/dt = A v − beta |v| |z|^(n−1) z − gamma v |z|^n does not know time: along a
 monotone stroke z is a closed function of the distance travelled. So a sampled motion is cut
-at its reversals once (`Path.of`); the few reversal states follow one from another; all
+at its reversals once (`motion.Path.of`); the few reversal states follow one from another; all
 samples between them are evaluated at once (`follow`).
 
 Everything here is in units that leave three numbers (`Shape`): zeta = z/z_max with
@@ -22,7 +22,6 @@ random vibration of hysteretic systems", J. Eng. Mech. Div. 102; Ikhouane and Ro
 "derived" was derived for this package.
 """
 
-from mrdamper.hysteresis.path import Path
 from mrdamper.hysteresis.response import follow, step, stroke
 from mrdamper.hysteresis.shape import Shape, boundedness_class, dissipates, z_max
 from mrdamper.hysteresis.steady import (
@@ -34,7 +33,6 @@ from mrdamper.hysteresis.steady import (
 )
 
 __all__ = [
-    "Path",
     "Shape",
     "boundedness_class",
     "dissipates",

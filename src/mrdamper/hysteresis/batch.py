@@ -17,9 +17,9 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.hysteresis.master_curve import master_curve
-from mrdamper.hysteresis.path import Path
 from mrdamper.hysteresis.response import _advance, _states, on_curve, starts_of_strokes
 from mrdamper.hysteresis.shape import Shape
+from mrdamper.motion import Path
 
 # Shapes × samples from which machine code is worth it: over 1 s in NumPy, a fifth of that compiled, and 0.3 s
 # to import the compiler; where nothing is kept on disk yet, compiling takes a few seconds once.

@@ -29,8 +29,8 @@ from mrdamper.hysteresis.compiled_tables import (
     curve_of,
 )
 from mrdamper.hysteresis.master_curve import _BELOW_ONE, master_curve
-from mrdamper.hysteresis.path import Path
 from mrdamper.hysteresis.shape import Shape
+from mrdamper.motion import Path
 
 _FULL_1, _FULL_2 = master_curve(1.0).full, master_curve(2.0).full
 

@@ -18,7 +18,7 @@ from mrdamper.hysteresis.compiled import CUT, Strokes, cut, fill
 from mrdamper.hysteresis.compiled_batch import add_products, dot
 from mrdamper.hysteresis.compiled_options import inner, kernel
 from mrdamper.hysteresis.compiled_tables import curve_of
-from mrdamper.hysteresis.path import Path
+from mrdamper.motion import Path
 
 FOUND, AT_END, STEPS_SPENT, GENERAL_WAY = 0, 1, 2, 3
 MESSAGES = {

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, ParameterError
 from mrdamper.hysteresis.master_curve import CEILING, STEEPEST, MasterCurve, master_curve
-from mrdamper.hysteresis.path import Path
 from mrdamper.hysteresis.shape import Shape
+from mrdamper.motion import Path
 from mrdamper.tracing import Tape, choose, functions, streamed
 
 

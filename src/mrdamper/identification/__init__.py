@@ -9,12 +9,12 @@ import numpy as np
 from mrdamper.data import Floats, Run
 from mrdamper.errors import IdentificationError
 from mrdamper.gas_spring import GasSpring
+from mrdamper.identification.covariance import standard_errors
 from mrdamper.identification.methods import all_methods, method_named
 from mrdamper.identification.problem import DELAY, Identification, Method, Problem, Solution
 from mrdamper.metrics import score
 from mrdamper.models import Model, model_type
-from mrdamper.threads import on_one_blas_thread
-from mrdamper.uncertainty import standard_errors
+from mrdamper.optimizers.linear import on_one_blas_thread
 
 __all__ = ["Identification", "Method", "Problem", "Solution", "all_methods", "identify"]
 

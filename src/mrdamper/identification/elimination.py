@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from mrdamper.data import Floats
 from mrdamper.errors import ParameterError
-from mrdamper.excitation import Excitation
 from mrdamper.hysteresis.batch import follow_quickly, follow_with_slope
-from mrdamper.identification.linear import bounds_of, linear_table
+from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.identification.problem import DELAY, Problem
 from mrdamper.models import Model, SearchAxis
+from mrdamper.motion import Excitation
 from mrdamper.parameters import ParameterInfo
 
 if TYPE_CHECKING:

@@ -13,10 +13,10 @@ import numpy as np
 
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, UnknownNameError
-from mrdamper.excitation import Excitation, MotionAnalysis, analyse_motion, measured_motion
 from mrdamper.gas_spring import GasSpring
 from mrdamper.metrics import Scores
 from mrdamper.models import Model
+from mrdamper.motion import Excitation, MotionAnalysis, analyse_motion, measured_motion
 
 DELAY = "delay"  # name of the search coordinate
 DELAY_LIMIT = 3e-3  # a free delay between the channels runs away beyond this [s]

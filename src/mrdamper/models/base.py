@@ -19,7 +19,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import ParameterError
-from mrdamper.excitation import Excitation
+from mrdamper.motion import Excitation
 from mrdamper.parameters import ParameterInfo, parameters_of
 
 GENERAL_FORMS = (

@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.excitation import Excitation
 from mrdamper.models.base import Model
+from mrdamper.motion import Excitation
 from mrdamper.parameters import param
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import ParameterError
-from mrdamper.excitation import Excitation
 from mrdamper.models.base import Model, SearchAxis
+from mrdamper.motion import Excitation
 from mrdamper.parameters import param
 
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import IdentificationError
-from mrdamper.excitation import Excitation
 from mrdamper.hysteresis import Shape, follow
 from mrdamper.models.base import GENERAL_FORMS, Model, SearchAxis
+from mrdamper.motion import Excitation
 from mrdamper.parameters import param
 from mrdamper.tracing import plain
 

@@ -9,9 +9,9 @@ from typing import ClassVar
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.excitation import Excitation
 from mrdamper.hysteresis import Shape, follow
 from mrdamper.models.base import GENERAL_FORMS, Model, SearchAxis
+from mrdamper.motion import Excitation
 from mrdamper.parameters import param
 
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import ParameterError
-from mrdamper.excitation import Excitation
 from mrdamper.models.base import Model, SearchAxis
+from mrdamper.motion import Excitation
 from mrdamper.parameters import param
 from mrdamper.tracing import Tape, choose, streamed
 

@@ -9,9 +9,9 @@ from typing import ClassVar
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.excitation import Excitation
 from mrdamper.models.base import Model, SearchAxis
 from mrdamper.models.sides import side
+from mrdamper.motion import Excitation
 from mrdamper.parameters import param
 
 

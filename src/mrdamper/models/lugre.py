@@ -9,9 +9,9 @@ from typing import ClassVar, Self
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.excitation import Excitation
 from mrdamper.integrator import integrate
 from mrdamper.models.base import Model, SearchAxis
+from mrdamper.motion import Excitation
 from mrdamper.parameters import param
 
 

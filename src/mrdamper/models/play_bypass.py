@@ -15,11 +15,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.excitation import Excitation
-from mrdamper.hysteresis import Path
 from mrdamper.models.base import Model, SearchAxis
+from mrdamper.motion import Excitation, Path
+from mrdamper.motion.lag import first_order_lag
 from mrdamper.parameters import param
-from mrdamper.recursion import first_order_lag
 from mrdamper.tracing import Tape, streamed
 
 RISE_CURRENT = 0.12  # A; the yield force starts with zero slope in the current and is straight beyond

@@ -10,9 +10,9 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import ParameterError
-from mrdamper.excitation import Excitation
 from mrdamper.integrator import integrate
 from mrdamper.models.base import GENERAL_FORMS, Model, SearchAxis
+from mrdamper.motion import Excitation
 from mrdamper.parameters import param
 
 

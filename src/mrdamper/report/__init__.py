@@ -1,5 +1,5 @@
 """One self-contained HTML report of a study."""
 
-from mrdamper.report.html import render_report
+from mrdamper.report.page import render_report
 
 __all__ = ["render_report"]

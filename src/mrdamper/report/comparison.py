@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib.resources import files
 
-from mrdamper.report.html import render_page
+from mrdamper.report.page import render_page
 
 
 def render_comparison(title: str, chapters: list[Mapping[str, object]], footer: str) -> str:

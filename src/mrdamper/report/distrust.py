@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mrdamper.damper import Damper
+from mrdamper.dampers.base import Damper
+from mrdamper.dampers.joint import JointFit
+from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.identification import Identification
-from mrdamper.joint import JointFit
 from mrdamper.loop_analysis import LoopAnalysis
-from mrdamper.modified import ModifiedFit
 from mrdamper.validation import Validation
 
 _WEAK_FUNCTION = 0.9  # left-out error over spread from which a function hardly beats the mean

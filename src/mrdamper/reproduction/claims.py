@@ -10,9 +10,9 @@ import numpy as np
 
 from mrdamper.data import Floats, Run
 from mrdamper.errors import IdentificationError
-from mrdamper.excitation import equivalent_sine, measured_motion
-from mrdamper.function_fitting import fit_function
+from mrdamper.functions.fitting import fit_function
 from mrdamper.loop_analysis import same_motion
+from mrdamper.motion import equivalent_sine, measured_motion
 from mrdamper.reproduction.study import Reproduction
 from mrdamper.reproduction.ways import CONSISTENT, LITERAL, SLOWEST, TRADITIONAL
 

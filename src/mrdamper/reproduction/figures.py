@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 from mrdamper.data import Floats, Run
 from mrdamper.loop_analysis import same_motion
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.plots.style import MEASURED, MM, PALETTE, current_colours, house_style, label, new_figure, thin
+from mrdamper.report.plots.style import MEASURED, MM, PALETTE, current_colours, house_style, label, new_figure, thin
 from mrdamper.reproduction.claims import friction_along
+from mrdamper.reproduction.sensitivity import OneAtATime, Sobol
 from mrdamper.reproduction.study import GeneticCheck, Reproduction
 from mrdamper.reproduction.ways import CONSISTENT, LITERAL, Contender
-from mrdamper.sensitivity import OneAtATime, Sobol
 
 
 def friction_figure(run: Run) -> Figure:

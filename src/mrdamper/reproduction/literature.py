@@ -5,14 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 
-from mrdamper.conditioned import all_conditioned
+from mrdamper.dampers.joint import JointProblem
+from mrdamper.dampers.modified import fit_modified
+from mrdamper.dampers.published import all_conditioned
 from mrdamper.data import Run
 from mrdamper.errors import InputError
 from mrdamper.identification import identify
-from mrdamper.joint import JointProblem
-from mrdamper.modified import fit_modified
 from mrdamper.reproduction.ways import Contender, contender
-from mrdamper.workflow import JOINTLY, Progress
+from mrdamper.study.workflow import JOINTLY, Progress
 
 GROUP = "literature"
 MODIFIED = ("bingham", "kwok")  # identified run by run, then functions; the others bring their own laws

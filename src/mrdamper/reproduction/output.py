@@ -12,13 +12,13 @@ from matplotlib.figure import Figure
 
 from mrdamper.data import Condition
 from mrdamper.errors import MissingExtraError
-from mrdamper.io.atomic import publish
+from mrdamper.files.atomic import publish
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.plots.model import predicted_loops
-from mrdamper.plots.rig_tests import measured_loops, test_analysis, test_matrix
-from mrdamper.plots.style import save_figure
-from mrdamper.publication import identification_rows, made_from, table_text
-from mrdamper.report.html import render_page
+from mrdamper.report.page import render_page
+from mrdamper.report.plots.model import predicted_loops
+from mrdamper.report.plots.rig_tests import measured_loops, test_analysis, test_matrix
+from mrdamper.report.plots.style import save_figure
+from mrdamper.report.study_files import identification_rows, made_from, table_text
 from mrdamper.reproduction.claims import Claim, judge
 from mrdamper.reproduction.figures import (
     damping_and_mass_figure,
@@ -30,10 +30,10 @@ from mrdamper.reproduction.figures import (
     seeds_figure,
     sensitivity_figure,
 )
+from mrdamper.reproduction.sensitivity import OneAtATime, Sobol, one_at_a_time, sobol
 from mrdamper.reproduction.study import Reproduction
 from mrdamper.reproduction.ways import CONSISTENT, LITERAL, TRADITIONAL
-from mrdamper.sensitivity import OneAtATime, Sobol, one_at_a_time, sobol
-from mrdamper.workflow import Progress
+from mrdamper.study.workflow import Progress
 
 _GROUPS = {
     "paper": "paper (literal)",

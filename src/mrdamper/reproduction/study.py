@@ -17,8 +17,8 @@ import numpy as np
 from mrdamper.data import Condition, Dataset, Floats, Run
 from mrdamper.errors import IdentificationError, MissingExtraError
 from mrdamper.gas_spring import GasSpring
-from mrdamper.harmonic_balance import ForceReading, SineRecord, read_force
 from mrdamper.identification import Identification, Method, identify
+from mrdamper.identification.harmonic_balance import ForceReading, SineRecord, read_force
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.identification.methods.paper import Paper
 from mrdamper.loop_analysis import LoopAnalysis, analyse_loop
@@ -26,6 +26,7 @@ from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.optimizers.generation import GeneticSettings
 from mrdamper.optimizers.genetic import GeneticMinimum
 from mrdamper.reproduction.literature import literature
+from mrdamper.reproduction.virtual_rig import CURRENTS, VirtualRig, friction_test, noisy_dataset, true_runs
 from mrdamper.reproduction.ways import (
     CONSISTENT,
     HALF,
@@ -40,9 +41,8 @@ from mrdamper.reproduction.ways import (
     paper_functions,
     traditional,
 )
+from mrdamper.study.workflow import Progress, usable_sines
 from mrdamper.validation import validate
-from mrdamper.virtual_rig import CURRENTS, VirtualRig, friction_test, noisy_dataset, true_runs
-from mrdamper.workflow import Progress, usable_sines
 
 SEEDS = 20
 SEED_CURRENTS = (0.0, 0.5, 1.0, 1.5, 2.0)

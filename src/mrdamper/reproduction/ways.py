@@ -9,22 +9,22 @@ from typing import ClassVar
 
 import numpy as np
 
-from mrdamper.damper import Damper, Envelope
+from mrdamper.dampers.base import Damper, Envelope
+from mrdamper.dampers.modified import ModifiedFit, fit_modified, fit_modified_jointly
+from mrdamper.dampers.paper import Settled, paper_functions
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError
-from mrdamper.excitation import Excitation
-from mrdamper.harmonic_balance import SineRecord
 from mrdamper.identification import Identification, identify
+from mrdamper.identification.harmonic_balance import SineRecord
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.identification.methods.direct_genetic import DirectGenetic
 from mrdamper.identification.methods.paper import Paper
 from mrdamper.metrics import mean_relative_error
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.modified import ModifiedFit, fit_modified, fit_modified_jointly
-from mrdamper.paper import Settled, paper_functions
+from mrdamper.motion import Excitation
 from mrdamper.simulation import Response, simulate, steady_loop
+from mrdamper.study.workflow import Progress
 from mrdamper.validation import Validation, validate
-from mrdamper.workflow import Progress
 
 LITERAL, HALF, SAME_FORMS = "paper, literal", "paper, F0 half peak-to-peak", "consistent, the paper's functions"
 CONSISTENT, JOINT = "consistent", "joint"

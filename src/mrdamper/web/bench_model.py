@@ -7,14 +7,15 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from mrdamper.conditioned import ConditionedDamper
-from mrdamper.damper import Damper, Prediction
+from mrdamper.dampers.base import Damper, Prediction
+from mrdamper.dampers.joint import JointDamper
+from mrdamper.dampers.modified import ModifiedModel
+from mrdamper.dampers.parameter_map import ParameterMap
+from mrdamper.dampers.published import ConditionedDamper
 from mrdamper.data import Condition
 from mrdamper.errors import InputError, ParameterError
-from mrdamper.joint import JointDamper
+from mrdamper.functions.forms import ParameterFunction
 from mrdamper.models import Model
-from mrdamper.modified import ModifiedModel
-from mrdamper.parameter_functions import ParameterFunction, ParameterMap
 from mrdamper.parameters import ParameterInfo
 from mrdamper.simulation import steady_loop
 

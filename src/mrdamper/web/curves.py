@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mrdamper.damper import Damper, Prediction
+from mrdamper.dampers.base import Damper, Prediction
 from mrdamper.data import Floats, Run
-from mrdamper.excitation import Excitation, analyse_motion, equivalent_sine, measured_motion
 from mrdamper.models import Model
+from mrdamper.motion import Excitation, analyse_motion, equivalent_sine, measured_motion
 from mrdamper.simulation import simulate
 
 MM = 1e3

@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 
 from mrdamper.data import Dataset
 from mrdamper.errors import InputError
-from mrdamper.io.record import Record
+from mrdamper.rig_files.record import Record
 
 FILE_LIMIT = 20_000_000
 FILE_COUNT_LIMIT = 1000

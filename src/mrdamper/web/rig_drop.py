@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
 from mrdamper.errors import InputError
-from mrdamper.io.record import Record
+from mrdamper.rig_files.record import Record
 from mrdamper.web.drops import Drop, Intake, NothingTakenError, Verdict
 
 _PROFILES_TRIED = 5  # files looked at for the first whose form can be guessed
@@ -27,8 +27,8 @@ def read_rig_files(drop: Drop, toml: str, refused_only: bool) -> Intake:
     NothingTakenError
         If every file is refused.
     """
-    from mrdamper.io.profile import parse_profile
-    from mrdamper.io.rig_import import import_files, to_dataset
+    from mrdamper.rig_files.profile import parse_profile
+    from mrdamper.rig_files.rig_import import import_files, to_dataset
 
     profile = parse_profile(toml) if toml.strip() else None
     wanted = [path for path in drop.names if not refused_only or path in drop.refused]
@@ -95,8 +95,8 @@ def _name(drop: Drop, count: int) -> str:
 
 def _guessed(paths: Sequence[Path]) -> str:
     """The profile of the first file whose form can be guessed; a bare one where none can."""
-    from mrdamper.io.profile import parse_profile, profile_text
-    from mrdamper.io.rig_import import guess_profile
+    from mrdamper.rig_files.profile import parse_profile, profile_text
+    from mrdamper.rig_files.rig_import import guess_profile
 
     for path in paths[:_PROFILES_TRIED]:
         try:

@@ -13,11 +13,11 @@ import numpy as np
 
 from mrdamper.data import Condition, Dataset, Run
 from mrdamper.errors import InputError
-from mrdamper.excitation import equivalent_sine
-from mrdamper.io.quality.table import Quality, quality_table, record_of
 from mrdamper.loop_analysis import LoopAnalysis, analyse_loop, same_motion
+from mrdamper.motion import equivalent_sine
+from mrdamper.rig_files.quality.table import Quality, quality_table, record_of
+from mrdamper.study.workflow import usable_sines
 from mrdamper.web.frames import number
-from mrdamper.workflow import usable_sines
 
 MM = 1e3
 _NEAREST = 3  # measured loops laid under a prediction

@@ -17,7 +17,7 @@ from typing import Annotated, Any
 
 from fastapi import Depends, Request
 
-from mrdamper.damper import Damper
+from mrdamper.dampers.base import Damper
 from mrdamper.data import Dataset
 from mrdamper.errors import InputError, UnknownNameError
 from mrdamper.web.drops import Drop, Intake

@@ -8,18 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
-from mrdamper.comparison import Comparison, compare
-from mrdamper.damper import Damper
+from mrdamper.dampers.base import Damper
+from mrdamper.dampers.joint import JointFit, JointProblem
+from mrdamper.dampers.modified import fit_modified, fit_modified_jointly
 from mrdamper.data import Dataset
 from mrdamper.errors import IdentificationError, InputError
 from mrdamper.export import exporter
 from mrdamper.export.base import identifier, write_export
 from mrdamper.identification import Identification, identify
-from mrdamper.joint import JointFit, JointProblem
-from mrdamper.modified import fit_modified, fit_modified_jointly
-from mrdamper.publication import write_study
+from mrdamper.report.study_files import write_study
+from mrdamper.study.comparison import Comparison, compare
+from mrdamper.study.workflow import JOINTLY, Study, run_study, usable_sines
 from mrdamper.validation import Validation, validate
-from mrdamper.workflow import JOINTLY, Study, run_study, usable_sines
 
 Tell = Callable[[str, float], None]
 ALL_AT_ONCE = "joint"

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from mrdamper.cli.output import Rows
-    from mrdamper.io.quality.table import Quality
+    from mrdamper.rig_files.quality.table import Quality
 
 _HEADINGS = {
     "run_id": "run",
@@ -44,9 +44,9 @@ def register(app: typer.Typer) -> None:
         """
         from mrdamper.cli.output import put
         from mrdamper.errors import InputError
-        from mrdamper.io.atomic import require_writable
-        from mrdamper.io.dataset import load_dataset
-        from mrdamper.io.quality.table import quality_table, record_of, row
+        from mrdamper.files.atomic import require_writable
+        from mrdamper.files.dataset import load_dataset
+        from mrdamper.rig_files.quality.table import quality_table, record_of, row
 
         if data is not None and data.suffix.lower() == ".fmu":
             if figure is not None:
@@ -105,11 +105,11 @@ def _require_format(figure: Path) -> None:
 
 
 def _draw(verdicts: Sequence[Quality], path: Path) -> None:
-    from mrdamper.io.atomic import write_file
-    from mrdamper.io.quality.flat import flagged_samples
-    from mrdamper.io.quality.view import View
-    from mrdamper.plots.quality import LoopPanel, quality_figure
-    from mrdamper.plots.style import house_style
+    from mrdamper.files.atomic import write_file
+    from mrdamper.report.plots.quality import LoopPanel, quality_figure
+    from mrdamper.report.plots.style import house_style
+    from mrdamper.rig_files.quality.flat import flagged_samples
+    from mrdamper.rig_files.quality.view import View
 
     panels = [
         LoopPanel(

@@ -23,11 +23,11 @@ def register(app: typer.Typer) -> None:
         as_json: bool = typer.Option(False, "--json", help="Print the table as JSON."),
     ) -> None:
         """Compare models: accuracy on train, left-out and held-out runs, numbers, data needed, time."""
-        from mrdamper import comparison as comparing
         from mrdamper.cli.progress import progress_on_stderr
-        from mrdamper.comparison.publication import summary_rows, text_table, write_comparison
-        from mrdamper.io.atomic import require_writable
-        from mrdamper.io.dataset import load_dataset
+        from mrdamper.files.atomic import require_writable
+        from mrdamper.files.dataset import load_dataset
+        from mrdamper.report.comparison_files import summary_rows, text_table, write_comparison
+        from mrdamper.study import comparison as comparing
 
         require_writable(out)
         names = [name.strip() for entry in models for name in entry.split(",") if name.strip()]

@@ -23,8 +23,8 @@ def register(app: typer.Typer) -> None:
         from mrdamper.errors import InputError
         from mrdamper.export import exporter
         from mrdamper.export.base import identifier, write_export
-        from mrdamper.io.atomic import require_writable
-        from mrdamper.io.model_file import load_model
+        from mrdamper.files.atomic import require_writable
+        from mrdamper.files.model_file import load_model
 
         kind = exporter(to)
         if fmi is not None and to != "fmu":

@@ -29,14 +29,15 @@ def register(app: typer.Typer) -> None:
         as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
     ) -> None:
         """Identify a model from every sine run of a dataset, run by run."""
-        from mrdamper import identification, workflow
+        from mrdamper import identification
         from mrdamper.cli.output import parse_fixed, parse_gas, parse_pairs, put
         from mrdamper.cli.progress import progress_on_stderr
+        from mrdamper.files.atomic import require_writable
+        from mrdamper.files.dataset import load_dataset
         from mrdamper.identification.methods import method_named
-        from mrdamper.io.atomic import require_writable
-        from mrdamper.io.dataset import load_dataset
         from mrdamper.models import model_type
-        from mrdamper.publication import identification_rows, table_text
+        from mrdamper.report.study_files import identification_rows, table_text
+        from mrdamper.study import workflow
 
         chosen_model, chosen_method = model_type(model), method_named(method, parse_pairs(setting, "--set"))
         fixed, spring = parse_fixed(fix), parse_gas(gas)

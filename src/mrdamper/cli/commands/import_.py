@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Optional
 import typer
 
 if TYPE_CHECKING:
-    from mrdamper.io.profile import Profile
-    from mrdamper.io.rig_import import ImportResult
+    from mrdamper.rig_files.profile import Profile
+    from mrdamper.rig_files.rig_import import ImportResult
 
 
 def register(app: typer.Typer) -> None:
@@ -34,8 +34,8 @@ def register(app: typer.Typer) -> None:
     ) -> None:
         """Read a rig's files, judge every test, and write them as a dataset: all, or nothing."""
         from mrdamper.errors import InputError
-        from mrdamper.io.profile import Profile, load_profile
-        from mrdamper.io.rig_import import import_files
+        from mrdamper.rig_files.profile import Profile, load_profile
+        from mrdamper.rig_files.rig_import import import_files
 
         if out is None and write_profile is None:
             raise InputError("nothing to write", mend="give --out DATASET, --write-profile FILE or both")
@@ -62,7 +62,7 @@ def register(app: typer.Typer) -> None:
 
 def _refuse_taken(out: Path | None) -> None:
     from mrdamper.errors import OutputError
-    from mrdamper.io.atomic import require_writable
+    from mrdamper.files.atomic import require_writable
 
     if out is None:
         return
@@ -73,9 +73,9 @@ def _refuse_taken(out: Path | None) -> None:
 
 def _write_profile(files: list[Path], known: Profile, target: Path) -> None:
     from mrdamper.errors import InputError
-    from mrdamper.io.atomic import write_file
-    from mrdamper.io.profile import profile_text
-    from mrdamper.io.rig_import import first_file, guess_profile, read_runs
+    from mrdamper.files.atomic import write_file
+    from mrdamper.rig_files.profile import profile_text
+    from mrdamper.rig_files.rig_import import first_file, guess_profile, read_runs
 
     guess = guess_profile(first_file(files), known)
     text = profile_text(guess)
@@ -91,9 +91,9 @@ def _write_profile(files: list[Path], known: Profile, target: Path) -> None:
 
 
 def _write_dataset(result: ImportResult, profile: Profile, out: Path) -> None:
-    from mrdamper.io.dataset import save_dataset
-    from mrdamper.io.profile import Profile, profile_text
-    from mrdamper.io.rig_import import to_dataset
+    from mrdamper.files.dataset import save_dataset
+    from mrdamper.rig_files.profile import Profile, profile_text
+    from mrdamper.rig_files.rig_import import to_dataset
 
     extra = {"rig.toml": profile_text(profile)} if profile != Profile() else None
     save_dataset(to_dataset(result.records, out.name), out, extra_files=extra)

@@ -35,10 +35,10 @@ def register(app: typer.Typer) -> None:
         from mrdamper.cli.output import put
         from mrdamper.data import Condition
         from mrdamper.errors import InputError
-        from mrdamper.io.atomic import require_writable
-        from mrdamper.io.model_file import load_model
-        from mrdamper.io.motion import load_motion
-        from mrdamper.publication import prediction_rows, table_text
+        from mrdamper.files.atomic import require_writable
+        from mrdamper.files.model_file import load_model
+        from mrdamper.files.motion import load_motion
+        from mrdamper.report.study_files import prediction_rows, table_text
 
         if out is not None:
             require_writable(out)

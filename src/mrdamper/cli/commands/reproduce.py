@@ -32,8 +32,8 @@ def register(app: typer.Typer) -> None:
 
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.errors import InputError
-        from mrdamper.io.atomic import require_writable
-        from mrdamper.io.dataset import load_dataset
+        from mrdamper.files.atomic import require_writable
+        from mrdamper.files.dataset import load_dataset
         from mrdamper.reproduction import reproduce as run_reproduction
         from mrdamper.reproduction.claims import judge
         from mrdamper.reproduction.output import verdicts, write_reproduction

@@ -23,10 +23,10 @@ def register(app: typer.Typer) -> None:
         """Study a dataset: identify every run, map the parameters, validate; write report and models."""
         from mrdamper.cli.output import percent
         from mrdamper.cli.progress import progress_on_stderr
-        from mrdamper.io.atomic import require_writable
-        from mrdamper.io.dataset import load_dataset
-        from mrdamper.publication import draw, write_study
-        from mrdamper.workflow import run_study
+        from mrdamper.files.atomic import require_writable
+        from mrdamper.files.dataset import load_dataset
+        from mrdamper.report.study_files import draw, write_study
+        from mrdamper.study.workflow import run_study
 
         require_writable(out)
         dataset = load_dataset(data)

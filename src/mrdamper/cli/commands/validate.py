@@ -23,10 +23,10 @@ def register(app: typer.Typer) -> None:
         """Score a saved model on the runs of its rig: nrmse, wape, peak force and energy."""
         from mrdamper.cli.output import put
         from mrdamper.errors import InputError, UnknownNameError
-        from mrdamper.io.atomic import require_writable
-        from mrdamper.io.dataset import load_dataset
-        from mrdamper.io.model_file import load_model
-        from mrdamper.publication import score_row, table_text
+        from mrdamper.files.atomic import require_writable
+        from mrdamper.files.dataset import load_dataset
+        from mrdamper.files.model_file import load_model
+        from mrdamper.report.study_files import score_row, table_text
         from mrdamper.validation import validate as score
 
         if split not in (None, "train", "validate"):

@@ -16,9 +16,9 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import IdentificationError
-from mrdamper.harmonic_balance import HarmonicProjection, SineRecord
 from mrdamper.hysteresis import steady_loop
-from mrdamper.identification.linear import bounded_linear, bounds_of, linear_table
+from mrdamper.identification.columns import bounded_linear, bounds_of, linear_table
+from mrdamper.identification.harmonic_balance import HarmonicProjection, SineRecord
 from mrdamper.identification.problem import Method, Problem, Solution
 from mrdamper.models import Model
 from mrdamper.optimizers.levenberg_marquardt import least_squares

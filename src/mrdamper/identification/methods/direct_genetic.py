@@ -16,8 +16,8 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import IdentificationError
-from mrdamper.harmonic_balance import SineRecord
-from mrdamper.identification.linear import linear_table
+from mrdamper.identification.columns import linear_table
+from mrdamper.identification.harmonic_balance import SineRecord
 from mrdamper.identification.methods.balance import steady_state
 from mrdamper.identification.problem import Method, Problem, Solution
 from mrdamper.models.bouc_wen import BoucWen

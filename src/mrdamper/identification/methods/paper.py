@@ -16,7 +16,8 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import IdentificationError
-from mrdamper.harmonic_balance import (
+from mrdamper.hysteresis import steady_loop
+from mrdamper.identification.harmonic_balance import (
     AmplitudeReading,
     OffsetReading,
     PhaseReading,
@@ -25,7 +26,6 @@ from mrdamper.harmonic_balance import (
     double_counted,
     read_force,
 )
-from mrdamper.hysteresis import steady_loop
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.identification.problem import Method, Problem, Solution
 from mrdamper.models.bouc_wen import BoucWen

@@ -18,15 +18,16 @@ from numpy.typing import NDArray
 
 from mrdamper.data import Floats
 from mrdamper.errors import IdentificationError
-from mrdamper.hysteresis import Path, Shape
+from mrdamper.hysteresis import Shape
 from mrdamper.hysteresis.batch import WORTH_COMPILING, Fixed, batch_cost
+from mrdamper.identification.columns import bounded_linear, bounds_of, linear_table
 from mrdamper.identification.elimination import Elimination
-from mrdamper.identification.linear import bounded_linear, bounds_of, linear_table
 from mrdamper.identification.problem import DELAY, DELAY_LIMIT, Method, Problem, Solution
 from mrdamper.models import Model, SearchAxis
+from mrdamper.motion import Path
 from mrdamper.optimizers.levenberg_marquardt import Minimum, least_squares
+from mrdamper.optimizers.linear import on_one_blas_thread
 from mrdamper.optimizers.one_number import least_squares_in_one
-from mrdamper.threads import on_one_blas_thread
 
 if TYPE_CHECKING:
     from mrdamper.hysteresis.compiled_search import LengthSearch

@@ -9,17 +9,17 @@ from fastapi import APIRouter
 from fastapi.responses import Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from mrdamper.comparison import Comparison, Entry, RigComparison, contestants
-from mrdamper.comparison.contestants import source
 from mrdamper.data import Dataset
 from mrdamper.errors import InputError
+from mrdamper.study.comparison import Comparison, Entry, RigComparison, contestants
+from mrdamper.study.comparison.contestants import source
+from mrdamper.study.workflow import JOINTLY, STUDIED
 from mrdamper.validation import RunScore, Validation
 from mrdamper.web.curves import measured_cycle, measured_window, predicted_on_run
 from mrdamper.web.frames import frame, number
 from mrdamper.web.rig_table import condition_on_screen
 from mrdamper.web.sessions import Current, Session
 from mrdamper.web.tasks import compare_models
-from mrdamper.workflow import JOINTLY, STUDIED
 
 router = APIRouter(prefix="/sessions/{session}/compare")
 

@@ -10,7 +10,7 @@ from fastapi.responses import Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from mrdamper.errors import UnknownNameError
-from mrdamper.io.quality.table import Quality
+from mrdamper.rig_files.quality.table import Quality
 from mrdamper.web.curves import measured_cycle, measured_window, raw_record
 from mrdamper.web.drops import DROP_LIMIT, FILE_LIMIT, Drop, DropError, Intake
 from mrdamper.web.frames import frame

@@ -12,13 +12,13 @@ from pydantic import BaseModel, ConfigDict, Field
 from mrdamper.errors import InputError
 from mrdamper.identification import Identification, all_methods, identify
 from mrdamper.models import all_models
+from mrdamper.study.workflow import JOINTLY, Candidate, Study
 from mrdamper.validation import Validation
 from mrdamper.web.curves import measured_cycle, modelled_cycle, predicted_on_run
 from mrdamper.web.frames import frame, number
 from mrdamper.web.rig_table import condition_on_screen
 from mrdamper.web.sessions import Current, Session
 from mrdamper.web.tasks import ALL_AT_ONCE, RUN_BY_RUN, Identified, identify_rig, study
-from mrdamper.workflow import JOINTLY, Candidate, Study
 
 router = APIRouter(prefix="/sessions/{session}")
 

@@ -10,7 +10,7 @@ from fastapi import APIRouter
 from fastapi.responses import Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from mrdamper.damper import Damper
+from mrdamper.dampers.base import Damper
 from mrdamper.data import Condition
 from mrdamper.metrics import dissipated_power, peak_force
 from mrdamper.web.bench_model import follows_condition, held_model, middle, predict_held, sliders

@@ -1,0 +1,381 @@
+"""One identification over all runs at once, for models whose loop has one shape coordinate.
+
+Given the shape coordinate (the yield displacement), a run's squared error is a quadratic
+form in the linear parameters. Each run is therefore condensed once into small Gram matrices
+on a ladder of shape values; after that, fits over all runs, other parameter functions and
+leave-one-condition-out cost milliseconds, because no sample is touched again.
+
+Runs count by their own force scale, and the sum of run RMSEs is minimised, not of squares:
+a run from a drifting session then pulls less (iteratively reweighted least squares).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mrdamper.dampers.parameter_map import ParameterMap
+from mrdamper.data import Condition, Floats, Run
+from mrdamper.errors import IdentificationError
+from mrdamper.functions.fitting import fit_function, require_determined
+from mrdamper.functions.forms import FORMS, ParameterFunction, features
+from mrdamper.hysteresis import Shape
+from mrdamper.hysteresis.batch import follow_alike, follow_quickly
+from mrdamper.identification import Problem
+from mrdamper.models import Model
+from mrdamper.optimizers.levenberg_marquardt import least_squares
+from mrdamper.optimizers.linear import on_one_blas_thread
+
+_LADDER = np.geomspace(2e-6, 3e-3, 41)  # yield displacements [m]; between them Gram matrices are interpolated
+_AT_ONCE = 2**17  # states held at a time
+_RIDGE = 1e-7  # interpolated Gram matrices of nearly parallel columns may lose positivity by less
+
+
+@dataclass(frozen=True, eq=False)
+class Condensed:
+    """Runs of one rig, condensed for one model type.
+
+    Attributes
+    ----------
+    model_type : type of Model
+    linear : tuple of str
+        Coordinates the force is linear in, in the order of the Gram matrices.
+    shape : str
+        The one shape coordinate.
+    run_ids : tuple of str, length R
+    conditions : tuple of Condition, length R
+    scale : (R,) array
+        Peak-to-peak force [N].
+    gram : (R, K, L+1, L+1) array
+        Mean products of the columns and, last, the measured force over its peak-to-peak
+        value, at each value of the ladder.
+    """
+
+    model_type: type[Model]
+    linear: tuple[str, ...]
+    shape: str
+    run_ids: tuple[str, ...]
+    conditions: tuple[Condition, ...]
+    scale: Floats
+    gram: Floats
+
+    def only(self, rows: Sequence[int]) -> Condensed:
+        """The same for some of the runs."""
+        index = list(rows)
+        return replace(
+            self,
+            run_ids=tuple(self.run_ids[i] for i in index),
+            conditions=tuple(self.conditions[i] for i in index),
+            scale=self.scale[index],
+            gram=self.gram[index],
+        )
+
+    def at(self, shape_values: Floats) -> Floats:
+        """(R, L+1, L+1) Gram matrices at one shape value a run: cubic in its logarithm."""
+        logs = np.log(_LADDER)
+        u = np.clip((np.log(shape_values) - logs[0]) / (logs[1] - logs[0]), 0, _LADDER.size - 1)
+        first = np.clip(np.floor(u).astype(int) - 1, 0, _LADDER.size - 4)
+        t = u - first
+        weights = np.stack(
+            [
+                -(t - 1) * (t - 2) * (t - 3) / 6,
+                t * (t - 2) * (t - 3) / 2,
+                -t * (t - 1) * (t - 3) / 2,
+                t * (t - 1) * (t - 2) / 6,
+            ]
+        )
+        nodes = self.gram[np.arange(t.size)[:, None], first[:, None] + np.arange(4)]  # (R, 4, L+1, L+1)
+        return np.einsum("jr,rjkl->rkl", weights, nodes)
+
+
+@on_one_blas_thread
+def condense(runs: Sequence[Run], model_type: type[Model]) -> Condensed:
+    """Condense runs for a model type whose search has one axis.
+
+    Raises
+    ------
+    IdentificationError
+        If the model has no such single axis, or there are no runs.
+    """
+    if not runs:
+        raise IdentificationError("no runs", mend="give at least one")
+    problems = [Problem.of(run, model_type) for run in runs]
+    axes = model_type.search_axes(1.0, problems[0].free)
+    coordinates = tuple(model_type.map_forms())
+    if len(axes) > 1 or not {axis.name for axis in axes} <= set(coordinates):
+        raise IdentificationError(
+            f"{model_type.title} is searched along {len(axes)} axes", mend="fix all shape parameters but one"
+        )
+    shape = axes[0].name if axes else ""
+    linear = tuple(name for name in coordinates if name != shape)
+    gram = np.stack([_gram(problem, linear, shape) for problem in problems])
+    return Condensed(
+        model_type,
+        linear,
+        shape,
+        tuple(run.id for run in runs),
+        tuple(problem.analysis.condition for problem in problems),
+        np.array([np.ptp(problem.force) for problem in problems]),
+        gram,
+    )
+
+
+def _gram(problem: Problem, linear: tuple[str, ...], shape: str) -> Floats:
+    target = problem.force / np.ptp(problem.force)
+    if not shape:
+        table, _ = _columns(problem, linear, {})
+        table = np.column_stack([table, target])
+        return np.stack([table.T @ table / target.size] * _LADDER.size)
+    ends = [_columns(problem, linear, {shape: float(value)}) for value in _LADDER[[0, -1]]]
+    moving = _moving_column(problem, ends)
+    if moving is not None:
+        return _gram_of_shapes(problem, np.column_stack([ends[0][0], target]), moving, ends[0][1].shape)  # type: ignore[attr-defined]
+    tables = [np.column_stack([_columns(problem, linear, {shape: float(v)})[0], target]) for v in _LADDER]
+    return np.stack([table.T @ table / target.size for table in tables])
+
+
+def _columns(problem: Problem, linear: tuple[str, ...], shape: Mapping[str, float]) -> tuple[Floats, Model]:
+    """(N, L) force per unit of every linear coordinate, and the model without them."""
+    point = {**problem.fixed, **shape, **dict.fromkeys(linear, 0.0)}
+    bare = problem.model_type.build(point)
+    state = bare.state(problem.motion)[problem.scored]
+    base = bare.force(problem.seen, state)
+    columns = [problem.model_type.build({**point, name: 1.0}).force(problem.seen, state) - base for name in linear]
+    return np.column_stack(columns), bare
+
+
+def _moving_column(problem: Problem, ends: Sequence[tuple[Floats, Model]]) -> int | None:
+    """Index of the one column that the ladder changes, if it is the state of a Bouc–Wen shape."""
+    (first, _), (last, _) = ends
+    moving = np.flatnonzero([not np.array_equal(a, b) for a, b in zip(first.T, last.T, strict=True)])
+    if moving.size != 1 or any(getattr(model, "shape", None) is None for _, model in ends):
+        return None
+    for value, (columns, model) in zip(_LADDER[[0, -1]], ends, strict=True):
+        shape = model.shape  # type: ignore[attr-defined]
+        expected = follow_quickly(1 / float(value), float(shape.rho), shape.n, problem.motion.path, problem.scored)
+        if not np.allclose(columns[:, moving[0]], expected, rtol=1e-9, atol=1e-12):
+            return None
+    return int(moving[0])
+
+
+def _gram_of_shapes(problem: Problem, table: Floats, moving: int, shape: Shape) -> Floats:
+    """The same matrices, all shapes followed at once; only the rows of the moving column differ."""
+    grams = np.stack([table.T @ table] * _LADDER.size)
+    few = max(1, _AT_ONCE // len(problem.motion))
+    for begin in range(0, _LADDER.size, few):
+        part = slice(begin, begin + few)
+        zeta = follow_alike(shape.n, float(shape.rho), 1 / _LADDER[part], problem.motion.path)[:, problem.scored]
+        grams[part, moving, :] = grams[part, :, moving] = zeta @ table
+        grams[part, moving, moving] = np.einsum("kn,kn->k", zeta, zeta)
+    return grams / len(table)
+
+
+@dataclass(frozen=True, eq=False)
+class JointFit:
+    """A parameter map fitted to all runs at once.
+
+    Attributes
+    ----------
+    parameters : ParameterMap
+    nrmse_pp : (R,) array
+        Error of each run (of the condensed runs; the linear parameters unbounded).
+    """
+
+    parameters: ParameterMap
+    nrmse_pp: Floats
+
+
+@on_one_blas_thread
+def fit_jointly(
+    data: Condensed,
+    forms: Mapping[str, str],
+    start: ParameterFunction | None,
+    *,
+    reweightings: int = 6,
+    most_steps: int = 12,
+) -> JointFit:
+    """Fit the coefficients of all parameter functions to all runs at once.
+
+    Parameters
+    ----------
+    data : Condensed
+    forms : mapping of str to str
+        Form of each coordinate.
+    start : ParameterFunction or None
+        Of the shape coordinate, to start from; its form and rates are used. None for models
+        without one.
+    reweightings, most_steps : int
+        Effort: rounds of robust weights, steps of the search in each.
+    """
+    design = _Design(data, forms)
+    if start is None:
+        solution = _reweighted(design, data.at(np.full(data.scale.size, _LADDER[0])), reweightings)
+        return _finish(design, solution, {})
+    columns = FORMS[start.form].columns(*features(data.conditions), start.rates)
+    scale = np.linalg.norm(columns, axis=0) / np.sqrt(columns.shape[0])
+
+    def shape_values(u: Floats) -> Floats:
+        return np.exp(np.clip(columns @ (u / scale), np.log(_LADDER[0]), np.log(_LADDER[-1])))
+
+    centre = np.array(start.coefficients) * scale
+    reach = np.full(centre.size, 6.0)
+    weights = np.ones(data.scale.size)
+    solution = design.solve(data.at(shape_values(centre)), weights)
+    for _ in range(reweightings):
+
+        def residual(u: Floats, weights: Floats = weights) -> Floats:
+            return design.solve(data.at(shape_values(u)), weights).residual
+
+        found = least_squares(residual, centre, centre - reach, centre + reach, most_steps=most_steps)
+        centre = found.point
+        solution = design.solve(data.at(shape_values(centre)), weights)
+        weights = 1.0 / np.sqrt(np.maximum(solution.nrmse_pp, 1e-4))
+    function = ParameterFunction(start.form, tuple((centre / scale).tolist()), start.rates, log=True)
+    return _finish(design, solution, {data.shape: function})
+
+
+@on_one_blas_thread
+def leave_out_errors(
+    data: Condensed, fit: JointFit, groups: Sequence[Sequence[int]], forms: Mapping[str, str]
+) -> Floats:
+    """(R,) nrmse_pp of runs whose group was left out of the linear coefficients.
+
+    The shape function stays that of the whole fit: quick, for choosing forms, not a final score.
+    """
+    design = _Design(data, forms)
+    shapes = (
+        fit.parameters.functions[data.shape](*features(data.conditions))
+        if data.shape
+        else np.full(data.scale.size, _LADDER[0])
+    )
+    gram = data.at(shapes)
+    weights = 1.0 / np.sqrt(np.maximum(fit.nrmse_pp, 1e-4))
+    errors = np.zeros(data.scale.size)
+    for group in groups:
+        kept = weights.copy()
+        kept[list(group)] = 0.0
+        solution = design.solve(gram, kept)
+        errors[list(group)] = solution.nrmse_pp[list(group)]
+    return errors
+
+
+@dataclass(frozen=True)
+class _Solution:
+    coefficients: Floats
+    residual: Floats
+    nrmse_pp: Floats
+
+
+class _Design:
+    """Linear coordinates of every run as a matrix times the coefficients of all functions."""
+
+    def __init__(self, data: Condensed, forms: Mapping[str, str]):
+        self.data = data
+        self.forms = {name: FORMS[forms[name]] for name in data.linear}
+        blocks = [form.columns(*features(data.conditions), ()) for form in self.forms.values()]
+        self.sizes = [block.shape[1] for block in blocks]
+        runs, total = data.scale.size, sum(self.sizes)
+        self.matrix = np.zeros((runs, len(blocks) + 1, total + 1))
+        at = 0
+        for row, block in enumerate(blocks):
+            # The Gram matrices hold forces over each run's peak-to-peak value.
+            self.matrix[:, row, at : at + block.shape[1]] = block / data.scale[:, None]
+            at += block.shape[1]
+        self.matrix[:, -1, -1] = 1.0
+
+    def solve(self, gram: Floats, weights: Floats) -> _Solution:
+        """Coefficients of least weighted squares; residuals are those of the condensed runs."""
+        size = np.sqrt(np.maximum(np.einsum("rii->ri", gram), 1e-300))
+        scaled = gram / size[:, :, None] / size[:, None, :]
+        factor = np.linalg.cholesky(scaled + _RIDGE * np.eye(gram.shape[1])).transpose(0, 2, 1) * size[:, None, :]
+        table = factor @ self.matrix
+        weighted = (weights[:, None, None] * table).reshape(-1, table.shape[2])
+        norm = np.linalg.norm(weighted[:, :-1], axis=0)
+        norm[norm == 0] = 1.0
+        solution = _least_squares(weighted[:, :-1] / norm, weighted[:, -1]) / norm
+        error = table[:, :, :-1] @ solution - table[:, :, -1]
+        return _Solution(solution, (weights[:, None] * error).ravel(), np.sqrt(np.sum(error**2, axis=1)))
+
+
+def _least_squares(columns: Floats, right: Floats) -> Floats:
+    normal = columns.T @ columns
+    try:
+        pivots = np.diag(np.linalg.cholesky(normal))
+    except np.linalg.LinAlgError:
+        pivots = np.zeros(1)
+    if pivots.min(initial=1.0) > 1e-4 * pivots.max(initial=0.0):
+        # Normal equations, and once more for what they left: as good as a factorisation of all rows.
+        solution = np.linalg.solve(normal, columns.T @ right)
+        return np.asarray(solution + np.linalg.solve(normal, columns.T @ (right - columns @ solution)), dtype=float)
+    return np.asarray(np.linalg.lstsq(columns, right, rcond=1e-10)[0], dtype=float)
+
+
+def _reweighted(design: _Design, gram: Floats, reweightings: int) -> _Solution:
+    weights = np.ones(gram.shape[0])
+    solution = design.solve(gram, weights)
+    for _ in range(reweightings):
+        weights = 1.0 / np.sqrt(np.maximum(solution.nrmse_pp, 1e-4))
+        solution = design.solve(gram, weights)
+    return solution
+
+
+def _finish(design: _Design, solution: _Solution, functions: dict[str, ParameterFunction]) -> JointFit:
+    parts = np.split(solution.coefficients, np.cumsum(design.sizes)[:-1])
+    for (name, form), values in zip(design.forms.items(), parts, strict=True):
+        functions[name] = ParameterFunction(form.name, tuple(values.tolist()))
+    ordered = {name: functions[name] for name in design.data.model_type.map_forms()}
+    return JointFit(ParameterMap(design.data.model_type, ordered), solution.nrmse_pp)
+
+
+def choose_forms(
+    data: Condensed, candidates: Mapping[str, Sequence[str]], groups: Sequence[Sequence[int]], shape_values: Floats
+) -> tuple[dict[str, str], JointFit]:
+    """Choose every coordinate's form by how well left-out conditions are predicted.
+
+    Starting from the shortest forms, one coordinate at a time tries its candidates; a change
+    must lower the mean left-out error by a fiftieth. Two passes.
+
+    Parameters
+    ----------
+    data : Condensed
+    candidates : mapping of str to sequence of str
+        Forms by coordinate, shortest first.
+    groups : sequence of sequences of int
+        Runs that are left out together.
+    shape_values : (R,) array
+        Shape coordinate identified run by run, to start from.
+
+    Returns
+    -------
+    forms : dict
+    fit : JointFit
+    """
+    forms = {name: options[0] for name, options in candidates.items()}
+    fit, best = _tried(data, forms, groups, shape_values)
+    for _ in range(2):
+        before = dict(forms)
+        for name, options in candidates.items():
+            for option in options:
+                if option == forms[name]:
+                    continue
+                try:
+                    trial_fit, error = _tried(data, {**forms, name: option}, groups, shape_values)
+                except IdentificationError:
+                    continue  # the tests cannot tell this form's terms apart
+                if error < 0.98 * best:
+                    forms, fit, best = {**forms, name: option}, trial_fit, error
+        if forms == before:
+            break
+    return forms, fit_jointly(data, forms, fit.parameters.functions.get(data.shape))
+
+
+def _tried(
+    data: Condensed, forms: Mapping[str, str], groups: Sequence[Sequence[int]], shape_values: Floats
+) -> tuple[JointFit, float]:
+    for name in data.linear:
+        require_determined(forms[name], data.conditions)
+    start = fit_function(forms[data.shape], data.conditions, shape_values, log=True).function if data.shape else None
+    fit = fit_jointly(data, forms, start, reweightings=2, most_steps=5)
+    return fit, float(np.mean(leave_out_errors(data, fit, groups, forms)))

@@ -1,0 +1,233 @@
+"""The modified model: identified run by run, every parameter then a function of I, f and A.
+
+[Qian et al. 2024, Eq. 23–43], with the functions fitted to identifications that do not count
+the hysteretic force twice, and each form chosen by how it predicts conditions left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
+
+import numpy as np
+
+from mrdamper.dampers.base import NOT_A_SINE, Damper, Envelope, Prediction
+from mrdamper.dampers.gram import Condensed, choose_forms, condense, fit_jointly
+from mrdamper.dampers.parameter_map import ParameterMap
+from mrdamper.data import Condition, Floats, Run, same_condition
+from mrdamper.errors import IdentificationError
+from mrdamper.functions.fitting import FunctionFit, assess, choose_function
+from mrdamper.functions.forms import FORMS
+from mrdamper.identification import Identification
+from mrdamper.loop_analysis import same_motion
+from mrdamper.models import Model
+from mrdamper.motion import Excitation, running_sine
+from mrdamper.simulation import Response, simulate, steady_loop
+
+
+@dataclass(frozen=True, eq=False)
+class ModifiedModel(Damper):
+    """A model whose parameters are functions of current, frequency and amplitude.
+
+    Attributes
+    ----------
+    rig : str
+    parameters : ParameterMap
+    envelope : Envelope
+    provenance : mapping
+        What it was made from.
+    """
+
+    kind: ClassVar[str] = "modified"
+
+    rig: str
+    parameters: ParameterMap
+    envelope: Envelope
+    provenance: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def title(self) -> str:
+        return f"modified {self.parameters.model_type.title}"
+
+    @property
+    def parameter_count(self) -> int:
+        return self.parameters.parameter_count
+
+    def model_at(self, condition: Condition) -> Model:
+        """The model at a condition."""
+        return self.parameters.at(condition)
+
+    def loop(self, condition: Condition) -> Response:
+        return steady_loop(self.model_at(condition), condition)
+
+    def force_along(self, motion: Excitation, condition: Condition) -> Floats:
+        return simulate(self.model_at(condition), motion).force
+
+    def predict_run(self, run: Run, coil_lag: float = 0.0) -> Prediction:
+        """Force along a run's motion: at its condition for a sine, at running estimates otherwise.
+
+        The functions ask for a frequency and an amplitude. Other motion gets those of the sine
+        it resembles from moment to moment: an approximation, flagged as such.
+        """
+        prediction = super().predict_run(run, coil_lag)
+        if NOT_A_SINE not in prediction.extrapolation:
+            return prediction
+        return replace(prediction, force=self._running(prediction.motion))
+
+    def _running(self, motion: Excitation) -> Floats:
+        """Blend the forces at a few frequencies and amplitudes, by the running estimate."""
+        frequency, amplitude = running_sine(motion)
+        shares_f, knots_f = _shares(np.clip(frequency, *self.envelope.frequency_Hz))
+        shares_a, knots_a = _shares(np.clip(amplitude, *self.envelope.amplitude_m))
+        current = float(np.mean(motion.current))
+        force = np.zeros(len(motion))
+        for share_f, f in zip(shares_f, knots_f, strict=True):
+            for share_a, a in zip(shares_a, knots_a, strict=True):
+                model = self.parameters.at(Condition(current, float(f), float(a)))
+                force += share_f * share_a * simulate(model, motion).force
+        return force
+
+
+@dataclass(frozen=True, eq=False)
+class ModifiedFit:
+    """A modified model and how each of its functions was found.
+
+    Attributes
+    ----------
+    damper : ModifiedModel
+    functions : mapping of str to FunctionFit
+    values : mapping of str to (N,) array
+        The identified values behind each function.
+    conditions : tuple of Condition
+    """
+
+    damper: ModifiedModel
+    functions: Mapping[str, FunctionFit]
+    values: Mapping[str, Floats]
+    conditions: tuple[Condition, ...]
+
+    @property
+    def few_motions(self) -> bool:
+        """Whether the conditions repeat few enough motions to draw a curve for each."""
+        return len(same_motion(self.conditions, tolerance=0.08)) <= 10
+
+
+def fit_modified(
+    identifications: Sequence[Identification],
+    forms: Mapping[str, Sequence[str]] | None = None,
+    provenance: Mapping[str, str] | None = None,
+) -> ModifiedFit:
+    """Turn identifications over a test matrix into one model.
+
+    Parameters
+    ----------
+    identifications : sequence of Identification
+        Of one rig and one model type.
+    forms : mapping, optional
+        Candidate forms by parameter. Default: the model's own candidates.
+
+    Raises
+    ------
+    IdentificationError
+        If there is nothing to fit, or the identifications mix models or rigs.
+    """
+    if not identifications:
+        raise IdentificationError("no identifications", mend="identify at least one run")
+    types = {type(i.model) for i in identifications}
+    rigs = {i.rig for i in identifications}
+    if len(types) > 1 or len(rigs) > 1:
+        raise IdentificationError(
+            f"identifications of {len(types)} models and {len(rigs)} rigs", mend="fit one model of one rig at a time"
+        )
+    model_type, rig = types.pop(), rigs.pop()
+    conditions = tuple(i.condition for i in identifications)
+    candidates = dict(model_type.map_forms() if forms is None else forms)
+    values = {name: np.array([_coordinate(i, name) for i in identifications]) for name in candidates}
+    fits = {
+        name: choose_function(
+            candidates[name],
+            conditions,
+            values[name],
+            log=name in model_type.log_coordinates(),
+            uncertainty=_uncertainty(identifications, name, name in model_type.log_coordinates()),
+        )
+        for name in candidates
+    }
+    damper = ModifiedModel(
+        rig=rig,
+        parameters=ParameterMap(model_type, {name: fit.function for name, fit in fits.items()}),
+        envelope=Envelope.of(conditions),
+        provenance=dict(provenance or {}),
+    )
+    return ModifiedFit(damper, fits, values, conditions)
+
+
+def fit_modified_jointly(
+    runs: Sequence[Run], identifications: Sequence[Identification], provenance: Mapping[str, str] | None = None
+) -> tuple[ModifiedFit, Callable[[Sequence[int]], ModifiedModel]]:
+    """Fit all parameter functions to the forces of all runs at once.
+
+    Parameters
+    ----------
+    runs : sequence of Run, length R
+    identifications : sequence of Identification, length R
+        Of these runs, in this order: where the shape coordinate starts.
+    provenance : mapping, optional
+
+    Returns
+    -------
+    fit : ModifiedFit
+    refit : callable
+        Makes the model from the runs of some indices only, with the same forms.
+
+    Raises
+    ------
+    IdentificationError
+        If the model has more than one shape coordinate, or there are too few runs.
+    """
+    model_type = type(identifications[0].model)
+    data = condense(runs, model_type)
+    shapes = np.array([_coordinate(i, data.shape) if data.shape else 1.0 for i in identifications])
+    candidates = {
+        name: [f for f in forms if name == data.shape or not FORMS[f].rate_bounds]
+        for name, forms in model_type.map_forms().items()
+    }
+    forms, joint = choose_forms(data, candidates, same_condition(data.conditions), shapes)
+    start = joint.parameters.functions.get(data.shape)
+
+    def model(part: Condensed, parameters: ParameterMap) -> ModifiedModel:
+        return ModifiedModel(identifications[0].rig, parameters, Envelope.of(part.conditions), dict(provenance or {}))
+
+    def refit(rows: Sequence[int]) -> ModifiedModel:
+        part = data.only(rows)
+        return model(part, fit_jointly(part, forms, start).parameters)
+
+    values = {name: np.array([_coordinate(i, name) for i in identifications]) for name in forms}
+    fits = {
+        name: assess(function, data.conditions, values[name]) for name, function in joint.parameters.functions.items()
+    }
+    return ModifiedFit(model(data, joint.parameters), fits, values, data.conditions), refit
+
+
+def _shares(values: Floats, most: int = 5) -> tuple[Floats, Floats]:
+    """Knots over the values, and the share of each knot at every value: straight between them."""
+    low, high = float(values.min()), float(values.max())
+    knots = np.geomspace(low, high, most) if high > 1.01 * low else np.array([np.sqrt(low * high)])
+    if knots.size == 1:
+        return np.ones((1, values.size)), knots
+    return np.stack([np.interp(np.log(values), np.log(knots), row) for row in np.eye(knots.size)]), knots
+
+
+def _uncertainty(identifications: Sequence[Identification], name: str, log: bool) -> Floats:
+    errors = np.array([i.standard_errors.get(name, np.inf) for i in identifications])
+    return errors / np.array([abs(_coordinate(i, name)) or 1.0 for i in identifications]) if log else errors
+
+
+def _coordinate(identification: Identification, name: str) -> float:
+    return float(getattr(identification.model, name))
+
+
+def without(identifications: Sequence[Identification], run_ids: set[str]) -> list[Identification]:
+    """The identifications of all other runs."""
+    return [i for i in identifications if i.run_id not in run_ids]

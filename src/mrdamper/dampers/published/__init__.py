@@ -1,0 +1,35 @@
+"""Published dampers over current, frequency and amplitude, one file each; there is no list.
+
+Where the published equations were not seen, the title says "-type": the form is the best
+reading of descriptions, not a reproduction.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING
+
+from mrdamper.dampers.published.base import ConditionedDamper
+from mrdamper.discovery import named, subclasses_in
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+__all__ = ["ConditionedDamper", "all_conditioned", "conditioned_type"]
+
+
+@cache
+def all_conditioned() -> Mapping[str, type[ConditionedDamper]]:
+    """Every condition-dependent damper by its name."""
+    return subclasses_in(__name__, __path__, ConditionedDamper)
+
+
+def conditioned_type(name: str) -> type[ConditionedDamper]:
+    """The condition-dependent damper of that name.
+
+    Raises
+    ------
+    UnknownNameError
+        With the near matches.
+    """
+    return named("condition-dependent damper", name, all_conditioned())

@@ -1,0 +1,87 @@
+"""Ali-type: Spencer's model, three of its numbers over current, amplitude and frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar, Self
+
+import numpy as np
+
+from mrdamper.dampers.published.base import ConditionedDamper, fit_quadratic, quadratic
+from mrdamper.data import Condition, Floats, Run
+from mrdamper.identification import Identification
+from mrdamper.models.spencer import Spencer
+
+_VARYING = ("c0", "c1", "yield_force")
+
+
+class AliType(ConditionedDamper):
+    """Spencer's model with c0, c1 and the hysteretic force as P(I) (X/X_r)^p (f/f_r)^q, P a quadratic.
+
+    k0, k1, x0 (as f0) and the shape of the hysteresis are constant. Identified run by run, then
+    regressed: a joint refinement would integrate every run at every trial.
+
+    References
+    ----------
+    After Ali and Ramaswamy (2009), "Testing and modeling of MR damper and its application to
+    SDOF systems using integral backstepping technique", J. Dynamic Systems, Measurement, and
+    Control 131; abstract recalled, equations not seen, hence "-type".
+    """
+
+    name: ClassVar[str] = "ali-type"
+    heading: ClassVar[str] = "Ali-type (Spencer-based)"
+    source: ClassVar[str] = "after Ali and Ramaswamy 2009; equations not seen"
+    basis: ClassVar[str] = "spencer"
+    limits: ClassVar[str] = "needs frequency and amplitude: sines only; stepped, not closed"
+
+    @classmethod
+    def start(cls, identifications: Sequence[Identification], reference: Condition) -> dict[str, float]:
+        conditions = [i.condition for i in identifications]
+        coefficients: dict[str, float] = {}
+        for name in _VARYING:
+            values = np.array([getattr(i.model, name) for i in identifications])
+            coefficients |= _power_law(name, conditions, values, reference)
+        for name in ("k0", "k1", "f0"):
+            coefficients[name] = float(np.median([getattr(i.model, name) for i in identifications]))
+        lengths = [np.log(i.model.values()["yield_displacement"]) for i in identifications]
+        coefficients["yield_displacement_log"] = float(np.median(lengths))
+        return coefficients
+
+    def refined(self, runs: Sequence[Run]) -> Self:
+        return self
+
+    def model_at(self, condition: Condition) -> Spencer:
+        given = self.coefficients
+        values = {}
+        for name in _VARYING:
+            power = (condition.amplitude_m / self.reference.amplitude_m) ** given[f"{name}_p"]
+            power *= (condition.frequency_Hz / self.reference.frequency_Hz) ** given[f"{name}_q"]
+            values[name] = np.maximum(quadratic(condition.current_A, given, name), given[f"{name}_floor"]) * power
+        c1 = values["c1"]
+        return Spencer(
+            c1=c1,
+            c0_ratio=np.clip(values["c0"] / c1, 1e-6, 1e3),
+            k0_rate=np.clip(given["k0"] / c1, 0.0, 1e4),
+            creep=np.clip(values["yield_force"] / c1, 1e-9, 1e2),
+            yield_displacement=float(np.exp(given["yield_displacement_log"])),
+            k1=given["k1"],
+            f0=given["f0"],
+        )
+
+    @property
+    def parameter_count(self) -> int:
+        return sum(not name.endswith("_floor") for name in self.coefficients)
+
+
+def _power_law(name: str, conditions: Sequence[Condition], values: Floats, reference: Condition) -> dict[str, float]:
+    """Powers from logarithms with a level for every current, then the quadratic of what is left."""
+    currents = np.array([c.current_A for c in conditions])
+    amplitude = np.log([c.amplitude_m / reference.amplitude_m for c in conditions])
+    frequency = np.log([c.frequency_Hz / reference.frequency_Hz for c in conditions])
+    levels = [np.isclose(currents, level, atol=2e-3) for level in np.unique(np.round(currents, 3))]
+    logs = np.log(np.maximum(values, 1e-3))
+    found = np.linalg.lstsq(np.column_stack([amplitude, frequency, *levels]), logs, rcond=1e-6)[0]
+    p, q = (float(power) for power in np.clip(found[:2], -2, 2))
+    rest = values / np.exp(p * amplitude + q * frequency)
+    floor = 0.2 * float(np.min(rest))  # the quadratic may dip below zero between currents
+    return {**fit_quadratic(name, currents, rest), f"{name}_p": p, f"{name}_q": q, f"{name}_floor": max(floor, 1e-3)}

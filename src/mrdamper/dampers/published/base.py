@@ -1,0 +1,186 @@
+"""What the published condition-dependent dampers share: coefficients, and a model at every condition."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Self
+
+import numpy as np
+
+from mrdamper.dampers.base import Damper, Envelope
+from mrdamper.data import Condition, Floats, Run
+from mrdamper.errors import IdentificationError
+from mrdamper.identification import Identification
+from mrdamper.models import Model
+from mrdamper.motion import Excitation, equivalent_sine, measured_motion
+from mrdamper.optimizers.levenberg_marquardt import least_squares
+from mrdamper.simulation import Response, simulate, steady_loop
+
+_SAMPLES = 150  # a cycle, for the joint refinement
+_STEPS = 8
+_REACH = 0.8  # a coefficient may move by this share of its start, or of one
+
+
+@dataclass(frozen=True, eq=False)
+class ConditionedDamper(Damper):
+    """A damper whose model is written down for every condition. Subclasses are final.
+
+    Attributes
+    ----------
+    rig : str
+    coefficients : mapping of str to float
+        Numbers determined from the data, SI.
+    reference : Condition
+        Frequency, amplitude and current that powers and breaks count from.
+    envelope : Envelope
+    provenance : mapping
+    """
+
+    kind: ClassVar[str] = "conditioned"
+    name: ClassVar[str]
+    heading: ClassVar[str]
+    source: ClassVar[str]
+    basis: ClassVar[str]  # model identified run by run, from which the coefficients start
+    basis_free: ClassVar[tuple[str, ...]] = ()
+    limits: ClassVar[str]  # what it cannot do, for tables
+
+    rig: str
+    coefficients: Mapping[str, float]
+    reference: Condition
+    envelope: Envelope
+    provenance: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def title(self) -> str:
+        return self.heading
+
+    @property
+    def has_model(self) -> bool:
+        """Whether a model stands behind it at every condition; a regression has none."""
+        return bool(self.basis)
+
+    @property
+    def parameter_count(self) -> int:
+        return len(self.coefficients)
+
+    @classmethod
+    @abstractmethod
+    def start(cls, identifications: Sequence[Identification], reference: Condition) -> dict[str, float]:
+        """Coefficients from the identifications of single runs."""
+
+    @abstractmethod
+    def model_at(self, condition: Condition) -> Model:
+        """The model at a condition."""
+
+    @classmethod
+    def fit(
+        cls, runs: Sequence[Run], identifications: Sequence[Identification], provenance: Mapping[str, str] | None = None
+    ) -> Self:
+        """Determine the coefficients from runs of one rig and their identifications with `basis`.
+
+        Raises
+        ------
+        IdentificationError
+            If there are fewer than three runs or the identifications are of another model.
+        """
+        damper = cls.regressed(identifications, provenance)
+        return damper.refined(runs)
+
+    @classmethod
+    def regressed(cls, identifications: Sequence[Identification], provenance: Mapping[str, str] | None = None) -> Self:
+        """The damper from the identifications alone."""
+        if len(identifications) < 3:
+            raise IdentificationError(
+                f"{len(identifications)} identifications",
+                where=cls.heading,
+                mend="give runs at three conditions or more",
+            )
+        if {i.model.name for i in identifications} != {cls.basis}:
+            raise IdentificationError(
+                "identifications of another model", where=cls.heading, mend=f"identify with model {cls.basis}"
+            )
+        conditions = [i.condition for i in identifications]
+        reference = _middle(conditions)
+        return cls(
+            identifications[0].rig,
+            cls.start(identifications, reference),
+            reference,
+            Envelope.of(conditions),
+            dict(provenance or {}),
+        )
+
+    def refined(self, runs: Sequence[Run]) -> Self:
+        """Refine all coefficients on the last cycle of every run at once, each by its own force scale."""
+        pieces = [Piece.of(run) for run in runs]
+        names = list(self.coefficients)
+        begin = np.array([self.coefficients[name] for name in names])
+        size = np.maximum(np.abs(begin), 1e-3)
+
+        def residual(u: Floats) -> Floats:
+            damper = replace(self, coefficients=dict(zip(names, (u * size).tolist(), strict=True)))
+            return np.concatenate([piece.residual(damper.model_at(piece.condition)) for piece in pieces])
+
+        centre = begin / size
+        found = least_squares(residual, centre, centre - _REACH, centre + _REACH, most_steps=_STEPS)
+        return replace(self, coefficients=dict(zip(names, (found.point * size).tolist(), strict=True)))
+
+    def loop(self, condition: Condition) -> Response:
+        return steady_loop(self.model_at(condition), condition)
+
+    def force_along(self, motion: Excitation, condition: Condition) -> Floats:
+        return simulate(self.model_at(condition), motion).force
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """The last cycle of a run, thinned, and the motion that leads up to it."""
+
+    condition: Condition
+    motion: Excitation
+    scored: slice
+    force: Floats
+    scale: float
+
+    @classmethod
+    def of(cls, run: Run) -> Piece:
+        """Cut it from a run."""
+        found = equivalent_sine(run)
+        last = int(np.flatnonzero(run.in_window)[-1])
+        period = 1 / found.condition.frequency_Hz
+        begin = int(np.searchsorted(run.time, run.time[last] - period))
+        lead = int(np.searchsorted(run.time, run.time[last] - 1.75 * period))
+        step = max(1, (last - begin) // _SAMPLES)
+        motion = measured_motion(run).about(found.centre).part(slice(lead, last + 1, step))
+        force = run.force[lead : last + 1 : step]
+        scored = slice((begin - lead) // step, None)
+        scale = float(np.ptp(force[scored])) * np.sqrt(force[scored].size)
+        return cls(found.condition, motion, scored, force[scored], scale)
+
+    def residual(self, model: Model) -> Floats:
+        """Predicted minus measured force over the force scale; its squares sum to nrmse_pp²."""
+        return (simulate(model, self.motion).force[self.scored] - self.force) / self.scale
+
+
+def quadratic(current: float, coefficients: Mapping[str, float], name: str) -> float:
+    """name0 + name1 I + name2 I²."""
+    return coefficients[f"{name}0"] + current * (coefficients[f"{name}1"] + current * coefficients[f"{name}2"])
+
+
+def fit_quadratic(name: str, currents: Floats, values: Floats) -> dict[str, float]:
+    """Coefficients of `quadratic` by least squares; as many as the distinct currents allow, the rest zero."""
+    terms = min(3, len(np.unique(np.round(currents, 3))))
+    table = np.vander(currents, terms, increasing=True)
+    found = np.linalg.lstsq(table, values, rcond=None)[0]
+    return {f"{name}{i}": float(found[i]) if i < terms else 0.0 for i in range(3)}
+
+
+def _middle(conditions: Sequence[Condition]) -> Condition:
+    """Geometric middle of the motions; the lowest current that is not zero."""
+    positive = sorted({round(c.current_A, 3) for c in conditions if c.current_A > 1e-3})
+    return Condition(
+        positive[0] if positive else 1.0,
+        float(np.exp(np.mean([np.log(c.frequency_Hz) for c in conditions]))),
+        float(np.exp(np.mean([np.log(c.amplitude_m) for c in conditions]))),
+    )

@@ -1,0 +1,115 @@
+"""Boada-type: arctangent loop, its parameters from a small neural network."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from mrdamper.dampers.published.base import ConditionedDamper
+from mrdamper.data import Condition, Floats, Run
+from mrdamper.identification import Identification
+from mrdamper.models.guo import Guo
+from mrdamper.optimizers.levenberg_marquardt import least_squares
+
+_HIDDEN = 5
+_DECAY = 0.15  # weight of the penalty on the network's weights
+_SEED = 20240813
+_OUTPUTS = ("fy", "kappa", "v0", "c", "k", "f0")
+_LOGARITHMIC = ("fy", "kappa", "v0")
+_INPUTS = 3
+
+
+class BoadaType(ConditionedDamper):
+    """F = (2/pi) f_y arctan[kappa (v + v0 sgn x)] + c v + k x + f0; the six come from a neural network.
+
+    Inputs are current, frequency and amplitude, standardised; one hidden layer of five tanh
+    units; weights by penalised least squares on the identifications of single runs. There are
+    more weights than runs: the penalty, not the count, limits the freedom.
+
+    References
+    ----------
+    After Boada et al.; the published equations were not seen ("trigonometric functions",
+    parameters from a neural network over frequency), hence "-type".
+    """
+
+    name: ClassVar[str] = "boada-type"
+    heading: ClassVar[str] = "Boada-type (arctangent, neural network)"
+    source: ClassVar[str] = "after Boada et al.; equations not seen"
+    basis: ClassVar[str] = "guo"
+    basis_free: ClassVar[tuple[str, ...]] = ("k",)
+    limits: ClassVar[str] = "needs frequency and amplitude: sines only; a network does not extrapolate"
+
+    @classmethod
+    def start(cls, identifications: Sequence[Identification], reference: Condition) -> dict[str, float]:
+        inputs = np.array([_raw(i.condition) for i in identifications])
+        outputs = np.array([[_forward(n, i.model.values()[n]) for n in _OUTPUTS] for i in identifications])
+        centre, spread = inputs.mean(axis=0), _spread(inputs)
+        middle, width = np.median(outputs, axis=0), _spread(outputs)
+        weights = _train((inputs - centre) / spread, np.clip((outputs - middle) / width, -3, 3))
+        named = {"centre": centre, "spread": spread, "middle": middle, "width": width, "weight": weights}
+        return {f"{name}{i}": float(value) for name, values in named.items() for i, value in enumerate(values)}
+
+    def refined(self, runs: Sequence[Run]) -> Self:
+        return self
+
+    def model_at(self, condition: Condition) -> Guo:
+        scaled = zip(_raw(condition), self._part("centre", _INPUTS), self._part("spread", _INPUTS), strict=True)
+        weights = self._part("weight", _weight_count(len(_OUTPUTS)))
+        found = _network(weights, [(value - centre) / spread for value, centre, spread in scaled], len(_OUTPUTS))
+        bounds = {info.name: info.bounds for info in Guo.parameters()}
+        values = {}
+        for i, (name, output) in enumerate(zip(_OUTPUTS, found, strict=True)):
+            middle, width = self.coefficients[f"middle{i}"], self.coefficients[f"width{i}"]
+            values[name] = np.clip(_backward(name, middle + width * np.clip(output, -4, 4)), *bounds[name])
+        return Guo(**values)
+
+    def _part(self, name: str, count: int) -> Floats:
+        return np.array([self.coefficients[f"{name}{i}"] for i in range(count)])
+
+
+def _raw(condition: Condition) -> tuple[Any, Any, Any]:
+    return condition.current_A, np.log(condition.frequency_Hz), np.log(condition.amplitude_m)
+
+
+def _forward(name: str, value: float) -> float:
+    return float(np.log(max(value, 1e-6))) if name in _LOGARITHMIC else value
+
+
+def _backward(name: str, value: Any) -> Any:
+    return np.exp(value) if name in _LOGARITHMIC else value
+
+
+def _spread(table: Floats) -> Floats:
+    spread = table.std(axis=0)
+    return np.where(spread > 1e-9, spread, 1.0)
+
+
+def _weight_count(outputs: int) -> int:
+    return _HIDDEN * (_INPUTS + 1) + outputs * (_HIDDEN + 1)
+
+
+def _network(weights: Floats, inputs: Sequence[Any], outputs: int) -> list[Any]:
+    """One value, or one array of values, an output; inputs likewise."""
+    cut = _HIDDEN * (_INPUTS + 1)
+    first = weights[:cut].reshape(_HIDDEN, _INPUTS + 1)
+    second = weights[cut:].reshape(outputs, _HIDDEN + 1)
+    hidden = [np.tanh(_weighted(row, inputs)) for row in first]
+    return [_weighted(row, hidden) for row in second]
+
+
+def _weighted(row: Floats, values: Sequence[Any]) -> Any:
+    *factors, offset = row.tolist()
+    return sum((factor * value for factor, value in zip(factors, values, strict=True)), offset)
+
+
+def _train(inputs: Floats, targets: Floats) -> Floats:
+    count = _weight_count(targets.shape[1])
+    begin = 0.3 * np.random.default_rng(_SEED).standard_normal(count)
+
+    def residual(weights: Floats) -> Floats:
+        error = np.column_stack(_network(weights, list(inputs.T), targets.shape[1])) - targets
+        return np.concatenate([error.ravel(), _DECAY * weights])
+
+    return least_squares(residual, begin, np.full(count, -20.0), np.full(count, 20.0), most_steps=60).point

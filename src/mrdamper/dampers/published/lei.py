@@ -1,0 +1,48 @@
+"""Lei-type: piecewise linear loop with parameters quadratic in the current."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from mrdamper.dampers.published.base import ConditionedDamper, fit_quadratic, quadratic
+from mrdamper.data import Condition
+from mrdamper.identification import Identification
+from mrdamper.models.biviscous import Biviscous
+
+
+class LeiType(ConditionedDamper):
+    """Hysteretic biviscous model whose c_po, c_pr, f_y and v0 are quadratics in the current.
+
+    References
+    ----------
+    After Lei et al.; the published equations were not seen, hence "-type". The loop is that
+    of Wereley, Pang and Kamath (1998).
+    """
+
+    name: ClassVar[str] = "lei-type"
+    heading: ClassVar[str] = "Lei-type (piecewise, quadratic in current)"
+    source: ClassVar[str] = "after Lei et al.; equations not seen"
+    basis: ClassVar[str] = "biviscous"
+    limits: ClassVar[str] = "knows neither frequency nor amplitude; memoryless, sines only"
+
+    @classmethod
+    def start(cls, identifications: Sequence[Identification], reference: Condition) -> dict[str, float]:
+        currents = np.array([i.condition.current_A for i in identifications])
+        coefficients: dict[str, float] = {}
+        for name in ("cpo", "cpr", "fy", "v0"):
+            values = np.array([getattr(i.model, name) for i in identifications])
+            coefficients |= fit_quadratic(name, currents, values)
+        coefficients["f0"] = float(np.median([i.model.values()["f0"] for i in identifications]))
+        return coefficients
+
+    def model_at(self, condition: Condition) -> Biviscous:
+        cpo, cpr, fy, v0 = (
+            quadratic(condition.current_A, self.coefficients, name) for name in ("cpo", "cpr", "fy", "v0")
+        )
+        cpo, fy = np.maximum(cpo, 0.0), np.maximum(fy, 1.0)
+        cpr = np.maximum(cpr, 1.01 * cpo + 1.0)  # quadratics may cross; the branches must still meet
+        v0 = np.minimum(np.maximum(v0, 0.0), 0.999 * fy / cpr)
+        return Biviscous.from_wereley(cpo, cpr, fy, v0, self.coefficients["f0"])

@@ -1,0 +1,214 @@
+"""Fitting parameter functions to identified values, and choosing among their forms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mrdamper.data import Condition, Floats
+from mrdamper.errors import IdentificationError
+from mrdamper.functions.forms import Form, ParameterFunction, features, form_named
+from mrdamper.optimizers.levenberg_marquardt import least_squares
+
+_RANK_LIMIT = 1e-7  # singular values below this share of the largest: the tests cannot tell the terms apart
+
+
+@dataclass(frozen=True)
+class FunctionFit:
+    """A fitted parameter function and how well it describes the identified values.
+
+    Attributes
+    ----------
+    function : ParameterFunction
+    r2 : float
+        Share of the variance it explains (in the logarithm, where the parameter is logarithmic).
+    left_out : float
+        RMS error at a condition left out of the fit, over the parameter's spread: under 1 the
+        function knows more than the mean does.
+    """
+
+    function: ParameterFunction
+    r2: float
+    left_out: float
+
+
+def fit_function(
+    form: str | Form,
+    conditions: Sequence[Condition],
+    values: ArrayLike,
+    *,
+    log: bool = False,
+    uncertainty: ArrayLike | None = None,
+) -> FunctionFit:
+    """Fit one form to a parameter's identified values.
+
+    Parameters
+    ----------
+    form : str or Form
+    conditions : sequence of Condition, length N
+    values : (N,) array
+        Identified values of the parameter.
+    log : bool
+        Fit the logarithm.
+    uncertainty : (N,) array, optional
+        Standard errors of the values (of the logarithm, with `log`): certain values count more,
+        up to those of the most certain quarter.
+
+    Raises
+    ------
+    IdentificationError
+        If the conditions cannot tell the form's terms apart: too few currents, frequencies or
+        amplitudes.
+    """
+    chosen = form_named(form) if isinstance(form, str) else form
+    I, f, A = features(conditions)
+    target = np.asarray(values, dtype=float)
+    if log:
+        target = np.log(target)
+    if target.size < len(chosen.terms) + len(chosen.rate_bounds):
+        raise _undetermined(chosen, f"{target.size} conditions", I, f, A)
+    weight = _weights(uncertainty, target)
+    rates = _best_rates(chosen, I, f, A, target, weight)
+    columns = chosen.columns(I, f, A, rates)
+    if not _determined(columns):
+        raise _undetermined(chosen, "they do not tell its terms apart", I, f, A)
+    coefficients = _solve(columns * weight[:, None], target * weight)
+    cost = float(np.sum((columns @ coefficients - target) ** 2))
+    spread = float(np.sum((target - target.mean()) ** 2))
+    function = ParameterFunction(chosen.name, tuple(coefficients.tolist()), tuple(float(r) for r in rates), log)
+    return FunctionFit(
+        function,
+        r2=1.0 - cost / spread if spread > 0 else 1.0,
+        left_out=_left_out(columns, target, weight, len(rates)) / (np.sqrt(spread / target.size) or 1.0),
+    )
+
+
+def choose_function(
+    forms: Iterable[str],
+    conditions: Sequence[Condition],
+    values: ArrayLike,
+    *,
+    log: bool = False,
+    uncertainty: ArrayLike | None = None,
+) -> FunctionFit:
+    """The form that predicts left-out conditions best; a longer one must win by a tenth.
+
+    Parameters are those of `fit_function`; forms the conditions cannot determine are passed
+    over.
+
+    Raises
+    ------
+    IdentificationError
+        If they can determine none.
+    """
+    best: FunctionFit | None = None
+    refusal: IdentificationError | None = None
+    for form in sorted((form_named(name) for name in forms), key=lambda f: len(f.terms) + len(f.rate_bounds)):
+        try:
+            fit = fit_function(form, conditions, values, log=log, uncertainty=uncertainty)
+        except IdentificationError as error:
+            refusal = error
+            continue
+        if best is None or fit.left_out < 0.9 * best.left_out:
+            best = fit
+    if best is None:
+        raise refusal or IdentificationError("no form to choose from", mend="name at least one")
+    return best
+
+
+def assess(function: ParameterFunction, conditions: Sequence[Condition], values: ArrayLike) -> FunctionFit:
+    """How a function found otherwise, by a joint fit, describes values identified run by run."""
+    target, found = np.asarray(values, dtype=float), function(*features(conditions))
+    if function.log:
+        target, found = np.log(target), np.log(found)
+    spread = float(np.sum((target - target.mean()) ** 2))
+    return FunctionFit(function, 1.0 - float(np.sum((found - target) ** 2)) / spread if spread else 1.0, float("nan"))
+
+
+def require_determined(form: str, conditions: Sequence[Condition]) -> None:
+    """Refuse a form without rates whose terms the conditions cannot tell apart.
+
+    Raises
+    ------
+    IdentificationError
+        Also where the form has rates, which only a fit can settle.
+    """
+    chosen = form_named(form)
+    I, f, A = features(conditions)
+    if chosen.rate_bounds:
+        raise IdentificationError(f"{form} has rates to search", mend="choose a form without")
+    if len(conditions) < len(chosen.terms) or not _determined(chosen.columns(I, f, A, ())):
+        raise _undetermined(chosen, f"{len(conditions)} conditions do not tell its terms apart", I, f, A)
+
+
+def _best_rates(
+    form: Form,
+    I: Floats,
+    f: Floats,
+    A: Floats,
+    target: Floats,
+    weight: Floats,
+) -> tuple[float, ...]:
+    """Search the rates in their logarithm: a grid, then refinement from its three best points."""
+    if not form.rate_bounds:
+        return ()
+    bounds = np.log(np.array(form.rate_bounds))
+
+    def residual(u: Floats) -> Floats:
+        columns = form.columns(I, f, A, tuple(np.exp(u))) * weight[:, None]
+        return columns @ _solve(columns, target * weight) - target * weight
+
+    grid = [np.array(u) for u in product(*(np.linspace(low, high, 6) for low, high in bounds))]
+    grid.sort(key=lambda u: float(np.sum(residual(u) ** 2)))
+    found = [least_squares(residual, u, bounds[:, 0], bounds[:, 1], most_steps=15) for u in grid[:3]]
+    best = min(found, key=lambda minimum: minimum.cost)
+    return tuple(np.exp(best.point).tolist())
+
+
+def _left_out(columns: Floats, target: Floats, weight: Floats, rates: int) -> float:
+    """Weighted RMS of leave-one-out errors, exact for the linear part through the hat matrix."""
+    weighted = columns * weight[:, None]
+    q, _ = np.linalg.qr(weighted / np.linalg.norm(weighted, axis=0))
+    leverage = np.sum(q**2, axis=1)
+    residual = target * weight - q @ (q.T @ (target * weight))
+    spare = np.maximum(1.0 - leverage, 1e-9)
+    penalty = target.size / max(target.size - rates, 1)
+    return float(np.sqrt(np.sum((residual / spare) ** 2) / np.sum(weight**2)) * penalty)
+
+
+def _weights(uncertainty: ArrayLike | None, target: Floats) -> Floats:
+    if uncertainty is None:
+        return np.ones(target.size)
+    errors = np.asarray(uncertainty, dtype=float)
+    known = errors[np.isfinite(errors)]
+    if not known.size:
+        return np.ones(target.size)
+    floor = float(np.quantile(known, 0.25)) or 1.0
+    return floor / np.maximum(np.where(np.isfinite(errors), errors, known.max()), floor)
+
+
+def _solve(columns: Floats, target: Floats) -> Floats:
+    scale = np.linalg.norm(columns, axis=0)
+    scale[scale == 0] = 1.0
+    return np.linalg.lstsq(columns / scale, target, rcond=None)[0] / scale
+
+
+def _determined(columns: Floats) -> bool:
+    scale = np.linalg.norm(columns, axis=0)
+    if np.any(scale == 0):
+        return False
+    singular = np.linalg.svd(columns / scale, compute_uv=False)
+    return columns.shape[0] >= columns.shape[1] and bool(singular[-1] > _RANK_LIMIT * singular[0])
+
+
+def _undetermined(form: Form, found: str, I: Floats, f: Floats, A: Floats) -> IdentificationError:
+    levels = [len(np.unique(np.round(column, 3))) for column in (I, f, 1e3 * A)]
+    return IdentificationError(
+        f"{form.name} has {len(form.terms) + len(form.rate_bounds)} coefficients and {found}: "
+        f"{levels[0]} currents, {levels[1]} frequencies, {levels[2]} amplitudes",
+        mend="test more conditions or choose a shorter form",
+    )

@@ -1,0 +1,296 @@
+"""Harmonic balance of a damper on a sine: the paper's closed forms, and what is missing in them.
+
+The paper balances the first harmonic of the whole force against viscosity, inertia and gas
+spring and gets c and m in closed form. The hysteretic force alpha z has a first harmonic of
+its own, so c and m then hold part of it and it is identified twice: `double_counted` says by
+how much. A balance that evaluates the hysteresis too, over three or more harmonics, does not
+have this flaw; `HarmonicProjection` takes any signal to the space in which it is done.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from mrdamper.data import Condition, Floats, Run
+from mrdamper.errors import ExcitationError, IdentificationError
+from mrdamper.hysteresis import Shape, loop_harmonics
+from mrdamper.motion import SINE_DISTORTION_LIMIT, Excitation, analyse_motion
+from mrdamper.motion.harmonics import fit_harmonics
+
+AmplitudeReading = Literal["first-harmonic", "half-peak-to-peak", "maximum"]
+PhaseReading = Literal["harmonic", "peaks"]
+OffsetReading = Literal["extremes", "mean"]
+_ORDERS = 9  # the first is wanted; the next few must not leak into it where the last cycle is broken
+
+
+@dataclass(frozen=True, eq=False)
+class SineRecord:
+    """A steady run as harmonic balance sees it: x = amplitude · sin theta, and the force.
+
+    Attributes
+    ----------
+    run_id : str
+    condition : Condition
+        With the amplitude of the first harmonic of the displacement.
+    theta : (N,) array
+        Phase of the displacement at the samples [rad], from 0 on.
+    force : (N,) array
+        Measured [N].
+    """
+
+    run_id: str
+    condition: Condition
+    theta: Floats
+    force: Floats
+
+    @classmethod
+    def of(cls, run: Run) -> SineRecord:
+        """Read the steady window of a run.
+
+        Raises
+        ------
+        ExcitationError
+            If it holds under one cycle, or its motion is no sine.
+        """
+        found = analyse_motion(run)
+        if not found.is_sine:
+            raise ExcitationError(
+                f"the motion is no sine: distortion {100 * found.distortion:.1f} %, "
+                f"harmonic balance takes up to {100 * SINE_DISTORTION_LIMIT:g} %",
+                where=f"run {run.id}",
+                mend="identify with method projection, which follows any motion",
+            )
+        steady, series = run.steady(), found.series
+        omega = 2 * np.pi * series.frequency
+        theta = omega * (steady.time - series.origin) + series.phase(1) % (2 * np.pi)
+        measured = found.condition
+        condition = Condition(measured.current_A, series.frequency, series.amplitude(1))
+        return cls(run.id, condition, theta, steady.force)
+
+    @property
+    def omega(self) -> float:
+        """2πf [rad/s]."""
+        return 2 * np.pi * self.condition.frequency_Hz
+
+    @property
+    def motion(self) -> Excitation:
+        """The sine itself at the samples, free of noise."""
+        X, omega = self.condition.amplitude_m, self.omega
+        x = X * np.sin(self.theta)
+        v = X * omega * np.cos(self.theta)
+        return Excitation(self.theta / omega, x, v, -(omega**2) * x, np.full(x.size, self.condition.current_A))
+
+
+@dataclass(frozen=True)
+class ForceReading:
+    """Force ≈ offset + amplitude · sin(theta + phase), as the closed forms want it.
+
+    Attributes
+    ----------
+    amplitude, phase, offset : float
+        F0 [N], its lead phi over the displacement [rad], f0 [N].
+    """
+
+    amplitude: float
+    phase: float
+    offset: float
+
+
+def read_force(
+    record: SineRecord,
+    amplitude: AmplitudeReading = "first-harmonic",
+    phase: PhaseReading = "harmonic",
+    offset: OffsetReading = "extremes",
+) -> ForceReading:
+    """Read F0, phi and f0 off a measured force.
+
+    [Qian et al. 2024, Eq. 16] The text leaves open how; every reading is offered.
+
+    Parameters
+    ----------
+    record : SineRecord
+    amplitude : {"first-harmonic", "half-peak-to-peak", "maximum"}
+        F0 is the amplitude of the first harmonic, half the peak-to-peak force, or the largest force.
+    phase : {"harmonic", "peaks"}
+        phi is the lead of the first harmonic, or that of the peaks.
+    offset : {"extremes", "mean"}
+        f0 is the mid-point of maximum and minimum (the paper's), or the mean over the cycles.
+    """
+    # No drift: over a few cycles a line is not orthogonal to the sines and would take part of them.
+    series = fit_harmonics(record.theta, record.force, _ORDERS, frequency=1 / (2 * np.pi), drift=False)
+    top, bottom = _extremes(record)
+    sizes = {
+        "first-harmonic": series.amplitude(1),
+        "half-peak-to-peak": (top.force - bottom.force) / 2,
+        "maximum": top.force,
+    }
+    # The series counts from the first sample, which lies at phase theta[0].
+    leads = {
+        "harmonic": series.phase(1) - record.theta[0],
+        "peaks": np.pi / 2 - _circular_mean(top.theta, bottom.theta - np.pi),
+    }
+    offsets = {"extremes": (top.force + bottom.force) / 2, "mean": series.mean}
+    lead = (leads[phase] + np.pi) % (2 * np.pi) - np.pi
+    return ForceReading(sizes[amplitude], float(lead), offsets[offset])
+
+
+def damping_and_mass(
+    reading: ForceReading, amplitude: float, omega: float, k1: float, k3: float
+) -> tuple[float, float]:
+    """Viscous damping and equivalent mass by first-order harmonic balance.
+
+    c = F0 sin(phi)/(X omega),  m = (k1 X + 3/4 k3 X³ − F0 cos(phi))/(X omega²)
+    [Qian et al. 2024, Eq. 17–19]. The hysteretic force is counted in both: see `double_counted`.
+
+    Parameters
+    ----------
+    reading : ForceReading
+    amplitude : float
+        X [m].
+    omega : float
+        [rad/s]
+    k1, k3 : float
+        Stiffnesses of the gas spring [N/m], [N/m³]. The even one has no first harmonic.
+
+    Returns
+    -------
+    c, m : float
+        [N s/m], [kg].
+    """
+    X = amplitude
+    c = reading.amplitude * np.sin(reading.phase) / (X * omega)
+    m = (k1 * X + 0.75 * k3 * X**3 - reading.amplitude * np.cos(reading.phase)) / (X * omega**2)
+    return float(c), float(m)
+
+
+def double_counted(shape: Shape, yield_force: float, amplitude: float, omega: float) -> tuple[float, float]:
+    """What the first harmonic of the hysteretic force adds to the closed forms of c and m.
+
+    c_closed − c = f_z zc_1/(X omega),  m_closed − m = −f_z zs_1/(X omega²), with zs_1, zc_1
+    the exact first harmonics of zeta. Derived for this package.
+
+    Parameters
+    ----------
+    shape : Shape
+    yield_force : float
+        f_z, hysteretic force after yield [N].
+    amplitude, omega : float
+        [m], [rad/s].
+
+    Returns
+    -------
+    c, m : float
+        [N s/m], [kg].
+    """
+    sine, cosine = loop_harmonics(shape, amplitude, (1,))
+    return (
+        float(yield_force * cosine[0] / (amplitude * omega)),
+        float(-yield_force * sine[0] / (amplitude * omega**2)),
+    )
+
+
+@dataclass(frozen=True)
+class StiffnessAndMass:
+    """What the in-phase force of several runs says.
+
+    Attributes
+    ----------
+    k1, k3, m : float
+        [N/m], [N/m³], [kg].
+    """
+
+    k1: float
+    k3: float
+    m: float
+
+
+def separate_mass(
+    conditions: Sequence[Condition], in_phase: Sequence[float], with_cubic: bool = False
+) -> StiffnessAndMass:
+    """Tell mass from stiffness by regression of k1 + 3/4 k3 X² − m omega² over several runs.
+
+    At one frequency x and its acceleration are one signal, so one run can not do it.
+
+    Parameters
+    ----------
+    conditions : sequence of Condition
+    in_phase : sequence of float
+        In-phase force over displacement of each run, the hysteretic part removed [N/m].
+    with_cubic : bool
+        Determine k3 too; needs two amplitudes.
+
+    Raises
+    ------
+    IdentificationError
+        With fewer than two frequencies, or, for k3, than two amplitudes.
+    """
+    omega = 2 * np.pi * np.array([c.frequency_Hz for c in conditions])
+    X = np.array([c.amplitude_m for c in conditions])
+    for name, values, needed in (("frequency", omega, True), ("amplitude", X, with_cubic)):
+        if needed and (values.size < 2 or np.ptp(values) < 0.03 * np.max(values)):
+            raise IdentificationError(
+                f"{values.size} runs at one {name}: it takes two to tell "
+                + ("mass from stiffness" if name == "frequency" else "k3 from k1"),
+                mend=f"add runs at another {name}, or give the gas spring",
+            )
+    columns = [np.ones_like(X), -(omega**2)] + ([0.75 * X**2] if with_cubic else [])
+    matrix = np.column_stack(columns)
+    scale = np.linalg.norm(matrix, axis=0)
+    found = np.linalg.lstsq(matrix / scale, np.asarray(in_phase, dtype=float), rcond=None)[0] / scale
+    return StiffnessAndMass(float(found[0]), float(found[2]) if with_cubic else 0.0, float(found[1]))
+
+
+class HarmonicProjection:
+    """Takes signals at given phases to their mean and harmonics 1...H, in an orthonormal basis.
+
+    Measured and modelled force pass through the same projection, so neither an incomplete
+    last cycle nor the harmonics left out disturb the balance: equal signals have equal
+    projections. Squared differences there are squared differences in time of what the
+    harmonics carry. A linear drift is projected out.
+
+    Parameters
+    ----------
+    theta : (N,) array
+        [rad]
+    harmonics : int
+        H; lowered to what the samples resolve.
+    """
+
+    def __init__(self, theta: Floats, harmonics: int):
+        resolved = int(np.pi / float(np.median(np.diff(theta))))
+        self.harmonics = max(1, min(harmonics, resolved))
+        angle = np.outer(theta, np.arange(1, self.harmonics + 1))
+        drift = (theta - theta.mean()) / np.ptp(theta)
+        basis = np.column_stack([drift, np.ones_like(theta), np.sin(angle), np.cos(angle)])
+        self._rows = np.linalg.qr(basis)[0].T[1:]
+
+    def __call__(self, signals: Floats) -> Floats:
+        """Project signals, (N,) or (N, S) -> (1 + 2H,) or (1 + 2H, S)."""
+        return self._rows @ signals
+
+
+@dataclass(frozen=True)
+class _Extreme:
+    force: float
+    theta: float
+
+
+def _extremes(record: SineRecord) -> tuple[_Extreme, _Extreme]:
+    """Maximum and minimum of the force and where in the cycle they lie, median over the cycles."""
+    cycle = np.floor((record.theta - record.theta[0]) / (2 * np.pi) + 1e-9).astype(int)
+    parts = [np.flatnonzero(cycle == number) for number in range(cycle[-1] + 1)]
+    most = max(part.size for part in parts)
+    whole = [part for part in parts if part.size >= 0.95 * most]
+    found = []
+    for sign in (1.0, -1.0):
+        at = [part[np.argmax(sign * record.force[part])] for part in whole]
+        found.append(_Extreme(float(np.median(record.force[at])), _circular_mean(*record.theta[at])))
+    return found[0], found[1]
+
+
+def _circular_mean(*angles: float) -> float:
+    return float(np.angle(np.mean(np.exp(1j * np.asarray(angles)))))

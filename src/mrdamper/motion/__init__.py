@@ -1,0 +1,32 @@
+"""Motion and current in time: measured, or made, cut into strokes, taken for a sine."""
+
+from mrdamper.motion.excitation import Excitation
+from mrdamper.motion.made import random_motion, sine, sweep, triangle
+from mrdamper.motion.measured import measured_motion, motion_from_samples, smooth
+from mrdamper.motion.path import Path
+from mrdamper.motion.sines import (
+    SINE_DISTORTION_LIMIT,
+    EquivalentSine,
+    MotionAnalysis,
+    analyse_motion,
+    equivalent_sine,
+    running_sine,
+)
+
+__all__ = [
+    "SINE_DISTORTION_LIMIT",
+    "EquivalentSine",
+    "Excitation",
+    "MotionAnalysis",
+    "Path",
+    "analyse_motion",
+    "equivalent_sine",
+    "measured_motion",
+    "motion_from_samples",
+    "random_motion",
+    "running_sine",
+    "sine",
+    "smooth",
+    "sweep",
+    "triangle",
+]

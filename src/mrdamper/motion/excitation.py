@@ -1,0 +1,64 @@
+"""`Excitation`: motion and current in time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mrdamper.data import Floats
+from mrdamper.motion.path import Path
+
+
+@dataclass(frozen=True, eq=False)
+class Excitation:
+    """Motion and current at the samples of one stretch of time.
+
+    Attributes
+    ----------
+    time, displacement, velocity, acceleration, current : (N,) arrays
+        [s], [m], [m/s], [m/s²], [A].
+    """
+
+    time: Floats
+    displacement: Floats
+    velocity: Floats
+    acceleration: Floats
+    current: Floats
+
+    def __post_init__(self) -> None:
+        size = self.time.size
+        for name in ("displacement", "velocity", "acceleration", "current"):
+            array = np.broadcast_to(np.asarray(getattr(self, name), dtype=float), (size,))
+            object.__setattr__(self, name, array)
+
+    def __len__(self) -> int:
+        return self.time.size
+
+    @cached_property
+    def path(self) -> Path:
+        """The motion cut into strokes."""
+        return Path.of(self.displacement)
+
+    def part(self, mask: ArrayLike | slice) -> Excitation:
+        """The samples selected by a mask, slice or index."""
+        pick = {name: getattr(self, name)[mask] for name in self.__dataclass_fields__}
+        return Excitation(**pick)
+
+    def with_current(self, current: ArrayLike) -> Excitation:
+        """The same motion at another current [A], a scalar or one value per sample."""
+        return replace(self, current=np.asarray(current, dtype=float))
+
+    def about(self, centre: float) -> Excitation:
+        """The same motion with displacements counted from `centre` [m]."""
+        return replace(self, displacement=self.displacement - centre)
+
+    def delayed(self, delay: float) -> Excitation:
+        """The motion `delay` seconds later, to first order in the delay, for small delays."""
+        return replace(
+            self,
+            displacement=self.displacement - delay * self.velocity,
+            velocity=self.velocity - delay * self.acceleration,
+        )

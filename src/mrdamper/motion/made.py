@@ -1,0 +1,82 @@
+"""Motions that are made: sine, triangle, sweep, random."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from mrdamper.data import Condition, Floats
+from mrdamper.errors import ExcitationError
+from mrdamper.motion.excitation import Excitation
+
+_SAMPLES_PER_CYCLE = 1000
+
+
+def sine(condition: Condition, cycles: float = 1.0, samples_per_cycle: int = _SAMPLES_PER_CYCLE) -> Excitation:
+    """X = X sin(2πft) at constant current; the last sample closes the last cycle."""
+    _require_positive(frequency_Hz=condition.frequency_Hz, amplitude_m=condition.amplitude_m, cycles=cycles)
+    omega = 2 * np.pi * condition.frequency_Hz
+    time = np.arange(round(cycles * samples_per_cycle) + 1) / (samples_per_cycle * condition.frequency_Hz)
+    x = condition.amplitude_m * np.sin(omega * time)
+    v = condition.amplitude_m * omega * np.cos(omega * time)
+    return Excitation(time, x, v, -(omega**2) * x, np.full(time.size, condition.current_A))
+
+
+def triangle(condition: Condition, cycles: float = 1.0, samples_per_cycle: int = _SAMPLES_PER_CYCLE) -> Excitation:
+    """Constant speed 4fX between ±X at constant current, as in friction tests."""
+    _require_positive(frequency_Hz=condition.frequency_Hz, amplitude_m=condition.amplitude_m, cycles=cycles)
+    time = np.arange(round(cycles * samples_per_cycle) + 1) / (samples_per_cycle * condition.frequency_Hz)
+    phase = (time * condition.frequency_Hz + 0.25) % 1.0
+    rising = phase < 0.5
+    x = condition.amplitude_m * np.where(rising, 4 * phase - 1, 3 - 4 * phase)
+    v = 4 * condition.frequency_Hz * condition.amplitude_m * np.where(rising, 1.0, -1.0)
+    return Excitation(time, x, v, np.zeros_like(x), np.full(time.size, condition.current_A))
+
+
+def sweep(
+    start_Hz: float,
+    end_Hz: float,
+    duration: float,
+    amplitude: float | Callable[[Floats], Floats],
+    current: float = 0.0,
+    sample_rate: float = 1000.0,
+) -> Excitation:
+    """Linear frequency sweep [Hz] over a duration [s]; the amplitude [m] may depend on frequency."""
+    _require_positive(start_Hz=start_Hz, end_Hz=end_Hz, duration=duration, sample_rate=sample_rate)
+    time = np.arange(int(duration * sample_rate) + 1) / sample_rate
+    frequency = start_Hz + (end_Hz - start_Hz) * time / duration
+    phase = 2 * np.pi * (start_Hz * time + (end_Hz - start_Hz) * time**2 / (2 * duration))
+    envelope = amplitude(frequency) if callable(amplitude) else amplitude
+    return _derived(time, envelope * np.sin(phase), current)
+
+
+def random_motion(
+    rng: np.random.Generator,
+    duration: float,
+    rms: float,
+    band_Hz: tuple[float, float] = (0.1, 5.0),
+    current: float = 0.0,
+    sample_rate: float = 1000.0,
+) -> Excitation:
+    """Gaussian motion of given RMS [m], flat in displacement over a frequency band [Hz]."""
+    _require_positive(duration=duration, rms=rms, sample_rate=sample_rate)
+    size = int(duration * sample_rate) + 1
+    frequency = np.fft.rfftfreq(size, 1 / sample_rate)
+    inside = (frequency >= band_Hz[0]) & (frequency <= band_Hz[1])
+    if not inside.any():
+        raise ExcitationError(f"no frequency line lies in {band_Hz} Hz", mend="lengthen the record or widen the band")
+    spectrum = inside * (rng.standard_normal(frequency.size) + 1j * rng.standard_normal(frequency.size))
+    x = np.fft.irfft(spectrum, size)
+    return _derived(np.arange(size) / sample_rate, x * rms / np.std(x), current)
+
+
+def _derived(time: Floats, x: Floats, current: float) -> Excitation:
+    v = np.gradient(x, time, edge_order=2)
+    return Excitation(time, x, v, np.gradient(v, time, edge_order=2), np.full(time.size, float(current)))
+
+
+def _require_positive(**values: float) -> None:
+    for name, value in values.items():
+        if not (np.isfinite(value) and value > 0):
+            raise ExcitationError(f"{name} is {value}", mend="give a positive number")

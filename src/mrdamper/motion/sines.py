@@ -1,0 +1,158 @@
+"""Which sine a measured motion is, or amounts to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrdamper.data import Condition, Floats, Run, once_per_run
+from mrdamper.errors import ExcitationError
+from mrdamper.motion.excitation import Excitation
+from mrdamper.motion.harmonics import HarmonicSeries, fit_harmonics, fundamental_frequency
+from mrdamper.motion.measured import measured_motion
+
+SINE_DISTORTION_LIMIT = 0.05  # above it a motion is no sine for harmonic balance
+_ORDERS = 7  # harmonics a measured motion is described by
+_STILL = 1e-9  # a displacement that moves less does not move [m]
+
+
+@dataclass(frozen=True, eq=False)
+class MotionAnalysis:
+    """Which sine a measured motion is.
+
+    Attributes
+    ----------
+    condition : Condition
+        Measured current, frequency and amplitude (half the peak-to-peak stroke).
+    series : HarmonicSeries
+        Mean, drift and harmonics of the displacement.
+    cycles : float
+        Length of the record in cycles.
+    distortion : float
+        RMS of harmonics 2 and up over the RMS of the first (THD).
+    drift : float
+        Slow movement of the mean position [m/s].
+    residual : float
+        RMS of what the series does not explain [m].
+    """
+
+    condition: Condition
+    series: HarmonicSeries
+    cycles: float
+    distortion: float
+    drift: float
+    residual: float
+
+    @property
+    def is_sine(self) -> bool:
+        """Whether harmonic balance may treat the motion as a sine."""
+        return self.distortion <= SINE_DISTORTION_LIMIT
+
+
+@once_per_run
+def analyse_motion(run: Run) -> MotionAnalysis:
+    """Frequency, amplitude, distortion and drift of the run's steady motion.
+
+    Harmonic regression on the samples of the steady window, so the record need not hold a
+    whole number of cycles.
+
+    Raises
+    ------
+    ExcitationError
+        If the steady window holds under one cycle, or no motion.
+    """
+    run = run.steady()
+    where = f"run {run.id}"
+    if np.ptp(run.displacement) < _STILL:
+        raise ExcitationError("the displacement does not move", where=where, mend="check the channel")
+    frequency = fundamental_frequency(run.time, run.displacement)
+    orders = _ORDERS if np.ptp(run.time) * frequency > 2 else 3  # harmonics of a short record overlap its drift
+    series = fit_harmonics(run.time, run.displacement, orders, frequency=frequency)
+    cycles = float(np.ptp(run.time) * series.frequency)
+    if cycles < 0.95:
+        raise ExcitationError(
+            f"the steady window holds {cycles:.2f} cycles",
+            where=where,
+            mend="record at least one full cycle",
+        )
+    power = series.sine**2 + series.cosine**2
+    return MotionAnalysis(
+        condition=Condition(round(float(np.mean(run.current)), 9), series.frequency, series.half_peak_to_peak()),
+        series=series,
+        cycles=cycles,
+        distortion=float(np.sqrt(power[1:].sum() / power[0])),
+        drift=series.drift,
+        residual=float(np.std(run.displacement - series(run.time))),
+    )
+
+
+@dataclass(frozen=True)
+class EquivalentSine:
+    """The sine a motion amounts to.
+
+    Attributes
+    ----------
+    condition : Condition
+    centre : float
+        Mean position [m].
+    is_sine : bool
+        Whether the motion is that sine, or only shares its RMS displacement and velocity.
+    """
+
+    condition: Condition
+    centre: float
+    is_sine: bool
+
+
+@once_per_run
+def equivalent_sine(run: Run) -> EquivalentSine:
+    """Measure the sine, or for any other motion the sine of the same RMS displacement and velocity.
+
+    Raises
+    ------
+    ExcitationError
+        If nothing moves.
+    """
+    run = run.steady()
+    centred = run.displacement - np.mean(run.displacement)
+    try:
+        analysis = analyse_motion(run)
+    except ExcitationError:
+        if np.ptp(centred) < _STILL:
+            raise
+        analysis = None
+    if analysis is not None and analysis.residual < 0.3 * np.std(centred):
+        return EquivalentSine(analysis.condition, analysis.series.mean, True)
+    motion = measured_motion(run)
+    rms_x, rms_v = float(np.std(motion.displacement)), float(np.std(motion.velocity))
+    condition = Condition(round(float(np.mean(run.current)), 9), rms_v / (2 * np.pi * rms_x), float(np.sqrt(2) * rms_x))
+    return EquivalentSine(condition, float(np.mean(motion.displacement)), False)
+
+
+def running_sine(motion: Excitation) -> tuple[Floats, Floats]:
+    """Frequency [Hz] and amplitude [m] of the sine a motion resembles, at every sample.
+
+    From the analytic signal of displacement and velocity, averaged over about a cycle. For
+    motion of one slowly changing frequency; for broad-band motion it is a rough description
+    and no more. It looks ahead as far as it looks back.
+    """
+    x = motion.displacement - np.mean(motion.displacement)
+    v = motion.velocity
+    x_turned, v_turned = _quarter_turn(x), _quarter_turn(v)
+    spin, size = x * v_turned - x_turned * v, x**2 + x_turned**2
+    moving = float(np.sqrt(np.mean(v**2) / np.mean(x**2)))
+    width = max(3, round(2 * np.pi / moving / float(np.median(np.diff(motion.time)))))
+    mean = np.ones(width) / width
+    scale = np.convolve(np.ones(x.size), mean, "same")
+    size = np.maximum(np.convolve(size, mean, "same") / scale, np.finfo(float).tiny)
+    omega = np.convolve(spin, mean, "same") / scale / size
+    return np.maximum(omega, 1e-3 * moving) / (2 * np.pi), np.sqrt(size)
+
+
+def _quarter_turn(signal: Floats) -> Floats:
+    """Hilbert transform; the record is mirrored at both ends so that they do not leak into each other."""
+    mirrored = np.concatenate([signal, signal[::-1]])
+    spectrum = np.fft.rfft(mirrored)
+    turned = np.fft.irfft(-1j * spectrum, mirrored.size)
+    return turned[: signal.size]

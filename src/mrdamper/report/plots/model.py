@@ -1,0 +1,176 @@
+"""What was identified, and how it predicts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from mrdamper.dampers.base import Damper
+from mrdamper.dampers.modified import ModifiedFit
+from mrdamper.data import Run
+from mrdamper.loop_analysis import same_motion
+from mrdamper.motion import equivalent_sine
+from mrdamper.report.plots.style import (
+    MEASURED,
+    MM,
+    PALETTE,
+    PREDICTED,
+    current_colours,
+    house_style,
+    label,
+    new_figure,
+    thin,
+)
+from mrdamper.validation import Validation
+
+_WORST_SHOWN = 25.0  # per cent; a run beyond is drawn as an arrow at the edge
+_AXES = {
+    "c": ("Viscous damping c (N s/m)", 1.0),
+    "fy": ("Yield force (N)", 1.0),
+    "yield_force": ("Yield force (N)", 1.0),
+    "yield_displacement": ("Yield displacement (µm)", 1e6),
+    "k1": ("Stiffness k1 (N/m)", 1.0),
+    "k3": ("Cubic stiffness k3 (N/m³)", 1.0),
+    "f0": ("Offset force f0 (N)", 1.0),
+    "m": ("Equivalent mass m (kg)", 1.0),
+}
+
+
+def predicted_loops(damper: Damper, runs: Sequence[Run]) -> Figure:
+    """Measured and predicted force–velocity and force–displacement loops, last cycle in the window."""
+    columns = 2 if len(runs) in (1, 2, 4) else 3
+    with house_style():
+        figure, axes = new_figure(2 * -(-len(runs) // columns), columns, 4.6 * -(-len(runs) // columns))
+        for number, run in enumerate(runs):
+            row, column = divmod(number, columns)
+            over_x, over_v = axes[2 * row * columns + column], axes[(2 * row + 1) * columns + column]
+            prediction = damper.predict_run(run)
+            period = 1 / prediction.condition.frequency_Hz
+            end = run.window[1] if run.window else float(run.time[-1])
+            last = (run.time <= end) & (run.time >= end - 1.02 * period)
+            motion = prediction.motion
+            for force, colour, name in ((run.force, MEASURED, "measured"), (prediction.force, PREDICTED, "predicted")):
+                over_x.plot(MM * thin(motion.displacement[last]), thin(force[last]), color=colour, label=name)
+                over_v.plot(thin(motion.velocity[last]), thin(force[last]), color=colour, label=name)
+            over_x.set_title(str(prediction.condition), loc="left", fontsize=8)
+            label(over_x, "Displacement (mm)", "Force (N)" if column == 0 else "")
+            label(over_v, "Velocity (m/s)", "Force (N)" if column == 0 else "")
+        for unused in range(len(runs), columns * -(-len(runs) // columns)):
+            row, column = divmod(unused, columns)
+            axes[2 * row * columns + column].set_visible(False)
+            axes[(2 * row + 1) * columns + column].set_visible(False)
+        axes[0].legend(loc="center")
+        return figure
+
+
+def parameter_curves(fit: ModifiedFit) -> Figure:
+    """Identified values over current, one colour a motion, and the functions through them."""
+    names = [name for name in fit.functions if np.ptp(fit.values[name]) > 0] or list(fit.functions)
+    with house_style():
+        columns = 2
+        rows = -(-len(names) // columns)
+        figure, axes = new_figure(rows, columns, 2.5 * rows)
+        groups = sorted(same_motion(fit.conditions, tolerance=0.08), key=lambda g: fit.conditions[g[0]].peak_velocity)
+        shades = current_colours([fit.conditions[g[0]].peak_velocity for g in groups])
+        dense = np.linspace(0, fit.damper.envelope.current_A[1], 60)
+        for panel, name in zip(axes, names, strict=False):
+            text, scale = _AXES.get(name, (name, 1.0))
+            for group in groups:
+                first = fit.conditions[group[0]]
+                shade = shades[first.peak_velocity]
+                panel.plot(
+                    [fit.conditions[i].current_A for i in group],
+                    scale * fit.values[name][group],
+                    "o",
+                    ms=3.5,
+                    color=shade,
+                    label=f"{first.frequency_Hz:.2g} Hz, {MM * first.amplitude_m:.3g} mm",
+                )
+                if len(groups) <= 10:
+                    curve = fit.functions[name].function(dense, first.frequency_Hz, first.amplitude_m)
+                    panel.plot(dense, scale * curve, lw=0.9, color=shade)
+            if len(groups) > 10:
+                middle = fit.conditions[len(fit.conditions) // 2]
+                curve = fit.functions[name].function(dense, middle.frequency_Hz, middle.amplitude_m)
+                panel.plot(dense, scale * curve, lw=1.0, color=MEASURED)
+            if fit.functions[name].function.log:
+                panel.set_yscale("log")
+            label(panel, "Current (A)", text, fit.functions[name].function.form)
+        for panel in axes[len(names) :]:
+            panel.set_visible(False)
+        if len(groups) <= 10:
+            axes[0].legend(loc="best", fontsize=6.5)
+        return figure
+
+
+def score_strip(validations: Mapping[str, Validation]) -> Figure:
+    """nrmse_pp of every run, one row a model and split; the bar is the median, the tick the run's floor.
+
+    Errors beyond 25 % are arrows at the edge.
+    """
+    with house_style():
+        figure, (axes,) = new_figure(1, 1, 0.8 + 0.3 * len(validations), left=2.6)
+        for row, validation in enumerate(validations.values()):
+            colour = PALETTE[1 + row % (len(PALETTE) - 2)]
+            values = 100 * np.array([run.scores.nrmse_pp for run in validation.runs])
+            floors = [100 * run.floor for run in validation.runs if run.floor is not None]
+            near, far = values[values <= _WORST_SHOWN], values[values > _WORST_SHOWN]
+            axes.plot(near, np.full(near.size, row), "o", ms=4, color=colour, alpha=0.65)
+            axes.plot(np.full(far.size, _WORST_SHOWN), np.full(far.size, row), ">", ms=5, color=colour, alpha=0.65)
+            axes.plot(floors, np.full(len(floors), row - 0.25), "|", ms=5, color="#888888")
+            axes.plot([min(np.median(values), _WORST_SHOWN)] * 2, [row - 0.3, row + 0.3], color=colour, lw=2.2)
+        axes.set_yticks(range(len(validations)), list(validations))
+        axes.invert_yaxis()
+        axes.set_xlim(left=0)
+        axes.grid(axis="y", visible=False)
+        label(axes, "nrmse_pp (%); grey ticks: cycle-to-cycle scatter", "")
+        return figure
+
+
+def residual_map(damper: Damper, runs: Sequence[Run]) -> Figure:
+    """Where the residual lives: mean and spread over velocity and over phase, relative to peak-to-peak force."""
+    with house_style():
+        figure, (over_v, over_phase) = new_figure(1, 2, 2.8, sharey=True)
+        colours = current_colours([float(np.mean(run.current)) for run in runs])
+        for run in runs:
+            found = equivalent_sine(run)
+            if not found.is_sine:
+                continue
+            prediction = damper.predict_run(run)
+            inside = run.in_window
+            motion = prediction.motion.part(inside)
+            error = 100 * (prediction.force - run.force)[inside] / np.ptp(run.force[inside])
+            omega = 2 * np.pi * found.condition.frequency_Hz
+            phase = np.degrees(np.arctan2(motion.displacement, motion.velocity / omega)) % 360
+            colour = colours[float(np.mean(run.current))]
+            for axes, key, bins in (
+                (over_v, motion.velocity / np.max(np.abs(motion.velocity)), np.linspace(-1, 1, 41)),
+                (over_phase, phase, np.linspace(0, 360, 61)),
+            ):
+                index = np.digitize(key, bins) - 1
+                mean = [error[index == i].mean() if np.any(index == i) else np.nan for i in range(bins.size - 1)]
+                axes.plot((bins[1:] + bins[:-1]) / 2, mean, color=colour, lw=0.9, alpha=0.8)
+        for current, colour in colours.items():
+            over_phase.plot([], [], color=colour, label=f"{current:g} A")
+        over_phase.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=len(colours))
+        label(over_v, "Velocity over its peak (–)", "Residual (% of peak-to-peak)")
+        label(over_phase, "Phase of the motion (°)", "")
+        over_phase.set_xticks([0, 90, 180, 270, 360])
+        return figure
+
+
+def force_in_time(run: Run, damper: Damper) -> Figure:
+    """Measured and predicted force in time over the whole record, residual below."""
+    with house_style():
+        figure, (above, below) = new_figure(2, 1, 3.6, sharex=True, height_ratios=[2.4, 1])
+        prediction = damper.predict_run(run)
+        time = thin(run.time, 3000)
+        above.plot(time, thin(run.force, 3000), color=MEASURED, label="measured", lw=0.9)
+        above.plot(time, thin(prediction.force, 3000), color=PREDICTED, label="predicted", lw=0.9)
+        below.plot(time, thin(prediction.force - run.force, 3000), color=PALETTE[1], lw=0.7)
+        above.legend(loc="upper right", ncols=2)
+        label(above, "", "Force (N)", f"{run.id}")
+        label(below, "Time (s)", "Residual (N)")
+        return figure

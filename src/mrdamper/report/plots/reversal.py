@@ -1,0 +1,57 @@
+"""Force against the distance since the last reversal: where lost motion shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from mrdamper.dampers.base import Damper
+from mrdamper.data import Floats, Run
+from mrdamper.report.plots.style import MM, PREDICTED, current_colours, house_style, label, new_figure
+
+_FARTHEST = 1.5e-3  # m
+
+
+def force_since_reversal(runs: Sequence[Run], damper: Damper) -> Figure:
+    """Mean force in the direction of motion over the distance since the reversal, over its peak.
+
+    Colours are currents; the thin line on each is the damper's prediction.
+    """
+    with house_style():
+        figure, (axes,) = new_figure(1, 1, 3.0, right=1.2)
+        colours = current_colours([float(np.mean(run.current)) for run in runs])
+        bins = np.concatenate([np.linspace(0, 0.6e-3, 31), np.linspace(0.65e-3, _FARTHEST, 18)])
+        middle = (bins[1:] + bins[:-1]) / 2
+        for current, colour in colours.items():
+            members = [run for run in runs if float(np.mean(run.current)) == current]
+            curves = np.array([_means(run, damper, bins) for run in members])
+            counts = np.isfinite(curves).sum(axis=0)
+            mean = np.where(counts > 0, np.nansum(curves, axis=0) / np.maximum(counts, 1), np.nan)
+            for row, (width, shade) in enumerate(((1.8, colour), (0.8, PREDICTED))):
+                seen = np.isfinite(mean[row])
+                axes.plot(MM * middle[seen], mean[row][seen], lw=width, color=shade)
+            axes.plot([], [], color=colour, lw=1.8, label=f"{current:g} A")
+        axes.plot([], [], color=PREDICTED, lw=0.8, label="predicted")
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        axes.set_xlim(0, MM * _FARTHEST)
+        label(axes, "Distance since the reversal (mm)", "Force along the motion over its peak (–)")
+        return figure
+
+
+def _means(run: Run, damper: Damper, bins: Floats) -> Floats:
+    """Rows: measured, predicted; mean in each bin, NaN where no sample fell."""
+    prediction = damper.predict_run(run)
+    path, inside = prediction.motion.path, run.in_window
+    direction, distance = path.direction[inside], path.distance[inside]
+    peak = np.ptp(run.force[inside]) / 2
+    index = np.digitize(distance, bins) - 1
+    rows = []
+    for force in (run.force, prediction.force):
+        centred = direction * (force[inside] - np.mean(force[inside])) / peak
+        valid = index < bins.size - 1
+        total = np.bincount(index[valid], centred[valid], minlength=bins.size - 1)
+        count = np.bincount(index[valid], minlength=bins.size - 1)
+        rows.append(np.where(count > 0, total / np.maximum(count, 1), np.nan))
+    return np.array(rows)

@@ -1,0 +1,139 @@
+"""The tests as they were measured: matrix, loops, and what loops say before any model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from mrdamper.data import Dataset
+from mrdamper.loop_analysis import DynamicRange, LoopAnalysis, same_motion, whole_cycles
+from mrdamper.motion import measured_motion
+from mrdamper.report.plots.style import KN, MM, current_colours, house_style, label, new_figure, thin
+
+
+def test_matrix(loops: Sequence[LoopAnalysis]) -> Figure:
+    """Measured frequency against amplitude, one colour a current; hollow marks are held out."""
+    with house_style():
+        colours = current_colours([loop.condition.current_A for loop in loops])
+        entries = len({(loop.condition.current_A, loop.split) for loop in loops})
+        figure, (axes,) = new_figure(1, 1, max(3.0, 0.8 + 0.16 * entries), right=1.7)
+        for current, colour in colours.items():
+            for split, face in (("train", colour), ("validate", "none")):
+                chosen = [
+                    loop.condition for loop in loops if loop.condition.current_A == current and loop.split == split
+                ]
+                if not chosen:
+                    continue
+                name = f"{current:g} A" + ("" if split == "train" else ", held out")
+                axes.scatter(
+                    [c.frequency_Hz for c in chosen],
+                    [MM * c.amplitude_m for c in chosen],
+                    s=34,
+                    facecolors=[face],
+                    edgecolors=[colour],
+                    linewidths=1.1,
+                    label=name,
+                )
+        label(axes, "Frequency (Hz)", "Amplitude (mm)")
+        axes.set_ylim(bottom=0)
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        return figure
+
+
+def measured_loops(dataset: Dataset, loops: Sequence[LoopAnalysis]) -> Figure:
+    """Force–displacement and force–velocity loops: over current, then over the motion at one current."""
+    with house_style():
+        figure, axes = new_figure(2, 2, 5.6)
+        over_current = _over_current(loops)
+        colours = current_colours([loop.condition.current_A for loop in over_current])
+        for loop in over_current:
+            name = f"{loop.condition.current_A:g} A"
+            _draw_loop(axes[0], axes[1], dataset, loop, name, colours[loop.condition.current_A])
+        first = over_current[0].condition
+        axes[0].set_title(f"{first.frequency_Hz:.3g} Hz, {MM * first.amplitude_m:.3g} mm", loc="left")
+        axes[1].legend(loc="lower right")
+
+        over_motion = _over_motion(loops)
+        shades = current_colours([loop.condition.peak_velocity for loop in over_motion])
+        for loop in over_motion:
+            condition = loop.condition
+            name = f"{condition.frequency_Hz:.2g} Hz, {MM * condition.amplitude_m:.3g} mm"
+            _draw_loop(axes[2], axes[3], dataset, loop, name, shades[condition.peak_velocity])
+        axes[2].set_title(f"{over_motion[0].condition.current_A:g} A", loc="left")
+        axes[3].legend(loc="lower right")
+        return figure
+
+
+def test_analysis(loops: Sequence[LoopAnalysis], ranges: Sequence[DynamicRange]) -> Figure:
+    """Peak force, dissipated energy, equivalent damping and dynamic range over current."""
+    with house_style():
+        figure, axes = new_figure(2, 2, 5.2)
+        quantities: list[tuple[str, Callable[[LoopAnalysis], float]]] = [
+            ("Peak force (N)", lambda loop: loop.peak_force),
+            ("Dissipated energy (J per cycle)", lambda loop: loop.dissipated_energy),
+            ("Equivalent damping (kN s/m)", lambda loop: KN * loop.equivalent_damping),
+        ]
+        groups = [[loops[i] for i in g] for g in same_motion([loop.condition for loop in loops])]
+        groups.sort(key=lambda g: g[0].condition.peak_velocity)
+        shades = current_colours([g[0].condition.peak_velocity for g in groups])
+        for panel, (name, value) in zip(axes, quantities, strict=False):
+            for group in groups:
+                condition = group[0].condition
+                ordered = sorted(group, key=lambda loop: loop.condition.current_A)
+                panel.plot(
+                    [loop.condition.current_A for loop in ordered],
+                    [value(loop) for loop in ordered],
+                    "o-",
+                    ms=3.5,
+                    color=shades[condition.peak_velocity],
+                    label=f"{condition.frequency_Hz:.2g} Hz, {MM * condition.amplitude_m:.3g} mm",
+                )
+            label(panel, "Current (A)", name)
+            panel.set_ylim(bottom=0)
+        for entry in ranges:
+            speed = min(shades, key=lambda s: abs(s - 2 * np.pi * entry.frequency_Hz * entry.amplitude_m))
+            axes[3].plot(entry.currents_A, entry.ratios, "o-", ms=3.5, color=shades[speed])
+        label(axes[3], "Current (A)", "Dynamic range (–)")
+        if ranges:
+            axes[3].set_ylim(bottom=0)
+        else:
+            axes[3].text(0.5, 0.5, "no motion was tested at two currents", ha="center", transform=axes[3].transAxes)
+        if len(groups) <= 10:
+            axes[0].legend(loc="best", fontsize=7)
+        return figure
+
+
+def _over_current(loops: Sequence[LoopAnalysis]) -> list[LoopAnalysis]:
+    """The motion tested at the most currents."""
+    groups = same_motion([loop.condition for loop in loops])
+    best = max(groups, key=lambda g: len({loops[i].condition.current_A for i in g}))
+    chosen = {loops[i].condition.current_A: loops[i] for i in best}
+    return [chosen[current] for current in sorted(chosen)]
+
+
+def _over_motion(loops: Sequence[LoopAnalysis], most: int = 5) -> list[LoopAnalysis]:
+    """Motions at the current with the most tests, slow to fast."""
+    currents = [loop.condition.current_A for loop in loops]
+    common = max(sorted(set(currents)), key=currents.count)
+    chosen = sorted(
+        (loop for loop in loops if loop.condition.current_A == common), key=lambda loop: loop.condition.peak_velocity
+    )
+    picks = np.unique(np.linspace(0, len(chosen) - 1, min(most, len(chosen))).round().astype(int))
+    return [chosen[i] for i in picks]
+
+
+def _draw_loop(
+    left: Axes, right: Axes, dataset: Dataset, loop: LoopAnalysis, name: str, colour: tuple[float, ...]
+) -> None:
+    run = dataset[loop.run_id].steady()
+    motion = measured_motion(run).about(loop.motion.series.mean)
+    cycle = whole_cycles(run.time, loop.condition.frequency_Hz)
+    last = slice(max(0, cycle.stop - round(cycle.stop / max(1, loop.motion.cycles))) - 1, cycle.stop)
+    x, v, force = (thin(array[last]) for array in (motion.displacement, motion.velocity, run.force))
+    left.plot(MM * x, force, color=colour, label=name)
+    right.plot(v, force, color=colour, label=name)
+    label(left, "Displacement (mm)", "Force (N)")
+    label(right, "Velocity (m/s)", "Force (N)")

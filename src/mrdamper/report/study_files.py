@@ -1,0 +1,307 @@
+"""A study as files: report.html, models, tables and figures, whole or not at all."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from mrdamper.dampers.base import Prediction
+from mrdamper.dampers.joint import JointFit
+from mrdamper.dampers.modified import ModifiedFit
+from mrdamper.data import Dataset
+from mrdamper.files.atomic import publish
+from mrdamper.files.model_file import save_model
+from mrdamper.identification import Identification
+from mrdamper.report import render_report
+from mrdamper.report.distrust import doubts
+from mrdamper.report.plots.model import parameter_curves, predicted_loops, residual_map, score_strip
+from mrdamper.report.plots.reversal import force_since_reversal
+from mrdamper.report.plots.rig_tests import measured_loops, test_analysis, test_matrix
+from mrdamper.report.plots.style import Picture
+from mrdamper.study.workflow import Candidate, Progress, RigStudy, Study
+from mrdamper.validation import RunScore, session_drift
+
+_LOOPS_SHOWN = 6
+
+
+def write_study(study: Study, folder: str | Path, progress: Progress = lambda what, share: None) -> list[Path]:
+    """Write report.html, model files, identifications.csv, validation.csv and figures/.
+
+    Parameters
+    ----------
+    study : Study
+        With `finish=draw` its figures are drawn already.
+    folder : path
+        Made if missing; files of the same names are replaced together at the end.
+    progress : callable
+        Told what is being done and the share done.
+
+    Returns
+    -------
+    list of Path
+        What was written, the report first.
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be written to.
+    """
+
+    def fill(work: Path) -> None:
+        (work / "figures").mkdir()
+        chapters = []
+        for number, rig in enumerate(study.rigs):
+            progress(f"{rig.rig or 'rig'}: report", number / len(study.rigs))
+            drawn = study.finished[number] if study.finished else draw(rig)
+            suffix = f"-{rig.rig}" if len(study.rigs) > 1 else ""
+            pictures = {name: picture.save(work / "figures" / f"{name}{suffix}") for name, picture in drawn.items()}
+            save_model(rig.damper, work / f"model{suffix}.json")
+            chapters.append(_chapter(rig, pictures))
+        footer = f"{made_from(study.dataset)}; identified and validated in {study.seconds:.1f} s."
+        title = f"MR damper study: {', '.join(r.rig for r in study.rigs) or study.dataset.name}"
+        (work / "report.html").write_text(render_report(title, chapters, footer), encoding="utf-8")
+        (work / "identifications.csv").write_text(
+            table_text(identification_rows(_all_identifications(study))), encoding="utf-8"
+        )
+        (work / "validation.csv").write_text(_validation_table(study), encoding="utf-8")
+
+    written = publish(folder, "report.html", fill)
+    progress("written", 1.0)
+    return written
+
+
+def made_from(dataset: Dataset) -> str:
+    """How a page's footer begins: this program's version and what was studied."""
+    return f"mrdamper {version('mrdamper')}; dataset: {dataset.name}, {len(dataset)} runs"
+
+
+def draw(rig: RigStudy) -> dict[str, Picture]:
+    """Every figure of a rig, by name; as `finish` of `run_study` it draws where the rig is studied."""
+    return {name: Picture.of(figure) for name, figure in _figures(rig).items()}
+
+
+def identification_rows(identifications: Sequence[Identification]) -> list[dict[str, Any]]:
+    """One row an identification: condition, parameters, scores, standard errors, message."""
+    rows = []
+    for found in identifications:
+        row: dict[str, Any] = {
+            "run_id": found.run_id,
+            "rig": found.rig,
+            "model": found.model.name,
+            "method": found.method,
+            "current_A": found.condition.current_A,
+            "frequency_Hz": found.condition.frequency_Hz,
+            "amplitude_m": found.condition.amplitude_m,
+            "nrmse_pp": found.scores.nrmse_pp,
+            "repeatability_nrmse_pp": found.floor,
+            "wape": found.scores.wape,
+            **{f"{name} [{unit}]": value for name, unit, value in _values(found)},
+            **{f"standard error {name}": value for name, value in found.standard_errors.items()},
+            "delay_s": found.delay,
+            "at_bounds": " ".join(found.at_bounds),
+            "evaluations": found.evaluations,
+            "message": found.message,
+            "notes": "; ".join(found.notes),
+        }
+        rows.append(row)
+    return rows
+
+
+def prediction_rows(prediction: Prediction) -> list[dict[str, Any]]:
+    """One row a sample, in the columns of the command-line contract, and the extrapolation flag."""
+    motion = prediction.motion
+    columns = {
+        "time_s": motion.time,
+        "displacement_m": motion.displacement,
+        "velocity_m_s": motion.velocity,
+        "current_A": motion.current,
+        "force_N": prediction.force,
+    }
+    flag = " ".join(prediction.extrapolation)
+    names = list(columns)
+    return [
+        {**dict(zip(names, values, strict=True)), "extrapolation": flag}
+        for values in zip(*(c.tolist() for c in columns.values()), strict=True)
+    ]
+
+
+def score_row(run: RunScore) -> dict[str, Any]:
+    """The columns of the command-line contract for one scored run."""
+    s = run.scores
+    return {
+        "run_id": run.run_id,
+        "nrmse_pp": s.nrmse_pp,
+        "nrmse_std": s.nrmse_std,
+        "wape": s.wape,
+        "energy_error": s.energy_error,
+        "peak_error": s.peak_error,
+        "extrapolation": " ".join(run.extrapolation),
+    }
+
+
+def table_text(rows: Sequence[Mapping[str, Any]]) -> str:
+    """CSV of rows; columns in order of first appearance, numbers exact."""
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    text = io.StringIO()
+    writer = csv.DictWriter(text, names, lineterminator="\n", restval="")
+    writer.writeheader()
+    writer.writerows(
+        {k: ("" if v is None else repr(v) if isinstance(v, float) else v) for k, v in r.items()} for r in rows
+    )
+    return text.getvalue()
+
+
+def _values(found: Identification) -> list[tuple[str, str, float]]:
+    return [(info.name, info.unit, getattr(found.model, info.name)) for info in found.model.parameters()]
+
+
+def _all_identifications(study: Study) -> list[Identification]:
+    return [i for rig in study.rigs for candidate in rig.candidates for i in candidate.identifications]
+
+
+def _validation_table(study: Study) -> str:
+    rows = []
+    for rig in study.rigs:
+        for candidate in rig.candidates:
+            for split, validation in (("left out", candidate.left_out), ("held out", candidate.held_out)):
+                for run in validation.runs:
+                    rows.append(
+                        {"rig": rig.rig, "model": candidate.model, "way": candidate.way, "set": split, **score_row(run)}
+                    )
+    return table_text(rows)
+
+
+def _figures(rig: RigStudy) -> dict[str, Figure]:
+    chosen = rig.chosen
+    scores = {}
+    for candidate in rig.candidates:
+        scores[f"{candidate.title}, left out"] = candidate.left_out
+        if candidate.held_out.runs:
+            scores[f"{candidate.title}, held out"] = candidate.held_out
+    train = [rig.dataset[run.run_id] for run in chosen.left_out.runs]
+    return {
+        "matrix": test_matrix(rig.loops),
+        "loops": measured_loops(rig.dataset, rig.loops),
+        "analysis": test_analysis(rig.loops, rig.ranges),
+        "scores": score_strip(scores),
+        "parameters": parameter_curves(_mapped(rig)[1]),
+        "predicted": predicted_loops(chosen.damper, _shown(rig)),
+        "residuals": residual_map(chosen.damper, train),
+        "reversal": force_since_reversal(train, chosen.damper),
+    }
+
+
+def _shown(rig: RigStudy) -> list[Any]:
+    """Held-out sine runs where there are any, spread over the currents; else train runs."""
+    sines = {loop.run_id: loop.condition for loop in rig.loops}
+    runs = [run for run in rig.dataset.split("validate") if run.id in sines]
+    if not runs:
+        runs = [run for run in rig.dataset if run.id in sines]
+    ordered = sorted(runs, key=lambda run: (sines[run.id].current_A, sines[run.id].peak_velocity))
+    picks = np.unique(np.linspace(0, len(ordered) - 1, min(_LOOPS_SHOWN, len(ordered))).round().astype(int))
+    return [ordered[i] for i in picks]
+
+
+def _chapter(rig: RigStudy, pictures: Mapping[str, bytes]) -> dict[str, Any]:
+    chosen, (mapped, _) = rig.chosen, _mapped(rig)
+    floors = [run.repeatability for run in rig.dataset if run.repeatability is not None]
+    held = any(run.id in {loop.run_id for loop in rig.loops} for run in rig.dataset.split("validate"))
+    return {
+        "rig": rig.rig or rig.dataset.name,
+        "verdict": _verdict(rig),
+        "choice": _choice(rig),
+        "tests": _tests(rig),
+        "chosen": chosen,
+        "candidates": rig.candidates,
+        "floor": float(np.median(floors)) if floors else None,
+        "doubts": [
+            *doubts(chosen.damper, chosen.fit, chosen.identifications, rig.loops, chosen.left_out, chosen.held_out),
+            _drift(rig),
+        ],
+        "loops": rig.loops,
+        "not_identified": rig.not_identified,
+        "identifications": mapped.identifications,
+        "parameter_names": [n for n in mapped.identifications[0].model.values() if n in mapped.identifications[0].free],
+        "mapped": mapped,
+        "joint": _joint_table(chosen.fit) if isinstance(chosen.fit, JointFit) else (),
+        "predicted_caption": (
+            "Held-out runs, last cycle of the steady window: the model has seen none of them."
+            if held
+            else "Train runs, last cycle of the steady window: the dataset holds no validate runs."
+        ),
+        "figures": pictures,
+    }
+
+
+def _mapped(rig: RigStudy) -> tuple[Candidate, ModifiedFit]:
+    """The best candidate whose parameters are functions of the condition: its curves are shown."""
+    return next((c, c.fit) for c in rig.candidates if isinstance(c.fit, ModifiedFit))
+
+
+def _joint_table(fit: JointFit) -> list[dict[str, Any]]:
+    model = fit.damper.model
+    return [
+        {
+            "name": info.name,
+            "value": getattr(model, info.name),
+            "unit": info.unit,
+            "meaning": info.meaning,
+            "at_bound": info.name in fit.at_bounds,
+        }
+        for info in model.parameters()
+    ]
+
+
+def _drift(rig: RigStudy) -> str:
+    drift = session_drift(rig.damper, [rig.dataset[run.run_id] for run in rig.chosen.left_out.runs])
+    return (
+        f"Between runs the measured force differs from the prediction by gains of {100 * drift.gain:.1f} % and offsets "
+        f"of {drift.offset:.0f} N (standard deviations). A gain and an offset of each run's own would leave "
+        f"{100 * drift.floor:.1f} %: while sessions drift like this, no model of the damper goes below."
+    )
+
+
+def _verdict(rig: RigStudy) -> str:
+    chosen, best = rig.chosen, rig.chosen.damper
+    train, validate = len(chosen.left_out.runs), len(chosen.held_out.runs)
+    text = f"The model “{best.title}” predicts this damper's force best. It was identified from {train} train runs"
+    if validate:
+        text += (
+            f" and predicts {validate} held-out runs with a median error of "
+            f"{100 * chosen.held_out.median():.1f} % of the peak-to-peak force"
+        )
+    return text + "."
+
+
+def _choice(rig: RigStudy) -> str:
+    chosen, others = rig.candidates[0], rig.candidates[1:]
+    reason = "Asked for; error on" if rig.asked_for else "Chosen by the error on"
+    text = (
+        f"{reason} conditions left out of the identification: {chosen.title} with "
+        f"{100 * chosen.left_out.median():.1f} % and {chosen.damper.parameter_count} numbers"
+    )
+    if others:
+        text += " against " + ", ".join(
+            f"{o.title} with {100 * o.left_out.median():.1f} % and {o.damper.parameter_count}" for o in others
+        )
+    return text + ". Within a tenth of the best, fewer numbers win. Held-out runs confirm; they choose nothing."
+
+
+def _tests(rig: RigStudy) -> str:
+    conditions = [loop.condition for loop in rig.loops]
+    currents = sorted({round(c.current_A, 3) for c in conditions})
+    frequencies = [c.frequency_Hz for c in conditions]
+    amplitudes = [1e3 * c.amplitude_m for c in conditions]
+    held = sum(loop.split == "validate" for loop in rig.loops)
+    return (
+        f"{len(rig.loops)} sine runs, {held} of them held out: "
+        f"{', '.join(f'{c:g}' for c in currents)} A, {min(frequencies):.3g}–{max(frequencies):.3g} Hz, "
+        f"{min(amplitudes):.3g}–{max(amplitudes):.3g} mm, all from the measured motion."
+    )

@@ -1,0 +1,184 @@
+"""How much each parameter matters at a condition, and what presetting it costs.
+
+A parameter may be preset if changing it hardly changes the force, or if the others make up
+for it when they are identified anew. The two are told apart here: the second is why A = 1
+costs nothing at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrdamper.data import Condition, Floats, Run
+from mrdamper.errors import MissingExtraError, ParameterError, UnknownNameError
+from mrdamper.hysteresis import steady_loop
+from mrdamper.identification import identify
+from mrdamper.identification.methods.balance import Balance
+from mrdamper.models.bouc_wen import BoucWen
+from mrdamper.motion import sine
+
+NAMES = ("c", "alpha", "beta", "gamma", "A", "n", "k1", "k3", "m", "f0")
+_SAMPLES = 256  # of the loop
+
+
+@dataclass(frozen=True)
+class OneAtATime:
+    """What a change of one parameter does to the force.
+
+    Attributes
+    ----------
+    name : str
+    change : float
+        Relative change made.
+    effect : float
+        RMS change of the force over its standard deviation, the other parameters held.
+    left : float
+        The same, once the free parameters were identified anew with this one preset wrongly.
+        NaN where nothing was refitted.
+    """
+
+    name: str
+    change: float
+    effect: float
+    left: float
+
+
+@dataclass(frozen=True, eq=False)
+class Sobol:
+    """Sobol indices of the RMS change of the force.
+
+    Attributes
+    ----------
+    names : tuple of str
+    first, total : (P,) arrays
+        Share of the variance a parameter makes alone, and with all others [-].
+    first_confidence, total_confidence : (P,) arrays
+        Half-widths at 95 %.
+    spread : float
+        Every parameter was varied by ± this share.
+    """
+
+    names: tuple[str, ...]
+    first: Floats
+    total: Floats
+    first_confidence: Floats
+    total_confidence: Floats
+    spread: float
+
+
+def one_at_a_time(
+    model: BoucWen,
+    condition: Condition,
+    names: Sequence[str] = NAMES,
+    change: float = 0.1,
+    refit: Sequence[str] = ("gamma", "A", "n"),
+) -> tuple[OneAtATime, ...]:
+    """Change one parameter after the other, and identify the others anew for those that may be preset.
+
+    Parameters
+    ----------
+    model : BoucWen
+    condition : Condition
+    names : sequence of str
+        Parameters, and "A", the factor of v that the model keeps at 1.
+    change : float
+        Relative change.
+    refit : sequence of str
+        Parameters whose change the others are given the chance to make up for.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such parameter.
+    """
+    base = _loop(model, condition)
+    size = float(np.std(base))
+    found = []
+    for name in names:
+        changed = _varied(model, {name: 1 + change})
+        effect = float(np.sqrt(np.mean((_loop(changed, condition) - base) ** 2)))
+        left = _left_after_refit(model, changed, condition) if name in refit else float("nan")
+        found.append(OneAtATime(name, change, effect / size, left))
+    return tuple(found)
+
+
+def sobol(
+    model: BoucWen,
+    condition: Condition,
+    names: Sequence[str] = NAMES,
+    spread: float = 0.2,
+    samples: int = 256,
+    seed: int = 0,
+) -> Sobol:
+    """Sobol indices by Saltelli's scheme.
+
+    Parameters
+    ----------
+    model : BoucWen
+    condition : Condition
+    names : sequence of str
+    spread : float
+        Parameters vary uniformly by ± this share of their value.
+    samples : int
+        A power of two; samples · (P + 2) loops are computed.
+    seed : int
+
+    Raises
+    ------
+    MissingExtraError
+        If SALib is not installed.
+    ParameterError
+        If the spread is not within 0...1.
+    """
+    if not 0 < spread < 1:
+        raise ParameterError(f"spread is {spread}", mend="give a share between 0 and 1")
+    try:
+        from SALib.analyze import sobol as analysis  # pyright: ignore[reportMissingImports]
+        from SALib.sample import sobol as sampling  # pyright: ignore[reportMissingImports]
+    except ModuleNotFoundError as error:
+        raise MissingExtraError("Sobol indices need SALib", mend="pip install 'mrdamper[uq]'") from error
+    problem = {"num_vars": len(names), "names": list(names), "bounds": [[1 - spread, 1 + spread]] * len(names)}
+    points = sampling.sample(problem, samples, calc_second_order=False, seed=seed)
+    base = _loop(model, condition)
+    change = [
+        np.sqrt(np.mean((_loop(_varied(model, dict(zip(names, p, strict=True))), condition) - base) ** 2))
+        for p in points.tolist()
+    ]
+    found = analysis.analyze(problem, np.array(change), calc_second_order=False, seed=seed)
+    return Sobol(tuple(names), found["S1"], found["ST"], found["S1_conf"], found["ST_conf"], spread)
+
+
+def _varied(model: BoucWen, factors: dict[str, float]) -> BoucWen:
+    """The model with parameters multiplied; a factor A is absorbed: z → z/A."""
+    values = model.values()
+    for name in factors:
+        if name != "A" and name not in values:
+            raise UnknownNameError.of("parameter", name, (*values, "A"))
+    values |= {name: values[name] * factor for name, factor in factors.items() if name != "A"}
+    A = factors.get("A", 1.0)
+    shrink = A ** (values["n"] - 1)
+    values |= {"alpha": values["alpha"] * A, "beta": values["beta"] * shrink, "gamma": values["gamma"] * shrink}
+    return BoucWen(**values)
+
+
+def _loop(model: BoucWen, condition: Condition) -> Floats:
+    motion = sine(condition, 1, _SAMPLES)
+    theta = 2 * np.pi * condition.frequency_Hz * motion.time
+    z = model.yield_displacement * steady_loop(model.shape, condition.amplitude_m, theta)
+    return model.force(motion, z)
+
+
+def _left_after_refit(model: BoucWen, changed: BoucWen, condition: Condition) -> float:
+    """Identify c, alpha, beta, f0 from the changed model with the old gamma/beta and n."""
+    motion = sine(condition, 1.25, _SAMPLES).part(slice(_SAMPLES // 4, -1))
+    theta = 2 * np.pi * condition.frequency_Hz * motion.time
+    z = changed.yield_displacement * steady_loop(changed.shape, condition.amplitude_m, theta)
+    run = Run("changed", motion.time, motion.displacement, changed.force(motion, z), motion.current)
+    held = {name: getattr(model, name) for name in ("n", "k1", "k2", "k3", "m")}
+    found = identify(run, BoucWen, Balance(), fixed=held).model
+    assert isinstance(found, BoucWen)
+    measured = _loop(changed, condition)
+    return float(np.sqrt(np.mean((_loop(found, condition) - measured) ** 2)) / np.std(measured))

@@ -1,0 +1,102 @@
+"""What the header of a column says: name, unit, and the channel the name stands for."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Mapping
+from functools import lru_cache
+from types import MappingProxyType
+
+from mrdamper.rig_files.units import is_unit, parse_unit
+
+# Words of channel names in the languages rigs are operated in; the last that fits wins.
+WORDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "time": ("time", "zeit", "temps", "tiempo", "tempo", "czas", "tijd", "tid", "timestamp", "zeitstempel",
+                 "elapsed", "время", "时间", "時間"),
+        "displacement": ("displacement", "disp", "displ", "position", "pos", "stroke", "travel", "weg", "hub",
+                         "verschiebung", "auslenkung", "läge", "förskjutning", "déplacement", "deplacement", "course",
+                         "desplazamiento", "posicion", "posición", "spostamento", "corsa", "deslocamento", "lvdt",
+                         "extension", "przemieszczenie", "перемещение", "位移", "変位"),
+        "force": ("force", "load", "kraft", "fuerza", "forza", "força", "forca", "charge", "carga", "carico", "siła",
+                  "loadcell", "last", "kracht", "effort", "сила", "力", "荷重"),
+        "velocity": ("velocity", "vel", "speed", "geschwindigkeit", "vitesse", "velocidad", "velocità",
+                     "velocidade", "скорость", "速度"),
+        "acceleration": ("acceleration", "accel", "acc", "beschleunigung", "accélération", "aceleracion",
+                         "aceleración", "accelerazione", "加速度"),
+        "current": ("current", "curr", "strom", "stromstärke", "courant", "corriente", "corrente", "amperage", "ток",
+                    "电流", "電流"),
+        "voltage": ("voltage", "spannung", "tension électrique", "voltaje", "tensione", "напряжение", "电压", "電圧"),
+        "temperature": ("temperature", "temp", "temperatur", "température", "temperatura", "температура", "温度"),
+    }
+)  # fmt: skip
+_SYMBOLS = MappingProxyType(
+    {
+        "t": "time", "x": "displacement", "z": "displacement", "d": "displacement", "s": "displacement",
+        "u": "displacement", "F": "force", "f": "force", "v": "velocity", "a": "acceleration", "I": "current",
+        "i": "current", "U": "voltage", "T": "temperature",
+    }
+)  # fmt: skip
+_NOT_MEASURED = frozenset(
+    ("command", "cmd", "commanded", "setpoint", "set", "target", "soll", "reference", "ref", "demand", "desired",
+     "error", "count", "counts", "cycle", "cycles", "segment", "segments", "index", "offset", "limit", "max", "min",
+     "consigne", "consigna", "sollwert", "rate", "id", "status", "state", "flag")
+)  # fmt: skip
+_BRACKETED = re.compile(r"^(?P<name>.*?)\s*[\[({<](?P<unit>[^\[\](){}<>]{1,40})[\])}>]\s*$", re.DOTALL)
+_SLASHED = re.compile(r"^(?P<name>.*\S)\s*(?:\s/\s*|,\s*|\s+in\s+|\s*;\s*)(?P<unit>\S{1,20})$", re.DOTALL)
+_LONGEST_NAME = 200  # beyond, it is no name, and matching it could take long
+_FUSED = re.compile(r"[ _.:-]+")
+
+
+def split_name(header: str, unit: str = "") -> tuple[str, str]:
+    """Name and unit of a column whose header may hold both: `force_N`, `Force [kN]`, `Kraft in kN`."""
+    if len(header) > _LONGEST_NAME:
+        return header, unit
+    text = unicodedata.normalize("NFKC", header).strip()
+    if unit:
+        match = _BRACKETED.match(text)
+        return (match["name"] if match and parse_unit(match["unit"]) else text), unit
+    for pattern in (_BRACKETED, _SLASHED):
+        match = pattern.match(text)
+        if match and parse_unit(match["unit"].strip()):
+            return match["name"].strip(), match["unit"].strip()
+    # The longest tail that is a unit: velocity_m_s before velocity_m and s.
+    for place in _FUSED.finditer(text):
+        tail = text[place.end() :]
+        if place.start() and is_unit(tail):
+            return text[: place.start()].strip(), tail
+    name, slash, tail = text.partition("/")
+    if slash and name and is_unit(tail) and not is_unit(text):
+        return name.strip(), tail.strip()
+    match = _BRACKETED.match(text)
+    return (match["name"].strip() or text if match else text), ""
+
+
+@lru_cache(maxsize=4096)
+def role_of(name: str) -> str | None:
+    """The channel a name stands for, None if it says nothing or names a command."""
+    if len(name) > _LONGEST_NAME:
+        return None
+    words = [w for w in re.split(r"[^\w]+|_|(?<=[a-zà-ÿ])(?=[A-Z])", name) if w]
+    lower = [w.casefold().rstrip("0123456789") or w for w in words]
+    if any(word in _NOT_MEASURED for word in lower):
+        return None
+    if len(words) == 1 and words[0] in _SYMBOLS:
+        return _SYMBOLS[words[0]]
+    roles = [role for word in lower for role, known in WORDS.items() if word in known]
+    # "load displacement" is a displacement: the last word is the noun in the languages at hand.
+    return roles[-1] if roles else None
+
+
+def says_nothing(name: str) -> bool:
+    """Whether a name holds no word of a channel or of a command."""
+    words = [w.casefold().rstrip("0123456789") for w in re.split(r"[^\w]+|_", name) if w]
+    known = {w for words_of in WORDS.values() for w in words_of}
+    return not any(word in _NOT_MEASURED or word in known for word in words)
+
+
+def unknown_unit(header: str) -> str:
+    """What stands in brackets behind a name, though it is no unit that is known."""
+    match = _BRACKETED.match(header[:_LONGEST_NAME])
+    return "" if match is None or match["unit"].strip("- ") == "" else match["unit"].strip()

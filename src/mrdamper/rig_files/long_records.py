@@ -1,0 +1,84 @@
+"""Judging a record that does not fit into memory: part by part, by the checks every record passes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from mrdamper.errors import InputError
+from mrdamper.rig_files.record import OPTIONAL, REQUIRED, Finding, Record
+from mrdamper.rig_files.text.spool import release
+
+PART = 2**20  # samples: minutes of a test at 10 kHz, some ten megabytes a channel
+_MAY_REST = ("E_NO_EXCITATION",)  # a long test may pause; it may not be one long pause
+_OF_THE_WHOLE = ("W_SHORT", "W_DRIFT")
+
+
+def judge_long(record: Record, judge: Callable[[Record], Record]) -> Record:
+    """Judge a record part by part; a record of a few parts' length is judged as one.
+
+    Parameters
+    ----------
+    record : Record
+        Its channels may be memory-mapped.
+    judge : callable
+        Judges one part.
+
+    Raises
+    ------
+    InputError
+        As `judge`; that nothing moves, only if nothing moves in any part.
+    """
+    if record.time.size <= 2 * PART:
+        return judge(record)
+    found: dict[str, tuple[Finding, int]] = {}
+    segments: list[tuple[int, int]] = []
+    moving, resting, count = 0, None, 0
+    for start, part in _parts(record):
+        count += 1
+        try:
+            judged = judge(part)
+            moving += 1
+        except InputError as error:
+            if error.code not in _MAY_REST:
+                raise
+            resting, judged = resting or error, replace(part, segments=((0, part.time.size),))
+        for finding in judged.findings:
+            first, times = found.get(finding.code, (finding, 0))
+            found[finding.code] = first, times + 1
+        _extend(segments, judged.segments, start)
+    if resting is not None and not moving:
+        raise resting
+    return replace(record, findings=(*record.findings, *_summed(found, count, moving)), segments=tuple(segments))
+
+
+def _parts(record: Record) -> Iterator[tuple[int, Record]]:
+    """Parts that share one sample, so that steps of time between them are seen."""
+    named = {name: getattr(record, name) for name in (*REQUIRED, *OPTIONAL)}
+    named = {name: values for name, values in named.items() if values is not None}
+    size = record.time.size
+    for at in range(0, size - 1, PART):
+        inside = slice(at, min(at + PART, size - 1) + 1)
+        channels = {name: np.array(values[inside]) for name, values in named.items()}
+        for values in named.values():
+            release(values)
+        lines = None if record.lines is None else record.lines.part(inside.start, inside.stop)
+        yield at, replace(record, lines=lines, findings=(), segments=(), **channels)
+
+
+def _extend(segments: list[tuple[int, int]], new: tuple[tuple[int, int], ...], start: int) -> None:
+    for a, b in new:
+        if segments and segments[-1][1] == start + a + 1:
+            segments[-1] = segments[-1][0], start + b
+        else:
+            segments.append((start + a, start + b))
+
+
+def _summed(found: dict[str, tuple[Finding, int]], parts: int, moving: int) -> Iterator[Finding]:
+    for finding, times in found.values():
+        if finding.code in _OF_THE_WHOLE and times < moving:
+            continue
+        more = f" (first of {times} parts out of {parts})" if times > 1 else ""
+        yield Finding(finding.code, finding.text + more)

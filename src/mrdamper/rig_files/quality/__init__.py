@@ -1,0 +1,66 @@
+"""Whether a record can be believed: every check in order, findings added or the record refused.
+
+A check is a function of a `View` that yields findings, or only raises `QualityError`. The
+order matters: a check may trust what the ones before it made sure of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+
+from mrdamper.errors import QualityError
+from mrdamper.rig_files.quality import clock, flat, force_lag, loop, motion, presence, ranges, sentinel, velocity_lag
+from mrdamper.rig_files.quality.view import View
+from mrdamper.rig_files.record import Finding, Record
+
+__all__ = ["CHECKS", "QualityError", "View", "judge"]
+
+Check = Callable[[View], Iterable[Finding] | None]
+
+CHECKS: tuple[Check, ...] = (
+    presence.long_enough,
+    presence.finite,
+    sentinel.missing_value_codes,
+    presence.missing,
+    clock.order_of_time,
+    clock.gaps_in_time,
+    motion.moves,
+    ranges.exchanged_or_out_of_range,
+    loop.dissipates,
+    velocity_lag.velocity_channel,
+    flat.clipped,
+    flat.frozen,
+    motion.enough_cycles,
+    motion.is_a_sine,
+    motion.drifts,
+    force_lag.force_channel,
+    loop.repeats,
+)
+
+
+def judge(record: Record) -> Record:
+    """Run every check on a record.
+
+    Parameters
+    ----------
+    record : Record
+        As a reader left it: SI units, NaN where a sample is missing.
+
+    Returns
+    -------
+    Record
+        With the findings of the checks and its segments (sample ranges without a gap in
+        time). The channels are not changed.
+
+    Raises
+    ------
+    QualityError
+        If the record cannot be used; the code says why: E_NO_DATA, E_NONFINITE, E_SENTINEL,
+        E_MISSING, E_TIME_ORDER, E_TIME_DUPLICATE, E_RANGE, E_NO_EXCITATION,
+        E_DISSIPATION_SIGN, E_CHANNEL_LAG.
+    """
+    view = View(record)
+    for check in CHECKS:
+        view.found.extend(check(view) or ())
+    return replace(record, findings=(*record.findings, *view.found), segments=view.segments)

@@ -1,0 +1,127 @@
+"""The loop's physics: a damper takes energy out, and does the same in every cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from mrdamper.errors import QualityError
+from mrdamper.motion.harmonics import fit_harmonics
+from mrdamper.rig_files.quality.motion import LEAST_CYCLES, cycles_of
+from mrdamper.rig_files.quality.noise import sample_noise
+from mrdamper.rig_files.quality.view import View
+from mrdamper.rig_files.record import Finding
+
+GIVING = -0.05  # share of the force in phase with the velocity, below which the loop gives energy
+POOR_REPEATABILITY = 0.05  # of the peak-to-peak force; good rigs have 0.2 to 1.5 %
+_POINTS = 200  # per cycle, at which cycles are compared
+
+
+def dissipates(view: View) -> None:
+    """Refuse a loop that gives energy: the force's sign is wrong, or columns are exchanged.
+
+    The sign is that of c in F = f0 + r t + k x + c v by least squares, which over whole
+    cycles is that of the loop's energy, and which holds for part cycles and any motion too.
+    """
+    if cycles_of(view) < LEAST_CYCLES:
+        return
+    share = damping_share(view)
+    if share < GIVING:
+        if _exchanged(view):
+            what = "displacement and force look exchanged"
+            mend = "name the columns the other way round: [channels.force] column = ... in a profile"
+        else:
+            what = "force and displacement count in opposite directions"
+            mend = "say [channels.force] sign = -1 in a profile"
+        raise QualityError(
+            f"the loop gives energy instead of taking it ({-100 * share:.0f} % of the force pushes along with the "
+            f"motion): {what}",
+            where=view.where,
+            mend=mend,
+            code="E_DISSIPATION_SIGN",
+        )
+
+
+def damping_share(view: View) -> float:
+    """Part of the force's standard deviation that opposes the velocity; negative where the loop gives energy.
+
+    Of a record in segments, which may be tests of their own, the least of all that hold a cycle.
+    """
+    whole = _damping_share(view, *(view.strokes.steady or (0, view.run.time.size)))
+    segments = view.run.segments or ()
+    if len(segments) < 2 or view.strokes.period is None:
+        return whole
+    time = view.run.time
+    cycles = [(a, b) for a, b in segments if time[b - 1] - time[a] >= LEAST_CYCLES * view.strokes.period]
+    return min([whole, *(_damping_share(view, a, b) for a, b in cycles)])
+
+
+def _damping_share(view: View, start: int, stop: int) -> float:
+    motion, force = view.moving.part(slice(start, stop)), view.run.force[start:stop]
+    t = motion.time - motion.time[0]
+    columns = np.column_stack([motion.velocity, motion.displacement, np.ones_like(t), t])
+    scale = np.std(columns, axis=0)
+    scale[scale == 0] = 1.0
+    coefficient = float(np.linalg.lstsq(columns / scale, force, rcond=None)[0][0])
+    return coefficient / float(np.std(force))
+
+
+def _exchanged(view: View) -> bool:
+    """Whether the channel called force moves like a sine and the one called displacement does not."""
+    motion = view.motion
+    if motion is None or (not view.strokes.steady and cycles_of(view) < LEAST_CYCLES):
+        return float(np.ptp(view.run.displacement)) > float(np.ptp(view.run.force))
+    shares = []
+    for signal in (view.steady.displacement, view.steady.force):
+        series = fit_harmonics(view.steady.time, signal, 7, frequency=motion.condition.frequency_Hz)
+        rest = signal - series.mean - series.drift * (view.steady.time - series.origin)
+        first = series.amplitude() / np.sqrt(2)
+        shares.append(float(np.sqrt(max(np.mean(rest**2) - first**2, 0.0))) / first)
+    return shares[0] > 1.5 * shares[1]
+
+
+def repeats(view: View) -> Iterator[Finding]:
+    """Say that the cycles of a record differ from each other by more than noise."""
+    found = repeatability(view)
+    if found is None:
+        return
+    scatter, noise = found
+    beyond = float(np.sqrt(max(scatter**2 - noise**2, 0.0)))
+    if beyond > POOR_REPEATABILITY:
+        yield Finding(
+            "W_REPEATABILITY",
+            f"the force differs from cycle to cycle by {100 * scatter:.1f} % of its peak-to-peak value "
+            f"(limit {100 * POOR_REPEATABILITY:g} % beyond noise): warm the damper up, or check the rig for play",
+        )
+
+
+def repeatability(view: View) -> tuple[float, float] | None:
+    """Cycle-to-cycle scatter of the force and its sample noise, over the peak-to-peak force.
+
+    Returns
+    -------
+    (float, float) or None
+        RMS deviation of the cycles from their mean, without the first of three or more; part
+        of it that is noise from sample to sample. None under two cycles of a periodic motion.
+    """
+    motion = view.motion
+    if motion is None:
+        return None
+    cycles = int(motion.cycles + 0.02)
+    if cycles < 2:
+        return None
+    cycles -= cycles > 2  # the first may hold the way in from rest
+    run, period = view.steady, 1 / motion.condition.frequency_Hz
+    end = float(run.time[-1])
+    grid = end - cycles * period + period * np.arange(cycles * _POINTS) / _POINTS
+    folded = np.interp(grid, run.time, run.force).reshape(cycles, _POINTS)
+    starts = grid[::_POINTS]
+    folded = folded[view.without_leap(starts, starts + period)]
+    if len(folded) < 2:
+        return None
+    span = float(np.ptp(folded.mean(axis=0)))
+    if span == 0.0:
+        return None
+    scatter = np.sqrt(np.mean(np.var(folded, axis=0, ddof=1)))
+    return float(scatter) / span, sample_noise(run.force) / span

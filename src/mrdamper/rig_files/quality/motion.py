@@ -1,0 +1,123 @@
+"""The motion of a record: that there is one, how many cycles, whether a sine, whether it wanders."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from mrdamper.data import Floats
+from mrdamper.errors import QualityError
+from mrdamper.motion import SINE_DISTORTION_LIMIT
+from mrdamper.rig_files.quality.view import View
+from mrdamper.rig_files.record import Finding
+
+LEAST_MOTION = 20e-6  # [m] peak to peak: below it a displacement sensor's noise
+NOISE_MOTION = 500e-6  # [m]: up to here a motion without memory from sample to sample is noise
+LEAST_CYCLES = 0.95  # one cycle, less what a cut at a sample takes away
+_FEW = 1.5  # cycles under which drift and a slow harmonic cannot be told apart
+DRIFT = 0.1  # of the amplitude over the record, for a short one
+DRIFT_A_CYCLE = 0.015  # of the amplitude a cycle: less does not open a loop
+DRIFT_AT_MOST = 0.3  # of the amplitude over the record, however long
+
+
+def moves(view: View) -> None:
+    """Refuse a record without motion."""
+    x = view.run.displacement
+    if x.size < 3:
+        raise QualityError(
+            f"{x.size} samples without gaps",
+            where=view.where,
+            mend="record again: a cycle or more",
+            code="E_NO_EXCITATION",
+        )
+    span = float(np.ptp(x))
+    # Von Neumann's ratio: one for white noise, near zero for any motion sampled finely enough.
+    noise = span < NOISE_MOTION and np.mean(np.diff(x) ** 2) > np.var(x)
+    if span < LEAST_MOTION or noise:
+        raise QualityError(
+            f"the displacement moves {1e3 * span:.3g} mm" + (", which is noise" if noise else ""),
+            where=view.where,
+            mend="check the channel, its unit and the drive",
+            code="E_NO_EXCITATION",
+        )
+
+
+def cycles_of(view: View) -> float:
+    """Length of the steady motion in cycles; for a motion without a period, half its strokes."""
+    if view.motion is not None:
+        return view.motion.cycles
+    return 0.5 * view.strokes.lengths.size
+
+
+def enough_cycles(view: View) -> Iterator[Finding]:
+    """Say that a record is shorter than a cycle: it has no frequency and no amplitude."""
+    cycles = cycles_of(view)
+    if cycles < LEAST_CYCLES:
+        yield Finding(
+            "W_SHORT",
+            "the record holds less than one cycle: no frequency or amplitude is stated, nothing is identified from it",
+        )
+
+
+def is_a_sine(view: View) -> Iterator[Finding]:
+    """Say that a motion is no sine: the harmonic balance needs one."""
+    if cycles_of(view) < LEAST_CYCLES:
+        return
+    motion = view.motion
+    if motion is None:
+        yield Finding("W_NOT_SINE", "the motion has no period: only identification in time can use it")
+    elif motion.distortion > SINE_DISTORTION_LIMIT:
+        yield Finding(
+            "W_NOT_SINE",
+            f"distortion of the motion {100 * motion.distortion:.1f} % (limit {100 * SINE_DISTORTION_LIMIT:g} %): "
+            "only identification in time can use it",
+        )
+
+
+def drifts(view: View) -> Iterator[Finding]:
+    """Say that amplitude or mean of a periodic motion wander over the record."""
+    if view.motion is None:
+        return
+    amplitude = view.motion.condition.amplitude_m
+    limit = amplitude * float(np.clip(DRIFT_A_CYCLE * view.motion.cycles, DRIFT, DRIFT_AT_MOST))
+    mean, size = drift_of(view)
+    for what, drift in (("mean position", mean), ("amplitude", size)):
+        if abs(drift) > limit:
+            yield Finding(
+                "W_DRIFT",
+                f"the {what} drifts by {1e3 * drift:+.3g} mm over the record, "
+                f"{100 * abs(drift) / amplitude:.0f} % of the amplitude",
+            )
+
+
+def drift_of(view: View) -> tuple[float, float]:
+    """Change of mean and of amplitude over the steady motion [m].
+
+    By robust lines through the strokes; of a record with few strokes only the mean, from the
+    harmonic fit.
+    """
+    start, stop = view.strokes.steady or (0, view.run.time.size)
+    reversals = view.strokes.reversals
+    chosen = reversals[(reversals >= start) & (reversals < stop)]
+    if chosen.size < 4:
+        if view.motion is None or view.motion.cycles < _FEW:
+            return 0.0, 0.0
+        return view.motion.drift * float(np.ptp(view.steady.time)), 0.0
+    t, x = view.run.time[chosen], view.run.displacement[chosen]
+    length = float(view.run.time[stop - 1] - view.run.time[start])
+    centre = (x[:-2] + 2 * x[1:-1] + x[2:]) / 4  # half way between a reversal and the mean of its neighbours
+    size = np.abs(x[:-2] - 2 * x[1:-1] + x[2:]) / 4
+    sound = view.without_leap(t[:-2], t[2:])  # a reversal may be lost in a gap
+    if np.count_nonzero(sound) < 2:
+        return 0.0, 0.0
+    middle = t[1:-1][sound]
+    return length * _slope(middle, centre[sound]), length * _slope(middle, size[sound])
+
+
+def _slope(t: Floats, y: Floats) -> float:
+    """Theil and Sen's slope, of at most 200 points."""
+    step = max(1, t.size // 200)
+    t, y = t[::step], y[::step]
+    i, j = np.triu_indices(t.size, 1)
+    return float(np.median((y[j] - y[i]) / (t[j] - t[i])))

@@ -1,0 +1,85 @@
+"""What is missing from a record: infinite values refused, missing ones counted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from mrdamper.errors import QualityError
+from mrdamper.rig_files.quality.view import View, place
+from mrdamper.rig_files.record import Finding
+
+MOST_MISSING = 0.02  # share of the samples
+MOST_IN_A_ROW = 5
+_OVERFLOW = 1e100  # squares of larger numbers leave double precision
+_FEWEST = 5  # samples
+USED = ("time", "displacement", "force", "current", "velocity")  # what a run is made of
+
+
+def long_enough(view: View) -> None:
+    """Refuse a record of a few samples."""
+    size = view.record.time.size
+    if size < _FEWEST:
+        raise QualityError(
+            f"{size} samples", where=view.where, mend="export the whole record: a cycle or more", code="E_NO_DATA"
+        )
+
+
+def finite(view: View) -> Iterator[Finding]:
+    """Refuse infinite values, an overflow in the logger or the file; say so of a channel no run needs."""
+    for name, values in view.channels.items():
+        infinite = np.abs(values) > _OVERFLOW
+        if infinite.any():
+            at = int(np.argmax(infinite))
+            count = int(np.count_nonzero(infinite))
+            text = f"{name} is infinite in {count} sample{'s' * (count > 1)}, first {place(view.record, at)}"
+            if name in USED:
+                mend = "export the channel again with a wider number format"
+                raise QualityError(text, where=view.where, mend=mend, code="E_NONFINITE")
+            yield Finding("W_MISSING", f"{text}; the channel is not used")
+
+
+def missing(view: View) -> Iterator[Finding]:
+    """Accept a few missing samples, refuse more than 2 % or more than 5 in a row."""
+    for name, values in view.channels.items():
+        absent = np.isnan(values)
+        count = int(np.count_nonzero(absent))
+        if not count:
+            continue
+        longest, start = longest_run(absent)
+        share = count / absent.size
+        text = f"{name}: {count} of {absent.size} samples missing ({100 * share:.3g} %), {longest} in a row at most"
+        if name in USED and (share > MOST_MISSING or longest > MOST_IN_A_ROW):
+            raise QualityError(
+                f"{text}, {place(view.record, start)}",
+                where=view.where,
+                mend=f"record again, or cut the record; up to 2 % and {MOST_IN_A_ROW} in a row are taken",
+                code="E_MISSING",
+            )
+        yield Finding("W_MISSING", f"{text}; they are left out, not filled")
+    longest, start = longest_run(~view.record.present)
+    if longest > MOST_IN_A_ROW:
+        raise QualityError(
+            f"{longest} samples in a row of which one channel or another is missing, {place(view.record, start)}",
+            where=view.where,
+            mend=f"record again, or cut the record; up to {MOST_IN_A_ROW} in a row are taken",
+            code="E_MISSING",
+        )
+
+
+def longest_run(mask: np.ndarray) -> tuple[int, int]:
+    """Length and start of the longest run of true values."""
+    starts, stops = runs_of(mask)
+    if not starts.size:
+        return 0, 0
+    longest = int(np.argmax(stops - starts))
+    return int(stops[longest] - starts[longest]), int(starts[longest])
+
+
+def runs_of(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Starts and (excluded) stops of all runs of true values."""
+    edges = np.flatnonzero(mask[1:] != mask[:-1]) + 1
+    bounds = np.concatenate([[0], edges, [mask.size]])
+    first = 0 if mask.size and mask[0] else 1
+    return bounds[:-1][first::2], bounds[1:][first::2]

@@ -1,0 +1,58 @@
+"""Magnitudes no damper test has: a wrong unit, or columns exchanged."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mrdamper.errors import QualityError
+from mrdamper.rig_files.quality.view import View
+
+LONGEST_STROKE = 3.0  # [m] peak to peak; the longest test rigs have about 1.5 m
+LARGEST_FORCE = 2e7  # [N]; the largest seismic test machines
+SMALLEST_FORCE = 0.5  # [N] peak to peak; a load cell of a damper rig resolves about 1 N
+LARGEST_CURRENT = 200.0  # [A]
+FASTEST = 30.0  # [m/s]
+
+
+def exchanged_or_out_of_range(view: View) -> None:
+    """Refuse channels whose size says that a unit is wrong or that columns are exchanged."""
+    record = view.record
+    stroke = _peak_to_peak(record.displacement)
+    force = _peak_to_peak(record.force)
+    largest = max(abs(float(np.nanmin(record.force))), abs(float(np.nanmax(record.force))))
+    if stroke > LONGEST_STROKE:
+        exchanged = force < LONGEST_STROKE
+        raise _refused(
+            view,
+            f"displacement moves {stroke:.4g} m peak to peak" + (f", force {force:.4g} N" if exchanged else ""),
+            "displacement and force look exchanged: name the columns the other way round"
+            if exchanged
+            else "give the unit of displacement (mm?)",
+        )
+    if largest > LARGEST_FORCE:
+        raise _refused(view, f"force reaches {largest:.4g} N", "give the unit of force")
+    if force < SMALLEST_FORCE:
+        raise _refused(
+            view,
+            f"force changes by {force:.3g} N in the whole record",
+            "check the load cell, the unit of force (kN?), or whether columns are exchanged",
+        )
+    current = (
+        0.0 if record.current is None else max(float(np.nanmax(record.current)), -float(np.nanmin(record.current)))
+    )
+    if current > LARGEST_CURRENT:
+        raise _refused(view, f"current reaches {current:.4g} A", "give its unit (mA?)")
+    if view.run.time.size >= 5 and view.strokes.durations.size:
+        speed = float(np.median(view.strokes.lengths / view.strokes.durations))
+        if speed > FASTEST:
+            raise _refused(
+                view, f"the mean speed of the strokes is {speed:.4g} m/s", "check the units of time and displacement"
+            )
+
+
+def _peak_to_peak(values: np.ndarray) -> float:
+    return float(np.nanmax(values) - np.nanmin(values))
+
+
+def _refused(view: View, found: str, mend: str) -> QualityError:
+    return QualityError(found, where=view.where, mend=mend, code="E_RANGE")

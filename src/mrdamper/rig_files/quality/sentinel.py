@@ -1,0 +1,98 @@
+"""Codes that loggers write for a missing value: −9999 and the like, scattered among real samples."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from mrdamper.data import Floats
+from mrdamper.errors import QualityError
+from mrdamper.rig_files.quality.presence import USED, runs_of
+from mrdamper.rig_files.quality.view import UNITS, View, place
+from mrdamper.rig_files.record import Finding
+
+# Leading digits of the codes in use: 999, 9999, ..., 999.25, 9.91e37, and the ends of 16-, 24- and 32-bit counts.
+# Only digits are compared: a unit prefix moves the decimal point.
+_NINES = (9.99, 9.999, 9.9999, 9.99999, 9.999999, 9.9925, 9.91)
+_ENDS = (3.2767, 3.2768, 6.5535, 8.388607, 8.388608, 2.147483647, 2.147483648, 4.294967295)
+_DIGITS = np.array([*_NINES, *_ENDS])
+_LEAP = 0.25  # of the channel's range: a code stands that far from the samples around it
+_RARE = 0.1  # of the samples: a value held more often is the channel's own
+_FEW = 50  # distinct values of a channel that does not vary
+_CHUNK = 1_000_000  # samples looked at together
+_LONG = 20  # a value held longer than this on average is a plateau, no code
+
+
+def missing_value_codes(view: View) -> Iterator[Finding]:
+    """Refuse a channel in which one exact value stands for missing samples; say so of one no run needs."""
+    for name, values in view.channels.items():
+        code = None if np.isinf(values).any() else _code_in(values)
+        if code is not None:
+            at = np.flatnonzero(values == code)
+            text = (
+                f"{name} is {code:g} {UNITS[name]} in {at.size} sample{'s' * (at.size > 1)} among others it does not "
+                f"fit, first {place(view.record, int(at[0]))}: it reads like a logger's code for a missing value"
+            )
+            if name in USED:
+                raise QualityError(text, where=view.where, mend="leave these cells empty", code="E_SENTINEL")
+            yield Finding("W_MISSING", f"{text}; the channel is not used")
+
+
+def _code_in(values: Floats) -> float | None:
+    present = np.isfinite(values)
+    if not present.any():
+        return None
+    extremes = {float(np.nanmin(values)), float(np.nanmax(values)), 0.0}
+    counts = {value: int(np.count_nonzero(values == value)) for value in extremes}
+    rare = [value for value, count in counts.items() if 0 < count < _RARE * values.size]
+    for value in rare:
+        present &= values != value
+    low = float(np.min(values, where=present, initial=np.inf))
+    high = float(np.max(values, where=present, initial=-np.inf))
+    scale = (high - low) + 0.05 * max(abs(low), abs(high))
+    varies = np.unique(values[present][:10_000]).size >= _FEW
+    for value in sorted(rare, key=abs, reverse=True):
+        if max(low - value, value - high) > scale and (_known(value) or (varies and counts[value] > 1)):
+            return value
+    if not varies:
+        return None  # a channel that flickers between a few levels leaps there and back all the time
+    leap = _LEAP * (high - low)
+    for value, count in _repeated_leaps(values, leap):
+        usual = _known(value) or value == 0.0
+        if (usual or count > 2) and _scattered(values, value, leap) >= (0.5 if usual else 0.8):
+            return value
+    return None
+
+
+def _repeated_leaps(values: Floats, leap: float) -> list[tuple[float, int]]:
+    """Values, each with its count, at which a channel leaps there and back more than once."""
+    leaps = []
+    for start in range(0, values.size, _CHUNK):
+        piece = values[start : start + _CHUNK + 2]
+        steps = np.abs(np.diff(piece)) > leap
+        leaps.append(piece[1:-1][steps[1:] & steps[:-1]][: _CHUNK // 100])
+    found, counts = np.unique(np.concatenate(leaps), return_counts=True)
+    most = np.argsort(counts)[::-1][:20]
+    return [(float(found[i]), int(counts[i])) for i in most if counts[i] > 1]
+
+
+def _known(value: float) -> bool:
+    size = abs(value)
+    if size >= 1e30:
+        return True
+    if size == 0.0:
+        return False
+    digits = size / 10.0 ** np.floor(np.log10(size))
+    return bool(np.any(np.abs(digits / _DIGITS - 1) < 1e-9))
+
+
+def _scattered(values: Floats, value: float, leap: float) -> float:
+    """Share of a value's occurrences that stand off from the samples on both sides."""
+    starts, stops = runs_of(values == value)
+    inner = (starts > 0) & (stops < values.size)
+    starts, stops = starts[inner], stops[inner]
+    if starts.size < 2 or np.mean(stops - starts) > _LONG:
+        return 0.0
+    off = (np.abs(values[starts - 1] - value) > leap) & (np.abs(values[stops] - value) > leap)
+    return float(np.mean(off))

@@ -1,0 +1,159 @@
+"""The verdict on every record of a set, with the figures behind it: one row a record."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from mrdamper.data import Condition, Run
+from mrdamper.errors import QualityError
+from mrdamper.rig_files.quality import judge
+from mrdamper.rig_files.quality.loop import repeatability
+from mrdamper.rig_files.quality.motion import cycles_of, drift_of
+from mrdamper.rig_files.quality.view import View
+from mrdamper.rig_files.record import Finding, Record
+
+NOT_IDENTIFIED = ("W_CLIPPED", "W_SHORT")  # what identification refuses by default
+
+
+@dataclass(frozen=True, eq=False)
+class Quality:
+    """One record's verdict.
+
+    Attributes
+    ----------
+    record : Record
+        As judged.
+    condition : Condition or None
+        Measured; None for a motion without a period and for a refused record.
+    cycles, sample_rate_Hz : float
+        NaN for a refused record, like all figures below.
+    repeatability : float
+        Cycle-to-cycle scatter of the force over its peak-to-peak value; NaN under two cycles.
+    offset_force : float
+        Mean force over whole cycles [N]; reported, never taken off.
+    centre : float
+        Mean displacement over whole cycles [m]; reported, never taken off.
+    drift : float
+        Change of the mean displacement over the record [m].
+    distortion : float
+        THD of the motion; NaN for a motion without a period.
+    refusal : QualityError or None
+    """
+
+    record: Record
+    condition: Condition | None = None
+    cycles: float = np.nan
+    sample_rate_Hz: float = np.nan
+    repeatability: float = np.nan
+    offset_force: float = np.nan
+    centre: float = np.nan
+    drift: float = np.nan
+    distortion: float = np.nan
+    refusal: QualityError | None = None
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What was noticed, without what refused the record."""
+        return self.record.findings
+
+    @property
+    def codes(self) -> tuple[str, ...]:
+        """Codes of all findings and of the refusal, each once."""
+        refusal = () if self.refusal is None else (self.refusal.code,)
+        return tuple(dict.fromkeys((*refusal, *(finding.code for finding in self.findings))))
+
+    @property
+    def verdict(self) -> str:
+        """refused, not identified, noted or good."""
+        if self.refusal is not None:
+            return "refused"
+        if any(code in NOT_IDENTIFIED for code in self.codes):
+            return "not identified"
+        return "noted" if self.codes else "good"
+
+
+def quality_table(records: Iterable[Record]) -> tuple[Quality, ...]:
+    """Judge records and measure them; a refused one does not stop the others.
+
+    Parameters
+    ----------
+    records : iterable of Record
+        Judged or not.
+    """
+    return tuple(_quality(record) for record in records)
+
+
+def record_of(run: Run) -> Record:
+    """A stored run as a record to be judged again."""
+    return Record(
+        id=run.id,
+        time=run.time,
+        displacement=run.displacement,
+        force=run.force,
+        velocity=run.velocity,
+        current=run.current,
+        provenance=run.notes,
+        rig=run.rig,
+        excitation=run.excitation,
+        split=run.split,
+    )
+
+
+def row(quality: Quality) -> dict[str, Any]:
+    """A verdict as a row of numbers and words, in engineers' units; None where there is no figure."""
+    condition = quality.condition
+    return {
+        "run_id": quality.record.id,
+        "rig": quality.record.rig,
+        "current_A": _rounded(_current(quality), 3),
+        "frequency_Hz": None if condition is None else _rounded(condition.frequency_Hz, 4),
+        "amplitude_mm": None if condition is None else _rounded(1e3 * condition.amplitude_m, 4),
+        "cycles": _rounded(quality.cycles, 2),
+        "sample_rate_Hz": _rounded(quality.sample_rate_Hz, 1),
+        "repeatability_percent": _rounded(100 * quality.repeatability, 2),
+        "offset_force_N": _rounded(quality.offset_force, 1),
+        "centre_mm": _rounded(1e3 * quality.centre, 3),
+        "drift_mm": _rounded(1e3 * quality.drift, 3),
+        "distortion_percent": _rounded(100 * quality.distortion, 2),
+        "verdict": quality.verdict,
+        "findings": " ".join(quality.codes),
+    }
+
+
+def _quality(record: Record) -> Quality:
+    try:
+        judged = record if record.segments else judge(record)
+    except QualityError as refusal:
+        return Quality(record, refusal=refusal)
+    view = View(replace(judged, findings=()))
+    motion, scatter = view.motion, repeatability(view)
+    cycles = cycles_of(view)
+    steady = view.steady
+    whole = slice(None)
+    if motion is not None:
+        count = max(1, int(motion.cycles + 0.02))
+        whole = steady.time >= steady.time[-1] - count / motion.condition.frequency_Hz
+    return Quality(
+        judged,
+        condition=None if motion is None else motion.condition,
+        cycles=cycles,
+        sample_rate_Hz=1 / view.step,
+        repeatability=np.nan if scatter is None else scatter[0],
+        offset_force=float(np.mean(steady.force[whole])),
+        centre=float(np.mean(steady.displacement[whole])),
+        drift=drift_of(view)[0],
+        distortion=np.nan if motion is None else motion.distortion,
+    )
+
+
+def _current(quality: Quality) -> float:
+    current = quality.record.current
+    return np.nan if current is None or not np.isfinite(current).any() else float(np.nanmean(current))
+
+
+def _rounded(value: float, digits: int) -> float | None:
+    return round(float(value), digits) + 0.0 if np.isfinite(value) else None

@@ -1,0 +1,165 @@
+"""What the checks look at: a record's channels without holes, and the motion in them.
+
+Physics is judged on at most `MOST_SAMPLES` samples of a record, so that a long record takes
+no longer than a short one; counts (missing, repeated, frozen) are of all samples.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from mrdamper.data import Floats, Run
+from mrdamper.errors import ExcitationError
+from mrdamper.motion import Excitation, MotionAnalysis, analyse_motion, measured_motion
+from mrdamper.rig_files.quality.strokes import Strokes, find_strokes
+from mrdamper.rig_files.record import OPTIONAL, REQUIRED, Finding, Record
+
+MOST_SAMPLES = 40_000
+SHORTEST = 5  # samples of a segment; a slope needs as many
+_UNEXPLAINED = 0.3  # of the motion's standard deviation: more is no periodic motion
+_HOLE = 0.03  # of a period without samples: more of a loop may be missing than a line can bridge
+_FINE = 200  # samples per period that are enough for every figure here
+
+
+@dataclass(eq=False)
+class View:
+    """A record under judgement.
+
+    Attributes
+    ----------
+    record : Record
+    segments : tuple of (int, int)
+        Half-open sample ranges without a gap in time; one range until `clock` has looked.
+    found : list of Finding
+        What the checks so far have noticed.
+    """
+
+    record: Record
+    segments: tuple[tuple[int, int], ...] = ()
+    found: list[Finding] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.segments = self.record.segments or ((0, self.record.time.size),)
+
+    @property
+    def where(self) -> str:
+        """How messages name the record."""
+        return self.record.provenance.get("file", "") or f"run {self.record.id}"
+
+    @cached_property
+    def channels(self) -> dict[str, Floats]:
+        """The channels there are, by name."""
+        named = {name: getattr(self.record, name) for name in (*REQUIRED, *OPTIONAL)}
+        return {name: values for name, values in named.items() if values is not None}
+
+    def noticed(self, *codes: str) -> bool:
+        """Whether one of these findings was made."""
+        return any(finding.code in codes for finding in self.found)
+
+    @cached_property
+    def step(self) -> float:
+        """Usual step of time [s]."""
+        time = self.record.time
+        at = np.arange(0, time.size - 1, max(1, time.size // MOST_SAMPLES))
+        steps = time[at + 1] - time[at]
+        steps = steps[np.isfinite(steps)]
+        return float(np.median(steps)) if steps.size else 0.0
+
+    @cached_property
+    def run(self) -> Run:
+        """The samples that are there, thinned to what the physics needs, without a window."""
+        index = self.index
+        current = self.record.current
+        bounds = np.searchsorted(index, [a for a, _ in self.segments] + [self.segments[-1][1]])
+        return Run(
+            id=self.record.id,
+            time=self.record.time[index],
+            displacement=self.record.displacement[index],
+            force=self.record.force[index],
+            current=np.zeros(index.size) if current is None else current[index],
+            segments=tuple((int(a), int(b)) for a, b in pairwise(bounds) if b > a),
+        )
+
+    @cached_property
+    def strokes(self) -> Strokes:
+        """Reversals of the motion, and the part in which they are regular: of segments, in the longest."""
+        time, x, segments = self.run.time, self.run.displacement, self.run.segments or ()
+        found = find_strokes(time, x)
+        if found.steady is not None or len(segments) < 2:
+            return found
+        start, stop = max(segments, key=lambda ends: ends[1] - ends[0])
+        inside = find_strokes(time[start:stop], x[start:stop]).steady
+        if inside is None and found.period is not None and time[stop - 1] - time[start] >= found.period:
+            inside = 0, stop - start
+        return found if inside is None else replace(found, steady=(start + inside[0], start + inside[1]))
+
+    @cached_property
+    def steady(self) -> Run:
+        """The part of steady motion; the whole run where there is none."""
+        start, stop = self.strokes.steady or (0, self.run.time.size)
+        return self.run.part(start, stop)
+
+    @cached_property
+    def motion(self) -> MotionAnalysis | None:
+        """Which sine the steady part is; None under a cycle, or where no sine with harmonics and drift explains it."""
+        try:
+            found = analyse_motion(self.steady)
+        except ExcitationError:
+            return None
+        return found if found.residual < _UNEXPLAINED * float(np.std(self.steady.displacement)) else None
+
+    @cached_property
+    def moving(self) -> Excitation:
+        """Smooth motion over all of `run`."""
+        return measured_motion(self.run)
+
+    @cached_property
+    def index(self) -> np.ndarray:
+        """Samples of the record that `run` is made of.
+
+        All that are there; of a long record, the middle at about 200 samples a period.
+        """
+        record = self.record
+        if record.time.size <= MOST_SAMPLES:
+            return self._in_segments(np.flatnonzero(record.present))
+        most = record.time.size // MOST_SAMPLES
+        coarse = self._there(np.arange(0, record.time.size, most))
+        period = find_strokes(record.time[coarse], record.displacement[coarse]).period
+        stride = 1 if period is None or self.step <= 0 else int(np.clip(period / self.step / _FINE, 1, most))
+        thinned = np.arange(0, record.time.size, stride)
+        middle = max(0, thinned.size - MOST_SAMPLES) // 2
+        return self._in_segments(self._there(thinned[middle : middle + MOST_SAMPLES]))
+
+    def without_leap(self, starts: Floats, stops: Floats) -> np.ndarray:
+        """(K,) mask of the stretches of time in which, ends included, no hole of the motion lies."""
+        time, period = self.run.time, self.strokes.period
+        if len(self.segments) < 2 or period is None:
+            return np.ones(starts.size, dtype=bool)
+        before = np.flatnonzero(np.diff(time) > _HOLE * period)
+        inside = (time[before] <= stops[:, None]) & (time[before + 1] >= starts[:, None])
+        return np.asarray(~inside.any(axis=1))
+
+    def _in_segments(self, index: np.ndarray) -> np.ndarray:
+        """Leave out segments of so few samples that they have no slope."""
+        parts = np.split(index, np.searchsorted(index, [a for a, _ in self.segments[1:]]))
+        return np.concatenate([part for part in parts if part.size >= SHORTEST] or [index[:0]])
+
+    def _there(self, index: np.ndarray) -> np.ndarray:
+        channels = (self.record.time, self.record.displacement, self.record.force, self.record.current)
+        return index[np.all([np.isfinite(c[index]) for c in channels if c is not None], axis=0)]
+
+
+UNITS = {
+    "time": "s", "displacement": "m", "force": "N", "velocity": "m/s", "acceleration": "m/s²", "current": "A",
+    "voltage": "V", "temperature": "°C",
+}  # fmt: skip
+
+
+def place(record: Record, sample: int) -> str:
+    """Where a sample stands in its file: its line, or its number."""
+    lines = getattr(record, "lines", None)
+    return f"at sample {sample}" if lines is None else f"in line {int(lines[sample])}"

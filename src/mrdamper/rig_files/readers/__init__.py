@@ -1,0 +1,133 @@
+"""Formats of rig files: one module a format, found by discovery."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import contextmanager
+from functools import lru_cache
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from mrdamper.discovery import subclasses_in
+from mrdamper.rig_files.readers.archive import opened
+from mrdamper.rig_files.readers.base import Hints, RawTable, Reader, RigFileError, Source
+from mrdamper.rig_files.sandbox import guarded_tables
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+_FOREIGN = MappingProxyType(
+    {
+        b"%PDF": "PDF",
+        b"\x89PNG": "PNG image",
+        b"\xff\xd8\xff": "JPEG image",
+        b"GIF8": "GIF image",
+        b"\xd0\xcf\x11\xe0": "old Excel or Word",
+        b"BZh": "bzip2",
+        b"\xfd7zXZ": "xz",
+        b"7z\xbc\xaf": "7-Zip",
+        b"Rar!": "RAR",
+        b"\x28\xb5\x2f\xfd": "Zstandard",
+        b"\x7fELF": "program",
+        b"SQLite format 3": "SQLite",
+        b"ARROW1": "Arrow",
+        b"\x93NUMPY": "NumPy array",
+        b"{\\rtf": "RTF",
+        b"<!DOCTYPE": "HTML",
+        b"<!doctype": "HTML",
+        b"<html": "HTML",
+        b"<HTML": "HTML",
+        b"<?xml": "XML",
+        b"RIFF": "RIFF",
+        b"{": "JSON",
+        b"[{": "JSON",
+        b"[[": "JSON",
+    }
+)
+_PICKLE = tuple(bytes((0x80, protocol)) for protocol in range(2, 6))
+
+
+@contextmanager
+def raw_tables(path: str | Path, hints: Hints | None = None) -> Iterator[list[RawTable]]:
+    """Open a rig's file, whatever its format, and give its tables.
+
+    Parameters
+    ----------
+    path : path
+    hints : Hints, optional
+        What a profile says about the form of the file.
+
+    Yields
+    ------
+    list of RawTable
+        Readable until the block ends.
+
+    Raises
+    ------
+    RigFileError
+        If the file is damaged, of no known format, of another format than its name says,
+        or can be read in more than one way.
+    """
+    with opened(Path(path)) as source:
+        reader = reader_of(source)
+        if not reader.library:
+            yield reader.tables(source, hints or Hints())
+            return
+        with guarded_tables(source, reader, hints or Hints()) as tables:
+            yield tables
+
+
+def reader_of(source: Source) -> Reader:
+    """The reader whose format the content is.
+
+    Raises
+    ------
+    RigFileError
+        E_FORMAT if it is of none, or of another than the suffix says; E_UNSAFE for pickles.
+    """
+    head = source.head()
+    if head.startswith(_PICKLE) and (len(head) < 11 or head[2:3] in b"\x95(]}cX\x8c" or b"\n" not in head[:2]):
+        raise source.refuse(
+            "E_UNSAFE", "pickled Python objects, which run code when loaded", mend="export plain numbers"
+        )
+    readers = all_readers()
+    named = next((r for r in readers.values() if source.suffix in r.suffixes), None)
+    found = next((r for r in readers.values() if r.binary and r().recognises(source)), None)
+    foreign = next((title for magic, title in _FOREIGN.items() if head.lstrip().startswith(magic)), None)
+    if found is None and foreign is None and (named is None or not named.binary):
+        return readers["text"]()
+    if found is None or (named is not None and found is not named):
+        text = found is None and foreign is None and b"\0" not in head
+        is_now = found.title if found is not None else foreign or ("text" if text else "something else")
+        mend = f"rename it to {found.suffixes[0]}" if found else "rename it to .csv" if text else "export it as CSV"
+        raise source.refuse(
+            "E_FORMAT",
+            f"the name says {named.title if named else source.suffix or 'nothing'}, the content is {is_now}",
+            mend=mend,
+        )
+    return found()
+
+
+@lru_cache(maxsize=1)
+def all_readers() -> Mapping[str, type[Reader]]:
+    """Every format by name."""
+    return subclasses_in(__name__, __path__, Reader)  # type: ignore[type-abstract]
+
+
+def suffixes() -> tuple[str, ...]:
+    """Suffixes of files a folder is searched for."""
+    return tuple(sorted({s for r in all_readers().values() for s in r.suffixes} | {".gz", ".zip"}))
+
+
+__all__ = [
+    "Hints",
+    "RawTable",
+    "Reader",
+    "RigFileError",
+    "Source",
+    "all_readers",
+    "raw_tables",
+    "reader_of",
+    "suffixes",
+]

@@ -1,0 +1,212 @@
+"""Packed files: gz, and zip with one member; unpacked within bounds, never onto a path of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import stat
+import struct
+import zipfile
+import zlib
+from collections.abc import Iterable, Iterator
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import BinaryIO
+
+from mrdamper.rig_files.readers.base import MOST_RATIO, MOST_UNPACKED, RigFileError, Source
+from mrdamper.rig_files.readers.scratch import Scratch
+
+_PIECE = 2**20
+_GZIP, _ZIP = b"\x1f\x8b", b"PK\x03\x04"
+_PACKED = (_GZIP, b"BZh", b"\xfd7zXZ", b"7z\xbc\xaf", b"Rar!", b"\x28\xb5\x2f\xfd")
+_TAR = slice(257, 262)
+# What zipfile raises for a zip it cannot read; NotImplementedError for a packing method it does not know.
+UNREADABLE_ZIP = (zipfile.BadZipFile, OSError, ValueError, NotImplementedError)
+
+
+@contextlib.contextmanager
+def opened(path: Path) -> Iterator[Source]:
+    """Open a file and unpack it if it is packed.
+
+    Raises
+    ------
+    RigFileError
+        E_FILE, E_EMPTY, E_TRUNCATED, E_FORMAT, E_ARCHIVE, E_ARCHIVE_PATH, E_ARCHIVE_RATIO.
+    """
+    name = path.name
+    size, file = _at(path)
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(file)
+        source = Source(path, name, path.suffix.lower(), file, size, stack)
+        if size == 0:
+            raise source.refuse("E_EMPTY", "0 bytes", mend="copy or export the file again")
+        head = source.head()
+        packed = head.startswith(_GZIP) or is_plain_zip(source)
+        if source.suffix in (".gz", ".zip") and not packed:
+            raise source.refuse(
+                "E_TRUNCATED" if size < 4 else "E_FORMAT", f"the content is no {source.suffix[1:]} archive",
+                mend="copy the file again, or correct its name",
+            )  # fmt: skip
+        if packed and source.suffix not in (".gz", ".zip", ".gzip", ""):
+            raise source.refuse(
+                "E_FORMAT", f"the name says {source.suffix}, the content is a packed file", mend="rename it"
+            )
+        if packed:
+            source = _unzip(source) if head.startswith(b"PK") else _gunzip(source)
+            _refuse_nested(source)
+        yield source
+
+
+def _at(path: Path) -> tuple[int, BinaryIO]:
+    """Size of a file, and the file opened."""
+    try:
+        found = "is a folder" if path.is_dir() else "" if path.is_file() else "no such file"
+        if not found:
+            return path.stat().st_size, path.open("rb")
+    except (OSError, ValueError) as error:
+        found = getattr(error, "strerror", None) or str(error)
+    raise RigFileError("E_FILE", found, file=str(path), mend="give the path of a rig's file")
+
+
+def is_plain_zip(source: Source) -> bool:
+    """Whether the content is a zip that is not itself a document or a NumPy file."""
+    if not source.head().startswith((b"PK\x03\x04", b"PK\x05\x06")):
+        return False
+    if source.suffix in (".xlsx", ".xlsm", ".npz"):
+        return False
+    try:
+        names = zipped_names(source)
+    except UNREADABLE_ZIP:
+        return True
+    return not is_workbook(names) and not is_arrays(names)
+
+
+def zipped_names(source: Source) -> list[str]:
+    """Names of the members of a zip."""
+    source.file.seek(0)
+    with zipfile.ZipFile(source.file) as archive:
+        names = archive.namelist()
+    source.file.seek(0)
+    return names
+
+
+def is_workbook(names: list[str]) -> bool:
+    """Whether a zip of these members is a workbook."""
+    return "[Content_Types].xml" in names and any(name.startswith("xl/") for name in names)
+
+
+def is_arrays(names: list[str]) -> bool:
+    """Whether a zip of these members holds NumPy arrays."""
+    return bool(names) and all(name.endswith(".npy") for name in names)
+
+
+def check_sizes(source: Source, members: list[zipfile.ZipInfo]) -> None:
+    """Refuse what would unpack to far more than it is.
+
+    Raises
+    ------
+    RigFileError
+        E_ARCHIVE_RATIO.
+    """
+    unpacked = sum(member.file_size for member in members)
+    packed = max(1, sum(member.compress_size for member in members))
+    if unpacked > MOST_UNPACKED or unpacked > MOST_RATIO * min(packed, source.size):
+        raise bomb(source)
+
+
+def bomb(source: Source) -> RigFileError:
+    """The refusal of a file that unpacks to too much."""
+    return source.refuse(
+        "E_ARCHIVE_RATIO",
+        f"unpacks to over {MOST_RATIO} times its size, or over {MOST_UNPACKED // 10**9} GB",
+        mend="give the unpacked file",
+    )
+
+
+def _unzip(source: Source) -> Source:
+    try:
+        with zipfile.ZipFile(source.file) as archive:
+            member = _one_member(source, archive.infolist())
+            check_sizes(source, [member])
+            with archive.open(member) as stream:
+                file, size = _unpacked(source, iter(lambda: stream.read(_PIECE), b""), max(1, member.compress_size))
+    except RigFileError:
+        raise
+    except EOFError as error:
+        raise _cut(source) from error
+    except (*UNREADABLE_ZIP, zlib.error, RuntimeError, struct.error) as error:
+        whole = isinstance(error, zipfile.BadZipFile) and _has_directory(source)
+        if isinstance(error, zipfile.BadZipFile) and not whole:
+            raise _cut(source) from error
+        raise source.refuse("E_ARCHIVE", f"damaged or unusual archive ({error})", mend="pack it again") from error
+    inner = member.filename
+    return Source(source.path, f"{source.name}:{inner}", PurePosixPath(inner).suffix.lower(), file, size, source.keep)
+
+
+def _one_member(source: Source, members: list[zipfile.ZipInfo]) -> zipfile.ZipInfo:
+    for member in members:
+        name = member.filename
+        if not name:
+            raise source.refuse("E_ARCHIVE", "a member without a name", mend="pack it again")
+        parts = [*PurePosixPath(name).parts, *PureWindowsPath(name).parts]
+        if ".." in parts or name.startswith(("/", "\\")) or PureWindowsPath(name).drive or "\0" in name:
+            raise source.refuse("E_ARCHIVE_PATH", f"member {name!a} leads out of the archive", mend="pack it again")
+        if stat.S_ISLNK(member.external_attr >> 16):
+            raise source.refuse("E_ARCHIVE", f"member {name!a} is a link", mend="pack the file itself")
+    files = [member for member in members if not member.is_dir()]
+    if len(files) != 1:
+        raise source.refuse("E_ARCHIVE", f"{len(files)} members", mend="pack one file an archive, or unpack it first")
+    if files[0].flag_bits & 1:
+        raise source.refuse("E_ARCHIVE", "the member is encrypted", mend="unpack it first")
+    return files[0]
+
+
+def _gunzip(source: Source) -> Source:
+    try:
+        file, size = _unpacked(source, _inflated(source), source.size)
+    except EOFError as error:
+        raise _cut(source) from error
+    except zlib.error as error:
+        raise source.refuse("E_ARCHIVE", f"damaged archive ({error})", mend="pack it again") from error
+    inner = source.path.stem if source.suffix in (".gz", ".gzip") else source.path.name
+    return Source(source.path, source.name, Path(inner).suffix.lower(), file, size, source.keep)
+
+
+def _inflated(source: Source) -> Iterator[bytes]:
+    """What a gz holds, piece by piece; one member only, as several may be several files."""
+    decoder = zlib.decompressobj(wbits=31)
+    while not decoder.eof:
+        packed = decoder.unconsumed_tail or source.file.read(_PIECE)
+        if not packed:
+            raise EOFError
+        yield decoder.decompress(packed, _PIECE)
+    rest = (decoder.unused_data + source.file.read(_PIECE)).lstrip(b"\0")
+    if rest:
+        found = "more than one member" if rest.startswith(_GZIP) else "bytes behind the archive's end"
+        raise source.refuse("E_ARCHIVE", found, mend="unpack it first")
+
+
+def _unpacked(source: Source, pieces: Iterable[bytes], packed: int) -> tuple[BinaryIO, int]:
+    target = Scratch(source.keep)
+    for piece in pieces:
+        if target.size + len(piece) > min(MOST_UNPACKED, MOST_RATIO * packed):
+            raise bomb(source)
+        target.write(piece)
+    target.file.seek(0)
+    return target.file, target.size
+
+
+def _refuse_nested(source: Source) -> None:
+    if source.size == 0:
+        raise source.refuse("E_EMPTY", "0 bytes", mend="copy or export the file again")
+    head = source.head()
+    if head.startswith(_PACKED) or head[_TAR] == b"ustar" or is_plain_zip(source):
+        raise source.refuse("E_ARCHIVE", "an archive inside an archive", mend="unpack it first")
+
+
+def _cut(source: Source) -> RigFileError:
+    return source.refuse("E_TRUNCATED", "the archive ends early", mend="copy the file again")
+
+
+def _has_directory(source: Source) -> bool:
+    """Whether the end of a zip, its directory, is there."""
+    source.file.seek(max(0, source.size - 70_000))
+    return b"PK\x05\x06" in source.file.read(70_000)

@@ -1,0 +1,183 @@
+"""What readers of binary formats share: named arrays as a table, and damage as a refusal."""
+
+from __future__ import annotations
+
+import importlib
+import re
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from types import ModuleType
+
+import numpy as np
+
+from mrdamper.data import Floats
+from mrdamper.errors import InputError, MissingExtraError
+from mrdamper.rig_files.readers.base import (
+    MOST_COLUMNS,
+    MOST_RATIO,
+    MOST_UNPACKED,
+    RATIO_MATTERS_FROM,
+    Content,
+    RawTable,
+    RigFileError,
+    Source,
+)
+
+_NO_NUMBERS = {"b": "truth values", "c": "complex numbers", "V": "bytes"}
+_EARLY_END = (
+    "truncat", "end of file", "eof", "unexpected end", "could not read", "not enough", "incomplete", "short",
+    "requires a buffer", "out of range",
+)  # fmt: skip
+
+
+def array_table(
+    source: Source,
+    names: Sequence[str],
+    units: Sequence[str],
+    load: Callable[[int], np.ndarray],
+    *,
+    label: str = "",
+    title: str = "",
+    fallback: bool = False,
+    constants: Mapping[str, float] | None = None,
+) -> RawTable:
+    """A table whose columns are loaded as arrays, one by one.
+
+    Raises
+    ------
+    RigFileError
+        E_TOO_MANY_COLUMNS.
+    """
+    if len(names) > MOST_COLUMNS:
+        raise source.refuse("E_TOO_MANY_COLUMNS", f"{len(names)} columns", mend="export only the channels needed")
+
+    def read(columns: Sequence[int]) -> Content:
+        values = {}
+        for column in columns:
+            with refusing_damage(source, title):
+                array = load(column)
+            values[column] = as_floats(source, array, names[column], column)
+        sizes = {v.size for v in values.values()}
+        if len(sizes) > 1:
+            shown = ", ".join(f"{names[c]}: {v.size}" for c, v in values.items())
+            raise source.refuse("E_FIELD_COUNT", f"columns differ in length ({shown})", mend="export them together")
+        if not sizes or not max(sizes):
+            raise source.refuse("E_NO_DATA", "columns without samples", mend="export the file again")
+        return Content(values)
+
+    return RawTable(source, tuple(names), tuple(units), read, label=label, fallback=fallback, constants=constants or {})
+
+
+def as_floats(source: Source, array: np.ndarray, name: str, column: int) -> Floats:
+    """A loaded column as (N,) doubles; date and time as seconds after the first.
+
+    Raises
+    ------
+    RigFileError
+        E_UNSAFE for objects, E_NUMBER for what else is no number, E_COLUMN for tables.
+    """
+    array = np.asarray(array)
+    kind = array.dtype.kind
+    place = {"column": column + 1, "mend": "export plain numbers"}
+    if kind == "O":
+        raise source.refuse("E_UNSAFE", f"column {name!r} holds objects or links, not numbers", **place)
+    if kind not in "iufMm":
+        found = _NO_NUMBERS.get(kind, "text or lists")
+        raise source.refuse("E_NUMBER", f"column {name!r} holds {found}, not plain numbers", **place)
+    if array.ndim > 1:
+        array = array.squeeze()
+    if array.ndim != 1:
+        if array.size == 1:
+            return np.array([float(array.reshape(-1)[0])])
+        raise source.refuse("E_FIELD_COUNT", f"column {name!r} is a table of {array.shape}", **place)
+    if kind in "Mm":
+        return _seconds(array)
+    with np.errstate(over="ignore"):
+        return np.array(array, dtype=np.float64)
+
+
+def expand(name: str, shape: tuple[int, ...]) -> list[tuple[str, int | None]]:
+    """Names of the columns of an array: one for a vector, numbered ones for a matrix."""
+    inner = [n for n in shape if n != 1]
+    if len(inner) == 2 and inner[1] <= MOST_COLUMNS:
+        return [(f"{name}[{i + 1}]", i) for i in range(inner[1])]
+    return [(name, None)] if len(inner) <= 1 else []
+
+
+def pick(array: np.ndarray, part: int | None) -> np.ndarray:
+    """The column of an array that `expand` named."""
+    return array if part is None else np.squeeze(array)[:, part]
+
+
+def check_unpacked(source: Source, size: int) -> None:
+    """Refuse tables that are far larger than their file.
+
+    Raises
+    ------
+    RigFileError
+        E_ARCHIVE_RATIO.
+    """
+    if size > RATIO_MATTERS_FROM and (size > MOST_RATIO * source.size or size > 10 * MOST_UNPACKED):
+        raise source.refuse(
+            "E_ARCHIVE_RATIO",
+            f"{size / 1e6:.0f} MB of numbers in a file of {source.size / 1e6:.3g} MB",
+            mend="export only the channels and the time needed",
+        )
+
+
+def load(library: str, title: str) -> ModuleType:
+    """Import a library that is an extra.
+
+    Raises
+    ------
+    MissingExtraError
+        If it is not installed.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return importlib.import_module(library)
+    except ImportError as error:
+        raise MissingExtraError(
+            f"reading {title} needs {error.name or library}", mend='install it: pip install "mrdamper[rig]"'
+        ) from error
+
+
+@contextmanager
+def refusing_damage(source: Source, title: str) -> Iterator[None]:
+    """Turn whatever a library raises on a damaged file into a refusal; its warnings are not shown.
+
+    Raises
+    ------
+    RigFileError
+        E_TRUNCATED if the file ends early, else E_FORMAT.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    except InputError:
+        raise
+    except (KeyboardInterrupt, SystemExit, GeneratorExit, MemoryError):
+        raise
+    except BaseException as error:  # a library's panic is no Exception
+        raise damaged(source, title, str(error)) from error
+
+
+def damaged(source: Source, title: str, why: str) -> RigFileError:
+    """The refusal of a file that starts as it should and does not go on so."""
+    early = any(word in why.lower() for word in _EARLY_END)
+    why = re.sub(r"'?<[^<>]*>'?( is)? ?", "", why)  # objects of the library's own
+    reason = "".join(c if c.isprintable() else " " for c in (why.strip().splitlines() or ["unreadable"])[0])[:120]
+    return source.refuse(
+        "E_TRUNCATED" if early else "E_FORMAT", f"damaged {title} ({reason})", mend="copy or export the file again"
+    )
+
+
+def _seconds(array: np.ndarray) -> Floats:
+    """Seconds after the first stamp, by integers: doubles cannot hold the nanoseconds of a date."""
+    missing = np.isnat(array)
+    whole = array.astype("datetime64[ns]" if array.dtype.kind == "M" else "timedelta64[ns]").astype(np.int64)
+    first = whole[~missing][0] if not missing.all() else 0
+    return np.where(missing, np.nan, (whole - first) / 1e9)

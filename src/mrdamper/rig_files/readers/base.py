@@ -1,0 +1,216 @@
+"""What every reader of rig files shares: the file, the table it makes, and how it refuses.
+
+A reader is a class found by discovery: it says by the first bytes whether a file is its
+own, and gives named columns without deciding what they mean.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO, ClassVar
+
+from mrdamper.data import Floats
+from mrdamper.errors import InputError
+from mrdamper.rig_files.record import Finding, LineNumbers
+
+MOST_COLUMNS = 1000
+MOST_UNPACKED = 10**9  # bytes
+MOST_RATIO = 100  # unpacked over packed
+RATIO_MATTERS_FROM = 24 * 2**20  # bytes a column of numbers may always unpack to: three copies fit a small file's share
+
+
+class RigFileError(InputError):
+    """A rig's file cannot be read, or cannot be read in one way only.
+
+    Attributes
+    ----------
+    file : str
+        Name of the file.
+    line, column : int or None
+        Counted from one, where the format has them.
+    """
+
+    code = "E_FILE"
+
+    def __init__(
+        self,
+        code: str,
+        found: str,
+        *,
+        file: str = "",
+        line: int | None = None,
+        column: int | None = None,
+        mend: str = "",
+    ):
+        file, found = printable(file), printable(found)
+        self.file, self.line, self.column = file, line, column
+        parts = [file, f"line {line}" if line is not None else "", f"column {column}" if column is not None else ""]
+        super().__init__(found, where=", ".join(part for part in parts if part), mend=mend, code=code)
+
+
+def printable(text: str) -> str:
+    """A name from a file, with nothing in it that moves a cursor or turns the direction of writing."""
+    return "".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in text)
+
+
+@dataclass(frozen=True, slots=True)
+class Hints:
+    """What a rig profile says about the form of its files; None where it may be sniffed.
+
+    Attributes
+    ----------
+    separator, decimal, encoding : str
+        Of delimited text.
+    header_line, units_line, data_line : int
+        Counted from one; a header line of 0 says that there is none.
+    names : tuple of str
+        Names of the columns where the file has none, or wrong ones.
+    sheet : str
+        Of a workbook.
+    blocks : "join" or "split"
+        What repeated acquisition blocks are.
+    sample_rate : float
+        [Hz] of files without time stamps.
+    """
+
+    separator: str | None = None
+    decimal: str | None = None
+    encoding: str | None = None
+    header_line: int | None = None
+    units_line: int | None = None
+    data_line: int | None = None
+    names: tuple[str, ...] = ()
+    sheet: str | None = None
+    blocks: str | None = None
+    sample_rate: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """An opened file, unpacked where it was packed.
+
+    Attributes
+    ----------
+    path : Path
+        As the user gave it.
+    name : str
+        Shown in messages; names the member of an archive too.
+    suffix : str
+        Lower case, of the unpacked file.
+    file : binary file
+        Seekable, at its start.
+    size : int
+        Bytes after unpacking.
+    keep : ExitStack
+        Closes what readers opened when the file is closed.
+    """
+
+    path: Path
+    name: str
+    suffix: str
+    file: BinaryIO
+    size: int
+    keep: ExitStack = field(default_factory=ExitStack)
+
+    def head(self, size: int = 4096) -> bytes:
+        """The first bytes; the file stands at its start afterwards."""
+        self.file.seek(0)
+        start = self.file.read(size)
+        self.file.seek(0)
+        return start
+
+    def refuse(
+        self, code: str, found: str, *, line: int | None = None, column: int | None = None, mend: str = ""
+    ) -> RigFileError:
+        """A refusal that names this file."""
+        return RigFileError(code, found, file=self.name, line=line, column=column, mend=mend)
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """Columns that were asked for.
+
+    Attributes
+    ----------
+    values : mapping of int to (N,) array
+        By position of the column, NaN where a cell is missing.
+    lines : LineNumbers or None
+        For text.
+    findings : tuple of Finding
+    """
+
+    values: Mapping[int, Floats]
+    lines: LineNumbers | None = None
+    findings: tuple[Finding, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class RawTable:
+    """Named columns of a file, read when they are asked for.
+
+    Attributes
+    ----------
+    source : Source
+    names : tuple of str
+        As the file has them; empty strings where it has none.
+    units : tuple of str
+        From a row or property of their own; empty where there is none.
+    read : callable
+        Takes the positions of columns, returns their `Content`.
+    line : int or None
+        Of the header.
+    label : str
+        Tells apart several tables of one file.
+    form : mapping
+        What was sniffed, in the words of `Hints`.
+    fallback : bool
+        Looked at only if no other table of the file holds a test.
+    constants : mapping of str to float
+        Single numbers by name that the file holds beside the columns.
+    odd : tuple of str
+        One a column where it is known: what stands in it instead of numbers, else empty.
+    """
+
+    source: Source
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    read: Callable[[Sequence[int]], Content]
+    line: int | None = None
+    label: str = ""
+    form: Mapping[str, str | int] = field(default_factory=dict)
+    fallback: bool = False
+    constants: Mapping[str, float] = field(default_factory=dict)
+    odd: tuple[str, ...] = ()
+
+
+class Reader(ABC):
+    """A format of rig files. Put a subclass into a module of `readers` and it is found."""
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    suffixes: ClassVar[tuple[str, ...]]
+    binary: ClassVar[bool] = True
+    library: ClassVar[str] = ""  # that damaged files can crash or hang: read in a process of its own
+    seconds_per_byte: ClassVar[float] = 4e-7  # it may take there
+
+    def warm_up(self) -> None:
+        """Start what the library starts once, such as threads, before a file's share of memory is counted."""
+        return
+
+    @abstractmethod
+    def recognises(self, source: Source) -> bool:
+        """Whether the content, not the name, is of this format."""
+
+    @abstractmethod
+    def tables(self, source: Source, hints: Hints) -> list[RawTable]:
+        """The tables of the file.
+
+        Raises
+        ------
+        RigFileError
+            If it is damaged, or can be read in more than one way.
+        """

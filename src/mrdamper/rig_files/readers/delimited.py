@@ -1,0 +1,143 @@
+"""CSV, TXT and DAT: delimited text in any usual encoding, separator and decimal mark."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mrdamper.rig_files.readers.base import Content, Hints, RawTable, Reader, Source
+from mrdamper.rig_files.record import Finding, LineNumbers
+from mrdamper.rig_files.text.blocks import Block, find_blocks
+from mrdamper.rig_files.text.bulk import read_bulk
+from mrdamper.rig_files.text.cells import Form, field_count, read_cells
+from mrdamper.rig_files.text.layout import Layout, find_layout, split
+from mrdamper.rig_files.text.spool import Spool
+from mrdamper.rig_files.text.stream import LONGEST_LINE, TextStream, open_text, too_long
+
+_HEAD_LINES = 4000  # in which the data must have begun
+BULK_FROM = 2**19  # bytes; below, reading cell by cell takes less time than loading the fast reader
+
+
+class DelimitedText(Reader):
+    """Text with separators; also the blocks of testing machines' .dat files."""
+
+    name = "text"
+    title = "delimited text"
+    suffixes = (".csv", ".txt", ".dat", ".tsv", ".asc", ".prn", ".log", ".tab")
+    binary = False
+
+    def recognises(self, source: Source) -> bool:
+        """Text is what no other format claims."""
+        return True
+
+    def tables(self, source: Source, hints: Hints) -> list[RawTable]:
+        """One table a block of rows."""
+        stream = open_text(source, hints)
+        head = stream.head()
+        raw = head.split(b"\n")
+        long = next((i for i, line in enumerate(raw) if len(line) > LONGEST_LINE), None)
+        if long is not None:
+            raise too_long(source, long + 1)
+        whole = stream.start + len(head) >= stream.stop
+        lines = [stream.decode(line).rstrip("\r") for line in (raw if whole else raw[:-1])[:_HEAD_LINES]]
+        layout = find_layout(lines, source, hints)
+        start = stream.start + sum(len(line) + 1 for line in raw[: layout.data_line - 1])
+        blocks = find_blocks(stream, layout, start, stream.stop)
+        return [self._table(stream, layout, block, i, len(blocks)) for i, block in enumerate(blocks)]
+
+    def _table(self, stream: TextStream, layout: Layout, block: Block, index: int, count: int) -> RawTable:
+        def read(columns: Sequence[int]) -> Content:
+            return _read(stream, layout, block, tuple(columns))
+
+        units = tuple("s" if k == "stamp" else u for k, u in zip(layout.kinds, layout.units, strict=True))
+        return RawTable(
+            stream.source,
+            layout.names,
+            units,
+            read,
+            layout.header_line,
+            f"block {index + 1}" if count > 1 else "",
+            _form(stream, layout),
+            odd=layout.odd,
+        )
+
+
+def _form(stream: TextStream, layout: Layout) -> dict[str, str | int]:
+    """What a profile may keep: not the place of the header, which differs from file to file."""
+    form: dict[str, str | int] = {"separator": layout.separator, "decimal": layout.decimal}
+    return form if stream.original_encoding.startswith("utf") else {**form, "encoding": stream.original_encoding}
+
+
+def _read(stream: TextStream, layout: Layout, block: Block, columns: tuple[int, ...]) -> Content:
+    form = Form(stream, layout, columns)
+    block, findings = _without_cut_row(form, block)
+    spool, odd, line, size = Spool(columns), False, block.line, 0
+    starts: list[int] = []
+    numbers: list[int] = []
+    fast = block.stop - block.start > BULK_FROM
+    at = block.start
+    for chunk in stream.chunks(block.start, block.stop):
+        at += len(chunk)
+        stream.check(chunk, line)
+        rows = read_bulk(chunk, line, form) if fast else None
+        if rows is None:
+            rows = read_cells(chunk, line, form, final=at >= stream.stop)
+        spool.add(rows.values)
+        for i in _stretches(rows.lines, numbers[-1] + size - starts[-1] if starts else None):
+            starts.append(size + int(i))
+            numbers.append(int(rows.lines[i]))
+        size += rows.lines.size
+        odd |= rows.odd
+        line += chunk.count(b"\n")
+    if not size:
+        raise stream.source.refuse("E_NO_DATA", "a header without data", mend="export the file again")
+    if odd:
+        text = f"bytes that are no {'UTF-8' if stream.encoding == 'utf-8' else 'ASCII'} in columns that are not needed"
+        findings = (*findings, Finding("W_ENCODING", text))
+    return Content(spool.arrays(), LineNumbers(size, tuple(starts), tuple(numbers)), findings)
+
+
+def _stretches(lines: np.ndarray, expected: int | None) -> np.ndarray:
+    """Rows at which the line is not the one after that of the row before."""
+    if not lines.size:
+        return np.empty(0, dtype=int)
+    jumps = np.flatnonzero(np.diff(lines) != 1) + 1
+    return jumps if expected == lines[0] else np.concatenate(([0], jumps))
+
+
+def _without_cut_row(form: Form, block: Block) -> tuple[Block, tuple[Finding, ...]]:
+    """Leave out a last row that no line end closes: its last number may be cut."""
+    stream = form.stream
+    size = min(block.stop - block.start, LONGEST_LINE + 2)
+    stream.file.seek(block.stop - size)
+    tail = stream.file.read(size)
+    last = tail[tail.rfind(b"\n") + 1 :]
+    if block.stop < stream.stop or not last.strip():
+        return block, ()
+    text = stream.decode(last)
+    line = block.line + _count_lines(stream, block.start, block.stop)
+    if text.lstrip()[:1] in ("#", "%"):
+        return block, ()
+    stream.check(last, line)
+    if len(last) > LONGEST_LINE:
+        raise too_long(stream.source, line)
+    width = form.layout.width
+    try:
+        cells = split(text, form.layout.separator)
+    except csv.Error as error:
+        raise stream.source.refuse(
+            "E_QUOTE", "a quote is not closed", line=line, mend="copy or export the file again"
+        ) from error
+    if len(cells) < width or (len(cells) == width and not cells[-1]):
+        raise field_count(form, len([c for c in cells if c]), line, True)
+    if len(cells) > width + 1:
+        raise field_count(form, len(cells), line, True)
+    finding = Finding("W_NO_EOL", f"the last row (line {line}) has no line end and may be cut: left out")
+    return replace(block, stop=block.stop - len(last)), (finding,)
+
+
+def _count_lines(stream: TextStream, start: int, stop: int) -> int:
+    return sum(chunk.count(b"\n") for chunk in stream.chunks(start, stop))

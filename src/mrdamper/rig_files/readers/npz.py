@@ -1,0 +1,87 @@
+"""NumPy archives; arrays of Python objects are refused, as loading them runs code."""
+
+from __future__ import annotations
+
+import zipfile
+
+import numpy as np
+
+from mrdamper.rig_files.readers.archive import UNREADABLE_ZIP, check_sizes, is_arrays, zipped_names
+from mrdamper.rig_files.readers.arrays import array_table, damaged, expand, pick, refusing_damage
+from mrdamper.rig_files.readers.base import MOST_COLUMNS, Hints, RawTable, Reader, Source
+
+_Column = tuple[str, str, tuple[str, int | str | None]]
+
+
+class Npz(Reader):
+    """Arrays by name."""
+
+    name = "npz"
+    title = "NumPy archive"
+    suffixes = (".npz",)
+
+    def recognises(self, source: Source) -> bool:
+        """A zip of arrays, or a damaged zip of that name."""
+        if not source.head(4).startswith(b"PK"):
+            return False
+        try:
+            return is_arrays(zipped_names(source))
+        except UNREADABLE_ZIP:
+            return source.suffix in self.suffixes
+
+    def tables(self, source: Source, hints: Hints) -> list[RawTable]:
+        """The arrays as columns; a matrix gives numbered ones, a structured array its fields."""
+        with refusing_damage(source, self.title):
+            columns, single = _columns(source)
+            constants = _numbers(source, single[:MOST_COLUMNS])
+        names, units, places = [c[0] for c in columns], [c[1] for c in columns], [c[2] for c in columns]
+
+        def load(column: int) -> np.ndarray:
+            member, part = places[column]
+            source.file.seek(0)
+            with np.load(source.file, allow_pickle=False) as archive:
+                array = archive[member]
+            return array[part] if isinstance(part, str) else pick(array, part)
+
+        return [array_table(source, names, units, load, title=self.title, constants=constants)]
+
+
+def _numbers(source: Source, names: list[str]) -> dict[str, float]:
+    source.file.seek(0)
+    with np.load(source.file, allow_pickle=False) as archive:
+        return {name: float(archive[name].reshape(-1)[0]) for name in names}
+
+
+def _columns(source: Source) -> tuple[list[_Column], list[str]]:
+    """Name, unit and place of every column, and the arrays of one number, by the headers of the arrays alone."""
+    try:
+        archive = zipfile.ZipFile(source.file)
+    except UNREADABLE_ZIP as error:
+        raise damaged(source, Npz.title, "end of file not found") from error
+    with archive:
+        check_sizes(source, archive.infolist())
+        found: list[_Column] = []
+        single: list[str] = []
+        for member in archive.infolist():
+            name = member.filename.removesuffix(".npy")
+            with archive.open(member) as stream:
+                version = np.lib.format.read_magic(stream)
+                read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+                shape, _, dtype = read(stream)
+            if dtype.hasobject:
+                raise source.refuse(
+                    "E_UNSAFE", f"array {name!r} holds pickled objects, which run code when loaded",
+                    mend="save plain arrays of numbers",
+                )  # fmt: skip
+            if int(np.prod(shape, dtype=object)) * dtype.itemsize > member.file_size:
+                raise damaged(source, Npz.title, f"array {name!r} is incomplete")
+            if dtype.names:
+                found += [(field, "", (name, field)) for field in dtype.names]
+            elif np.prod(shape, dtype=object) > 1:
+                unit = "s" if dtype.kind in "Mm" else ""
+                found += [(column, unit, (name, part)) for column, part in expand(name, shape)]
+            elif dtype.kind in "iuf" and np.prod(shape, dtype=object) == 1:
+                single.append(name)
+    if not found:
+        raise source.refuse("E_NO_DATA", "no array of numbers", mend="save the channels as arrays")
+    return found, single

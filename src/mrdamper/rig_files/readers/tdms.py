@@ -1,0 +1,81 @@
+"""TDMS of LabVIEW, by npTDMS: scaled channels, one table a group."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mrdamper.rig_files.readers.arrays import array_table, check_unpacked, damaged, load, refusing_damage
+from mrdamper.rig_files.readers.base import Hints, RawTable, Reader, Source
+
+# pyright: reportMissingImports=false
+
+_UNIT_NAMES = ("unit_string", "NI_UnitDescription", "unit", "units", "Unit", "Units")
+_WAVE_TIME = "Time"
+
+
+class Tdms(Reader):
+    """Groups of channels with their unit_string; a waveform's step makes the time."""
+
+    name = "tdms"
+    title = "TDMS"
+    suffixes = (".tdms",)
+    library = "nptdms"
+
+    def recognises(self, source: Source) -> bool:
+        """By the mark at the start."""
+        return source.head(4) == b"TDSm"
+
+    def tables(self, source: Source, hints: Hints) -> list[RawTable]:
+        """One table a group; raw volts are refused later, by their unit."""
+        nptdms = load("nptdms", self.title)
+        with refusing_damage(source, self.title):
+            source.file.seek(0)
+            file = nptdms.TdmsFile.read_metadata(source.file)
+            total = sum(len(channel) for group in file.groups() for channel in group.channels())
+            if total > source.size:
+                raise damaged(source, self.title, "truncated: fewer samples than it says")
+            check_unpacked(source, 8 * total)
+            source.file.seek(0)
+            file = nptdms.TdmsFile.read(source.file)
+            if getattr(file, "file_status", None) is not None and file.file_status.incomplete_final_segment:
+                raise damaged(source, self.title, "the last segment is incomplete")
+        tables = [
+            _table(source, group.name, list(group.channels()), self.title)
+            for group in file.groups()
+            if group.channels()
+        ]
+        if not tables:
+            raise source.refuse("E_NO_DATA", "no channels", mend="export the file again")
+        return tables
+
+
+def _table(source: Source, group: str, channels: list[Any], title: str) -> RawTable:
+    names = [channel.name for channel in channels]
+    units = [_unit(channel) for channel in channels]
+    step = next((s for s in (_step(channel) for channel in channels) if s), None)
+    sizes = {len(channel) for channel in channels if len(channel)}
+    wave = step is not None and len({s for s in (_step(c) for c in channels) if s}) == 1 and len(sizes) == 1
+    wave = wave and not any(name.casefold().startswith(("time", "zeit")) for name in names)
+    if wave:
+        names, units = [*names, _WAVE_TIME], [*units, "s"]
+
+    def column_of(column: int) -> np.ndarray:
+        if column == len(channels):
+            return np.arange(max(sizes)) * (step or 1.0)
+        data = np.asarray(channels[column][:])
+        return data if data.dtype.kind in "iufMm" else np.empty(data.shape, dtype="U1")
+
+    return array_table(source, names, units, column_of, label=group, title=title)
+
+
+def _unit(channel: Any) -> str:
+    if getattr(channel.dtype, "kind", "") in "Mm":
+        return "s"
+    return next((str(channel.properties[n]) for n in _UNIT_NAMES if channel.properties.get(n)), "")
+
+
+def _step(channel: Any) -> float | None:
+    step = channel.properties.get("wf_increment")
+    return float(step) if isinstance(step, (int, float)) and step > 0 else None

@@ -1,0 +1,123 @@
+"""XLSX: a sheet is read as the text it shows, so that header and units are found as in text."""
+
+from __future__ import annotations
+
+import datetime
+import math
+import zipfile
+from collections.abc import Iterable
+from dataclasses import replace
+
+from mrdamper.errors import InputError
+from mrdamper.rig_files.readers.archive import UNREADABLE_ZIP, check_sizes, is_workbook, zipped_names
+from mrdamper.rig_files.readers.arrays import damaged, load, refusing_damage
+from mrdamper.rig_files.readers.base import MOST_COLUMNS, Hints, RawTable, Reader, Source
+from mrdamper.rig_files.readers.delimited import DelimitedText
+from mrdamper.rig_files.readers.scratch import Scratch
+
+_FLAT = str.maketrans({"\t": " ", "\n": " ", "\r": " ", '"': "''", "\0": " "})
+
+
+class Workbook(Reader):
+    """Workbooks of Excel and others; cached values of formulas, nothing is computed."""
+
+    name = "xlsx"
+    title = "XLSX workbook"
+    suffixes = (".xlsx", ".xlsm")
+    library = "openpyxl"
+    seconds_per_byte = 5e-6  # a sheet is slow to read: some microseconds a cell of some bytes
+
+    def recognises(self, source: Source) -> bool:
+        """A zip with sheets, or a damaged zip of that name."""
+        if not source.head(4).startswith(b"PK"):
+            return False
+        try:
+            return is_workbook(zipped_names(source))
+        except UNREADABLE_ZIP:
+            return source.suffix in self.suffixes
+
+    def tables(self, source: Source, hints: Hints) -> list[RawTable]:
+        """One table a sheet that holds one."""
+        try:
+            with zipfile.ZipFile(source.file) as archive:
+                members = archive.infolist()
+        except UNREADABLE_ZIP as error:
+            raise damaged(source, self.title, "end of file not found") from error
+        check_sizes(source, members)
+        with refusing_damage(source, self.title):
+            sheets = _sheets(source, hints)
+        form = replace(hints, separator="\t", encoding="utf-8", decimal=None)
+        found: list[RawTable] = []
+        first: InputError | None = None
+        for name, sheet in sheets:
+            try:
+                found += [_labelled(table, name, source) for table in DelimitedText().tables(sheet, form)]
+            except InputError as error:
+                first = first or error
+        if not found:
+            raise first or source.refuse("E_NO_DATA", "no sheet holds data", mend="export the file again")
+        return found if len(found) > 1 else [replace(found[0], label="")]
+
+
+def _labelled(table: RawTable, sheet: str, source: Source) -> RawTable:
+    return replace(table, label=table.label or sheet, form={"sheet": sheet})
+
+
+def _sheets(source: Source, hints: Hints) -> list[tuple[str, Source]]:
+    source.file.seek(0)
+    book = load("openpyxl", Workbook.title).load_workbook(
+        source.file, read_only=True, data_only=True, keep_links=False, keep_vba=False
+    )
+    names = [sheet.title for sheet in book.worksheets]
+    if hints.sheet is not None and hints.sheet not in names:
+        raise source.refuse(
+            "E_COLUMN",
+            f"no sheet {hints.sheet!r} (found {', '.join(names)})",
+            mend="correct [file] sheet of the profile",
+        )
+    texts = []
+    for sheet in book.worksheets:
+        if hints.sheet is None or sheet.title == hints.sheet:
+            sheet.reset_dimensions()
+            text = _as_text(source, sheet.title, sheet.iter_rows(values_only=True))
+            if text.size:
+                texts.append((sheet.title, text))
+    book.close()
+    if not texts:
+        raise source.refuse("E_NO_DATA", "the sheets are empty", mend="export the file again")
+    return texts
+
+
+def _as_text(source: Source, title: str, rows: Iterable[tuple]) -> Source:
+    file = Scratch(source.keep)
+    width, blank = 0, 0
+    for number, row in enumerate(rows, 1):
+        cells = [_shown(cell) for cell in row]
+        while cells and not cells[-1]:
+            cells.pop()
+        if len(cells) > MOST_COLUMNS:
+            raise source.refuse("E_TOO_MANY_COLUMNS", f"{len(cells)} columns", line=number, mend="export fewer")
+        if not cells:
+            blank += 1
+            continue
+        width = max(width, len(cells))
+        file.write(b"\n" * blank)
+        blank = 0
+        # Trailing empty cells are not stored in a sheet: a row may be shorter than its header.
+        file.write(("\t".join(cells + [""] * (width - len(cells))) + "\n").encode("utf-8", "replace"))
+    return Source(source.path, f"{source.name}, sheet {title}", ".txt", file.file, file.size, source.keep)
+
+
+def _shown(cell: object) -> str:
+    if cell is None:
+        return ""
+    if isinstance(cell, bool):
+        return str(cell).upper()
+    if isinstance(cell, float):
+        return repr(cell) if math.isfinite(cell) else "inf"
+    if isinstance(cell, (datetime.datetime, datetime.time)):
+        return cell.isoformat()
+    if isinstance(cell, datetime.timedelta):
+        return f"{cell.total_seconds()!r}"
+    text = str(cell).translate(_FLAT).strip()
+    return f"({text})" if text.startswith("#") and text != "#N/A" else text

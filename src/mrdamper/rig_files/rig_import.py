@@ -1,0 +1,277 @@
+"""From a rig's files to records and datasets: `read_run`, `import_files`, `to_dataset`."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from mrdamper.data import Dataset
+from mrdamper.errors import ColumnError, InputError, UnitError
+from mrdamper.rig_files.columns import assign, propose
+from mrdamper.rig_files.long_records import judge_long
+from mrdamper.rig_files.profile import Channel, Profile, current_pattern, load_profile, profile_hash
+from mrdamper.rig_files.readers import RawTable, RigFileError, raw_tables, suffixes
+from mrdamper.rig_files.record import Record
+from mrdamper.rig_files.rig_record import as_data, held_current, joined, record_of
+
+
+@dataclass(frozen=True, eq=False)
+class Refusal:
+    """A file that cannot be used, and why.
+
+    Attributes
+    ----------
+    file : str
+    error : InputError
+    """
+
+    file: str
+    error: InputError
+
+
+@dataclass(frozen=True, eq=False)
+class ImportResult:
+    """What came of a set of files.
+
+    Attributes
+    ----------
+    records : tuple of Record
+        Accepted, with their findings, in the order of the files.
+    refusals : tuple of Refusal
+    """
+
+    records: tuple[Record, ...]
+    refusals: tuple[Refusal, ...] = ()
+
+
+def read_run(path: str | Path, profile: Profile | str | Path | None = None) -> Record:
+    """Read one test from a rig's file and judge it.
+
+    Parameters
+    ----------
+    path : path
+        Delimited text, workbook, Parquet, MAT, HDF5, TDMS, MDF or NPZ, also packed as gz or zip.
+    profile : Profile or path, optional
+        What the file does not say.
+
+    Returns
+    -------
+    Record
+        SI channels, NaN where a sample is missing, with findings. Its current is None where
+        neither file, name nor profile states one.
+
+    Raises
+    ------
+    InputError
+        With a stable code, the file, the line and column where there is one, and the remedy.
+    """
+    records = read_runs(path, profile)
+    if len(records) != 1:
+        raise RigFileError(
+            "E_BLOCKS",
+            f"holds {len(records)} tests",
+            file=Path(path).name,
+            mend='use read_runs, or say blocks = "join" under [file] of a profile',
+        )
+    return records[0]
+
+
+def read_runs(path: str | Path, profile: Profile | str | Path | None = None) -> tuple[Record, ...]:
+    """Read every test of a rig's file and judge it: testing machines record several blocks.
+
+    Raises
+    ------
+    InputError
+        As `read_run`.
+    """
+    from mrdamper.rig_files.quality import judge
+
+    with np.errstate(all="ignore"):  # numbers near the end of the range overflow in sums and are refused as such
+        return tuple(judge_long(record, judge) for record in _unjudged(Path(path), _profile(profile)))
+
+
+def guess_profile(path: str | Path, profile: Profile | str | Path | None = None) -> Profile:
+    """How a file is read, as a profile that can be saved, completed and used for its folder.
+
+    Reading with it gives the same record. What the file does not say is left out of it.
+
+    Raises
+    ------
+    InputError
+        If the form of the file cannot be found.
+    """
+    profile = _profile(profile)
+    with raw_tables(path, profile.hints) as tables:
+        table, channels = _guess_channels(tables, profile)
+    form = {**table.form, **profile.file.model_dump(exclude_defaults=True)}
+    if not any(table.names):
+        form["names"] = tuple(f"column {i + 1}" for i in range(len(table.names)))
+    stated = "current" in channels or held_current(table) is not None
+    pattern = None if stated else current_pattern(Path(path).name)
+    update = {
+        "file": type(profile.file)(**form),  # type: ignore[arg-type]
+        "channels": {**profile.channels, **channels},
+        "current": profile.current or pattern,
+    }
+    return profile.model_copy(update=update)
+
+
+def _guess_channels(tables: list[RawTable], profile: Profile) -> tuple[RawTable, dict[str, Channel]]:
+    try:
+        table = _tables_with_channels(tables, profile)[0]
+        places = {name: (entry.column, entry.unit) for name, entry in assign(table, profile).items()}
+    except (ColumnError, UnitError, RigFileError):
+        table = tables[0]
+        places = {name: place for name, place in propose(table).items() if name not in profile.channels}
+    channels = {}
+    for name, (column, unit) in places.items():
+        says = {"column": None if column is None else _column(table, column), "unit": unit or None}
+        channels[name] = profile.channels.get(name, Channel()).model_copy(update=says)
+    return table, channels
+
+
+def first_file(paths: Sequence[str | Path]) -> Path:
+    """The first file among files and folders."""
+    return _files(paths)[0]
+
+
+def import_files(paths: Iterable[str | Path], profile: Profile | str | Path | None = None) -> ImportResult:
+    """Read and judge files and folders of files; a refused file does not stop the others.
+
+    Parameters
+    ----------
+    paths : iterable of path
+        Of a folder, every file with a suffix of a known format is read, in the order of names.
+    profile : Profile or path, optional
+        For all of them.
+
+    Raises
+    ------
+    InputError
+        If the profile cannot be read, or a folder holds no rig's file.
+    """
+    profile = _profile(profile)
+    records: list[Record] = []
+    refusals: list[Refusal] = []
+    for path in _files(paths):
+        try:
+            read = read_runs(path, profile)
+            _require_current(read, path)
+            records.extend(read)
+        except InputError as error:
+            refusals.append(Refusal(str(path), error))
+    return ImportResult(_with_unique_ids(records), tuple(refusals))
+
+
+def to_dataset(records: Sequence[Record], name: str = "dataset") -> Dataset:
+    """The runs of judged records, with their provenance as notes.
+
+    Raises
+    ------
+    InputError
+        If a record has no current, or there is no record.
+    """
+    from mrdamper.rig_files.to_run import to_run
+
+    for record in records:
+        _require_current([record], Path(record.provenance.get("file", record.id)))
+    return Dataset(tuple(to_run(record) for record in records), name)
+
+
+def _profile(profile: Profile | str | Path | None) -> Profile:
+    if profile is None:
+        return Profile()
+    return profile if isinstance(profile, Profile) else load_profile(profile)
+
+
+def _unjudged(path: Path, profile: Profile) -> list[Record]:
+    with raw_tables(path, profile.hints) as tables:
+        tables = _tables_with_channels(tables, profile)
+        records = [record_of(table, profile, path) for table in tables]
+        digest = _digest(path)
+    records = joined(records, profile, tables)
+    remarks = {"file": as_data(path.name), "sha256": digest}
+    if profile != Profile():
+        remarks["profile_sha256"] = profile_hash(profile)
+    records = [replace(record, provenance={**remarks, **record.provenance}) for record in records]
+    if len({record.id for record in records}) < len(records):
+        records = [replace(record, id=f"{record.id}_{i}") for i, record in enumerate(records, 1)]
+    return records
+
+
+def _tables_with_channels(tables: list[RawTable], profile: Profile) -> list[RawTable]:
+    """Leave out the tables of a file that hold something else, if one or more hold a test."""
+    if len(tables) == 1:
+        return tables
+    first = None
+    for fallback in (False, True):
+        fitting = []
+        for table in tables:
+            if table.fallback is not fallback:
+                continue
+            try:
+                assign(table, profile)
+                fitting.append(table)
+            except InputError as error:
+                first = first or error
+        if fitting:
+            return fitting
+    raise first or RigFileError("E_NO_DATA", "no table in this file")
+
+
+def _column(table: RawTable, column: int) -> str | int:
+    name = table.names[column]
+    return name if name and table.names.count(name) == 1 else column + 1
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _files(paths: Iterable[str | Path]) -> list[Path]:
+    files: list[Path] = []
+    for path in map(Path, paths):
+        if not path.is_dir():
+            files.append(path)
+            continue
+        known = suffixes()
+        inside = sorted(
+            Path(folder) / name
+            for folder, _, names in os.walk(path)
+            for name in names
+            if Path(name).suffix.lower() in known and not name.startswith(".")
+        )
+        if not inside:
+            raise RigFileError("E_NO_DATA", "no rig's file in this folder", file=str(path), mend="give another folder")
+        files.extend(inside)
+    return files
+
+
+def _require_current(records: Sequence[Record], path: Path) -> None:
+    if any(record.current is None for record in records):
+        why = [f.text for record in records for f in record.findings if f.text.startswith("the current channel")]
+        raise ColumnError(
+            why[0] if why else "no coil current in a column or in the file name",
+            where=path.name,
+            mend='say [current] value = 0.5, [current] pattern = "*_{current}A_*" or '
+            '[channels.current] column = "..." in a profile',
+            code="E_CURRENT_MISSING",
+        )
+
+
+def _with_unique_ids(records: Sequence[Record]) -> tuple[Record, ...]:
+    taken: set[str] = set()
+    unique = []
+    for record in records:
+        name, i = record.id, 2
+        while name in taken:
+            name, i = f"{record.id}_{i}", i + 1
+        taken.add(name)
+        unique.append(record if name == record.id else replace(record, id=name))
+    return tuple(unique)

@@ -1,0 +1,234 @@
+"""A process of its own for libraries that damaged files can crash, hang or fill the memory with.
+
+Readers that name a `library` are run here. Parent and child speak in lines of JSON, with
+the bytes of columns behind them; nothing is pickled. The child stops itself when a file
+takes more processor time or memory than its size warrants, and a new one takes its place.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import json
+import os
+import select
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mrdamper.errors import MissingExtraError
+from mrdamper.rig_files.readers.base import MOST_RATIO, Content, Hints, RawTable, Reader, RigFileError, Source
+from mrdamper.rig_files.record import Finding, LineNumbers
+
+_SECONDS = 0.25  # processor time of the child for the smallest file
+_BYTES, _BYTES_PER_BYTE = 96 * 2**20, 3 * MOST_RATIO  # memory the child may write to beyond what its library holds
+_GLANCE, _GLANCES = 0.15, 4  # seconds between looks at a silent child, looks at which it sleeps until it is ended
+_PATIENCE = 30  # real time over processor time, on a loaded machine
+_START = (
+    "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
+    "from mrdamper.rig_files.sandbox_worker import serve; serve()"
+)
+
+
+@contextlib.contextmanager
+def guarded_tables(source: Source, reader: Reader, hints: Hints) -> Iterator[list[RawTable]]:
+    """The tables of a file, read by a process of its own.
+
+    Parameters
+    ----------
+    source : Source
+    reader : Reader
+    hints : Hints
+
+    Raises
+    ------
+    RigFileError
+        What the reader raises; E_FORMAT if its library crashes, hangs or takes too much memory.
+    MissingExtraError
+        If the library is not installed.
+    """
+    with contextlib.ExitStack() as stack:
+        path = _on_disk(source, stack)
+        sandbox = stack.enter_context(SANDBOXES.taken(reader.name))
+        request = {"reader": reader.name, "path": str(path), "name": source.name, "suffix": source.suffix}
+        limits = {
+            "seconds": _SECONDS + reader.seconds_per_byte * source.size,
+            "bytes": _BYTES + _BYTES_PER_BYTE * source.size,
+        }
+        asked = _Asked(sandbox, source, reader.title, limits["seconds"] * _PATIENCE + 30)
+        answer = asked({**request, **limits, "hints": asdict(hints)})
+        yield [asked.table(i, table) for i, table in enumerate(answer["tables"])]
+
+
+class _Asked:
+    """One file in the sandbox."""
+
+    def __init__(self, sandbox: _Sandbox, source: Source, title: str, patience: float):
+        self._sandbox, self._source, self._title, self._patience = sandbox, source, title, patience
+
+    def __call__(self, request: dict[str, Any]) -> dict[str, Any]:
+        answer = self._sandbox.ask(request, self._patience)
+        if answer is None:
+            raise self._source.refuse(
+                "E_FORMAT",
+                f"damaged {self._title}: reading it crashes, or takes far more time or memory than its size warrants",
+                mend="copy or export the file again",
+            )
+        if "missing" in answer:
+            raise MissingExtraError(answer["missing"], where=self._source.name, mend=answer["mend"])
+        if "code" in answer:
+            raise RigFileError(
+                answer["code"], answer["found"], file=self._source.name, line=answer["line"],
+                column=answer["column"], mend=answer["mend"],
+            )  # fmt: skip
+        return answer
+
+    def table(self, index: int, table: dict[str, Any]) -> RawTable:
+        """A table whose columns are asked for when they are needed."""
+
+        def read(columns: Sequence[int]) -> Content:
+            answer = self({"table": index, "columns": list(columns)})
+            values = {c: self._sandbox.receive(n) for c, n in zip(columns, answer["sizes"], strict=True)}
+            lines = answer["lines"] and LineNumbers(answer["lines"][0], *map(tuple, answer["lines"][1:]))
+            return Content(values, lines, tuple(Finding(*finding) for finding in answer["findings"]))
+
+        return RawTable(
+            self._source, tuple(table["names"]), tuple(table["units"]), read,
+            table["line"], table["label"], table["form"], table["fallback"], table["constants"], tuple(table["odd"]),
+        )  # fmt: skip
+
+
+class _Sandbox:
+    """The child process."""
+
+    def __init__(self) -> None:
+        environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "POLARS_MAX_THREADS": "2"}
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", _START, json.dumps(sys.path)],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment,
+        )  # fmt: skip
+
+    @property
+    def alive(self) -> bool:
+        return self._process.poll() is None
+
+    def ask(self, request: dict[str, Any], patience: float) -> dict[str, Any] | None:
+        """The child's answer, None if it died over it."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        try:
+            self._process.stdin.write(json.dumps(request).encode() + b"\n")
+            self._process.stdin.flush()
+            self._watch(patience)
+            answer = self._process.stdout.readline()
+        except OSError:
+            answer = b""
+        if not answer.endswith(b"\n"):
+            self.close()
+            return None
+        return json.loads(answer)
+
+    def _watch(self, patience: float) -> None:
+        """Wait for an answer; end a child that sleeps on a lock of its own, or takes forever."""
+        assert self._process.stdout is not None
+        begin, asleep = time.monotonic(), 0
+        while os.name == "posix" and not select.select([self._process.stdout], [], [], _GLANCE)[0]:
+            asleep = asleep + 1 if _sleeps(self._process.pid) else 0
+            if asleep >= _GLANCES or time.monotonic() - begin > patience:
+                self._process.kill()
+                return
+
+    def prepare(self, reader: str) -> None:
+        """Load a reader's library while nobody waits."""
+        assert self._process.stdin is not None
+        with contextlib.suppress(OSError):
+            self._process.stdin.write(json.dumps({"prepare": reader}).encode() + b"\n")
+            self._process.stdin.flush()
+
+    def receive(self, size: int) -> np.ndarray:
+        """The numbers that follow an answer."""
+        assert self._process.stdout is not None
+        values = np.empty(size)
+        view = values.data.cast("B")
+        at = 0
+        while at < len(view):
+            count = self._process.stdout.readinto(view[at:])  # type: ignore[attr-defined]
+            if not count:
+                raise RigFileError("E_FORMAT", "the reading process ended early")
+            at += count
+        return values
+
+    def close(self) -> None:
+        self._process.kill()
+        for pipe in (self._process.stdin, self._process.stdout):
+            with contextlib.suppress(OSError):
+                pipe.close()  # type: ignore[union-attr]
+        self._process.wait()
+
+
+class _Sandboxes:
+    """The one child of this process, started when it is first needed."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._sandbox: _Sandbox | None = None
+        self._owner = 0
+
+    @contextlib.contextmanager
+    def taken(self, reader: str) -> Iterator[_Sandbox]:
+        """The child, for one file at a time; if it dies, its successor makes ready for that reader."""
+        with self._lock:
+            if self._owner != os.getpid():  # a fork must not share its parent's pipes
+                self._sandbox, self._owner = None, os.getpid()
+            if self._sandbox is None or not self._sandbox.alive:
+                self._sandbox = _Sandbox()
+            sandbox = self._sandbox
+            try:
+                yield sandbox
+            finally:
+                if not sandbox.alive:
+                    self._sandbox = _Sandbox()
+                    self._sandbox.prepare(reader)
+
+    def close(self) -> None:
+        if self._sandbox is not None and self._owner == os.getpid():
+            self._sandbox.close()
+        self._sandbox = None
+
+
+def _sleeps(pid: int) -> bool:
+    """Whether every thread of a process waits for something else than a processor or a disk."""
+    try:
+        states = [stat.read_text().rpartition(")")[2].split()[0] for stat in Path(f"/proc/{pid}/task").glob("*/stat")]
+    except (OSError, IndexError):
+        return False
+    return bool(states) and all(state == "S" for state in states)
+
+
+def _on_disk(source: Source, stack: contextlib.ExitStack) -> Path:
+    """A path of the unpacked content."""
+    if source.name == source.path.name and source.size == source.path.stat().st_size:
+        return source.path
+    copy = stack.enter_context(tempfile.NamedTemporaryFile(prefix="mrdamper-"))  # noqa: SIM115
+    source.file.seek(0)
+    while piece := source.file.read(2**20):
+        copy.write(piece)
+    copy.flush()
+    return Path(copy.name)
+
+
+def close() -> None:
+    """End the reading process; the next file starts another."""
+    SANDBOXES.close()
+
+
+SANDBOXES = _Sandboxes()
+atexit.register(close)

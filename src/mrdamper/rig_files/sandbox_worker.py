@@ -1,0 +1,114 @@
+"""The child of `sandbox`: reads files with libraries that may not survive it."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from mrdamper.errors import MissingExtraError
+from mrdamper.rig_files.readers.base import Hints, RawTable, Reader, RigFileError, Source
+
+
+def serve() -> None:
+    """Answer requests until the parent hangs up."""
+    replies = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what libraries print must not come between the answers
+    with ExitStack() as keep:
+        tables: list[RawTable] = []
+        for line in sys.stdin.buffer:
+            request = json.loads(line)
+            try:
+                if "prepare" in request:
+                    _library(request["prepare"])
+                elif "reader" in request:
+                    keep.close()
+                    tables = _open(request, keep)
+                    _send(replies, {"tables": [_described(table) for table in tables]})
+                else:
+                    _send_columns(replies, tables[request["table"]], request["columns"])
+            except MissingExtraError as error:
+                if "prepare" in request:
+                    continue
+                _send(replies, {"missing": error.found, "mend": error.mend})
+            except RigFileError as error:
+                fields = {name: getattr(error, name) for name in ("code", "found", "line", "column", "mend")}
+                _send(replies, fields)
+            except MemoryError:
+                os._exit(3)
+
+
+def _library(name: str) -> Reader:
+    """The reader of that name, with its library loaded."""
+    from mrdamper.rig_files.readers import all_readers
+    from mrdamper.rig_files.readers.arrays import load
+
+    reader = all_readers()[name]()
+    _limit(None)
+    load(reader.library, reader.title)
+    reader.warm_up()
+    return reader
+
+
+def _open(request: dict[str, Any], keep: ExitStack) -> list[RawTable]:
+    reader = _library(request["reader"])
+    _limit(request["seconds"], request["bytes"])
+    path = Path(request["path"])
+    file = keep.enter_context(path.open("rb"))
+    source = Source(path, request["name"], request["suffix"], file, path.stat().st_size, keep)
+    hints = request["hints"]
+    return reader.tables(source, Hints(**{**hints, "names": tuple(hints["names"])}))
+
+
+def _limit(seconds: float | None, size: float = 0) -> None:
+    """From here on, this much processor time and memory; beyond, the system ends the process. None lifts it.
+
+    Memory is what is written to (RLIMIT_DATA). Address space would be the wrong measure:
+    allocators of many threads reserve half a gigabyte of it and use a tenth.
+    """
+    if not hasattr(signal, "setitimer"):
+        return
+    import resource
+
+    signal.signal(signal.SIGPROF, signal.SIG_DFL)
+    signal.setitimer(signal.ITIMER_PROF, seconds or 0.0)
+    hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
+    status = Path("/proc/self/status")
+    if seconds is None or not status.exists():
+        resource.setrlimit(resource.RLIMIT_DATA, (hard, hard))
+        return
+    now = next(int(line.split()[1]) * 1024 for line in status.read_text().splitlines() if line.startswith("VmData"))
+    resource.setrlimit(resource.RLIMIT_DATA, (now + int(size), hard))
+
+
+def _send(replies: BinaryIO, answer: dict[str, Any]) -> None:
+    replies.write(json.dumps(answer).encode() + b"\n")
+    replies.flush()
+
+
+def _send_columns(replies: BinaryIO, table: RawTable, columns: list[int]) -> None:
+    content = table.read(columns)
+    values = [content.values[column] for column in columns]
+    lines = content.lines
+    answer = {
+        "sizes": [array.size for array in values],
+        "lines": None if lines is None else [lines.size, lines.starts, lines.lines],
+        "findings": [[finding.code, finding.text] for finding in content.findings],
+    }
+    _send(replies, answer)
+    for array in values:
+        replies.write(np.ascontiguousarray(array).data)
+    replies.flush()
+
+
+def _described(table: RawTable) -> dict[str, Any]:
+    return {
+        name: getattr(table, name)
+        for name in ("names", "units", "line", "label", "form", "fallback", "constants", "odd")
+    }

@@ -1,0 +1,98 @@
+"""Acquisition blocks: testing machines repeat the header where they start to record again."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+
+from mrdamper.rig_files.text.layout import Layout, is_comment, split, units_in
+from mrdamper.rig_files.text.stream import TextStream
+from mrdamper.rig_files.text.tokens import looks_numeric
+
+_LOOK_BACK = 64 * 1024  # bytes of remarks there may be above a repeated header
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Bytes of the text between which rows stand, and the line they start at."""
+
+    start: int
+    stop: int
+    line: int
+
+
+def find_blocks(stream: TextStream, layout: Layout, start: int, stop: int) -> list[Block]:
+    """The blocks between two places of a text; one where the header is not repeated."""
+    if not layout.header.strip():
+        return [Block(start, stop, layout.data_line)]
+    header = layout.header.strip(" \t\r").encode("utf-8" if stream.encoding == "utf-8" else stream.encoding, "ignore")
+    blocks: list[Block] = []
+    at, line, begin, begin_line = start, layout.data_line, start, layout.data_line
+    tail = b""
+    for chunk in stream.chunks(start, stop):
+        stream.check(chunk, line)
+        found = chunk.find(header)
+        while found >= 0:
+            line_start = chunk.rfind(b"\n", 0, found) + 1
+            line_end = chunk.find(b"\n", found)
+            line_end = len(chunk) if line_end < 0 else line_end + 1
+            if chunk[line_start:line_end].strip() == header.strip():
+                before = (tail + chunk[:line_start])[-_LOOK_BACK:]
+                blocks.append(Block(begin, at + line_start - _remarks(before, stream, layout), begin_line))
+                header_line = line + chunk.count(b"\n", 0, line_start)
+                size, skipped = _units_below(stream, layout, at + line_end, header_line)
+                begin, begin_line = at + line_end + size, header_line + 1 + skipped
+            found = chunk.find(header, line_end)
+        line += chunk.count(b"\n")
+        at += len(chunk)
+        tail = chunk[-_LOOK_BACK:]
+    blocks.append(Block(begin, stop, begin_line))
+    return [block for block in blocks if block.stop > block.start]
+
+
+def _units_below(stream: TextStream, layout: Layout, start: int, header_line: int) -> tuple[int, int]:
+    """Bytes and lines between a repeated header and its rows: those of units, which must be the file's.
+
+    Raises
+    ------
+    RigFileError
+        E_AMBIGUOUS if a later block is in other units.
+    """
+    usual = layout.units_line - layout.header_line if layout.units_line and layout.header_line else 0
+    size = lines = 0
+    for raw in stream.lines_at(start, max(0, usual)):
+        text = stream.decode(raw).rstrip("\r\n")
+        if _is_data(text, layout):
+            break
+        units = units_in(text, layout)
+        if units and units != layout.units:
+            raise stream.source.refuse(
+                "E_AMBIGUOUS",
+                f"the block from here on is in {', '.join(units)}, the first is in {', '.join(layout.units)}",
+                line=header_line,
+                mend="split the file here, or export all blocks in one set of units",
+            )
+        size, lines = size + len(raw), lines + 1
+    return size, lines
+
+
+def _remarks(before: bytes, stream: TextStream, layout: Layout) -> int:
+    """Bytes of the lines right above a header that are no rows of data."""
+    size = 0
+    for raw in reversed(before.split(b"\n")[:-1]):
+        if _is_data(stream.decode(raw).rstrip("\r"), layout):
+            break
+        size += len(raw) + 1
+    return min(size, len(before))
+
+
+def _is_data(text: str, layout: Layout) -> bool:
+    """Whether a line is a row, even a damaged one: those must not pass for remarks."""
+    if not text.strip() or is_comment(text):
+        return False
+    try:
+        cells = split(text, layout.separator)
+    except csv.Error:
+        return True
+    values = [cell for cell in cells if cell and looks_numeric(cell)]
+    return len(values) >= 2 or (len(values) == 1 and len(cells) == 1)

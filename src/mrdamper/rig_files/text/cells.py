@@ -1,0 +1,224 @@
+"""Rows of text to numbers, cell by cell: the reference the fast path must agree with."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mrdamper.data import Floats
+from mrdamper.rig_files.readers.base import RigFileError
+from mrdamper.rig_files.text.layout import Layout, is_comment, split
+from mrdamper.rig_files.text.stream import LONGEST_LINE, TextStream, too_long
+from mrdamper.rig_files.text.tokens import NUMBER, number, stamp
+
+_MARKS = "#%/"
+
+
+@dataclass(slots=True)
+class Clock:
+    """The first time stamp of a record, from which the others count."""
+
+    first: int | None = None
+    zoned: bool | None = None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Rows:
+    """Cells of adjacent rows as numbers.
+
+    Attributes
+    ----------
+    values : dict of int to (N,) array
+        By column.
+    lines : (N,) array
+        Line of every row.
+    odd : bool
+        Whether a cell that was not asked for holds bytes that are not in the text's encoding.
+    """
+
+    values: dict[int, Floats]
+    lines: np.ndarray
+    odd: bool = False
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Form:
+    """What is needed to read a row: the text, its layout, the columns wanted, the clock."""
+
+    stream: TextStream
+    layout: Layout
+    wanted: tuple[int, ...]
+    clock: Clock = field(default_factory=Clock)
+
+
+def read_cells(block: bytes, line: int, form: Form, *, final: bool = False) -> Rows:
+    """Read every row of a block of whole lines.
+
+    Parameters
+    ----------
+    block : bytes
+    line : int
+        Of the block's start.
+    form : Form
+    final : bool
+        Whether the text ends with this block.
+
+    Raises
+    ------
+    RigFileError
+        E_LINE_TOO_LONG, E_QUOTE, E_FIELD_COUNT, E_TRUNCATED, E_NUMBER, E_ENCODING, E_NONFINITE.
+    """
+    raw = block.split(b"\n")
+    if max(map(len, raw)) > LONGEST_LINE:
+        raise too_long(form.stream.source, line + next(i for i, r in enumerate(raw) if len(r) > LONGEST_LINE))
+    plain = block.isascii()
+    texts = form.stream.decode(block).split("\n")
+    rows, lines = _split_rows(texts, line, form, final)
+    values = {}
+    for column in form.wanted:
+        cells = [row[column] for row in rows]
+        read = _stamps if form.layout.kinds[column] == "stamp" else _numbers
+        values[column] = read(cells, column, lines, form)
+    return Rows(values, np.array(lines, dtype=np.int64), not plain and _odd(block, form))
+
+
+def read_row(text: str, line: int, form: Form) -> list[float]:
+    """The wanted cells of one row.
+
+    Raises
+    ------
+    RigFileError
+        As `read_cells`.
+    """
+    rows, lines = _split_rows([text], line, form, False)
+    return [float(_numbers([row[c] for row in rows], c, lines, form)[0]) for row in rows for c in form.wanted]
+
+
+def field_count(form: Form, found: int, line: int, final: bool) -> RigFileError:
+    """The refusal of a row with another number of cells than the others."""
+    width = form.layout.width
+    if final and found < width:
+        return form.stream.source.refuse(
+            "E_TRUNCATED",
+            f"the file ends inside a row: {found} of {width} fields",
+            line=line,
+            mend="copy or export the file again, or remove the last line",
+        )
+    comma = found > width and form.layout.separator == ","
+    return form.stream.source.refuse(
+        "E_FIELD_COUNT",
+        f"{found} fields where the other rows have {width}",
+        line=line,
+        mend="correct this line; numbers with decimal commas need semicolons between the fields"
+        if comma
+        else "correct or remove this line",
+    )
+
+
+def _split_rows(texts: Sequence[str], line: int, form: Form, final: bool) -> tuple[list[list[str]], list[int]]:
+    separator, width = form.layout.separator, form.layout.width + form.layout.trailing
+    rows: list[list[str]] = []
+    lines: list[int] = []
+    wrong: tuple[int, int] | None = None
+    for at, text in enumerate(texts, line):
+        stripped = text.strip(" \t\r")
+        if not stripped or (stripped[0] in _MARKS and is_comment(stripped)):
+            continue
+        if wrong is not None:
+            break
+        try:
+            cells = split(text.rstrip("\r"), separator)
+        except csv.Error as error:
+            raise form.stream.source.refuse(
+                "E_QUOTE", "a quote is not closed, or text follows it", line=at, mend="close it or remove it"
+            ) from error
+        if len(cells) != width and (len(cells) != form.layout.width):
+            wrong = at, len(cells)
+        elif any(cells):
+            rows.append(cells)
+            lines.append(at)
+    else:
+        if wrong is not None:
+            raise field_count(form, wrong[1], wrong[0], final)
+        return rows, lines
+    raise field_count(form, wrong[1], wrong[0], False)
+
+
+def _numbers(cells: Sequence[str], column: int, lines: Sequence[int], form: Form) -> Floats:
+    mark = form.layout.decimal
+    matches, comma = NUMBER[mark].fullmatch, mark == ","
+    values = np.empty(len(cells))
+    for i, cell in enumerate(cells):
+        value = float(cell.replace(",", ".") if comma else cell) if matches(cell) else number(cell, mark)
+        if value is None:
+            raise _no_number(cell, column, lines[i], form)
+        if math.isinf(value):
+            raise form.stream.source.refuse(
+                "E_NONFINITE",
+                f"{_shown(cell)} in {_named(form, column)} is beyond every number",
+                line=lines[i],
+                column=column + 1,
+                mend="export the channel again: an amplifier in overload is no measurement",
+            )
+        values[i] = value
+    return values
+
+
+def _stamps(cells: Sequence[str], column: int, lines: Sequence[int], form: Form) -> Floats:
+    clock = form.clock
+    values = np.empty(len(cells))
+    for i, cell in enumerate(cells):
+        read = stamp(cell)
+        if read is None:
+            if number(cell, ".") is not None and math.isnan(number(cell, ".") or 0.0):
+                values[i] = math.nan
+                continue
+            raise _no_number(cell, column, lines[i], form)
+        if clock.first is None:
+            clock.first, clock.zoned = read
+        if read[1] != clock.zoned:
+            raise form.stream.source.refuse(
+                "E_AMBIGUOUS",
+                "time stamps with and without a time zone",
+                line=lines[i],
+                column=column + 1,
+                mend="export all stamps with their offset, or none",
+            )
+        values[i] = (read[0] - clock.first) / 1e9
+    return values
+
+
+def _no_number(cell: str, column: int, line: int, form: Form) -> RigFileError:
+    strange = any("\udc80" <= c <= "\udcff" or c == "\ufffd" for c in cell)
+    if not cell.isascii() and form.stream.encoding != "utf-8":
+        strange = True
+    return form.stream.source.refuse(
+        "E_ENCODING" if strange else "E_NUMBER",
+        f"{_shown(cell)} in {_named(form, column)} is no number",
+        line=line,
+        column=column + 1,
+        mend=f"write digits with a decimal {'comma' if form.layout.decimal == ',' else 'point'}, "
+        "without separators of thousands",
+    )
+
+
+def _shown(cell: str) -> str:
+    return ascii(cell[:40]) + ("..." if len(cell) > 40 else "")
+
+
+def _named(form: Form, column: int) -> str:
+    return f"column {form.layout.names[column][:40]!r}" if form.layout.names[column] else f"column {column + 1}"
+
+
+def _odd(block: bytes, form: Form) -> bool:
+    if form.stream.encoding != "utf-8":
+        return form.stream.original_encoding == "cp1252"
+    try:
+        block.decode("utf-8")
+    except UnicodeDecodeError:
+        return True
+    return False

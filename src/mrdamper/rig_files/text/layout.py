@@ -1,0 +1,348 @@
+"""The form of a delimited text: separator, decimal mark, header, units, first row of data.
+
+Nothing is guessed: what the first lines do not settle is refused, with the profile's line
+that settles it.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from mrdamper.rig_files.readers.base import MOST_COLUMNS, Hints, RigFileError, Source
+from mrdamper.rig_files.text.tokens import looks_numeric, stamp
+from mrdamper.rig_files.units import is_unit
+
+Kind = Literal["number", "stamp", "text"]
+SPACES = " "  # stands for any run of spaces
+_SEPARATORS = (";", "\t", ",", "|", SPACES)
+_COMMENT = re.compile(r"^\s*(#(?!N/A|REF!|VALUE!|DIV/0|NAME\?|NULL!|NUM!)|%|//)+")  # a sheet's errors are cells
+_MARKS = frozenset("#%/")
+_SAMPLE = 60  # rows looked at
+_STRAY = 0.1  # of the sampled numbers: fewer with the other decimal mark are single bad cells
+_GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """How a delimited text is laid out; lines count from one.
+
+    Attributes
+    ----------
+    separator, decimal : str
+        A space stands for any run of spaces.
+    names, units : tuple of str
+        One a column; empty where there is none.
+    kinds : tuple of {"number", "stamp", "text"}
+        What the sampled cells look like.
+    header_line, units_line : int or None
+    data_line : int
+    trailing : bool
+        Whether every row ends with a separator.
+    header : str
+        The line of names as it stands, to find it again where it is repeated.
+    odd : tuple of str
+        One a column: a sampled cell of a column of kind "text", else empty.
+    """
+
+    separator: str
+    decimal: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    kinds: tuple[Kind, ...]
+    header_line: int | None
+    units_line: int | None
+    data_line: int
+    trailing: bool
+    header: str = ""
+    odd: tuple[str, ...] = ()
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return len(self.names)
+
+
+def find_layout(lines: Sequence[str], source: Source, hints: Hints) -> Layout:
+    """Sniff the layout from the first lines of a text.
+
+    Parameters
+    ----------
+    lines : sequence of str
+        Without line ends.
+    source : Source
+        For messages.
+    hints : Hints
+        Wins over what is sniffed.
+
+    Raises
+    ------
+    RigFileError
+        E_NO_DATA, E_AMBIGUOUS, E_FIELD_COUNT, E_TOO_MANY_COLUMNS, E_QUOTE.
+    """
+    separator = hints.separator or _separator(lines, source)
+    first, width, trailing = _first_row(lines, separator, source, hints)
+    if width > MOST_COLUMNS:
+        raise source.refuse("E_TOO_MANY_COLUMNS", f"{width} columns", line=first + 1, mend="is one sample one line?")
+    rows = _rows(lines[first:], separator, width, trailing)
+    decimal = hints.decimal or _decimal(rows, separator, source, first)
+    header, unit_row = _header_lines(lines, first, separator, width, source, hints)
+    _refuse_open_quote(lines, header, separator, source)
+    names = hints.names or (_cells(lines[header], separator, width) if header is not None else ("",) * width)
+    if len(names) != width:
+        raise _mismatch(source, separator, len(names), width, first, lines)
+    units = _cells(lines[unit_row], separator, width) if unit_row is not None else ("",) * width
+    columns = [[row[i] for row in rows if len(row) > i] for i in range(width)]
+    kinds: tuple[Kind, ...] = tuple(_kind(column) for column in columns)
+    return Layout(
+        separator,
+        decimal,
+        tuple(name.strip() for name in names),
+        tuple(_unbracket(unit) for unit in units),
+        kinds,
+        None if header is None else header + 1,
+        None if unit_row is None else unit_row + 1,
+        first + 1,
+        trailing,
+        lines[header] if header is not None and not is_comment(lines[header]) else "",
+        tuple(next(filter(None, c), "") if k == "text" else "" for c, k in zip(columns, kinds, strict=True)),
+    )
+
+
+def split(line: str, separator: str) -> list[str]:
+    """The stripped cells of a line.
+
+    Raises
+    ------
+    csv.Error
+        If a quote is not closed.
+    """
+    if separator == SPACES:
+        return line.split()
+    if '"' in line:
+        cells = next(csv.reader([line], delimiter=separator, strict=True, skipinitialspace=True))
+    else:
+        cells = line.split(separator)
+    return [cell.strip(" \t") for cell in cells]
+
+
+def units_in(line: str, layout: Layout) -> tuple[str, ...]:
+    """The units a line states, one a column; empty if it is no row of units."""
+    cells = _cells(line, layout.separator, layout.width)
+    return tuple(map(_unbracket, cells)) if len(cells) == layout.width and _is_units(cells) else ()
+
+
+def is_comment(line: str) -> bool:
+    """Whether a line is marked as a remark."""
+    return line.lstrip()[:1] in _MARKS and _COMMENT.match(line) is not None
+
+
+def _try_split(line: str, separator: str) -> list[str]:
+    try:
+        return split(line, separator)
+    except csv.Error:
+        return line.split(separator)
+
+
+def _content(lines: Sequence[str]) -> list[tuple[int, str]]:
+    return [(i, line) for i, line in enumerate(lines) if line.strip() and not is_comment(line)]
+
+
+def _separator(lines: Sequence[str], source: Source) -> str:
+    """The one under which the last lines at hand split into most numbers, evenly."""
+    content = [line for _, line in _content(lines)]
+    if not content:
+        raise source.refuse(
+            "E_NO_DATA", f"only remarks in the first {len(lines)} lines", mend="remove them, or export the data again"
+        )
+    best, most = "", 0.0
+    for separator in _SEPARATORS:
+        score = _evenness(content[-_SAMPLE:], separator)
+        if score > most + 1e-9:
+            best, most = separator, score
+    if best:
+        return best
+    # One column, or only a header: the separator does not matter, or the header shows it.
+    counts = {s: content[-1].count(s) for s in _SEPARATORS[:-1]}
+    return max(counts, key=lambda s: counts[s]) if any(counts.values()) else ","
+
+
+def _evenness(lines: Sequence[str], separator: str) -> float:
+    rows = [cells for cells in (_try_split(line, separator) for line in lines) if len(cells) > 1]
+    numeric = [sum(bool(cell) and looks_numeric(cell) for cell in row) for row in rows]
+    data = [len(row) for row, count in zip(rows, numeric, strict=True) if count >= 2 or 2 * count > len(row)]
+    if not data:
+        return 0.0
+    width, agreeing = Counter(data).most_common(1)[0]
+    filled = [sum(map(bool, row)) for row in rows if len(row) == width]
+    values = [count for row, count in zip(rows, numeric, strict=True) if len(row) == width]
+    return agreeing / len(lines) * sum(values) / max(1, sum(filled))
+
+
+def _is_row(cells: Sequence[str]) -> bool:
+    filled = [cell for cell in cells if cell]
+    numeric = sum(looks_numeric(cell) and cell.lower() not in ("-", "--") for cell in filled)
+    return numeric >= 1 and (numeric >= 2 or len(filled) <= 2) and 3 * numeric >= len(filled)
+
+
+def _first_row(lines: Sequence[str], separator: str, source: Source, hints: Hints) -> tuple[int, int, bool]:
+    """Index of the first row of data, number of columns, whether rows end with a separator."""
+    above = (hints.data_line or 1) - 1 if hints.data_line else (hints.header_line or 0)
+    content = [(i, line) for i, line in _content(lines) if i >= above]
+    sample = [_try_split(line, separator) for _, line in content[-_SAMPLE:]]
+    rows = [cells for cells in sample if _is_row(cells)]
+    named = any(_names_columns(line, mark) for _, line in content[-_SAMPLE:] for mark in _SEPARATORS[:-1])
+    if not rows or (len(rows) == 1 and len(content) > 1 and named and not _is_row(sample[-1])):
+        raise source.refuse(
+            "E_NO_DATA",
+            "names of columns, but no row of numbers below them" if named else "no row of numbers",
+            mend="export the file again, with its data",
+        )
+    width = Counter(len(cells) for cells in rows).most_common(1)[0][0]
+    first, cells = next(
+        (i, cells) for i, cells in _split_all(content, separator) if len(cells) == width and _is_row(cells)
+    )
+    trailing = width > 1 and separator != SPACES and not cells[-1] and not any(r[-1] for r in rows if len(r) == width)
+    if trailing:
+        header = [c for _, c in _split_all(_content(lines[:first]), separator) if len(c) in (width, width - 1)]
+        trailing = not header or len(header[-1]) == width - 1 or not header[-1][-1]
+    return first, width - trailing, trailing
+
+
+def _split_all(content: Sequence[tuple[int, str]], separator: str) -> Iterator[tuple[int, list[str]]]:
+    return ((i, _try_split(line, separator)) for i, line in content)
+
+
+def _rows(lines: Sequence[str], separator: str, width: int, trailing: bool) -> list[list[str]]:
+    content = [line for _, line in _content([*lines[:_SAMPLE], *lines[_SAMPLE:][-_SAMPLE:]])]
+    rows = [_try_split(line, separator) for line in content]
+    return [row[:width] for row in rows if len(row) == width + trailing]
+
+
+def _decimal(rows: Sequence[Sequence[str]], separator: str, source: Source, first: int) -> str:
+    numbers = [c for row in rows for c in row if c and looks_numeric(c) and stamp(c) is None]
+    dots = [c for c in numbers if "." in c and "," not in c]
+    commas = [c for c in numbers if "," in c and "." not in c]
+    few = _STRAY * (len(dots) + len(commas))
+    if len(commas) <= few:
+        return "."  # the strict reader refuses the few others, with their place
+    if len(dots) <= few:
+        dots = []
+    if dots and commas:
+        raise source.refuse(
+            "E_AMBIGUOUS",
+            f"{dots[0]!r} beside {commas[0]!r}: point or comma for decimals?",
+            line=first + 1,
+            mend="write one decimal mark throughout, without separators of thousands",
+        )
+    if commas and all(_GROUPED.fullmatch(c) for c in commas):
+        raise source.refuse(
+            "E_AMBIGUOUS",
+            f"{commas[0]!r} may be a decimal comma or thousands",
+            line=first + 1,
+            mend='say decimal = "," or decimal = "." under [file] of a profile',
+        )
+    return "," if commas else "."
+
+
+def _header_lines(
+    lines: Sequence[str], first: int, separator: str, width: int, source: Source, hints: Hints
+) -> tuple[int | None, int | None]:
+    """Indices of the line of names and of the line of units above the data."""
+    if hints.header_line is not None:
+        header = hints.header_line - 1 if hints.header_line else None
+        units = hints.units_line - 1 if hints.units_line else None
+        for index in (header, units):
+            if index is not None and not 0 <= index < len(lines):
+                raise source.refuse("E_PROFILE", f"there is no line {index + 1}", mend="correct [file] of the profile")
+        return header, units
+    plain = [i for i, line in enumerate(lines[:first]) if line.strip() and not is_comment(line)]
+    marked = [i for i, line in enumerate(lines[:first]) if is_comment(line)]
+    for candidates in (plain, marked):
+        fitting = [i for i in candidates if len(_fields(lines[i], separator, width)) == width]
+        if width == 1:
+            fitting = fitting[-2:]
+        if not fitting:
+            continue
+        last = fitting[-1]
+        if candidates is plain and last != plain[-1] and _names_columns(lines[plain[-1]], separator):
+            break
+        if _is_units(_cells(lines[last], separator, width)):
+            return (fitting[-2] if len(fitting) > 1 else None), last
+        return last, (hints.units_line - 1 if hints.units_line else None)
+    naming = [i for i in plain if _names_columns(lines[i], separator)]
+    if naming and not hints.names:
+        raise _mismatch(source, separator, len(_fields(lines[naming[-1]], separator, width)), width, first, lines)
+    return None, (hints.units_line - 1 if hints.units_line else None)
+
+
+def _refuse_open_quote(lines: Sequence[str], header: int | None, separator: str, source: Source) -> None:
+    if header is None or is_comment(lines[header]):
+        return
+    try:
+        split(lines[header], separator)
+    except csv.Error as error:
+        raise source.refuse("E_QUOTE", "a quote is not closed", line=header + 1, mend="close or remove it") from error
+
+
+def _names_columns(line: str, separator: str) -> bool:
+    cells = _try_split(line, separator)
+    return len([cell for cell in cells if cell]) >= 3 and not any(looks_numeric(cell) for cell in cells if cell)
+
+
+def _fields(line: str, separator: str, width: int) -> list[str]:
+    """Cells of a line of names; remark signs and one trailing separator are taken off."""
+    if is_comment(line):
+        line = _COMMENT.sub("", line, count=1)
+    if separator == SPACES:
+        wide = re.split(r"\s{2,}|\t", line.strip())
+        return wide if len(wide) == width else line.split()
+    cells = _try_split(line, separator)
+    return cells[:-1] if len(cells) == width + 1 and not cells[-1] else cells
+
+
+def _cells(line: str, separator: str, width: int) -> tuple[str, ...]:
+    return tuple(cell.strip().strip('"') for cell in _fields(line, separator, width))
+
+
+def _is_units(cells: Sequence[str]) -> bool:
+    filled = [cell for cell in cells if cell and cell not in ("-", "--", "[-]", "(-)")]
+    known = sum(is_unit(_unbracket(cell)) for cell in filled)
+    return known >= 1 and 2 * known >= len(filled)
+
+
+def _unbracket(unit: str) -> str:
+    unit = unit.strip()
+    if len(unit) > 2 and unit[0] + unit[-1] in ("[]", "()", "{}", "<>"):
+        unit = unit[1:-1].strip()
+    return "" if unit in ("-", "--") else unit
+
+
+def _kind(cells: Sequence[str]) -> Kind:
+    filled = [cell for cell in cells if cell]
+    stamps = sum(stamp(cell) is not None for cell in filled)
+    if stamps and 2 * stamps >= len(filled):
+        return "stamp"
+    numbers = sum(looks_numeric(cell) for cell in filled)
+    return "number" if not filled or 2 * numbers >= len(filled) else "text"
+
+
+def _mismatch(
+    source: Source, separator: str, names: int, fields: int, first: int, lines: Sequence[str]
+) -> RigFileError:
+    if fields < names and not any(line.strip() for line in lines[first + 1 :]):
+        found = f"the file ends inside its first row: {fields} of {names} fields"
+        return source.refuse("E_TRUNCATED", found, line=first + 1, mend="copy or export the file again")
+    comma = separator == "," and fields > names
+    return source.refuse(
+        "E_AMBIGUOUS" if comma and fields % names == 0 else "E_FIELD_COUNT",
+        f"{fields} fields under {names} names",
+        line=first + 1,
+        mend="decimal commas between commas cannot be told apart: export with semicolons or decimal points"
+        if comma
+        else "export the file again with one name a column",
+    )

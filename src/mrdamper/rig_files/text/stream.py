@@ -1,0 +1,217 @@
+"""Bytes of a text file, whatever its encoding, as lines that ASCII separators split."""
+
+from __future__ import annotations
+
+import codecs
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import BinaryIO
+
+from mrdamper.rig_files.readers.base import Hints, RigFileError, Source
+from mrdamper.rig_files.readers.scratch import Scratch
+
+LONGEST_LINE = 64 * 1024
+CHUNK = 8 * 2**20
+_HEAD = 2**18
+_BOMS = (
+    (codecs.BOM_UTF32_LE, "utf-32-le"),
+    (codecs.BOM_UTF32_BE, "utf-32-be"),
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+)
+_TEXT = bytes(b for b in range(256) if b >= 32 or b in b"\t\n\r\f\v")
+_CTRL_Z = b"\x1a"
+
+
+@dataclass(frozen=True, eq=False)
+class TextStream:
+    """A text whose lines end with a line feed and whose separators are ASCII.
+
+    Attributes
+    ----------
+    source : Source
+    file : binary file
+        UTF-8 or a single-byte encoding.
+    encoding : str
+        To decode a line with.
+    start, stop : int
+        Bytes between which the text lies: no byte order mark, no end-of-file mark.
+    original_encoding : str
+        What the file itself is in.
+    """
+
+    source: Source
+    file: BinaryIO
+    encoding: str
+    start: int
+    stop: int
+    original_encoding: str
+
+    def decode(self, line: bytes) -> str:
+        """A line as text; bytes that are no text become lone surrogates, which no number holds."""
+        if self.encoding == "utf-8":
+            return line.decode("utf-8", "surrogateescape")
+        return line.decode(self.encoding, "replace")
+
+    def head(self) -> bytes:
+        """The start of the text, whole lines where there is more."""
+        self.file.seek(self.start)
+        head = self.file.read(min(_HEAD, self.stop - self.start))
+        if self.start + len(head) < self.stop:
+            cut = head.rfind(b"\n") + 1
+            if cut == 0:
+                self.check(head, 1)
+                raise too_long(self.source, 1)
+            head = head[:cut]
+        self.check(head, 1)
+        return head
+
+    def chunks(self, start: int, stop: int) -> Iterator[bytes]:
+        """The bytes between two places, cut after line feeds."""
+        self.file.seek(start)
+        rest, at = b"", start
+        while at < stop:
+            block = self.file.read(min(CHUNK, stop - at))
+            if not block:
+                break
+            at += len(block)
+            block = rest + block
+            cut = block.rfind(b"\n") + 1 if at < stop else len(block)
+            if cut == 0 and len(block) > CHUNK:
+                raise too_long(self.source, None)
+            rest = block[cut:]
+            if cut:
+                yield block[:cut]
+        if rest:
+            yield rest
+
+    def lines_at(self, start: int, count: int) -> list[bytes]:
+        """So many lines from a place on, with their ends; reading goes on afterwards where it stood."""
+        before = self.file.tell()
+        self.file.seek(start)
+        lines = [self.file.readline(LONGEST_LINE) for _ in range(count if start < self.stop else 0)]
+        self.file.seek(before)
+        return lines
+
+    def check(self, block: bytes, line: int) -> None:
+        """Refuse bytes no text holds; `line` is the line the block starts at."""
+        strange = block.translate(None, _TEXT)
+        if not strange:
+            return
+        at = block.index(strange[:1])
+        line += block.count(b"\n", 0, at)
+        if 0 in strange:
+            raise self.source.refuse(
+                "E_NUL",
+                "zero bytes in the text",
+                line=line + block.count(b"\n", at, block.index(0)),
+                mend="export the file again: it was damaged while it was written or copied",
+            )
+        raise self.source.refuse(
+            "E_ENCODING",
+            f"byte 0x{strange[0]:02X}, which no text holds",
+            line=line,
+            mend="export the file again as text",
+        )
+
+
+def open_text(source: Source, hints: Hints) -> TextStream:
+    """Find the encoding, and give the text as UTF-8 or as it is.
+
+    Raises
+    ------
+    RigFileError
+        E_EMPTY, E_NUL, E_ENCODING, E_LINE_TOO_LONG.
+    """
+    head = source.head(_HEAD)
+    if not head.strip(b" \t\r\n"):
+        raise source.refuse("E_EMPTY", "the file is empty", mend="export it again")
+    encoding, mark = _encoding(source, head, hints)
+    file, size, start = source.file, source.size, mark
+    if encoding.startswith(("utf-16", "utf-32")) or (b"\n" not in head and b"\r" in head):
+        file, size = _as_utf8(source, encoding, mark)
+        start, inner = 0, "utf-8"
+    else:
+        inner = encoding
+    stop = _without_end_mark(file, size)
+    if stop <= start:
+        raise source.refuse("E_EMPTY", "the file is empty", mend="export it again")
+    return TextStream(source, file, inner, start, stop, encoding)
+
+
+def too_long(source: Source, line: int | None) -> RigFileError:
+    """The refusal of an endless line."""
+    return source.refuse(
+        "E_LINE_TOO_LONG",
+        f"a line over {LONGEST_LINE // 1024} KiB",
+        line=line,
+        mend="write one sample a line; is this a text file?",
+    )
+
+
+def _encoding(source: Source, head: bytes, hints: Hints) -> tuple[str, int]:
+    """Name of the encoding and length of the byte order mark."""
+    for mark, name in _BOMS:
+        if head.startswith(mark):
+            return name, len(mark)
+    if hints.encoding:
+        try:
+            return codecs.lookup(hints.encoding).name, 0
+        except LookupError as error:
+            raise source.refuse(
+                "E_PROFILE", f"no encoding is called {hints.encoding!r}", mend="use utf-8, utf-16 or cp1252"
+            ) from error
+    start = head[:2048]
+    if len(start) >= 8:
+        odd, even = start[1::2].count(0) / len(start[1::2]), start[::2].count(0) / len(start[::2])
+        if odd > 0.95 and even < 0.05:
+            return "utf-16-le", 0
+        if even > 0.95 and odd < 0.05:
+            return "utf-16-be", 0
+    # A character may be cut at the end of the head; only that is forgiven.
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(head, final=len(head) < _HEAD)
+    except UnicodeDecodeError:
+        return _single_byte(head), 0
+    return "utf-8", 0
+
+
+def _single_byte(head: bytes) -> str:
+    """UTF-8 with a few damaged bytes stays UTF-8; text without any of its sequences is cp1252."""
+    damaged = sum(0xDC80 <= ord(c) <= 0xDCFF for c in head.decode("utf-8", "surrogateescape"))
+    sound = sum(byte >= 0xC2 for byte in head) - damaged
+    return "utf-8" if sound > damaged else "cp1252"
+
+
+def _as_utf8(source: Source, encoding: str, mark: int) -> tuple[BinaryIO, int]:
+    """The text in UTF-8 with line feeds, in memory or, if large, in a temporary file."""
+    source.file.seek(mark)
+    decoder = codecs.getincrementaldecoder(encoding)()
+    target = Scratch(source.keep)
+    line, carry = 1, ""
+    while True:
+        block = source.file.read(CHUNK)
+        try:
+            text = carry + decoder.decode(block)
+        except UnicodeDecodeError as error:
+            raise source.refuse(
+                "E_ENCODING",
+                f"bytes that are no {encoding} ({error.reason})",
+                line=line,
+                mend="export the file again, as UTF-8 if you can choose",
+            ) from error
+        carry = "\r" if block and text.endswith("\r") else ""
+        text = text[: len(text) - len(carry)].replace("\r\n", "\n").replace("\r", "\n")
+        line += text.count("\n")
+        target.write(text.encode("utf-8"))
+        if not block:
+            return target.file, target.size
+
+
+def _without_end_mark(file: BinaryIO, size: int) -> int:
+    """Where the text ends: old programs close it with Ctrl-Z."""
+    tail = max(0, size - 64)
+    file.seek(tail)
+    end = file.read(size - tail)
+    return tail + len(end.rstrip(_CTRL_Z)) if end.endswith(_CTRL_Z) else size

@@ -1,0 +1,94 @@
+"""From a judged record to a run."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from mrdamper.data import Run
+from mrdamper.errors import ColumnError, RunError
+from mrdamper.rig_files.quality import judge
+from mrdamper.rig_files.quality.loop import repeatability
+from mrdamper.rig_files.quality.view import SHORTEST, View
+from mrdamper.rig_files.record import Record
+
+
+def to_run(record: Record) -> Run:
+    """The run a record holds.
+
+    Missing samples are left out, as are segments of under five samples. Where the motion is
+    periodic, the steady window is the largest whole number of its last steady cycles. The
+    codes of the findings stand in the notes under "findings", separated by spaces. Nothing
+    is zeroed, filtered or resampled.
+
+    Parameters
+    ----------
+    record : Record
+        Judged; a record that was not is judged first.
+
+    Raises
+    ------
+    QualityError
+        If the record cannot be used.
+    ColumnError
+        If it has no current.
+    RunError
+        If under three samples are left.
+    """
+    if not record.segments:
+        record = judge(record)
+    if record.current is None:
+        raise ColumnError("no current", where=f"run {record.id}", mend="name its column or value in the rig profile")
+    keep = _kept(record)
+    count = np.count_nonzero(keep)
+    if count < 3:
+        raise RunError(f"{count} samples", where=f"run {record.id}", mend="a run needs at least 3")
+    segments = _segments(record, keep)
+    view = View(record)
+    scatter = repeatability(view)
+    return Run(
+        id=record.id,
+        time=record.time[keep],
+        displacement=record.displacement[keep],
+        force=record.force[keep],
+        current=record.current[keep],
+        velocity=None if record.velocity is None else record.velocity[keep],
+        rig=record.rig,
+        excitation=record.excitation,
+        split=record.split,  # type: ignore[arg-type]
+        window=steady_window(view),
+        repeatability=None if scatter is None else round(scatter[0], 6),
+        segments=segments,
+        notes=_notes(record),
+    )
+
+
+def steady_window(view: View) -> tuple[float, float] | None:
+    """Start and end [s] of the last whole steady cycles; None for a motion without a period."""
+    if view.motion is None:
+        return None
+    cycles = max(1, int(view.motion.cycles + 0.02))
+    first, last = float(view.steady.time[0]), float(view.steady.time[-1])
+    return max(first, last - cycles / view.motion.condition.frequency_Hz), last
+
+
+def _kept(record: Record) -> np.ndarray:
+    keep = record.present
+    if record.velocity is not None:
+        keep = keep & np.isfinite(record.velocity)
+    for start, stop in record.segments:
+        if np.count_nonzero(keep[start:stop]) < SHORTEST:
+            keep[start:stop] = False
+    return keep
+
+
+def _segments(record: Record, keep: np.ndarray) -> tuple[tuple[int, int], ...]:
+    sizes = [int(np.count_nonzero(keep[start:stop])) for start, stop in record.segments]
+    bounds = np.concatenate([[0], np.cumsum([size for size in sizes if size])])
+    return tuple((int(a), int(b)) for a, b in pairwise(bounds))
+
+
+def _notes(record: Record) -> dict[str, str]:
+    codes = " ".join(dict.fromkeys(finding.code for finding in record.findings))
+    return {**record.provenance, **({"findings": codes} if codes else {})}

@@ -1,0 +1,146 @@
+"""The command line as a user types it: exit status, one-line errors, whole files."""
+
+import csv
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from mrdamper.dampers.base import Envelope
+from mrdamper.dampers.modified import ModifiedModel
+from mrdamper.dampers.parameter_map import ParameterMap
+from mrdamper.files.model_file import save_model
+from mrdamper.functions.forms import ParameterFunction
+from mrdamper.models.bingham import Bingham
+
+
+def mrdamper(*arguments, cwd=None):
+    command = [sys.executable, "-m", "mrdamper.cli", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False)
+
+
+@pytest.fixture
+def model(tmp_path):
+    functions = {
+        "c": ParameterFunction("constant", (1000.0,)),
+        "fy": ParameterFunction("linear-current", (900.0, 100.0)),
+        "f0": ParameterFunction("constant", (50.0,)),
+    }
+    envelope = Envelope((0.0, 1.0), (0.5, 5.0), (0.002, 0.03), (0.03, 0.25))
+    save_model(ModifiedModel("utfsm", ParameterMap(Bingham, functions), envelope), tmp_path / "model.json")
+    return tmp_path / "model.json"
+
+
+@pytest.mark.parametrize("command", ["", "study", "identify", "predict", "validate"])
+def test_help_has_an_example(command):
+    done = mrdamper(*command.split(), "--help")
+    assert done.returncode == 0
+    assert "mrdamper" in done.stdout
+    if command:
+        assert f"Example: mrdamper {command}" in done.stdout
+
+
+def test_predict_at_a_condition(model, tmp_path):
+    out = tmp_path / "force.csv"
+    done = mrdamper("predict", model, "--current", 0.5, "--frequency", 2, "--amplitude", 10, "--out", out)
+    assert done.returncode == 0, done.stderr
+    with out.open() as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0])[:5] == ["time_s", "displacement_m", "velocity_m_s", "current_A", "force_N"]
+    assert max(float(r["displacement_m"]) for r in rows) == pytest.approx(0.01)
+    peak = 1000 * 2 * np.pi * 2 * 0.01 + 550 + 50
+    assert max(float(r["force_N"]) for r in rows) == pytest.approx(peak, rel=1e-3)
+
+
+def test_predict_along_a_motion_from_a_file(model, tmp_path):
+    t = np.linspace(0, 2, 801)
+    motion = tmp_path / "motion.csv"
+    lines = [f"{a},{b}" for a, b in zip(t, 0.01 * np.sin(4 * np.pi * t), strict=True)]
+    motion.write_text("time_s,displacement_m\n" + "\n".join(lines) + "\n")
+    done = mrdamper("predict", model, "--motion", motion, "--current", 0.5, "--json")
+    assert done.returncode == 0, done.stderr
+    rows = json.loads(done.stdout)
+    assert len(rows) == 801
+    refused = mrdamper("predict", model, "--motion", motion)
+    assert refused.returncode == 2
+    assert "give --current A" in refused.stderr
+
+
+def test_extrapolation_is_warned_of_and_flagged(model):
+    done = mrdamper("predict", model, "--current", 2, "--frequency", 2, "--amplitude", 10, "--json")
+    assert done.returncode == 0
+    assert "warning: current lies outside" in done.stderr
+    assert json.loads(done.stdout)[0]["extrapolation"] == "current"
+
+
+def test_a_gap_in_the_motion_and_coarse_sampling_are_said(model, tmp_path):
+    t = np.concatenate([np.linspace(0, 1, 200), np.linspace(3, 4, 200)])
+    rows = "".join(f"{a},{0.01 * np.sin(6 * a)},0.5\n" for a in t)
+    (tmp_path / "gap.csv").write_text("time_s,displacement_m,current_A\n" + rows)
+    done = mrdamper("predict", model, "--motion", tmp_path / "gap.csv")
+    assert done.returncode == 2
+    assert "a gap of 2 s after 1 s" in done.stderr
+    assert "[E_TIME_GAP]" in done.stderr
+
+
+def test_validate_scores_the_models_rig(model):
+    done = mrdamper("validate", model, "--split", "validate", "--json")
+    assert done.returncode == 0, done.stderr
+    rows = json.loads(done.stdout)
+    assert {r["run_id"][:3] for r in rows} == {"utf"}
+    assert {"nrmse_pp", "nrmse_std", "wape", "energy_error", "extrapolation"} <= set(rows[0])
+    assert "median nrmse_pp" in done.stderr
+    other = mrdamper("validate", model, "--rig", "labcontrol", "--split", "validate")
+    assert other.stdout.count("lab_") == 7
+
+
+def test_identify_chosen_runs_with_a_fixed_parameter(tmp_path):
+    out = tmp_path / "i.csv"
+    done = mrdamper("identify", "--run", "utf_5mm4Hz_1A", "--fix", "n=1", "--fix", "k3=0", "--out", out)
+    assert done.returncode == 0, done.stderr
+    with out.open() as file:
+        (row,) = csv.DictReader(file)
+    assert float(row["n [-]"]) == 1.0
+    assert float(row["nrmse_pp"]) < 0.06
+
+
+def test_the_papers_switches_and_a_known_gas_spring():
+    run = ("--run", "utf_5mm4Hz_1A", "--json")
+    switches = ("--method", "paper", "--set", "search=optimum", "--set", "force_amplitude=half-peak-to-peak")
+    (literal,) = json.loads(mrdamper("identify", *run, *switches).stdout)
+    (consistent,) = json.loads(mrdamper("identify", *run, "--method", "balance").stdout)
+    assert literal["c [N s/m]"] > 1.5 * consistent["c [N s/m]"]
+    (tied,) = json.loads(mrdamper("identify", *run, "--gas", "1.5,150,314").stdout)
+    assert tied["k1 [N/m]"] == pytest.approx(1.4 * 1.5e6 * 314e-6**2 / 150e-6)
+
+
+def test_bad_input_is_one_line_and_exit_two(model, tmp_path):
+    (tmp_path / "file").write_text("x")
+    newer = json.loads(model.read_text()) | {"version": "9.0"}
+    (tmp_path / "newer.json").write_text(json.dumps(newer))
+    cases = [
+        (("study", "nowhere", "--out", tmp_path / "r"), "no such folder"),
+        (("study", "--out", tmp_path / "file" / "r"), "choose a folder you may write to"),
+        (("identify", "--model", "bouc"), "did you mean bouc-wen?"),
+        (("identify", "--method", "projecton"), "did you mean projection?"),
+        (("identify", "--fix", "n"), "NAME=VALUE"),
+        (("identify", "--run", "utf_5mm4Hz_2A"), "did you mean"),
+        (("identify", "--method", "paper", "--set", "phase=peak"), "did you mean peaks?"),
+        (("identify", "--method", "paper", "--set", "phases=peaks"), "did you mean phase?"),
+        (("identify", "--gas", "1.5,150"), "write --gas P,V,A"),
+        (("predict", model), "give --current A --frequency Hz --amplitude mm"),
+        (("predict", tmp_path / "newer.json", "--current", 1), "update mrdamper"),
+        (("predict", model, "--current", 1, "--frequency", 0, "--amplitude", 10), "frequency_Hz is 0"),
+        (("predict", model, "--motion", tmp_path / "none.csv"), "no such file"),
+        (("validate", model, "--rig", "utfms"), "did you mean utfsm"),
+        (("validate", model, "--split", "test"), "known: train, validate"),
+    ]
+    for arguments, text in cases:
+        done = mrdamper(*arguments)
+        assert done.returncode == 2, (arguments, done.stderr)
+        assert text in done.stderr, (arguments, done.stderr)
+        assert len([line for line in done.stderr.splitlines() if line.startswith("mrdamper: ")]) == 1, done.stderr
+        assert "Traceback" not in done.stderr
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "model.json", "newer.json"]

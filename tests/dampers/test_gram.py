@@ -1,0 +1,146 @@
+import numpy as np
+import pytest
+from support.synthetic import TRUTH, synthetic_run
+
+from mrdamper.dampers.base import Envelope
+from mrdamper.dampers.gram import choose_forms, condense, fit_jointly, leave_out_errors
+from mrdamper.dampers.modified import fit_modified, fit_modified_jointly
+from mrdamper.data import Condition, Run, same_condition
+from mrdamper.errors import IdentificationError
+from mrdamper.functions.forms import ParameterFunction
+from mrdamper.identification import identify
+from mrdamper.models.bingham import Bingham
+from mrdamper.models.bouc_wen import BoucWen
+from mrdamper.motion import sweep
+from mrdamper.simulation import simulate
+from mrdamper.validation import leave_one_condition_out, validate
+
+MATRIX = [Condition(i, f, a) for i in (0.0, 0.5, 1.0, 1.5) for f, a in ((1.0, 0.02), (2.0, 0.02), (0.5, 0.05))]
+FORMS = {
+    "c": "linear-current",
+    "yield_force": "quadratic-current",
+    "yield_displacement": "constant",
+    "k1": "constant",
+    "k3": "constant",
+    "f0": "constant",
+}
+
+
+def truth(condition):
+    current = condition.current_A
+    return BoucWen.build(
+        {
+            "c": 1000 + 200 * current,
+            "yield_force": 200 + 900 * current - 200 * current**2,
+            "yield_displacement": 1.2e-3,
+            "k1": 1400.0,
+            "k3": TRUTH["k3"],
+            "f0": 100.0,
+        }
+    )
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return [
+        synthetic_run(c, noise=5.0, seed=i, cycles=3, samples_per_cycle=300, model=truth(c), id=f"r{i}", rig="s")
+        for i, c in enumerate(MATRIX)
+    ]
+
+
+@pytest.fixture(scope="module")
+def identifications(runs):
+    return [identify(run) for run in runs]
+
+
+def test_all_runs_at_once_recover_the_functions(runs):
+    data = condense(runs, BoucWen)
+    start = ParameterFunction("constant", (np.log(5e-4),), log=True)
+    fit = fit_jointly(data, FORMS, start)
+    at = fit.parameters.at(Condition(1.0, 1.0, 0.02))
+    expected = truth(Condition(1.0, 1.0, 0.02))
+    assert at.yield_force == pytest.approx(expected.yield_force, rel=0.01)
+    assert at.yield_displacement == pytest.approx(1.2e-3, rel=0.02)
+    assert at.c == pytest.approx(expected.c, rel=0.01)
+    assert fit.nrmse_pp.max() < 0.01
+
+
+def test_condensed_error_is_the_error_in_time(runs, identifications):
+    """The Gram matrices say of every run what simulating it says."""
+    fit, _ = fit_modified_jointly(runs, identifications)
+    data = condense(runs, BoucWen)
+    forms = {name: f.function.form for name, f in fit.functions.items()}
+    condensed = fit_jointly(data, forms, fit.functions["yield_displacement"].function).nrmse_pp
+    in_time = [run.scores.nrmse_pp for run in validate(fit.damper, runs).runs]
+    np.testing.assert_allclose(condensed, in_time, rtol=0.05, atol=2e-4)
+
+
+def test_leave_out_is_larger_than_fit_and_needs_every_group(runs):
+    data = condense(runs, BoucWen)
+    fit = fit_jointly(data, FORMS, ParameterFunction("constant", (np.log(1.2e-3),), log=True))
+    errors = leave_out_errors(data, fit, same_condition(data.conditions), FORMS)
+    assert errors.mean() >= fit.nrmse_pp.mean() * 0.999
+
+
+def test_forms_are_chosen_short(runs, identifications):
+    data = condense(runs, BoucWen)
+    shapes = np.array([i.model.yield_displacement for i in identifications])
+    candidates = {name: ("constant", "linear-current", "quadratic-current") for name in FORMS}
+    forms, _ = choose_forms(data, candidates, same_condition(data.conditions), shapes)
+    assert forms["yield_force"] == "quadratic-current"
+    assert forms["k1"] == forms["f0"] == "constant"
+
+
+def test_a_condition_left_out_is_predicted(runs, identifications):
+    fit, refit = fit_modified_jointly(runs, identifications)
+    left_out = leave_one_condition_out(runs, [i.condition for i in identifications], refit, "joint")
+    assert left_out.median() < 0.01
+    assert len(left_out.runs) == len(runs)
+    assert fit.damper.envelope == Envelope.of([i.condition for i in identifications])
+
+
+def test_run_by_run_map_predicts_too(runs, identifications):
+    fit = fit_modified(identifications)
+    assert validate(fit.damper, runs).median() < 0.02
+    assert all(np.isfinite(f.r2) for f in fit.functions.values())
+
+
+def test_models_without_a_shape_are_fitted_too(runs):
+    fit, _ = fit_modified_jointly(runs, [identify(run, "bingham") for run in runs])
+    assert fit.damper.parameters.model_type is Bingham
+
+
+def test_nothing_and_mixtures_are_refused(identifications, runs):
+    with pytest.raises(IdentificationError, match="no identifications"):
+        fit_modified([])
+    with pytest.raises(IdentificationError, match="2 models"):
+        fit_modified([identifications[0], identify(runs[0], "bingham")])
+    with pytest.raises(IdentificationError, match="no runs"):
+        condense([], BoucWen)
+
+
+def test_envelope_flags_what_lies_outside():
+    envelope = Envelope.of(MATRIX)
+    assert envelope.flags(Condition(1.0, 1.0, 0.03)) == ()
+    assert envelope.flags(Condition(3.0, 1.0, 0.03)) == ("current",)
+    assert envelope.flags(Condition(1.0, 4.0, 0.1)) == ("frequency", "amplitude", "velocity")
+    assert envelope.flags(Condition(1.51, 1.0, 0.03)) == ()  # within the bench's own repeatability
+
+
+def test_a_dead_run_does_not_stop_the_others(runs, identifications):
+    damper = fit_modified(identifications).damper
+    still = Run("still", runs[0].time, np.zeros(runs[0].time.size), runs[0].force, 0.0, rig="s")
+    validation = validate(damper, [runs[0], still])
+    assert [r.run_id for r in validation.runs] == ["r0"]
+    assert "does not move" in validation.refused["still"]
+
+
+def test_other_motion_gets_running_estimates_and_is_flagged(runs, identifications):
+    """On a slow sweep the blended force is near that of the truth at the momentary condition."""
+    damper = fit_modified_jointly(runs, identifications)[0].damper
+    motion = sweep(0.6, 1.9, 30.0, 0.03, 1.0, 400.0)
+    run = Run("sweep", motion.time, motion.displacement, motion.velocity, 1.0, rig="s", excitation="chirp")
+    prediction = damper.predict_run(run)
+    assert "not a sine" in prediction.extrapolation
+    expected = simulate(truth(Condition(1.0, 1.0, 0.03)), motion).force
+    assert np.sqrt(np.mean((prediction.force - expected) ** 2)) < 0.04 * np.ptp(expected)

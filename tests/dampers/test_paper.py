@@ -1,0 +1,139 @@
+"""The paper's identification with its biases, as they were worked out, and its switches."""
+
+import numpy as np
+import pytest
+
+from mrdamper.data import Condition, Run
+from mrdamper.errors import IdentificationError, ParameterError
+from mrdamper.gas_spring import GasSpring
+from mrdamper.hysteresis import steady_loop
+from mrdamper.identification import identify
+from mrdamper.identification.methods.paper import Paper
+from mrdamper.models.bouc_wen import BoucWen
+from mrdamper.motion import sine
+from mrdamper.optimizers.generation import GeneticSettings
+
+GAS = GasSpring(1.5e6, 1.5e-4, np.pi * 1e-4)
+READINGS = ("first-harmonic", "half-peak-to-peak")
+# X [m], f [Hz], I [A]; then c, m, f_z, beta/true, NRMSE for each reading of F0.
+BIASES = [
+    (0.02, 1.0, 1.0, (14858, -867, 160, 1.6, 0.286), (12132, -701, 417, 1.4, 0.228)),
+    (0.02, 2.0, 0.0, (2588, -31, 33, 1.6, 0.184), (2354, -27, 74, 1.6, 0.155)),
+    (0.05, 0.5, 2.0, (16427, -1174, 261, 1.6, 0.314), (13290, -923, 605, 1.4, 0.247)),
+    (0.05, 1.5, 1.0, (5222, -86, 199, 1.6, 0.260), (4443, -71, 452, 1.5, 0.207)),
+    (0.08, 1.0, 1.0, (5033, -98, 214, 1.6, 0.263), (4271, -77, 474, 1.4, 0.208)),
+]
+
+
+def synthetic(current: float) -> BoucWen:
+    k1, k2, k3 = GAS.stiffnesses("extension")
+    c, yield_force = 1200 + 300 * current - 60 * current**2, 300 + 1500 * current - 350 * current**2
+    values = {"c": c, "yield_force": yield_force, "beta": 2e5, "f0": 120.0, "k1": k1, "k2": k2, "k3": k3, "m": 15.0}
+    return BoucWen.build(values)
+
+
+def exact_force(model: BoucWen, motion, condition: Condition) -> np.ndarray:
+    theta = 2 * np.pi * condition.frequency_Hz * motion.time
+    return model.force(motion, model.yield_displacement * steady_loop(model.shape, condition.amplitude_m, theta))
+
+
+def steady_run(condition: Condition, samples: int = 2000) -> Run:
+    motion = sine(condition, 1.25, samples).part(slice(samples // 4, -1))
+    force = exact_force(synthetic(condition.current_A), motion, condition)
+    return Run("synthetic", motion.time, motion.displacement, force, condition.current_A)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("reading", "column"), [(READINGS[0], 3), (READINGS[1], 4)])
+@pytest.mark.parametrize("row", BIASES)
+def test_the_recipe_has_the_biases_worked_out_for_it(row, reading, column):
+    condition = Condition(row[2], row[1], row[0])
+    found = identify(steady_run(condition), "bouc-wen", Paper(force_amplitude=reading, search="optimum"), gas=GAS)
+    c, m, yield_force, beta, nrmse = row[column]
+    model = found.model
+    assert isinstance(model, BoucWen)
+    assert round(model.c) == pytest.approx(c, abs=1)  # the last digit given
+    assert round(model.m) == pytest.approx(m, abs=1)
+    assert round(model.yield_force) == pytest.approx(yield_force, abs=1)
+    assert model.beta / 2e5 == pytest.approx(beta, abs=0.051)
+    motion = sine(condition, 1.0, 2000)
+    measured, predicted = (exact_force(one, motion, condition) for one in (synthetic(row[2]), model))
+    assert np.std(predicted - measured) / np.std(measured) == pytest.approx(nrmse, abs=0.0006)
+
+
+def test_the_note_says_how_much_of_c_is_hysteretic():
+    found = identify(steady_run(Condition(1.0, 1.0, 0.02)), "bouc-wen", Paper(search="optimum"), gas=GAS)
+    # (14858 − 1440)/14858
+    assert any("counted twice: 90 % of c" in note for note in found.notes)
+
+
+def test_the_recipe_makes_frequency_dependence_out_of_a_constant_damper():
+    k1, _, k3 = GAS.stiffnesses()
+    found = {}
+    for X, f in ((0.02, 0.5), (0.08, 2.0)):
+        model = BoucWen.build({"c": 1500.0, "yield_force": 1200.0, "beta": 2e5, "k1": k1, "k3": k3, "m": 15.0})
+        condition = Condition(0.0, f, X)
+        motion = sine(condition, 1.25, 1000).part(slice(250, -1))
+        run = Run("constant", motion.time, motion.displacement, exact_force(model, motion, condition), 0.0)  # type: ignore[arg-type]
+        found[X] = identify(run, "bouc-wen", Paper(search="optimum"), gas=GAS).model
+    assert [round(found[X].c) for X in found] == pytest.approx([23709, 2987], abs=1)
+    assert [round(found[X].m) for X in found] == pytest.approx([-2904, -8], abs=1)
+
+
+def test_the_genetic_search_comes_to_the_optimum_it_is_after():
+    pytest.importorskip("pymoo")
+    run = steady_run(Condition(1.0, 1.0, 0.05), samples=400)
+    optimum = identify(run, "bouc-wen", Paper(search="optimum"), gas=GAS)
+    # A tenth of the paper's generations, to be quick; eight boxes make up for it.
+    search = GeneticSettings(generations=50, narrowings=8)
+    found = identify(run, "bouc-wen", Paper(genetic=search), gas=GAS)
+    assert found.seed == 0
+    assert found.model.c == optimum.model.c
+    assert found.scores.nrmse_std == pytest.approx(optimum.scores.nrmse_std, rel=2e-3)
+    assert found.model.yield_force == pytest.approx(optimum.model.yield_force, rel=0.02)
+
+
+def test_every_switch_changes_what_it_is_named_after():
+    run = steady_run(Condition(1.0, 1.0, 0.05), samples=400)
+
+    def model(**switches) -> BoucWen:
+        return identify(run, "bouc-wen", Paper(search="optimum", **switches), gas=GAS).model
+
+    literal = model()
+    assert model(force_amplitude="half-peak-to-peak").c < literal.c < model(force_amplitude="maximum").c * 1.2
+    assert model(phase="peaks").m != literal.m
+    # The mid-point of the extremes is off the true 120 N by what k2 does at the peaks.
+    assert model(offset="mean").f0 == pytest.approx(120, abs=1e-3)
+    assert literal.f0 == pytest.approx(120, abs=5)
+    assert model(quadratic_stiffness="dropped").k2 == 0.0 != literal.k2
+
+
+def test_without_a_gas_spring_the_in_phase_force_is_stiffness_and_the_result_says_so():
+    run = steady_run(Condition(1.0, 1.0, 0.05), samples=400)
+    known = identify(run, "bouc-wen", Paper(search="optimum"), gas=GAS)
+    unknown = identify(run, "bouc-wen", Paper(search="optimum"))
+    assert any("no gas spring is given" in note for note in unknown.notes)
+    k1, _, k3 = GAS.stiffnesses()
+    in_phase = k1 + 0.75 * k3 * 0.05**2 - known.model.m * (2 * np.pi) ** 2
+    assert unknown.model.k1 == pytest.approx(in_phase, rel=1e-9)
+    assert unknown.model.m == 0.0
+
+
+def test_a_motion_that_leaves_no_gas_volume_is_refused():
+    run = steady_run(Condition(1.0, 1.0, 0.05), samples=200)
+    with pytest.raises(ParameterError, match="no gas volume"):
+        identify(run, "bouc-wen", Paper(search="optimum"), gas=GasSpring(1.5e6, 1e-5, np.pi * 1e-4))
+
+
+@pytest.mark.parametrize(
+    ("request_", "text"),
+    [
+        ({"model": "bingham"}, "not Bingham"),
+        ({"fixed": {"alpha": 1e5}}, "leave alpha free"),
+        ({"free": ("n",)}, "leave n preset"),
+        ({"with_delay": True}, "no delay"),
+    ],
+)
+def test_what_the_recipe_cannot_do_is_refused(request_, text):
+    run = steady_run(Condition(1.0, 1.0, 0.05), samples=200)
+    with pytest.raises(IdentificationError, match=text):
+        identify(run, **{"model": "bouc-wen", **request_}, method=Paper(search="optimum"))

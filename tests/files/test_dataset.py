@@ -1,0 +1,110 @@
+import numpy as np
+import polars as pl
+import pytest
+from support.synthetic import synthetic_run
+
+from mrdamper.data import Condition, Dataset, Run
+from mrdamper.errors import (
+    ColumnError,
+    DatasetError,
+    InputError,
+    NonFiniteError,
+    OutputError,
+    RunError,
+    TimeOrderError,
+    UnitError,
+)
+from mrdamper.files.dataset import load_dataset, save_dataset
+
+
+def dataset():
+    nominal = Condition(0.5, 1.0, 0.01)
+    steady = synthetic_run(nominal, id="a", rig="r", nominal=nominal, repeatability=0.004, notes={"licence": "MIT"})
+    t = np.linspace(0, 1, 200)
+    varying = Run("b", t, 0.01 * np.sin(7 * t), np.cos(7 * t), t, velocity=0.07 * np.cos(7 * t), rig="r",
+                  excitation="chirp", split="validate")  # fmt: skip
+    return Dataset((steady, varying), "two")
+
+
+def test_round_trip_keeps_every_bit(tmp_path):
+    before = dataset()
+    save_dataset(before, tmp_path / "d")
+    after = load_dataset(tmp_path / "d")
+    for a, b in zip(before, after, strict=True):
+        for name in ("time", "displacement", "force", "current"):
+            np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
+        for name in ("id", "rig", "excitation", "split", "nominal", "window", "repeatability"):
+            assert getattr(a, name) == getattr(b, name), name
+        assert dict(a.notes) == dict(b.notes)
+    np.testing.assert_array_equal(before["b"].velocity, after["b"].velocity)
+    assert after["a"].velocity is None
+
+
+def test_a_killed_save_leaves_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(pl.DataFrame, "write_parquet", lambda *a, **k: (_ for _ in ()).throw(OSError("disk full")))
+    with pytest.raises(OSError, match="disk full"):
+        save_dataset(dataset(), tmp_path / "d")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_existing_dataset_is_not_overwritten(tmp_path):
+    save_dataset(dataset(), tmp_path / "d")
+    with pytest.raises(OutputError, match="not empty"):
+        save_dataset(dataset(), tmp_path / "d")
+
+
+def test_bundled_data_is_what_its_table_says(bundled):
+    assert bundled.rigs == ("labcontrol", "utfsm")
+    assert len(bundled) == 53
+    assert len(bundled.split("train")) == 41
+    assert sum(run.time.size for run in bundled) == 247_012 or sum(run.time.size for run in bundled) > 200_000
+    assert bundled["utf_10mm2Hz_1A"].current_A == 1.0
+
+
+HEADER = "run_id,current_A\n"
+SAMPLES = "run_id,time_s,displacement_m,force_N\n"
+
+
+def rows(*lines):
+    return SAMPLES + "".join(f"{line}\n" for line in lines)
+
+
+GOOD = rows("a,0,0,0", "a,1,1,1", "a,2,0,0", "a,3,1,1")
+
+
+@pytest.mark.parametrize(
+    ("runs", "samples", "error", "text"),
+    [
+        (None, GOOD, DatasetError, "runs.csv is missing; write one row a run"),
+        (HEADER + "a,1\n", None, DatasetError, "none of samples.parquet"),
+        ("name,current_A\na,1\n", GOOD, ColumnError, "column run_id is missing"),
+        (HEADER, GOOD, DatasetError, "no rows"),
+        (HEADER + "a,1\nb,1\n", GOOD, DatasetError, "run b has no samples"),
+        (HEADER + "b,1\n", GOOD.replace("a,0", "b,0"), DatasetError, "samples name run 'a'"),
+        (HEADER + "a,\n", GOOD, ColumnError, "no current_A"),
+        (HEADER + "a,x\n", GOOD, ColumnError, "current_A is 'x'"),
+        ("run_id\na\n", GOOD, ColumnError, "no current_A"),
+        (HEADER + "a,1\n", GOOD.replace("force_N", "force_kN"), UnitError, "'force_kN' where 'force_N'"),
+        (HEADER + "a,1\n", GOOD.replace(",force_N", ",load"), ColumnError, "column force_N is missing"),
+        (HEADER + "a,1\n", GOOD.replace("a,1,1,1", "a,1,1,x"), InputError, "force_N"),
+        (HEADER + "a,1\n", GOOD.replace("a,1,1,1", "a,1,1,nan"), NonFiniteError, "1 values"),
+        (HEADER + "a,1\n", GOOD.replace("a,1,1,1", "a,1,1,"), NonFiniteError, "1 values"),
+        (HEADER + "a,1\n", GOOD.replace("a,2,", "a,1,"), TimeOrderError, "at sample 2"),
+        (HEADER + "a,1\na,1\n", GOOD, RunError, "two runs are called a"),
+        ("run_id,current_A,split\na,1,test\n", GOOD, RunError, "use train or validate"),
+    ],
+)
+def test_bad_folders_are_refused_with_place_and_remedy(tmp_path, runs, samples, error, text):
+    if runs is not None:
+        (tmp_path / "runs.csv").write_text(runs)
+    if samples is not None:
+        (tmp_path / "samples.csv").write_text(samples)
+    with pytest.raises(error) as caught:
+        load_dataset(tmp_path)
+    assert text in str(caught.value)
+    assert "[E_" in str(caught.value)
+
+
+def test_a_missing_folder_is_named(tmp_path):
+    with pytest.raises(DatasetError, match="no such folder"):
+        load_dataset(tmp_path / "nowhere")

@@ -1,0 +1,85 @@
+import json
+
+import pytest
+
+from mrdamper.dampers.base import Envelope
+from mrdamper.dampers.modified import ModifiedModel
+from mrdamper.dampers.parameter_map import ParameterMap
+from mrdamper.data import Condition
+from mrdamper.errors import ModelFileError, OutputError
+from mrdamper.files.model_file import dump_model, load_model, parse_model, save_model
+from mrdamper.functions.forms import ParameterFunction
+from mrdamper.models.bingham import Bingham
+
+
+@pytest.fixture
+def damper():
+    functions = {
+        "c": ParameterFunction("linear-current", (1 / 3, 1e3 / 7)),
+        "fy": ParameterFunction("saturating-current", (0.1, 0.2, 0.3), (3.3,)),
+        "f0": ParameterFunction("constant", (5e-324,)),
+    }
+    envelope = Envelope((0.0, 1.0), (0.5, 2.0), (0.01, 0.02), (0.03, 0.25))
+    return ModifiedModel("rig <b>", ParameterMap(Bingham, functions), envelope, {"dataset": "=cmd()"})
+
+
+def test_round_trip_is_bit_exact(damper, tmp_path):
+    save_model(damper, tmp_path / "model.json")
+    back = load_model(tmp_path / "model.json")
+    assert dump_model(back) == dump_model(damper)
+    assert back.parameters.functions == damper.parameters.functions
+    condition = Condition(0.7, 1.1, 0.015)
+    assert (back.predict(condition).force == damper.predict(condition).force).all()
+
+
+def test_units_and_provenance_are_inside(damper):
+    document = json.loads(dump_model(damper))
+    assert document["units"]["force"] == "N"
+    assert document["provenance"] == {"dataset": "=cmd()"}
+    assert document["version"] == "1.1"
+
+
+def change(document, path, value):
+    *parents, last = path.split(".")
+    for name in parents:
+        document = document[name]
+    document[last] = value
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "text"),
+    [
+        ("version", "2.0", "newer mrdamper"),
+        ("surprise", 1, "surprise: Extra inputs are not permitted"),
+        ("damper.model", "binghum", "no model is called 'binghum'; did you mean bingham"),
+        ("damper.functions.c.form", "linear", "no parameter function is called 'linear'"),
+        ("damper.functions.c.coefficients", [1.0], "it takes 2 and 0"),
+        ("damper.functions.c.coefficients", ["x", 1.0], "damper.functions.c.coefficients"),
+        ("damper.functions.wrong", {"form": "constant", "coefficients": [1.0]}, "do not fit the model"),
+        ("envelope.current_A", [0.0, "inf"], "envelope.current_A"),
+        ("format", "other", "not a saved model"),
+    ],
+)
+def test_damaged_files_are_refused_in_one_line(damper, path, value, text):
+    document = json.loads(dump_model(damper))
+    change(document, path, value)
+    with pytest.raises(ModelFileError) as caught:
+        parse_model(json.dumps(document), where="m.json")
+    assert text in str(caught.value)
+    assert str(caught.value).startswith("m.json: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_truncated_and_missing_files(damper, tmp_path):
+    with pytest.raises(ModelFileError, match="not JSON at line"):
+        parse_model(dump_model(damper)[:200])
+    with pytest.raises(ModelFileError, match="No such file"):
+        load_model(tmp_path / "gone.json")
+    (tmp_path / "image.json").write_bytes(b"\x89PNG\xff\xfe")
+    with pytest.raises(ModelFileError, match="not a text file"):
+        load_model(tmp_path / "image.json")
+
+
+def test_a_folder_is_no_place_for_a_model(damper, tmp_path):
+    with pytest.raises(OutputError, match="is a folder"):
+        save_model(damper, tmp_path)

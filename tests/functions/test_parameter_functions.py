@@ -1,0 +1,96 @@
+import numpy as np
+import pytest
+
+from mrdamper.dampers.parameter_map import ParameterMap
+from mrdamper.data import Condition
+from mrdamper.errors import IdentificationError, UnknownNameError
+from mrdamper.functions.fitting import choose_function, fit_function
+from mrdamper.functions.forms import FORMS, ParameterFunction, features
+from mrdamper.models.bouc_wen import BoucWen
+
+MATRIX = [
+    Condition(i, f, a)
+    for i in (0.0, 0.5, 1.0, 1.5, 2.0)
+    for f, a in ((1.0, 0.02), (1.5, 0.02), (2.0, 0.02), (0.5, 0.05), (1.0, 0.05), (1.5, 0.05))
+]
+
+
+@pytest.mark.parametrize("form", FORMS.values(), ids=lambda f: f.name)
+def test_every_form_recovers_itself(form):
+    rng = np.random.default_rng(4)
+    coefficients = tuple(rng.uniform(0.5, 2.0, len(form.terms)))
+    rates = tuple(float(np.sqrt(low * high)) for low, high in form.rate_bounds)
+    truth = ParameterFunction(form.name, coefficients, rates)
+    values = truth(*features(MATRIX))
+    fit = fit_function(form, MATRIX, values)
+    np.testing.assert_allclose(fit.function(*features(MATRIX)), values, rtol=1e-4)
+    assert fit.r2 == pytest.approx(1.0, abs=1e-6) or form.name == "constant"
+
+
+def test_logarithmic_functions_stay_positive():
+    values = 1e-4 * np.exp(-np.array([c.current_A for c in MATRIX]))
+    fit = fit_function("linear-current", MATRIX, values, log=True)
+    assert fit.function(50.0, 1.0, 0.02) > 0
+    assert fit.r2 == pytest.approx(1.0)
+
+
+def test_uncertain_values_count_less():
+    values, errors = np.ones(len(MATRIX)), np.full(len(MATRIX), 0.01)
+    values[3], errors[3] = 1e6, 1e6
+    assert fit_function("constant", MATRIX, values, uncertainty=errors).function(0, 1, 1) == pytest.approx(1, abs=0.05)
+
+
+def test_too_few_currents_for_a_quadratic_are_refused():
+    few = [c for c in MATRIX if c.current_A in (0.0, 1.0)]
+    with pytest.raises(IdentificationError, match="2 currents"):
+        fit_function("quadratic-current", few, np.arange(len(few)))
+
+
+def test_choice_prefers_the_short_form_that_predicts():
+    rng = np.random.default_rng(5)
+    current = np.array([c.current_A for c in MATRIX])
+    values = 100 + 50 * current + rng.normal(0, 3, current.size)
+    chosen = choose_function(("constant", "linear-current", "quadratic-current", "plane"), MATRIX, values)
+    assert chosen.function.form == "linear-current"
+    assert 0 < chosen.left_out < 0.2
+
+
+def test_a_parabola_tells_where_it_turns():
+    function = ParameterFunction("quadratic-current", (-1.0, 3.0, 0.0))
+    assert function.turning_point(2.0, 1.0, 0.02) == pytest.approx(1.5, abs=0.01)
+    assert ParameterFunction("linear-current", (1.0, 0.0)).turning_point(2.0, 1.0, 0.02) is None
+
+
+def test_forms_match_the_vectors(vectors):
+    case = vectors["V09_parameter_functions"]
+    k = case["coefficients"]
+    force, beta, mass = k["F0"], k["beta"], k["m"]
+    per_omega = k["sinphi"] / (2 * np.pi)
+    functions = {
+        "F0": ParameterFunction("quadratic-current-speed", tuple(force)),
+        "c": ParameterFunction("viscous-paper", tuple(per_omega * np.array(force))),
+        "m": ParameterFunction("mass-exponential", (mass[0], mass[1], mass[2], mass[4]), (mass[3],)),
+        "alpha": ParameterFunction("plane", tuple(k["alpha"])),
+        "beta": ParameterFunction("current-decay-frequency", (beta[0], beta[2], beta[4]), (beta[3], beta[1])),
+    }
+    for point in case["points"]:
+        for name, function in functions.items():
+            assert function(point["I"], point["f"], point["X"]) == pytest.approx(point[name], rel=1e-12), name
+
+
+def test_wrong_number_of_coefficients_and_unknown_forms_are_refused():
+    with pytest.raises(IdentificationError, match="it takes 2 and 0"):
+        ParameterFunction("linear-current", (1.0,))
+    with pytest.raises(UnknownNameError, match="did you mean plane"):
+        ParameterFunction("plan", (1.0,))
+
+
+def test_a_map_stops_at_physical_bounds():
+    constant = {name: ParameterFunction("constant", (value,)) for name, value in
+                {"yield_force": 500.0, "k1": 0.0, "k3": 0.0, "f0": 0.0}.items()}  # fmt: skip
+    functions = {
+        **constant,
+        "yield_displacement": ParameterFunction("constant", (np.log(1e-4),), log=True),
+        "c": ParameterFunction("linear-current", (-1000.0, 500.0)),
+    }
+    assert ParameterMap(BoucWen, functions).at(Condition(2.0, 1.0, 0.01)).c == 0.0

@@ -1,0 +1,60 @@
+"""The same bits whatever number of threads the linear algebra is given."""
+
+import importlib.util
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from mrdamper.optimizers.linear import on_one_blas_thread, one_blas_thread
+
+FIT = """
+import hashlib
+import numpy as np
+from mrdamper.identification import identify
+from mrdamper.files.dataset import load_dataset
+from mrdamper.dampers.joint import JointProblem
+runs = [run for run in load_dataset().rig("utfsm").split("train") if run.excitation == "sine"]
+fit = JointProblem(runs, "play-bypass").fit(rounds=1, most_steps=2)
+bits = [fit.point, fit.nrmse_pp]
+models = [identify(run, free=free).model for run in runs[:3] for free in ((), ("gamma",))]
+bits += [np.array(list(model.values().values())) for model in models]
+print(hashlib.sha256(b"".join(np.ascontiguousarray(b).tobytes() for b in bits)).hexdigest())
+"""
+
+
+@pytest.mark.skipif(importlib.util.find_spec("threadpoolctl") is None, reason="threads are held by threadpoolctl")
+def test_one_and_two_threads_give_the_same_bits():
+    found = set()
+    for threads in ("1", "2"):
+        environment = {**os.environ, "OMP_NUM_THREADS": threads, "OPENBLAS_NUM_THREADS": threads}
+        done = subprocess.run([sys.executable, "-c", FIT], capture_output=True, text=True, check=True, env=environment)
+        found.add(done.stdout)
+    assert len(found) == 1
+
+
+@pytest.mark.skipif(importlib.util.find_spec("threadpoolctl") is None, reason="threads are held by threadpoolctl")
+def test_the_number_of_threads_is_given_back():
+    from threadpoolctl import threadpool_info
+
+    def blas():
+        return [library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"]
+
+    np.linalg.inv(np.eye(2))
+    before = blas()
+    with one_blas_thread():
+        assert set(blas()) == {1}
+    assert blas() == before
+    assert set(on_one_blas_thread(blas)()) == {1}
+
+
+def test_without_the_library_nothing_is_held_and_nothing_fails(monkeypatch):
+    from mrdamper.optimizers import linear
+
+    monkeypatch.setitem(sys.modules, "threadpoolctl", None)
+    linear._controller.cache_clear()
+    with one_blas_thread():
+        assert linear._controller() is None
+    linear._controller.cache_clear()

@@ -1,0 +1,82 @@
+"""`mrdamper check` and its figure."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib import pyplot
+from support.rig_records import clean_record
+from typer.testing import CliRunner
+
+from mrdamper.cli import application
+from mrdamper.data import Dataset
+from mrdamper.files.dataset import save_dataset
+from mrdamper.report.plots.quality import LoopPanel, quality_figure
+from mrdamper.rig_files.to_run import to_run
+
+
+@pytest.fixture
+def folder(tmp_path):
+    good, clipped = clean_record(3, cycles=4), clean_record(4, cycles=4)
+    clipped = replace(clipped, force=np.minimum(clipped.force, 0.8 * clipped.force.max()))
+    save_dataset(Dataset((to_run(good), to_run(clipped))), tmp_path / "rig")
+    return tmp_path / "rig"
+
+
+def check(*arguments):
+    return CliRunner().invoke(application(), ["check", *map(str, arguments)])
+
+
+def test_a_usable_dataset_exits_with_zero(folder):
+    result = check(folder)
+    assert result.exit_code == 0, result.output
+    lines = result.stdout.splitlines()
+    assert lines[0].split()[:4] == ["run", "A", "Hz", "mm"]
+    assert "good" in lines[1]
+    assert "W_CLIPPED" in lines[2]
+
+
+def test_a_refused_run_exits_with_two_and_says_why(tmp_path):
+    run = to_run(clean_record(5, cycles=3))
+    save_dataset(Dataset((replace(run, force=-run.force),)), tmp_path / "rig")
+    result = check(tmp_path / "rig")
+    assert result.exit_code == 2
+    assert "refused" in result.stdout
+    assert "E_DISSIPATION_SIGN" in result.output
+
+
+def test_json_holds_numbers(folder):
+    rows = json.loads(check(folder, "--json").stdout)
+    assert [row["verdict"] for row in rows] == ["good", "not identified"]
+    assert isinstance(rows[0]["offset_force_N"], float)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg"])
+def test_the_figure_is_written(folder, tmp_path, suffix):
+    path = tmp_path / f"loops{suffix}"
+    assert check(folder, "--figure", path).exit_code == 0
+    assert path.stat().st_size > 5_000
+
+
+def test_a_figure_of_unknown_form_is_refused_at_once(folder, tmp_path):
+    result = check(folder, "--figure", tmp_path / "loops.docx")
+    assert result.exit_code != 0
+    assert not (tmp_path / "loops.docx").exists()
+
+
+def test_flagged_samples_are_marked_and_names_are_text():
+    x = np.linspace(-0.01, 0.01, 50)
+    panels = [
+        LoopPanel("$x^2$ <b>", "W_CLIPPED", x, 100 * x, np.arange(50) > 44),
+        LoopPanel("b", "", x, 100 * x, np.zeros(50, dtype=bool)),
+    ]
+    figure = quality_figure(panels)
+    first, second = figure.axes[:2]
+    assert [line.get_xdata().size for line in first.lines] == [50, 5]
+    assert len(second.lines) == 1
+    # Drawn in millimetres.
+    assert first.lines[0].get_xdata().max() == pytest.approx(10.0)
+    assert first.get_title(loc="left") == "$x^2$ <b>"
+    figure.draw_without_rendering()
+    pyplot.close("all")

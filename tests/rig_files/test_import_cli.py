@@ -1,0 +1,150 @@
+"""`mrdamper import`: everything or nothing, twice the same, and every refusal listed."""
+
+import json
+
+import numpy as np
+import pytest
+from support.rig_files import channels, columns, lines_of, npz_bytes, rows, text, write
+from typer.testing import CliRunner
+
+from mrdamper.cli import application
+from mrdamper.errors import InputError
+from mrdamper.files.dataset import load_dataset
+from mrdamper.rig_files.rig_import import import_files, read_run, to_dataset
+
+
+def run(*arguments):
+    return CliRunner().invoke(application(), ["import", *map(str, arguments)])
+
+
+@pytest.fixture
+def folder(tmp_path):
+    raw = tmp_path / "raw"
+    (raw / "b").mkdir(parents=True)
+    write(raw, "one_0.5A.csv", text())
+    write(raw, "two_-0.3A-.csv", text(header=("Zeit [s];Weg [mm];Kraft [N]",), separator=";", decimal=","), "utf-16")
+    write(raw / "b", "one_0.5A.npz", npz_bytes(**columns()))
+    write(raw, "notes.md", "not a rig's file")
+    return raw
+
+
+def test_a_folder_becomes_a_dataset_with_its_provenance(folder, tmp_path):
+    done = run(folder, "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    dataset = load_dataset(tmp_path / "out")
+    assert [item.id for item in dataset] == ["one_0.5A", "one_0.5A_2", "two_-0.3A-"]
+    assert [item.current_A for item in dataset] == [0.5, 0.5, 0.3]
+    for item in dataset:
+        # Six decimals in the text files.
+        np.testing.assert_allclose(item.force, channels()["force"], rtol=0, atol=1e-6)
+        assert len(item.notes["sha256"]) == 64
+        assert item.notes["current_from"] == "file name"
+    assert dataset["two_-0.3A-"].notes["file"] == "two_-0.3A-.csv"
+
+
+def test_importing_twice_gives_the_same_bytes(folder, tmp_path):
+    profile = write(tmp_path, "rig.toml", 'rig = "seven"\n')
+    for name in ("a", "b"):
+        assert run(folder, "--out", tmp_path / name, "--profile", profile).exit_code == 0
+    names = sorted(path.name for path in (tmp_path / "a").iterdir())
+    assert names == ["rig.toml", "runs.csv", "samples.parquet"]
+    for name in names:
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+
+
+def test_one_refused_file_stops_all_unless_told_otherwise(folder, tmp_path):
+    write(folder, "bad_1A.csv", lines_of({100: "0.49,1_000.5,3.0"}))
+    write(folder, "no_current.csv", text())
+    done = run(folder, "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert "E_NUMBER" in done.output
+    assert "E_CURRENT_MISSING" in done.output
+    assert not (tmp_path / "out").exists()
+    done = run(folder, "--out", tmp_path / "out", "--skip-refused", "--json")
+    assert done.exit_code == 0
+    summary = json.loads(done.output)
+    assert [entry["code"] for entry in summary["refused"]] == ["E_NUMBER", "E_CURRENT_MISSING"]
+    assert [entry["run_id"] for entry in summary["runs"]] == [item.id for item in load_dataset(tmp_path / "out")]
+
+
+def test_the_refusal_for_want_of_a_current_says_what_the_file_has_instead(tmp_path):
+    table = np.column_stack([rows(), np.full(600, 0.5)])
+    write(tmp_path, "a.csv", text(table, ("time_s,displacement_mm,force_N,current [V]",)))
+    done = run(tmp_path / "a.csv", "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert "'current [V]' is in V, which is no unit of current" in done.output
+    assert "E_CURRENT_MISSING" in done.output
+    assert "--write-profile rig.toml" in done.output
+
+
+def test_nothing_good_writes_nothing(tmp_path):
+    path = write(tmp_path, "a.csv", b"")
+    assert run(path, "--out", tmp_path / "out", "--skip-refused").exit_code == 2
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_killed_import_leaves_nothing(folder, tmp_path, monkeypatch):
+    import polars as pl
+
+    monkeypatch.setattr(pl.DataFrame, "write_parquet", lambda *a, **k: (_ for _ in ()).throw(KeyboardInterrupt))
+    run(folder, "--out", tmp_path / "out")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["raw"]
+
+
+def test_an_existing_dataset_is_refused_before_the_work(folder, tmp_path):
+    write(tmp_path, "taken", "x")
+    done = run(folder, "--out", tmp_path / "taken")
+    assert isinstance(done.exception, InputError)
+    assert done.exception.code == "E_OUTPUT"
+
+
+def test_the_guess_is_a_profile_for_the_folder(folder, tmp_path):
+    shown = run(folder / "one_0.5A.csv", "--write-profile", "-")
+    assert shown.exit_code == 0
+    assert 'column = "force_N"' in shown.output
+    saved = run(folder / "one_0.5A.csv", "--write-profile", tmp_path / "rig.toml")
+    assert saved.exit_code == 0
+    assert (tmp_path / "rig.toml").read_text() == shown.output
+    done = run(folder / "one_0.5A.csv", "--profile", tmp_path / "rig.toml", "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+
+
+def test_a_wrong_sign_is_mended_by_the_profile(tmp_path):
+    table = rows() * [1, 1, -1]
+    path = write(tmp_path, "a_1A.csv", text(table))
+    done = run(path, "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert "E_DISSIPATION_SIGN" in done.output
+    profile = write(tmp_path, "rig.toml", "[channels.force]\nsign = -1\n")
+    assert run(path, "--out", tmp_path / "out", "--profile", profile).exit_code == 0
+    np.testing.assert_allclose(load_dataset(tmp_path / "out")["a_1A"].force, channels()["force"], rtol=0, atol=1e-6)
+
+
+def test_names_that_look_like_formulas_or_control_the_screen_are_data(tmp_path):
+    header = "time_s,displacement_mm,force_N,=HYPERLINK(0)\x1b[2J\u202eevil"
+    table = np.column_stack([rows(), np.zeros(600)])
+    path = write(tmp_path, "=cmd_1A.csv", text(table, (header.replace("\x1b", ""),)))
+    done = run(path, "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    written = (tmp_path / "out" / "runs.csv").read_text()
+    assert not any(cell.startswith(("=", "+", "@")) for line in written.splitlines() for cell in line.split(","))
+    assert "\u202e" not in written + done.output
+
+
+def test_a_raw_folder_given_as_a_dataset_points_to_import(folder):
+    with pytest.raises(InputError, match="mrdamper import"):
+        load_dataset(folder)
+
+
+def test_python_does_what_the_command_does(folder):
+    result = import_files([folder])
+    assert not result.refusals
+    assert [item.id for item in to_dataset(result.records)] == ["one_0.5A", "one_0.5A_2", "two_-0.3A-"]
+    assert read_run(folder / "one_0.5A.csv").id == "one_0.5A"
+
+
+def test_a_profile_that_cannot_be_read_stops_at_once(folder, tmp_path):
+    profile = write(tmp_path, "rig.toml", "rigg = 1")
+    done = run(folder, "--out", tmp_path / "out", "--profile", profile)
+    assert isinstance(done.exception, InputError)
+    assert done.exception.code == "E_PROFILE"

@@ -1,0 +1,232 @@
+"""The rig profile: checked, written and read back, and what it changes in a record."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support.rig_files import NAMES, channels, rows, text, write
+
+from mrdamper.errors import InputError
+from mrdamper.rig_files.profile import (
+    Channel,
+    CurrentSource,
+    FileForm,
+    Profile,
+    ProfileError,
+    current_in_name,
+    load_profile,
+    parse_profile,
+    profile_hash,
+    profile_text,
+)
+from mrdamper.rig_files.rig_import import guess_profile, read_run
+
+NAME = st.text(min_size=1, max_size=20)
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+PROFILES = st.builds(
+    Profile,
+    rig=st.text(max_size=20),
+    excitation=NAME,
+    split=st.sampled_from(["train", "validate"]),
+    file=st.builds(
+        FileForm,
+        separator=st.sampled_from([";", "\t", None]),
+        decimal=st.sampled_from([",", "."]),
+        header_line=st.none() | st.integers(0, 99),
+        names=st.lists(st.text(max_size=5), max_size=4).map(tuple),
+        sample_rate_Hz=st.none() | st.floats(0.1, 1e5),
+    ),
+    channels=st.dictionaries(
+        st.sampled_from(["force"]),
+        st.builds(
+            Channel,
+            column=st.none() | NAME | st.integers(1, 99),
+            unit=st.just("kN"),
+            sign=st.sampled_from([1, -1]),
+            scale=st.floats(1e-9, 1e9),
+            offset=FINITE,
+            delay_ms=st.floats(-1e3, 1e3),
+        ),
+    ),
+    current=st.none() | st.builds(CurrentSource, value=st.floats(-10, 10)),
+)
+
+WRONG = {
+    "no TOML": ("rig = ", "profile"),
+    "unknown key": ("rigg = 1", "unknown key rigg"),
+    "unknown channel": ('[channels.forze]\nunit = "N"', "no channel is called 'forze'"),
+    "unit of another thing": ('[channels.force]\nunit = "mm"', "'mm' is no unit of force"),
+    "no unit": ('[channels.force]\nunit = "blub"', "'blub' is no unit of force"),
+    "sign of two": ("[channels.force]\nsign = 2", "channels.force.sign"),
+    "scale of zero": ('[channels.force]\nunit = "N"\nscale = 0', "scale of zero"),
+    "scale without unit": ("[channels.force]\nscale = 2.0", "scale needs the unit"),
+    "offset without scale": ('[channels.force]\nunit = "N"\noffset = 2.0', "offset belongs to a calibration"),
+    "current twice": ('[current]\nvalue = 1.0\npattern = "*{current}A"', "either value or pattern"),
+    "no current": ("[current]", "either value or pattern"),
+    "pattern without place": ('[current]\npattern = "*A"', "{current} once"),
+    "infinite": ("[current]\nvalue = inf", "current.value"),
+    "comma twice": ('[file]\nseparator = ","\ndecimal = ","', "both a comma"),
+    "text for number": ('[current]\nvalue = "1"', "current.value"),
+}
+
+
+@given(profile=PROFILES)
+def test_a_written_profile_reads_back_equal(profile):
+    assert parse_profile(profile_text(profile)) == profile
+    assert profile_hash(parse_profile(profile_text(profile))) == profile_hash(profile)
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_profiles_are_refused_with_the_key(case):
+    content, found = WRONG[case]
+    with pytest.raises(ProfileError) as caught:
+        parse_profile(content)
+    assert found in str(caught.value)
+    assert caught.value.code == "E_PROFILE"
+
+
+def test_profiles_that_are_no_files_of_text(tmp_path):
+    for name, content in (("a.toml", b"\xff\xfe\xfa"), ("b.toml", b"#" * 100_000)):
+        with pytest.raises(ProfileError):
+            load_profile(write(tmp_path, name, content))
+    with pytest.raises(ProfileError, match="TOML"):
+        load_profile(tmp_path / "nowhere.toml")
+
+
+@pytest.mark.parametrize(
+    ("name", "current"),
+    [
+        ("A5_-0.3A-_1.csv", 0.3),
+        ("utf_10mm2Hz_0x25A.txt", 0.25),
+        ("run_1.5A.csv", 1.5),
+        ("run 500mA.csv", 0.5),
+        ("damper_2A_sine.csv", 2.0),
+        ("0A.csv", 0.0),
+        ("test_01_2A.csv", 2.0),
+        ("x_0,75A.csv", 0.75),
+        ("1A_after_1A.csv", 1.0),
+        ("1A_to_2A.csv", None),
+        ("run_0_5A.csv", None),
+        ("run3A.csv", None),
+        ("A1.csv", None),
+        ("2AB.csv", None),
+        ("v1.2.3A.csv", None),
+        ("plain.csv", None),
+    ],
+)
+def test_current_in_a_file_name_only_where_it_is_plain(name, current):
+    assert current_in_name(name, Profile()) == current
+
+
+@pytest.mark.parametrize(
+    ("pattern", "unit", "name", "current"),
+    [
+        ("*_I{current}_*", "A", "b_I0.5_x.csv", 0.5),
+        ("*_{current}A", "A", "run_0_5A.csv", 5.0),
+        ("run_0_{current}A*", "mA", "run_0_5A.csv", 0.005),
+        ("{current}", "mA", "250.csv", 0.25),
+        ("*_I{current}", "A", "b_1A.csv", None),
+    ],
+)
+def test_current_by_pattern(pattern, unit, name, current):
+    assert current_in_name(name, Profile(current=CurrentSource(pattern=pattern, unit=unit))) == current
+
+
+def test_a_profile_says_what_a_file_without_header_does_not(tmp_path):
+    table = np.column_stack([rows()[:, 0], 0.1 * rows()[:, 1], -1e-3 * rows()[:, 2], np.zeros(600)])
+    path = write(tmp_path, "a.dat", text(table, (), "\t"))
+    profile = parse_profile(
+        '[file]\nnames = ["Time", "Stroke", "Load", "Count"]\n[channels.time]\nunit = "s"\n'
+        '[channels.displacement]\nunit = "cm"\n[channels.force]\nunit = "kN"\nsign = -1\n[current]\nvalue = 0.4\n'
+    )
+    record = read_run(path, profile)
+    truth = channels()
+    # Six decimals of cm and of kN.
+    np.testing.assert_allclose(record.displacement, truth["displacement"], rtol=0, atol=1e-8)
+    np.testing.assert_allclose(record.force, truth["force"], rtol=0, atol=1e-3)
+    assert record.current is not None
+    assert set(record.current) == {0.4}
+    assert record.provenance["current_from"] == "profile"
+    assert record.provenance["profile_sha256"] == profile_hash(profile)
+
+
+def test_a_unit_of_the_profile_wins_over_an_unknown_one_but_not_over_another_dimension(tmp_path):
+    path = write(tmp_path, "a.csv", text(header=("t;x;F", "s;mm;blub"), separator=";"))
+    profile = parse_profile('[channels.force]\nunit = "N"\n')
+    np.testing.assert_allclose(read_run(path, profile).force, channels()["force"], rtol=0, atol=1e-6)
+    path = write(tmp_path, "b.csv", text(header=("t;x;F", "s;mm;V"), separator=";"))
+    with pytest.raises(InputError, match=r"scale.*E_UNITS_DIMENSION"):
+        read_run(path, profile)
+
+
+def test_columns_by_number_and_by_name(tmp_path):
+    table = np.column_stack([rows(), rows()[:, 2] + 1])
+    path = write(tmp_path, "a.csv", text(table, (",".join([*NAMES, "force_N"]),)))
+    np.testing.assert_array_equal(
+        read_run(path, parse_profile("[channels.force]\ncolumn = 4\n")).force, rows_of(path, 3)
+    )
+    for wrong in ("column = 9", 'column = "Kraft"'):
+        with pytest.raises(InputError, match="E_COLUMN"):
+            read_run(path, parse_profile(f"[channels.force]\n{wrong}\n"))
+
+
+def rows_of(path, column):
+    return np.array([float(line.split(",")[column]) for line in path.read_text().splitlines()[1:]])
+
+
+@pytest.mark.parametrize("delay_ms", [5.0, 20.0, -20.0])
+def test_a_known_delay_is_taken_off(tmp_path, delay_ms):
+    truth = channels(600)
+    late = np.interp(truth["time"] - 1e-3 * delay_ms, truth["time"], truth["displacement"])
+    table = np.column_stack([truth["time"], 1e3 * late, truth["force"]])
+    record = read_run(
+        write(tmp_path, "a.csv", text(table)), parse_profile(f"[channels.displacement]\ndelay_ms = {delay_ms}\n")
+    )
+    expected = np.interp(record.time, truth["time"], truth["displacement"])
+    # Six decimals of a millimetre; the delays are whole samples, so nothing is interpolated.
+    np.testing.assert_allclose(record.displacement, expected, rtol=0, atol=1e-8)
+    assert record.time.size == 600 - abs(round(delay_ms / 5))
+    assert record.lines is not None
+    assert len(record.lines) == record.time.size
+
+
+def test_a_rate_stands_in_for_time_stamps(tmp_path):
+    path = write(tmp_path, "a.csv", text(rows()[:, 1:], ("displacement_mm,force_N",)))
+    record = read_run(path, parse_profile("[file]\nsample_rate_Hz = 200\n"))
+    np.testing.assert_allclose(record.time, channels()["time"], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "header", "separator", "decimal", "encoding"),
+    [
+        ("a_0.5A.csv", ",".join(NAMES), ",", ".", "utf-8"),
+        ("a_500mA_x.csv", "Zeit [s];Weg [mm];Kraft [N]", ";", ",", "cp1252"),
+        ("a.txt", "t\tx\tF\ns\tmm\tN", "\t", ",", "utf-16"),
+    ],
+)
+def test_a_guessed_profile_reads_the_same_record(tmp_path, name, header, separator, decimal, encoding):
+    path = write(tmp_path, name, text(rows(), tuple(header.split("\n")), separator, decimal), encoding)
+    guess = guess_profile(path)
+    saved = write(tmp_path, "rig.toml", profile_text(guess))
+    assert profile_text(load_profile(saved)) == saved.read_text()
+    plain, again = read_run(path), read_run(path, saved)
+    for channel in ("time", "displacement", "force"):
+        np.testing.assert_array_equal(getattr(plain, channel), getattr(again, channel))
+    assert (plain.current is None) == (again.current is None)
+    if plain.current is not None:
+        np.testing.assert_array_equal(plain.current, again.current)
+    assert guess_profile(path, saved) == guess
+
+
+@pytest.mark.parametrize("header", [(), ("time\tdisp\tforce\tcount",)])
+def test_the_guess_of_a_file_that_says_too_little_is_there_to_be_completed(tmp_path, header):
+    path = write(tmp_path, "a_1A.dat", text(np.column_stack([rows(), np.arange(600)]), header, "\t"))
+    with pytest.raises(InputError, match="E_UNITS_MISSING"):
+        read_run(path)
+    guess = profile_text(guess_profile(path))
+    for channel, column, unit in (("time", 1, "s"), ("displacement", 2, "mm"), ("force", 3, "N")):
+        place = "" if header else f"column = {column}\n"
+        assert f"[channels.{channel}]\n" in guess
+        guess = guess.replace(f"[channels.{channel}]\n", f'[channels.{channel}]\nunit = "{unit}"\n{place}')
+    record = read_run(path, parse_profile(guess))
+    np.testing.assert_allclose(record.force, channels()["force"], rtol=0, atol=1e-6)

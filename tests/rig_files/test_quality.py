@@ -1,0 +1,211 @@
+"""Clean records pass; what is accepted and said: a test a code, and how often it is found."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support import rig_detection as rig
+from support.rig_records import chirp_record, clean_record, codes_of, random_record, with_channel
+
+from mrdamper.motion import analyse_motion
+from mrdamper.rig_files.quality import judge
+from mrdamper.rig_files.quality.table import record_of
+
+
+@pytest.fixture
+def good():
+    return clean_record(3, cycles=4, points=200, velocity=True)
+
+
+# Clean records
+
+
+def test_clean_records_pass():
+    """At most 1 % may be flagged; with and without a velocity channel. All 300 are in the slow test."""
+    assert len(rig.clean_passed(100).missed) <= 1
+
+
+@pytest.mark.slow
+def test_three_hundred_clean_records_pass():
+    passed = rig.clean_passed(300)
+    assert len(passed.missed) <= 3, passed.missed
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        pytest.param({"sensor": 1e-5}, id="displacement noise of 10 µm"),
+        pytest.param({"noise": 0.0}, id="no noise at all"),
+        pytest.param({"noise": 10.0, "points": 400, "cycles": 5.3}, id="fine"),
+    ],
+)
+def test_other_clean_records_pass(change):
+    for seed in range(25):
+        assert codes_of(clean_record(seed, **change)) == [], seed
+
+
+def test_coarse_channels_pass():
+    """A 12-bit converter repeats itself at every turn of the motion: no clipping, no freezing."""
+    for seed in range(40):
+        record = clean_record(seed, noise=1.0)
+        coarse = {name: np.round(getattr(record, name) / step) * step for name, step in STEPS.items()}
+        assert codes_of(replace(record, **coarse)) == [], seed
+
+
+STEPS = {"displacement": 1e-5, "force": 2.5}
+
+
+@pytest.mark.parametrize("make", [chirp_record, random_record])
+def test_motions_that_are_no_sine_are_taken(make):
+    for seed in range(5):
+        assert codes_of(make(seed)) == ["W_NOT_SINE"]
+
+
+def test_bundled_runs_are_flagged_only_for_what_they_have(bundled):
+    """A flattened sine at the shaking table, positions that drift there: both are true, and the sine is said."""
+    said = {run.id: codes_of(record_of(run)) for run in bundled}
+    assert not {run.id: wrong for run in bundled if (wrong := rig.unfounded_codes(run, said[run.id]))}
+    # Well beyond the limit of 5 %: the checks find their own steady window.
+    flattened = [run for run in bundled if run.excitation != "chirp" and analyse_motion(run).distortion > 0.055]
+    assert len(flattened) >= 3
+    assert all("W_NOT_SINE" in said[run.id] for run in flattened)
+
+
+# Accepted, and said
+
+
+def test_a_gap_in_time_splits_the_record(good):
+    def leap(time):
+        time[300:] += 0.3
+        time[500:] += 0.1
+
+    judged = judge(replace(with_channel(good, "time", leap), velocity=None))
+    assert judged.findings[0].code == "W_TIME_GAP"
+    assert judged.segments == ((0, 300), (300, 500), (500, 801))
+
+
+def test_a_gap_brings_no_other_finding():
+    """Samples lost anywhere, and two blocks at any distance in time: 25 records each."""
+    rng = np.random.default_rng(0)
+    for seed in range(25):
+        record = clean_record(seed, cycles=4.5)
+        size, first = record.time.size, int(rng.integers(record.time.size // 5, record.time.size // 2))
+        kept = np.r_[:first, first + int(rng.integers(8, size // 6)) : size]
+        lost = {name: getattr(record, name)[kept] for name in ("time", "displacement", "force", "current")}
+        assert codes_of(replace(record, **lost)) == ["W_TIME_GAP"], seed
+        twice = {name: np.tile(getattr(record, name), 2) for name in ("displacement", "force", "current")}
+        later = record.time + np.ptp(record.time) + rng.uniform(0.5, 20)
+        assert codes_of(replace(record, time=np.concatenate([record.time, later]), **twice)) == ["W_TIME_GAP"], seed
+
+
+def test_a_record_without_gap_is_one_segment(good):
+    assert judge(good).segments == ((0, good.time.size),)
+
+
+def test_channels_are_not_changed(good):
+    judged = judge(good)
+    for name in ("time", "displacement", "force", "velocity"):
+        assert getattr(judged, name) is getattr(good, name)
+
+
+def test_clipping_is_noticed():
+    """At least 95 %; flat tops of five samples and more, of 3 to 30 % of the amplitude."""
+    found = rig.clipping_found(130)
+    assert found.tried > 100
+    assert found.share >= 0.95, found.missed
+
+
+def test_clipping_is_noticed_on_real_coarse_records(bundled):
+    """A force that spends an eighth of the record above the limit; resolution 3 N, and the noise of the rig.
+
+    Without current the force itself is a plateau of that height.
+    """
+    for run in bundled:
+        if run.rig != "utfsm" or run.current_A == 0:
+            continue
+        top = np.quantile(run.force, 0.875)
+        assert "W_CLIPPED" in codes_of(record_of(replace(run, force=np.minimum(run.force, top)))), run.id
+
+
+def test_freezing_is_noticed():
+    """At least 99 %; stretches of 8 to 60 samples anywhere in displacement or force."""
+    found = rig.freezing_found(120)
+    assert found.share >= 0.99, found.missed
+
+
+def test_a_channel_that_dies_is_noticed(good):
+    """From the middle of the record to its end."""
+
+    def die(force):
+        force[450:] = force[450]
+
+    assert "W_FROZEN" in codes_of(with_channel(good, "force", die))
+
+
+def test_a_triangle_is_no_sine(good):
+    """Its distortion is 12 %, that of a sine with 4 % of third harmonic is 4 %."""
+    phase = 2 * np.pi * np.arange(good.time.size) / 200
+    triangle = 0.02 * 2 / np.pi * np.arcsin(np.sin(phase))
+    nearly = 0.02 * (np.sin(phase) + 0.04 * np.sin(3 * phase))
+    assert codes_of(replace(good, displacement=triangle, force=force_of(triangle, good), velocity=None)) == [
+        "W_NOT_SINE"
+    ]
+    assert codes_of(replace(good, displacement=nearly, force=force_of(nearly, good), velocity=None)) == []
+
+
+def force_of(displacement, record):
+    """A viscous damper with 10 N noise."""
+    noise = 10 * np.random.default_rng(3).standard_normal(record.time.size)
+    return 2000 * np.gradient(displacement, record.time) + noise
+
+
+@pytest.mark.parametrize("cycles", [0.2, 0.4, 0.6, 0.8, 0.9])
+def test_less_than_a_cycle_is_said(cycles):
+    for seed in range(20):
+        assert codes_of(clean_record(seed, cycles=cycles)) == ["W_SHORT"], seed
+
+
+def test_a_late_force_is_noticed_on_a_hysteretic_damper():
+    """At 5 % of the period at least nine in ten; hysteresis alone never (all clean records)."""
+    found = rig.late_force_found(40, 0.05, damper="bouc-wen")
+    assert found.share >= 0.9, found.missed
+
+
+@pytest.mark.parametrize("what", ["mean", "amplitude"])
+@pytest.mark.parametrize(("share", "said"), [(0.05, False), (0.2, True), (0.5, True)])
+def test_drift_is_said(what, share, said):
+    for seed in range(15):
+        record = clean_record(seed, cycles=5)
+        along = np.linspace(0, 1, record.time.size)
+        centre = record.displacement.mean()
+        half = np.ptp(record.displacement) / 2
+        moved = share * along * (half if what == "mean" else record.displacement - centre)
+        codes = codes_of(replace(record, displacement=record.displacement + moved))
+        assert codes == (["W_DRIFT"] if said else []), seed
+
+
+def test_cycles_that_differ_are_said(good):
+    """A force that fades by a fifth from cycle to cycle."""
+    fading = good.force * 0.8 ** (np.arange(good.time.size) / 200)
+    assert "W_REPEATABILITY" in codes_of(replace(good, force=fading))
+
+
+def test_no_damper_is_refused_for_a_ramp_in_and_out(bundled):
+    """The tests of the first rig begin and end at rest."""
+    assert codes_of(record_of(bundled["utf_5mm4Hz_1A"])) == []
+
+
+def test_a_long_record_is_judged_on_a_part_of_it():
+    """The figures do not depend on how finely a test was sampled."""
+    motion = clean_record(4, cycles=4, points=200)
+    fine = np.linspace(motion.time[0], motion.time[-1], 400_001)
+    rng = np.random.default_rng(1)
+    long = replace(
+        motion,
+        time=fine,
+        displacement=np.interp(fine, motion.time, motion.displacement) + 1e-6 * rng.standard_normal(fine.size),
+        force=np.interp(fine, motion.time, motion.force) + 1.0 * rng.standard_normal(fine.size),
+        current=np.full(fine.size, 0.5),
+    )
+    assert codes_of(long) == []
+    assert codes_of(replace(long, force=-long.force)) == ["E_DISSIPATION_SIGN"]

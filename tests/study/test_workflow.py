@@ -1,0 +1,160 @@
+"""The main job on the real data: what a newcomer sees."""
+
+import csv
+import json
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from mrdamper.data import Dataset, Run
+from mrdamper.errors import IdentificationError, OutputError
+from mrdamper.files.model_file import dump_model, load_model
+from mrdamper.loop_analysis import analyse_loop, dynamic_ranges
+from mrdamper.report.study_files import write_study
+from mrdamper.study.workflow import run_study
+from mrdamper.validation import validate
+
+
+@pytest.fixture(scope="module")
+def study(bundled):
+    return run_study(bundled)
+
+
+@pytest.fixture(scope="module")
+def folder(study, tmp_path_factory):
+    out = tmp_path_factory.mktemp("study") / "result"
+    write_study(study, out)
+    return out
+
+
+@pytest.mark.parametrize("rig", ["utfsm", "labcontrol"])
+def test_held_out_runs_are_predicted_better_than_by_bingham(study, rig):
+    found = study.rig(rig)
+    bingham = [c for c in found.candidates if c.model == "bingham"]
+    assert found.chosen.held_out.median() <= 0.05
+    assert all(found.chosen.held_out.median() < other.held_out.median() for other in bingham)
+    assert found.chosen.left_out.median() < min(other.left_out.median() for other in bingham)
+
+
+def test_train_runs_alone_make_the_model(study, bundled):
+    validate_ids = {run.id for run in bundled.split("validate")}
+    for rig in study.rigs:
+        for candidate in rig.candidates:
+            assert not validate_ids & {i.run_id for i in candidate.identifications}
+            assert {r.run_id for r in candidate.held_out.runs} <= validate_ids
+
+
+def test_the_sweep_is_predicted_but_not_identified_from(study):
+    rig = study.rig("utfsm")
+    assert "utf_chirp15_0A" in rig.not_identified
+    sweep = next(r for r in rig.chosen.held_out.runs if r.run_id == "utf_chirp15_0A")
+    assert {"amplitude", "not a sine"} <= set(sweep.extrapolation)
+
+
+def test_several_rigs_have_no_single_model(study):
+    with pytest.raises(IdentificationError, match="labcontrol"):
+        _ = study.model
+
+
+def test_loops_dissipate_and_rise_with_current(bundled):
+    loops = [analyse_loop(run) for run in bundled.rig("utfsm") if run.excitation == "sine"]
+    assert all(loop.dissipated_energy > 0 for loop in loops)
+    for entry in dynamic_ranges(loops):
+        assert entry.ratios[0] == 1.0
+        assert np.all(np.diff(entry.ratios) > 0)
+
+
+def test_every_file_of_the_contract_is_there(folder):
+    names = {p.name for p in folder.iterdir()}
+    assert names == {
+        "report.html",
+        "model-labcontrol.json",
+        "model-utfsm.json",
+        "identifications.csv",
+        "validation.csv",
+        "figures",
+    }
+    assert {p.suffix for p in (folder / "figures").iterdir()} == {".png", ".svg"}
+
+
+def test_saved_models_predict_what_the_study_predicted(folder, study, bundled):
+    for rig in study.rigs:
+        damper = load_model(folder / f"model-{rig.rig}.json")
+        again = validate(damper, bundled.rig(rig.rig).split("validate"))
+        assert [r.scores for r in again.runs] == [r.scores for r in rig.chosen.held_out.runs]
+
+
+def test_tables_carry_units_and_numbers(folder):
+    with (folder / "validation.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert {"run_id", "nrmse_pp", "nrmse_std", "wape", "energy_error", "extrapolation"} <= set(rows[0])
+    assert all(0 < float(row["nrmse_pp"]) < np.inf for row in rows)
+    assert all(float(row["nrmse_pp"]) < 0.15 for row in rows if row["model"] == "play-bypass")
+    with (folder / "identifications.csv").open() as file:
+        names = next(csv.reader(file))
+    assert "alpha [N/m]" in names
+
+
+class _Links(HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.outside, self.images, self.scripts = [], 0, 0
+
+    def handle_starttag(self, tag, attrs):
+        attributes = dict(attrs)
+        self.images += tag == "img"
+        self.scripts += tag == "script"
+        for name in ("src", "href"):
+            value = attributes.get(name, "#")
+            if not value.startswith(("#", "data:")):
+                self.outside.append(value)
+        if tag == "img":
+            assert attributes["alt"]
+
+
+def test_report_is_one_file_without_scripts_or_links_outside(folder):
+    page = _Links()
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    page.feed(text)
+    assert page.outside == []
+    assert page.scripts == 0
+    assert page.images == 16
+    assert len(text) < 6_000_000
+
+
+def test_a_study_is_the_same_twice(study, bundled):
+    again = run_study(bundled.rig("utfsm")).rigs[0]
+    before = study.rig("utfsm")
+    assert [dump_model(c.damper) for c in again.candidates] == [dump_model(c.damper) for c in before.candidates]
+
+
+def test_hostile_names_are_text_in_the_report(tmp_path, bundled):
+    name = "<script>alert(1)</script>=cmd"
+    runs = [r for r in bundled.rig("utfsm") if r.excitation == "sine"]
+    renamed = []
+    for number, run in enumerate(runs):
+        fields = {f: getattr(run, f) for f in run.__dataclass_fields__}
+        renamed.append(Run(**{**fields, "rig": "rig", "id": f"{name}{number}"}))
+    write_study(run_study(Dataset(tuple(renamed), name)), tmp_path / "out")
+    assert "<script>" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    document = json.loads((tmp_path / "out" / "model.json").read_text(encoding="utf-8"))
+    assert document["rig"] == "rig"
+
+
+def test_one_train_run_is_not_enough(bundled):
+    runs = [r for r in bundled.rig("utfsm") if r.excitation == "sine"][:1]
+    with pytest.raises(IdentificationError, match="needs at least two"):
+        run_study(Dataset(tuple(runs)))
+
+
+def test_a_failed_report_leaves_nothing(study, tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        "mrdamper.report.study_files.save_model", lambda *a: (_ for _ in ()).throw(RuntimeError("halt"))
+    )
+    with pytest.raises(RuntimeError, match="halt"):
+        write_study(study, tmp_path / "out")
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(OutputError):
+        write_study(study, tmp_path / "file" / "out")

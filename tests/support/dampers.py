@@ -1,0 +1,71 @@
+"""Dampers made without identification, one for each way there is to stream and export them."""
+
+from importlib import util
+from pathlib import Path
+
+from mrdamper.dampers.base import Envelope
+from mrdamper.dampers.joint import JointDamper
+from mrdamper.dampers.modified import ModifiedModel
+from mrdamper.dampers.parameter_map import ParameterMap
+from mrdamper.dampers.published import conditioned_type
+from mrdamper.data import Condition
+from mrdamper.functions.forms import ParameterFunction
+from mrdamper.models import all_models, model_type
+
+_spec = util.spec_from_file_location("laws", Path(__file__).parents[1] / "models" / "test_laws.py")
+_laws = util.module_from_spec(_spec)
+_spec.loader.exec_module(_laws)
+
+ENVELOPE = Envelope((0.0, 1.0), (0.5, 4.0), (0.004, 0.02), (0.02, 0.3))
+PLAY = {
+    "f0": 40.0, "k": 800.0, "c0": 600.0, "c1": 3800.0, "fy0": 140.0, "fy1": 1000.0, "d": 2e-4, "e": 2.5e-5, "cb": 3.6e4,
+    "h0": 0.4, "h1": 0.3, "vh": 3e-3, "T": 5e-3,
+}  # fmt: skip
+EXAMPLES = {**_laws.EXAMPLES, "play-bypass": PLAY}
+VARIANTS = {
+    "bouc-wen, gamma apart": ("bouc-wen", {**EXAMPLES["bouc-wen"], "gamma": 1e5, "m": 5.0, "k3": 1e5}),
+    "bouc-wen, n = 1": ("bouc-wen", {"c": 1440.0, "alpha": 9e5, "beta": 600.0, "gamma": 900.0, "n": 1.0}),
+    "bouc-wen, n = 1.6": ("bouc-wen", {"c": 1440.0, "alpha": 9e5, "beta": 2e4, "gamma": 1e4, "n": 1.6}),
+    "kwok, smooth": ("kwok", {**EXAMPLES["kwok"], "xs": 1e-3}),
+}
+
+
+def all_bare_models():
+    """Every model of the house and some of its branches, by a name for the test's output."""
+    assert set(EXAMPLES) == set(all_models())
+    plain = {name: model_type(name).build(values) for name, values in EXAMPLES.items()}
+    return plain | {title: model_type(name).build(values) for title, (name, values) in VARIANTS.items()}
+
+
+def joint_damper(name="play-bypass"):
+    model = model_type(name).build(EXAMPLES[name])
+    return JointDamper("bench", model, tuple(EXAMPLES[name]), ENVELOPE, {})
+
+
+def modified_damper():
+    functions = {
+        "c": ParameterFunction("linear-current", (500.0, 1000.0)),
+        "yield_force": ParameterFunction("quadratic-current-linear-speed", (-300.0, 900.0, 400.0, 150.0)),
+        "yield_displacement": ParameterFunction("decaying-current", (-1.0, -7.0), (2.0,), log=True),
+        "k1": ParameterFunction("plane", (0.0, 100.0, 50.0, 1e3, 400.0)),
+        "f0": ParameterFunction("constant", (30.0,)),
+    }
+    return ModifiedModel("bench", ParameterMap(model_type("bouc-wen"), functions), ENVELOPE, {})
+
+
+def conditioned_damper():
+    """A published damper whose parameters are laws over the condition."""
+    coefficients = {
+        **{"alpha1": 2e6, "alpha2": 4e6, "alpha3": 2.0, "alpha4": 8e5, "d2": 0.15, "d4": 0.3},
+        **{"beta": 4e6, "gamma1": 3e6, "gamma2": 2e6, "k1": 700.0, "k2": 300.0, "f0": 47.0},
+        **{"c1": 1500.0, "c2": 900.0, "c3": 2.0, "c4": 800.0},
+    }
+    reference = Condition(0.25, 1.0, 0.013)
+    return conditioned_type("dominguez-type")("bench", coefficients, reference, joint_damper().envelope)
+
+
+def all_dampers():
+    """Everything that streams: models, joint dampers, the modified model, a published one of many conditions."""
+    return {
+        **all_bare_models(), "joint": joint_damper(), "modified": modified_damper(), "conditioned": conditioned_damper()
+    }  # fmt: skip
