@@ -12,7 +12,7 @@ from pathlib import Path
 
 from mrdamper.files.dataset import load_dataset
 
-_IMPORTS = "import time; t = time.process_time(); import mrdamper.report.study_files; print(time.process_time() - t)"
+_IMPORTS = "import time; t = time.process_time(); import mrdamper.report.study; print(time.process_time() - t)"
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class PartRow:
 def part_rows() -> list[PartRow]:
     """Parts in the order they are done; the command studies the rigs in one process each, at once."""
     from mrdamper.report.plots.style import save_figure
-    from mrdamper.report.study_files import _figures, write_study
+    from mrdamper.report.study import _figures, write_study
     from mrdamper.study.workflow import Study, study_rig
 
     rows = [PartRow("imports, in every process", (_imports(),))]

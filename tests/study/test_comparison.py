@@ -19,7 +19,7 @@ from mrdamper.identification import identify
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.models.spencer import Spencer
 from mrdamper.motion import sine
-from mrdamper.report.comparison_files import summary_rows, write_comparison
+from mrdamper.report.comparison import summary_rows, write_comparison
 from mrdamper.streaming import stepper
 from mrdamper.study.comparison import compare, contestants
 from mrdamper.study.comparison.parallel import shortened

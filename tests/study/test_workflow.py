@@ -11,7 +11,8 @@ from mrdamper.data import Dataset, Run
 from mrdamper.errors import IdentificationError, OutputError
 from mrdamper.files.model_file import dump_model, load_model
 from mrdamper.loop_analysis import analyse_loop, dynamic_ranges
-from mrdamper.report.study_files import write_study
+from mrdamper.report.study import write_study
+from mrdamper.study import workflow
 from mrdamper.study.workflow import run_study
 from mrdamper.validation import validate
 
@@ -149,12 +150,19 @@ def test_one_train_run_is_not_enough(bundled):
 
 
 def test_a_failed_report_leaves_nothing(study, tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        "mrdamper.report.study_files.save_model", lambda *a: (_ for _ in ()).throw(RuntimeError("halt"))
-    )
+    monkeypatch.setattr("mrdamper.report.study.save_model", lambda *a: (_ for _ in ()).throw(RuntimeError("halt")))
     with pytest.raises(RuntimeError, match="halt"):
         write_study(study, tmp_path / "out")
     assert list(tmp_path.iterdir()) == []
     (tmp_path / "file").write_text("x")
     with pytest.raises(OutputError):
         write_study(study, tmp_path / "file" / "out")
+
+
+def test_our_own_faults_are_not_a_reason_to_leave_a_run_out(bundled, monkeypatch):
+    def broken(run):
+        raise ValueError("a fault of the program")
+
+    monkeypatch.setattr(workflow, "equivalent_sine", broken)
+    with pytest.raises(ValueError, match="a fault of the program"):
+        workflow.usable_sines(bundled)

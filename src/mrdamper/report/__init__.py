@@ -1,5 +1,1 @@
-"""One self-contained HTML report of a study."""
-
-from mrdamper.report.page import render_report
-
-__all__ = ["render_report"]
+"""Results for readers: tables, figures, and pages that hold both."""

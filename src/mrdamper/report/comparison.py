@@ -1,27 +1,188 @@
-"""The comparison as one HTML file: no script, no network, prints well."""
+"""A comparison as files: comparison.html, comparison.csv, runs.csv, comparison.json, models and figures."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from importlib.resources import files
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
-from mrdamper.report.page import render_page
+import numpy as np
+
+from mrdamper.data import Run
+from mrdamper.files.atomic import publish
+from mrdamper.files.model_file import save_model
+from mrdamper.report.page import made_from, render_page
+from mrdamper.report.plots.comparison import overlaid_loops, ranking
+from mrdamper.report.plots.style import save_figure
+from mrdamper.report.tables import score_row, table_text
+from mrdamper.study.comparison import Comparison, Entry, RigComparison
+from mrdamper.study.workflow import Progress
+
+_LOOPS, _OVERLAID = 3, 5
 
 
-def render_comparison(title: str, chapters: list[Mapping[str, object]], footer: str) -> str:
-    """The comparison's HTML.
+def write_comparison(
+    comparison: Comparison, folder: str | Path, progress: Progress = lambda what, share: None
+) -> list[Path]:
+    """Write the comparison, whole or not at all.
 
     Parameters
     ----------
-    title : str
-    chapters : list of mapping
-        One a rig: what the template shows, figures included.
-    footer : str
-        How it was made.
+    comparison : Comparison
+    folder : path
+        Made if missing; files of the same names are replaced together at the end.
+    progress : callable
+
+    Returns
+    -------
+    list of Path
+        What was written, the page first.
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be written to.
     """
-    template = files("mrdamper.report") / "comparison.html.j2"
-    return render_page(template, title=title, chapters=chapters, footer=footer, percent=_percent)
+
+    def fill(work: Path) -> None:
+        (work / "figures").mkdir()
+        (work / "models").mkdir()
+        chapters = []
+        for number, rig in enumerate(comparison.rigs):
+            progress(f"{rig.rig or 'rig'}: figures", number / len(comparison.rigs))
+            suffix = f"-{rig.rig}" if len(comparison.rigs) > 1 else ""
+            chapters.append(_chapter(rig, work / "figures", suffix))
+            for entry in rig.entries:
+                save_model(entry.damper, work / "models" / f"{entry.name.replace(':', '-')}{suffix}.json")
+        took = f"compared in {comparison.seconds:.0f} s on {comparison.jobs} processes."
+        footer = f"{made_from(comparison.dataset)}; {took}"
+        title = f"MR damper models compared: {', '.join(r.rig for r in comparison.rigs) or comparison.dataset.name}"
+        page = render_page("comparison.html.j2", title, footer, chapters=chapters)
+        (work / "comparison.html").write_text(page, encoding="utf-8")
+        rows = summary_rows(comparison)
+        (work / "comparison.csv").write_text(table_text(rows), encoding="utf-8")
+        (work / "runs.csv").write_text(table_text(run_rows(comparison)), encoding="utf-8")
+        (work / "comparison.json").write_text(json.dumps(rows, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+    written = publish(folder, "comparison.html", fill)
+    progress("written", 1.0)
+    return written
 
 
-def _percent(value: float | None) -> str:
-    return "–" if value is None else f"{100 * value:.1f}"
+def summary_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    """One row a rig and model, best first: scores as fractions, counts, seconds, reason."""
+    return [row for rig in comparison.rigs for row in _rows(rig)]
+
+
+def run_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    """One row a model, set and run, scores as fractions; "per run" rows are identified from that run."""
+    rows = []
+    for rig in comparison.rigs:
+        for entry in rig.entries:
+            head = {"rig": rig.rig, "model": entry.name}
+            for found in entry.identifications:
+                rows.append({**head, "set": "per run", "run_id": found.run_id, "nrmse_pp": found.scores.nrmse_pp})
+            sets = {"train": entry.train, "left out": entry.left_out, "held out": entry.held_out, "other": entry.other}
+            for name, validation in sets.items():
+                rows += [{**head, "set": name, **score_row(run)} for run in validation.runs]
+    return rows
+
+
+def _rows(rig: RigComparison) -> list[dict[str, Any]]:
+    return [
+        {
+            "rig": rig.rig,
+            "rank": rank,
+            "model": entry.name,
+            "title": entry.title,
+            "per_run_nrmse_pp": _plain(entry.per_run),
+            "train_nrmse_pp": _plain(entry.train.median()),
+            "left_out_nrmse_pp": _plain(entry.left_out.median()),
+            "held_out_nrmse_pp": _plain(entry.held_out.median()),
+            "other_motions_nrmse_pp": _plain(entry.other.median()),
+            "held_out_energy_error": _plain(entry.held_out.median("energy_error")),
+            "numbers_per_run": entry.numbers_per_run,
+            "numbers": entry.damper.parameter_count,
+            "conditions_needed": entry.runs_needed,
+            "forces_computed_per_run": _evaluations(entry),
+            "seconds": entry.seconds,
+            "limits": entry.limits,
+            "source": entry.source,
+            "reason": _reason(entry, rig.entries),
+        }
+        for rank, entry in enumerate(rig.entries, start=1)
+    ]
+
+
+def _evaluations(entry: Entry) -> int | None:
+    """The budget of an identification: forces computed, median over runs."""
+    counts = [i.evaluations for i in entry.identifications]
+    return int(np.median(counts)) if counts else None
+
+
+def _reason(entry: Entry, entries: Sequence[Entry]) -> str:
+    """Say why it stands where it stands."""
+    own, best = entry.left_out.median(), entries[0]
+    text = f"{100 * own:.1f} % on left-out conditions with {entry.damper.parameter_count} numbers"
+    if entry is best:
+        text += ": the lowest error"
+    else:
+        text += f", {100 * (own / best.left_out.median() - 1):.0f} % above the first"
+    leaner = [
+        e for e in entries if e.left_out.median() <= own and e.damper.parameter_count < entry.damper.parameter_count
+    ]
+    if leaner and entry is not best:
+        fewest = min(leaner, key=lambda e: e.damper.parameter_count)
+        text += f"; {fewest.title} is no worse with {fewest.damper.parameter_count}"
+    if math.isfinite(entry.per_run) and own > 1.5 * entry.per_run:
+        text += f"; a single run is described to {100 * entry.per_run:.1f} %: the rest is lost between conditions"
+    return text
+
+
+def _chapter(rig: RigComparison, folder: Path, suffix: str) -> dict[str, Any]:
+    scores = {e.title: (e.train.median(), e.left_out.median(), e.held_out.median()) for e in rig.entries}
+    runs = _shown(rig)
+    best = {entry.title: entry.damper for entry in rig.entries[:_OVERLAID]}
+    figures = {"ranking": ranking(scores), "loops": overlaid_loops(runs, best)}
+    first = rig.entries[0]
+    return {
+        "rig": rig.rig or rig.dataset.name,
+        "rows": _rows(rig),
+        "refused": rig.refused,
+        "verdict": (
+            f"{first.title} predicts left-out conditions best: {100 * first.left_out.median():.1f} % of the "
+            f"peak-to-peak force, among {len(rig.entries)} models."
+        ),
+        "loops_caption": (
+            f"Last cycle of {'held-out' if runs[0].split == 'validate' else 'train'} runs; the best {len(best)} models."
+        ),
+        "figures": {name: save_figure(figure, folder / f"{name}{suffix}") for name, figure in figures.items()},
+    }
+
+
+def _shown(rig: RigComparison) -> list[Run]:
+    """Held-out sines, where there are any, over the currents."""
+    entry = rig.entries[0]
+    scored = entry.held_out.runs or entry.train.runs
+    ordered = sorted(scored, key=lambda run: (run.condition.current_A, run.condition.peak_velocity))
+    picks = np.unique(np.linspace(0, len(ordered) - 1, min(_LOOPS, len(ordered))).round().astype(int))
+    return [rig.dataset[ordered[i].run_id] for i in picks]
+
+
+def _plain(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def text_table(rows: Sequence[Mapping[str, Any]]) -> str:
+    """The ranking for a terminal."""
+    lines = [f"{'':3} {'model':42} {'per run':>8} {'train':>6} {'left out':>8} {'held out':>8} {'numbers':>7} {'s':>6}"]
+    for row in rows:
+        scores = [row[f"{name}_nrmse_pp"] for name in ("per_run", "train", "left_out", "held_out")]
+        shown = ["–" if s is None else f"{100 * s:.2f}" for s in scores]
+        lines.append(
+            f"{row['rank']:3} {row['title']:42} {shown[0]:>8} {shown[1]:>6} {shown[2]:>8} {shown[3]:>8} "
+            f"{row['numbers']:7} {row['seconds']:6.1f}"
+        )
+    return "\n".join(lines)

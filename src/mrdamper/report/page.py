@@ -1,40 +1,37 @@
-"""The study as one HTML file: no script, no network, prints well."""
+"""Pages as one HTML file each: no script, no network, prints well.
+
+Templates stand in `templates/`; each extends `base.html.j2`, which holds the frame and the style.
+"""
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Mapping
-from importlib.resources import files
-from importlib.resources.abc import Traversable
+from importlib.metadata import version
 
 import jinja2
 import numpy as np
 from markupsafe import Markup
 
-_ENVIRONMENT = jinja2.Environment(
-    autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-)
+from mrdamper.data import Dataset
 
 
-def render_report(title: str, chapters: list[Mapping[str, object]], footer: str) -> str:
-    """The report's HTML.
+def render_page(template: str, title: str, footer: str, **facts: object) -> str:
+    """The HTML of a template that is given facts.
 
     Parameters
     ----------
+    template : str
+        Name of a file in `templates/`.
     title : str
-    chapters : list of mapping
-        One a rig: what the template shows, figures included.
     footer : str
-        How it was made.
+        How the page was made.
     """
-    helpers = {"mm": lambda v: 1e3 * v, "number": _number, "percent": _percent}
-    template = files("mrdamper.report") / "report.html.j2"
-    return render_page(template, title=title, chapters=chapters, footer=footer, **helpers)
+    return _ENVIRONMENT.get_template(template).render(title=title, footer=footer, **facts)
 
 
-def render_page(template: Traversable, **facts: object) -> str:
-    """The HTML of a template that is given facts, and `svg` to put figures into the page."""
-    return _ENVIRONMENT.from_string(template.read_text(encoding="utf-8")).render(svg=inline_svg, **facts)
+def made_from(dataset: Dataset) -> str:
+    """How a page's footer begins: this program's version and what was studied."""
+    return f"mrdamper {version('mrdamper')}; dataset: {dataset.name}, {len(dataset)} runs"
 
 
 def inline_svg(picture: bytes, alt: str) -> Markup:
@@ -43,9 +40,21 @@ def inline_svg(picture: bytes, alt: str) -> Markup:
     return Markup('<img alt="{}" src="data:image/svg+xml;base64,{}">').format(alt, data)
 
 
-def _number(value: float) -> str:
-    return f"{value:.2f}" if np.isfinite(value) else "–"
+def number(value: float | None, digits: int = 4) -> str:
+    """A value to some significant digits, or a dash where there is none."""
+    return "–" if value is None or not np.isfinite(value) else f"{value:.{digits}g}"
 
 
-def _percent(value: float | None, digits: int = 1) -> str:
-    return "–" if value is None or not np.isfinite(value) else f"{100 * value:.{digits}f}"
+def percent(share: float | None, digits: int = 1) -> str:
+    """A share in per cent, or a dash where there is none."""
+    return "–" if share is None or not np.isfinite(share) else f"{100 * share:.{digits}f}"
+
+
+_ENVIRONMENT = jinja2.Environment(
+    loader=jinja2.PackageLoader("mrdamper.report"),
+    autoescape=True,
+    trim_blocks=True,
+    lstrip_blocks=True,
+    undefined=jinja2.StrictUndefined,
+)
+_ENVIRONMENT.globals |= {"svg": inline_svg, "number": number, "percent": percent, "mm": lambda v: 1e3 * v}

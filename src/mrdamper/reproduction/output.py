@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +13,11 @@ from mrdamper.data import Condition
 from mrdamper.errors import MissingExtraError
 from mrdamper.files.atomic import publish
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.report.page import render_page
+from mrdamper.report.page import made_from, render_page
 from mrdamper.report.plots.model import predicted_loops
 from mrdamper.report.plots.rig_tests import measured_loops, test_analysis, test_matrix
 from mrdamper.report.plots.style import save_figure
-from mrdamper.report.study_files import identification_rows, made_from, table_text
+from mrdamper.report.tables import identification_rows, table_text
 from mrdamper.reproduction.claims import Claim, judge
 from mrdamper.reproduction.figures import (
     damping_and_mass_figure,
@@ -251,7 +250,10 @@ def _page(
     notes: tuple[str, ...],
 ) -> str:
     return render_page(
-        files("mrdamper.reproduction") / "page.html.j2",
+        "reproduction.html.j2",
+        "The method of Qian et al. 2024, claim by claim",
+        f"{made_from(study.dataset)}; computed in {study.seconds:.0f} s. "
+        "Reference: Qian, Wang, Jiang, Zhang, Zhai, Wang (2024), Actuators 13(8), 297.",
         study=study,
         claims=claims,
         tables=tables,
@@ -261,9 +263,6 @@ def _page(
         literal=study.contender(LITERAL),
         consistent=study.contender(CONSISTENT),
         synthetic=study.rig is not None,
-        percent=lambda v, digits=1: "–" if v is None or not np.isfinite(v) else f"{100 * v:.{digits}f}",
-        number=lambda v, digits=4: "–" if v is None else f"{v:.{digits}g}",
-        footer=f"{made_from(study.dataset)}; computed in {study.seconds:.0f} s.",
     )
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrdamper.data import Condition, Dataset, Floats, Run
-from mrdamper.errors import IdentificationError, MissingExtraError
+from mrdamper.errors import IdentificationError, InputError, MissingExtraError
 from mrdamper.gas_spring import GasSpring
 from mrdamper.identification import Identification, Method, identify
 from mrdamper.identification.harmonic_balance import ForceReading, SineRecord, read_force
@@ -192,7 +192,7 @@ def _splits(dataset: Dataset) -> tuple[list[Run], list[Run], tuple[str, ...]]:
         try:
             SineRecord.of(run)
             pure.append(run)
-        except ValueError as error:
+        except InputError as error:
             refused[run.id] = str(error)
     train, held_out = ([r for r in pure if r.split == split] for split in ("train", "validate"))
     for split, runs in (("train", train), ("validate", held_out)):

@@ -20,7 +20,7 @@ from mrdamper.dampers.joint import JointFit, JointProblem
 from mrdamper.dampers.modified import ModifiedFit, fit_modified, fit_modified_jointly
 from mrdamper.dampers.paper import Settled, paper_functions
 from mrdamper.data import Dataset, Run
-from mrdamper.errors import IdentificationError, UnknownNameError
+from mrdamper.errors import IdentificationError, InputError, UnknownNameError
 from mrdamper.identification import Identification, identify, refuse_clipped
 from mrdamper.identification.methods.paper import Paper
 from mrdamper.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, dynamic_ranges
@@ -270,7 +270,7 @@ def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], di
             refuse_clipped(run, clipped)
             run.current_A  # noqa: B018
             found = equivalent_sine(run)
-        except ValueError as error:
+        except InputError as error:
             refused[run.id] = str(error)
             continue
         if found.is_sine:

@@ -16,7 +16,7 @@ from mrdamper.errors import IdentificationError, InputError
 from mrdamper.export import exporter
 from mrdamper.export.base import identifier, write_export
 from mrdamper.identification import Identification, identify
-from mrdamper.report.study_files import write_study
+from mrdamper.report.study import write_study
 from mrdamper.study.comparison import Comparison, compare
 from mrdamper.study.workflow import JOINTLY, Study, run_study, usable_sines
 from mrdamper.validation import Validation, validate

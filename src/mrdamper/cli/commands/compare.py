@@ -26,7 +26,7 @@ def register(app: typer.Typer) -> None:
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.dataset import load_dataset
-        from mrdamper.report.comparison_files import summary_rows, text_table, write_comparison
+        from mrdamper.report.comparison import summary_rows, text_table, write_comparison
         from mrdamper.study import comparison as comparing
 
         require_writable(out)

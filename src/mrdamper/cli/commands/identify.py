@@ -36,7 +36,7 @@ def register(app: typer.Typer) -> None:
         from mrdamper.files.dataset import load_dataset
         from mrdamper.identification.methods import method_named
         from mrdamper.models import model_type
-        from mrdamper.report.study_files import identification_rows, table_text
+        from mrdamper.report.tables import identification_rows, table_text
         from mrdamper.study import workflow
 
         chosen_model, chosen_method = model_type(model), method_named(method, parse_pairs(setting, "--set"))

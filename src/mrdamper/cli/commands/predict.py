@@ -38,7 +38,7 @@ def register(app: typer.Typer) -> None:
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.model_file import load_model
         from mrdamper.files.motion import load_motion
-        from mrdamper.report.study_files import prediction_rows, table_text
+        from mrdamper.report.tables import prediction_rows, table_text
 
         if out is not None:
             require_writable(out)

@@ -25,7 +25,7 @@ def register(app: typer.Typer) -> None:
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.dataset import load_dataset
-        from mrdamper.report.study_files import draw, write_study
+        from mrdamper.report.study import draw, write_study
         from mrdamper.study.workflow import run_study
 
         require_writable(out)

@@ -26,7 +26,7 @@ def register(app: typer.Typer) -> None:
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.dataset import load_dataset
         from mrdamper.files.model_file import load_model
-        from mrdamper.report.study_files import score_row, table_text
+        from mrdamper.report.tables import score_row, table_text
         from mrdamper.validation import validate as score
 
         if split not in (None, "train", "validate"):

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from mrdamper.errors import InputError
 from mrdamper.export import all_exporters
 from mrdamper.files.model_file import dump_model, parse_model
-from mrdamper.report.study_files import prediction_rows, table_text
+from mrdamper.report.tables import prediction_rows, table_text
 from mrdamper.web.api.model import Ask
 from mrdamper.web.bench_model import as_damper, predict_held
 from mrdamper.web.sessions import Current, Session

@@ -2,31 +2,27 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Mapping, Sequence
-from importlib.metadata import version
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from mrdamper.dampers.base import Prediction
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
-from mrdamper.data import Dataset
 from mrdamper.files.atomic import publish
 from mrdamper.files.model_file import save_model
 from mrdamper.identification import Identification
-from mrdamper.report import render_report
 from mrdamper.report.distrust import doubts
+from mrdamper.report.page import made_from, render_page
 from mrdamper.report.plots.model import parameter_curves, predicted_loops, residual_map, score_strip
 from mrdamper.report.plots.reversal import force_since_reversal
 from mrdamper.report.plots.rig_tests import measured_loops, test_analysis, test_matrix
 from mrdamper.report.plots.style import Picture
+from mrdamper.report.tables import identification_rows, score_row, table_text
 from mrdamper.study.workflow import Candidate, Progress, RigStudy, Study
-from mrdamper.validation import RunScore, session_drift
+from mrdamper.validation import session_drift
 
 _LOOPS_SHOWN = 6
 
@@ -66,7 +62,8 @@ def write_study(study: Study, folder: str | Path, progress: Progress = lambda wh
             chapters.append(_chapter(rig, pictures))
         footer = f"{made_from(study.dataset)}; identified and validated in {study.seconds:.1f} s."
         title = f"MR damper study: {', '.join(r.rig for r in study.rigs) or study.dataset.name}"
-        (work / "report.html").write_text(render_report(title, chapters, footer), encoding="utf-8")
+        page = render_page("study.html.j2", title, footer, chapters=chapters)
+        (work / "report.html").write_text(page, encoding="utf-8")
         (work / "identifications.csv").write_text(
             table_text(identification_rows(_all_identifications(study))), encoding="utf-8"
         )
@@ -77,89 +74,9 @@ def write_study(study: Study, folder: str | Path, progress: Progress = lambda wh
     return written
 
 
-def made_from(dataset: Dataset) -> str:
-    """How a page's footer begins: this program's version and what was studied."""
-    return f"mrdamper {version('mrdamper')}; dataset: {dataset.name}, {len(dataset)} runs"
-
-
 def draw(rig: RigStudy) -> dict[str, Picture]:
     """Every figure of a rig, by name; as `finish` of `run_study` it draws where the rig is studied."""
     return {name: Picture.of(figure) for name, figure in _figures(rig).items()}
-
-
-def identification_rows(identifications: Sequence[Identification]) -> list[dict[str, Any]]:
-    """One row an identification: condition, parameters, scores, standard errors, message."""
-    rows = []
-    for found in identifications:
-        row: dict[str, Any] = {
-            "run_id": found.run_id,
-            "rig": found.rig,
-            "model": found.model.name,
-            "method": found.method,
-            "current_A": found.condition.current_A,
-            "frequency_Hz": found.condition.frequency_Hz,
-            "amplitude_m": found.condition.amplitude_m,
-            "nrmse_pp": found.scores.nrmse_pp,
-            "repeatability_nrmse_pp": found.floor,
-            "wape": found.scores.wape,
-            **{f"{name} [{unit}]": value for name, unit, value in _values(found)},
-            **{f"standard error {name}": value for name, value in found.standard_errors.items()},
-            "delay_s": found.delay,
-            "at_bounds": " ".join(found.at_bounds),
-            "evaluations": found.evaluations,
-            "message": found.message,
-            "notes": "; ".join(found.notes),
-        }
-        rows.append(row)
-    return rows
-
-
-def prediction_rows(prediction: Prediction) -> list[dict[str, Any]]:
-    """One row a sample, in the columns of the command-line contract, and the extrapolation flag."""
-    motion = prediction.motion
-    columns = {
-        "time_s": motion.time,
-        "displacement_m": motion.displacement,
-        "velocity_m_s": motion.velocity,
-        "current_A": motion.current,
-        "force_N": prediction.force,
-    }
-    flag = " ".join(prediction.extrapolation)
-    names = list(columns)
-    return [
-        {**dict(zip(names, values, strict=True)), "extrapolation": flag}
-        for values in zip(*(c.tolist() for c in columns.values()), strict=True)
-    ]
-
-
-def score_row(run: RunScore) -> dict[str, Any]:
-    """The columns of the command-line contract for one scored run."""
-    s = run.scores
-    return {
-        "run_id": run.run_id,
-        "nrmse_pp": s.nrmse_pp,
-        "nrmse_std": s.nrmse_std,
-        "wape": s.wape,
-        "energy_error": s.energy_error,
-        "peak_error": s.peak_error,
-        "extrapolation": " ".join(run.extrapolation),
-    }
-
-
-def table_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    """CSV of rows; columns in order of first appearance, numbers exact."""
-    names = list(dict.fromkeys(name for row in rows for name in row))
-    text = io.StringIO()
-    writer = csv.DictWriter(text, names, lineterminator="\n", restval="")
-    writer.writeheader()
-    writer.writerows(
-        {k: ("" if v is None else repr(v) if isinstance(v, float) else v) for k, v in r.items()} for r in rows
-    )
-    return text.getvalue()
-
-
-def _values(found: Identification) -> list[tuple[str, str, float]]:
-    return [(info.name, info.unit, getattr(found.model, info.name)) for info in found.model.parameters()]
 
 
 def _all_identifications(study: Study) -> list[Identification]:

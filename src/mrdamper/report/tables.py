@@ -1,0 +1,90 @@
+"""Results as rows, and rows as CSV: what the command line and the pages print.
+
+Nothing here draws: a command that writes a table loads no plotting library.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from mrdamper.dampers.base import Prediction
+from mrdamper.identification import Identification
+from mrdamper.validation import RunScore
+
+
+def table_text(rows: Sequence[Mapping[str, Any]]) -> str:
+    """CSV of rows; columns in order of first appearance, numbers exact."""
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    text = io.StringIO()
+    writer = csv.DictWriter(text, names, lineterminator="\n", restval="")
+    writer.writeheader()
+    writer.writerows(
+        {k: ("" if v is None else repr(v) if isinstance(v, float) else v) for k, v in r.items()} for r in rows
+    )
+    return text.getvalue()
+
+
+def identification_rows(identifications: Sequence[Identification]) -> list[dict[str, Any]]:
+    """One row an identification: condition, parameters, scores, standard errors, message."""
+    rows = []
+    for found in identifications:
+        row: dict[str, Any] = {
+            "run_id": found.run_id,
+            "rig": found.rig,
+            "model": found.model.name,
+            "method": found.method,
+            "current_A": found.condition.current_A,
+            "frequency_Hz": found.condition.frequency_Hz,
+            "amplitude_m": found.condition.amplitude_m,
+            "nrmse_pp": found.scores.nrmse_pp,
+            "repeatability_nrmse_pp": found.floor,
+            "wape": found.scores.wape,
+            **{f"{name} [{unit}]": value for name, unit, value in _values(found)},
+            **{f"standard error {name}": value for name, value in found.standard_errors.items()},
+            "delay_s": found.delay,
+            "at_bounds": " ".join(found.at_bounds),
+            "evaluations": found.evaluations,
+            "message": found.message,
+            "notes": "; ".join(found.notes),
+        }
+        rows.append(row)
+    return rows
+
+
+def prediction_rows(prediction: Prediction) -> list[dict[str, Any]]:
+    """One row a sample, in the columns of the command-line contract, and the extrapolation flag."""
+    motion = prediction.motion
+    columns = {
+        "time_s": motion.time,
+        "displacement_m": motion.displacement,
+        "velocity_m_s": motion.velocity,
+        "current_A": motion.current,
+        "force_N": prediction.force,
+    }
+    flag = " ".join(prediction.extrapolation)
+    names = list(columns)
+    return [
+        {**dict(zip(names, values, strict=True)), "extrapolation": flag}
+        for values in zip(*(c.tolist() for c in columns.values()), strict=True)
+    ]
+
+
+def score_row(run: RunScore) -> dict[str, Any]:
+    """The columns of the command-line contract for one scored run."""
+    s = run.scores
+    return {
+        "run_id": run.run_id,
+        "nrmse_pp": s.nrmse_pp,
+        "nrmse_std": s.nrmse_std,
+        "wape": s.wape,
+        "energy_error": s.energy_error,
+        "peak_error": s.peak_error,
+        "extrapolation": " ".join(run.extrapolation),
+    }
+
+
+def _values(found: Identification) -> list[tuple[str, str, float]]:
+    return [(info.name, info.unit, getattr(found.model, info.name)) for info in found.model.parameters()]

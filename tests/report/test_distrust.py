@@ -1,0 +1,39 @@
+"""Doubts are sentences, whatever ended the search."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.dampers import joint_damper
+
+from mrdamper.dampers.joint import JointFit
+from mrdamper.report.distrust import doubts
+from mrdamper.validation import Validation
+
+NONE = Validation("none", ())
+
+
+@pytest.mark.parametrize(
+    ("why", "said"),
+    [
+        ("converged: the cost changes no more", None),
+        ("every coordinate ended at a bound", "did not converge: every coordinate ended at a bound."),
+        ("stopped after 15 steps; the cost was still falling", "did not converge: stopped after 15 steps; the cost"),
+    ],
+)
+def test_a_search_that_did_not_converge_is_said_so_in_a_sentence(why, said):
+    fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), why, 9, 0.1)
+    sentences = [s for s in doubts(fit.damper, fit, (), (), NONE, NONE) if "search" in s]
+    assert len(sentences) == (said is not None)
+    if said:
+        assert said in sentences[0]
+        assert sentences[0].startswith("The search ")
+
+
+def test_a_run_described_far_worse_than_the_others_is_named_by_its_factor():
+    fit = JointFit(joint_damper(), np.array([0.02, 0.02, 0.09]), ("d",), np.zeros(2), "converged", 9, 0.1)
+    sentences = doubts(fit.damper, fit, (), (), NONE, NONE)
+    assert any("4.5 times the median" in s for s in sentences)
+    assert any("at a limit of their range: d" in s for s in sentences)
+    calm = replace(fit, nrmse_pp=np.array([0.02, 0.02, 0.03]), at_bounds=())
+    assert not any("times the median" in s or "limit" in s for s in doubts(fit.damper, calm, (), (), NONE, NONE))
