@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.dampers.base import SLACK, Damper, Envelope
+from mrdamper.dampers.coil import Coil, field_step
 from mrdamper.dampers.joint import JointDamper
 from mrdamper.dampers.modified import ModifiedModel
 from mrdamper.dampers.published import ConditionedDamper
@@ -93,7 +94,8 @@ def stream(damper: Damper | Model) -> Stream:
     """
     tape = Tape()
     envelope = None if isinstance(damper, Model) else damper.envelope
-    motion = _motion(tape, float(np.mean(envelope.current_A)) if envelope else 0.0)
+    coil = None if isinstance(damper, Model) else damper.coil
+    motion = _motion(tape, float(np.mean(envelope.current_A)) if envelope else 0.0, coil)
     extra: Any = 0.0
     if isinstance(damper, ModifiedModel) or (isinstance(damper, ConditionedDamper) and damper.has_model):
         model, extra, free = *_running_model(damper, motion), None
@@ -109,16 +111,19 @@ def stream(damper: Damper | Model) -> Stream:
             mend="stream a damper with a model behind it",
         )
     force = model.force(motion, model.state(motion))  # type: ignore[arg-type]
-    flags = _flags(motion, envelope) + extra if envelope else 0.0
+    flags = _flags(motion, abs(tape.inputs["current"]), envelope) + extra if envelope else 0.0
     drives = {"displacement": _from_displacement(), "velocity": _from_velocity()}
     return Stream(damper.title, program(tape, {"force": force, "flags": flags}), drives, envelope, free)
 
 
-def _motion(tape: Tape, current: float) -> TracedMotion:
+def _motion(tape: Tape, current: float, coil: Coil | None) -> TracedMotion:
+    """Inputs as a motion; its current is the one whose field is there, as `Damper.felt` gives it."""
     x, v, a = (tape.input(name) for name in ("displacement", "velocity", "acceleration"))
     I, dt = tape.input("current", current), tape.input("dt")
     moved = x - tape.previous(x, "displacement")
-    return TracedMotion(tape, x, v, a, I, TracedStep(tape, dt), TracedStep(tape, moved))
+    felt = field_step(tape, dt, I, coil.rise_s, coil.fall_s) if coil else abs(I)
+    felt = tape.assume(felt, current)
+    return TracedMotion(tape, x, v, a, felt, TracedStep(tape, dt), TracedStep(tape, moved))
 
 
 def _from_displacement() -> Program:
@@ -173,11 +178,11 @@ def _running_model(damper: ModifiedModel | ConditionedDamper, motion: TracedMoti
     return damper.model_at(Condition(motion.current, f, A)), flag
 
 
-def _flags(motion: TracedMotion, envelope: Envelope) -> Any:
+def _flags(motion: TracedMotion, current: Any, envelope: Envelope) -> Any:
     """Extrapolation in current, amplitude and velocity as bits 0 to 2."""
     tape, (low, high) = motion.tape, envelope.current_A
     outside = (
-        (motion.current < low - SLACK * high) | (motion.current > high * (1 + SLACK)),
+        (current < low - SLACK * high) | (current > high * (1 + SLACK)),
         abs(motion.displacement) > envelope.amplitude_m[1] * (1 + SLACK),
         abs(motion.velocity) > envelope.peak_velocity_m_s[1] * (1 + SLACK),
     )

@@ -1,10 +1,13 @@
 """Joint identification: one model for a whole damper, any motion."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.joint import JointProblem, string
 from mrdamper.data import Condition, Run
 from mrdamper.errors import IdentificationError, RunError
@@ -115,7 +118,7 @@ def test_the_coil_follows_a_changed_current_late(runs):
     motion = sine(Condition(0.0, 1.0, 0.01), 4, 500)
     current = np.where(motion.time < 2, 0.0, 1.0)
     run = Run("step", motion.time, motion.displacement, motion.velocity, current)
-    late, prompt = (damper.predict_run(run, coil_lag=lag).force for lag in (0.05, 0.0))
+    late, prompt = (replace(damper, coil=coil).predict_run(run).force for coil in (Coil(0.05, 0.05), None))
     before, after, later = motion.time < 2, (motion.time > 2) & (motion.time < 2.05), motion.time > 2.6
     np.testing.assert_allclose(late[before], prompt[before])
     assert np.abs(late[after]).mean() < 0.9 * np.abs(prompt[after]).mean()

@@ -14,9 +14,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from mrdamper.dampers.coil import Coil
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.motion import Excitation, equivalent_sine, measured_motion
-from mrdamper.motion.lag import first_order_lag
 from mrdamper.simulation import Response
 
 NOT_A_SINE = "not a sine"
@@ -57,7 +57,7 @@ class Envelope:
     def flags(self, condition: Condition) -> tuple[str, ...]:
         """Which quantities of a condition lie outside: empty inside the envelope."""
         checks = (
-            ("current", condition.current_A, self.current_A),
+            ("current", abs(condition.current_A), self.current_A),
             ("frequency", condition.frequency_Hz, self.frequency_Hz),
             ("amplitude", condition.amplitude_m, self.amplitude_m),
             ("velocity", condition.peak_velocity, self.peak_velocity_m_s),
@@ -70,7 +70,7 @@ class Envelope:
         """Which quantities of a motion that is no sine lie outside."""
         moved = float(np.ptp(motion.displacement) / 2)
         checks = (
-            ("current", float(np.min(motion.current)), float(np.max(motion.current)), self.current_A),
+            ("current", float(np.min(np.abs(motion.current))), float(np.max(np.abs(motion.current))), self.current_A),
             ("amplitude", moved, moved, self.amplitude_m),
             ("velocity", 0.0, float(np.max(np.abs(motion.velocity))), self.peak_velocity_m_s),
         )
@@ -116,6 +116,7 @@ class Damper(ABC):
     rig: str
     envelope: Envelope
     provenance: Mapping[str, str]
+    coil: Coil | None
 
     @property
     @abstractmethod
@@ -145,20 +146,16 @@ class Damper(ABC):
         response = self.loop(condition)
         return Prediction(response.excitation, response.force, condition, self.envelope.flags(condition))
 
-    def predict_run(self, run: Run, coil_lag: float = 0.0) -> Prediction:
-        """Force along the measured motion of a run, with its flags. The measured force is not looked at.
+    def felt(self, motion: Excitation) -> Excitation:
+        """The motion with the current whose field is there: its magnitude, behind the coil's lags."""
+        if self.coil is None:
+            return motion.with_current(np.abs(motion.current))
+        return motion.with_current(self.coil.along(motion.time, motion.current))
 
-        Parameters
-        ----------
-        run : Run
-        coil_lag : float
-            Time constant with which the field follows a changing current [s].
-        """
+    def predict_run(self, run: Run) -> Prediction:
+        """Force along the measured motion of a run, with its flags. The measured force is not looked at."""
         found = equivalent_sine(run)
         motion = measured_motion(run).about(found.centre)
-        if coil_lag > 0:
-            start = motion.current[0]
-            motion = motion.with_current(start + first_order_lag(motion.time, motion.current - start, coil_lag))
         flags = self.envelope.flags(found.condition)
         if not found.is_sine:
             flags = (*self.envelope.motion_flags(motion), NOT_A_SINE)

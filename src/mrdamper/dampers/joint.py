@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.dampers.base import Damper, Envelope
+from mrdamper.dampers.coil import Coil
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, RunError
 from mrdamper.identification.columns import bounded_linear, bounds_of, linear_table
@@ -47,6 +48,7 @@ class JointDamper(Damper):
         Parameters determined from the data.
     envelope : Envelope
     provenance : mapping
+    coil : Coil, optional
     """
 
     kind: ClassVar[str] = "joint"
@@ -56,6 +58,7 @@ class JointDamper(Damper):
     free: tuple[str, ...]
     envelope: Envelope
     provenance: Mapping[str, str] = field(default_factory=dict)
+    coil: Coil | None = None
 
     @property
     def title(self) -> str:
@@ -73,7 +76,7 @@ class JointDamper(Damper):
         return steady_loop(self.model, condition)
 
     def force_along(self, motion: Excitation, condition: Condition) -> Floats:
-        return simulate(self.model, motion).force
+        return simulate(self.model, self.felt(motion)).force
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,6 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from mrdamper.dampers.base import NOT_A_SINE, Damper, Envelope, Prediction
+from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.gram import Condensed, choose_forms, condense, fit_jointly
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.data import Condition, Floats, Run, same_condition
@@ -37,6 +38,7 @@ class ModifiedModel(Damper):
     envelope : Envelope
     provenance : mapping
         What it was made from.
+    coil : Coil, optional
     """
 
     kind: ClassVar[str] = "modified"
@@ -45,6 +47,7 @@ class ModifiedModel(Damper):
     parameters: ParameterMap
     envelope: Envelope
     provenance: Mapping[str, str] = field(default_factory=dict)
+    coil: Coil | None = None
 
     @property
     def title(self) -> str:
@@ -62,15 +65,15 @@ class ModifiedModel(Damper):
         return steady_loop(self.model_at(condition), condition)
 
     def force_along(self, motion: Excitation, condition: Condition) -> Floats:
-        return simulate(self.model_at(condition), motion).force
+        return simulate(self.model_at(condition), self.felt(motion)).force
 
-    def predict_run(self, run: Run, coil_lag: float = 0.0) -> Prediction:
+    def predict_run(self, run: Run) -> Prediction:
         """Force along a run's motion: at its condition for a sine, at running estimates otherwise.
 
         The functions ask for a frequency and an amplitude. Other motion gets those of the sine
         it resembles from moment to moment: an approximation, flagged as such.
         """
-        prediction = super().predict_run(run, coil_lag)
+        prediction = super().predict_run(run)
         if NOT_A_SINE not in prediction.extrapolation:
             return prediction
         return replace(prediction, force=self._running(prediction.motion))

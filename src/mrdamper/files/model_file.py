@@ -6,7 +6,8 @@ Numbers round-trip bit by bit. The document states units and where the model cam
 from __future__ import annotations
 
 import json
-from dataclasses import astuple, fields
+import math
+from dataclasses import asdict, astuple, fields, replace
 from pathlib import Path
 from typing import Literal
 
@@ -14,6 +15,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from mrdamper.dampers.base import Damper, Envelope
+from mrdamper.dampers.coil import Coil, Driver
 from mrdamper.dampers.joint import JointDamper
 from mrdamper.dampers.modified import ModifiedModel
 from mrdamper.dampers.parameter_map import ParameterMap
@@ -26,7 +28,7 @@ from mrdamper.models import model_type
 from mrdamper.motion import sine
 
 FORMAT = "mrdamper-model"
-MAJOR, MINOR = 1, 1
+MAJOR, MINOR = 1, 2
 UNITS = {
     "time": "s",
     "displacement": "m",
@@ -50,6 +52,19 @@ class _Envelope(_Strict):
     frequency_Hz: Range
     amplitude_m: Range
     peak_velocity_m_s: Range
+
+
+class _Driver(_Strict):
+    amperes_per_volt: float
+    resistance_ohm: float = 0.0
+    inductance_H: float = 0.0
+    limit_A: float | None = None
+
+
+class _Coil(_Strict):
+    rise_s: float
+    fall_s: float
+    driver: _Driver | None = None
 
 
 class _Function(_Strict):
@@ -89,6 +104,7 @@ class _Document(_Strict):
     units: dict[str, str]
     envelope: _Envelope
     provenance: dict[str, str]
+    coil: _Coil | None = None  # since 1.2
     damper: _Modified | _Joint | _Conditioned = Field(discriminator="kind")
 
 
@@ -113,9 +129,10 @@ def dump_model(damper: Damper) -> str:
         units=UNITS,
         envelope=_Envelope(**{name: getattr(damper.envelope, name) for name in _Envelope.model_fields}),
         provenance=dict(damper.provenance),
+        coil=_describe_coil(damper.coil),
         damper=_describe(damper),
     )
-    return json.dumps(document.model_dump(), indent=1, ensure_ascii=False) + "\n"
+    return json.dumps(document.model_dump(exclude_none=True), indent=1, ensure_ascii=False) + "\n"
 
 
 def load_model(path: str | Path) -> Damper:
@@ -159,9 +176,24 @@ def parse_model(text: str, where: str = "model") -> Damper:
         field = ".".join(str(part) for part in first["loc"] if part not in ("modified", "joint", "conditioned"))
         raise ModelFileError(f"{field}: {first['msg']}", where=where, mend="write the model again") from error
     try:
-        return _restore(document)
+        damper = _restore(document)
+        return replace(damper, coil=_restore_coil(document.coil)) if document.coil else damper  # type: ignore[type-var]
     except InputError as error:
         raise ModelFileError(error.found, where=where, mend=error.mend) from error
+
+
+def _describe_coil(coil: Coil | None) -> _Coil | None:
+    if coil is None:
+        return None
+    driver = coil.driver and _Driver(
+        **{**asdict(coil.driver), "limit_A": None if coil.driver.limit_A == math.inf else coil.driver.limit_A}
+    )
+    return _Coil(rise_s=coil.rise_s, fall_s=coil.fall_s, driver=driver)
+
+
+def _restore_coil(saved: _Coil) -> Coil:
+    known = saved.driver.model_dump(exclude_none=True) if saved.driver else None
+    return Coil(saved.rise_s, saved.fall_s, Driver(**known) if known else None)
 
 
 def _describe(damper: Damper) -> _Modified | _Joint | _Conditioned:

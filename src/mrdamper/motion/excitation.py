@@ -49,7 +49,10 @@ class Excitation:
 
     def with_current(self, current: ArrayLike) -> Excitation:
         """The same motion at another current [A], a scalar or one value per sample."""
-        return replace(self, current=np.asarray(current, dtype=float))
+        made = replace(self, current=np.asarray(current, dtype=float))
+        if "path" in self.__dict__:
+            made.__dict__["path"] = self.path  # the current does not bend it
+        return made
 
     def about(self, centre: float) -> Excitation:
         """The same motion with displacements counted from `centre` [m]."""

@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Envelope
+from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.modified import ModifiedFit, fit_modified, fit_modified_jointly
 from mrdamper.dampers.paper import Settled, paper_functions
 from mrdamper.data import Condition, Floats, Run
@@ -158,6 +159,7 @@ class OnePerCurrent(Damper):
         Current [A] and model.
     envelope : Envelope
     provenance : mapping
+    coil : Coil, optional
     """
 
     kind: ClassVar[str] = "one-per-current"
@@ -166,6 +168,7 @@ class OnePerCurrent(Damper):
     models: tuple[tuple[float, BoucWen], ...]
     envelope: Envelope
     provenance: Mapping[str, str] = field(default_factory=dict)
+    coil: Coil | None = None
 
     @classmethod
     def of(cls, found: Sequence[Identification]) -> OnePerCurrent:
@@ -190,7 +193,7 @@ class OnePerCurrent(Damper):
         return steady_loop(self.at(condition), condition)
 
     def force_along(self, motion: Excitation, condition: Condition) -> Floats:
-        return simulate(self.at(condition), motion).force
+        return simulate(self.at(condition), self.felt(motion)).force
 
 
 def _peak_velocity(runs: Sequence[Run]) -> float:

@@ -27,12 +27,17 @@ def register(app: typer.Typer) -> None:
         motion: Optional[Path] = typer.Option(  # noqa: UP045
             None, "--motion", help="CSV with time_s, displacement_m and optionally current_A."
         ),
-        coil_lag: float = typer.Option(0.0, "--coil-lag", help="Time constant of the coil for a varying current [ms]."),
+        coil_lag: Optional[float] = typer.Option(  # noqa: UP045
+            None, "--coil-lag", help="Time constant of the coil [ms], in place of the model's own."
+        ),
         out: Optional[Path] = typer.Option(None, "--out", help="CSV to write; default: standard output."),  # noqa: UP045
         as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
     ) -> None:
         """Predict the force of a saved model at a condition, or along a motion from a file."""
+        from dataclasses import replace
+
         from mrdamper.cli.output import put
+        from mrdamper.dampers.coil import Coil
         from mrdamper.data import Condition
         from mrdamper.errors import InputError
         from mrdamper.files.atomic import require_writable
@@ -43,10 +48,13 @@ def register(app: typer.Typer) -> None:
         if out is not None:
             require_writable(out)
         damper = load_model(model)
+        if coil_lag is not None:
+            driver = damper.coil.driver if damper.coil else None
+            damper = replace(damper, coil=Coil(1e-3 * coil_lag, 1e-3 * coil_lag, driver))  # type: ignore[type-var]
         if motion is not None:
             if frequency is not None or amplitude is not None:
                 raise InputError("--motion beside --frequency or --amplitude", mend="give one or the other")
-            prediction = damper.predict_run(load_motion(motion, current), coil_lag=1e-3 * coil_lag)
+            prediction = damper.predict_run(load_motion(motion, current))
         else:
             if current is None or frequency is None or amplitude is None:
                 raise InputError(

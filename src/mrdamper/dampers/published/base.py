@@ -10,6 +10,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Envelope
+from mrdamper.dampers.coil import Coil
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError
 from mrdamper.identification import Identification
@@ -36,6 +37,7 @@ class ConditionedDamper(Damper):
         Frequency, amplitude and current that powers and breaks count from.
     envelope : Envelope
     provenance : mapping
+    coil : Coil, optional
     """
 
     kind: ClassVar[str] = "conditioned"
@@ -51,6 +53,7 @@ class ConditionedDamper(Damper):
     reference: Condition
     envelope: Envelope
     provenance: Mapping[str, str] = field(default_factory=dict)
+    coil: Coil | None = field(default=None, kw_only=True)
 
     @property
     def title(self) -> str:
@@ -130,7 +133,7 @@ class ConditionedDamper(Damper):
         return steady_loop(self.model_at(condition), condition)
 
     def force_along(self, motion: Excitation, condition: Condition) -> Floats:
-        return simulate(self.model_at(condition), motion).force
+        return simulate(self.model_at(condition), self.felt(motion)).force
 
 
 @dataclass(frozen=True, eq=False)

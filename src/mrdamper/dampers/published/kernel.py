@@ -93,7 +93,7 @@ class KernelBaseline(ConditionedDamper):
     def force_along(self, motion: Excitation, condition: Condition) -> Floats:
         given = self.coefficients
         spread = np.array([given[f"spread_{n}"] for n in ("displacement", "velocity", "acceleration", "current")])
-        kernel = _kernel(_inputs(motion) / spread, self.centres)
+        kernel = _kernel(_inputs(self.felt(motion)) / spread, self.centres)
         return given["mean"] + given["size"] * (kernel @ self.weights)
 
     def loop(self, condition: Condition) -> Response:

@@ -1,0 +1,170 @@
+"""The coil: how the field, and so the yield force, follows a changing current, and what drives it.
+
+Flux builds up and decays with different lags: eddy currents hold both back, the driver's
+free-wheeling the decay. The damper's field is symmetric: a current counts by its magnitude, in
+every damper, with a coil or without.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mrdamper.data import Floats
+from mrdamper.errors import ParameterError
+from mrdamper.tracing import Tape, choose
+
+_LONGEST = 10.0  # s; a field that needs longer is no coil's
+
+
+@dataclass(frozen=True)
+class Driver:
+    """What makes the current out of a command voltage.
+
+    Attributes
+    ----------
+    amperes_per_volt : float
+        Gain of the amplifier [A/V]; for a bare coil one over its resistance.
+    resistance_ohm, inductance_H : float
+        Of the coil behind an amplifier without current control [ohm], [H]: the current then lags
+        by L/R. Zero inductance: a current controller, no lag of its own.
+    limit_A : float
+        Largest magnitude of current it delivers [A].
+
+    Raises
+    ------
+    ParameterError
+        If a number is no driver's.
+    """
+
+    amperes_per_volt: float
+    resistance_ohm: float = 0.0
+    inductance_H: float = 0.0
+    limit_A: float = math.inf
+
+    def __post_init__(self) -> None:
+        for name, value, good in (
+            ("amperes_per_volt", self.amperes_per_volt, 0 < abs(self.amperes_per_volt) < math.inf),
+            ("resistance_ohm", self.resistance_ohm, 0 <= self.resistance_ohm < math.inf),
+            ("inductance_H", self.inductance_H, 0 <= self.inductance_H < math.inf),
+            ("limit_A", self.limit_A, self.limit_A > 0),
+            ("resistance_ohm", self.resistance_ohm, self.resistance_ohm > 0 or self.inductance_H == 0),
+        ):
+            if not good:
+                raise ParameterError(
+                    f"{name} = {value:g}", where="coil driver", mend="a gain, R, L >= 0 (R with L), a limit above zero"
+                )
+
+    @property
+    def lag_s(self) -> float:
+        """L/R [s]; zero under current control."""
+        return self.inductance_H / self.resistance_ohm if self.inductance_H else 0.0
+
+    def current(self, time: Floats, volts: Floats) -> Floats:
+        """(N,) current [A] of (N,) command voltages [V] at (N,) times [s]."""
+        amperes = np.clip(self.amperes_per_volt * np.asarray(volts, dtype=float), -self.limit_A, self.limit_A)
+        return field_current(time, amperes, self.lag_s, self.lag_s, signed=True)
+
+
+@dataclass(frozen=True)
+class Coil:
+    """Lags of the field behind the current.
+
+    Attributes
+    ----------
+    rise_s, fall_s : float
+        Time constants [s] while the field grows and while it decays; zero follows at once.
+    driver : Driver or None
+        What makes the current, where the input is a voltage.
+
+    Raises
+    ------
+    ParameterError
+        If a time constant is negative, not finite, or over 10 s.
+    """
+
+    rise_s: float
+    fall_s: float
+    driver: Driver | None = None
+
+    def __post_init__(self) -> None:
+        for name, value in (("rise_s", self.rise_s), ("fall_s", self.fall_s)):
+            if not 0 <= value <= _LONGEST:
+                raise ParameterError(f"{name} = {value:g} s", where="coil", mend=f"give 0 to {_LONGEST:g} s")
+
+    def along(self, time: Floats, current: Floats) -> Floats:
+        """(N,) current [A] whose steady field is there at (N,) times [s]; see `field_current`."""
+        return field_current(time, current, self.rise_s, self.fall_s)
+
+
+def field_current(time: Floats, current: Floats, rise: float, fall: float, signed: bool = False) -> Floats:
+    """Current that would, held for ever, make the field that is there: the lagged magnitude.
+
+    T di/dt + i = |I|, T = `rise` while |I| > i and `fall` while |I| < i, exact for |I| straight
+    between samples; settled at the first sample.
+
+    Parameters
+    ----------
+    time, current : (N,) arrays
+        [s], [A].
+    rise, fall : float
+        Time constants [s].
+    signed : bool
+        Lag the current itself, not its magnitude: the current behind a driver's L/R.
+    """
+    wanted = np.asarray(current, dtype=float) if signed else np.abs(current)
+    if (rise <= 0 and fall <= 0) or not np.any(np.diff(wanted)):
+        return wanted.copy()
+    lagged = wanted.tolist()
+    steps, last, gap = np.diff(time).tolist(), lagged[0], 0.0
+    for i, step in enumerate(steps, start=1):
+        now = lagged[i]
+        if gap != 0.0 or now != last:
+            gap = _gap(gap, now - last, step, rise, fall)
+            lagged[i] = now - gap
+        last = now
+    return np.array(lagged)
+
+
+def _gap(gap: float, change: float, step: float, rise: float, fall: float) -> float:
+    """What is missing to the wanted current a step later: dg/dt = s − g/T, T by the sign of g."""
+    upward = gap > 0 or (gap == 0 and change > 0)
+    constant, slope = (rise if upward else fall), change / step
+    if gap * change < 0 and constant > 0:  # met on the way, perhaps: then the other lag from there on
+        met = constant * math.log1p(-gap / (slope * constant))
+        if met < step:
+            gap, step, constant = 0.0, step - met, (fall if upward else rise)
+    elif constant <= 0 and gap * change < 0:
+        gap, constant = 0.0, (fall if upward else rise)
+    if constant <= 0:
+        return 0.0
+    decay = math.expm1(-step / constant)
+    return gap + (gap - slope * constant) * decay
+
+
+def field_step(tape: Tape, step: Any, current: Any, rise: float, fall: float) -> Any:
+    """`field_current` for one sample, on a tape; `step` is the step of time."""
+    wanted = abs(current)
+    if rise <= 0 and fall <= 0:
+        return wanted
+    change = wanted - tape.previous(wanted, "wanted_current")
+    gap = tape.remember("current_gap")
+    slope = change / step
+    upward = (gap > 0) | ((gap <= 0) & (gap >= 0) & (change > 0))
+    constant, other = tape.select(upward, rise, fall), tape.select(upward, fall, rise)
+    against = gap * change < 0
+    met = choose(
+        against & (constant > 0),
+        lambda: constant * np.log1p(-gap / (slope * constant)),
+        lambda: tape.select(against, 0.0, step),
+    )
+    crosses = against & (met < step)
+    left, lag = tape.select(crosses, step - met, step), tape.select(crosses, other, constant)
+    begin = tape.select(crosses, 0.0, gap)
+    moved = choose(lag > 0, lambda: begin + (begin - slope * lag) * np.expm1(-left / lag), lambda: 0.0 * left)
+    gap_now = tape.select(tape.first, 0.0, moved)
+    tape.update(gap, gap_now)
+    return wanted - gap_now
