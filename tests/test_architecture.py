@@ -1,7 +1,10 @@
 """The house stays in order: imports go downward, nothing heavy is imported by the numerics."""
 
+import re
 import subprocess
 import sys
+import tomllib
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 from importlinter.cli import lint_imports
@@ -28,3 +31,13 @@ def test_public_names_exist():
 
     for name in mrdamper.__all__:
         assert getattr(mrdamper, name) is not None
+
+
+def test_every_extra_is_imported_somewhere():
+    """An extra nobody imports is a promise nobody keeps."""
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    text = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "src").rglob("*.py"))
+    modules = packages_distributions()
+    for wanted in {re.split(r"[>=\[]", name)[0] for key in extras if key not in ("all", "dev") for name in extras[key]}:
+        provided = [module for module, dists in modules.items() if wanted.lower() in map(str.lower, dists)]
+        assert any(re.search(rf'(import|from) {m}\b|"{m}"', text) for m in provided), wanted

@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+from support.command import mrdamper
 
 from mrdamper.dampers.base import Envelope
 from mrdamper.dampers.modified import ModifiedModel
@@ -14,11 +15,6 @@ from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.files.model_file import save_model
 from mrdamper.functions.forms import ParameterFunction
 from mrdamper.models.bingham import Bingham
-
-
-def mrdamper(*arguments, cwd=None):
-    command = [sys.executable, "-m", "mrdamper.cli", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False)
 
 
 @pytest.fixture
@@ -40,6 +36,16 @@ def test_help_has_an_example(command):
     assert "mrdamper" in done.stdout
     if command:
         assert f"Example: mrdamper {command}" in done.stdout
+
+
+def test_a_process_ends_with_the_same_status_and_line():
+    """The other tests here share one process."""
+    done = subprocess.run(
+        [sys.executable, "-m", "mrdamper.cli", "identify", "--fix", "n"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert done.stderr == mrdamper("identify", "--fix", "n").stderr
+    assert done.stderr.count("\n") == 1
 
 
 def test_predict_at_a_condition(model, tmp_path):

@@ -22,6 +22,7 @@ from mrdamper.export import exporter
 from mrdamper.export.base import identifier
 from mrdamper.files.model_file import dump_model, parse_model
 from mrdamper.identification import identify
+from mrdamper.identification.methods import all_methods
 from mrdamper.loop_analysis import analyse_loop
 from mrdamper.web.frames import frame
 from mrdamper.web.tasks import export_name
@@ -51,6 +52,13 @@ def joint(bundled):
 def modified(bundled):
     runs = [run for run in bundled.rig("utfsm").split("train") if run.excitation == "sine"][:6]
     return fit_modified([identify(run, "bingham") for run in runs]).damper
+
+
+def test_a_methods_tool_tip_is_its_own(client, bench):
+    methods = client.get(f"{bench}/choices").json()["methods"]
+    assert {m["name"]: m["about"] for m in methods} == {
+        name: cls.__doc__.split("\n")[0] for name, cls in all_methods().items()
+    }
 
 
 def put_on(client, bench, damper):

@@ -7,6 +7,9 @@ import signal
 import socket
 import threading
 import webbrowser
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
 
 import uvicorn
 
@@ -14,16 +17,22 @@ from mrdamper.errors import InputError
 from mrdamper.web.app import create_app
 
 LOOPBACK = "127.0.0.1"
+_ENDS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
-def serve(port: int, open_browser: bool = True) -> None:
-    """Serve until interrupted; then every file and process of the bench is gone.
+def serve(port: int, open_browser: bool = True) -> int:
+    """Serve until a signal ends it; then every file and process of the bench is gone.
 
     Parameters
     ----------
     port : int
         0 for any that is free.
     open_browser : bool
+
+    Returns
+    -------
+    int
+        The signal.
 
     Raises
     ------
@@ -43,15 +52,12 @@ def serve(port: int, open_browser: bool = True) -> None:
         f"http://{LOOPBACK}:{port}/",
         open_browser,
     )
-    if hasattr(signal, "SIGHUP"):
-        signal.signal(signal.SIGHUP, server.handle_exit)  # the terminal was closed
     try:
         server.run(sockets=[listener])
-    except KeyboardInterrupt:
-        pass  # the way to stop it; the application has cleaned up
     finally:
         listener.close()
     print("stopped", flush=True)
+    return server.ended_by
 
 
 class _Server(uvicorn.Server):
@@ -59,7 +65,21 @@ class _Server(uvicorn.Server):
 
     def __init__(self, config: uvicorn.Config, address: str, open_browser: bool):
         super().__init__(config)
-        self.address, self.open_browser = address, open_browser
+        self.address, self.open_browser, self.ended_by = address, open_browser, 0
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        # uvicorn would raise the signal again, and the process would end before it has cleaned up.
+        before = {number: signal.signal(number, self.handle_exit) for number in _ENDS}
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        self.ended_by = sig
+        super().handle_exit(sig, frame)
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets=sockets)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Optional
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -34,8 +34,8 @@ def register(app: typer.Typer) -> None:
 
     @app.command(epilog="Example: mrdamper check rig/ --figure loops.png")
     def check(
-        data: Optional[Path] = typer.Argument(None, help="Dataset folder, or an .fmu; default: the bundled tests."),  # noqa: UP045
-        figure: Optional[Path] = typer.Option(None, "--figure", help="Loops with flagged samples: PNG, SVG or PDF."),  # noqa: UP045
+        data: Path | None = typer.Argument(None, help="Dataset folder, or an .fmu; default: the bundled tests."),
+        figure: Path | None = typer.Option(None, "--figure", help="Loops with flagged samples: PNG, SVG or PDF."),
         as_json: bool = typer.Option(False, "--json", help="Print JSON instead of a table."),
     ) -> None:
         """Judge every run of a dataset again: sign, lag, clipping, distortion, drift; exit 2 if one is refused.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Optional
 
 import typer
 
@@ -13,13 +12,13 @@ def register(app: typer.Typer) -> None:
 
     @app.command(epilog="Example: mrdamper compare rig/ --out comparison/ --models bouc-wen --models kwok")
     def compare(
-        data: Optional[Path] = typer.Argument(None, help="Dataset folder; default: the bundled tests of two dampers."),  # noqa: UP045
+        data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests of two dampers."),
         out: Path = typer.Option(..., "--out", help="Folder for comparison.html, tables and figures."),
         models: list[str] = typer.Option([], "--models", help="Only this model; may be repeated. Default: all."),
         genetic: bool = typer.Option(
             False, "--genetic", help="Also by genetic algorithm, 60 generations; takes minutes."
         ),
-        jobs: Optional[int] = typer.Option(None, "--jobs", min=1, help="Processes; default one a core."),  # noqa: UP045
+        jobs: int | None = typer.Option(None, "--jobs", min=1, help="Processes; default one a core."),
         as_json: bool = typer.Option(False, "--json", help="Print the table as JSON."),
     ) -> None:
         """Compare models: accuracy on train, left-out and held-out runs, numbers, data needed, time."""

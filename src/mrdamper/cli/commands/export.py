@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Optional
 
 import typer
 
@@ -16,8 +15,8 @@ def register(app: typer.Typer) -> None:
         model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
         to: str = typer.Option(..., "--to", help="c, fmu, latex, markdown, table, adams."),
         out: Path = typer.Option(..., "--out", help="Folder to write into, or the file for fmu, latex, markdown."),
-        name: Optional[str] = typer.Option(None, "--name", help="Of files and symbols; default: the rig."),  # noqa: UP045
-        fmi: Optional[int] = typer.Option(None, "--fmi", help="For fmu: version of the standard, 2 (default) or 3."),  # noqa: UP045
+        name: str | None = typer.Option(None, "--name", help="Of files and symbols; default: the rig."),
+        fmi: int | None = typer.Option(None, "--fmi", help="For fmu: version of the standard, 2 (default) or 3."),
     ) -> None:
         """Export a saved model: C99 source, FMU, LaTeX or Markdown equations, force–velocity tables."""
         from mrdamper.errors import InputError

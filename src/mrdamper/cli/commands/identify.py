@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Optional
 
 import typer
 
@@ -13,19 +12,19 @@ def register(app: typer.Typer) -> None:
 
     @app.command(epilog="Example: mrdamper identify rig/ --model bouc-wen --free n --out identifications.csv")
     def identify(
-        data: Optional[Path] = typer.Argument(None, help="Dataset folder; default: the bundled tests."),  # noqa: UP045
+        data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests."),
         model: str = typer.Option("bouc-wen", "--model", help="Name of the model."),
         method: str = typer.Option("projection", "--method", help="Name of the identification method."),
         free: list[str] = typer.Option([], "--free", help="Preset parameter to determine as well; may be repeated."),
         fix: list[str] = typer.Option([], "--fix", help="NAME=VALUE [SI] held fixed; may be repeated."),
         setting: list[str] = typer.Option([], "--set", help="SWITCH=VALUE of the method; may be repeated."),
-        gas: Optional[str] = typer.Option(  # noqa: UP045
+        gas: str | None = typer.Option(
             None, "--gas", help="Known gas spring: pressure MPa, volume cm3, rod area mm2, as P,V,A."
         ),
         delay: bool = typer.Option(False, "--delay", help="Also determine a delay of the force, within 3 ms."),
         clipped: bool = typer.Option(False, "--clipped", help="Use records with a channel cut off at its extreme too."),
         run: list[str] = typer.Option([], "--run", help="Only this run; may be repeated."),
-        out: Optional[Path] = typer.Option(None, "--out", help="CSV to write; default: standard output."),  # noqa: UP045
+        out: Path | None = typer.Option(None, "--out", help="CSV to write; default: standard output."),
         as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
     ) -> None:
         """Identify a model from every sine run of a dataset, run by run."""

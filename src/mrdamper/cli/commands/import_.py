@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Optional
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -22,11 +22,9 @@ def register(app: typer.Typer) -> None:
     )
     def import_(
         files: list[Path] = typer.Argument(..., help="Files of a rig, or folders of them."),
-        out: Optional[Path] = typer.Option(None, "--out", help="Dataset folder to write."),  # noqa: UP045
-        profile: Optional[Path] = typer.Option(  # noqa: UP045
-            None, "--profile", help="Rig profile (TOML): what the files do not say."
-        ),
-        write_profile: Optional[Path] = typer.Option(  # noqa: UP045
+        out: Path | None = typer.Option(None, "--out", help="Dataset folder to write."),
+        profile: Path | None = typer.Option(None, "--profile", help="Rig profile (TOML): what the files do not say."),
+        write_profile: Path | None = typer.Option(
             None, "--write-profile", help="Write how the first file was read as a profile; - for standard output."
         ),
         skip_refused: bool = typer.Option(False, "--skip-refused", help="Write the good files, list the others."),

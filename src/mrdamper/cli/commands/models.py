@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Optional
-
 import typer
 
 
@@ -12,7 +10,7 @@ def register(app: typer.Typer) -> None:
 
     @app.command(epilog="Example: mrdamper models spencer")
     def models(
-        name: Optional[str] = typer.Argument(None, help="Show this model in full; default: list all."),  # noqa: UP045
+        name: str | None = typer.Argument(None, help="Show this model in full; default: list all."),
         as_json: bool = typer.Option(False, "--json", help="Print JSON a program can read."),
     ) -> None:
         """List the damper models, or show one: equation, parameters with units and bounds, source."""

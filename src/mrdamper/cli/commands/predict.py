@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Optional
 
 import typer
 
@@ -21,16 +20,16 @@ def register(app: typer.Typer) -> None:
     )
     def predict(
         model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
-        current: Optional[float] = typer.Option(None, "--current", help="Coil current [A]."),  # noqa: UP045
-        frequency: Optional[float] = typer.Option(None, "--frequency", help="Frequency of a sine [Hz]."),  # noqa: UP045
-        amplitude: Optional[float] = typer.Option(None, "--amplitude", help="Amplitude of a sine [mm]."),  # noqa: UP045
-        motion: Optional[Path] = typer.Option(  # noqa: UP045
+        current: float | None = typer.Option(None, "--current", help="Coil current [A]."),
+        frequency: float | None = typer.Option(None, "--frequency", help="Frequency of a sine [Hz]."),
+        amplitude: float | None = typer.Option(None, "--amplitude", help="Amplitude of a sine [mm]."),
+        motion: Path | None = typer.Option(
             None, "--motion", help="CSV with time_s, displacement_m and optionally current_A."
         ),
-        coil_lag: Optional[float] = typer.Option(  # noqa: UP045
+        coil_lag: float | None = typer.Option(
             None, "--coil-lag", help="Time constant of the coil [ms], in place of the model's own."
         ),
-        out: Optional[Path] = typer.Option(None, "--out", help="CSV to write; default: standard output."),  # noqa: UP045
+        out: Path | None = typer.Option(None, "--out", help="CSV to write; default: standard output."),
         as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
     ) -> None:
         """Predict the force of a saved model at a condition, or along a motion from a file."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Optional
 
 import typer
 
@@ -17,7 +16,7 @@ def register(app: typer.Typer) -> None:
     def reproduce(
         out: Path = typer.Option(..., "--out", help="Folder for reproduction.html, tables and figures."),
         data: Path | None = typer.Option(None, "--data", help="Dataset folder; default: the virtual rig, synthetic."),
-        rig: Optional[str] = typer.Option(None, "--rig", help="Rig of the dataset; needed where it holds several."),  # noqa: UP045
+        rig: str | None = typer.Option(None, "--rig", help="Rig of the dataset; needed where it holds several."),
         with_direct_genetic: bool = typer.Option(
             False,
             "--with-direct-genetic",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import signal
 
 import typer
 
@@ -25,4 +26,6 @@ def register(app: typer.Typer) -> None:
             raise MissingExtraError(f"the live bench needs {', '.join(missing)}", mend="pip install 'mrdamper[web]'")
         from mrdamper.web import serve as run
 
-        run(port, browser)
+        ended_by = run(port, browser)
+        if ended_by != signal.SIGINT:  # Ctrl-C is the way to stop it
+            raise typer.Exit(128 + ended_by)

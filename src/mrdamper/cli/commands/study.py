@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from pathlib import Path
-from typing import Optional
 
 import typer
 
@@ -15,9 +14,9 @@ def register(app: typer.Typer) -> None:
 
     @app.command(epilog="Example: mrdamper study rig/ --out result/")
     def study(
-        data: Optional[Path] = typer.Argument(None, help="Dataset folder; default: the bundled tests of two dampers."),  # noqa: UP045
+        data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests of two dampers."),
         out: Path = typer.Option(..., "--out", help="Folder for report.html, model.json, tables and figures."),
-        model: Optional[str] = typer.Option(None, "--model", help="Save this model instead of the best."),  # noqa: UP045
+        model: str | None = typer.Option(None, "--model", help="Save this model instead of the best."),
         as_json: bool = typer.Option(False, "--json", help="Print a summary a program can read."),
     ) -> None:
         """Study a dataset: identify every run, map the parameters, validate; write report and models."""

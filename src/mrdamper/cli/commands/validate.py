@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Optional
 
 import typer
 
@@ -14,10 +13,10 @@ def register(app: typer.Typer) -> None:
     @app.command(epilog="Example: mrdamper validate model.json rig/ --out scores.csv")
     def validate(
         model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
-        data: Optional[Path] = typer.Argument(None, help="Dataset folder; default: the bundled tests."),  # noqa: UP045
-        rig: Optional[str] = typer.Option(None, "--rig", help="Score the runs of this rig instead."),  # noqa: UP045
-        split: Optional[str] = typer.Option(None, "--split", help="Only train or only validate runs."),  # noqa: UP045
-        out: Optional[Path] = typer.Option(None, "--out", help="CSV to write; default: standard output."),  # noqa: UP045
+        data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests."),
+        rig: str | None = typer.Option(None, "--rig", help="Score the runs of this rig instead."),
+        split: str | None = typer.Option(None, "--split", help="Only train or only validate runs."),
+        out: Path | None = typer.Option(None, "--out", help="CSV to write; default: standard output."),
         as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
     ) -> None:
         """Score a saved model on the runs of its rig: nrmse, wape, peak force and energy."""

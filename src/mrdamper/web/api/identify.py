@@ -191,5 +191,5 @@ def _percent(validation: Validation) -> str:
     return f"{100 * validation.median():.1f} %"
 
 
-def _first_line(method: Any) -> str:
-    return (type(method).__doc__ or "").strip().split("\n")[0]
+def _first_line(method: type) -> str:
+    return (method.__doc__ or "").strip().split("\n")[0]

@@ -1,0 +1,34 @@
+"""The command line in this process: what a user types, and what comes of it."""
+
+import contextlib
+import io
+import sys
+from dataclasses import dataclass
+from unittest.mock import patch
+
+from mrdamper.cli import main
+
+
+@dataclass(frozen=True)
+class Done:
+    """Named as those of a process."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def mrdamper(*arguments):
+    """Run a command as `mrdamper ARGUMENTS` would, without paying for a process."""
+    out, err = io.StringIO(), io.StringIO()
+    with (
+        patch.object(sys, "argv", ["mrdamper", *map(str, arguments)]),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+    ):
+        try:
+            main()
+            code = 0
+        except SystemExit as end:
+            code = end.code or 0
+    return Done(code, out.getvalue(), err.getvalue())
