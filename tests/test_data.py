@@ -41,7 +41,7 @@ def test_what_does_not_fit_is_refused_with_the_run_and_the_remedy(changes, error
 
 
 def test_varying_current_has_no_single_value():
-    with pytest.raises(RunError, match="current varies"):
+    with pytest.raises(RunError, match="current changes"):
         _ = run(current=np.linspace(0, 1, 11)).current_A
 
 

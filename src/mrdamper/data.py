@@ -150,21 +150,39 @@ class Run:
 
     @property
     def current_A(self) -> float:
-        """The run's one coil current [A].
+        """The run's one coil current [A]: the mean over the steady window, however noisy the channel is.
 
         Raises
         ------
         RunError
-            If the current varies by more than 1 mA + 1 % within the run.
+            E_CURRENT_VARIES if the current changes within the run.
         """
-        mean = float(np.mean(self.current))
-        if np.ptp(self.current) > 1e-3 + 0.01 * abs(mean):
+        current, change = _held_current(self)
+        if change:
             raise RunError(
-                f"current varies between {self.current.min():g} A and {self.current.max():g} A",
+                change,
                 where=self._where,
                 mend="use a joint model, which takes a current channel",
+                code="E_CURRENT_VARIES",
             )
-        return round(mean, 9)
+        return current
+
+    @property
+    def mean_current(self) -> float:
+        """Mean current over the steady window [A], also of a current that changes."""
+        return _held_current(self)[0]
+
+    @property
+    def current_changes(self) -> bool:
+        """Whether the current changes within the run, by more than noise, ripple and drift."""
+        return bool(_held_current(self)[1])
+
+    @property
+    def coil_current(self) -> Floats:
+        """(N,) current that models are given [A]: without its noise where it is constant, else the channel."""
+        if self.current_changes:
+            return self.current
+        return np.broadcast_to(np.float64(self.mean_current), self.time.shape)
 
     @property
     def findings(self) -> tuple[str, ...]:
@@ -243,6 +261,64 @@ def once_per_run(function: Callable[[Run], T]) -> Callable[[Run], T]:
         return known[run]
 
     return remembered
+
+
+_BLOCKS = 64  # stretches of a record whose mean currents are compared
+_TREND_A, _TREND = 0.01, 0.03  # a current may differ by so much from begin to end: [A], and of its mean
+_SLOW_A, _SLOW = 0.016, 0.01  # RMS of its slow part: a rectifier's or a chopper's ripple, seen at a slow rate
+_FAST_A, _FAST = 0.03, 0.02  # RMS of all of it
+_COARSEST = 0.1  # [A]: a channel of such steps flickers by half a step
+_WHITE_MORE = 4  # times as much where it has no memory from sample to sample: no coil follows that
+_WHITE = 1.0  # von Neumann's ratio: two for white noise, near zero for a current that keeps its levels
+
+
+@once_per_run
+def _held_current(run: Run) -> tuple[float, str]:
+    inside = run.current[run.in_window]
+    return held_current(inside if inside.size >= 3 else run.current)
+
+
+def held_current(current: Floats) -> tuple[float, str]:
+    """Mean of a current [A], and how it changes; empty if it is constant but for noise.
+
+    A channel is a constant with noise if it neither trends nor wanders by more than a supply
+    does. What is left after averaging over stretches of the record counts as wandering, less
+    what white noise leaves there, so that noise of any size is none.
+
+    Parameters
+    ----------
+    current : (N,) array
+        At least three samples [A].
+    """
+    low, high = float(current.min()), float(current.max())
+    if low == high:
+        return round(low, 9), ""
+    mean, size = float(np.mean(current)), current.size
+    count = min(_BLOCKS, max(3, size // 8))
+    bounds = np.linspace(0, size, count, endpoint=False).astype(int)
+    sizes = np.diff(np.append(bounds, size))
+    levels = np.add.reduceat(current, bounds) / sizes
+    within = float(np.sum((current - np.repeat(levels, sizes)) ** 2)) / max(1, size - count)
+    wander = float(np.sqrt(max(0.0, np.var(levels, ddof=1) - within * count / size)))
+    trend = abs(float(np.mean(current[: size // 3]) - np.mean(current[size - size // 3 :])))
+    total = float(np.std(current))
+    white = float(np.mean(np.diff(current) ** 2)) > _WHITE * total**2
+    allowed = (_FAST_A + _FAST * abs(mean)) * (_WHITE_MORE if white else 1) + 0.5 * _resolution(current)
+    steady = (
+        trend <= _TREND_A + _TREND * abs(mean) + 4 * float(np.sqrt(6 * within / size))
+        and wander <= _SLOW_A + _SLOW * abs(mean)
+        and total <= allowed
+    )
+    if steady:
+        return round(mean, 4), ""
+    return round(mean, 4), f"the current changes within the run, between {low:.4g} A and {high:.4g} A"
+
+
+def _resolution(current: Floats) -> float:
+    """Step in which a coarse channel counts [A]; zero where it is fine, or coarser than any channel of currents."""
+    levels = np.unique(current[:: max(1, current.size // 2000)])
+    step = float(np.min(np.diff(levels))) if 1 < levels.size < 10 else 0.0
+    return step if step <= _COARSEST * 1.001 else 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -204,13 +204,12 @@ def _run(row: dict[str, Any], samples: pl.DataFrame, folder: Path) -> Run:
 
 
 def _row(run: Run) -> dict[str, Any]:
-    constant = float(np.ptp(run.current)) == 0.0
     window = run.window or (None, None)
     return {
         "run_id": run.id,
         "rig": run.rig,
         "excitation": run.excitation,
-        "current_A": float(run.current[0]) if constant else None,
+        "current_A": None if run.current_changes else run.current_A,
         "nominal_frequency_Hz": run.nominal.frequency_Hz if run.nominal else None,
         "nominal_amplitude_m": run.nominal.amplitude_m if run.nominal else None,
         "steady_t0_s": window[0],

@@ -21,11 +21,11 @@ def measured_motion(run: Run) -> Excitation:
     A quadratic is fitted around each sample over a fortieth of the motion's period (at least
     five samples); its value, slope and curvature are displacement, velocity and
     acceleration. The fit is centred, so no phase is lost; it never reaches across a gap in
-    time.
+    time. A constant current comes without the noise of its channel.
     """
     parts = [smooth(run.time[a:b], run.displacement[a:b]) for a, b in run.segments]
     x, v, a = (np.concatenate(p) for p in zip(*parts, strict=True))
-    return Excitation(run.time, x, v, a, run.current)
+    return Excitation(run.time, x, v, a, run.coil_current)
 
 
 def motion_from_samples(time: ArrayLike, displacement: ArrayLike, current: ArrayLike = 0.0) -> Excitation:

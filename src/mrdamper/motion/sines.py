@@ -78,7 +78,7 @@ def analyse_motion(run: Run) -> MotionAnalysis:
         )
     power = series.sine**2 + series.cosine**2
     return MotionAnalysis(
-        condition=Condition(round(float(np.mean(run.current)), 9), series.frequency, series.half_peak_to_peak()),
+        condition=Condition(run.mean_current, series.frequency, series.half_peak_to_peak()),
         series=series,
         cycles=cycles,
         distortion=float(np.sqrt(power[1:].sum() / power[0])),
@@ -126,7 +126,7 @@ def equivalent_sine(run: Run) -> EquivalentSine:
         return EquivalentSine(analysis.condition, analysis.series.mean, True)
     motion = measured_motion(run)
     rms_x, rms_v = float(np.std(motion.displacement)), float(np.std(motion.velocity))
-    condition = Condition(round(float(np.mean(run.current)), 9), rms_v / (2 * np.pi * rms_x), float(np.sqrt(2) * rms_x))
+    condition = Condition(run.mean_current, rms_v / (2 * np.pi * rms_x), float(np.sqrt(2) * rms_x))
     return EquivalentSine(condition, float(np.mean(motion.displacement)), False)
 
 

@@ -132,7 +132,7 @@ def _sensitivity(study: Reproduction) -> tuple[tuple[OneAtATime, ...], Sobol | N
 
 
 def _figures(study: Reproduction, single: tuple[OneAtATime, ...], indices: Sobol | None) -> dict[str, Figure]:
-    by_current = sorted(study.held_out, key=lambda run: float(np.mean(run.current)))
+    by_current = sorted(study.held_out, key=lambda run: run.mean_current)
     picks = np.unique(np.linspace(0, len(by_current) - 1, 3).round().astype(int))
     shown = [by_current[i] for i in picks]
     functions = ("c", "m", "alpha", "beta", "f0")

@@ -8,12 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from mrdamper.errors import InputError
+from mrdamper.rig_files.quality.current import change_of
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED, Finding, Record
 from mrdamper.rig_files.text.spool import release
 
 PART = 2**20  # samples: minutes of a test at 10 kHz, some ten megabytes a channel
 _MAY_REST = ("E_NO_EXCITATION",)  # a long test may pause; it may not be one long pause
 _OF_THE_WHOLE = ("W_SHORT", "W_DRIFT")
+_ONCE = ("W_CURRENT_VARIES",)  # judged over the whole record: parts may each hold another current
 
 
 def judge_long(record: Record, judge: Callable[[Record], Record]) -> Record:
@@ -51,7 +53,9 @@ def judge_long(record: Record, judge: Callable[[Record], Record]) -> Record:
         _extend(segments, judged.segments, start)
     if resting is not None and not moving:
         raise resting
-    return replace(record, findings=(*record.findings, *_summed(found, count, moving)), segments=tuple(segments))
+    whole = [] if record.current is None else change_of(record, None)
+    findings = (*record.findings, *_summed(found, count, moving), *whole)
+    return replace(record, findings=findings, segments=tuple(segments))
 
 
 def _parts(record: Record) -> Iterator[tuple[int, Record]]:
@@ -78,7 +82,7 @@ def _extend(segments: list[tuple[int, int]], new: tuple[tuple[int, int], ...], s
 
 def _summed(found: dict[str, tuple[Finding, int]], parts: int, moving: int) -> Iterator[Finding]:
     for finding, times in found.values():
-        if finding.code in _OF_THE_WHOLE and times < moving:
+        if finding.code in _ONCE or (finding.code in _OF_THE_WHOLE and times < moving):
             continue
         more = f" (first of {times} parts out of {parts})" if times > 1 else ""
         yield Finding(finding.code, finding.text + more)

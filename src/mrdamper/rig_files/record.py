@@ -105,6 +105,8 @@ class Record:
         Half-open sample ranges without a gap in time; empty before the checks looked.
     lines : LineNumbers, optional
         Line of every sample, where the file is text.
+    window : (float, float), optional
+        Steady window of a stored run [s]; of a new record it is found.
     """
 
     id: str
@@ -123,6 +125,7 @@ class Record:
     split: str = "train"
     segments: tuple[tuple[int, int], ...] = ()
     lines: LineNumbers | None = None
+    window: tuple[float, float] | None = None
 
     @property
     def present(self) -> np.ndarray:

@@ -10,6 +10,7 @@ from mrdamper.data import Run
 from mrdamper.errors import ColumnError, RunError
 from mrdamper.rig_files.quality import judge
 from mrdamper.rig_files.quality.loop import repeatability
+from mrdamper.rig_files.quality.motion import steady_window
 from mrdamper.rig_files.quality.view import SHORTEST, View
 from mrdamper.rig_files.record import Record
 
@@ -62,15 +63,6 @@ def to_run(record: Record) -> Run:
         segments=segments,
         notes=_notes(record),
     )
-
-
-def steady_window(view: View) -> tuple[float, float] | None:
-    """Start and end [s] of the last whole steady cycles; None for a motion without a period."""
-    if view.motion is None:
-        return None
-    cycles = max(1, int(view.motion.cycles + 0.02))
-    first, last = float(view.steady.time[0]), float(view.steady.time[-1])
-    return max(first, last - cycles / view.motion.condition.frequency_Hz), last
 
 
 def _kept(record: Record) -> np.ndarray:

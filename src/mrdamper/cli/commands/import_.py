@@ -9,6 +9,7 @@ import typer
 
 if TYPE_CHECKING:
     from mrdamper.rig_files.profile import Profile
+    from mrdamper.rig_files.record import Record
     from mrdamper.rig_files.rig_import import ImportResult
 
 
@@ -101,7 +102,7 @@ def _print(result: ImportResult, out: Path | None) -> None:
     for record in result.records:
         known = record.time[~(record.time != record.time)]
         seconds = float(known[-1] - known[0])
-        current = "" if record.current is None else f"{_current(record.current)}, "
+        current = "" if record.current is None else f"{_current(record)}, "
         print(f"{record.id}: {record.time.size} samples, {seconds:.4g} s, {current}{record.provenance['columns']}")
         for finding in record.findings:
             print(f"  {finding}")
@@ -118,9 +119,12 @@ def _print(result: ImportResult, out: Path | None) -> None:
         print("nothing written; mend or leave out the refused files, or give --skip-refused")
 
 
-def _current(current) -> str:
-    low, high = float(current.min()), float(current.max())
-    return f"{low:g} A" if low == high else f"{low:g} to {high:g} A"
+def _current(record: Record) -> str:
+    from mrdamper.data import held_current
+    from mrdamper.rig_files.quality.current import current_in
+
+    mean, change = held_current(current := current_in(record, None))
+    return f"{current.min():.4g} to {current.max():.4g} A" if change else f"{mean:g} A"
 
 
 def _summary(result: ImportResult, out: Path | None) -> dict:

@@ -133,7 +133,7 @@ def residual_map(damper: Damper, runs: Sequence[Run]) -> Figure:
     """Where the residual lives: mean and spread over velocity and over phase, relative to peak-to-peak force."""
     with house_style():
         figure, (over_v, over_phase) = new_figure(1, 2, 2.8, sharey=True)
-        colours = current_colours([float(np.mean(run.current)) for run in runs])
+        colours = current_colours([run.mean_current for run in runs])
         for run in runs:
             found = equivalent_sine(run)
             if not found.is_sine:
@@ -144,7 +144,7 @@ def residual_map(damper: Damper, runs: Sequence[Run]) -> Figure:
             error = 100 * (prediction.force - run.force)[inside] / np.ptp(run.force[inside])
             omega = 2 * np.pi * found.condition.frequency_Hz
             phase = np.degrees(np.arctan2(motion.displacement, motion.velocity / omega)) % 360
-            colour = colours[float(np.mean(run.current))]
+            colour = colours[run.mean_current]
             for axes, key, bins in (
                 (over_v, motion.velocity / np.max(np.abs(motion.velocity)), np.linspace(-1, 1, 41)),
                 (over_phase, phase, np.linspace(0, 360, 61)),

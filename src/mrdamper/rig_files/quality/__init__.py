@@ -10,7 +10,18 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from mrdamper.errors import QualityError
-from mrdamper.rig_files.quality import clock, flat, force_lag, loop, motion, presence, ranges, sentinel, velocity_lag
+from mrdamper.rig_files.quality import (
+    clock,
+    current,
+    flat,
+    force_lag,
+    loop,
+    motion,
+    presence,
+    ranges,
+    sentinel,
+    velocity_lag,
+)
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding, Record
 
@@ -36,6 +47,7 @@ CHECKS: tuple[Check, ...] = (
     motion.drifts,
     force_lag.force_channel,
     loop.repeats,
+    current.changes,
 )
 
 

@@ -50,6 +50,17 @@ def cycles_of(view: View) -> float:
     return 0.5 * view.strokes.lengths.size
 
 
+def steady_window(view: View) -> tuple[float, float] | None:
+    """Start and end [s] of the last whole steady cycles; None for a motion without a period."""
+    if view.record.window is not None:
+        return view.record.window
+    if view.motion is None:
+        return None
+    cycles = max(1, int(view.motion.cycles + 0.02))
+    first, last = float(view.steady.time[0]), float(view.steady.time[-1])
+    return max(first, last - cycles / view.motion.condition.frequency_Hz), last
+
+
 def enough_cycles(view: View) -> Iterator[Finding]:
     """Say that a record is shorter than a cycle: it has no frequency and no amplitude."""
     cycles = cycles_of(view)

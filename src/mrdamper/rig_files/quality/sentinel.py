@@ -18,16 +18,20 @@ _NINES = (9.99, 9.999, 9.9999, 9.99999, 9.999999, 9.9925, 9.91)
 _ENDS = (3.2767, 3.2768, 6.5535, 8.388607, 8.388608, 2.147483647, 2.147483648, 4.294967295)
 _DIGITS = np.array([*_NINES, *_ENDS])
 _LEAP = 0.25  # of the channel's range: a code stands that far from the samples around it
+_FAR = 2.0  # times as far as all but a hundredth of the channel's own leaps
+_PULSES = 9  # times as far, a value that no logger writes for missing ones is no pulse of a supply
+_COARSEST = {"current": 0.1}  # leaps below are a supply's own [A]: ripple and a chopper's pulses
 _RARE = 0.1  # of the samples: a value held more often is the channel's own
 _FEW = 50  # distinct values of a channel that does not vary
 _CHUNK = 1_000_000  # samples looked at together
 _LONG = 20  # a value held longer than this on average is a plateau, no code
+_ENOUGH = 50  # of a channel's own samples, below which its leaps say nothing
 
 
 def missing_value_codes(view: View) -> Iterator[Finding]:
     """Refuse a channel in which one exact value stands for missing samples; say so of one no run needs."""
     for name, values in view.channels.items():
-        code = None if np.isinf(values).any() else _code_in(values)
+        code = None if np.isinf(values).any() else _code_in(values, _COARSEST.get(name, 0.0))
         if code is not None:
             at = np.flatnonzero(values == code)
             text = (
@@ -39,7 +43,7 @@ def missing_value_codes(view: View) -> Iterator[Finding]:
             yield Finding("W_MISSING", f"{text}; the channel is not used")
 
 
-def _code_in(values: Floats) -> float | None:
+def _code_in(values: Floats, coarsest: float) -> float | None:
     present = np.isfinite(values)
     if not present.any():
         return None
@@ -50,36 +54,41 @@ def _code_in(values: Floats) -> float | None:
         present &= values != value
     low = float(np.min(values, where=present, initial=np.inf))
     high = float(np.max(values, where=present, initial=-np.inf))
-    scale = (high - low) + 0.05 * max(abs(low), abs(high))
+    scale = (high - low) + 0.05 * max(abs(low), abs(high)) + coarsest
     varies = np.unique(values[present][:10_000]).size >= _FEW
     for value in sorted(rare, key=abs, reverse=True):
-        if max(low - value, value - high) > scale and (_known(value) or (varies and counts[value] > 1)):
+        away = max(low - value, value - high)
+        if away > scale and (_known(value) or (varies and counts[value] > 1 and away > scale + _PULSES * coarsest)):
             return value
     if not varies:
         return None  # a channel that flickers between a few levels leaps there and back all the time
-    leap = _LEAP * (high - low)
+    leap = max(_LEAP * (high - low), coarsest)
     for value, count in _repeated_leaps(values, leap):
         usual = _known(value) or value == 0.0
-        if (usual or count > 2) and _scattered(values, value, leap) >= (0.5 if usual else 0.8):
+        if count < (1 if _known(value) else 2 if usual else 3):
+            continue
+        off, share = _scattered(values, value, leap)
+        scattered = share >= 0.5 or off >= 2 if usual else share >= 0.8
+        if scattered and _stands_out(values, value, leap):
             return value
     return None
 
 
 def _repeated_leaps(values: Floats, leap: float) -> list[tuple[float, int]]:
-    """Values, each with its count, at which a channel leaps there and back more than once."""
+    """Values, each with its count, at which a channel leaps there and back: twice, or once to a code in use."""
     leaps = []
     for start in range(0, values.size, _CHUNK):
         piece = values[start : start + _CHUNK + 2]
         steps = np.abs(np.diff(piece)) > leap
         leaps.append(piece[1:-1][steps[1:] & steps[:-1]][: _CHUNK // 100])
     found, counts = np.unique(np.concatenate(leaps), return_counts=True)
-    most = np.argsort(counts)[::-1][:20]
-    return [(float(found[i]), int(counts[i])) for i in most if counts[i] > 1]
+    most = np.argsort(counts)[::-1][:200]
+    return [(float(found[i]), int(counts[i])) for i in most if counts[i] > 1 or _known(found[i])]
 
 
 def _known(value: float) -> bool:
     size = abs(value)
-    if size >= 1e30:
+    if size >= 1e20:
         return True
     if size == 0.0:
         return False
@@ -87,12 +96,27 @@ def _known(value: float) -> bool:
     return bool(np.any(np.abs(digits / _DIGITS - 1) < 1e-9))
 
 
-def _scattered(values: Floats, value: float, leap: float) -> float:
-    """Share of a value's occurrences that stand off from the samples on both sides."""
+def _scattered(values: Floats, value: float, leap: float) -> tuple[int, float]:
+    """Number and share of a value's occurrences that stand off from the samples on both sides."""
     starts, stops = runs_of(values == value)
     inner = (starts > 0) & (stops < values.size)
     starts, stops = starts[inner], stops[inner]
-    if starts.size < 2 or np.mean(stops - starts) > _LONG:
-        return 0.0
+    if not starts.size or np.mean(stops - starts) > _LONG:
+        return 0, 0.0
     off = (np.abs(values[starts - 1] - value) > leap) & (np.abs(values[stops] - value) > leap)
-    return float(np.mean(off))
+    return int(np.count_nonzero(off)), float(np.mean(off))
+
+
+def _stands_out(values: Floats, value: float, leap: float) -> bool:
+    """Whether a channel leaps to a value from much further than it leaps by itself.
+
+    A leap is how far a sample lies from the middle of its neighbours.
+    """
+    for_all = np.abs(values[1:-1] - 0.5 * (values[:-2] + values[2:]))[:_CHUNK]
+    same = values == value
+    near = (same[:-2] | same[1:-1] | same[2:])[:_CHUNK]
+    own = for_all[~near & np.isfinite(for_all)]
+    at = for_all[same[1:-1][:_CHUNK] & np.isfinite(for_all) & (for_all > leap)]
+    if own.size < _ENOUGH or not at.size:
+        return False
+    return bool(np.median(at) > _FAR * np.quantile(own, 0.99))

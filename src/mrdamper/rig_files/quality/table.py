@@ -8,15 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from mrdamper.data import Condition, Run
+from mrdamper.data import Condition, Run, held_current
 from mrdamper.errors import QualityError
 from mrdamper.rig_files.quality import judge
+from mrdamper.rig_files.quality.current import current_in
 from mrdamper.rig_files.quality.loop import repeatability
-from mrdamper.rig_files.quality.motion import cycles_of, drift_of
+from mrdamper.rig_files.quality.motion import cycles_of, drift_of, steady_window
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding, Record
 
-NOT_IDENTIFIED = ("W_CLIPPED", "W_SHORT")  # what identification refuses by default
+NOT_IDENTIFIED = ("W_CLIPPED", "W_SHORT", "W_CURRENT_VARIES")  # what identification refuses by default
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +30,8 @@ class Quality:
         As judged.
     condition : Condition or None
         Measured; None for a motion without a period and for a refused record.
+    current : float
+        Mean over the steady window [A]; NaN where it changes there.
     cycles, sample_rate_Hz : float
         NaN for a refused record, like all figures below.
     repeatability : float
@@ -46,6 +49,7 @@ class Quality:
 
     record: Record
     condition: Condition | None = None
+    current: float = np.nan
     cycles: float = np.nan
     sample_rate_Hz: float = np.nan
     repeatability: float = np.nan
@@ -100,6 +104,7 @@ def record_of(run: Run) -> Record:
         rig=run.rig,
         excitation=run.excitation,
         split=run.split,
+        window=run.window,
     )
 
 
@@ -109,7 +114,7 @@ def row(quality: Quality) -> dict[str, Any]:
     return {
         "run_id": quality.record.id,
         "rig": quality.record.rig,
-        "current_A": _rounded(_current(quality), 3),
+        "current_A": _rounded(quality.current, 4),
         "frequency_Hz": None if condition is None else _rounded(condition.frequency_Hz, 4),
         "amplitude_mm": None if condition is None else _rounded(1e3 * condition.amplitude_m, 4),
         "cycles": _rounded(quality.cycles, 2),
@@ -140,6 +145,7 @@ def _quality(record: Record) -> Quality:
     return Quality(
         judged,
         condition=None if motion is None else motion.condition,
+        current=_current(view),
         cycles=cycles,
         sample_rate_Hz=1 / view.step,
         repeatability=np.nan if scatter is None else scatter[0],
@@ -150,9 +156,11 @@ def _quality(record: Record) -> Quality:
     )
 
 
-def _current(quality: Quality) -> float:
-    current = quality.record.current
-    return np.nan if current is None or not np.isfinite(current).any() else float(np.nanmean(current))
+def _current(view: View) -> float:
+    if view.record.current is None:
+        return np.nan
+    mean, change = held_current(current_in(view.record, steady_window(view)))
+    return np.nan if change else mean
 
 
 def _rounded(value: float, digits: int) -> float | None:

@@ -1,0 +1,42 @@
+"""The coil current: constant but for noise, or a channel of its own that only some methods can take."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from mrdamper.data import Floats, held_current
+from mrdamper.rig_files.quality.motion import steady_window
+from mrdamper.rig_files.quality.view import View
+from mrdamper.rig_files.record import Finding, Record
+
+_MOST = 1_000_000  # samples looked at
+
+
+def changes(view: View) -> Iterator[Finding]:
+    """Say that the current changes within the steady motion."""
+    if view.record.current is not None:
+        yield from change_of(view.record, steady_window(view))
+
+
+def change_of(record: Record, window: tuple[float, float] | None) -> Iterator[Finding]:
+    """The finding that a record's current changes within a window of time."""
+    current = current_in(record, window)
+    change = held_current(current)[1] if current.size >= 3 else ""
+    if change:
+        yield Finding(
+            "W_CURRENT_VARIES",
+            f"{change}: only methods that take a current channel use the run, nothing is identified from it alone",
+        )
+
+
+def current_in(record: Record, window: tuple[float, float] | None) -> Floats:
+    """The current's samples that are there within a window of time, thinned where they are many."""
+    assert record.current is not None
+    thinned = slice(None, None, max(1, record.time.size // _MOST))
+    time, current = record.time[thinned], np.asarray(record.current[thinned])
+    there = np.isfinite(current)
+    if window is not None:
+        there &= (time >= window[0]) & (time <= window[1])
+    return current[there]
