@@ -7,8 +7,12 @@
 
 from __future__ import annotations
 
+# ruff: noqa: F401  type checkers take the names from the imports, everybody else from _HOME
 import importlib
+import sys
 from typing import TYPE_CHECKING, Any
+
+from mrdamper.discovery import MovedNames
 
 if TYPE_CHECKING:
     from mrdamper.data import Condition, Dataset, Run
@@ -38,26 +42,16 @@ _HOME = {
     "stepper": "streaming",
     "validate": "validation",
 }
-__all__ = [
-    "Condition",
-    "Dataset",
-    "GasSpring",
-    "InputError",
-    "Run",
-    "identify",
-    "load_dataset",
-    "load_model",
-    "run_study",
-    "save_dataset",
-    "save_model",
-    "simulate",
-    "stepper",
-    "validate",
-]
+__all__ = list(_HOME)  # pyright: ignore[reportUnsupportedDunderAll]
+
+_moved = MovedNames(__name__)
+sys.meta_path.insert(0, _moved)  # type: ignore[arg-type]
 
 
 def __getattr__(name: str) -> Any:
     # Names are looked up on first use: the command line's --help needs none of them.
     if name in _HOME:
-        return getattr(importlib.import_module(f"mrdamper.{_HOME[name]}"), name)
-    raise AttributeError(f"module 'mrdamper' has no attribute {name!r}")
+        return getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)
+    if _moved.new_name(f"{__name__}.{name}"):
+        return importlib.import_module(f"{__name__}.{name}")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,11 +1,13 @@
-"""Finding what was dropped into a package: there is no list to keep."""
+"""Finding what was dropped into a package, and modules under the names they had in version 0.1."""
 
 from __future__ import annotations
 
 import importlib
 import pkgutil
+import warnings
 from collections.abc import Iterable, Mapping
-from types import MappingProxyType
+from importlib.machinery import ModuleSpec
+from types import MappingProxyType, ModuleType
 from typing import TypeVar
 
 from mrdamper.errors import UnknownNameError
@@ -32,3 +34,67 @@ def named(kind: str, name: str, known: Mapping[str, N]) -> N:
     if name not in known:
         raise UnknownNameError.of(kind, name, known)
     return known[name]
+
+
+MOVED = MappingProxyType(
+    {
+        "comparison": "study.comparison",
+        "comparison.publication": "report.comparison",
+        "condensed": "dampers.gram",
+        "conditioned": "dampers.published",
+        "damper": "dampers.base",
+        "datasets": "files.bundled",
+        "excitation": "motion",
+        "formulas": "export.formulas",
+        "function_fitting": "functions.fitting",
+        "harmonic_balance": "identification.harmonic_balance",
+        "harmonics": "motion.harmonics",
+        "io": "rig_files",
+        "io.atomic": "files.atomic",
+        "io.dataset": "files.dataset",
+        "io.model_file": "files.model_file",
+        "io.motion": "files.motion",
+        "joint": "dampers.joint",
+        "loop_analysis": "identification.loop_analysis",
+        "modified": "dampers.modified",
+        "paper": "dampers.paper",
+        "parameter_functions": "functions.forms",
+        "plots": "report.plots",
+        "publication": "report.study",
+        "recursion": "motion.lag",
+        "sensitivity": "reproduction.sensitivity",
+        "threads": "optimizers.linear",
+        "uncertainty": "identification.covariance",
+        "virtual_rig": "reproduction.virtual_rig",
+        "workflow": "study.workflow",
+    }
+)
+
+
+class MovedNames:
+    """Modules under their names of version 0.1: found in the import system's list of finders, said once each."""
+
+    def __init__(self, package: str):
+        self.package = package
+        self.spec: ModuleSpec | None = None
+
+    def new_name(self, name: str) -> str | None:
+        """Where a module of 0.1 stands now; None if it did not move."""
+        parts = name.split(".")
+        for count in range(min(len(parts), 3), 1, -1):
+            if (home := MOVED.get(".".join(parts[1:count]))) and parts[0] == self.package:
+                return ".".join([self.package, home, *parts[count:]])
+        return None
+
+    def find_spec(self, name: str, path: object = None, target: object = None) -> ModuleSpec | None:
+        new = self.new_name(name)
+        return ModuleSpec(name, self, origin=new) if new else None  # type: ignore[arg-type]
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        warnings.warn(f"{spec.name} is now {spec.origin}", FutureWarning, stacklevel=2)
+        module = importlib.import_module(str(spec.origin))
+        self.spec = module.__spec__  # the import system puts the old name's there
+        return module
+
+    def exec_module(self, module: ModuleType) -> None:
+        module.__spec__ = self.spec

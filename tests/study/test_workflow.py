@@ -10,7 +10,7 @@ import pytest
 from mrdamper.data import Dataset, Run
 from mrdamper.errors import IdentificationError, OutputError
 from mrdamper.files.model_file import dump_model, load_model
-from mrdamper.loop_analysis import analyse_loop, dynamic_ranges
+from mrdamper.identification.loop_analysis import analyse_loop, dynamic_ranges
 from mrdamper.report.study import write_study
 from mrdamper.study import workflow
 from mrdamper.study.workflow import run_study

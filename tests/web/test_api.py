@@ -22,8 +22,8 @@ from mrdamper.export import exporter
 from mrdamper.export.base import identifier
 from mrdamper.files.model_file import dump_model, parse_model
 from mrdamper.identification import identify
+from mrdamper.identification.loop_analysis import analyse_loop
 from mrdamper.identification.methods import all_methods
-from mrdamper.loop_analysis import analyse_loop
 from mrdamper.web.frames import frame
 from mrdamper.web.tasks import export_name
 

@@ -21,7 +21,7 @@ from mrdamper.errors import IdentificationError
 from mrdamper.functions.fitting import FunctionFit, assess, choose_function
 from mrdamper.functions.forms import FORMS
 from mrdamper.identification import Identification
-from mrdamper.loop_analysis import same_motion
+from mrdamper.identification.loop_analysis import same_motion
 from mrdamper.models import Model
 from mrdamper.motion import Excitation, running_sine
 from mrdamper.simulation import Response, simulate, steady_loop

@@ -10,7 +10,7 @@ from mrdamper.dampers.base import Damper
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.identification import Identification
-from mrdamper.loop_analysis import LoopAnalysis
+from mrdamper.identification.loop_analysis import LoopAnalysis
 from mrdamper.validation import Validation
 
 _WEAK_FUNCTION = 0.9  # left-out error over spread from which a function hardly beats the mean

@@ -19,9 +19,9 @@ from mrdamper.errors import IdentificationError, InputError, MissingExtraError
 from mrdamper.gas_spring import GasSpring
 from mrdamper.identification import Identification, Method, identify
 from mrdamper.identification.harmonic_balance import ForceReading, SineRecord, read_force
+from mrdamper.identification.loop_analysis import LoopAnalysis, analyse_loop
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.identification.methods.paper import Paper
-from mrdamper.loop_analysis import LoopAnalysis, analyse_loop
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.optimizers.generation import GeneticSettings
 from mrdamper.optimizers.genetic import GeneticMinimum

@@ -22,8 +22,8 @@ from mrdamper.dampers.paper import Settled, paper_functions
 from mrdamper.data import Dataset, Run
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError
 from mrdamper.identification import Identification, identify, refuse_clipped
+from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, dynamic_ranges
 from mrdamper.identification.methods.paper import Paper
-from mrdamper.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, dynamic_ranges
 from mrdamper.motion import analyse_motion, equivalent_sine
 from mrdamper.validation import Validation, leave_one_condition_out, validate
 

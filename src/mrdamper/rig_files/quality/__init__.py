@@ -1,13 +1,17 @@
 """Whether a record can be believed: every check in order, findings added or the record refused.
 
 A check is a function of a `View` that yields findings, or only raises `QualityError`. The
-order matters: a check may trust what the ones before it made sure of.
+order matters: a check may trust what the ones before it made sure of. A module dropped in here
+with a function `check` is found and comes last, when everything else is made sure of.
 """
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import cache
 
 from mrdamper.errors import QualityError
 from mrdamper.rig_files.quality import (
@@ -51,6 +55,12 @@ CHECKS: tuple[Check, ...] = (
 )
 
 
+@cache
+def _dropped_in() -> tuple[Check, ...]:
+    modules = (importlib.import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__))
+    return tuple(module.check for module in modules if hasattr(module, "check"))
+
+
 def judge(record: Record) -> Record:
     """Run every check on a record.
 
@@ -73,6 +83,6 @@ def judge(record: Record) -> Record:
         E_DISSIPATION_SIGN, E_CHANNEL_LAG.
     """
     view = View(record)
-    for check in CHECKS:
+    for check in (*CHECKS, *_dropped_in()):
         view.found.extend(check(view) or ())
     return replace(record, findings=(*record.findings, *view.found), segments=view.segments)
