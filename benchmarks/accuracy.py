@@ -7,7 +7,6 @@ import importlib.util
 import numpy as np
 
 from mrdamper.hysteresis import Shape, follow
-from mrdamper.hysteresis.compiled import follow_compiled
 from mrdamper.motion import Path
 
 PLACES = np.array([0.0, 3e-4, 2e-3, 1.1e-3, 1.4e-3, -4e-3, 2e-2, 1.9e-2, -2e-2, 5e-3])  # turning points [m]
@@ -15,7 +14,7 @@ KAPPA = 632.0
 
 
 def largest_errors() -> dict[str, float | None]:
-    """Of closed forms (n = 1, 2) and of tables (other n), NumPy and compiled; None without mpmath."""
+    """Of closed forms (n = 1, 2) and of tables (other n); None without mpmath."""
     if importlib.util.find_spec("mpmath") is None:
         return {"closed": None, "tables": None}
     found = {"closed": 0.0, "tables": 0.0}
@@ -24,7 +23,7 @@ def largest_errors() -> dict[str, float | None]:
             truth = _exact(n, rho)
             path = Path.of(PLACES, peaks="samples")
             shape = Shape(KAPPA, rho, n)
-            error = max(float(np.abs(way(shape, path) - truth).max()) for way in (follow, follow_compiled))
+            error = float(np.abs(follow(shape, path) - truth).max())
             kind = "closed" if n in (1.0, 2.0) else "tables"
             found[kind] = max(found[kind], error)
     return dict(found)

@@ -10,13 +10,12 @@ from benchmarks import conditions
 from benchmarks.timing import growth, race
 from mrdamper.data import Run
 from mrdamper.hysteresis import Shape
-from mrdamper.hysteresis.batch import Fixed, batch_cost
-from mrdamper.hysteresis.compiled_search import LengthSearch, search_lengths
+from mrdamper.hysteresis.batch import batch_cost
 from mrdamper.identification import Problem, identify
-from mrdamper.identification.elimination import Elimination
-from mrdamper.identification.methods.projection import Projection, length_search, search_axes
+from mrdamper.identification.methods.projection import Projection
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.motion import Path
+from mrdamper.optimizers.linear import FixedColumns
 
 SETS = 1000
 
@@ -40,23 +39,13 @@ class BatchRow:
 
 
 def batch_rows(quick: bool) -> list[BatchRow]:
-    """A thousand parameter sets on one loop of 1,000 samples, and on a record of ten cycles."""
-    share = 0.2 if quick else 1.0
+    """The grid of a search, a thousand shapes: on one loop of 1,000 samples, and on a record of ten cycles."""
     rows = []
     for cycles in (1, 10):
-        fixed, many = loop(cycles * 1000, cycles), shapes(SETS)
-        times = race(
-            {
-                "compiled": lambda f=fixed, s=many: batch_cost(f, s, compiled=True),
-                "NumPy": lambda f=fixed, s=many: batch_cost(f, s, compiled=False),
-            },
-            share,
-        )
+        path, fixed = loop(cycles * 1000, cycles)
+        seconds = race({"": lambda p=path, f=fixed: batch_cost(p, f, shapes(SETS))}, 0.2 if quick else 1.0)[""]
         work = SETS * cycles * 1000
-        rows += [
-            BatchRow(f"{name}, {SETS:,} parameter sets × {cycles * 1000:,} samples", t, 1e9 * t / work)
-            for name, t in times.items()
-        ]
+        rows.append(BatchRow(f"{SETS:,} shapes × {cycles * 1000:,} samples", seconds, 1e9 * seconds / work))
     return rows
 
 
@@ -73,18 +62,15 @@ def many_rows(quick: bool) -> list[ManyRow]:
     runs = [conditions.run(condition) for condition in conditions.MATRIX]
     problems = [prepared(run) for run in runs]
     sharp = [prepared(run, ("n",)) for run in runs]
-    searches = [search_of(problem) for problem in problems]
-    method, machine = Projection(), Projection(compiled=True)
+    method = Projection()
     times = race(
         {
-            "search compiled": lambda: search_lengths(searches),
-            "search NumPy": lambda: [method.solve(problem) for problem in problems],
-            "n free, search compiled": lambda: [machine.solve(problem) for problem in sharp],
-            "n free, search NumPy": lambda: [method.solve(problem) for problem in sharp],
+            "search": lambda: [method.solve(problem) for problem in problems],
+            "n free, search": lambda: [method.solve(problem) for problem in sharp],
             "motion analysis alone: frequency, harmonics, smoothing, strokes": lambda: [
                 prepared(replace(r)) for r in runs
             ],
-            "identify() NumPy: motion analysis, errors and scores too": lambda: [identify(replace(r)) for r in runs],
+            "identify(): motion analysis, errors and scores too": lambda: [identify(replace(r)) for r in runs],
         },
         0.4 if quick else 3.0,
     )
@@ -98,27 +84,24 @@ def growth_rows(quick: bool) -> list[Growth]:
     found = [
         race({"": lambda p=prepared(conditions.run(samples=n)): Projection().solve(p)}, share)[""] for n in samples
     ]
-    rows.append(Growth("NumPy search over samples", "1,000 … 30,000", growth(samples, found)))
-    searches = [search_of(prepared(conditions.run(samples=n))) for n in samples]
-    found = [race({"": lambda s=s: search_lengths([s])}, share)[""] for s in searches]
-    rows.append(Growth("compiled search over samples", "1,000 … 30,000", growth(samples, found)))
-    many = [search_of(prepared(conditions.run(c))) for c in conditions.MATRIX]
+    rows.append(Growth("search over samples", "1,000 … 30,000", growth(samples, found)))
+    many = [prepared(conditions.run(c)) for c in conditions.MATRIX]
     counts = (6, 12, 24, 48)
-    found = [race({"": lambda n=n: search_lengths(many[:n])}, share)[""] for n in counts]
-    rows.append(Growth("compiled search over conditions", "6 … 48", growth(counts, found)))
+    found = [race({"": lambda n=n: [Projection().solve(p) for p in many[:n]]}, share)[""] for n in counts]
+    rows.append(Growth("search over conditions", "6 … 48", growth(counts, found)))
     sets = (30, 100, 300, 1000)
-    fixed = loop(1000, 1)
-    found = [race({"": lambda n=n: batch_cost(fixed, shapes(n), compiled=True)}, share)[""] for n in sets]
-    rows.append(Growth("compiled batch over parameter sets", "30 … 1,000", growth(sets, found)))
+    path, fixed = loop(1000, 1)
+    found = [race({"": lambda n=n: batch_cost(path, fixed, shapes(n))}, share)[""] for n in sets]
+    rows.append(Growth("grid over shapes", "30 … 1,000", growth(sets, found)))
     return rows
 
 
-def loop(samples: int, cycles: int) -> Fixed:
+def loop(samples: int, cycles: int) -> tuple[Path, FixedColumns]:
     """A sine of some cycles, three columns, and a force that they and a state explain in part."""
     phase = 2 * np.pi * cycles * np.arange(samples) / samples + 0.3
     x, v = 0.02 * np.sin(phase), 0.02 * np.cos(phase)
     force = np.tanh(50 * v) + v + 0.1 * x
-    return Fixed.of(Path.of(x), np.column_stack([v, x, np.ones(samples)]), force)
+    return Path.of(x), FixedColumns.of(np.column_stack([v, x, np.ones(samples)]), force)
 
 
 def shapes(count: int) -> Shape:
@@ -131,13 +114,3 @@ def prepared(run: Run, free: tuple[str, ...] = ()) -> Problem:
     problem = Problem.of(run, BoucWen, free=free)
     _ = problem.motion.path, problem.seen, problem.force, problem.analysis
     return problem
-
-
-def search_of(problem: Problem) -> LengthSearch:
-    """Its search in machine code."""
-    axes = search_axes(problem)
-    elimination = Elimination.of(problem, axes)
-    assert elimination is not None
-    found = length_search(axes, elimination)
-    assert found is not None
-    return found

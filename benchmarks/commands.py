@@ -22,9 +22,7 @@ runs = [
     Run(f"{i}", t, x, f, I, window=(w, t[-1]))
     for i, (t, x, f, I, w) in enumerate(zip(*(records[k] for k in ("t", "x", "f", "I", "w")), strict=True))
 ]
-method = "projection" if len(sys.argv) < 3 else __import__(
-    "mrdamper.identification.methods.projection", fromlist=["Projection"]).Projection(compiled=True)
-found = [identify(run, method=method) for run in runs]
+found = [identify(run) for run in runs]
 assert max(i.scores.nrmse_std for i in found) < 0.05
 """
 
@@ -61,18 +59,11 @@ def process_rows(quick: bool) -> list[ProcessRow]:
         rows = [
             _fresh("mrdamper --help", ["-m", "mrdamper.cli", "--help"], folder, repeats + 2),
             _fresh("Python and NumPy alone", ["-c", "import numpy"], folder, repeats + 2),
-            _fresh("identify() of 48 conditions, NumPy", ["-c", _IDENTIFY, str(records)], folder, repeats + 2),
-            _fresh("identify() of 48 conditions, compiled", ["-c", _IDENTIFY, str(records), "x"], folder, repeats),
+            _fresh("identify() of 48 conditions", ["-c", _IDENTIFY, str(records)], folder, repeats + 2),
             _fresh("mrdamper study, caches filled", [*study, str(folder / "warm")], folder, 1 if quick else 2),
         ]
         if not quick:
-            rows += [
-                _cold(
-                    "identify() of 48 conditions, compiled, nothing compiled before",
-                    ["-c", _IDENTIFY, str(records), "x"],
-                ),
-                _cold("mrdamper study, caches empty", [*study, str(folder / "cold")]),
-            ]
+            rows.append(_cold("mrdamper study, caches empty", [*study, str(folder / "cold")]))
         return rows
 
 

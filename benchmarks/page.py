@@ -10,16 +10,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from benchmarks.goals import goals
-from mrdamper.hysteresis.batch import WORTH_COMPILING
-
-WHEN_COMPILED = (
-    'The compiled path costs the import of numba, and once on a machine the time to compile: the rows "compiled" and '
-    '"compiled, nothing compiled before" under Whole processes against "NumPy". It is chosen where shapes × samples '
-    f"come to {WORTH_COMPILING:.0e} (`hysteresis.batch.WORTH_COMPILING`): NumPy takes over a second for that, machine "
-    "code a fifth. `Projection(compiled=True)` asks for it where one process identifies hundreds of runs; "
-    "`compiled=False` and a smaller job never import it. The choice depends on the work alone, never on what happens "
-    "to be loaded, so that the same input gives the same bits."
-)
 
 
 @dataclass
@@ -101,13 +91,12 @@ def page(results: Results) -> str:
             ),
         ),
         "## Many",
-        WHEN_COMPILED,
         _table(
             ("what", "ms"),
             ((r.name, _number(1e3 * r.seconds)) for r in results.many),
         ),
         _table(
-            ("batch cost, four linear parameters eliminated", "ms", "ns a sample and set"),
+            ("grid of a search, the linear parameters eliminated", "ms", "ns a sample and shape"),
             ((r.name, _number(1e3 * r.seconds), _number(r.nanoseconds)) for r in results.batches),
         ),
         _table(

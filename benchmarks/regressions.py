@@ -13,8 +13,6 @@ from benchmarks import batches, conditions
 from benchmarks.simulation import SHAPE, T, X
 from mrdamper.hysteresis import follow
 from mrdamper.hysteresis.batch import batch_cost
-from mrdamper.hysteresis.compiled import follow_compiled
-from mrdamper.hysteresis.compiled_search import search_length
 from mrdamper.identification import identify
 from mrdamper.identification.methods.projection import Projection
 from mrdamper.motion import Path
@@ -26,22 +24,16 @@ def test_cut_into_strokes(benchmark):
     benchmark(Path.of, MOTION)
 
 
-@pytest.mark.parametrize("way", [follow, follow_compiled])
-def test_follow(benchmark, way):
-    benchmark(way, SHAPE, Path.of(MOTION))
+def test_follow(benchmark):
+    benchmark(follow, SHAPE, Path.of(MOTION))
 
 
-@pytest.mark.parametrize("compiled", [False, True], ids=["NumPy", "compiled"])
-def test_batch_cost(benchmark, compiled):
-    benchmark(batch_cost, batches.loop(1000, 1), batches.shapes(100), compiled=compiled)
+def test_batch_cost(benchmark):
+    benchmark(batch_cost, *batches.loop(1000, 1), batches.shapes(100))
 
 
-def test_search_numpy(benchmark):
+def test_search(benchmark):
     benchmark(Projection().solve, batches.prepared(conditions.run()))
-
-
-def test_search_compiled(benchmark):
-    benchmark(search_length, batches.search_of(batches.prepared(conditions.run())))
 
 
 @pytest.mark.parametrize("free", [(), ("gamma",), ("n",)], ids=str)

@@ -10,8 +10,6 @@ import numpy as np
 
 from benchmarks.timing import race
 from mrdamper.hysteresis import Shape, follow
-from mrdamper.hysteresis.compiled import Strokes, states
-from mrdamper.hysteresis.compiled_tables import curve_of
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.motion import Path
 
@@ -19,7 +17,7 @@ X, F, BETA, PHASE = 0.02, 1.0, 2e5, 0.3  # with this phase every reversal falls 
 T = np.arange(3000) / 1000.0
 OMEGA = 2 * np.pi * F
 SHAPE = Shape.from_bouc_wen(BETA, BETA)
-OURS = "mrdamper compiled, closed form per stroke"
+OURS = "mrdamper, closed form per stroke"
 
 
 @dataclass(frozen=True)
@@ -53,17 +51,9 @@ def _truth() -> np.ndarray:
 def _ours() -> dict[str, Callable[[], np.ndarray]]:
     x = X * np.sin(OMEGA * T + PHASE)
     path = Path.of(x)
-    strokes, out = Strokes.of(path), np.empty(T.size)
-    arguments = (float(SHAPE.kappa), 0.0, curve_of(2.0), strokes, 0.0, out)
-
-    def compiled() -> np.ndarray:
-        states(*arguments)
-        return out
-
     ways = {
-        OURS: compiled,
-        "mrdamper NumPy, closed form per stroke": lambda: follow(SHAPE, path),
-        "mrdamper NumPy, cutting the motion into strokes included": lambda: follow(SHAPE, Path.of(x)),
+        OURS: lambda: follow(SHAPE, path),
+        "mrdamper, cutting the motion into strokes included": lambda: follow(SHAPE, Path.of(x)),
     }
     return ways | _streaming(x)
 

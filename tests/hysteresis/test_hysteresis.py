@@ -16,7 +16,6 @@ from scipy.special import hyp2f1, iv
 from mrdamper.errors import ExcitationError, ParameterError
 from mrdamper.hysteresis import (
     Shape,
-    boundedness_class,
     dissipates,
     follow,
     loop_area,
@@ -352,11 +351,6 @@ def test_v12_dahl(case):
     assert sine == pytest.approx(2 * iv(1, xi) / math.cosh(xi), rel=ROUNDING)
     loading = steady_loop(shape, case["X"], np.arcsin(np.array(case["x"]) / case["X"]))
     np.testing.assert_allclose(loading * scale, case["z_loading"], rtol=ROUNDING)
-
-
-@pytest.mark.parametrize("case", vectors("V17"))
-def test_v17_boundedness_class(case):
-    assert boundedness_class(case["A"], case["beta"], case["gamma"]) == case["cls"]
 
 
 @pytest.mark.parametrize("case", vectors("V18"))

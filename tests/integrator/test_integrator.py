@@ -7,6 +7,7 @@ from mrdamper.data import Condition
 from mrdamper.errors import ExcitationError, ParameterError
 from mrdamper.hysteresis import Shape, follow
 from mrdamper.integrator import integrate
+from mrdamper.models import Scale
 from mrdamper.models.spencer import Spencer
 from mrdamper.motion import sine
 
@@ -107,7 +108,9 @@ def test_a_voltage_lag_as_a_third_state_matches_the_vectors(vectors):
 
 def test_step_halving_at_the_search_bounds():
     """At every corner of the box a search may reach: the same force from half the sampling interval."""
-    axes = Spencer.guess(MOTION, np.zeros(len(MOTION)), 0.01, ("c0_ratio", "k0_rate", "creep", "yield_displacement"))
+    axes = Spencer.search_axes(
+        Scale.of(MOTION, np.zeros(len(MOTION)), 0.01), ("c0_ratio", "k0_rate", "creep", "yield_displacement")
+    )
     fine = sine(Condition(0.0, 1.0, 0.01), 1, 400)
     coarse = fine.part(slice(None, None, 2))
     corners = np.array(np.meshgrid(*[(axis.lower, axis.upper) for axis in axes])).reshape(len(axes), -1).T

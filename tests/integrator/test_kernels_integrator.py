@@ -5,6 +5,7 @@ import pytest
 
 from mrdamper.data import Condition
 from mrdamper.integrator import integrate
+from mrdamper.models import Scale
 from mrdamper.models.lugre import LuGre, bristle_rate
 from mrdamper.models.spencer import Spencer, series_rate
 from mrdamper.motion import sine
@@ -15,7 +16,7 @@ COARSE = FINE.part(slice(None, None, 2))
 
 
 def corners(model_type, names):
-    axes = model_type.guess(FINE, np.zeros(len(FINE)), AMPLITUDE, names)
+    axes = model_type.search_axes(Scale.of(FINE, np.zeros(len(FINE)), AMPLITUDE), names)
     grid = np.meshgrid(*[(axis.lower, axis.upper) for axis in axes])
     points = np.array(grid).reshape(len(axes), -1).T.tolist()
     return [dict(zip([axis.name for axis in axes], point, strict=True)) for point in points]

@@ -9,7 +9,6 @@ from mrdamper.motion import (
     analyse_motion,
     equivalent_sine,
     measured_motion,
-    motion_from_samples,
     random_motion,
     sine,
     smooth,
@@ -132,10 +131,3 @@ def test_bundled_sines_are_measured_as_their_authors_measured_them(bundled):
         # The authors' figures: 0.1 % in frequency; amplitude to 3 %, because position drifts.
         assert found.frequency_Hz == pytest.approx(float(run.notes["measured_frequency_Hz"]), rel=2e-3)
         assert found.amplitude_m == pytest.approx(float(run.notes["measured_amplitude_m"]), rel=0.03)
-
-
-def test_motion_from_samples_is_a_motion():
-    t = np.linspace(0, 2, 400)
-    motion = motion_from_samples(t, 0.01 * np.sin(2 * np.pi * t), 0.5)
-    assert motion.current[0] == 0.5
-    assert motion.velocity[0] == pytest.approx(0.02 * np.pi, rel=0.01)

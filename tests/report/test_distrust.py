@@ -7,6 +7,7 @@ import pytest
 from support.dampers import joint_damper
 
 from mrdamper.dampers.joint import JointFit
+from mrdamper.optimizers.ending import Ending
 from mrdamper.report.distrust import doubts
 from mrdamper.validation import Validation
 
@@ -16,9 +17,9 @@ NONE = Validation("none", ())
 @pytest.mark.parametrize(
     ("why", "said"),
     [
-        ("converged: the cost changes no more", None),
-        ("every coordinate ended at a bound", "did not converge: every coordinate ended at a bound."),
-        ("stopped after 15 steps; the cost was still falling", "did not converge: stopped after 15 steps; the cost"),
+        (Ending.SETTLED, None),
+        (Ending.AT_BOUNDS, None),  # the bounds have a sentence of their own
+        (Ending.STEPS_SPENT, "one set of parameters stopped at the limit of steps, the cost still falling"),
     ],
 )
 def test_a_search_that_did_not_converge_is_said_so_in_a_sentence(why, said):
@@ -31,7 +32,7 @@ def test_a_search_that_did_not_converge_is_said_so_in_a_sentence(why, said):
 
 
 def test_a_run_described_far_worse_than_the_others_is_named_by_its_factor():
-    fit = JointFit(joint_damper(), np.array([0.02, 0.02, 0.09]), ("d",), np.zeros(2), "converged", 9, 0.1)
+    fit = JointFit(joint_damper(), np.array([0.02, 0.02, 0.09]), ("d",), np.zeros(2), Ending.SETTLED, 9, 0.1)
     sentences = doubts(fit.damper, fit, (), (), NONE, NONE)
     assert any("4.5 times the median" in s for s in sentences)
     assert any("at a limit of their range: d" in s for s in sentences)

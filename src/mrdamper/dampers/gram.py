@@ -22,11 +22,11 @@ from mrdamper.errors import IdentificationError
 from mrdamper.functions.fitting import fit_function, require_determined
 from mrdamper.functions.forms import FORMS, ParameterFunction, features
 from mrdamper.hysteresis import Shape
-from mrdamper.hysteresis.batch import follow_alike, follow_quickly
+from mrdamper.hysteresis.batch import follow_alike
 from mrdamper.identification import Problem
-from mrdamper.models import Model
+from mrdamper.models import Model, Scale
 from mrdamper.optimizers.levenberg_marquardt import least_squares
-from mrdamper.optimizers.linear import on_one_blas_thread
+from mrdamper.optimizers.linear import on_one_blas_thread, solve_linear
 
 _LADDER = np.geomspace(2e-6, 3e-3, 41)  # yield displacements [m]; between them Gram matrices are interpolated
 _AT_ONCE = 2**17  # states held at a time
@@ -102,7 +102,7 @@ def condense(runs: Sequence[Run], model_type: type[Model]) -> Condensed:
     if not runs:
         raise IdentificationError("no runs", mend="give at least one")
     problems = [Problem.of(run, model_type) for run in runs]
-    axes = model_type.search_axes(1.0, problems[0].free)
+    axes = model_type.search_axes(Scale(1.0, 1.0), problems[0].free)
     coordinates = tuple(model_type.map_forms())
     if len(axes) > 1 or not {axis.name for axis in axes} <= set(coordinates):
         raise IdentificationError(
@@ -128,10 +128,10 @@ def _gram(problem: Problem, linear: tuple[str, ...], shape: str) -> Floats:
         table, _ = _columns(problem, linear, {})
         table = np.column_stack([table, target])
         return np.stack([table.T @ table / target.size] * _LADDER.size)
-    ends = [_columns(problem, linear, {shape: float(value)}) for value in _LADDER[[0, -1]]]
-    moving = _moving_column(problem, ends)
-    if moving is not None:
-        return _gram_of_shapes(problem, np.column_stack([ends[0][0], target]), moving, ends[0][1].shape)  # type: ignore[attr-defined]
+    table, bare = _columns(problem, linear, {shape: float(_LADDER[0])})
+    if bare.shape is not None and "yield_force" in linear:  # its column is zeta, the only one the ladder changes
+        table = np.column_stack([table, target])
+        return _gram_of_shapes(problem, table, linear.index("yield_force"), bare.shape)
     tables = [np.column_stack([_columns(problem, linear, {shape: float(v)})[0], target]) for v in _LADDER]
     return np.stack([table.T @ table / target.size for table in tables])
 
@@ -144,20 +144,6 @@ def _columns(problem: Problem, linear: tuple[str, ...], shape: Mapping[str, floa
     base = bare.force(problem.seen, state)
     columns = [problem.model_type.build({**point, name: 1.0}).force(problem.seen, state) - base for name in linear]
     return np.column_stack(columns), bare
-
-
-def _moving_column(problem: Problem, ends: Sequence[tuple[Floats, Model]]) -> int | None:
-    """Index of the one column that the ladder changes, if it is the state of a Bouc–Wen shape."""
-    (first, _), (last, _) = ends
-    moving = np.flatnonzero([not np.array_equal(a, b) for a, b in zip(first.T, last.T, strict=True)])
-    if moving.size != 1 or any(getattr(model, "shape", None) is None for _, model in ends):
-        return None
-    for value, (columns, model) in zip(_LADDER[[0, -1]], ends, strict=True):
-        shape = model.shape  # type: ignore[attr-defined]
-        expected = follow_quickly(1 / float(value), float(shape.rho), shape.n, problem.motion.path, problem.scored)
-        if not np.allclose(columns[:, moving[0]], expected, rtol=1e-9, atol=1e-12):
-            return None
-    return int(moving[0])
 
 
 def _gram_of_shapes(problem: Problem, table: Floats, moving: int, shape: Shape) -> Floats:
@@ -292,24 +278,9 @@ class _Design:
         factor = np.linalg.cholesky(scaled + _RIDGE * np.eye(gram.shape[1])).transpose(0, 2, 1) * size[:, None, :]
         table = factor @ self.matrix
         weighted = (weights[:, None, None] * table).reshape(-1, table.shape[2])
-        norm = np.linalg.norm(weighted[:, :-1], axis=0)
-        norm[norm == 0] = 1.0
-        solution = _least_squares(weighted[:, :-1] / norm, weighted[:, -1]) / norm
+        solution = solve_linear(weighted[:, :-1], weighted[:, -1], rank_limit=1e-10)
         error = table[:, :, :-1] @ solution - table[:, :, -1]
         return _Solution(solution, (weights[:, None] * error).ravel(), np.sqrt(np.sum(error**2, axis=1)))
-
-
-def _least_squares(columns: Floats, right: Floats) -> Floats:
-    normal = columns.T @ columns
-    try:
-        pivots = np.diag(np.linalg.cholesky(normal))
-    except np.linalg.LinAlgError:
-        pivots = np.zeros(1)
-    if pivots.min(initial=1.0) > 1e-4 * pivots.max(initial=0.0):
-        # Normal equations, and once more for what they left: as good as a factorisation of all rows.
-        solution = np.linalg.solve(normal, columns.T @ right)
-        return np.asarray(solution + np.linalg.solve(normal, columns.T @ (right - columns @ solution)), dtype=float)
-    return np.asarray(np.linalg.lstsq(columns, right, rcond=1e-10)[0], dtype=float)
 
 
 def _reweighted(design: _Design, gram: Floats, reweightings: int) -> _Solution:

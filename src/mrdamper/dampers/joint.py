@@ -21,11 +21,12 @@ from mrdamper.dampers.base import Damper, Envelope
 from mrdamper.dampers.coil import Coil
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, RunError
-from mrdamper.identification.columns import bounded_linear, bounds_of, linear_table
-from mrdamper.models import Model, SearchAxis, model_type
+from mrdamper.identification.columns import bounds_of, linear_table
+from mrdamper.models import Model, Scale, SearchAxis, model_type
 from mrdamper.motion import Excitation, equivalent_sine, measured_motion
+from mrdamper.optimizers.ending import Ending
 from mrdamper.optimizers.levenberg_marquardt import least_squares
-from mrdamper.optimizers.linear import on_one_blas_thread
+from mrdamper.optimizers.linear import on_one_blas_thread, solve_bounded, solve_linear
 from mrdamper.simulation import Response, simulate, steady_loop
 
 _ROWS = 400  # samples of a run that enter the least squares; its motion is followed in full
@@ -91,7 +92,7 @@ class JointFit:
     at_bounds : tuple of str
     point : (D,) array
         Where the search ended, on its axes.
-    message : str
+    ending : Ending
     evaluations : int
     seconds : float
     """
@@ -100,7 +101,7 @@ class JointFit:
     nrmse_pp: Floats
     at_bounds: tuple[str, ...]
     point: Floats
-    message: str
+    ending: Ending
     evaluations: int
     seconds: float
 
@@ -138,7 +139,7 @@ class JointProblem:
         infos = self.model_type.parameters()
         self.free = tuple(info.name for info in infos if info.name not in self.fixed)
         self.linear = [info for info in infos if info.linear and info.name in self.free]
-        self.axes: tuple[SearchAxis, ...] = self.model_type.search_axes(1e-2, self.free)
+        self.axes: tuple[SearchAxis, ...] = self.model_type.search_axes(Scale(1e-2, 0.1), self.free)
         self.parts = [_Part.of(run) for run in runs]
 
     @property
@@ -164,11 +165,11 @@ class JointProblem:
         table = _Table(self, self.parts if rows is None else [self.parts[i] for i in rows])
         lower, upper = self._box()
         point = self.start if start is None else start
-        evaluations, message = 0, "solved: every parameter is linear"
+        evaluations, ending = 0, Ending.SOLVED
         for _ in range(rounds):
             if self.axes:
                 found = least_squares(lambda u: table.solve(u).residual, point, lower, upper, most_steps, _SETTLED)
-                point, message = found.point, found.message
+                point, ending = found.point, found.ending
                 evaluations += found.evaluations
             table.weights = 1.0 / np.sqrt(np.maximum(table.solve(point).nrmse_pp, _BEST))
         solved = table.solve(point)
@@ -178,7 +179,7 @@ class JointProblem:
             solved.nrmse_pp,
             (*at_bounds, *solved.held),
             point,
-            message,
+            ending,
             evaluations,
             time.perf_counter() - begin,
         )
@@ -199,7 +200,7 @@ class JointProblem:
         """
         residual, jacobian, owner = self._linearised(fit)
         kept = np.isin(owner, list(rows))
-        step = np.linalg.lstsq(jacobian[kept], -residual[kept], rcond=1e-12)[0]
+        step = solve_linear(jacobian[kept], -residual[kept], rank_limit=1e-12)
         lower, upper = self._box()
         table = _Table(self, [self.parts[i] for i in rows])
         table.weights = 1.0 / np.sqrt(np.maximum(fit.nrmse_pp[list(rows)], _BEST))
@@ -288,7 +289,7 @@ class _Table:
         base, columns = linear_table(bare, linear, self.seen, bare.state(self.motion)[self.picked])
         factor = (self.weights / self.size)[self.owner]
         columns, right = columns * factor[:, None], (self.target - base) * factor
-        solution, held = bounded_linear(columns, right, *bounds_of(linear))
+        solution, held = solve_bounded(columns, right, *bounds_of(linear))
         residual = columns @ solution - right
         errors = np.sqrt(np.bincount(self.owner, residual**2)) / self.weights
         model = replace(bare, **{i.name: float(s) for i, s in zip(linear, solution, strict=True)})

@@ -13,6 +13,7 @@ from mrdamper.data import Condition, Floats
 from mrdamper.errors import IdentificationError
 from mrdamper.functions.forms import Form, ParameterFunction, features, form_named
 from mrdamper.optimizers.levenberg_marquardt import least_squares
+from mrdamper.optimizers.linear import solve_linear
 
 _RANK_LIMIT = 1e-7  # singular values below this share of the largest: the tests cannot tell the terms apart
 
@@ -76,7 +77,7 @@ def fit_function(
     columns = chosen.columns(I, f, A, rates)
     if not _determined(columns):
         raise _undetermined(chosen, "they do not tell its terms apart", I, f, A)
-    coefficients = _solve(columns * weight[:, None], target * weight)
+    coefficients = solve_linear(columns * weight[:, None], target * weight)
     cost = float(np.sum((columns @ coefficients - target) ** 2))
     spread = float(np.sum((target - target.mean()) ** 2))
     function = ParameterFunction(chosen.name, tuple(coefficients.tolist()), tuple(float(r) for r in rates), log)
@@ -160,7 +161,7 @@ def _best_rates(
 
     def residual(u: Floats) -> Floats:
         columns = form.columns(I, f, A, tuple(np.exp(u))) * weight[:, None]
-        return columns @ _solve(columns, target * weight) - target * weight
+        return columns @ solve_linear(columns, target * weight) - target * weight
 
     grid = [np.array(u) for u in product(*(np.linspace(low, high, 6) for low, high in bounds))]
     grid.sort(key=lambda u: float(np.sum(residual(u) ** 2)))
@@ -189,12 +190,6 @@ def _weights(uncertainty: ArrayLike | None, target: Floats) -> Floats:
         return np.ones(target.size)
     floor = float(np.quantile(known, 0.25)) or 1.0
     return floor / np.maximum(np.where(np.isfinite(errors), errors, known.max()), floor)
-
-
-def _solve(columns: Floats, target: Floats) -> Floats:
-    scale = np.linalg.norm(columns, axis=0)
-    scale[scale == 0] = 1.0
-    return np.linalg.lstsq(columns / scale, target, rcond=None)[0] / scale
 
 
 def _determined(columns: Floats) -> bool:

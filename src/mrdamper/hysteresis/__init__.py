@@ -23,7 +23,7 @@ random vibration of hysteretic systems", J. Eng. Mech. Div. 102; Ikhouane and Ro
 """
 
 from mrdamper.hysteresis.response import follow, step, stroke
-from mrdamper.hysteresis.shape import Shape, boundedness_class, dissipates, z_max
+from mrdamper.hysteresis.shape import Shape, dissipates, z_max
 from mrdamper.hysteresis.steady import (
     loop_area,
     loop_harmonics,
@@ -34,7 +34,6 @@ from mrdamper.hysteresis.steady import (
 
 __all__ = [
     "Shape",
-    "boundedness_class",
     "dissipates",
     "follow",
     "loop_area",

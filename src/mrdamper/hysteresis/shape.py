@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal, Self
+from typing import Self
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from mrdamper.errors import ParameterError
 from mrdamper.hysteresis.master_curve import STEEPEST
 
 HIGHEST_N = 20.0  # the tabulated curves hold 1e-8 up to here (for rho >= −30)
-BoundednessClass = Literal["I", "II", "III", "IV", "V", "unstable"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,8 +26,7 @@ class Shape:
     rho : float or (P,) array
         (gamma − beta)/(gamma + beta) [-], at most 1. 0: beta = gamma; −1: gamma = 0; 1: beta = 0, an
         elastic spring, which forgets where it is once zeta rounds to 1. Above 0, gamma > beta: still
-        dissipating, but bounded only for states that start within rho^(−1/n), see
-        `boundedness_class`.
+        dissipating, but bounded only for states that start within rho^(−1/n).
     n : float
         Sharpness of the yield [-], from 1 to 20.
 
@@ -117,27 +115,7 @@ def dissipates(beta: float | Floats, gamma: float | Floats) -> np.bool | np.ndar
     """Whether no motion gets energy out of the model, for A > 0: beta >= 0 and beta + gamma > 0.
 
     The condition usually quoted, beta >= |gamma|, is sufficient only. Derived, with the storage
-    ∫ y/(A − gamma y^n) dy. gamma > beta deserves a warning all the same: see class II of `boundedness_class`.
+    ∫ y/(A − gamma y^n) dy. With gamma > beta the
+    state is bounded only from |z| <= (A/(gamma − beta))^(1/n) [Ikhouane and Rodellar 2007, recalled].
     """
     return np.logical_and(np.greater_equal(beta, 0), np.greater(np.add(beta, gamma), 0))
-
-
-def boundedness_class(A: float, beta: float, gamma: float) -> BoundednessClass:
-    """Class of bounded input, bounded state. n has no influence.
-
-    I: bounded from any start. II: from |z| <= (A/(gamma − beta))^(1/n). III: from any start,
-    A < 0. IV: from |z| <= z_max, A < 0. V: A = 0, |z| never grows. Otherwise "unstable".
-    [Ikhouane and Rodellar 2007, recalled and derived again]
-    """
-    total, difference = beta + gamma, beta - gamma
-    if A > 0 and total > 0 and difference >= 0:
-        return "I"
-    if A > 0 and total > 0 and beta >= 0:
-        return "II"
-    if A < 0 and difference > 0 and total >= 0:
-        return "III"
-    if A < 0 and total < 0 and beta >= 0:
-        return "IV"
-    if A == 0 and total > 0 and difference >= 0:
-        return "V"
-    return "unstable"

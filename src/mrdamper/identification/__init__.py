@@ -110,7 +110,7 @@ def conclude(problem: Problem, method: Method, solution: Solution) -> Identifica
         start=solution.start,
         end=solution.end,
         evaluations=solution.evaluations,
-        message=solution.message,
+        ending=solution.ending,
         seed=solution.seed,
         notes=(*_notes(problem), *solution.notes),
         residual=residual,

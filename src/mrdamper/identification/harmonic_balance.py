@@ -20,6 +20,7 @@ from mrdamper.errors import ExcitationError, IdentificationError
 from mrdamper.hysteresis import Shape, loop_harmonics
 from mrdamper.motion import SINE_DISTORTION_LIMIT, Excitation, analyse_motion
 from mrdamper.motion.harmonics import fit_harmonics
+from mrdamper.optimizers.linear import solve_linear
 
 AmplitudeReading = Literal["first-harmonic", "half-peak-to-peak", "maximum"]
 PhaseReading = Literal["harmonic", "peaks"]
@@ -238,9 +239,7 @@ def separate_mass(
                 mend=f"add runs at another {name}, or give the gas spring",
             )
     columns = [np.ones_like(X), -(omega**2)] + ([0.75 * X**2] if with_cubic else [])
-    matrix = np.column_stack(columns)
-    scale = np.linalg.norm(matrix, axis=0)
-    found = np.linalg.lstsq(matrix / scale, np.asarray(in_phase, dtype=float), rcond=None)[0] / scale
+    found = solve_linear(np.column_stack(columns), np.asarray(in_phase, dtype=float))
     return StiffnessAndMass(float(found[0]), float(found[2]) if with_cubic else 0.0, float(found[1]))
 
 

@@ -17,6 +17,7 @@ from mrdamper.gas_spring import GasSpring
 from mrdamper.metrics import Scores
 from mrdamper.models import Model
 from mrdamper.motion import Excitation, MotionAnalysis, analyse_motion, measured_motion
+from mrdamper.optimizers.ending import Ending
 
 DELAY = "delay"  # name of the search coordinate
 DELAY_LIMIT = 3e-3  # a free delay between the channels runs away beyond this [s]
@@ -141,7 +142,7 @@ class Solution:
     start, end : mapping
         Search coordinates.
     evaluations : int
-    message : str
+    ending : Ending
     seed : int or None
     notes : tuple of str
     """
@@ -152,7 +153,7 @@ class Solution:
     start: Mapping[str, float]
     end: Mapping[str, float]
     evaluations: int
-    message: str
+    ending: Ending
     seed: int | None = None
     notes: tuple[str, ...] = ()
 
@@ -196,8 +197,8 @@ class Identification:
         Search coordinates the refinement began and ended at.
     evaluations : int
         Forces computed.
-    message : str
-        Why the search stopped.
+    ending : Ending
+        Why the search ended.
     seed : int or None
         Of the random search, where one was used.
     notes : tuple of str
@@ -220,7 +221,7 @@ class Identification:
     start: Mapping[str, float]
     end: Mapping[str, float]
     evaluations: int
-    message: str
+    ending: Ending
     seed: int | None
     notes: tuple[str, ...]
     residual: Floats = field(repr=False)

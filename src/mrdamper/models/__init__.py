@@ -6,12 +6,12 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from mrdamper.discovery import named, subclasses_in
-from mrdamper.models.base import Model, SearchAxis
+from mrdamper.models.base import Model, Scale, SearchAxis
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-__all__ = ["Model", "SearchAxis", "all_models", "model_type"]
+__all__ = ["Model", "Scale", "SearchAxis", "all_models", "model_type"]
 
 
 @cache

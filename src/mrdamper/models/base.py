@@ -19,6 +19,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import ParameterError
+from mrdamper.hysteresis import Shape
 from mrdamper.motion import Excitation
 from mrdamper.parameters import ParameterInfo, parameters_of
 
@@ -77,6 +78,34 @@ class SearchAxis:
         return min(coordinate - low, high - coordinate) < 1e-3 * (high - low)
 
 
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """Sizes of the data that a search is laid out for.
+
+    Attributes
+    ----------
+    amplitude : float
+        Displacement amplitude [m].
+    speed : float
+        Peak velocity [m/s].
+    force : float
+        Largest force, either way from the middle [N].
+    current : float
+        Largest current [A]; 0 where none flowed.
+    """
+
+    amplitude: float
+    speed: float
+    force: float = 1.0
+    current: float = 0.0
+
+    @classmethod
+    def of(cls, motion: Excitation, force: Floats, amplitude: float) -> Self:
+        """Read the sizes off a motion and the force measured along it."""
+        speed, current = (float(np.max(np.abs(channel))) for channel in (motion.velocity, motion.current))
+        return cls(amplitude, speed, float(np.ptp(force)) / 2, current)
+
+
 @dataclass(frozen=True)
 class Model(ABC):
     """A damper model. Subclasses are final: vary one with `dataclasses.replace`."""
@@ -86,6 +115,8 @@ class Model(ABC):
     equation: ClassVar[str]
     source: ClassVar[str]
     integrated: ClassVar[bool] = False  # the state is stepped: following a motion costs a hundred times more
+    # Linear parameter whose column the state is, where the search moves no other column; None: no such one.
+    state_column: ClassVar[str | None] = None
 
     def __post_init__(self) -> None:
         for info in self.parameters():
@@ -107,6 +138,15 @@ class Model(ABC):
         return np.zeros(len(motion))
 
     @property
+    def shape(self) -> Shape | None:
+        """Bouc–Wen shape whose zeta/kappa the state is; None: the memory is another, or there is none.
+
+        A model that has one is also built from `yield_force` [N], the size of zeta, in place of its
+        state column's parameter.
+        """
+        return None
+
+    @property
     def knee(self) -> float | None:
         """Motion after a reversal in which the force turns over [m]; None without such a length."""
         return None
@@ -117,34 +157,17 @@ class Model(ABC):
         return parameters_of(cls)
 
     @classmethod
-    def search_axes(cls, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-        """Coordinates in which the free nonlinear parameters are searched.
+    def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
+        """Coordinates in which the free nonlinear parameters are searched, with their starts.
 
         Parameters
         ----------
-        amplitude : float
-            Displacement amplitude of the data [m], for scale.
+        scale : Scale
+            Sizes of the data, which lay the box and the starts.
         free : sequence of str
             Names of the parameters to be determined.
         """
         return ()
-
-    @classmethod
-    def guess(cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-        """Search coordinates with start values read off the data.
-
-        Parameters
-        ----------
-        motion : Excitation
-            Smooth measured motion about mid-stroke.
-        force : (N,) array
-            Measured force there [N].
-        amplitude : float
-            Displacement amplitude [m].
-        free : sequence of str
-            Names of the parameters to be determined.
-        """
-        return cls.search_axes(amplitude, free)
 
     @classmethod
     def within(cls, axes: tuple[SearchAxis, ...], fixed: Mapping[str, float]) -> tuple[SearchAxis, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import ParameterError
-from mrdamper.models.base import Model, SearchAxis
+from mrdamper.models.base import Model, Scale, SearchAxis
 from mrdamper.motion import Excitation
 from mrdamper.parameters import param
 
@@ -36,6 +36,7 @@ class Biviscous(Model):
         r"F = c_{po} v + f_y\,\mathrm{clip}\!\left(\frac{v - v_h\,\mathrm{sgn}\,a}{v_y}, -1, 1\right) + f_0"
     )
     source: ClassVar[str] = "Wereley, Pang and Kamath 1998"
+    state_column: ClassVar[str | None] = "fy"
 
     cpo: float = param("N s/m", "post-yield viscous damping", bounds=(0, np.inf), linear=True)
     fy: float = param("N", "yield force", bounds=(0, np.inf), linear=True)
@@ -89,14 +90,9 @@ class Biviscous(Model):
         return self.cpo * motion.velocity + self.fy * state + self.f0
 
     @classmethod
-    def search_axes(cls, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-        """Both widths for a motion of 1 Hz; `guess` knows the velocity."""
-        return _axes(2 * np.pi * amplitude, free)
-
-    @classmethod
-    def guess(cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
+    def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """Both widths lie below the peak velocity."""
-        return _axes(float(np.max(np.abs(motion.velocity))), free)
+        return _axes(scale.speed, free)
 
 
 def _axes(speed: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import IdentificationError
 from mrdamper.hysteresis import Shape, follow
-from mrdamper.models.base import GENERAL_FORMS, Model, SearchAxis
+from mrdamper.models.base import GENERAL_FORMS, Model, Scale, SearchAxis
 from mrdamper.motion import Excitation
 from mrdamper.parameters import param
 from mrdamper.tracing import plain
@@ -39,6 +39,7 @@ class BoucWen(Model):
         r"\dot z = v - \beta |v| |z|^{n-1} z - \gamma v |z|^n"
     )
     source: ClassVar[str] = "Wen 1976; Qian et al. 2024, Eq. 8"
+    state_column: ClassVar[str | None] = "alpha"
 
     c: float = param("N s/m", "post-yield viscous damping", bounds=(0, np.inf), linear=True)
     alpha: float = param("N/m", "hysteretic stiffness", bounds=(0, np.inf), linear=True)
@@ -76,8 +77,9 @@ class BoucWen(Model):
         return spring + self.c * v + self.m * a + self.alpha * state + self.f0
 
     @classmethod
-    def search_axes(cls, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
+    def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """Yield displacement (log), asymmetry (gamma − beta)/(gamma + beta) and n: nearly orthogonal."""
+        amplitude = scale.amplitude
         ladder = tuple(amplitude * np.geomspace(1e-4, 2.0, 14))
         axes = []
         if "beta" in free or "gamma" in free:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.hysteresis import Shape, follow
-from mrdamper.models.base import GENERAL_FORMS, Model, SearchAxis
+from mrdamper.models.base import GENERAL_FORMS, Model, Scale, SearchAxis
 from mrdamper.motion import Excitation
 from mrdamper.parameters import param
 
@@ -33,6 +33,7 @@ class Dahl(Model):
     title: ClassVar[str] = "viscous and Dahl"
     equation: ClassVar[str] = r"F = \kappa_x v + \kappa_w w + f_0,\quad \dot w = (v - |v|\,w)/x_y"
     source: ClassVar[str] = "Dahl 1968; Ikhouane and Rodellar 2007"
+    state_column: ClassVar[str | None] = "kappa_w"
 
     kappa_x: float = param("N s/m", "post-yield viscous damping", bounds=(0, np.inf), linear=True)
     kappa_w: float = param("N", "yield force", bounds=(0, np.inf), linear=True)
@@ -54,8 +55,9 @@ class Dahl(Model):
         return self.kappa_x * motion.velocity + self.kappa_w * state + self.f0
 
     @classmethod
-    def search_axes(cls, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
+    def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """The displacement in which the friction builds up."""
+        amplitude = scale.amplitude
         ladder = tuple(amplitude * np.geomspace(1e-4, 2.0, 14))
         axis = SearchAxis("yield_displacement", amplitude * 1e-5, amplitude * 10, ladder, log=True)
         return (axis,) if axis.name in free else ()

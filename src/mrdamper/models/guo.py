@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.models.base import Model, SearchAxis
+from mrdamper.models.base import Model, Scale, SearchAxis
 from mrdamper.models.sides import side
 from mrdamper.motion import Excitation
 from mrdamper.parameters import param
@@ -34,6 +34,7 @@ class Guo(Model):
     title: ClassVar[str] = "algebraic (arctangent)"
     equation: ClassVar[str] = r"F = \tfrac{2}{\pi} f_y \arctan[\kappa (v + v_0\,\mathrm{sgn}\,x)] + c\,v + k\,x + f_0"
     source: ClassVar[str] = "Guo, Yang and Pan 2006"
+    state_column: ClassVar[str | None] = "fy"
 
     fy: float = param("N", "yield force", bounds=(0, np.inf), linear=True)
     c: float = param("N s/m", "post-yield viscous damping", bounds=(0, np.inf), linear=True)
@@ -54,14 +55,9 @@ class Guo(Model):
         return self.fy * state + self.c * motion.velocity + self.k * motion.displacement + self.f0
 
     @classmethod
-    def search_axes(cls, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-        """Steepness and shift for a motion of 1 Hz; `guess` knows the velocity."""
-        return _axes(2 * np.pi * amplitude, amplitude, free)
-
-    @classmethod
-    def guess(cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
+    def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """The curve yields somewhere between a thousandth and all of the peak velocity."""
-        return _axes(float(np.max(np.abs(motion.velocity))), amplitude, free)
+        return _axes(scale.speed, scale.amplitude, free)
 
 
 def _axes(speed: float, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import ParameterError
-from mrdamper.models.base import Model, SearchAxis
+from mrdamper.models.base import Model, Scale, SearchAxis
 from mrdamper.motion import Excitation
 from mrdamper.parameters import param
 from mrdamper.tracing import Tape, choose, streamed
@@ -46,6 +46,7 @@ class HerschelBulkley(Model):
         r" (1-T)^{1+1/m} \left(1 + \frac{m}{m+1} T\right)"
     )
     source: ClassVar[str] = "Herschel and Bulkley 1926, slot flow derived"
+    state_column: ClassVar[str | None] = "fy"
 
     fy: float = param("N", "yield force", bounds=(0, np.inf), linear=True)
     vc: float = param("m/s", "velocity scale of the viscous stress", bounds=(1e-9, 1e6), scale="log")
@@ -95,14 +96,9 @@ class HerschelBulkley(Model):
         return self.fy * state + self.c * motion.velocity + self.f0
 
     @classmethod
-    def search_axes(cls, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-        """v_c and m for a motion of 1 Hz; `guess` knows the velocity."""
-        return _axes(2 * np.pi * amplitude, free)
-
-    @classmethod
-    def guess(cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
+    def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """v_c from a hundredth of the peak velocity (viscous) to a hundred times it (all yield)."""
-        return _axes(float(np.max(np.abs(motion.velocity))), free)
+        return _axes(scale.speed, free)
 
 
 def flow_step(tape: Tape, speed: Any, m: Any) -> Any:

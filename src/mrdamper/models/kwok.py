@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.models.base import Model, SearchAxis
+from mrdamper.models.base import Model, Scale, SearchAxis
 from mrdamper.models.sides import side
 from mrdamper.motion import Excitation
 from mrdamper.parameters import param
@@ -34,6 +34,7 @@ class Kwok(Model):
     title: ClassVar[str] = "hyperbolic tangent"
     equation: ClassVar[str] = r"F = c\,v + k\,x + \alpha \tanh(\beta v + \delta\,\mathrm{sgn}\,x) + f_0"
     source: ClassVar[str] = "Kwok et al. 2006"
+    state_column: ClassVar[str | None] = "alpha"
 
     c: float = param("N s/m", "post-yield viscous damping", bounds=(0, np.inf), linear=True)
     k: float = param("N/m", "stiffness", linear=True)
@@ -53,14 +54,9 @@ class Kwok(Model):
         return self.c * motion.velocity + self.k * motion.displacement + self.alpha * state + self.f0
 
     @classmethod
-    def search_axes(cls, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-        """Beta and delta for a motion of 1 Hz; `guess` knows the velocity."""
-        return _axes(2 * np.pi * amplitude, amplitude, free)
-
-    @classmethod
-    def guess(cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
+    def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """The curve yields somewhere between a thousandth and all of the peak velocity."""
-        return _axes(float(np.max(np.abs(motion.velocity))), amplitude, free)
+        return _axes(scale.speed, scale.amplitude, free)
 
 
 def _axes(speed: float, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:

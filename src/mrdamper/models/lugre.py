@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.integrator import integrate
-from mrdamper.models.base import Model, SearchAxis
+from mrdamper.models.base import Model, Scale, SearchAxis
 from mrdamper.motion import Excitation
 from mrdamper.parameters import param
 
@@ -85,14 +85,9 @@ class LuGre(Model):
         return self.fc * state + self.sigma1 * bristles + self.sigma2 * v + self.f0
 
     @classmethod
-    def search_axes(cls, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-        """Deflection, onset force and Stribeck velocity for a motion of 1 Hz; `guess` knows the velocity."""
-        return _axes(amplitude, 2 * np.pi * amplitude, free)
-
-    @classmethod
-    def guess(cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
+    def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """The onset force fades well below the peak velocity."""
-        return _axes(amplitude, float(np.max(np.abs(motion.velocity))), free)
+        return _axes(scale.amplitude, scale.speed, free)
 
 
 def bristle_rate(x: float, v: float, current: float, state: Floats, p: Floats, out: Floats) -> None:

@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.models.base import Model, SearchAxis
+from mrdamper.models.base import Model, Scale, SearchAxis
 from mrdamper.motion import Excitation, Path
 from mrdamper.motion.lag import first_order_lag
 from mrdamper.parameters import param
@@ -96,7 +96,7 @@ class PlayBypass(Model):
         return self.f0 + self.k * x * (1 - state) + viscous + yielded + self.m * a
 
     @classmethod
-    def search_axes(cls, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
+    def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """Each nonlinear parameter on its own scale, from one start that both bundled rigs share."""
         starts = {
             "fy0": (1.0, 1e4, 100.0),

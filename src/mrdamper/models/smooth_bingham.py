@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.models.base import Model, SearchAxis
+from mrdamper.models.base import Model, Scale, SearchAxis
 from mrdamper.motion import Excitation
 from mrdamper.parameters import param
 
@@ -28,6 +28,7 @@ class SmoothBingham(Model):
     title: ClassVar[str] = "smoothed Bingham"
     equation: ClassVar[str] = r"F = c\,v + f_y \tanh(v/v_s) + f_0"
     source: ClassVar[str] = "Stanway, Sproston and Stevens 1987, smoothed"
+    state_column: ClassVar[str | None] = "fy"
 
     c: float = param("N s/m", "post-yield viscous damping", bounds=(0, np.inf), linear=True)
     fy: float = param("N", "yield force", bounds=(0, np.inf), linear=True)
@@ -42,14 +43,9 @@ class SmoothBingham(Model):
         return self.c * motion.velocity + self.fy * state + self.f0
 
     @classmethod
-    def search_axes(cls, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-        """v_s for a motion of 1 Hz; `guess` knows the velocity."""
-        return _axes(2 * np.pi * amplitude, free)
-
-    @classmethod
-    def guess(cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
+    def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """The yield force builds up between a thousandth and all of the peak velocity."""
-        return _axes(float(np.max(np.abs(motion.velocity))), free)
+        return _axes(scale.speed, free)
 
 
 def _axes(speed: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import ParameterError
 from mrdamper.integrator import integrate
-from mrdamper.models.base import GENERAL_FORMS, Model, SearchAxis
+from mrdamper.models.base import GENERAL_FORMS, Model, Scale, SearchAxis
 from mrdamper.motion import Excitation
 from mrdamper.parameters import param
 
@@ -160,14 +160,9 @@ class Spencer(Model):
         return self.c1 * (v - slip) + self.k1 * motion.displacement + self.f0
 
     @classmethod
-    def search_axes(cls, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-        """The four ratios for a motion of 1 Hz; `guess` knows the velocity."""
-        return _axes(amplitude, 2 * np.pi * amplitude, free)
-
-    @classmethod
-    def guess(cls, motion: Excitation, force: Floats, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
+    def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """The series damper creeps at a hundredth to all of the peak velocity."""
-        return _axes(amplitude, float(np.max(np.abs(motion.velocity))), free)
+        return _axes(scale.amplitude, scale.speed, free)
 
     @classmethod
     def map_forms(cls) -> Mapping[str, tuple[str, ...]]:

@@ -2,7 +2,7 @@
 
 from mrdamper.motion.excitation import Excitation
 from mrdamper.motion.made import random_motion, sine, sweep, triangle
-from mrdamper.motion.measured import measured_motion, motion_from_samples, smooth
+from mrdamper.motion.measured import measured_motion, smooth
 from mrdamper.motion.path import Path
 from mrdamper.motion.sines import (
     SINE_DISTORTION_LIMIT,
@@ -22,7 +22,6 @@ __all__ = [
     "analyse_motion",
     "equivalent_sine",
     "measured_motion",
-    "motion_from_samples",
     "random_motion",
     "running_sine",
     "sine",

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mrdamper.data import Floats
+from mrdamper.optimizers.linear import solve_linear
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +79,7 @@ def fit_harmonics(time: Floats, signal: Floats, orders: int, *, frequency: float
     origin = float(time[0])
     nyquist = 0.5 / float(np.median(np.diff(time)))
     orders = int(np.clip(nyquist / frequency, 1, orders))
-    coefficients = _solve(_columns(time - origin, frequency, orders, drift), signal)
+    coefficients = solve_linear(_columns(time - origin, frequency, orders, drift), signal)
     lead = 2 if drift else 1
     return HarmonicSeries(
         frequency=frequency,
@@ -106,10 +107,10 @@ def fundamental_frequency(time: Floats, signal: Floats, orders: int = 3) -> floa
     orders = orders if guess * t[-1] >= 3 else 1
     frequency = float(guess)
     columns = _columns(t, frequency, orders, drift=True)
-    coefficients = _solve(columns, signal)
+    coefficients = solve_linear(columns, signal)
     for _ in range(30):
         slope = _frequency_derivative(t, columns, coefficients, orders)
-        found = _solve(np.column_stack([columns, slope]), signal)
+        found = solve_linear(np.column_stack([columns, slope]), signal)
         coefficients, step = found[:-1], float(found[-1])
         frequency += float(np.clip(step, -0.1 * frequency, 0.1 * frequency))
         if abs(step) < 1e-11 * frequency:
@@ -172,20 +173,3 @@ def _frequency_derivative(t: Floats, columns: Floats, coefficients: Floats, orde
     k = np.arange(1, orders + 1)
     sine, cosine = np.reshape(coefficients[2:], (2, orders))
     return 2 * np.pi * t * (columns[:, 2 + orders :] @ (k * sine) - columns[:, 2 : 2 + orders] @ (k * cosine))
-
-
-def _solve(columns: Floats, signal: Floats) -> Floats:
-    scale = np.sqrt(np.einsum("nk,nk->k", columns, columns))
-    scale[scale == 0] = 1.0
-    scaled = columns / scale
-    normal = scaled.T @ scaled
-    try:
-        pivots = np.diag(np.linalg.cholesky(normal))
-    except np.linalg.LinAlgError:
-        pivots = np.zeros(1)
-    if pivots.min() > 1e-4:
-        # Normal equations, then once more for what they left: as good as a factorisation of N rows.
-        found = np.linalg.solve(normal, signal @ scaled)
-        found += np.linalg.solve(normal, (signal - scaled @ found) @ scaled)
-        return found / scale
-    return np.linalg.lstsq(scaled, signal, rcond=None)[0] / scale

@@ -6,7 +6,6 @@ Everything is computed from the motion that was measured, never from the one tha
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from mrdamper.data import Floats, Run, once_per_run
 from mrdamper.motion.excitation import Excitation
@@ -26,18 +25,6 @@ def measured_motion(run: Run) -> Excitation:
     parts = [smooth(run.time[a:b], run.displacement[a:b]) for a, b in run.segments]
     x, v, a = (np.concatenate(p) for p in zip(*parts, strict=True))
     return Excitation(run.time, x, v, a, run.coil_current)
-
-
-def motion_from_samples(time: ArrayLike, displacement: ArrayLike, current: ArrayLike = 0.0) -> Excitation:
-    """Motion from time [s], displacement [m] and current [A]; velocity is derived.
-
-    Raises
-    ------
-    InputError
-        If the arrays do not make a run (lengths, order of time, finite values).
-    """
-    time = np.asarray(time, dtype=float)
-    return measured_motion(Run("motion", time, displacement, np.zeros(time.size), current))  # type: ignore[arg-type]
 
 
 def smooth(time: Floats, signal: Floats, span: float | None = None) -> tuple[Floats, Floats, Floats]:

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from mrdamper.data import Floats
 from mrdamper.errors import MissingExtraError, ParameterError
+from mrdamper.optimizers.ending import Ending
 from mrdamper.optimizers.generation import GeneticSettings
 
 Cost = Callable[[Floats], Floats]
@@ -36,7 +37,7 @@ class GeneticMinimum:
         Lowest cost after every generation, over all boxes.
     boxes : tuple of (lower, upper)
         Searched one after the other, (D,) arrays.
-    message : str
+    ending : Ending
     """
 
     point: Floats
@@ -44,7 +45,7 @@ class GeneticMinimum:
     evaluations: int
     history: Floats
     boxes: tuple[tuple[Floats, Floats], ...]
-    message: str
+    ending: Ending
 
 
 def genetic(
@@ -99,8 +100,9 @@ def genetic(
         centre = np.clip(best, outer[0] + half, outer[1] - half)
         low, high = centre - half, centre + half
     total = chosen.population * chosen.generations * len(boxes)
-    message = f"ended after {chosen.generations} generations in each of {len(boxes)} boxes"
-    return GeneticMinimum(best, float(best_cost), total, np.concatenate(history), tuple(boxes), message)
+    return GeneticMinimum(
+        best, float(best_cost), total, np.concatenate(history), tuple(boxes), Ending.GENERATIONS_SPENT
+    )
 
 
 def _generations() -> Callable[[Cost, Floats, Floats, GeneticSettings, int], tuple[Floats, float, Floats]]:

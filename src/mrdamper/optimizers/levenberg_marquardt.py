@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.data import Floats
+from mrdamper.optimizers.ending import Ending
 
 _STEP = 1e-6  # forward difference, relative to the width of the box
 _STIFFEST = 1e12  # damping at which no step is left to try
@@ -30,15 +31,14 @@ class Minimum:
     cost : float
         Sum of squared residuals.
     evaluations : int
-    message : str
-        Why it stopped.
+    ending : Ending
     """
 
     point: Floats
     residual: Floats
     cost: float
     evaluations: int
-    message: str
+    ending: Ending
 
 
 def least_squares(
@@ -72,7 +72,7 @@ def least_squares(
     r = residual(point)
     cost, evaluations, damping = float(r @ r), 1, 1e-3
     extra = before = None
-    message = f"stopped after {most_steps} steps; the cost was still falling: start nearer or raise most_steps"
+    ending = Ending.STEPS_SPENT
     for _ in range(most_steps):
         jacobian = _forward_differences(residual, point, r, upper, width)
         evaluations += point.size
@@ -81,7 +81,7 @@ def least_squares(
             extra = _learnt_curvature(extra, point - before[0], gradient - before[1], jacobian)
         free = ~(((point <= lower) & (gradient > 0)) | ((point >= upper) & (gradient < 0)))
         if not free.any():
-            message = "every coordinate ended at a bound"
+            ending = Ending.AT_BOUNDS
             break
         better = None
         while better is None and damping < _STIFFEST:
@@ -96,16 +96,16 @@ def least_squares(
             else:
                 damping *= 10
         if better is None:
-            message = "converged: no step lowers the cost"
+            ending = Ending.NO_STEP
             break
         moved = float(np.max(np.abs(better[0] - point) / width))
         before, costlier = (point, gradient), cost
         point, r = better
         cost = float(r @ r)
         if costlier - cost <= tolerance * cost or moved < tolerance:
-            message = "converged: the cost changes no more"
+            ending = Ending.SETTLED
             break
-    return Minimum(point, r, cost, evaluations, message)
+    return Minimum(point, r, cost, evaluations, ending)
 
 
 def _forward_differences(

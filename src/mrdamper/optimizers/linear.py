@@ -1,18 +1,138 @@
-"""One thread for the linear algebra: the same bits whatever the machine offers.
+"""Linear least squares: equilibrated, bounded, or beside columns that are factored once.
 
-Matrices here are small, so threads of the linear algebra gain nothing, wait for each other on a
-busy machine, and add up sums in another order, which changes the last bits of a result.
+Many rows and few columns, whose sizes may differ by ten powers of ten. Matrices here are small, so
+threads of the linear algebra gain nothing, wait for each other on a busy machine, and add up sums
+in another order, which changes the last bits of a result: everything runs on one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache, wraps
-from typing import Any, ParamSpec, TypeVar
+from dataclasses import dataclass
+from functools import cache, cached_property, wraps
+from typing import Any, ParamSpec, Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mrdamper.data import Floats
+
+_WELL_APART = 1e-4  # smallest pivot of equilibrated columns at which the normal equations keep their digits
+_DEPENDENT = 1e-5  # pivot over the largest below which a column is explained by the others
 
 P = ParamSpec("P")
 T = TypeVar("T")
+
+
+def solve_linear(columns: Floats, right: Floats, rank_limit: float | None = None) -> Floats:
+    """Coefficients of least squares; of several solutions the shortest, each column counted by its size.
+
+    Parameters
+    ----------
+    columns : (N, L) array
+    right : (N,) array
+    rank_limit : float, optional
+        Singular value over the largest below which a direction counts as undetermined.
+
+    Returns
+    -------
+    (L,) array
+    """
+    scale = np.sqrt(np.einsum("nl,nl->l", columns, columns))
+    scale[scale == 0] = 1.0
+    scaled = columns / scale
+    normal = scaled.T @ scaled
+    if _pivots(normal).min(initial=1.0) > _WELL_APART:
+        # Normal equations, then once more for what they left: as good as a factorisation of N rows.
+        found = np.linalg.solve(normal, right @ scaled)
+        return (found + np.linalg.solve(normal, (right - scaled @ found) @ scaled)) / scale
+    return np.asarray(np.linalg.lstsq(scaled, right, rcond=rank_limit)[0], dtype=float) / scale
+
+
+def solve_bounded(columns: Floats, right: Floats, lower: Floats, upper: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Least squares with bounds on the coefficients, by holding violated ones at their bound.
+
+    Parameters
+    ----------
+    columns : (N, L) array
+    right : (N,) array
+    lower, upper : (L,) arrays
+
+    Returns
+    -------
+    solution : (L,) array
+    held : (L,) boolean array
+        Coefficients that ended at a bound.
+    """
+    held = np.zeros(columns.shape[1], dtype=bool)
+    solution = np.zeros(held.size)
+    for _ in range(held.size + 1):
+        free = ~held
+        solution[free] = solve_linear(columns[:, free], right - columns[:, held] @ solution[held])
+        outside = free & ((solution < lower) | (solution > upper))
+        if not outside.any():
+            break
+        solution = np.clip(solution, lower, upper)
+        held |= outside
+    return solution, held
+
+
+def _pivots(normal: Floats) -> Floats:
+    try:
+        return np.diag(np.linalg.cholesky(normal))
+    except np.linalg.LinAlgError:
+        return np.zeros(1)
+
+
+@dataclass(frozen=True, eq=False)
+class FixedColumns:
+    """Columns that stay while one beside them moves: factored once.
+
+    Attributes
+    ----------
+    basis : (N, L) array
+        Orthonormal, of the columns.
+    triangle : (L, L) array
+        columns = basis · triangle · scale.
+    scale : (L,) array
+        Root mean square of each column.
+    along : (L,) array
+        basisᵀ · right.
+    rest : (N,) array
+        The right side less its projection on the columns.
+    """
+
+    basis: Floats
+    triangle: Floats
+    scale: Floats
+    along: Floats
+    rest: Floats
+
+    @classmethod
+    def of(cls, columns: Floats, right: Floats) -> Self:
+        """Factor (N, L) columns beside an (N,) right side."""
+        scale = np.sqrt(np.mean(columns**2, axis=0))
+        scale[scale == 0] = 1.0
+        basis, triangle = np.linalg.qr(columns / scale)
+        along = basis.T @ right
+        return cls(basis, triangle, scale, along, right - basis @ along)
+
+    @property
+    def independent(self) -> bool:
+        """Whether no column is explained by the others."""
+        pivots = np.abs(np.diag(self.triangle))
+        return bool(pivots.min(initial=1.0) > _DEPENDENT * pivots.max(initial=1.0))
+
+    @cached_property
+    def rest_squared(self) -> float:
+        """Squared right side that no column explains."""
+        return float(self.rest @ self.rest)
+
+    @cached_property
+    def inverse(self) -> Floats:
+        """(L, L) matrix that takes what lies along the basis to coefficients of the columns."""
+        return np.linalg.inv(self.triangle) / self.scale[:, None]
 
 
 @contextmanager
@@ -48,7 +168,5 @@ def _controller() -> Any:
         from threadpoolctl import ThreadpoolController
     except ModuleNotFoundError:
         return None
-    import numpy as np
-
     np.linalg.inv(np.eye(2))  # the library to be held has to be loaded first
     return ThreadpoolController()

@@ -13,6 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.optimizers.ending import Ending
 from mrdamper.optimizers.levenberg_marquardt import Minimum
 
 Evaluation = tuple[Floats, Floats]  # residual, its derivative
@@ -43,7 +44,7 @@ def least_squares_in_one(
     """
     low, high = -math.inf, math.inf  # places whose gradient points up to, and back to, the minimum
     u, before, best, evaluations = start, None, None, 0
-    message = f"stopped after {most_steps} steps; the cost was still falling: start nearer or raise most_steps"
+    ending = Ending.STEPS_SPENT
     for _ in range(most_steps):
         found = evaluate(u)
         evaluations += 1
@@ -57,10 +58,10 @@ def least_squares_in_one(
         if before is not None and (gradient - before[1]) * (u - before[0]) > 0:
             curvature = (gradient - before[1]) / (u - before[0])
         if (u <= lower and gradient > 0) or (u >= upper and gradient < 0):
-            message = "every coordinate ended at a bound"
+            ending = Ending.AT_BOUNDS
             break
         if gradient**2 <= tolerance * cost * curvature:
-            message = "converged: the cost changes no more"
+            ending = Ending.SETTLED
             break
         target = min(max(u - gradient / curvature, lower), upper)
         if not low < target < high:
@@ -68,4 +69,4 @@ def least_squares_in_one(
         before, u = (u, gradient), target
     if best is None:
         return None
-    return Minimum(np.array([best[1]]), best[2], best[0], evaluations, message)
+    return Minimum(np.array([best[1]]), best[2], best[0], evaluations, ending)

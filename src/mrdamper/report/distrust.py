@@ -87,8 +87,8 @@ def _joint(fit: JointFit) -> list[str]:
     sentences = []
     if fit.at_bounds:
         sentences.append(f"Parameters at a limit of their range: {', '.join(fit.at_bounds)}.")
-    if not fit.message.startswith(("converged", "solved")):
-        sentences.append(f"The search for one set of parameters did not converge: {fit.message}.")
+    if not fit.ending.converged:
+        sentences.append(f"The search for one set of parameters {fit.ending}.")
     ratio = float(np.max(fit.nrmse_pp) / np.median(fit.nrmse_pp))
     if ratio > 2:
         sentences.append(f"The run described worst has {ratio:.1f} times the median error.")

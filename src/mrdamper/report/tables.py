@@ -47,7 +47,7 @@ def identification_rows(identifications: Sequence[Identification]) -> list[dict[
             "delay_s": found.delay,
             "at_bounds": " ".join(found.at_bounds),
             "evaluations": found.evaluations,
-            "message": found.message,
+            "message": str(found.ending),
             "notes": "; ".join(found.notes),
         }
         rows.append(row)

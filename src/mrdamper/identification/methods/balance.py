@@ -17,11 +17,13 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import IdentificationError
 from mrdamper.hysteresis import steady_loop
-from mrdamper.identification.columns import bounded_linear, bounds_of, linear_table
+from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.identification.harmonic_balance import HarmonicProjection, SineRecord
 from mrdamper.identification.problem import Method, Problem, Solution
-from mrdamper.models import Model
+from mrdamper.models import Model, Scale
+from mrdamper.optimizers.ending import Ending
 from mrdamper.optimizers.levenberg_marquardt import least_squares
+from mrdamper.optimizers.linear import solve_bounded
 
 _FEWEST = 3  # one harmonic gives two equations, for at least four unknowns
 
@@ -63,10 +65,10 @@ class Balance(Method):
         balanced = _Balanced(problem, record, HarmonicProjection(record.theta, self.harmonics))
         X = record.condition.amplitude_m
         kind = problem.model_type
-        axes = kind.within(kind.guess(record.motion, record.force, X, problem.free), problem.fixed)
+        axes = kind.within(kind.search_axes(Scale.of(record.motion, record.force, X), problem.free), problem.fixed)
         if not axes:
             model, _, held = balanced.at({})
-            return Solution(model, 0.0, held, {}, {}, 1, "solved: every parameter is linear")
+            return Solution(model, 0.0, held, {}, {}, 1, Ending.SOLVED)
 
         def point(u: Floats) -> dict[str, float]:
             return {axis.name: axis.value(float(c)) for axis, c in zip(axes, u, strict=True)}
@@ -90,7 +92,7 @@ class Balance(Method):
             start=point(start),
             end=point(best.point),
             evaluations=len(grid) + sum(minimum.evaluations for _, minimum in found),
-            message=best.message,
+            ending=best.ending,
         )
 
 
@@ -110,7 +112,7 @@ class _Balanced:
         state = steady_state(bare, self.record)
         base, forces = linear_table(bare, self.linear, self.motion, state)
         columns, right = self.project(forces), self.measured - self.project(base)
-        solution, held = bounded_linear(columns, right, *bounds_of(self.linear))
+        solution, held = solve_bounded(columns, right, *bounds_of(self.linear))
         names = [i.name for i in self.linear]
         model = replace(bare, **dict(zip(names, solution.tolist(), strict=True)))
         return model, columns @ solution - right, tuple(n for n, h in zip(names, held, strict=True) if h)
@@ -126,7 +128,7 @@ def steady_state(model: Model, record: SineRecord) -> Floats:
     """
     if type(model).state is Model.state:
         return np.zeros(record.theta.size)
-    shape = getattr(model, "shape", None)
+    shape = model.shape
     if shape is None:
         raise IdentificationError(
             f"no closed loop of the {model.title} model is known", mend="use method projection, which follows any model"

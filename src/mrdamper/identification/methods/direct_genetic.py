@@ -20,6 +20,7 @@ from mrdamper.identification.columns import linear_table
 from mrdamper.identification.harmonic_balance import SineRecord
 from mrdamper.identification.methods.balance import steady_state
 from mrdamper.identification.problem import Method, Problem, Solution
+from mrdamper.models import Scale
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.optimizers.generation import GeneticSettings
 from mrdamper.optimizers.genetic import genetic
@@ -77,7 +78,7 @@ class DirectGenetic(Method):
         )
         model = BoucWen.build({**problem.fixed, **end})
         searched = {name: end[name] for name in ("yield_displacement", "asymmetry", "n") if name in end}
-        return Solution(model, 0.0, at_bounds, {}, searched, found.evaluations, found.message, self.genetic.seed)
+        return Solution(model, 0.0, at_bounds, {}, searched, found.evaluations, found.ending, self.genetic.seed)
 
 
 def _thinned(record: SineRecord) -> SineRecord:
@@ -92,7 +93,9 @@ def _box(problem: Problem, record: SineRecord) -> dict[str, tuple[float, float]]
     sizes = {"f0": peak, "k1": peak / X, "k2": peak / X**2, "k3": peak / X**3, "m": peak / (speed * record.omega)}
     box = {"c": (0.0, peak / speed)} if "c" in problem.free else {}
     box |= {name: (-size, size) for name, size in sizes.items() if name in problem.free}
-    axes = problem.model_type.within(problem.model_type.search_axes(X, problem.free), problem.fixed)
+    axes = problem.model_type.within(
+        problem.model_type.search_axes(Scale.of(record.motion, record.force, X), problem.free), problem.fixed
+    )
     # The paper searches on a linear scale; a hundredth of an amplitude is a usual yield displacement.
     box |= {a.name: (a.lower, a.upper) for a in axes}
     if "yield_displacement" in box:

@@ -29,6 +29,7 @@ from mrdamper.identification.harmonic_balance import (
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.identification.problem import Method, Problem, Solution
 from mrdamper.models.bouc_wen import BoucWen
+from mrdamper.optimizers.ending import Ending
 from mrdamper.optimizers.generation import GeneticSettings
 from mrdamper.optimizers.genetic import GeneticMinimum, genetic
 from mrdamper.optimizers.levenberg_marquardt import least_squares
@@ -100,7 +101,7 @@ class Paper(Method):
             start={},
             end={"beta": searched.beta},
             evaluations=searched.evaluations,
-            message=searched.message,
+            ending=searched.ending,
             seed=self.genetic.seed if self.search == "genetic" else None,
             notes=(*notes, *(_counted_twice(problem, known) if self.explain else ())),
         )
@@ -145,7 +146,7 @@ class Paper(Method):
 
     def _by_genetic(self, rest: _Rest) -> _Searched:
         found = self._genetic(rest)
-        return _Searched(float(found.point[0]), float(found.point[1]), found.evaluations, found.message)
+        return _Searched(float(found.point[0]), float(found.point[1]), found.evaluations, found.ending)
 
     def _by_optimum(self, rest: _Rest) -> _Searched:
         """Grid over the yield displacement, then refinement; alpha is linear and solved for."""
@@ -163,7 +164,7 @@ class Paper(Method):
         beta = rest.beta(float(np.exp(best.point[0])))
         z = rest.state(beta)
         alpha = float(np.clip(z @ rest.force / (z @ z), low, high))
-        return _Searched(alpha, beta, best.evaluations + grid.size, best.message)
+        return _Searched(alpha, beta, best.evaluations + grid.size, best.ending)
 
 
 @dataclass(frozen=True)
@@ -171,7 +172,7 @@ class _Searched:
     alpha: float
     beta: float
     evaluations: int
-    message: str
+    ending: Ending
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,21 +19,18 @@ from numpy.typing import NDArray
 from mrdamper.data import Floats
 from mrdamper.errors import IdentificationError
 from mrdamper.hysteresis import Shape
-from mrdamper.hysteresis.batch import WORTH_COMPILING, Fixed, batch_cost
-from mrdamper.identification.columns import bounded_linear, bounds_of, linear_table
+from mrdamper.hysteresis.batch import batch_cost
+from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.identification.elimination import Elimination
 from mrdamper.identification.problem import DELAY, DELAY_LIMIT, Method, Problem, Solution
-from mrdamper.models import Model, SearchAxis
+from mrdamper.models import Model, Scale, SearchAxis
 from mrdamper.motion import Path
+from mrdamper.optimizers.ending import Ending
 from mrdamper.optimizers.levenberg_marquardt import Minimum, least_squares
-from mrdamper.optimizers.linear import on_one_blas_thread
+from mrdamper.optimizers.linear import FixedColumns, on_one_blas_thread, solve_bounded
 from mrdamper.optimizers.one_number import least_squares_in_one
 
-if TYPE_CHECKING:
-    from mrdamper.hysteresis.compiled_search import LengthSearch
-
 _GRID_SAMPLES = 1500  # the grid only has to find the valley
-_EVALUATIONS, _EVALUATIONS_OF_MANY = 12, 60  # of a whole record: searching the length alone, and more
 _GRID_SAMPLES_A_CYCLE, _GRID_CYCLES = 100, 3  # where all shapes are tried at once
 
 
@@ -45,19 +42,12 @@ class Projection(Method):
     ----------
     refine_best : int
         Number of grid points from which the refinement starts.
-    compiled : bool, optional
-        Search in machine code: 10 times faster where the yield displacement alone is searched, 3
-        times with n; asymmetry gains a third. It costs 0.4 s to import the compiler and the code,
-        and 8 s once to compile it (kept on disk), so say so for fleets: one test matrix takes less
-        without. Left open, it is chosen where samples × evaluations come to `WORTH_COMPILING`,
-        that is for records of millions of samples.
     """
 
     name: ClassVar[str] = "projection"
     summary: ClassVar[str] = "least squares on the force in time, linear parameters eliminated"
 
     refine_best: int = 2  # where more than one coordinate is searched; one alone has one valley
-    compiled: bool | None = None
 
     @on_one_blas_thread
     def solve(self, problem: Problem) -> Solution:
@@ -65,11 +55,8 @@ class Projection(Method):
         axes = search_axes(problem)
         if not axes:
             projected = _project(problem, {})
-            return Solution(projected.model, 0.0, projected.at_bounds, {}, {}, 1, "solved: every parameter is linear")
-        compiled = self._is_compiled(problem, axes)
-        elimination = Elimination.of(problem, axes, compiled=compiled)
-        if compiled and elimination and (solution := _searched_by_machine(axes, elimination)):
-            return solution
+            return Solution(projected.model, 0.0, projected.at_bounds, {}, {}, 1, Ending.SOLVED)
+        elimination = Elimination.of(problem, axes)
         starts, evaluated = _best_of_grid(problem, axes, elimination, self.refine_best if len(axes) > 1 else 1)
         found = [(start, _refined(problem, axes, elimination, start)) for start in starts]
         start, best = min(found, key=lambda pair: pair[1].cost)
@@ -85,13 +72,8 @@ class Projection(Method):
             start=_point(axes, start),
             end=end,
             evaluations=evaluated + sum(minimum.evaluations for _, minimum in found),
-            message=best.message,
+            ending=best.ending,
         )
-
-    def _is_compiled(self, problem: Problem, axes: tuple[SearchAxis, ...]) -> bool:
-        if self.compiled is not None:
-            return self.compiled
-        return len(problem.motion) * (_EVALUATIONS if len(axes) == 1 else _EVALUATIONS_OF_MANY) >= WORTH_COMPILING
 
 
 @dataclass(frozen=True)
@@ -115,7 +97,7 @@ def _project(problem: Problem, point: Mapping[str, float], thin: int = 1) -> Pro
     seen = seen.part(slice(None, None, thin)) if thin > 1 else seen
     base, columns = linear_table(bare, linear, seen, state)
     measured = problem.force[::thin]
-    solution, held = bounded_linear(columns, measured - base, *bounds_of(linear))
+    solution, held = solve_bounded(columns, measured - base, *bounds_of(linear))
     names = [i.name for i in linear]
     model = replace(bare, **{name: float(s) for name, s in zip(names, solution, strict=True)})
     return Projected(
@@ -125,58 +107,12 @@ def _project(problem: Problem, point: Mapping[str, float], thin: int = 1) -> Pro
 
 def search_axes(problem: Problem) -> tuple[SearchAxis, ...]:
     """Coordinates that are searched, with start values read off the data."""
-    amplitude = problem.analysis.condition.amplitude_m
-    axes = problem.model_type.guess(problem.seen, problem.force, amplitude, problem.free)
+    scale = Scale.of(problem.seen, problem.force, problem.analysis.condition.amplitude_m)
+    axes = problem.model_type.search_axes(scale, problem.free)
     axes = problem.model_type.within(axes, problem.fixed)
     if problem.with_delay:
         axes = (*axes, SearchAxis(DELAY, -DELAY_LIMIT, DELAY_LIMIT, (0.0,)))
     return axes
-
-
-def length_search(axes: tuple[SearchAxis, ...], elimination: Elimination) -> LengthSearch | None:
-    """The search in machine code; None where more than a yield displacement is searched."""
-    if not elimination.kind.has_shape or len(axes) != 1:
-        return None
-    from mrdamper.hysteresis.compiled_search import LengthSearch
-
-    (axis,), kind = axes, elimination.kind
-    lower, upper = bounds_of([*kind.others, kind.state])
-    return LengthSearch.of(
-        elimination.problem.motion.path,
-        elimination.columns,
-        elimination.right,
-        grid=np.array([axis.coordinate(value) for value in axis.grid]),
-        bounds=(axis.coordinate(axis.lower), axis.coordinate(axis.upper)),
-        lower=lower,
-        upper=upper,
-        rho=kind.rho,
-        n=kind.n,
-    )
-
-
-def _searched_by_machine(axes: tuple[SearchAxis, ...], elimination: Elimination) -> Solution | None:
-    """None where the general way is asked for."""
-    search = length_search(axes, elimination)
-    if search is None:
-        return None
-    from mrdamper.hysteresis.compiled_search import GENERAL_WAY, MESSAGES, search_length
-
-    found = search_length(search)
-    if found.status == GENERAL_WAY:
-        return None
-    end = _point(axes, np.array([found.log_length]))
-    model = elimination.solved(end)
-    if model is None:
-        return None
-    return Solution(
-        model=model,
-        delay=0.0,
-        at_bounds=tuple(axis.name for axis in axes if axis.at_bound(found.log_length)),
-        start=_point(axes, np.array([found.start])),
-        end=end,
-        evaluations=found.evaluations,
-        message=MESSAGES[found.status],
-    )
 
 
 def _refined(problem: Problem, axes: tuple[SearchAxis, ...], elimination: Elimination | None, start: Floats) -> Minimum:
@@ -217,14 +153,12 @@ def _best_of_grid(
 def _batched_costs(elimination: Elimination, points: list[dict[str, float]]) -> Floats:
     """Costs of the grid on a few cycles, all shapes of one n at once."""
     path, rows = _few_cycles(elimination.problem)
-    fixed = Fixed.of(path, elimination.columns[rows], elimination.right[rows])
+    fixed = FixedColumns.of(elimination.columns[rows], elimination.right[rows])
     shapes = np.array([elimination.kind.shape(point) for point in points], dtype=float)
     costs = np.empty(len(points))
     for n in set(shapes[:, 2].tolist()):
         alike = shapes[:, 2] == n
-        costs[alike] = batch_cost(
-            fixed, Shape(shapes[alike, 0], shapes[alike, 1], n), compiled=elimination.compiled or None
-        )
+        costs[alike] = batch_cost(path, fixed, Shape(shapes[alike, 0], shapes[alike, 1], n))
     return costs
 
 

@@ -159,18 +159,3 @@ def residual_map(damper: Damper, runs: Sequence[Run]) -> Figure:
         label(over_phase, "Phase of the motion (°)", "")
         over_phase.set_xticks([0, 90, 180, 270, 360])
         return figure
-
-
-def force_in_time(run: Run, damper: Damper) -> Figure:
-    """Measured and predicted force in time over the whole record, residual below."""
-    with house_style():
-        figure, (above, below) = new_figure(2, 1, 3.6, sharex=True, height_ratios=[2.4, 1])
-        prediction = damper.predict_run(run)
-        time = thin(run.time, 3000)
-        above.plot(time, thin(run.force, 3000), color=MEASURED, label="measured", lw=0.9)
-        above.plot(time, thin(prediction.force, 3000), color=PREDICTED, label="predicted", lw=0.9)
-        below.plot(time, thin(prediction.force - run.force, 3000), color=PALETTE[1], lw=0.7)
-        above.legend(loc="upper right", ncols=2)
-        label(above, "", "Force (N)", f"{run.id}")
-        label(below, "Time (s)", "Residual (N)")
-        return figure

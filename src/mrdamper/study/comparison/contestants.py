@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.published import ConditionedDamper, all_conditioned
 from mrdamper.errors import UnknownNameError
-from mrdamper.models import all_models, model_type
+from mrdamper.models import Scale, all_models, model_type
 from mrdamper.study.workflow import JOINTLY
 
 GENETIC = ("bouc-wen:paper", "bouc-wen:direct-genetic")
@@ -68,7 +68,9 @@ def contestants(names: Sequence[str] = (), genetic: bool = False) -> list[Contes
 def _closed_shapes() -> list[str]:
     """Models whose loop has at most one shape coordinate, the yield displacement: all runs fit at once."""
     shapes = {
-        name: [axis.name for axis in cls.search_axes(1.0, [i.name for i in cls.parameters() if not i.preset])]
+        name: [
+            axis.name for axis in cls.search_axes(Scale(1.0, 1.0), [i.name for i in cls.parameters() if not i.preset])
+        ]
         for name, cls in all_models().items()
         if name != JOINTLY
     }

@@ -157,7 +157,7 @@ def _identified(one: Identification) -> dict[str, Any]:
         "values": {n: number(v) for n, v in one.model.values().items()},
         "errors": {n: number(v) for n, v in one.standard_errors.items()},
         "at_bounds": one.at_bounds,
-        "message": one.message,
+        "message": str(one.ending),
         "notes": one.notes,
     }
 
@@ -173,7 +173,7 @@ def _joint(found: Identified) -> dict[str, Any] | None:
             {"id": name, "nrmse_pp": number(error)}
             for name, error in zip(found.run_ids, found.joint.nrmse_pp.tolist(), strict=True)
         ],
-        "message": found.joint.message,
+        "message": str(found.joint.ending),
     }
 
 

@@ -1,0 +1,21 @@
+"""Why a search ended."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class Ending(StrEnum):
+    """Why a search ended, as a sentence; the member itself is what programs ask for."""
+
+    SOLVED = "solved: every parameter is linear"
+    SETTLED = "converged: the cost changes no more"
+    NO_STEP = "converged: no step lowers the cost"
+    AT_BOUNDS = "every coordinate ended at a bound"
+    STEPS_SPENT = "stopped at the limit of steps, the cost still falling: start nearer or raise most_steps"
+    GENERATIONS_SPENT = "ended after the given number of generations"
+
+    @property
+    def converged(self) -> bool:
+        """Whether a minimum was reached, inside the box or at its edge."""
+        return self in (Ending.SOLVED, Ending.SETTLED, Ending.NO_STEP, Ending.AT_BOUNDS)
