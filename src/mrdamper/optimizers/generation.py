@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mrdamper.data import Floats
 from mrdamper.errors import ParameterError
+from mrdamper.optimizers.linear import Floats
 
 
 @dataclass(frozen=True)

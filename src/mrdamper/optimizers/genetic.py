@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mrdamper.data import Floats
 from mrdamper.errors import MissingExtraError, ParameterError
 from mrdamper.optimizers.ending import Ending
 from mrdamper.optimizers.generation import GeneticSettings
+from mrdamper.optimizers.linear import Floats
 
 Cost = Callable[[Floats], Floats]
 Report = Callable[[str, float], None]

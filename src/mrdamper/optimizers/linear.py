@@ -16,8 +16,7 @@ from typing import Any, ParamSpec, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mrdamper.data import Floats
-
+Floats = NDArray[np.float64]  # as in `data`, which this room does without
 _WELL_APART = 1e-4  # smallest pivot of equilibrated columns at which the normal equations keep their digits
 _DEPENDENT = 1e-5  # pivot over the largest below which a column is explained by the others
 

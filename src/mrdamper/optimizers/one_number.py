@@ -12,9 +12,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mrdamper.data import Floats
 from mrdamper.optimizers.ending import Ending
 from mrdamper.optimizers.levenberg_marquardt import Minimum
+from mrdamper.optimizers.linear import Floats
 
 Evaluation = tuple[Floats, Floats]  # residual, its derivative
 

@@ -17,8 +17,8 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.core.population import Population
 from pymoo.core.problem import Problem
 
-from mrdamper.data import Floats
 from mrdamper.optimizers.generation import GeneticSettings, next_generation
+from mrdamper.optimizers.linear import Floats
 
 
 class _Batch(Problem):
