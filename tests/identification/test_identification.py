@@ -91,7 +91,7 @@ def test_a_dead_force_and_a_varying_current_are_refused(condition):
     run = synthetic_run(condition)
     with pytest.raises(IdentificationError, match="force does not change"):
         identify(Run("dead", run.time, run.displacement, np.zeros(run.time.size), 1.0))
-    with pytest.raises(RunError, match="current varies"):
+    with pytest.raises(RunError, match="the current changes within the run"):
         identify(Run("vary", run.time, run.displacement, run.force, np.linspace(0, 1, run.time.size)))
 
 
