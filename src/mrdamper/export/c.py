@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -76,12 +76,12 @@ def reference_motion(made: Stream, samples: int = _SAMPLES) -> tuple[np.ndarray,
     return x, current, float(2 / (frequency * (samples - 1)))
 
 
-def c_facts(made: Stream, name: str, rig: str) -> dict[str, Any]:
-    """What the templates say of a damper."""
-    main = CWriter(made.step)
-    drives = {quantity: CWriter(drive, f"from_{quantity}_") for quantity, drive in made.drives.items()}
+def c_facts(made: Stream, name: str, rig: str, language: type[CWriter] = CWriter) -> dict[str, Any]:
+    """What the templates say of a damper, in C or in a language that shares its grammar."""
+    main = language(made.step)
+    drives = {quantity: language(drive, f"from_{quantity}_") for quantity, drive in made.drives.items()}
     setup, infos = main.setup(), made.model.parameters() if made.model else ()
-    derived = [("int" if e.logical else f"{name}_real", main.name(e).removeprefix("d->")) for e in made.step.derived]
+    derived = [("int" if e.logical else f"{name}_real", main.name(e).removeprefix(f"d{main.member}")) for e in made.step.derived]
     arguments = [(f"const {name}_parameters *p", "&m->p")] if infos else []
     arguments += [(f"const {name}_derived *d", "&m->d")] if derived else []
     described = _program("model", main, made.step, [*arguments, (f"{name}_state *s", "next")])
@@ -119,18 +119,18 @@ def c_facts(made: Stream, name: str, rig: str) -> dict[str, Any]:
         "setup": setup,
         "has_setup": bool(setup),
         "helpers": {word: f"{word}(" in text for word in ("signum", "lesser", "greater")},
-        **_tables(made.step.tape.tables),
+        **_tables(made.step.tape.tables, main.number),
     }
 
 
-def _tables(tables: Sequence[Table]) -> dict[str, Any]:
+def _tables(tables: Sequence[Table], number: Callable[[float], str]) -> dict[str, Any]:
     """Points at the nodes, shared by the tables that read them forwards and backwards."""
     shared = list({id(table.points): table.points for table in tables}.values())
     return {
         "curves": [
             {
-                "points": [[_number(v) for v in row] for row in points],
-                "few": [[_number(v) for v in row] for row in points[::_SINGLE_STRIDE]],
+                "points": [[number(v) for v in row] for row in points],
+                "few": [[number(v) for v in row] for row in points[::_SINGLE_STRIDE]],
             }
             for points in shared
         ],
@@ -178,10 +178,6 @@ def _envelope(made: Stream) -> list[tuple[str, str, str]]:
             for name in ("current_A", "frequency_Hz", "amplitude_m", "peak_velocity_m_s")
         )
     ]
-
-
-def _number(value: float) -> str:
-    return f"R({float(value)!r})"
 
 
 def _comment(text: str) -> str:

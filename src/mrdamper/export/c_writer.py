@@ -29,6 +29,11 @@ class CWriter(Writer):
         super().__init__(program)
         self.memory_prefix = memory_prefix
 
+    member: ClassVar[str] = "->"  # between a structure and what is in it
+    constant: ClassVar[str] = "const real"
+    answer: ClassVar[str] = "const int"  # yes or no
+    variable: ClassVar[str] = "real"
+    counter: ClassVar[str] = "int"
     formats: ClassVar[Mapping[str, str]] = {
         "add": "({} + {})",
         "subtract": "({} - {})",
@@ -58,11 +63,11 @@ class CWriter(Writer):
     def name(self, expression: Expression) -> str:
         name = super().name(expression)
         if expression.op == "memory":
-            return f"s->{self.memory_prefix}{name}"
+            return f"s{self.member}{self.memory_prefix}{name}"
         owner = {"parameter": "p", "input": "u"}.get(expression.op)
         if owner is None and any(expression is d for d in self.program.derived):
             owner = "d"
-        return f"{owner}->{name}" if owner else name
+        return f"{owner}{self.member}{name}" if owner else name
 
     def block(self, statements: list[Statement], indent: int = 1) -> str:
         """Text of a block."""
@@ -79,9 +84,9 @@ class CWriter(Writer):
     def results(self) -> str:
         """Outputs, then the new memory: all of it is computed before any of it is stored."""
         tape = self.program.tape
-        lines = [f"out->{name} = {self.text(value)};" for name, value in self.program.outputs.items()]
-        lines += [f"const real next_{name} = {self.text(value)};" for name, value in tape.updates.items()]
-        lines += [f"s->{self.memory_prefix}{name} = next_{name};" for name in tape.updates]
+        lines = [f"out{self.member}{name} = {self.text(value)};" for name, value in self.program.outputs.items()]
+        lines += [f"{self.constant} next_{name} = {self.text(value)};" for name, value in tape.updates.items()]
+        lines += [f"s{self.member}{self.memory_prefix}{name} = next_{name};" for name in tape.updates]
         return "".join(f"    {line}\n" for line in lines)
 
     def _guards(self, stage: int) -> str:
@@ -104,18 +109,18 @@ class CWriter(Writer):
 
     def _declared(self, expression: Expression) -> str:
         name = self.name(expression)
-        if "->" in name:
+        if self.member in name:
             return name
-        return f"const {'int' if expression.logical else 'real'} {name}"
+        return f"{self.answer if expression.logical else self.constant} {name}"
 
     def _branch(self, statement: Branch, indent: int) -> list[str]:
         pad = "    " * indent
         condition, then, otherwise = statement.select.args
         name = self.name(statement.select)
-        lines = [] if "->" in name else [f"{pad}real {name};"]
+        lines = [] if self.member in name else [f"{pad}{self.variable} {name};"]
         if not (statement.then or statement.otherwise):
             lines.clear()
-            kind = "" if "->" in name else "const real "
+            kind = "" if self.member in name else f"{self.constant} "
             return [f"{pad}{kind}{name} = {self.text(condition)} ? {self.text(then)} : {self.text(otherwise)};"]
         lines.append(f"{pad}if ({self.text(condition)}) {{")
         lines += [*self._lines(statement.then, indent + 1), f"{pad}    {name} = {self.text(then)};", f"{pad}}} else {{"]
@@ -130,13 +135,13 @@ class CWriter(Writer):
         pad, loop = "    " * indent, statement.loop
         carried = [self.carry(loop, i) for i in range(len(loop.start))]
         counter = f"{carried[0]}_count"
-        lines = [f"{pad}int {counter};"]
-        lines += [f"{pad}real {name} = {self.text(value)};" for name, value in zip(carried, loop.start, strict=True)]
+        lines = [f"{pad}{self.counter} {counter};"]
+        lines += [f"{pad}{self.variable} {name} = {self.text(value)};" for name, value in zip(carried, loop.start, strict=True)]
         lines.append(f"{pad}for ({counter} = 0; {counter} < {loop.most}; {counter}++) {{")
         lines += self._lines(statement.body, indent + 1)
-        lines.append(f"{pad}    const int going = {self.text(loop.going)};")
+        lines.append(f"{pad}    {self.answer} going = {self.text(loop.going)};")
         for name, value in zip(carried, loop.updates, strict=True):
-            lines.append(f"{pad}    const real next_{name} = {self.text(value)};")
+            lines.append(f"{pad}    {self.constant} next_{name} = {self.text(value)};")
         lines += [f"{pad}    {name} = next_{name};" for name in carried]
         lines += [f"{pad}    if (!going) {{", f"{pad}        break;", f"{pad}    }}", f"{pad}}}"]
         return lines

@@ -13,7 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 # Results are those of the Python stepper to the last bit: no contraction, no unsafe mathematics.
-FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared")
+_EXACT = ("-std=c99", "-O2", "-ffp-contract=off")
+FLAGS = (*_EXACT, "-fvisibility=hidden", "-fPIC", "-shared")
+_WEB = (*_EXACT, "-target", "wasm32-wasi", "-mexec-model=reactor", "-Wl,--no-entry", "-s")
 _PATIENCE = 600  # s; a cross compiler builds its C library the first time
 
 
@@ -93,17 +95,28 @@ def build_library(sources: Mapping[str, bytes], wanted: Platform, compiler: Sequ
     command = tuple(compiler) if compiler is not None else compiler_for(wanted)
     if not command:
         return Built(None, "no compiler for it; pip install ziglang")
+    # Without symbols, debug data and build paths the same sources give the same bytes.
+    strip = () if wanted.suffix == ".dylib" and "ziglang" not in command else ("-s",)
+    maths = () if wanted.suffix == ".dll" else ("-lm",)
+    return _built(sources, [*command, *FLAGS, *strip], maths)
+
+
+def build_webassembly(sources: Mapping[str, bytes]) -> Built:
+    """Compile C sources into a WebAssembly module that imports nothing; zig alone brings a C library for it."""
+    if not importlib.util.find_spec("ziglang"):
+        return Built(None, "no compiler for it; pip install ziglang")
+    return _built(sources, [sys.executable, "-m", "ziglang", "cc", *_WEB], ())
+
+
+def _built(sources: Mapping[str, bytes], command: Sequence[str], libraries: Sequence[str]) -> Built:
     with tempfile.TemporaryDirectory() as folder:
         for name, text in sources.items():
             (Path(folder) / name).write_bytes(text)
-        library = Path(folder) / f"library{wanted.suffix}"
+        library = Path(folder) / "library"
         files = sorted(name for name in sources if name.endswith(".c"))
-        # Without symbols, debug data and build paths the same sources give the same bytes.
-        strip = () if wanted.suffix == ".dylib" and "ziglang" not in command else ("-s",)
-        maths = () if wanted.suffix == ".dll" else ("-lm",)
         try:
             done = subprocess.run(
-                [*command, *FLAGS, *strip, *files, "-o", library.name, *maths],
+                [*command, *files, "-o", library.name, *libraries],
                 cwd=folder,
                 capture_output=True,
                 text=True,

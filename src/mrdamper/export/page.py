@@ -1,0 +1,164 @@
+"""One HTML file that answers sliders without a network: the damper's C as WebAssembly, and as JavaScript."""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+from importlib.resources import files
+from typing import Any, ClassVar
+
+import numpy as np
+
+from mrdamper.dampers.base import SLACK, Damper, Envelope
+from mrdamper.export.base import Exporter, Written, identifier, rig_of
+from mrdamper.export.c import TOLERANCE, c_facts, c_sources, reference_motion
+from mrdamper.export.js_writer import JavaScriptWriter
+from mrdamper.export.templates import render
+from mrdamper.export.toolchain import build_webassembly
+from mrdamper.models import Model
+from mrdamper.streaming import FLAGS, Stepper, Stream, stream
+
+_VECTORS = 240  # samples of the self-test
+_STEPS = 100  # of a slider from the lowest to the highest tested value
+# Field of the envelope, name, unit, factor to it, and how far sliders leave the tests below and above.
+_KNOBS = (
+    ("current", "current_A", "Current", "A", 1.0, 0.0, 1.5),
+    ("frequency", "frequency_Hz", "Frequency", "Hz", 1.0, 0.5, 1.5),
+    ("amplitude", "amplitude_m", "Amplitude", "mm", 1e3, 0.5, 1.5),
+)
+_UNTESTED = Envelope((0.0, 1.0), (0.5, 4.0), (2e-3, 2e-2), (6e-3, 0.5))  # where a bare model's sliders go
+_SIGNS = (
+    "Displacement is counted from mid-stroke; displacement, velocity and force are positive in extension, "
+    "so the damper resists."
+)
+_FUNCTIONS = (
+    "Its parameters are functions of current, frequency and amplitude: they follow the motion over about a cycle "
+    "of the slowest test, and stay at the edge of the tests outside."
+)
+
+
+class PageExporter(Exporter):
+    """A page for a colleague: sliders, loops, a motion of one's own, and a self-test."""
+
+    name: ClassVar[str] = "page"
+    title: ClassVar[str] = "web page in one file"
+    suffix: ClassVar[str] = ".html"
+
+    def export(self, damper: Damper | Model, name: str) -> Written:
+        made, name = stream(damper), identifier(name)
+        built = build_webassembly(_web_sources(made, name))
+        notes = () if built.library else (f"computed in JavaScript, not WebAssembly: {built.reason}",)
+        page = render("page.html.j2", **_facts(damper, made, name, built.library))
+        return Written({f"{name}{self.suffix}": page.encode()}, notes)
+
+
+def _web_sources(made: Stream, name: str) -> dict[str, bytes]:
+    wrapper = render("page_damper.c.j2", name=name, upper=name.upper())
+    return {file: text.encode() for file, text in {**c_sources(made, name, ""), f"{name}_page.c": wrapper}.items()}
+
+
+def _facts(damper: Damper | Model, made: Stream, name: str, library: bytes | None) -> dict[str, Any]:
+    """What the page's template says."""
+    rig = rig_of(damper)
+    envelope = made.envelope
+    computed = {
+        "wasm": base64.b64encode(library).decode() if library else None,
+        "test": _vectors(made),
+        "tested": envelope and _tested(envelope),
+        "slack": SLACK,
+        "flags": FLAGS,
+    }
+    folder = files("mrdamper.export.templates")
+    return {
+        "heading": f"Damper of rig {rig}" if rig else made.title,
+        "words": _words(damper, made),
+        "knobs": _knobs(envelope),
+        "parameters": [
+            {"meaning": info.meaning, "value": f"{getattr(made.model, info.name):.6g}", "unit": info.unit, "name": n}
+            for info in (made.model.parameters() if made.model else ())
+            for n in (info.name,)
+        ],
+        "facts": json.dumps(computed).replace("<", "\\u003c"),  # no text can end the element it stands in
+        "damper": render("damper.js.j2", **c_facts(made, name, "", JavaScriptWriter)),
+        "css": (folder / "page.css").read_text(encoding="utf-8"),
+        "script": (folder / "page.js").read_text(encoding="utf-8"),
+    }
+
+
+def _vectors(made: Stream) -> dict[str, Any]:
+    """A motion and the forces of the stepper here, all digits, for the page to repeat."""
+    x, current, step = reference_motion(made, _VECTORS)
+    stepper = Stepper(made)
+    force = [stepper.step(*sample, step) for sample in zip(x.tolist(), current.tolist(), strict=True)]
+    packed = {
+        name: base64.b64encode(np.asarray(values, "<f8").tobytes()).decode()
+        for name, values in (("displacement", x), ("current", current), ("force", force))
+    }
+    return {**packed, "step": step, "tolerance": TOLERANCE}
+
+
+def _tested(envelope: Envelope) -> list[dict[str, Any]]:
+    """The tested ranges, and what to say outside them."""
+    named = [(field, label.lower(), unit, factor) for _, field, label, unit, factor, *_ in _KNOBS]
+    named.append(("peak_velocity_m_s", "peak velocity", "mm/s", 1e3))
+    return [
+        {"field": field, "low": low, "high": high, "said": f"{label} was tested {_span((low, high), factor)} {unit}"}
+        for field, label, unit, factor in named
+        for low, high in (getattr(envelope, field),)
+    ]
+
+
+def _words(damper: Damper | Model, made: Stream) -> list[str]:
+    """Where the damper comes from and what it is good for, in sentences."""
+    from importlib.metadata import version
+
+    said = f"{made.title[:1].upper()}{made.title[1:]}, exported by mrdamper {version('mrdamper')}"
+    if isinstance(damper, Damper):
+        facts = "; ".join(f"{key}: {value}" for key, value in damper.provenance.items())
+        said += f" from a model with {damper.parameter_count} numbers determined from tests"
+        said += f" ({facts})" if facts else ""
+    sentences = [f"{said}.", _SIGNS]
+    if made.envelope is not None:
+        parts = [f"{_span(getattr(made.envelope, field), factor)} {unit}" for _, field, _, unit, factor, *_ in _KNOBS]
+        top = 1e3 * made.envelope.peak_velocity_m_s[1]
+        sentences.append(
+            f"Tested at {', '.join(parts)}, up to {top:.3g} mm/s; outside, curves are dashed: nobody measured there."
+        )
+        if made.model is None:
+            sentences.append(_FUNCTIONS)
+    else:
+        sentences.append("A model without tests behind it.")
+    return sentences
+
+
+def _knobs(envelope: Envelope | None) -> list[dict[str, Any]]:
+    """Sliders that leave the tests by half on either side, and start in their middle."""
+    ranges = envelope or _UNTESTED
+    knobs = []
+    for key, field, label, unit, factor, below, above in _KNOBS:
+        low, high = (factor * bound for bound in getattr(ranges, field))
+        step = 10.0 ** math.floor(math.log10(max(high, 1e-9) / _STEPS))
+        middle = (low + high) / 2 if key == "current" else math.sqrt(low * high)
+        least, most = _on(step, below * low, 0 if key == "current" else 1), _on(step, above * high)
+        share = 100 / (most - least)
+        knobs.append(
+            {"key": key, "label": label, "unit": unit, "step": _short(step)}
+            | {"low": _short(least), "high": _short(most), "start": _short(_on(step, middle))}
+            | {"tested": [f"{share * (low - least):.4g}", f"{share * (high - low):.4g}"] if envelope else []}
+            | {"said": f"tested {_span((low, high), 1.0)} {unit}" if envelope else ""}
+        )
+    return knobs
+
+
+def _on(step: float, value: float, least: int = 0) -> float:
+    """The nearest multiple of a slider's step."""
+    return max(round(value / step), least) * step
+
+
+def _span(bounds: tuple[float, float], factor: float) -> str:
+    return "–".join(f"{factor * bound:.3g}" for bound in bounds)
+
+
+def _short(value: float) -> str:
+    return f"{value:.6g}"
