@@ -9,6 +9,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
 import pytest
+from support.browser import launched
 
 from mrdamper.data import Condition
 from mrdamper.files.dataset import load_dataset
@@ -27,3 +28,10 @@ def vectors():
 @pytest.fixture
 def condition():
     return Condition(1.0, 1.0, 0.02)
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """One browser for all tests: two drivers in one process wait for each other."""
+    with launched() as browser:
+        yield browser

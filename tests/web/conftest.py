@@ -12,12 +12,12 @@ pytest.importorskip("fastapi", reason="the web extra is not installed")
 pytest.importorskip("uvicorn", reason="the web extra is not installed")
 pytest.importorskip("plotly", reason="the web extra is not installed")
 
+from support.browser import AUDIT
+
 from mrdamper.web import create_app
 
 HOST = "bench.test:1"
 ORIGIN = f"http://{HOST}"
-CHROMIUM = Path("/usr/bin/chromium")
-AUDIT = (Path(__file__).parent / "audit.js").read_text(encoding="utf-8")
 SCREENSHOTS = Path(__file__).parents[2] / "artefacts"
 
 
@@ -73,19 +73,6 @@ def served():
     server.should_exit = True
     thread.join(timeout=10)
     listener.close()
-
-
-@pytest.fixture(scope="session")
-def browser():
-    sync = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    if not CHROMIUM.is_file():
-        pytest.skip(f"no browser at {CHROMIUM}")
-    with sync.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=str(CHROMIUM), args=["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
-        )
-        yield browser
-        browser.close()
 
 
 @pytest.fixture

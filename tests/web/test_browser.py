@@ -6,7 +6,7 @@ import zipfile
 from dataclasses import replace
 
 import pytest
-from web.conftest import AUDIT
+from support.browser import AUDIT
 from web.rig_files import csv_of
 
 from mrdamper.dampers.joint import JointProblem

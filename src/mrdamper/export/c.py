@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mrdamper.dampers.base import Damper
+from mrdamper.data import Floats
 from mrdamper.export.base import Exporter, Written, identifier, rig_of
 from mrdamper.export.c_writer import CWriter
 from mrdamper.export.templates import render
@@ -81,7 +82,10 @@ def c_facts(made: Stream, name: str, rig: str, language: type[CWriter] = CWriter
     main = language(made.step)
     drives = {quantity: language(drive, f"from_{quantity}_") for quantity, drive in made.drives.items()}
     setup, infos = main.setup(), made.model.parameters() if made.model else ()
-    derived = [("int" if e.logical else f"{name}_real", main.name(e).removeprefix(f"d{main.member}")) for e in made.step.derived]
+    derived = [
+        ("int" if e.logical else f"{name}_real", main.name(e).removeprefix(f"d{main.member}"))
+        for e in made.step.derived
+    ]
     arguments = [(f"const {name}_parameters *p", "&m->p")] if infos else []
     arguments += [(f"const {name}_derived *d", "&m->d")] if derived else []
     described = _program("model", main, made.step, [*arguments, (f"{name}_state *s", "next")])
@@ -123,9 +127,13 @@ def c_facts(made: Stream, name: str, rig: str, language: type[CWriter] = CWriter
     }
 
 
+def shared_points(tables: Sequence[Table]) -> list[Floats]:
+    """Points at the nodes (K, 4), once for the tables that read them forwards and backwards."""
+    return list({id(table.points): table.points for table in tables}.values())
+
+
 def _tables(tables: Sequence[Table], number: Callable[[float], str]) -> dict[str, Any]:
-    """Points at the nodes, shared by the tables that read them forwards and backwards."""
-    shared = list({id(table.points): table.points for table in tables}.values())
+    shared = shared_points(tables)
     return {
         "curves": [
             {

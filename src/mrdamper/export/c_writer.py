@@ -136,7 +136,10 @@ class CWriter(Writer):
         carried = [self.carry(loop, i) for i in range(len(loop.start))]
         counter = f"{carried[0]}_count"
         lines = [f"{pad}{self.counter} {counter};"]
-        lines += [f"{pad}{self.variable} {name} = {self.text(value)};" for name, value in zip(carried, loop.start, strict=True)]
+        lines += [
+            f"{pad}{self.variable} {name} = {self.text(value)};"
+            for name, value in zip(carried, loop.start, strict=True)
+        ]
         lines.append(f"{pad}for ({counter} = 0; {counter} < {loop.most}; {counter}++) {{")
         lines += self._lines(statement.body, indent + 1)
         lines.append(f"{pad}    {self.answer} going = {self.text(loop.going)};")

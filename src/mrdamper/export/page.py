@@ -12,7 +12,7 @@ import numpy as np
 
 from mrdamper.dampers.base import SLACK, Damper, Envelope
 from mrdamper.export.base import Exporter, Written, identifier, rig_of
-from mrdamper.export.c import TOLERANCE, c_facts, c_sources, reference_motion
+from mrdamper.export.c import TOLERANCE, c_facts, c_sources, reference_motion, shared_points
 from mrdamper.export.js_writer import JavaScriptWriter
 from mrdamper.export.templates import render
 from mrdamper.export.toolchain import build_webassembly
@@ -64,6 +64,7 @@ def _facts(damper: Damper | Model, made: Stream, name: str, library: bytes | Non
     envelope = made.envelope
     computed = {
         "wasm": base64.b64encode(library).decode() if library else None,
+        "curves": [_curve(points, library) for points in shared_points(made.step.tape.tables)],
         "test": _vectors(made),
         "tested": envelope and _tested(envelope),
         "slack": SLACK,
@@ -96,6 +97,13 @@ def _vectors(made: Stream) -> dict[str, Any]:
         for name, values in (("displacement", x), ("current", current), ("force", force))
     }
     return {**packed, "step": step, "tolerance": TOLERANCE}
+
+
+def _curve(points: np.ndarray, library: bytes | None) -> dict[str, Any]:
+    """A table's doubles, or where they stand in the WebAssembly binary."""
+    packed = np.ascontiguousarray(points, "<f8").tobytes()
+    at = library.find(packed) if library else -1
+    return {"size": points.size, "at": at} if at >= 0 else {"data": base64.b64encode(packed).decode()}
 
 
 def _tested(envelope: Envelope) -> list[dict[str, Any]]:

@@ -13,12 +13,12 @@ def register(app: typer.Typer) -> None:
     @app.command(epilog="Example: mrdamper export model.json --to fmu --out damper.fmu")
     def export(
         model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
-        to: str = typer.Option(..., "--to", help="c, fmu, latex, markdown, table, adams."),
-        out: Path = typer.Option(..., "--out", help="Folder to write into, or the file for fmu, latex, markdown."),
+        to: str = typer.Option(..., "--to", help="c, fmu, page, latex, markdown, table, adams."),
+        out: Path = typer.Option(..., "--out", help="Folder to write into; for fmu, page, latex, markdown a file."),
         name: str | None = typer.Option(None, "--name", help="Of files and symbols; default: the rig."),
         fmi: int | None = typer.Option(None, "--fmi", help="For fmu: version of the standard, 2 (default) or 3."),
     ) -> None:
-        """Export a saved model: C99 source, FMU, LaTeX or Markdown equations, force–velocity tables."""
+        """Export a saved model: C99 source, FMU, web page, LaTeX or Markdown equations, force–velocity tables."""
         from mrdamper.errors import InputError
         from mrdamper.export import exporter
         from mrdamper.export.base import identifier, write_export
