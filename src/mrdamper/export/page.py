@@ -122,9 +122,9 @@ def _words(damper: Damper | Model, made: Stream) -> list[str]:
     from importlib.metadata import version
 
     said = f"{made.title[:1].upper()}{made.title[1:]}, exported by mrdamper {version('mrdamper')}"
-    if isinstance(damper, Damper):
-        facts = "; ".join(f"{key}: {value}" for key, value in damper.provenance.items())
-        said += f" from a model with {damper.parameter_count} numbers determined from tests"
+    if count := getattr(damper, "parameter_count", 0):  # a bare model was determined from nothing
+        facts = "; ".join(f"{key}: {value}" for key, value in getattr(damper, "provenance", {}).items())
+        said += f" from a model with {count} numbers determined from tests"
         said += f" ({facts})" if facts else ""
     sentences = [f"{said}.", _SIGNS]
     if made.envelope is not None:
