@@ -44,3 +44,12 @@ def test_the_house_does_not_grow_again():
     assert len(house.names_at_the_top()) <= 28
     assert len(house.floors()) <= 13
     assert len(house.isinstance_over_dampers()) <= 24  # going down to none
+
+
+def test_the_page_on_the_architecture_names_every_room_on_its_floor():
+    rows = re.findall(r"^\| (`[^|]+) \|", (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8"), re.MULTILINE)
+    named = [re.findall(r"`(\w+)`", row) for row in rows]
+    assert sorted(room for row in named for room in row) == house.names_at_the_top()
+    floor = {room.strip(): i for i, layer in enumerate(house.floors()) for room in layer.split("|")}
+    order = [floor[room] for row in named for room in row]
+    assert order == sorted(order)

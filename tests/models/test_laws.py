@@ -1,9 +1,10 @@
-"""One set of laws for every model in the house; a new model only adds an example here."""
+"""One set of laws for every model in the house; a new model takes part by itself."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.models import example_values
 from support.synthetic import synthetic_run
 
 from mrdamper.data import Condition
@@ -12,24 +13,6 @@ from mrdamper.models import all_models, model_type
 from mrdamper.motion import sine
 from mrdamper.simulation import simulate, steady_loop
 
-# Parameters of a plausible damper, in each model's letters.
-EXAMPLES = {
-    "bingham": {"c": 1500.0, "fy": 700.0, "f0": 60.0},
-    "smooth-bingham": {"c": 1500.0, "fy": 700.0, "vs": 0.01, "f0": 60.0},
-    "bouc-wen": {"c": 1440.0, "alpha": 9e5, "beta": 2e5, "gamma": 2e5, "f0": 60.0, "k1": 800.0},
-    "kwok": {"c": 1500.0, "k": 800.0, "alpha": 700.0, "beta": 60.0, "delta": 0.7, "f0": 60.0},
-    "guo": {"fy": 800.0, "c": 1100.0, "kappa": 80.0, "v0": 0.012, "f0": 60.0},
-    "biviscous": {"cpo": 1200.0, "fy": 700.0, "vy": 0.02, "vh": 0.008, "f0": 60.0},
-    "dahl": {"kappa_x": 1300.0, "kappa_w": 700.0, "yield_displacement": 6e-4, "f0": 60.0},
-    "herschel-bulkley": {"fy": 500.0, "vc": 0.05, "m": 0.8, "f0": 60.0},
-    "lugre": {
-        "fc": 600.0, "presliding": 5e-4, "stribeck": 1.3, "vs": 0.01, "sigma1": 300.0, "sigma2": 900.0, "f0": 60.0,
-    },
-    "spencer": {
-        "c1": 2.6e4, "c0_ratio": 0.06, "k0_rate": 0.15, "creep": 0.03, "yield_displacement": 1e-4, "k1": 800.0,
-        "f0": 60.0,
-    },
-}  # fmt: skip
 ODD_WITHOUT = {"f0": 0.0}
 SLOW = Condition(0.5, 1.0, 0.01)
 # Models of the whole current range are identified over currents, not from one run.
@@ -38,11 +21,7 @@ PER_RUN = sorted(set(all_models()) - OVER_CURRENT)
 
 
 def example(name):
-    return model_type(name).build(EXAMPLES[name])
-
-
-def test_every_model_has_an_example():
-    assert set(EXAMPLES) == set(PER_RUN)
+    return model_type(name).build(example_values(name))
 
 
 @pytest.mark.parametrize("name", PER_RUN)
@@ -88,7 +67,7 @@ def test_a_model_is_recovered_from_its_own_force(name):
     found = identify(synthetic_run(SLOW, model=truth, samples_per_cycle=500, cycles=3), name)
     # Where the force jumps with the sign of the smoothed velocity, a sample a cycle falls on the other side.
     assert found.scores.nrmse_pp < (2e-2 if name in JUMPING else 2e-3)
-    for parameter in set(EXAMPLES[name]) - WEAK.get(name, set()):
+    for parameter in set(example_values(name)) - WEAK.get(name, set()):
         assert getattr(found.model, parameter) == pytest.approx(getattr(truth, parameter), rel=0.02, abs=0.05), (
             parameter
         )

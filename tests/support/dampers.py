@@ -1,8 +1,5 @@
 """Dampers made without identification, one for each way there is to stream and export them."""
 
-from importlib import util
-from pathlib import Path
-
 from mrdamper.dampers.base import Envelope
 from mrdamper.dampers.joint import JointDamper
 from mrdamper.dampers.modified import ModifiedModel
@@ -11,17 +8,9 @@ from mrdamper.dampers.published import conditioned_type
 from mrdamper.data import Condition
 from mrdamper.functions.forms import ParameterFunction
 from mrdamper.models import all_models, model_type
-
-_spec = util.spec_from_file_location("laws", Path(__file__).parents[1] / "models" / "test_laws.py")
-_laws = util.module_from_spec(_spec)
-_spec.loader.exec_module(_laws)
+from support.models import EXAMPLES, example_values
 
 ENVELOPE = Envelope((0.0, 1.0), (0.5, 4.0), (0.004, 0.02), (0.02, 0.3))
-PLAY = {
-    "f0": 40.0, "k": 800.0, "c0": 600.0, "c1": 3800.0, "fy0": 140.0, "fy1": 1000.0, "d": 2e-4, "e": 2.5e-5, "cb": 3.6e4,
-    "h0": 0.4, "h1": 0.3, "vh": 3e-3, "T": 5e-3,
-}  # fmt: skip
-EXAMPLES = {**_laws.EXAMPLES, "play-bypass": PLAY}
 VARIANTS = {
     "bouc-wen, gamma apart": ("bouc-wen", {**EXAMPLES["bouc-wen"], "gamma": 1e5, "m": 5.0, "k3": 1e5}),
     "bouc-wen, n = 1": ("bouc-wen", {"c": 1440.0, "alpha": 9e5, "beta": 600.0, "gamma": 900.0, "n": 1.0}),
@@ -32,8 +21,7 @@ VARIANTS = {
 
 def all_bare_models():
     """Every model of the house and some of its branches, by a name for the test's output."""
-    assert set(EXAMPLES) == set(all_models())
-    plain = {name: model_type(name).build(values) for name, values in EXAMPLES.items()}
+    plain = {name: cls.build(example_values(name)) for name, cls in all_models().items()}
     return plain | {title: model_type(name).build(values) for title, (name, values) in VARIANTS.items()}
 
 

@@ -1,0 +1,18 @@
+"""`mrdamper rigs`: the rigs of a dataset."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+
+    @app.command(epilog="Example: mrdamper rigs")
+    def rigs(data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests.")) -> None:
+        """List the rigs of a dataset."""
+        from mrdamper.files.dataset import load_dataset
+
+        print("\n".join(load_dataset(data).rigs))
