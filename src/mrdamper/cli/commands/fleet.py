@@ -1,0 +1,73 @@
+"""`mrdamper fleet`: the same study over thousands of dampers."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Optional
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+
+    @app.command(epilog="Example: mrdamper fleet records/ --out line/ --workers 8")
+    def fleet(
+        source: Path = typer.Argument(
+            ..., metavar="SRC", help="Folder of datasets or of rig files, one a damper, or a Parquet lake."
+        ),
+        out: Path = typer.Option(..., "--out", help="Folder for dampers.parquet and the journal."),
+        workers: Optional[int] = typer.Option(None, "--workers", min=1, help="Processes; default one a core."),  # noqa: UP045
+        scheduler: Optional[str] = typer.Option(  # noqa: UP045
+            None, "--scheduler", help="Address of a Dask scheduler (mrdamper cluster shows how to start one)."
+        ),
+        profile: Optional[Path] = typer.Option(  # noqa: UP045
+            None, "--profile", help="Fleet profile (TOML): where serial numbers stand, golden dampers, rig profile."
+        ),
+        model: str = typer.Option("play-bypass", "--model", help="Identified from all runs of a damper."),
+        as_json: bool = typer.Option(False, "--json", help="Print a summary a program can read."),
+    ) -> None:
+        """Identify every damper of a fleet into one table; interrupted at any moment, the same command goes on."""
+        import signal
+
+        from mrdamper.cli.progress import progress_on_stderr
+        from mrdamper.fleet.line import run_fleet
+        from mrdamper.fleet.profile import load_fleet_profile
+
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        try:
+            with progress_on_stderr() as progress:
+                found = run_fleet(
+                    source,
+                    out,
+                    profile=load_fleet_profile(profile),
+                    model=model,
+                    workers=workers or os.cpu_count() or 1,
+                    scheduler=scheduler,
+                    progress=progress,
+                )
+        except KeyboardInterrupt:
+            typer.echo("stopped; what was finished is safe: run the same command again to go on", err=True)
+            raise typer.Exit(130) from None
+        for name, status, reason in found.troubled:
+            typer.echo(f"{status}: {name}: {reason}", err=True)
+        if as_json:
+            import json
+
+            print(json.dumps(_summary(found), indent=1, ensure_ascii=False))
+        else:
+            print(f"{found.done} of {found.dampers} dampers identified ({found.already} were already)")
+            print(f"table: {found.table}")
+        if not found.done:
+            raise typer.Exit(2)
+
+
+def _summary(found) -> dict:
+    return {
+        "dampers": found.dampers,
+        "done": found.done,
+        "already": found.already,
+        "troubled": [{"name": n, "status": s, "reason": r} for n, s, r in found.troubled],
+        "table": str(found.table),
+    }

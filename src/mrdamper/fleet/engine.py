@@ -1,0 +1,124 @@
+"""Where jobs run: processes of this machine, or a Dask cluster. Both hand out futures of rows."""
+
+from __future__ import annotations
+
+import atexit
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import asdict
+from typing import Any
+
+from mrdamper.errors import InputError, MissingExtraError
+from mrdamper.fleet.guard import Guard, JobError, Limits
+
+Row = dict[str, Any]
+Submit = Callable[[Row], "Future[Row]"]
+_ATTEMPT = "mrdamper.fleet.job:attempt"
+_LOST_TRIES = 8  # of a job whose cluster worker was killed
+
+
+class ClusterError(InputError):
+    """The cluster cannot be reached, or was lost."""
+
+    code = "E_CLUSTER"
+
+
+@contextmanager
+def local_engine(workers: int, limits: Limits) -> Iterator[tuple[Submit, int]]:
+    """Jobs on this machine, each worker a process that can be killed; no socket listens.
+
+    Yields
+    ------
+    submit : callable
+        Takes the argument of a job, returns the future of its row.
+    slots : int
+        Jobs that run at once.
+    """
+    held = threading.local()
+    guards: list[Guard] = []
+
+    def begin() -> None:
+        held.guard = Guard(limits)
+        guards.append(held.guard)
+
+    pool = ThreadPoolExecutor(workers, thread_name_prefix="fleet", initializer=begin)
+    try:
+        yield lambda job: pool.submit(lambda: guarded(held.guard, job)), workers
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for guard in guards:
+            guard.close()
+        pool.shutdown(wait=True)
+
+
+def guarded(guard: Guard, job: Row) -> Row:
+    """The row of a job that is run under a guard, whatever becomes of it."""
+    from mrdamper.fleet.job import refused
+
+    try:
+        return guard.call(_ATTEMPT, job)
+    except JobError as error:
+        return refused(error)
+
+
+@contextmanager
+def cluster_engine(
+    address: str, limits: Limits, security: dict[str, str] | None = None
+) -> Iterator[tuple[Submit, int]]:
+    """Jobs on a Dask cluster, each in a process that can be killed beside its worker; yields as `local_engine`.
+
+    Raises
+    ------
+    MissingExtraError
+        If Dask is not installed.
+    ClusterError
+        If no scheduler answers there, or it has no worker.
+    """
+    try:
+        import distributed
+    except ModuleNotFoundError as error:
+        raise MissingExtraError("Dask is not installed", mend="pip install 'mrdamper[fleet]'") from error
+    options: dict[str, Any] = {}
+    if security:
+        options["security"] = distributed.Security(require_encryption=True, **security)
+    try:
+        client = distributed.Client(address, timeout=10, set_as_default=False, **options)
+    except (OSError, TypeError, ValueError, RuntimeError) as error:
+        raise ClusterError(
+            f"no scheduler answers: {_first_line(error)}", where=address,
+            mend="mrdamper cluster shows how to start one",
+        ) from error  # fmt: skip
+    try:
+        slots = sum(
+            client.scheduler_info(n_workers=-1)["workers"][w]["nthreads"]
+            for w in client.scheduler_info(n_workers=-1)["workers"]
+        )
+        if not slots:
+            raise ClusterError(
+                "the cluster has no worker", where=address, mend="mrdamper cluster shows how to start one"
+            )
+        executor: Executor = client.get_executor(pure=False, retries=_LOST_TRIES)
+        yield lambda job: executor.submit(on_cluster, job, asdict(limits)), slots
+    finally:
+        client.close(timeout=5)
+
+
+_HELD = threading.local()
+
+
+def on_cluster(job: Row, limits: dict[str, Any]) -> Row:
+    """A job on a worker of the cluster; each of its threads keeps a process of its own."""
+    guard: Guard | None = getattr(_HELD, "guard", None)
+    if guard is None or _HELD.limits != limits:
+        if guard is not None:
+            guard.close()
+        _HELD.limits, _HELD.guard = limits, Guard(Limits(**limits))
+        atexit.register(_HELD.guard.close)
+        guard = _HELD.guard
+    return guarded(guard, job)
+
+
+def _first_line(error: BaseException) -> str:
+    return (str(error) or type(error).__name__).strip().splitlines()[0]

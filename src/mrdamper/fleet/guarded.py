@@ -1,0 +1,113 @@
+"""The child of `guard`: runs jobs that may not survive it."""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import importlib
+import json
+import os
+import queue
+import signal
+import sys
+import threading
+import traceback
+from pathlib import Path
+from typing import Any
+
+from mrdamper.errors import InputError
+from mrdamper.fleet.guard import descendants
+
+_LEFT = 256 * 2**20  # bytes that jobs may leave behind before a fresh process takes over
+_LINES = 12  # of a traceback that an answer carries
+
+
+def serve() -> None:
+    """Answer requests until the parent hangs up or dies."""
+    replies = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what libraries print must not come between the answers
+    _adopt_orphans()
+    requests: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    threading.Thread(target=_listen, args=(requests,), daemon=True).start()
+    own, first = os.getpid(), None
+    while True:
+        request = json.loads(requests.get())
+        answer = _answer(request)
+        if os.getpid() != own:
+            os._exit(0)  # a fork of a job that came back: it has no say here
+        held = _written()
+        first = held if first is None else first
+        answer["spent"] = held - first > _LEFT or bool(_strangers())
+        replies.write(json.dumps(answer).encode() + b"\n")
+        replies.flush()
+
+
+def _listen(requests: queue.SimpleQueue[bytes]) -> None:
+    for line in sys.stdin.buffer:
+        requests.put(line)
+    for pid in descendants(os.getpid()):
+        with contextlib.suppress(OSError):
+            os.kill(pid, signal.SIGKILL)
+    os._exit(0)
+
+
+def _answer(request: dict[str, Any]) -> dict[str, Any]:
+    module, _, name = request["call"].partition(":")
+    limits = request["limits"]
+    try:
+        function = getattr(importlib.import_module(module), name)
+        _limit(limits["cpu_s"], limits["memory_bytes"])
+        try:
+            return {"result": function(request["argument"])}
+        finally:
+            _limit(None, None)
+    except InputError as error:
+        return {"code": error.code, "found": error.found, "where": error.where, "mend": error.mend}
+    except MemoryError:
+        gc.collect()
+        return {"code": "E_JOB_MEMORY", "found": f"over {limits['memory_bytes'] / 2**30:.3g} GiB of memory"}
+    except Exception:
+        text = "".join(traceback.format_exc().splitlines(keepends=True)[-_LINES:])
+        return {"code": "E_JOB_FAULT", "found": text.strip(), "mend": "this is our fault, not yours; please report it"}
+
+
+def _limit(seconds: float | None, size: int | None) -> None:
+    """From here on, this much processor time and memory that is written to; None lifts the limits.
+
+    Over its processor time the system ends the process, whatever library it is in.
+    """
+    if sys.platform == "win32":
+        return
+    import resource
+
+    used = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
+    until = None if seconds is None else int(used + seconds) + 1
+    for what, most in ((resource.RLIMIT_CPU, until), (resource.RLIMIT_DATA, size)):
+        hard = resource.getrlimit(what)[1]
+        resource.setrlimit(what, (hard if most is None else most, hard))
+
+
+def _written() -> int:
+    """Memory this process may write to [bytes]; 0 where the system does not tell."""
+    status = Path("/proc/self/status")
+    if not status.exists():
+        return 0
+    return next((int(line.split()[1]) * 1024 for line in status.read_text().splitlines() if "VmData" in line), 0)
+
+
+def _strangers() -> list[int]:
+    """Processes a job left behind; the one that reads rig files belongs to the house."""
+    found = []
+    for pid in descendants(os.getpid()):
+        with contextlib.suppress(OSError):
+            if b"sandbox_worker" not in Path(f"/proc/{pid}/cmdline").read_bytes():
+                found.append(pid)
+    return found
+
+
+def _adopt_orphans() -> None:
+    """Have processes whose parent ended reported as children here, on Linux."""
+    if sys.platform == "linux":
+        import ctypes
+
+        ctypes.CDLL(None).prctl(36, 1, 0, 0, 0)  # PR_SET_CHILD_SUBREAPER

@@ -1,0 +1,243 @@
+"""The dampers of a fleet: what lies in a folder of datasets, of rig files, or in a Parquet lake."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from mrdamper.errors import InputError
+from mrdamper.files.dataset import SAMPLE_FILES
+from mrdamper.fleet.profile import FleetProfile
+
+Kind = Literal["dataset", "rig files", "lake"]
+
+
+class FleetError(InputError):
+    """A fleet cannot be read, or a damper of it cannot be used; the code says why."""
+
+    code = "E_FLEET"
+
+
+@dataclass(frozen=True)
+class Item:
+    """One damper of one session: where its records lie.
+
+    Attributes
+    ----------
+    serial, session : str
+        Together they name it; a golden damper comes again in other sessions.
+    batch, date : str
+        Empty where nothing states them.
+    golden : bool
+        Tested again and again to watch the rig.
+    kind : "dataset", "rig files" or "lake"
+    paths : tuple of str
+        The dataset folder, the rig files, or the lake's files.
+    rows : tuple of (int, int)
+        Of a lake: first row and number of rows in each file.
+    column : str
+        Column that holds the serial number, where one table holds several dampers.
+    error : InputError, optional
+        Why it cannot be used, known before it is read.
+    """
+
+    serial: str
+    session: str = ""
+    batch: str = ""
+    date: str = ""
+    golden: bool = False
+    kind: Kind = "dataset"
+    paths: tuple[str, ...] = ()
+    rows: tuple[tuple[int, int], ...] = ()
+    column: str = ""
+    error: InputError | None = None
+
+    @property
+    def name(self) -> str:
+        """Serial number, and the session where one is stated."""
+        return f"{self.serial}, session {self.session}" if self.session else self.serial
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What the tables say of it whatever its records hold."""
+        return {k: v for k, v in asdict(replace(self, error=None)).items() if k in _FACTS}
+
+
+_FACTS = ("serial", "session", "batch", "date", "golden")
+
+
+def find_items(source: str | Path, profile: FleetProfile) -> list[Item]:
+    """The dampers of a source, sorted by serial number and session.
+
+    Parameters
+    ----------
+    source : path
+        A folder of dataset folders, of folders of rig files or of rig files, a dataset folder, or
+        a Parquet lake (a file, or a folder of such files) with a column for the serial number.
+    profile : FleetProfile
+
+    Raises
+    ------
+    FleetError
+        E_FLEET_EMPTY if there is no damper in it.
+    """
+    source = Path(source)
+    if not source.exists():
+        raise FleetError("no such folder", where=str(source), mend="give a folder of datasets", code="E_FLEET_EMPTY")
+    from mrdamper.fleet.lake import is_lake, lake_items
+
+    lake = sorted(source.rglob("*.parquet")) if source.is_dir() else [source]
+    lake = [path for path in lake if path.name not in SAMPLE_FILES]
+    if lake and is_lake(lake, profile):
+        found = lake_items(lake, profile)
+    elif source.is_dir():
+        found = list(_in_folder(source, profile))
+    else:
+        raise FleetError(
+            "neither a folder nor a Parquet file with a serial number", where=str(source), mend="give a folder",
+            code="E_FLEET_EMPTY",
+        )  # fmt: skip
+    if not found:
+        raise FleetError(
+            "no damper in this folder", where=str(source), code="E_FLEET_EMPTY",
+            mend="a fleet is a folder of dataset folders, of rig files, or a Parquet lake",
+        )  # fmt: skip
+    return _without_twins(sorted(found, key=lambda item: (item.serial, item.session, item.paths)))
+
+
+def digest_of(item: Item) -> str:
+    """Hash of the bytes of an item's files, and of what names the damper in them."""
+    total = hashlib.blake2b(digest_size=20)
+    for path in _files(item):
+        total.update(f"{path.name}\0{path.stat().st_size}\0".encode())
+        with path.open("rb") as file:
+            while piece := file.read(2**20):
+                total.update(piece)
+    total.update(repr(sorted(item.facts.items())).encode())
+    total.update(repr((item.rows, item.column)).encode())
+    return total.hexdigest()
+
+
+def _files(item: Item) -> list[Path]:
+    if item.kind == "dataset":
+        folder = Path(item.paths[0])
+        return [folder / name for name in ("runs.csv", *SAMPLE_FILES) if (folder / name).is_file()]
+    return [Path(path) for path in item.paths]
+
+
+def _in_folder(folder: Path, profile: FleetProfile) -> Iterator[Item]:
+    from mrdamper.rig_files.readers import suffixes
+
+    if (folder / "runs.csv").is_file():
+        yield from _of_dataset(folder, profile)
+        return
+    known = suffixes()
+    loose: list[Path] = []
+    for path in sorted(folder.iterdir()):
+        if path.name.startswith("."):
+            continue
+        if path.is_dir() and (path / "runs.csv").is_file():
+            yield from _of_dataset(path, profile)
+        elif path.is_dir():
+            inside = [p for p in sorted(path.rglob("*")) if p.is_file() and p.suffix.lower() in known]
+            yield _named(path.name, profile, "rig files", tuple(map(str, inside)), path)
+        elif path.suffix.lower() in known:
+            loose.append(path)
+    yield from _of_loose_files(loose, profile)
+
+
+def _of_loose_files(paths: Sequence[Path], profile: FleetProfile) -> Iterator[Item]:
+    """Files whose names state the same serial number and session are one damper's."""
+    groups: dict[Item, list[str]] = {}
+    for path in paths:
+        stem = path.name.split(".")[0]
+        item = _named(stem, profile, "rig files", (str(path),), path)
+        if item.error is not None:
+            yield item
+        else:
+            groups.setdefault(replace(item, paths=()), []).append(str(path))
+    for item, files in groups.items():
+        yield replace(item, paths=tuple(files))
+
+
+def _named(name: str, profile: FleetProfile, kind: Kind, paths: tuple[str, ...], where: Path) -> Item:
+    facts = profile.of_name(name)
+    if facts is None:
+        error = FleetError(
+            f"the name does not follow the pattern {profile.names!r}", where=str(where), code="E_FLEET_NAME",
+            mend="rename it, or correct names in the fleet profile",
+        )  # fmt: skip
+        return Item(name, kind=kind, paths=paths, error=error)
+    item = make_item(facts, profile, kind=kind, paths=paths)
+    if not paths:
+        error = FleetError("no rig's file in this folder", where=str(where), mend="add them", code="E_NO_DATA")
+        return replace(item, error=error)
+    return item
+
+
+def _of_dataset(folder: Path, profile: FleetProfile) -> Iterator[Item]:
+    """The dampers of a dataset folder: one, unless a column names several."""
+    named = _named(folder.name, profile, "dataset", (str(folder),), folder)
+    try:
+        with (folder / "runs.csv").open(encoding="utf-8-sig", newline="") as file:
+            rows = [profile.of_columns(row) for row in csv.DictReader(file)]
+    except (OSError, UnicodeDecodeError, csv.Error):
+        rows = []  # the study of this damper says what is wrong with the file
+    serials = {row["serial"] for row in rows if "serial" in row}
+    if not serials and named.error is not None:
+        yield named
+        return
+    known = profile.of_name(folder.name) or {}
+    for serial in sorted(serials) or [named.serial]:
+        facts = dict(known)
+        for row in reversed([row for row in rows if row.get("serial", serial) == serial]):
+            facts.update(row)
+        column = _serial_column(folder, profile) if len(serials) > 1 else ""
+        yield make_item({**facts, "serial": serial}, profile, paths=(str(folder),), column=column)
+
+
+def _serial_column(folder: Path, profile: FleetProfile) -> str:
+    from mrdamper.fleet.profile import COLUMNS
+
+    with (folder / "runs.csv").open(encoding="utf-8-sig", newline="") as file:
+        names = next(csv.reader(file))
+    wanted = (profile.columns["serial"],) if "serial" in profile.columns else COLUMNS["serial"]
+    return next(name for name in wanted if name in names)
+
+
+def make_item(facts: dict[str, str], profile: FleetProfile, **where: Any) -> Item:
+    """An item from what names or columns state; without a session, its date is one."""
+    facts = {k: v for k, v in facts.items() if v is not None}
+    date = facts.get("date", "")
+    return Item(
+        serial=facts["serial"],
+        session=facts.get("session", date),
+        batch=facts.get("batch", ""),
+        date=date,
+        golden=profile.is_golden(facts),
+        **where,
+    )
+
+
+def _without_twins(items: Sequence[Item]) -> list[Item]:
+    """Two records of one serial number in one session: which is right nobody knows, so neither is used."""
+    seen: dict[tuple[str, str], list[Item]] = {}
+    for item in items:
+        seen.setdefault((item.serial, item.session), []).append(item)
+    checked = []
+    for twins in seen.values():
+        for item in twins:
+            if len(twins) > 1 and item.error is None:
+                others = ", ".join(sorted(Path(p).name for t in twins for p in t.paths[:1]))
+                error = FleetError(
+                    f"{len(twins)} datasets have serial number {item.name}: {others}",
+                    where=item.paths[0], code="E_FLEET_SERIAL",
+                    mend="remove or rename all but one, or state the session of each",
+                )  # fmt: skip
+                item = replace(item, error=error)
+            checked.append(item)
+    return checked

@@ -1,0 +1,145 @@
+"""A Parquet lake: many dampers in one file or a folder of files, one row a sample."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mrdamper.data import Dataset, Run
+from mrdamper.errors import ColumnError, UnitError
+from mrdamper.fleet.items import FleetError, Item, make_item
+from mrdamper.fleet.profile import COLUMNS, FACTS, FleetProfile
+
+if TYPE_CHECKING:
+    import polars as pl
+
+_NEEDED = ("run_id", "time_s", "displacement_m", "force_N", "current_A")
+
+
+def is_lake(paths: Sequence[Path], profile: FleetProfile) -> bool:
+    """Whether the first readable of these files has a column for the serial number."""
+    for path in paths:
+        names = _columns(path)
+        if names is not None:
+            return _column_of("serial", names, profile) is not None
+    return False
+
+
+def lake_items(paths: Sequence[Path], profile: FleetProfile) -> list[Item]:
+    """The dampers of a lake, each with the rows it occupies in every file.
+
+    A file that cannot be read, or lacks a column, becomes an item with the error; the others go on.
+    """
+    import polars as pl
+
+    found: dict[Item, list[tuple[str, tuple[int, int]]]] = {}
+    refused = []
+    for path in paths:
+        names = _columns(path)
+        error = _refusal(path, names, profile)
+        if names is None or error is not None:
+            refused.append(Item(path.stem, kind="lake", paths=(str(path),), error=error))
+            continue
+        columns = {fact: c for fact in FACTS if (c := _column_of(fact, names, profile)) is not None}
+        keys = [pl.col(column).cast(pl.String).alias(fact) for fact, column in columns.items()]
+        table = pl.scan_parquet(path, hive_partitioning=False).select(keys).with_row_index("row")
+        table = table.group_by(list(columns)).agg(pl.min("row").alias("first"), pl.max("row").alias("last")).collect()
+        for row in table.sort(list(columns)).iter_rows(named=True):
+            first, last = row.pop("first"), row.pop("last")
+            if row["serial"] is None:
+                error = FleetError(
+                    "rows without a serial number", where=str(path), mend="fill it in", code="E_FLEET_NAME"
+                )
+                refused.append(Item(path.stem, kind="lake", paths=(str(path),), error=error))
+                continue
+            item = make_item(row, profile, kind="lake", column=columns["serial"])
+            found.setdefault(item, []).append((str(path), (int(first), int(last - first + 1))))
+    items = []
+    for item, places in found.items():
+        items.append(replace(item, paths=tuple(p for p, _ in places), rows=tuple(r for _, r in places)))
+    return items + refused
+
+
+def lake_dataset(item: Item) -> Dataset:
+    """The records of one damper of a lake.
+
+    Raises
+    ------
+    ColumnError, RunError, TimeOrderError, NonFiniteError
+        If the channels of a run do not fit together.
+    """
+    import polars as pl
+
+    parts = []
+    for path, (first, count) in zip(item.paths, item.rows, strict=True):
+        part = pl.scan_parquet(path, hive_partitioning=False).slice(first, count)
+        wanted = pl.col(item.column).cast(pl.String) == item.serial
+        for fact in ("session", "date"):  # a golden damper comes again
+            column = next((c for c in COLUMNS[fact] if c in part.collect_schema().names()), None)
+            if column is not None and getattr(item, fact):
+                wanted &= pl.col(column).cast(pl.String) == getattr(item, fact)
+        parts.append(part.filter(wanted).collect())
+    table = pl.concat(parts, how="diagonal_relaxed")
+    runs = [_run(rows) for rows in table.partition_by("run_id", maintain_order=True)]
+    return Dataset(tuple(runs), item.serial)
+
+
+def _run(rows: pl.DataFrame) -> Run:
+    first = rows.row(0, named=True)
+    where = f"run {first['run_id']}"
+    channels = {}
+    for name in (*_NEEDED[1:], "velocity_m_s"):
+        if name in rows.columns and rows[name].null_count() < rows.height:
+            if not rows[name].dtype.is_numeric():
+                raise ColumnError(f"column {name} holds text", where=where, mend="write plain numbers")
+            channels[name] = np.array(rows[name].cast(float).to_numpy())
+    if "current_A" not in channels:
+        raise ColumnError("no current_A", where=where, mend="fill in the column current_A")
+    start, end = first.get("steady_t0_s"), first.get("steady_t1_s")
+    return Run(
+        id=str(first["run_id"]),
+        time=channels["time_s"],
+        displacement=channels["displacement_m"],
+        force=channels["force_N"],
+        current=channels["current_A"],
+        velocity=channels.get("velocity_m_s"),
+        rig=str(first.get("rig") or ""),
+        excitation=str(first.get("excitation") or "sine"),
+        split=str(first.get("split") or "train"),  # type: ignore[arg-type]
+        window=None if start is None or end is None else (float(start), float(end)),
+    )
+
+
+def _columns(path: Path) -> list[str] | None:
+    import polars as pl
+
+    try:
+        return [*pl.read_parquet_schema(path)]
+    except (pl.exceptions.PolarsError, OSError):
+        return None
+
+
+def _column_of(fact: str, names: Sequence[str], profile: FleetProfile) -> str | None:
+    wanted = (profile.columns[fact],) if fact in profile.columns else COLUMNS[fact]
+    return next((name for name in wanted if name in names), None)
+
+
+def _refusal(path: Path, names: Sequence[str] | None, profile: FleetProfile) -> FleetError | ColumnError | None:
+    if names is None:
+        return FleetError("no Parquet file", where=str(path), mend="write it again", code="E_FORMAT")
+    if _column_of("serial", names, profile) is None:
+        return ColumnError("no column for the serial number", where=str(path), mend="add a column serial")
+    missing = [name for name in _NEEDED if name not in names]
+    if not missing:
+        return None
+    quantity = missing[0].split("_")[0]
+    for other in names:
+        if other.lower().startswith(quantity + "_"):
+            return UnitError(  # type: ignore[return-value]
+                f"column {other!r} where {missing[0]!r} is expected", where=str(path), mend="convert it to SI"
+            )
+    return ColumnError(f"column {missing[0]} is missing", where=str(path), mend="add it to this file")

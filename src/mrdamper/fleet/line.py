@@ -1,0 +1,261 @@
+"""A fleet from its records to its table: find the dampers, make the plan, measure what is not yet in the journal."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import socket
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from mrdamper.errors import InputError
+from mrdamper.files.atomic import require_writable
+from mrdamper.fleet.engine import Submit, cluster_engine, local_engine
+from mrdamper.fleet.guard import Limits
+from mrdamper.fleet.items import Item, digest_of, find_items
+from mrdamper.fleet.job import Plan, Settings, as_job, make_plan, refused
+from mrdamper.fleet.journal import FORMAT, Journal
+from mrdamper.fleet.profile import FleetProfile
+from mrdamper.fleet.table import write_table
+from mrdamper.models import model_type
+
+Progress = Callable[[str, float], None]
+REFERENCES = 15  # dampers that make the plan
+_AHEAD = 2  # jobs that wait for each that runs
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """What came of a fleet.
+
+    Attributes
+    ----------
+    table : Path
+        `dampers.parquet`.
+    dampers, done, already : int
+        In the source; identified; of those, found in the journal.
+    troubled : tuple of (name, status, reason)
+        Dampers that were refused or whose job failed.
+    plan : Plan, optional
+        None if no damper could be identified.
+    """
+
+    table: Path
+    dampers: int
+    done: int
+    already: int
+    troubled: tuple[tuple[str, str, str], ...]
+    plan: Plan | None
+
+
+def run_fleet(
+    source: str | Path,
+    out: str | Path,
+    *,
+    profile: FleetProfile | None = None,
+    model: str = "play-bypass",
+    workers: int = 1,
+    scheduler: str | None = None,
+    security: dict[str, str] | None = None,
+    limits: Limits | None = None,
+    progress: Progress = lambda what, share: None,
+) -> Fleet:
+    """Identify every damper of a source that is not yet in the journal of `out`, and write the table.
+
+    The table holds the same bits for any number of workers, here or on a cluster, in one go or
+    after any interruption, apart from columns whose names say that they hold times or a host.
+
+    Parameters
+    ----------
+    source : path
+        As `find_items`.
+    out : path
+        Folder of the journal and the table.
+    profile : FleetProfile, optional
+    model : str
+        Identified jointly from all runs of a damper.
+    workers : int
+        Processes on this machine.
+    scheduler : str, optional
+        Address of a Dask scheduler; its workers have to see `source` under the same path.
+    security : dict, optional
+        tls_ca_file, tls_client_cert, tls_client_key of a tls:// scheduler.
+    limits : Limits, optional
+        Of one damper's job.
+    progress : callable
+
+    Raises
+    ------
+    FleetError, ProfileError, UnknownNameError
+        If the source holds no damper, or the profile or the model cannot be used.
+    JournalError
+        If another process writes to `out`, or its journal cannot be used.
+    OutputError
+        If `out` cannot be written to, or the disk is full; what was finished is safe.
+    ClusterError, MissingExtraError
+        If the cluster cannot be reached.
+    """
+    out = Path(out).absolute()
+    parameters = [info.name for info in model_type(model).parameters()]
+    require_writable(out)
+    profile = profile or FleetProfile()
+    items = [_absolute(item) for item in find_items(source, profile)]
+    settings = Settings(model, "" if profile.rig is None else Path(profile.rig).read_text(encoding="utf-8-sig"))
+    journal = Journal(out)
+    try:
+        line = _Line(items, settings, journal, progress)
+        engine = cluster_engine(scheduler, limits or Limits(), security) if scheduler else local_engine(
+            workers, limits or Limits()
+        )  # fmt: skip
+        with engine as (submit, slots):
+            line.run(submit, slots)
+        table = out / "dampers.parquet"
+        write_table(line.rows(), parameters, table)
+        return line.result(table)
+    finally:
+        journal.close()
+
+
+class _Line:
+    """The dampers of one run, their keys, and what is still to do."""
+
+    def __init__(self, items: Sequence[Item], settings: Settings, journal: Journal, progress: Progress):
+        self._items, self._settings, self._journal, self._progress = items, settings, journal, progress
+        self._plan: Plan | None = None
+        self._digests: dict[int, str] = {}
+        self._failed: dict[int, dict[str, Any]] = {}  # of this run: done again by the next
+        self._already = 0
+
+    def run(self, submit: Submit, slots: int) -> None:
+        for number, item in enumerate(self._items):
+            if item.error is None:
+                try:
+                    self._digests[number] = digest_of(item)
+                except OSError as error:
+                    self._failed[number] = _unreadable(item, error)
+            if number % 100 == 0:
+                self._progress(f"reading {len(self._items)} dampers", 0.0)
+        self._make_plan(submit, slots)
+        if self._plan is not None:
+            self._measure(list(self._digests), self._plan, submit, slots, count=True)
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """One row a damper, in the order of serial numbers and sessions."""
+        for number, item in enumerate(self._items):
+            yield {**item.facts, **self._row(number)}
+
+    def result(self, table: Path) -> Fleet:
+        troubled, done = [], 0
+        for row, item in zip(self.rows(), self._items, strict=True):
+            if row["status"] == "done":
+                done += 1
+            else:
+                troubled.append((item.name, row["status"], row["reason"]))
+        return Fleet(table, len(self._items), done, self._already, tuple(troubled), self._plan)
+
+    def _row(self, number: int) -> dict[str, Any]:
+        error = self._items[number].error
+        if error is not None:
+            return refused(error)
+        if number in self._failed:
+            return self._failed[number]
+        for plan in (self._plan, None):
+            row = self._journal.result(self._key(number, plan))
+            if row is not None:
+                return row
+        raise AssertionError(f"no row for {self._items[number].name}")
+
+    def _make_plan(self, submit: Submit, slots: int) -> None:
+        """From the first dampers that can be identified, in an order that their names alone decide."""
+        key = _hash("plan", asdict(self._settings), version("mrdamper"), FORMAT)
+        kept = self._journal.plan(key)
+        if kept is not None:
+            self._plan = Plan(**{k: _deep_tuple(v) for k, v in kept.items()})
+            return
+        order = sorted(self._digests, key=lambda n: _hash(self._items[n].serial, self._items[n].session))
+        found: dict[str, dict[str, Any]] = {}
+        for begin in range(0, len(order), REFERENCES):
+            some = order[begin : begin + REFERENCES]
+            self._measure(some, None, submit, slots)
+            for number in some:
+                row = self._row(number)
+                if row["status"] == "done" and len(found) < REFERENCES:
+                    found[self._items[number].name] = row
+            if len(found) >= REFERENCES:
+                break
+        if found:
+            self._plan = make_plan(found)
+            self._journal.keep_plan(key, asdict(self._plan))
+
+    def _measure(
+        self, numbers: Sequence[int], plan: Plan | None, submit: Submit, slots: int, count: bool = False
+    ) -> None:
+        """Run the jobs whose rows are not in the journal; what is finished together is kept together."""
+        waiting = [n for n in numbers if n not in self._failed and not self._is_kept(n, plan)]
+        if count:
+            self._already = len(numbers) - len(waiting)
+        running: dict[Future[dict[str, Any]], int] = {}
+        todo, done, begin = iter(waiting), 0, time.monotonic()
+        while True:
+            while len(running) < _AHEAD * slots and (number := next(todo, None)) is not None:
+                job = as_job(self._items[number], self._digests[number], self._settings, plan)
+                running[submit(job)] = number
+            if not running:
+                return
+            finished = wait(running, return_when=FIRST_COMPLETED).done
+            self._keep([(running.pop(future), future.result()) for future in finished], plan)
+            done += len(finished)
+            self._progress(*_pace(done, len(waiting), time.monotonic() - begin, plan is None))
+
+    def _is_kept(self, number: int, plan: Plan | None) -> bool:
+        if self._journal.result(self._key(number, plan)) is not None:
+            return True
+        if plan is None:
+            return False
+        first = self._journal.result(self._key(number, None))  # refused records stay refused
+        return first is not None and first["status"] == "refused"
+
+    def _keep(self, rows: Iterable[tuple[int, dict[str, Any]]], plan: Plan | None) -> None:
+        good = []
+        for number, row in rows:
+            stamp = datetime.now(UTC).isoformat(timespec="seconds")
+            row = {**row, "finished_time_utc": stamp, "host_name": row.get("host_name", socket.gethostname())}
+            if row["status"] == "failed":
+                self._failed[number] = row
+            else:
+                good.append((self._key(number, plan), row))
+        self._journal.keep(good)
+
+    def _key(self, number: int, plan: Plan | None) -> str:
+        about = None if plan is None else asdict(plan)
+        return _hash(self._digests[number], asdict(self._settings), version("mrdamper"), FORMAT, about)
+
+
+def _pace(done: int, total: int, seconds: float, reference: bool) -> tuple[str, float]:
+    rate = done / max(seconds, 1e-9)
+    left = (total - done) / rate
+    time_left = f"{left / 3600:.1f} h" if left >= 3600 else f"{left / 60:.0f} min" if left >= 60 else f"{left:.0f} s"
+    what = "reference dampers" if reference else "dampers"
+    return f"{done} of {total} {what}, {rate:.3g} a second, {time_left} left", done / total
+
+
+def _absolute(item: Item) -> Item:
+    return replace(item, paths=tuple(str(Path(path).absolute()) for path in item.paths))
+
+
+def _unreadable(item: Item, error: OSError) -> dict[str, Any]:
+    return refused(InputError(error.strerror or str(error), where=item.paths[0], mend="mend the file or its rights"))
+
+
+def _deep_tuple(value: Any) -> Any:
+    return tuple(map(_deep_tuple, value)) if isinstance(value, list) else value
+
+
+def _hash(*parts: Any) -> str:
+    return hashlib.blake2b(json.dumps(parts, sort_keys=True).encode(), digest_size=20).hexdigest()

@@ -1,0 +1,166 @@
+"""What a fleet's folders and tables do not say: where serial numbers stand, which dampers are golden, the limits."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from functools import cached_property
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from mrdamper.errors import InputError
+from mrdamper.rig_files.profile import ProfileError
+
+FACTS = ("serial", "session", "batch", "date", "golden")
+COLUMNS: dict[str, tuple[str, ...]] = {
+    "serial": ("serial", "serial_number", "serial_no", "sn"),
+    "session": ("session", "session_id"),
+    "batch": ("batch", "lot"),
+    "date": ("date", "tested_at", "recorded_at"),
+    "golden": ("golden",),
+}
+_TRUE = ("true", "yes", "1")
+T = TypeVar("T", bound=BaseModel)
+
+
+class LimitsError(InputError):
+    """A limits file cannot be read, or a limit is impossible."""
+
+    code = "E_LIMITS"
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class FleetProfile(_Table):
+    """The fleet profile, a TOML file; every key may be left out.
+
+    Attributes
+    ----------
+    names : str, optional
+        Pattern of the names of folders or files: {serial}, {session}, {batch}, {date}, and * for
+        anything: "{batch}_{serial}_*".
+    columns : mapping
+        Column of `runs.csv` or of the lake by fact: serial = "SN".
+    golden : tuple of str
+        Serial numbers of the dampers that are tested again and again to watch the rig.
+    rig : str, optional
+        Rig profile for rig files, relative to this file.
+    """
+
+    names: str | None = None
+    columns: dict[str, str] = Field(default_factory=dict)
+    golden: tuple[str, ...] = ()
+    rig: str | None = None
+
+    @field_validator("columns")
+    @classmethod
+    def _facts_exist(cls, columns: dict[str, str]) -> dict[str, str]:
+        for name in columns:
+            if name not in FACTS:
+                raise ValueError(f"no fact is called {name!r}; known: {', '.join(FACTS)}")
+        return columns
+
+    @field_validator("names")
+    @classmethod
+    def _pattern_names_the_serial(cls, names: str | None) -> str | None:
+        if names is not None:
+            found = re.findall(r"\{(\w*)\}", names)
+            if "serial" not in found or len(set(found)) < len(found) or not set(found) <= set(FACTS):
+                raise ValueError(f"a pattern needs {{serial}}, and each of {', '.join(FACTS)} at most once")
+        return names
+
+    @cached_property
+    def _expression(self) -> re.Pattern[str] | None:
+        if self.names is None:
+            return None
+        parts = re.split(r"(\{\w+\}|\*)", self.names)
+        inner = "".join(
+            ".*?" if p == "*" else f"(?P<{p[1:-1]}>[^_]+?)" if p.startswith("{") else re.escape(p) for p in parts
+        )
+        return re.compile(inner)
+
+    def of_name(self, name: str) -> dict[str, str] | None:
+        """The facts a name states; None if the pattern does not fit it."""
+        if self._expression is None:
+            return {"serial": name}
+        match = self._expression.fullmatch(name)
+        return None if match is None else match.groupdict()
+
+    def of_columns(self, row: dict[str, Any]) -> dict[str, str]:
+        """The facts a row of a table states; empty cells state nothing."""
+        found = {}
+        for fact in FACTS:
+            for column in (self.columns[fact],) if fact in self.columns else COLUMNS[fact]:
+                if str(row.get(column) if row.get(column) is not None else "").strip():
+                    found[fact] = str(row[column]).strip()
+                    break
+        return found
+
+    def is_golden(self, facts: dict[str, str]) -> bool:
+        """Whether a damper is one that watches the rig."""
+        return facts["serial"] in self.golden or facts.get("golden", "").lower() in _TRUE
+
+
+class Limit(_Table):
+    """Lowest and highest allowed value of a column; one of them may be left out."""
+
+    lower: float | None = Field(default=None, allow_inf_nan=False)
+    upper: float | None = Field(default=None, allow_inf_nan=False)
+
+    @model_validator(mode="after")
+    def _lower_lies_below(self) -> Limit:
+        if self.lower is None and self.upper is None:
+            raise ValueError("give lower, upper or both")
+        if self.lower is not None and self.upper is not None and self.lower >= self.upper:
+            raise ValueError(f"lower {self.lower:g} is not below upper {self.upper:g}")
+        return self
+
+
+class _Limits(_Table):
+    limits: dict[str, Limit]
+
+
+def load_fleet_profile(path: str | Path | None) -> FleetProfile:
+    """Read a fleet profile; without a path, the one that says nothing.
+
+    Raises
+    ------
+    ProfileError
+        If it is no TOML, or a key or value is not known.
+    """
+    if path is None:
+        return FleetProfile()
+    profile = _read(Path(path), FleetProfile, ProfileError)
+    if profile.rig is None:
+        return profile
+    return profile.model_copy(update={"rig": str(Path(path).absolute().parent / profile.rig)})
+
+
+def load_limits(path: str | Path) -> dict[str, Limit]:
+    """Read a limits file: a table [limits.COLUMN] with lower, upper or both.
+
+    Raises
+    ------
+    LimitsError
+        If it is no TOML, a key is not known, or a lower limit is not below the upper.
+    """
+    return _read(Path(path), _Limits, LimitsError).limits
+
+
+def _read(path: Path, kind: type[T], refuse: type[InputError]) -> T:
+    try:
+        return kind.model_validate(tomllib.loads(path.read_text(encoding="utf-8-sig")))
+    except OSError as error:
+        raise refuse(error.strerror or str(error), where=str(path), mend="give a TOML file") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise refuse(str(error), where=path.name, mend="correct the TOML") from error
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False)[0]
+        place = ".".join(str(part) for part in first["loc"])
+        unknown = first["type"] == "extra_forbidden"
+        found = f"unknown key {place}" if unknown else f"{place}: {first['msg'].removeprefix('Value error, ')}"
+        raise refuse(found, where=path.name, mend="correct it; docs/how-to/fleet.md shows every key") from error

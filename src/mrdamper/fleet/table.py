@@ -1,0 +1,78 @@
+"""The roll-up: rows of the journal as one Parquet file, one row a damper, memory flat."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mrdamper.errors import OutputError
+from mrdamper.files.atomic import write_file
+
+if TYPE_CHECKING:
+    import polars as pl
+
+_AT_ONCE = 10_000  # rows held in memory, and rows of a group in the file
+TIMES = ("wall_time_s", "cpu_time_s", "finished_time_utc", "host_name")  # differ from run to run; nothing else does
+_TEXT = (
+    "serial", "session", "batch", "date", "golden", "rig", "status", "code", "reason", "findings", "lane", "model",
+    "at_bounds",
+)  # fmt: skip
+_NUMBERS = ("nrmse_pp", "nrmse_pp_worst")
+
+
+def write_table(rows: Iterable[dict[str, Any]], parameters: Iterable[str], path: Path) -> None:
+    """Write rows as Parquet, whole or not at all.
+
+    Parameters
+    ----------
+    rows : iterable of dict
+    parameters : iterable of str
+        Names of the model's parameters; each becomes a column `p_NAME`.
+    path : path
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written; E_DISK_FULL if the disk is full.
+    """
+    import polars as pl
+
+    schema = _schema(tuple(parameters))
+    try:
+        with write_file(path) as target:
+            parts = target.parent / "parts"
+            parts.mkdir()
+            for number, some in enumerate(_chunks(rows)):
+                part = pl.DataFrame([_flat(row) for row in some], schema=schema)
+                part.write_parquet(parts / f"{number:06}.parquet", compression="zstd")
+            pl.scan_parquet(parts / "*.parquet").sink_parquet(target, compression="zstd", row_group_size=_AT_ONCE)
+    except OSError as error:
+        full = "No space left" in str(error)
+        raise OutputError(
+            "the disk is full" if full else str(error), where=str(path),
+            mend="make room and run the same command again; what was finished is safe",
+            code="E_DISK_FULL" if full else None,
+        ) from error  # fmt: skip
+
+
+def _chunks(rows: Iterable[dict[str, Any]]) -> Iterator[list[dict[str, Any]]]:
+    left = iter(rows)
+    while some := list(islice(left, _AT_ONCE)):
+        yield some
+
+
+def _schema(parameters: tuple[str, ...]) -> dict[str, pl.DataType]:
+    import polars as pl
+
+    kinds: dict[str, Any] = dict.fromkeys(_TEXT, pl.String)
+    kinds["golden"] = pl.Boolean
+    kinds["runs"] = pl.Int64
+    kinds |= dict.fromkeys((*_NUMBERS, *(f"p_{name}" for name in parameters)), pl.Float64)
+    kinds |= {name: pl.Float64 if name.endswith("_s") else pl.String for name in TIMES}
+    return kinds
+
+
+def _flat(row: dict[str, Any]) -> dict[str, Any]:
+    return {**row, **{f"p_{name}": value for name, value in (row.get("parameters") or {}).items()}}

@@ -1,0 +1,167 @@
+"""One command for the whole line: its table, its bits, its refusals."""
+
+import json
+import shutil
+import sqlite3
+import subprocess
+import sys
+import time
+
+import polars as pl
+import pytest
+from support.fleets import same_bits
+from typer.testing import CliRunner
+
+from mrdamper.cli import application
+from mrdamper.errors import InputError
+from mrdamper.files.dataset import load_dataset, save_dataset
+from mrdamper.fleet.generator import Line
+from mrdamper.fleet.line import run_fleet
+from mrdamper.fleet.profile import FleetProfile
+
+
+def test_one_row_a_damper_and_session(identified):
+    table = pl.read_parquet(identified.table)
+    assert identified.done == identified.dampers == table.height == 8
+    assert table["serial"].to_list() == [*(f"D{n:06}" for n in range(1, 7)), "G1", "G1"]
+    assert table.filter(pl.col("golden"))["session"].to_list() == ["S001", "S002"]
+    assert set(table["status"]) == {"done"}
+    assert table["nrmse_pp"].max() < 0.1
+    assert table["p_fy1"].is_not_null().all()
+
+
+def test_the_number_of_workers_changes_no_bit(line, identified, tmp_path):
+    found = run_fleet(line, tmp_path / "two", workers=2)
+    assert found.done == 8
+    assert same_bits(tmp_path / "two") == same_bits(identified.table.parent)
+
+
+def test_what_is_finished_is_not_done_again(line, identified):
+    before = same_bits(identified.table.parent)
+    identified.table.unlink()
+    again = run_fleet(line, identified.table.parent, workers=1)
+    assert again.already == again.done == 8
+    assert same_bits(identified.table.parent) == before
+
+
+def test_killed_at_any_moment_the_same_command_ends_with_the_same_bits(line, identified, tmp_path):
+    out = tmp_path / "killed"
+    command = [sys.executable, "-m", "mrdamper.cli", "fleet", str(line), "--out", str(out), "--workers", "2"]
+    kept = []
+    for rows in (2, 9):  # while the plan is made, and while the line is measured
+        process = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        while _kept(out) < rows and process.poll() is None:
+            time.sleep(0.02)
+        process.kill()
+        process.wait()
+        kept.append(_kept(out))
+    assert kept[0] >= 2
+    assert kept[1] >= 9
+    run_fleet(line, out, workers=1)
+    assert same_bits(out) == same_bits(identified.table.parent)
+
+
+def _kept(out):
+    # A copy: the journal itself belongs to the process that writes it.
+    try:
+        with _copied(out) as base:
+            return base.execute("SELECT count(*) FROM results").fetchone()[0]
+    except (sqlite3.Error, OSError):
+        return 0
+
+
+def _copied(out):
+    copy = out.parent / "copy.sqlite"
+    copy.with_name("copy.sqlite-wal").unlink(missing_ok=True)
+    for path in out.glob("journal.sqlite*"):
+        shutil.copyfile(path, copy.with_name(path.name.replace("journal", "copy")))
+    return sqlite3.connect(copy)
+
+
+def test_a_damper_that_cannot_be_used_is_named_and_the_others_go_on(tmp_path):
+    dampers = list(Line(dampers=6, sessions=1, golden=0))
+    source = tmp_path / "records"
+    for damper in dampers:
+        save_dataset(damper.dataset(), source / damper.serial)
+    (source / "D000001" / "samples.parquet").write_bytes(b"no table")
+    shutil.copytree(source / "D000002", source / "twin")  # the same serial number in its column
+    (source / "empty").mkdir()
+    mixed = load_dataset(source / "D000003")
+    runs = source / "D000003" / "runs.csv"
+    runs.write_text(runs.read_text().replace("virtual", "another", 1))
+    units = source / "D000004" / "samples.parquet"
+    pl.read_parquet(units).rename({"force_N": "force_kN"}).write_parquet(units)
+    found = run_fleet(source, tmp_path / "out", workers=1)
+    rows = {(r["serial"], r["code"]): r["status"] for r in pl.read_parquet(found.table).to_dicts()}
+    assert rows == {
+        ("D000001", "E_DATASET"): "refused",
+        ("D000002", "E_FLEET_SERIAL"): "refused",
+        ("D000003", "E_FLEET_RIGS"): "refused",
+        ("D000004", "E_UNITS"): "refused",
+        ("D000005", ""): "done",
+        ("D000006", ""): "done",
+        ("empty", "E_NO_DATA"): "refused",
+    }
+    assert len(mixed.rigs) == 1
+    assert found.done == 2
+    assert len(found.troubled) == 6
+
+
+def test_a_source_without_a_damper_is_refused(tmp_path):
+    with pytest.raises(InputError) as refused:
+        run_fleet(tmp_path, tmp_path / "out")
+    assert refused.value.code == "E_FLEET_EMPTY"
+
+
+def test_rig_files_of_a_folder_are_one_damper(tmp_path):
+    for damper in Line(dampers=2, sessions=1, golden=0):
+        folder = tmp_path / "records" / damper.serial
+        folder.mkdir(parents=True)
+        for run in damper.dataset():
+            table = pl.DataFrame({"time [s]": run.time, "displacement [m]": run.displacement, "force [N]": run.force})
+            table.write_csv(folder / f"{run.id.split('-')[0]}_{run.current_A:g}A.csv")
+    found = run_fleet(tmp_path / "records", tmp_path / "out")
+    table = pl.read_parquet(found.table)
+    assert table["serial"].to_list() == ["D000001", "D000002"]
+    assert table["runs"].to_list() == [4, 4]
+
+
+def test_a_lake_gives_what_folders_give(line, identified, tmp_path):
+    parts = []
+    for folder in sorted(line.iterdir()):
+        dataset = load_dataset(folder)
+        facts = pl.DataFrame([_facts(run) for run in dataset])
+        parts.append(pl.read_parquet(folder / "samples.parquet").join(facts, on="run_id", maintain_order="left"))
+    lake = tmp_path / "lake"
+    lake.mkdir()
+    pl.concat(parts[:3]).write_parquet(lake / "a.parquet")
+    pl.concat(parts[3:]).write_parquet(lake / "b.parquet")
+    (lake / "c.parquet").write_bytes(b"torn")
+    found = run_fleet(lake, tmp_path / "out")
+    ours = pl.read_parquet(found.table)
+    theirs = pl.read_parquet(identified.table)
+    assert ours.filter(pl.col("status") == "refused")["code"].to_list() == ["E_FORMAT"]
+    same = ["serial", "session", "batch", "date", "golden", "rig", *(c for c in theirs.columns if c.startswith("p_"))]
+    assert ours.filter(pl.col("status") == "done").select(same).rows() == theirs.select(same).rows()
+
+
+def _facts(run):
+    window = {"steady_t0_s": run.window[0], "steady_t1_s": run.window[1]}
+    return {"run_id": run.id, "current_A": run.current_A, "rig": run.rig, **run.notes, **window}
+
+
+def test_names_state_facts_by_a_pattern():
+    profile = FleetProfile(names="{batch}_{serial}_*")
+    assert profile.of_name("B01_D7_2024") == {"batch": "B01", "serial": "D7"}
+    assert profile.of_name("D7") is None
+
+
+def test_the_command_says_what_came_and_who_is_in_trouble(line, tmp_path):
+    source = tmp_path / "records"
+    shutil.copytree(line / "D000001", source / "D000001")
+    (source / "empty").mkdir()
+    done = CliRunner().invoke(application(), ["fleet", str(source), "--out", str(tmp_path / "out"), "--json"])
+    assert done.exit_code == 0
+    assert json.loads(done.stdout)["done"] == 1
+    assert "empty" in done.stderr
+    assert "E_NO_DATA" in done.stderr
