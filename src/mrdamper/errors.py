@@ -129,3 +129,21 @@ class MissingExtraError(InputError):
     """An optional dependency is not installed."""
 
     code = "E_EXTRA"
+
+
+class StructureError(InputError):
+    """A structure, or what hangs in it, is impossible: masses, matrices, points."""
+
+    code = "E_STRUCTURE"
+
+
+class RecordError(InputError):
+    """A ground motion or road cannot be used: units, step, gaps."""
+
+    code = "E_RECORD"
+
+
+class StepError(InputError):
+    """The time step of a simulation is too coarse, or a step has no solution."""
+
+    code = "E_STEP"

@@ -6,11 +6,15 @@ Fitting, the command line, reports, exports and the documentation all ask the fi
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields
 from functools import cache
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
+
+from mrdamper.errors import ParameterError
 
 Scale = Literal["linear", "log"]
+T = TypeVar("T")
 _KEY = "mrdamper.parameter"
 
 
@@ -65,6 +69,31 @@ def param(
 def parameters_of(owner: type) -> tuple[ParameterInfo, ...]:
     """Parameters of a model class, in the order they were declared."""
     return tuple(_info(f) for f in fields(owner) if _KEY in f.metadata)
+
+
+def with_values(kind: type[T], values: Mapping[str, float]) -> T:
+    """Make an object with some of its parameters set.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such parameter, one is missing, or a value lies outside its bounds.
+    """
+    known = {info.name: info for info in parameters_of(kind)}
+    for name, value in values.items():
+        if name not in known:
+            raise ParameterError(
+                f"no parameter {name!r}", where=kind.__name__, mend=f"known: {', '.join(known) or 'none'}"
+            )
+        low, high = known[name].bounds
+        if not low <= value <= high:
+            raise ParameterError(
+                f"{name} = {value:g} {known[name].unit}", where=kind.__name__, mend=f"give {low:g} to {high:g}"
+            )
+    missing = [name for name, info in known.items() if info.default is None and name not in values]
+    if missing:
+        raise ParameterError(f"no {', '.join(missing)}", where=kind.__name__, mend="give it")
+    return kind(**values)
 
 
 def _info(f: Field[Any]) -> ParameterInfo:

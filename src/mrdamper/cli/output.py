@@ -70,6 +70,26 @@ def parse_pairs(pairs: Sequence[str], option: str) -> dict[str, str]:
     return found
 
 
+def parse_named(text: str, option: str) -> tuple[str, dict[str, float]]:
+    """NAME or NAME:KEY=VALUE,KEY=VALUE as the name and its numbers.
+
+    Raises
+    ------
+    InputError
+        If it is not of that form.
+    """
+    name, colon, rest = text.partition(":")
+    if not colon or "=" not in rest:
+        return text, {}
+    values = {}
+    for key, value in parse_pairs(rest.split(","), option).items():
+        try:
+            values[key] = float(value)
+        except ValueError as error:
+            raise InputError(f"{option} {key}={value}", mend="give a number in SI units") from error
+    return name, values
+
+
 def parse_gas(text: str | None) -> GasSpring | None:
     """P,V,A in MPa, cm³ and mm² as a gas spring.
 

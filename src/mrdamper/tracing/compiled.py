@@ -21,10 +21,7 @@ def compiled_run(program: Program) -> Any:
 
     `memory` (M,), `force` and `flags` (N,) are written to.
     """
-    room: dict[str, Any] = {"math": math, "sign": _compile(sign)}
-    room |= {f"lookup{i}": _lookup(table) for i, table in enumerate(program.tape.tables)}
-    exec(compile(python_source(program), "<traced model>", "exec"), room)  # our own words and numbers only
-    step = _compile(room["step"])
+    step = compiled_step(program)
     size = len(program.tape.memory)
 
     @_compile
@@ -46,6 +43,14 @@ def compiled_run(program: Program) -> Any:
         return to_fixed_tuple(memory, size)  # type: ignore[call-arg]
 
     return run
+
+
+def compiled_step(program: Program) -> Any:
+    """`step(p, derived, memory, inputs)`: (status, outputs, memory), all tuples."""
+    room: dict[str, Any] = {"math": math, "sign": _compile(sign)}
+    room |= {f"lookup{i}": _lookup(table) for i, table in enumerate(program.tape.tables)}
+    exec(compile(python_source(program), "<traced model>", "exec"), room)  # our own words and numbers only
+    return _compile(room["step"])
 
 
 def _lookup(table: Table) -> Any:

@@ -1,0 +1,133 @@
+"""`mrdamper simulate`: a damper at work in a building or a vehicle."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Optional
+
+import typer
+
+if TYPE_CHECKING:
+    from mrdamper.dampers.base import Damper
+    from mrdamper.systems.simulate import Simulation
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+
+    @app.command(epilog="Example: mrdamper simulate dyke1996 --input elcentro --time-scale 5 --volts 2.25 --json")
+    def simulate(
+        system: str = typer.Argument(..., help="dyke1996, quarter-car, half-car, or a system TOML file."),
+        source: str = typer.Option(
+            ...,
+            "--input",
+            help="CSV with time_s and acceleration_m_s2, acceleration_g or height_m; or NAME[:KEY=VALUE,…].",
+        ),
+        damper: Optional[Path] = typer.Option(None, "--damper", help="model.json for every damper."),  # noqa: UP045
+        control: str = typer.Option("passive", "--control", help="Controller, NAME[:KEY=VALUE,…]."),
+        current: Optional[float] = typer.Option(  # noqa: UP045
+            None, "--current", help="Constant current [A]; with a controller, the largest."
+        ),
+        volts: Optional[float] = typer.Option(  # noqa: UP045
+            None, "--volts", help="The same as a command to the damper's driver [V]."
+        ),
+        without: bool = typer.Option(False, "--without-damper", help="Take the dampers out."),
+        time_scale: float = typer.Option(1.0, "--time-scale", help="How many times faster a record is played."),
+        step: Optional[float] = typer.Option(None, "--step", help="Time step [s]; default: found by halving."),  # noqa: UP045
+        as_json: bool = typer.Option(False, "--json", help="Print JSON, SI units."),
+    ) -> None:
+        """Simulate a building or a vehicle with its dampers, and print what they let through."""
+        import json
+
+        from mrdamper.cli.output import parse_named
+        from mrdamper.errors import InputError
+        from mrdamper.files.model_file import load_model
+        from mrdamper.parameters import with_values
+        from mrdamper.systems.controllers import controller_type
+        from mrdamper.systems.inputs import load_input
+        from mrdamper.systems.simulate import simulate_system
+        from mrdamper.systems.system_file import load_system
+
+        found = load_system(system)
+        shaken_by = load_input(*parse_named(source, "--input"), time_scale=time_scale)
+        dampers: dict[str, Damper] = {} if without else dict(found.dampers)
+        if damper is not None and not without:
+            dampers = dict.fromkeys((link.name for link in found.system.dampers), load_model(damper))
+        empty = [link.name for link in found.system.dampers if link.name not in dampers]
+        if empty and not without:
+            raise InputError(
+                f"no model for the damper {', '.join(empty)}",
+                where=system,
+                mend="give --damper model.json, or --without-damper",
+                code="E_NO_DAMPER",
+            )
+        highest = _amperes(current, volts, dampers)
+        name, values = parse_named(control, "--control")
+        if name == "passive" and highest is not None:
+            values = {"current_A": highest, **values}
+        controller = with_values(controller_type(name), values)
+        done = simulate_system(found.system, shaken_by, dampers, controller, step, highest)
+        figures = _figures(done)
+        if as_json:
+            print(json.dumps(figures, indent=1))
+        else:
+            _print(done)
+
+
+def _amperes(current: float | None, volts: float | None, dampers: dict[str, Damper]) -> float | None:
+    """The current asked for, straight or through the driver of the dampers [A]."""
+    from mrdamper.errors import InputError
+
+    if current is not None and volts is not None:
+        raise InputError("--current beside --volts", mend="give one")
+    if volts is None or not dampers:
+        if current is not None and not current >= 0:
+            raise InputError(f"--current {current:g}", mend="give zero or more")
+        return current
+    if not volts >= 0:
+        raise InputError(f"--volts {volts:g}", mend="give zero or more")
+    gains = {d.coil.driver if d.coil else None for d in dampers.values()}
+    driver = gains.pop()
+    if gains or driver is None:
+        raise InputError(
+            "volts for a damper whose driver is not known", mend="give --current, or a model with a coil driver"
+        )
+    return min(driver.amperes_per_volt * volts, driver.limit_A)
+
+
+def _figures(done: Simulation) -> dict[str, Any]:
+    peaks = {f"peak_{name}": values.tolist() for name, values in done.peaks.items()}
+    forces = dict(zip((link.name for link in done.dampers), peaks.pop("peak_force_N"), strict=True))
+    return {
+        "system": done.system.name,
+        "controller": done.controller,
+        "coordinates": list(done.system.coordinates),
+        "spans": list(done.system.spans),
+        **peaks,
+        "peak_force_N": max(forces.values(), default=0.0),
+        "peak_force_by_damper_N": forces,
+        "step_s": done.step,
+        "step_halving_change": done.halving,
+        "energy_gap": done.energy_gap,
+        "outside_tests": done.outside,
+    }
+
+
+def _print(done: Simulation) -> None:
+    peaks = done.peaks
+    typer.echo(f"{done.system.title}, {done.controller}")
+    for i, name in enumerate(done.system.coordinates):
+        typer.echo(
+            f"  {name:12} x {1e3 * peaks['displacement_m'][i]:9.3f} mm   a {peaks['acceleration_m_s2'][i]:8.3f} m/s²"
+        )
+    for name, value in zip(done.system.spans, peaks["drift_m"], strict=True):
+        typer.echo(f"  {name:12} drift {1e3 * value:9.3f} mm")
+    for link, value in zip(done.dampers, peaks["force_N"], strict=True):
+        typer.echo(f"  {link.name:12} F {value:9.1f} N")
+    typer.echo(
+        f"step {1e3 * done.step:.3g} ms; halving it last changed a peak by {100 * done.halving:.2g} %; "
+        f"energy balances to {done.energy_gap:.1g}"
+    )
+    for name, shares in done.outside.items():
+        for quantity, share in shares.items():
+            typer.echo(f"warning: {name}: {quantity} outside its tests {100 * share:.3g} % of the time", err=True)

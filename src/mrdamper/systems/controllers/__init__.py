@@ -1,0 +1,20 @@
+"""Laws that set the current from what sensors see, one file each, found by discovery."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from mrdamper.discovery import named, subclasses_in
+from mrdamper.systems.controllers.base import Controller
+
+__all__ = ["Controller", "controller_type", "controller_types"]
+
+
+def controller_types() -> Mapping[str, type[Controller]]:
+    """Every controller by its name."""
+    return subclasses_in(__name__, __path__, Controller)
+
+
+def controller_type(name: str) -> type[Controller]:
+    """The controller of that name; raises `UnknownNameError` with the near matches."""
+    return named("controller", name, controller_types())

@@ -1,0 +1,139 @@
+"""What a controller is: a law from what sensors see to a current, written once.
+
+The law runs on a tape, so that the loop steps it, machine code does, and C comes out of the
+same lines.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from mrdamper.dampers.base import Damper
+from mrdamper.parameters import ParameterInfo, parameters_of
+from mrdamper.systems.structure import Link, System
+from mrdamper.tracing import Program, Tape, program
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What the law of one damper can see and do.
+
+    Attributes
+    ----------
+    tape : Tape
+        For memory: `remember`, `update`, `select`.
+    link : Link
+        The damper's place.
+    damper : Damper
+    low, high : float
+        Currents it may be given [A].
+    """
+
+    tape: Tape
+    link: Link
+    damper: Damper
+    low: float
+    high: float
+
+    def __call__(self, point: str, quantity: str) -> Any:
+        """A signal: "position", "velocity" or "acceleration" (absolute) of a point.
+
+        The point is a name in the system, or "above" or "below" the damper.
+        """
+        name = {"above": self.link.above, "below": self.link.below}.get(point, point)
+        return self._input(f"{name}.{quantity}")
+
+    @property
+    def stroke(self) -> Any:
+        """[m]"""
+        return self._input(f"{self.link.name}.stroke")
+
+    @property
+    def stroke_rate(self) -> Any:
+        """[m/s]"""
+        return self._input(f"{self.link.name}.stroke_rate")
+
+    @property
+    def force(self) -> Any:
+        """Force of the damper as measured [N]."""
+        return self._input(f"{self.link.name}.force")
+
+    @property
+    def dt(self) -> Any:
+        """Time since the last sample [s]."""
+        return self._input("dt")
+
+    def _input(self, name: str) -> Any:
+        return self.tape.inputs[name] if name in self.tape.inputs else self.tape.input(name)
+
+
+@dataclass(frozen=True, eq=False)
+class Control:
+    """A controller made ready for a system.
+
+    Attributes
+    ----------
+    program : Program or None
+        From signals and dt to one current a link; None where currents never change.
+    signals : tuple of str
+        Its inputs but dt.
+    start : tuple of float
+        Current of each link before the first sample [A].
+    """
+
+    program: Program | None
+    signals: tuple[str, ...]
+    start: tuple[float, ...]
+
+
+class Controller(ABC):
+    """A law for the current. Subclasses are final, frozen dataclasses of `param` fields, one file each."""
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    source: ClassVar[str]
+
+    @classmethod
+    def parameters(cls) -> tuple[ParameterInfo, ...]:
+        """What is known of each parameter."""
+        return parameters_of(cls)
+
+    @abstractmethod
+    def law(self, see: Sight) -> Any:
+        """Current [A] of one damper from now on, from what can be seen now."""
+
+    def designed(self, system: System, links: Sequence[Link]) -> Controller:
+        """The controller with what it must know of the system."""
+        return self
+
+    def prepare(
+        self, system: System, links: Sequence[Link], dampers: Mapping[str, Damper], highest: float | None = None
+    ) -> Control:
+        """Trace the law of every damper into one program; `highest` caps the current [A]."""
+        ready, tape, outputs = self.designed(system, links), Tape(), {}
+        start = []
+        for link in links:
+            command: Any = 0.0
+            if link.role == "damper":
+                damper = dampers[link.name]
+                see = Sight(tape, link, damper, *current_range(damper, highest))
+                command = ready.law(see)
+                start.append(see.low)
+            else:
+                start.append(0.0)
+            outputs[f"{link.name}.current"] = command
+        if not tape.inputs and not tape.memory:
+            return Control(None, (), tuple(float(value) for value in outputs.values()))
+        if "dt" in tape.inputs:  # comes last
+            tape.inputs["dt"] = tape.inputs.pop("dt")
+        else:
+            tape.input("dt")
+        return Control(program(tape, outputs), tuple(n for n in tape.inputs if n != "dt"), tuple(start))
+
+
+def current_range(damper: Damper, highest: float | None) -> tuple[float, float]:
+    """Currents a damper may be given [A]: none, to the highest asked for or tested."""
+    return 0.0, damper.envelope.current_A[1] if highest is None else highest

@@ -1,0 +1,24 @@
+"""A current that never changes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from mrdamper.parameters import param
+from mrdamper.systems.controllers.base import Controller, Sight
+
+
+@dataclass(frozen=True)
+class Passive(Controller):
+    """I constant."""
+
+    name: ClassVar[str] = "passive"
+    title: ClassVar[str] = "passive, constant current"
+    source: ClassVar[str] = ""
+
+    current_A: float = param("A", "coil current", bounds=(0, math.inf), default=0.0)
+
+    def law(self, see: Sight) -> Any:
+        return self.current_A

@@ -1,0 +1,61 @@
+"""What shakes a system: ground motions and roads, one file each, found by discovery."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+
+from mrdamper.discovery import named, subclasses_in
+from mrdamper.errors import RecordError
+from mrdamper.parameters import parameters_of, with_values
+from mrdamper.systems.inputs.base import Input
+
+__all__ = ["Input", "input_type", "input_types", "load_input"]
+
+
+def input_types() -> Mapping[str, type[Input]]:
+    """Every input by its name."""
+    return subclasses_in(__name__, __path__, Input)
+
+
+def input_type(name: str) -> type[Input]:
+    """The input of that name; raises `UnknownNameError` with the near matches."""
+    return named("input", name, input_types())
+
+
+def bundled_records() -> dict[str, Path]:
+    """Records that ship with the package, by name."""
+    folder = Path(str(files("mrdamper.files.bundled") / "records"))
+    return {path.stem: path for path in sorted(folder.glob("*.csv"))}
+
+
+def load_input(name: str | Path, values: Mapping[str, float] | None = None, time_scale: float = 1.0) -> Input:
+    """An input by name: a record's file or the name of one that ships with the package, or a made one.
+
+    Parameters
+    ----------
+    name : str or path
+    values : mapping of str to float, optional
+        Parameters of a made input.
+    time_scale : float
+        How many times faster than recorded a record is played.
+
+    Raises
+    ------
+    UnknownNameError, ParameterError, DatasetError, ColumnError, UnitError, RecordError
+        If there is none of that name, or it cannot be used.
+    """
+    from mrdamper.systems.inputs.record import load_record
+
+    made = {kind: cls for kind, cls in input_types().items() if parameters_of(cls)}
+    if str(name) in made:
+        if time_scale != 1.0:
+            raise RecordError("a time scale for a made input", where=str(name), mend="set its own parameters instead")
+        return with_values(made[str(name)], values or {})
+    if values:
+        raise RecordError(f"{', '.join(values)} for a record", where=str(name), mend="leave them out")
+    known = bundled_records()
+    if str(name) not in known and Path(name).suffix != ".csv" and not Path(name).exists():
+        named("input", str(name), {**made, **dict.fromkeys(known, Input)})
+    return load_record(known.get(str(name), name), time_scale)

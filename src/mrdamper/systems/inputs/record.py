@@ -1,0 +1,127 @@
+"""A record from a file: a ground motion, or a road over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from mrdamper.data import Floats
+from mrdamper.errors import ColumnError, DatasetError, RecordError, UnitError
+from mrdamper.systems.inputs.base import Input
+
+STANDARD_GRAVITY = 9.81  # m/s² in a g of the records that come with the package; the figure published tables used
+_COLUMNS = {"acceleration_m_s2": 1.0, "acceleration_g": STANDARD_GRAVITY, "height_m": 1.0}
+_JITTER = 0.02  # share of a step that rounding of time stamps may move a sample
+_STRONGEST = 50.0  # m/s²: five times the strongest ground motion ever recorded is a mistake of units
+
+
+@dataclass(frozen=True, eq=False)
+class Record(Input):
+    """Samples at equal steps, straight lines between them.
+
+    Attributes
+    ----------
+    times, values : (N,) arrays
+        [s]; [m/s²] for the ground, [m] for a road.
+    kind : "ground" or "road"
+    """
+
+    name: ClassVar[str] = "record"
+    title: ClassVar[str] = "a record"
+
+    times: Floats
+    values: Floats
+    kind: Literal["ground", "road"] = "ground"
+
+    @property
+    def duration(self) -> float:
+        return float(self.times[-1])
+
+    @property
+    def step(self) -> float:
+        return float(self.times[1])
+
+    def value(self, time: Floats) -> Floats:
+        return np.interp(time, self.times, self.values)
+
+    def rate(self, time: Floats) -> Floats:
+        slope = np.append(np.diff(self.values) / np.diff(self.times), 0.0)
+        at = np.clip(np.searchsorted(self.times, time, side="right") - 1, 0, slope.size - 1)
+        return slope[at]
+
+
+def load_record(path: str | Path, time_scale: float = 1.0) -> Record:
+    """Read a record.
+
+    Parameters
+    ----------
+    path : path
+        CSV with time_s and one of acceleration_m_s2, acceleration_g (1 g = 9.81 m/s²), height_m.
+    time_scale : float
+        How many times faster than recorded it is played.
+
+    Raises
+    ------
+    DatasetError, ColumnError, UnitError, RecordError
+        If the file cannot be read, says no unit, or has steps that differ.
+    """
+    import polars as pl
+
+    path = Path(path)
+    if not path.is_file():
+        raise DatasetError("no such file", where=str(path), mend="give a CSV with time_s and acceleration_m_s2")
+    try:
+        table = pl.read_csv(path, infer_schema_length=10_000)
+    except (pl.exceptions.PolarsError, OSError) as error:
+        raise DatasetError(
+            str(error).splitlines()[0], where=str(path), mend="write it as comma-separated UTF-8"
+        ) from error
+    table = table.rename({column: column.strip().lstrip("\ufeff") for column in table.columns})
+    found = [name for name in _COLUMNS if name in table.columns]
+    if len(found) > 1:
+        raise ColumnError(f"both {' and '.join(found)}", where=str(path), mend="keep one")
+    if "time_s" not in table.columns or not found:
+        missing = f"no column {'time_s' if found else ' or '.join(_COLUMNS)} (found {', '.join(table.columns)})"
+        likely = any(c.lower().startswith(("time", "t_", "acc", "a_", "height")) for c in table.columns)
+        mend = "say the unit in the name: time_s, and acceleration_m_s2 or acceleration_g"
+        raise (UnitError if likely else ColumnError)(missing, where=str(path), mend=mend)
+    columns = {}
+    for name in ("time_s", found[0]):
+        if not table[name].dtype.is_numeric() or table[name].null_count():
+            raise ColumnError(f"column {name} holds text or empty cells", where=str(path), mend="write plain numbers")
+        columns[name] = table[name].to_numpy().astype(np.float64)
+    return record(columns["time_s"], columns[found[0]], found[0], time_scale, where=str(path))
+
+
+def record(time: Floats, values: Floats, quantity: str, time_scale: float = 1.0, where: str = "record") -> Record:
+    """A record from its samples; `quantity` is a column name of `load_record`, which raises the same."""
+    if quantity not in _COLUMNS:
+        raise UnitError(f"quantity {quantity!r}", where=where, mend=f"one of {', '.join(_COLUMNS)}")
+    if time.size < 3:
+        raise RecordError(f"{time.size} samples", where=where, mend="give at least three")
+    if not (np.isfinite(time).all() and np.isfinite(values).all()):
+        raise RecordError("not every number is finite", where=where, mend="remove or fill those rows")
+    if not (np.isfinite(time_scale) and time_scale > 0):
+        raise RecordError(f"time scale {time_scale:g}", where=where, mend="give a positive number")
+    steps = np.diff(time)
+    step = float(np.median(steps))
+    worst = int(np.argmax(np.abs(steps - step)))
+    if step <= 0 or abs(steps[worst] - step) > _JITTER * step + 1e-9 * abs(time[-1]):
+        raise RecordError(
+            f"step of {steps[worst]:.6g} s after {time[worst]:.6g} s where others are {step:.6g} s",
+            where=where,
+            mend="give samples at equal steps, in order of time",
+            code="E_RECORD_STEP",
+        )
+    scaled = values * _COLUMNS[quantity]
+    if quantity != "height_m" and np.abs(scaled).max() > _STRONGEST:
+        raise UnitError(
+            f"a peak of {np.abs(values).max():.4g} in {quantity} is {np.abs(scaled).max():.4g} m/s²",
+            where=where,
+            mend="no ground moves like that: is it in cm/s² (gal), or m/s² under the name of g?",
+        )
+    clock = np.arange(time.size) * ((time[-1] - time[0]) / (time.size - 1) / time_scale)
+    return Record(clock, scaled, "road" if quantity == "height_m" else "ground")

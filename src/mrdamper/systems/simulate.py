@@ -1,0 +1,375 @@
+"""A system, an input, dampers and a controller together: what moves, and how well it was computed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mrdamper.dampers.base import Damper
+from mrdamper.data import Floats
+from mrdamper.errors import ExcitationError, StepError, StructureError
+from mrdamper.streaming import FLAGS
+from mrdamper.systems.controllers import Controller
+from mrdamper.systems.controllers.passive import Passive
+from mrdamper.systems.inputs import Input
+from mrdamper.systems.kernel import Numbers, Stage, make_walk
+from mrdamper.systems.links import contact_stage, damper_stage, stage_of
+from mrdamper.systems.structure import Link, System
+
+HALVING = 5e-3  # change of a peak when the step is halved that is still called settled
+_COARSEST, _FINEST = 1e-3, 1e-5  # s
+_STEPS_A_PERIOD = 40  # of the highest natural frequency, to begin with
+_LINES = 10_000_000  # that the interpreter may walk; more is worth the seconds of compilation
+_LINES_A_STEP = 60  # of the loop itself
+_MOST_STEPS = 20_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """What a system did.
+
+    Attributes
+    ----------
+    system : System
+    time : (N,) array
+        [s]
+    x, v, a : (N, n) arrays
+        Coordinates [m], their rates [m/s], absolute accelerations [m/s²].
+    links : tuple of Link
+        That were there: without dampers where they were taken out.
+    force, stroke, stroke_rate : (N, E) arrays
+        Of each link [N], [m], [m/s].
+    current : (N, E) array
+        Commanded to each link [A]; zero for stops and tyres.
+    flags : (N, E) array of int
+        Of dampers: bits of `streaming.FLAGS`. Of stops and tyres: touching; in the air.
+    road, road_rate : (N, q) arrays
+        Height of the road by channel [m], [m/s]; zero on the ground.
+    energy : mapping of str to (N,) array
+        Put in, stored, dissipated by the structure, taken by each link since the start [J].
+    halving : float
+        Largest relative change of a peak against steps twice as long; NaN where not asked.
+    """
+
+    system: System
+    time: Floats
+    x: Floats
+    v: Floats
+    a: Floats
+    links: tuple[Link, ...]
+    force: Floats
+    stroke: Floats
+    stroke_rate: Floats
+    current: Floats
+    flags: NDArray[np.int64]
+    road: Floats
+    road_rate: Floats
+    energy: Mapping[str, Floats]
+    controller: str
+    halving: float = math.nan
+
+    @property
+    def step(self) -> float:
+        """Time step [s]."""
+        return float(self.time[1])
+
+    @property
+    def dampers(self) -> tuple[Link, ...]:
+        """The dampers that were there."""
+        return tuple(link for link in self.links if link.role == "damper")
+
+    @property
+    def outside(self) -> dict[str, dict[str, float]]:
+        """Share of the time each damper spent outside its tests, by quantity; stops and tyres: in touch, in the air."""
+        found: dict[str, dict[str, float]] = {}
+        for i, link in enumerate(self.links):
+            words = FLAGS if link.role == "damper" else ({"stop": "touching", "tyre": "in the air"}[link.role],)
+            shares = {word: float(np.mean(self.flags[:, i] >> bit & 1)) for bit, word in enumerate(words)}
+            if kept := {word: share for word, share in shares.items() if share > 0}:
+                found[link.name] = kept
+        return found
+
+    @cached_property
+    def peaks(self) -> dict[str, Floats]:
+        """Largest magnitudes: displacement, drift, acceleration, force, by coordinate, span, damper."""
+        dampers = [i for i, link in enumerate(self.links) if link.role == "damper"]
+        return {
+            "displacement_m": np.abs(self.x).max(axis=0),
+            "drift_m": np.array([np.abs(self.span(name)).max() for name in self.system.spans]),
+            "acceleration_m_s2": np.abs(self.a).max(axis=0),
+            "force_N": np.abs(self.force[:, dampers]).max(axis=0),
+        }
+
+    def span(self, name: str) -> Floats:
+        """(N,) relative displacement [m] of a span of the system."""
+        row, road = self.system.span(*self.system.spans[name])
+        return self.x @ row + self.road @ road
+
+    @property
+    def energy_gap(self) -> float:
+        """Largest imbalance of energy over the most that was put in."""
+        spent = sum(series for name, series in self.energy.items() if name != "input")
+        most = max(float(np.abs(self.energy["input"]).max()), np.finfo(float).tiny)
+        return float(np.abs(self.energy["input"] - spent).max()) / most
+
+
+def simulate_system(
+    system: System,
+    source: Input,
+    dampers: Mapping[str, Damper],
+    controller: Controller | None = None,
+    step: float | None = None,
+    highest: float | None = None,
+) -> Simulation:
+    """Run a system, with a step found by halving, or with the one given.
+
+    Parameters
+    ----------
+    system : System
+    source : Input
+    dampers : mapping of str to Damper
+        By the name of their link; a link without one stays empty.
+    controller : Controller, optional
+        Default: no current.
+    step : float, optional
+        Time step [s]; refused where halving it moves a peak by more than 0.5 %.
+    highest : float, optional
+        Largest current a controller may ask for [A]. Default: the largest tested.
+
+    Returns
+    -------
+    Simulation
+        At the finer of the two steps compared.
+
+    Raises
+    ------
+    StepError
+        If the step is too coarse, naming the step needed, or a step has no solution.
+    ExcitationError
+        If the input does not fit the system.
+    """
+    loop = Loop(system, source, dampers, controller or Passive(), highest)
+    dt = loop.first_step if step is None else step
+    coarse = loop.run(dt)
+    while True:
+        fine = loop.run(dt / 2)
+        change = _change(coarse, fine)
+        if change <= HALVING or (step is None and dt / 2 <= _FINEST):
+            return replace(fine, halving=change)
+        if step is not None:
+            needed = dt * math.sqrt(HALVING / change)
+            raise StepError(
+                f"halving the step of {dt:g} s changes a peak by {100 * change:.2g} %",
+                where=system.name,
+                mend=f"give --step {needed:.2g} or less, or none",
+                code="E_STEP_COARSE",
+            )
+        coarse, dt = fine, dt / 2
+
+
+class Loop:
+    """A system with its links and controller made ready; `run` may be called again and again.
+
+    Parameters
+    ----------
+    system, source, dampers, controller, highest
+        As `simulate_system`.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        source: Input,
+        dampers: Mapping[str, Damper],
+        controller: Controller,
+        highest: float | None = None,
+    ):
+        _fit(system, source, dampers)
+        self.system, self.source, self.controller = system, source, controller
+        self.links = tuple(link for link in system.links if link.role != "damper" or link.name in dampers)
+        self.stages = [
+            damper_stage(dampers[link.name]) if link.role == "damper" else contact_stage(link) for link in self.links
+        ]
+        self.numbers = Numbers.of(self.stages)
+        rows = [system.span(link.above, link.below) for link in self.links]
+        self.B = np.array([row for row, _ in rows]).reshape(len(rows), len(system.coordinates))
+        self.D = np.array([road for _, road in rows]).reshape(len(rows), len(system.channels))
+        self.control = controller.prepare(system, self.links, dampers, highest)
+        self._walks: dict[bool, Any] = {}
+
+    @property
+    def first_step(self) -> float:
+        """The step to begin with: the input's, the highest mode's share, or a millisecond."""
+        highest = float(self.system.frequencies_Hz().max())
+        step = min(_COARSEST, self.source.step, 1 / (_STEPS_A_PERIOD * highest) if highest else _COARSEST)
+        return self.source.step / math.ceil(self.source.step / step - 1e-9)
+
+    def run(self, dt: float, machine: bool | None = None, numbers: Numbers | None = None) -> Simulation:
+        """The whole input at one step.
+
+        Parameters
+        ----------
+        dt : float
+            [s]
+        machine : bool, optional
+            In machine code. Default: where steps are many.
+        numbers : Numbers, optional
+            Other parameters of the links than the dampers' own.
+
+        Raises
+        ------
+        StepError
+            If there are too many steps, or one has no solution.
+        """
+        system, n = self.system, len(self.system.coordinates)
+        samples = int(self.source.duration / dt + 1e-6) + 1
+        if not (dt > 0 and 2 < samples <= _MOST_STEPS):
+            raise StepError(
+                f"{self.source.duration:g} s in steps of {dt:g} s",
+                where=system.name,
+                mend=f"between two and {_MOST_STEPS:,} steps",
+            )
+        if machine is None:
+            lines = _LINES_A_STEP + 3 * sum(stage.lines for stage in (*self.stages, *self._controllers))
+            machine = 3 * samples * lines > _LINES  # this run, and one at half the step
+        time: Floats = dt * np.arange(samples, dtype=np.float64)
+        ground, road, road_rate = self._driven(time)
+        load = self._load(ground, road, road_rate)
+        S = np.linalg.inv(2 / dt * system.M + system.C + dt / 2 * system.K)
+        R = S @ self.B.T
+        mean_load = np.zeros_like(load)
+        mean_load[1:] = 0.5 * (load[1:] + load[:-1]) @ S.T
+        H, seen = self._sight(ground, road, road_rate)
+        x, v = np.zeros((samples, n)), np.zeros((samples, n))
+        force, current, flags = (np.zeros((samples, len(self.links))) for _ in range(3))
+        current[:] = self.control.start
+        numbers = numbers or self.numbers
+        control = Numbers.of(self._controllers)
+        failed = self._walk(machine)(
+            dt, S @ (2 / dt * system.M), -S @ system.K, R, self.B @ R, self.B, mean_load,
+            np.ascontiguousarray(road @ self.D.T), np.ascontiguousarray(road_rate @ self.D.T), H, seen,
+            numbers.given, numbers.derived, numbers.start.copy(), control.given, control.derived, control.start,
+            current, x, v, force, flags,
+        )  # fmt: skip
+        if failed >= 0 or not np.isfinite(x).all():
+            raise StepError(
+                f"no solution at {time[max(failed, 0)]:.6g} s",
+                where=system.name,
+                mend="shorten the step, and check the damper's range against the motion",
+                code="E_STEP_LOST",
+            )
+        relative = (load - v @ system.C - x @ system.K - force @ self.B) @ np.linalg.inv(system.M)
+        absolute = relative if system.ground is None else relative + np.outer(ground, system.ground)
+        return Simulation(
+            system, time, x, v, absolute, self.links, force, x @ self.B.T + road @ self.D.T,
+            v @ self.B.T + road_rate @ self.D.T, current, flags.astype(np.int64), road, road_rate,
+            self._energy(dt, x, v, force, load, road), type(self.controller).name,
+        )  # fmt: skip
+
+    def _driven(self, time: Floats) -> tuple[Floats, Floats, Floats]:
+        """Acceleration of the ground (N,), height and rate of the road (N, q)."""
+        q = len(self.system.channels)
+        still = np.zeros((time.size, q))
+        if self.system.ground is not None:
+            return self.source.value(time), still, still
+        late = [time - behind / self.source.speed_m_s for behind in self.system.behind]
+        return (
+            np.zeros(time.size),
+            np.column_stack([self.source.value(t) for t in late]),
+            np.column_stack([self.source.rate(t) for t in late]),
+        )
+
+    def _load(self, ground: Floats, road: Floats, road_rate: Floats) -> Floats:
+        """(N, n) forces of the input on the coordinates."""
+        if self.system.ground is not None:
+            return -np.outer(ground, self.system.M @ self.system.ground)
+        assert self.system.push is not None
+        height, rate = self.system.push
+        return road @ height.T + road_rate @ rate.T
+
+    def _sight(self, ground: Floats, road: Floats, road_rate: Floats) -> tuple[Floats, Floats]:
+        """Signals as H [x; v; f] + seen: (S, 2n + E) and (N, S)."""
+        names = self.control.signals
+        n, count = len(self.system.coordinates), len(self.links)
+        H, seen = np.zeros((len(names), 2 * n + count)), np.zeros((ground.size, len(names)))
+        inverse = np.linalg.inv(self.system.M)
+        pushed = self._load(0 * ground, road, road_rate) @ inverse
+        for s, name in enumerate(names):
+            at, _, quantity = name.rpartition(".")
+            link = next((i for i, known in enumerate(self.links) if known.name == at), None)
+            if quantity == "force" and link is not None:
+                H[s, 2 * n + link] = 1.0
+                continue
+            row, ways = (self.B[link], self.D[link]) if link is not None else self.system.point(at)
+            if quantity in ("stroke", "position"):
+                H[s, :n], seen[:, s] = row, road @ ways
+            elif quantity in ("stroke_rate", "velocity"):
+                H[s, n : 2 * n], seen[:, s] = row, road_rate @ ways
+            else:
+                H[s] = row @ inverse @ np.hstack([-self.system.K, -self.system.C, -self.B.T])
+                seen[:, s] = pushed @ row
+        return H, seen
+
+    @cached_property
+    def _controllers(self) -> list[Stage]:
+        """None or one."""
+        return [stage_of(self.control.program)] if self.control.program else []
+
+    def _walk(self, machine: bool) -> Any:
+        if machine not in self._walks:
+            self._walks[machine] = make_walk(
+                self.stages, next(iter(self._controllers), None), len(self.control.signals), machine
+            )
+        return self._walks[machine]
+
+    def _energy(self, dt: float, x: Floats, v: Floats, force: Floats, load: Floats, road: Floats) -> dict[str, Floats]:
+        """Energies since the start [J], by the trapezoidal rule the loop itself steps with."""
+
+        def running(power: Floats) -> Floats:
+            return np.concatenate([[0.0], np.cumsum(power)])
+
+        def mean(series: Floats) -> Floats:
+            return 0.5 * (series[1:] + series[:-1])
+
+        system, moved = self.system, np.diff(x, axis=0)
+        ways, middle = np.diff(road, axis=0) @ self.D.T, mean(v)
+        work = mean(force) * (moved @ self.B.T + ways)
+        entered = np.einsum("ij,ij->i", mean(load), moved) + (mean(force) * ways).sum(axis=1)
+        stored = 0.5 * (np.einsum("ij,ij->i", v @ system.M, v) + np.einsum("ij,ij->i", x @ system.K, x))
+        found = {
+            "input": running(entered),
+            "stored": stored,
+            "structure": running(dt * np.einsum("ij,ij->i", middle @ system.C, middle)),
+        }
+        return found | {link.name: running(work[:, i]) for i, link in enumerate(self.links)}
+
+
+def _fit(system: System, source: Input, dampers: Mapping[str, Damper]) -> None:
+    wanted = "road" if system.ground is None else "ground"
+    if source.kind != wanted:
+        raise ExcitationError(
+            f"a {source.kind} input for a system on a {wanted}",
+            where=system.name,
+            mend="give acceleration_m_s2 or acceleration_g" if wanted == "ground" else "give a road, or height_m",
+        )
+    known = {link.name for link in system.dampers}
+    for name in dampers:
+        if name not in known:
+            raise StructureError(
+                f"no damper is called {name!r}", where=system.name, mend=f"known: {', '.join(sorted(known)) or 'none'}"
+            )
+
+
+def _change(coarse: Simulation, fine: Simulation) -> float:
+    """Largest relative change of a peak, over the largest peak of its kind."""
+    worst = 0.0
+    for kind, values in fine.peaks.items():
+        if values.size and (largest := float(values.max())) > 0:
+            worst = max(worst, float(np.abs(values - coarse.peaks[kind]).max()) / largest)
+    return worst

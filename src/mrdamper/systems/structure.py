@@ -1,0 +1,321 @@
+"""What a damper acts in: masses, dashpots and springs as matrices, and links between points.
+
+Everything is relative to static equilibrium. The input enters through channels: the
+acceleration of the ground, or the height of the road under each wheel and its rate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from mrdamper.data import Floats
+from mrdamper.errors import StructureError, UnknownNameError
+
+_SYMMETRY = 1e-9  # relative difference of K and K' that rounding may leave
+
+
+@dataclass(frozen=True)
+class Link:
+    """What lies between two points: a damper, a stop, or a tyre that may lift off.
+
+    Attributes
+    ----------
+    name : str
+    above, below : str
+        Points; extension is positive.
+    role : "damper", "stop" or "tyre"
+    stiffness, damping : float
+        Of a stop beyond its gap; of a tyre while it touches [N/m, N s/m].
+    gap : float
+        Free travel either way of a stop; static deflection of a tyre [m].
+    """
+
+    name: str
+    above: str
+    below: str
+    role: Literal["damper", "stop", "tyre"] = "damper"
+    stiffness: float = 0.0
+    damping: float = 0.0
+    gap: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """A linear structure M x'' + C x' + K x = load − B' f, f the forces of links.
+
+    Attributes
+    ----------
+    name, title : str
+    coordinates : tuple of str
+        Names of the (n,) coordinates: relative to the ground if that accelerates.
+    M, C, K : (n, n) arrays
+        [kg], [N s/m], [N/m]; moments of inertia and rotations in [kg m²], [rad].
+    channels : tuple of str
+        Of the input: ("ground",), or the road under each wheel.
+    ground : (n,) array or None
+        Share a coordinate takes in the ground's acceleration; None for a road.
+    push : ((n, q), (n, q)) arrays
+        Forces on the coordinates per metre of road height and per m/s of its rate.
+    behind : (q,) tuple of float
+        How far each channel follows the first along the road [m].
+    links : tuple of Link
+    points : mapping of str to (n,) array
+        Further points as combinations of coordinates, such as the corners of a body.
+    spans : mapping of str to (str, str)
+        Relative displacements to report: storey drifts, suspension travel.
+    """
+
+    name: str
+    title: str
+    coordinates: tuple[str, ...]
+    M: Floats
+    C: Floats
+    K: Floats
+    channels: tuple[str, ...] = ("ground",)
+    ground: Floats | None = None
+    push: tuple[Floats, Floats] | None = None
+    behind: tuple[float, ...] = (0.0,)
+    links: tuple[Link, ...] = ()
+    points: Mapping[str, Floats] = field(default_factory=dict)
+    spans: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        n = len(self.coordinates)
+        for letter in "MCK":
+            matrix = np.array(getattr(self, letter), dtype=float)
+            if matrix.shape != (n, n) or not np.isfinite(matrix).all():
+                raise StructureError(
+                    f"{letter} of shape {matrix.shape} for {n} coordinates, or not finite",
+                    where=self.name,
+                    mend="give one row and one column a coordinate",
+                )
+            if not np.allclose(matrix, matrix.T, rtol=0, atol=_SYMMETRY * max(np.abs(matrix).max(), 1e-300)):
+                raise StructureError(
+                    f"{letter} is not symmetric",
+                    where=self.name,
+                    mend="forces between two points are equal",
+                    code=f"E_{_CODES[letter]}",
+                )
+            object.__setattr__(self, letter, matrix)
+        if np.linalg.eigvalsh(self.M).min() <= 0:
+            raise StructureError(
+                "M is not positive definite", where=self.name, mend="every coordinate needs a mass", code="E_MASS"
+            )
+        for letter in "CK":
+            matrix = getattr(self, letter)
+            if np.linalg.eigvalsh(matrix).min() < -_SYMMETRY * max(np.abs(matrix).max(), 1e-300):
+                raise StructureError(
+                    f"{letter} has a negative eigenvalue: it gives energy away",
+                    where=self.name,
+                    mend="check the signs off the diagonal",
+                    code=f"E_{_CODES[letter]}",
+                )
+        for link in self.links:
+            for end in (link.above, link.below):
+                if end not in self.known:
+                    raise StructureError(
+                        f"{link.role} {link.name} hangs on {end!r}, which does not exist",
+                        where=self.name,
+                        mend=f"known: {', '.join(self.known)}",
+                        code="E_POINT",
+                    )
+            if link.above == link.below:
+                raise StructureError(
+                    f"{link.role} {link.name} hangs on {link.above!r} twice",
+                    where=self.name,
+                    mend="give two points",
+                    code="E_POINT",
+                )
+
+    @property
+    def known(self) -> tuple[str, ...]:
+        """Every point a link can hang on."""
+        return (*self.coordinates, *self.points, *self.channels)
+
+    @property
+    def dampers(self) -> tuple[Link, ...]:
+        """Links that are dampers."""
+        return tuple(link for link in self.links if link.role == "damper")
+
+    def point(self, name: str) -> tuple[Floats, Floats]:
+        """A point as a combination of the coordinates (n,) and of the channels' heights (q,)."""
+        row, road = np.zeros(len(self.coordinates)), np.zeros(len(self.channels))
+        if name in self.coordinates:
+            row[self.coordinates.index(name)] = 1.0
+        elif name in self.points:
+            row = np.array(self.points[name], dtype=float)
+        elif name in self.channels:
+            road[self.channels.index(name)] = 0.0 if self.ground is not None else 1.0
+        else:
+            raise UnknownNameError.of("point", name, self.known)
+        return row, road
+
+    def span(self, above: str, below: str) -> tuple[Floats, Floats]:
+        """The displacement of one point relative to another, as `point`."""
+        (a, road_a), (b, road_b) = self.point(above), self.point(below)
+        return a - b, road_a - road_b
+
+    def frequencies_Hz(self) -> Floats:
+        """(n,) undamped natural frequencies without links, lowest first."""
+        from scipy.linalg import eigh
+
+        return np.sqrt(np.maximum(eigh(self.K, self.M, eigvals_only=True), 0.0)) / (2 * np.pi)
+
+
+_CODES = {"M": "MASS", "C": "DAMPING", "K": "STIFFNESS"}
+
+
+def shear_building(
+    name: str,
+    masses: Sequence[float],
+    stiffnesses: Sequence[float],
+    dampings: Sequence[float],
+    links: Sequence[Link] = (),
+    title: str = "",
+) -> System:
+    """Storeys one above the other.
+
+    Parameters
+    ----------
+    masses, stiffnesses, dampings : (n,) sequences
+        By storey from below [kg], [N/m], [N s/m].
+    """
+    floors = tuple(f"floor{i + 1}" for i in range(len(masses)))
+    M = np.diag(np.array(masses, dtype=float))
+    return building(name, floors, M, _chain(dampings), _chain(stiffnesses), links, title)
+
+
+def building(
+    name: str,
+    floors: Sequence[str],
+    M: Floats,
+    C: Floats,
+    K: Floats,
+    links: Sequence[Link] = (),
+    title: str = "",
+) -> System:
+    """A structure on ground that accelerates, by its matrices; drifts are from floor to floor."""
+    below = ("ground", *floors[:-1])
+    spans = dict(zip(floors, zip(floors, below, strict=True), strict=True))
+    return System(
+        name, title or name, tuple(floors), M, C, K, ("ground",), np.ones(len(floors)), links=tuple(links), spans=spans
+    )
+
+
+def quarter_car(
+    name: str,
+    body: float,
+    wheel: float,
+    spring: float,
+    tyre: float,
+    tyre_damping: float = 0.0,
+    damping: float = 0.0,
+    stop: tuple[float, float] | None = None,
+    gravity: float = 9.81,
+    title: str = "",
+) -> System:
+    """A quarter of a car: body on spring and damper, wheel on a tyre that lifts off.
+
+    Parameters
+    ----------
+    body, wheel : float
+        Masses [kg].
+    spring, tyre : float
+        Stiffnesses [N/m].
+    tyre_damping, damping : float
+        Of the tyre, and of a passive damper beside the controlled one [N s/m].
+    stop : (float, float), optional
+        Free travel either way [m] and stiffness [N/m] of bump stops.
+    """
+    M = np.diag([body, wheel])
+    C, K = (np.array([[s, -s], [-s, s + t]]) for s, t in ((damping, tyre_damping), (spring, tyre)))
+    links = [Link("damper", "body", "wheel")]
+    if stop is not None:
+        links.append(Link("stop", "body", "wheel", "stop", stop[1], 0.0, stop[0]))
+    links.append(Link("tyre", "wheel", "road", "tyre", tyre, tyre_damping, (body + wheel) * gravity / tyre))
+    push = (np.array([[0.0], [tyre]]), np.array([[0.0], [tyre_damping]]))
+    spans = {"travel": ("body", "wheel"), "tyre": ("wheel", "road")}
+    return System(
+        name,
+        title or "quarter car",
+        ("body", "wheel"),
+        M,
+        C,
+        K,
+        ("road",),
+        None,
+        push,
+        links=tuple(links),
+        spans=spans,
+    )
+
+
+def half_car(
+    name: str,
+    body: float,
+    inertia: float,
+    front_arm: float,
+    rear_arm: float,
+    wheels: tuple[float, float],
+    springs: tuple[float, float],
+    tyres: tuple[float, float],
+    tyre_damping: float = 0.0,
+    stop: tuple[float, float] | None = None,
+    gravity: float = 9.81,
+    title: str = "",
+) -> System:
+    """Half a car seen from the side: heave and pitch on two axles.
+
+    Parameters
+    ----------
+    body, inertia : float
+        Mass [kg] and moment of inertia in pitch [kg m²].
+    front_arm, rear_arm : float
+        From the centre of gravity to the axles [m].
+    wheels, springs, tyres : (float, float)
+        Front and rear [kg], [N/m], [N/m].
+    """
+    coordinates = ("body", "pitch", "wheel_front", "wheel_rear")
+    corners = {"body_front": np.array([1.0, -front_arm, 0, 0]), "body_rear": np.array([1.0, rear_arm, 0, 0])}
+    M = np.diag([body, inertia, *wheels])
+    K, C = np.diag([0.0, 0.0, *tyres]), np.diag([0.0, 0.0, tyre_damping, tyre_damping])
+    links, spans = [], {}
+    push = (np.zeros((4, 2)), np.zeros((4, 2)))
+    share = (rear_arm / (front_arm + rear_arm), front_arm / (front_arm + rear_arm))
+    for i, end in enumerate(("front", "rear")):
+        travel = corners[f"body_{end}"].copy()
+        travel[2 + i] = -1.0
+        K += springs[i] * np.outer(travel, travel)
+        push[0][2 + i, i], push[1][2 + i, i] = tyres[i], tyre_damping
+        ends = (f"body_{end}", f"wheel_{end}")
+        links.append(Link(f"damper_{end}", *ends))
+        if stop is not None:
+            links.append(Link(f"stop_{end}", *ends, "stop", stop[1], 0.0, stop[0]))
+        load = (share[i] * body + wheels[i]) * gravity
+        links.append(Link(f"tyre_{end}", ends[1], end, "tyre", tyres[i], tyre_damping, load / tyres[i]))
+        spans |= {f"travel_{end}": ends, f"tyre_{end}": (ends[1], end)}
+    return System(
+        name,
+        title or "half car",
+        coordinates,
+        M,
+        C,
+        K,
+        ("front", "rear"),
+        None,
+        push,
+        (0.0, front_arm + rear_arm),
+        tuple(links),
+        corners,
+        spans,
+    )
+
+
+def _chain(values: Sequence[float]) -> Floats:
+    """Springs in series from the ground up, as a matrix."""
+    k = np.array([*values, 0.0], dtype=float)
+    return np.diag(k[:-1] + k[1:]) - np.diag(k[1:-1], 1) - np.diag(k[1:-1], -1)

@@ -1,0 +1,196 @@
+"""Systems from TOML files: those that ship with the package by name, others by path."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from mrdamper.dampers.base import Damper
+from mrdamper.data import Floats
+from mrdamper.errors import StructureError, UnknownNameError
+from mrdamper.files.model_file import load_model
+from mrdamper.systems.structure import Link, System, building, half_car, quarter_car, shear_building
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Pair = tuple[Positive, Positive]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class _Building(_Strict):
+    mass_kg: list[float] | list[list[float]]
+    damping_N_s_m: list[list[float]]
+    stiffness_N_m: list[list[float]]
+    floors: list[str] = []
+
+    def build(self, name: str, title: str, links: Sequence[Link]) -> System:
+        M = np.array(self.mass_kg, dtype=float)
+        floors = self.floors or [f"floor{i + 1}" for i in range(len(self.mass_kg))]
+        matrices = (np.diag(M) if M.ndim == 1 else M, _array(self.damping_N_s_m), _array(self.stiffness_N_m))
+        return building(name, floors, *matrices, links, title)
+
+
+class _Storey(_Strict):
+    mass_kg: float
+    stiffness_N_m: Positive
+    damping_N_s_m: NotNegative = 0.0
+
+
+class _Car(_Strict):
+    body_kg: Positive
+    tyre_damping_N_s_m: NotNegative = 0.0
+    stop_gap_m: Positive | None = None
+    stop_N_m: NotNegative = 0.0
+
+    @property
+    def stop(self) -> tuple[float, float] | None:
+        return None if self.stop_gap_m is None else (self.stop_gap_m, self.stop_N_m)
+
+
+class _QuarterCar(_Car):
+    wheel_kg: Positive
+    spring_N_m: Positive
+    tyre_N_m: Positive
+    damping_N_s_m: NotNegative = 0.0
+
+    def build(self, name: str, title: str) -> System:
+        masses, springs = (self.body_kg, self.wheel_kg), (self.spring_N_m, self.tyre_N_m)
+        damping = (self.tyre_damping_N_s_m, self.damping_N_s_m)
+        return quarter_car(name, *masses, *springs, *damping, stop=self.stop, title=title)
+
+
+class _HalfCar(_Car):
+    pitch_inertia_kg_m2: Positive
+    front_arm_m: Positive
+    rear_arm_m: Positive
+    wheel_kg: Pair
+    spring_N_m: Pair
+    tyre_N_m: Pair
+
+    def build(self, name: str, title: str) -> System:
+        body = (self.body_kg, self.pitch_inertia_kg_m2, self.front_arm_m, self.rear_arm_m)
+        axles = (self.wheel_kg, self.spring_N_m, self.tyre_N_m)
+        return half_car(name, *body, *axles, self.tyre_damping_N_s_m, self.stop, title=title)
+
+
+class _Damper(_Strict):
+    name: str
+    above: str | None = None
+    below: str = "ground"
+    model: str | None = None
+
+
+class _Document(_Strict):
+    title: str = ""
+    source: str = ""
+    building: _Building | None = None
+    storey: list[_Storey] | None = None
+    quarter_car: _QuarterCar | None = None
+    half_car: _HalfCar | None = None
+    damper: list[_Damper] = []
+
+
+@dataclass(frozen=True, eq=False)
+class SystemFile:
+    """A system, and the saved dampers its file names.
+
+    Attributes
+    ----------
+    system : System
+    dampers : mapping of str to Damper
+        By link; links whose damper the file leaves open are missing.
+    """
+
+    system: System
+    dampers: Mapping[str, Damper]
+
+
+def bundled_systems() -> dict[str, Path]:
+    """Systems that ship with the package, by name."""
+    folder = Path(str(files("mrdamper.files.bundled") / "systems"))
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def load_system(name: str | Path) -> SystemFile:
+    """Read a system.
+
+    Parameters
+    ----------
+    name : str or path
+        Of one that ships with the package, or a TOML file.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such file and no such system.
+    StructureError, ModelFileError
+        If the file, its structure or a damper it names cannot be used.
+    """
+    known = bundled_systems()
+    path = known.get(str(name), Path(name))
+    if not path.is_file():
+        if path.suffix == ".toml":
+            raise StructureError("no such file", where=str(path), mend="give a system TOML file")
+        raise UnknownNameError.of("system", str(name), known)
+    try:
+        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+        document = _Document.model_validate(raw)
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise StructureError(
+            f"not a TOML file: {error}", where=str(path), mend="see docs/how-to/simulate.md"
+        ) from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        field = ".".join(str(part) for part in first["loc"])
+        raise StructureError(f"{field}: {first['msg']}", where=str(path), mend="see docs/how-to/simulate.md") from error
+    system = _build(document, path)
+    models = {d.name: d.model for d in document.damper if d.model is not None}
+    return SystemFile(system, {link: load_model(path.parent / model) for link, model in models.items()})
+
+
+def _build(document: _Document, path: Path) -> System:
+    shapes = [shape for shape in ("building", "storey", "quarter_car", "half_car") if getattr(document, shape)]
+    if len(shapes) != 1:
+        raise StructureError(
+            f"{len(shapes)} structures: {', '.join(shapes) or 'none'}",
+            where=str(path),
+            mend="give one of [building], [[storey]], [quarter_car], [half_car]",
+        )
+    car = document.quarter_car or document.half_car
+    if car is not None:
+        system = car.build(path.stem, document.title)
+        own = {link.name for link in system.dampers}
+        for damper in document.damper:
+            if damper.name not in own or damper.above is not None:
+                found = f"damper {damper.name!r} in a car, which has {', '.join(sorted(own))} in their places"
+                raise StructureError(found, where=str(path), mend="use those names, with a model only")
+        return system
+    links = []
+    for damper in document.damper:
+        if damper.above is None:
+            raise StructureError(f"damper {damper.name!r} hangs nowhere", where=str(path), mend="give above and below")
+        links.append(Link(damper.name, damper.above, damper.below))
+    if len({link.name for link in links}) < len(links):
+        raise StructureError("two dampers of one name", where=str(path), mend="name each differently")
+    if document.building is not None:
+        return document.building.build(path.stem, document.title, links)
+    storeys = document.storey or []
+    masses, dampings = [s.mass_kg for s in storeys], [s.damping_N_s_m for s in storeys]
+    return shear_building(path.stem, masses, [s.stiffness_N_m for s in storeys], dampings, links, document.title)
+
+
+def _array(rows: list[list[float]]) -> Floats:
+    try:
+        return np.array(rows, dtype=float)
+    except ValueError as error:
+        raise StructureError("rows of a matrix differ in length", mend="give it square") from error
