@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import wraps
+from functools import cached_property, wraps
 from typing import Literal, TypeVar
 from weakref import WeakKeyDictionary
 
@@ -189,7 +189,7 @@ class Run:
         """Codes of what the import noticed, for example W_CLIPPED."""
         return tuple(self.notes.get("findings", "").split())
 
-    @property
+    @cached_property
     def in_window(self) -> NDArray[np.bool_]:
         """(N,) mask of the samples inside the steady window."""
         if self.window is None:

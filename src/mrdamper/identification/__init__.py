@@ -14,6 +14,7 @@ from mrdamper.identification.methods import all_methods, method_named
 from mrdamper.identification.problem import DELAY, Identification, Method, Problem, Solution
 from mrdamper.metrics import score
 from mrdamper.models import Model, model_type
+from mrdamper.motion import Excitation
 from mrdamper.optimizers.linear import on_one_blas_thread
 
 __all__ = ["Identification", "Method", "Problem", "Solution", "all_methods", "identify"]
@@ -93,7 +94,8 @@ def conclude(problem: Problem, method: Method, solution: Solution) -> Identifica
     """Score a solution and say how certain it is."""
     motion = problem.motion.delayed(solution.delay) if solution.delay else problem.motion
     seen = motion.part(problem.scored)
-    predicted = solution.model.force(seen, solution.model.state(motion)[problem.scored])
+    state = solution.model.state(motion)[problem.scored]
+    predicted = solution.model.force(seen, state)
     residual = predicted - problem.force
     return Identification(
         run_id=problem.run.id,
@@ -106,7 +108,7 @@ def conclude(problem: Problem, method: Method, solution: Solution) -> Identifica
         delay=solution.delay,
         scores=score(problem.force, predicted, seen.velocity, seen.time),
         floor=problem.run.repeatability,
-        standard_errors=_standard_errors(problem, solution, residual),
+        standard_errors=_standard_errors(problem, solution, motion, state, residual),
         start=solution.start,
         end=solution.end,
         evaluations=solution.evaluations,
@@ -117,22 +119,21 @@ def conclude(problem: Problem, method: Method, solution: Solution) -> Identifica
     )
 
 
-def _standard_errors(problem: Problem, solution: Solution, residual: Floats) -> dict[str, float]:
+def _standard_errors(
+    problem: Problem, solution: Solution, motion: Excitation, state: Floats, residual: Floats
+) -> dict[str, float]:
     """Differentiate the force by each free coordinate; those at a bound have no error to state."""
-    motion = problem.motion.delayed(solution.delay) if solution.delay else problem.motion
     seen = motion.part(problem.scored)
-
-    state = solution.model.state(motion)[problem.scored]  # linear parameters do not change it
     linear = {i.name: getattr(solution.model, i.name) for i in solution.model.parameters() if i.linear}
     searched = {name: value for name, value in solution.end.items() if name != DELAY}
     point = {**problem.fixed, **searched, **linear}
     names = [n for n in (*linear, *searched) if (n in problem.free or n in searched) and n not in solution.at_bounds]
-    base = solution.model.force(seen, state)
+    base = residual + problem.force
     columns = []
     for name in names:
         step = 1e-6 * abs(point[name]) or 1e-6
         moved = problem.model_type.build({**point, name: point[name] + step})
-        there = state if name in linear else moved.state(motion)[problem.scored]
+        there = state if name in linear else moved.state(motion)[problem.scored]  # linear ones do not change it
         columns.append((moved.force(seen, there) - base) / step)
     if not columns:
         return {}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar, Self
 
 import numpy as np
@@ -52,7 +53,7 @@ class BoucWen(Model):
     k3: float = param("N/m^3", "cubic stiffness", linear=True, default=0.0)
     m: float = param("kg", "equivalent mass", linear=True, preset=True, default=0.0)
 
-    @property
+    @cached_property
     def shape(self) -> Shape:
         """Shape of the hysteresis without its force scale."""
         return Shape.from_bouc_wen(self.beta, self.gamma, self.n)

@@ -31,8 +31,8 @@ class Excitation:
     def __post_init__(self) -> None:
         size = self.time.size
         for name in ("displacement", "velocity", "acceleration", "current"):
-            array = np.broadcast_to(np.asarray(getattr(self, name), dtype=float), (size,))
-            object.__setattr__(self, name, array)
+            array = np.asarray(getattr(self, name), dtype=float)
+            object.__setattr__(self, name, array if array.shape == (size,) else np.broadcast_to(array, (size,)))
 
     def __len__(self) -> int:
         return self.time.size

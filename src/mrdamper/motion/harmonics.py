@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike
 from mrdamper.data import Floats
 from mrdamper.optimizers.linear import solve_linear
 
+_FEW = 250  # samples on which a frequency is found to begin with
+
 
 @dataclass(frozen=True, eq=False)
 class HarmonicSeries:
@@ -47,7 +49,7 @@ class HarmonicSeries:
         sine, cosine = _waves(omega * t, self.sine.size)
         for _ in range(derivative % 4):  # a quarter period for each derivative
             sine, cosine = cosine, -sine
-        return trend + sine @ (scale * self.sine) + cosine @ (scale * self.cosine)
+        return trend + (scale * self.sine) @ sine + (scale * self.cosine) @ cosine
 
     def amplitude(self, order: int = 1) -> float:
         """Amplitude of one harmonic."""
@@ -60,7 +62,7 @@ class HarmonicSeries:
     def half_peak_to_peak(self) -> float:
         """Half the difference of maximum and minimum of the periodic part."""
         sine, cosine = _cycle(self.sine.size)
-        return float(np.ptp(sine @ self.sine + cosine @ self.cosine) / 2)
+        return float(np.ptp(self.sine @ sine + self.cosine @ cosine) / 2)
 
 
 def fit_harmonics(time: Floats, signal: Floats, orders: int, *, frequency: float, drift: bool = True) -> HarmonicSeries:
@@ -79,7 +81,7 @@ def fit_harmonics(time: Floats, signal: Floats, orders: int, *, frequency: float
     origin = float(time[0])
     nyquist = 0.5 / float(np.median(np.diff(time)))
     orders = int(np.clip(nyquist / frequency, 1, orders))
-    coefficients = solve_linear(_columns(time - origin, frequency, orders, drift), signal)
+    coefficients = solve_linear(_rows(time - origin, frequency, orders, drift).T, signal)
     lead = 2 if drift else 1
     return HarmonicSeries(
         frequency=frequency,
@@ -105,17 +107,26 @@ def fundamental_frequency(time: Floats, signal: Floats, orders: int = 3) -> floa
         ladder = guess * np.geomspace(0.4, 2.5, 45)
         guess = ladder[int(np.argmin(_single_sine_costs(t[few], signal[few], ladder)))]
     orders = orders if guess * t[-1] >= 3 else 1
-    frequency = float(guess)
-    columns = _columns(t, frequency, orders, drift=True)
-    coefficients = solve_linear(columns, signal)
+    # Most steps on few samples: the last ones, on all, decide.
+    near = float(guess)
+    if t.size > 4 * _FEW:
+        some = slice(None, None, t.size // _FEW)
+        near = _refined(t[some], signal[some], near, orders, 1e-6)
+    return _refined(t, signal, near, orders, 1e-11)
+
+
+def _refined(t: Floats, signal: Floats, frequency: float, orders: int, tolerance: float) -> float:
+    """Gauss–Newton on frequency and coefficients, until a step is below a share of the frequency."""
+    rows = _rows(t, frequency, orders, drift=True)
+    coefficients = solve_linear(rows.T, signal)
     for _ in range(30):
-        slope = _frequency_derivative(t, columns, coefficients, orders)
-        found = solve_linear(np.column_stack([columns, slope]), signal)
+        slope = _frequency_derivative(t, rows, coefficients, orders)
+        found = solve_linear(np.vstack([rows, slope]).T, signal)
         coefficients, step = found[:-1], float(found[-1])
         frequency += float(np.clip(step, -0.1 * frequency, 0.1 * frequency))
-        if abs(step) < 1e-11 * frequency:
+        if abs(step) < tolerance * frequency:
             break
-        columns = _columns(t, frequency, orders, drift=True)
+        rows = _rows(t, frequency, orders, drift=True)
     return frequency
 
 
@@ -148,14 +159,13 @@ def _crossings(wave: Floats) -> int:
 
 
 def _waves(angle: Floats, orders: int) -> tuple[Floats, Floats]:
-    """Sines and cosines of 1...orders times an angle, (N, K) each: powers of one complex number."""
-    first = np.exp(1j * angle)
-    powers = np.empty((angle.size, orders), dtype=complex)
-    power = first
-    for k in range(orders):
-        powers[:, k] = power
-        power = power * first
-    return np.imag(powers), np.real(powers)
+    """Sines and cosines of 1...orders times an angle, (K, N) each: powers of one complex number."""
+    sine, cosine = np.empty((orders, angle.size)), np.empty((orders, angle.size))
+    sine[0], cosine[0] = np.sin(angle), np.cos(angle)
+    for k in range(1, orders):
+        sine[k] = sine[k - 1] * cosine[0] + cosine[k - 1] * sine[0]
+        cosine[k] = cosine[k - 1] * cosine[0] - sine[k - 1] * sine[0]
+    return sine, cosine
 
 
 @lru_cache
@@ -163,13 +173,13 @@ def _cycle(orders: int) -> tuple[Floats, Floats]:
     return _waves(np.linspace(0, 2 * np.pi, 2048, endpoint=False), orders)
 
 
-def _columns(t: Floats, frequency: float, orders: int, drift: bool) -> Floats:
+def _rows(t: Floats, frequency: float, orders: int, drift: bool) -> Floats:
+    """(L, N) mean, drift, sines and cosines; the transpose of a least-squares table, whose rows are long."""
     sine, cosine = _waves(2 * np.pi * frequency * t, orders)
-    trend = [np.ones_like(t), t] if drift else [np.ones_like(t)]
-    return np.column_stack([*trend, sine, cosine])
+    return np.concatenate([np.stack([np.ones_like(t), t] if drift else [np.ones_like(t)]), sine, cosine])
 
 
-def _frequency_derivative(t: Floats, columns: Floats, coefficients: Floats, orders: int) -> Floats:
+def _frequency_derivative(t: Floats, rows: Floats, coefficients: Floats, orders: int) -> Floats:
     k = np.arange(1, orders + 1)
     sine, cosine = np.reshape(coefficients[2:], (2, orders))
-    return 2 * np.pi * t * (columns[:, 2 + orders :] @ (k * sine) - columns[:, 2 : 2 + orders] @ (k * cosine))
+    return 2 * np.pi * t * ((k * sine) @ rows[2 + orders :] - (k * cosine) @ rows[2 : 2 + orders])

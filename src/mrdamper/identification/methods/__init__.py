@@ -34,9 +34,11 @@ def method_named(name: str, settings: Mapping[str, str] | None = None) -> Method
         If there is no such method, switch or value; with the near matches.
     """
     chosen = named("method", name, all_methods())
+    if not settings:
+        return chosen()
     kinds = {k: t for k, t in get_type_hints(chosen).items() if _is_simple(t)}
     values: dict[str, object] = {}
-    for key, text in (settings or {}).items():
+    for key, text in settings.items():
         if key not in kinds:
             raise UnknownNameError.of(f"setting of {name}", key, kinds)
         allowed = get_args(kinds[key])
