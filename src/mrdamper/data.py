@@ -53,10 +53,24 @@ class Condition:
 
 def same_condition(conditions: Sequence[Condition]) -> list[list[int]]:
     """Group the indices of conditions that agree in current and, to 3 %, in frequency and amplitude."""
+    return _grouped(
+        conditions,
+        lambda a, b: (
+            abs(a.current_A - b.current_A) <= 1e-3 + _SAME * abs(b.current_A) and _agree_in_motion(a, b, _SAME)
+        ),
+    )
+
+
+def same_motion(conditions: Sequence[Condition], tolerance: float = 0.05) -> list[list[int]]:
+    """Group the indices of conditions whose frequency and amplitude agree to a tolerance, at any current."""
+    return _grouped(conditions, lambda a, b: _agree_in_motion(a, b, tolerance))
+
+
+def _grouped(conditions: Sequence[Condition], agree: Callable[[Condition, Condition], bool]) -> list[list[int]]:
     groups: list[list[int]] = []
     for index, condition in enumerate(conditions):
         for group in groups:
-            if _agree(condition, conditions[group[0]]):
+            if agree(condition, conditions[group[0]]):
                 group.append(index)
                 break
         else:
@@ -64,12 +78,8 @@ def same_condition(conditions: Sequence[Condition]) -> list[list[int]]:
     return groups
 
 
-def _agree(a: Condition, b: Condition) -> bool:
-    return (
-        abs(a.current_A - b.current_A) <= 1e-3 + _SAME * abs(b.current_A)
-        and abs(a.frequency_Hz / b.frequency_Hz - 1) <= _SAME
-        and abs(a.amplitude_m / b.amplitude_m - 1) <= _SAME
-    )
+def _agree_in_motion(a: Condition, b: Condition, tolerance: float) -> bool:
+    return abs(a.frequency_Hz / b.frequency_Hz - 1) <= tolerance and abs(a.amplitude_m / b.amplitude_m - 1) <= tolerance
 
 
 @dataclass(frozen=True, eq=False)

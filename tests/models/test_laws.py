@@ -13,18 +13,19 @@ from mrdamper.models import all_models, model_type
 from mrdamper.motion import sine
 from mrdamper.simulation import simulate, steady_loop
 
-ODD_WITHOUT = {"f0": 0.0}
+ODD_WITHOUT = {"play-bypass": {"f0": 0.0, "k": 0.0}}  # the one-sided stiffness is not odd
 SLOW = Condition(0.5, 1.0, 0.01)
 # Models of the whole current range are identified over currents, not from one run.
 OVER_CURRENT = {"play-bypass"}
 PER_RUN = sorted(set(all_models()) - OVER_CURRENT)
+ALL = sorted(all_models())
 
 
 def example(name):
     return model_type(name).build(example_values(name))
 
 
-@pytest.mark.parametrize("name", PER_RUN)
+@pytest.mark.parametrize("name", ALL)
 def test_a_closed_loop_never_creates_energy(name):
     """The loop's area, and of each stroke's the friction part: springs give back what they took."""
     loop = steady_loop(example(name), SLOW, 2000)
@@ -32,27 +33,46 @@ def test_a_closed_loop_never_creates_energy(name):
     assert np.sum((force[1:] + force[:-1]) / 2 * np.diff(x)) > 0
 
 
-@pytest.mark.parametrize("name", PER_RUN)
+@pytest.mark.parametrize("name", ALL)
 def test_without_offset_the_loop_is_odd(name):
-    loop = steady_loop(replace(example(name), **ODD_WITHOUT), SLOW, 400)
+    loop = steady_loop(
+        replace(example(name), **ODD_WITHOUT.get(name, {"f0": 0.0})), SLOW, 402
+    )  # no sample where v is zero
     scale = np.abs(loop.force).max()
-    # A memoryless branch is undecided on the very sample where x or a is zero.
-    away = np.abs(loop.excitation.displacement[:201]) > 1e-6
-    away &= np.abs(loop.excitation.acceleration[:201]) > 1e-6
-    np.testing.assert_allclose(loop.force[200:401][away], -loop.force[:201][away], atol=1e-5 * scale)
+    # A memoryless branch is undecided on the very sample where x or a is zero; no sample is where v is.
+    away = np.abs(loop.excitation.displacement[:202]) > 1e-6
+    away &= np.abs(loop.excitation.acceleration[:202]) > 1e-6
+    np.testing.assert_allclose(loop.force[201:403][away], -loop.force[:202][away], atol=1e-5 * scale)
 
 
-@pytest.mark.parametrize("name", PER_RUN)
-def test_the_force_does_not_depend_on_the_step(name):
-    model = example(name)
-    coarse, fine = sine(SLOW, 2, 250), sine(SLOW, 2, 2000)
+def step_error(model, samples):
+    """Largest difference to eight times the samples, over the largest force."""
+    coarse, fine = sine(SLOW, 2, samples), sine(SLOW, 2, 8 * samples)
     a, b = simulate(model, coarse).force, simulate(model, fine).force[::8]
     away = (np.abs(coarse.displacement) > 1e-6) & (np.abs(coarse.acceleration) > 1e-6)
+    return np.max(np.abs(a - b)[away]) / np.abs(b).max()
+
+
+# A lag takes its input as straight between samples; a seat of 25 µm bends within one of them.
+LAGGED = {"play-bypass"}
+
+
+@pytest.mark.parametrize("name", sorted(set(ALL) - LAGGED))
+def test_the_force_does_not_depend_on_the_step(name):
     # The vertex of a reversal between samples is known to 1e-5 of the stroke at 250 samples a cycle.
-    np.testing.assert_allclose(a[away], b[away], atol=2e-4 * np.abs(b).max())
+    assert step_error(example(name), 250) < 2e-4
 
 
-@pytest.mark.parametrize("name", PER_RUN)
+@pytest.mark.parametrize("name", sorted(LAGGED))
+def test_the_force_of_a_lag_settles_with_the_step(name):
+    """With more than its first power, once the seat holds a sample; a force that depends on the step would not."""
+    errors = [step_error(example(name), samples) for samples in (250, 1000, 4000)]
+    assert errors[0] < 2e-2
+    assert errors[1] < errors[0] / 4
+    assert errors[2] < errors[1] / 8
+
+
+@pytest.mark.parametrize("name", ALL)
 def test_two_quarters_of_a_cycle_give_what_the_whole_gives(name):
     """The force at a sample depends on the past only."""
     motion = sine(SLOW, 2, 500)
@@ -78,7 +98,7 @@ JUMPING = {"bingham", "herschel-bulkley"}
 WEAK = {"spencer": {"k0_rate"}}
 
 
-@pytest.mark.parametrize("name", PER_RUN)
+@pytest.mark.parametrize("name", ALL)
 def test_a_model_says_all_a_table_needs(name):
     cls = model_type(name)
     for info in cls.parameters():

@@ -11,6 +11,8 @@ from mrdamper.hysteresis import loop_area
 from mrdamper.models import all_models, model_type
 from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
+from mrdamper.models.lugre import LuGre
+from mrdamper.models.spencer import Spencer
 from mrdamper.motion import Excitation, sine
 from mrdamper.simulation import simulate, steady_loop
 
@@ -117,3 +119,23 @@ def test_bingham_matches_the_vectors(vectors):
     motion = Excitation(np.arange(len(case["v"])), np.array(case["x"]), np.array(case["v"]), 0.0, 0.0)
     model = Bingham(c=params["c"], fy=params["fc"], f0=params["f0"])
     np.testing.assert_allclose(model.force(motion, np.zeros(len(motion))), case["bingham"]["F"], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Spencer.build(
+            {"c1": 0.0, "c0": 1e2, "k0": 1.0, "yield_force": 1.0, "yield_displacement": 1e-4, "k1": 0.0, "f0": 0.0}
+        ),
+        lambda: Spencer.from_letters(c0=0, c1=1e4, k0=0, k1=0, alpha=0, gamma=1e6, beta=0, A=1),
+        lambda: Spencer.from_letters(c0=1e2, c1=1e4, k0=0, k1=0, alpha=1e2, gamma=1e6, beta=0, A=1, n=0),
+        lambda: LuGre.from_bristles(0.0, 1.0, 1.0, 1.0, 1.0, 1.0),
+        lambda: LuGre.from_bristles(1e6, 1.0, 1.0, 0.0, 1.0, 1.0),
+        lambda: BoucWen.build({"c": 1.0, "yield_force": 1.0, "yield_displacement": 0.0}),
+        lambda: BoucWen.build({"c": 1.0, "yield_force": 1.0, "yield_displacement": 1e-3, "n": 0.0}),
+        lambda: BoucWen.build({"c": 1.0, "yield_force": 1.0, "beta": 1e5, "n": 0.0}),
+    ],
+)
+def test_a_zero_below_a_fraction_line_is_named(make):
+    with pytest.raises(ParameterError):
+        make()

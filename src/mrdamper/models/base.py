@@ -198,3 +198,15 @@ class Model(ABC):
     def values(self) -> dict[str, float]:
         """Parameter values by name."""
         return {info.name: getattr(self, info.name) for info in self.parameters()}
+
+
+def require_positive(where: str, **values: float) -> None:
+    """Refuse letters of a publication that stand below a fraction line and are not above zero.
+
+    Raises
+    ------
+    ParameterError
+    """
+    for name, value in values.items():
+        if not 0 < value < math.inf:
+            raise ParameterError(f"{name} = {value:g}", where=where, mend="give a positive, finite value in SI units")

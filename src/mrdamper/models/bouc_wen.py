@@ -12,7 +12,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import IdentificationError
 from mrdamper.hysteresis import Shape, follow
-from mrdamper.models.base import GENERAL_FORMS, Model, Scale, SearchAxis
+from mrdamper.models.base import GENERAL_FORMS, Model, Scale, SearchAxis, require_positive
 from mrdamper.motion import Excitation
 from mrdamper.parameters import param
 from mrdamper.tracing import plain
@@ -133,6 +133,7 @@ class BoucWen(Model):
         given = dict(values)
         n = given.get("n", 2.0)
         if (length := given.pop("yield_displacement", None)) is not None:
+            require_positive(cls.title, yield_displacement=length, n=n)
             if "gamma" in given:
                 given["beta"] = length**-n - given["gamma"]
             elif "beta" in given:
@@ -144,5 +145,6 @@ class BoucWen(Model):
         elif "gamma" not in given:
             given["gamma"] = given["beta"]
         if (force := given.pop("yield_force", None)) is not None:
+            require_positive(cls.title, n=n)
             given["alpha"] = plain(force * (given["beta"] + given["gamma"]) ** (1 / n))
         return cls(**given)

@@ -10,8 +10,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.errors import ParameterError
-from mrdamper.models.base import Model, Scale, SearchAxis
+from mrdamper.models.base import Model, Scale, SearchAxis, require_positive
 from mrdamper.motion import Excitation
 from mrdamper.parameters import param
 from mrdamper.tracing import Tape, choose, streamed
@@ -81,9 +80,7 @@ class HerschelBulkley(Model):
             If one is not positive.
         """
         given = {"width": width, "height": height, "length": length, "piston_area": piston_area}
-        for name, value in {**given, "yield_stress": yield_stress, "K": K, "m": m}.items():
-            if not value > 0:
-                raise ParameterError(f"{name} = {value:g}", where=cls.title, mend="give a positive value in SI units")
+        require_positive(cls.title, **given, yield_stress=yield_stress, K=K, m=m)
         force = 2 * length * piston_area * yield_stress / height
         return cls(fy=force, vc=width * height**2 / (2 * piston_area) * (yield_stress / K) ** (1 / m), m=m)
 

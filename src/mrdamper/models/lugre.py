@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.integrator import integrate
-from mrdamper.models.base import Model, Scale, SearchAxis
+from mrdamper.models.base import Model, Scale, SearchAxis, require_positive
 from mrdamper.motion import Excitation
 from mrdamper.parameters import param
 
@@ -69,7 +69,13 @@ class LuGre(Model):
             Sliding and onset force [N].
         vs : float
             Stribeck velocity [m/s].
+
+        Raises
+        ------
+        ParameterError
+            Unless sigma0, fc and vs are positive.
         """
+        require_positive(cls.title, sigma0=sigma0, fc=fc, vs=vs)
         return cls(fc=fc, presliding=fc / sigma0, stribeck=fs / fc, vs=vs, sigma1=sigma1, sigma2=sigma2)
 
     def state(self, motion: Excitation) -> Floats:

@@ -11,7 +11,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import ParameterError
 from mrdamper.integrator import integrate
-from mrdamper.models.base import GENERAL_FORMS, Model, Scale, SearchAxis
+from mrdamper.models.base import GENERAL_FORMS, Model, Scale, SearchAxis, require_positive
 from mrdamper.motion import Excitation
 from mrdamper.parameters import param
 
@@ -114,6 +114,7 @@ class Spencer(Model):
                 where=cls.title,
                 mend="c1, A and beta + gamma are positive; gamma, the coefficient of |v|, is not negative",
             )
+        require_positive(cls.title, n=n)
         z_max = (A / (beta + gamma)) ** (1 / n)
         return cls(
             c1=c1,
@@ -132,6 +133,7 @@ class Spencer(Model):
 
         x0 is 0 where there is no k1 to stand for the offset force.
         """
+        require_positive(self.title, A=A)
         z_max = A * self.yield_displacement
         total = A / z_max**self.n
         return {
@@ -185,6 +187,8 @@ class Spencer(Model):
     def build(cls, values: Mapping[str, float]) -> Self:
         """Make the model from its parameters, or from `c0` [N s/m], `k0` [N/m], `yield_force` [N] in their place."""
         given = dict(values)
+        if given.keys() & {"c0", "k0", "yield_force"}:
+            require_positive(cls.title, c1=given["c1"])
         for letter, ratio in (("c0", "c0_ratio"), ("k0", "k0_rate"), ("yield_force", "creep")):
             if letter in given:
                 given[ratio] = given.pop(letter) / given["c1"]
