@@ -16,12 +16,11 @@ from mrdamper.dampers.base import NOT_A_SINE, Damper, Envelope, Prediction
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.gram import Condensed, choose_forms, condense, fit_jointly
 from mrdamper.dampers.parameter_map import ParameterMap
-from mrdamper.data import Condition, Floats, Run, same_condition
+from mrdamper.data import Condition, Floats, Run, same_condition, same_motion
 from mrdamper.errors import IdentificationError
 from mrdamper.functions.fitting import FunctionFit, assess, choose_function
 from mrdamper.functions.forms import FORMS
 from mrdamper.identification import Identification
-from mrdamper.identification.loop_analysis import same_motion
 from mrdamper.models import Model
 from mrdamper.motion import Excitation, running_sine
 from mrdamper.simulation import Response, simulate, steady_loop

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrdamper.data import Condition, Floats, Run
+from mrdamper.data import Condition, Floats, Run, same_motion
 from mrdamper.metrics import dissipated_power
 from mrdamper.motion import MotionAnalysis, analyse_motion, measured_motion
 
@@ -96,23 +96,6 @@ class DynamicRange:
     amplitude_m: float
     currents_A: tuple[float, ...]
     ratios: tuple[float, ...]
-
-
-def same_motion(conditions: Sequence[Condition], tolerance: float = 0.05) -> list[list[int]]:
-    """Group conditions by motion: indices whose frequency and amplitude agree to a tolerance."""
-    groups: list[list[int]] = []
-    for index, condition in enumerate(conditions):
-        for group in groups:
-            first = conditions[group[0]]
-            if (
-                abs(condition.frequency_Hz / first.frequency_Hz - 1) <= tolerance
-                and abs(condition.amplitude_m / first.amplitude_m - 1) <= tolerance
-            ):
-                group.append(index)
-                break
-        else:
-            groups.append([index])
-    return groups
 
 
 def dynamic_ranges(loops: Sequence[LoopAnalysis]) -> tuple[DynamicRange, ...]:

@@ -8,10 +8,9 @@ from typing import Literal
 
 import numpy as np
 
-from mrdamper.data import Floats, Run
+from mrdamper.data import Floats, Run, same_motion
 from mrdamper.errors import IdentificationError
 from mrdamper.functions.fitting import fit_function
-from mrdamper.identification.loop_analysis import same_motion
 from mrdamper.motion import equivalent_sine, measured_motion
 from mrdamper.reproduction.study import Reproduction
 from mrdamper.reproduction.ways import CONSISTENT, LITERAL, SLOWEST, TRADITIONAL

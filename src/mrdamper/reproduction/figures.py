@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from mrdamper.data import Floats, Run
-from mrdamper.identification.loop_analysis import same_motion
+from mrdamper.data import Floats, Run, same_motion
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.report.plots.style import MEASURED, MM, PALETTE, current_colours, house_style, label, new_figure, thin
 from mrdamper.reproduction.claims import friction_along

@@ -11,9 +11,9 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from mrdamper.data import Condition, Dataset, Run
+from mrdamper.data import Condition, Dataset, Run, same_motion
 from mrdamper.errors import InputError
-from mrdamper.identification.loop_analysis import LoopAnalysis, analyse_loop, same_motion
+from mrdamper.identification.loop_analysis import LoopAnalysis, analyse_loop
 from mrdamper.motion import equivalent_sine
 from mrdamper.rig_files.quality.table import Quality, quality_table, record_of
 from mrdamper.study.workflow import usable_sines

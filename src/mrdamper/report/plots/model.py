@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.modified import ModifiedFit
-from mrdamper.data import Run
-from mrdamper.identification.loop_analysis import same_motion
+from mrdamper.data import Run, same_motion
 from mrdamper.motion import equivalent_sine
 from mrdamper.report.plots.style import (
     MEASURED,

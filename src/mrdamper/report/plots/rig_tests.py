@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mrdamper.data import Dataset
-from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, same_motion, whole_cycles
+from mrdamper.data import Dataset, same_motion
+from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, whole_cycles
 from mrdamper.motion import measured_motion
 from mrdamper.report.plots.style import KN, MM, current_colours, house_style, label, new_figure, thin
 
