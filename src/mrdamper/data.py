@@ -16,11 +16,12 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mrdamper.errors import NonFiniteError, RunError, TimeOrderError, UnknownNameError
+from mrdamper.errors import NonFiniteError, RunError, TimeOrderError, UnknownNameError, printable
 
 Floats = NDArray[np.float64]
 T = TypeVar("T")
 Split = Literal["train", "validate"]
+_LONGEST_NAME = 255
 _SAME = 0.03  # frequencies and amplitudes this close are one condition of the test matrix
 
 
@@ -135,6 +136,8 @@ class Run:
     notes: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        for what, name in (("id", self.id), ("rig", self.rig)):
+            require_name(what, name)
         time = self._channel("time", self.time)
         size = time.size
         if size < 3:
@@ -254,6 +257,21 @@ class Run:
         array = array.view()
         array.flags.writeable = False
         return array
+
+
+def require_name(what: str, name: object) -> None:
+    """Refuse a name that would not stay a name on a page, in a terminal or in a table.
+
+    Raises
+    ------
+    RunError
+        Unless it is printable text of one line.
+    """
+    if not isinstance(name, str) or len(name) > _LONGEST_NAME or printable(name) != name:
+        raise RunError(
+            f"the {what} is {name!r:.60}",
+            mend=f"name it in printable text on one line, at most {_LONGEST_NAME} characters",
+        )
 
 
 def once_per_run(function: Callable[[Run], T]) -> Callable[[Run], T]:

@@ -6,8 +6,15 @@ Anything that is not an `InputError` is our fault, not the user's.
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Iterable
 from difflib import get_close_matches
+
+
+def printable(text: str) -> str:
+    """Text on one line of a terminal: nothing in it moves a cursor or turns the direction of writing."""
+    odd = ("Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp")
+    return "".join(f"\\x{ord(c):02x}" if unicodedata.category(c) in odd else c for c in text)
 
 
 class InputError(ValueError):
@@ -36,7 +43,7 @@ class InputError(ValueError):
         text = f"{self.where}: {self.found}" if self.where else self.found
         if self.mend:
             text += f"; {self.mend}"
-        return f"{text} [{self.code}]"
+        return printable(f"{text} [{self.code}]")
 
 
 class DatasetError(InputError):

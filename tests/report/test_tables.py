@@ -10,8 +10,8 @@ from support.dampers import joint_damper
 from support.synthetic import synthetic_run
 
 from mrdamper.files.dataset import save_dataset
+from mrdamper.files.encoding import csv_text
 from mrdamper.files.model_file import save_model
-from mrdamper.report.tables import table_text
 
 PLAIN = """
 import sys
@@ -47,7 +47,7 @@ def test_commands_that_write_tables_load_no_plotting_library(tmp_path, condition
 
 def test_a_table_keeps_every_digit_and_leaves_gaps_empty():
     value = math.pi * 1e-7
-    rows = list(csv.DictReader(table_text([{"a": value, "b": None}, {"a": 1, "c": "x, y"}]).splitlines()))
+    rows = list(csv.DictReader(csv_text([{"a": value, "b": None}, {"a": 1, "c": "x, y"}]).splitlines()))
     assert float(rows[0]["a"]) == value
     assert rows[0]["b"] == rows[0]["c"] == ""
     assert rows[1] == {"a": "1", "b": "", "c": "x, y"}

@@ -14,6 +14,7 @@ from mrdamper.data import Floats
 from mrdamper.export.base import Exporter, Written, identifier, rig_of
 from mrdamper.export.c_writer import CWriter
 from mrdamper.export.templates import render
+from mrdamper.files.encoding import c_comment
 from mrdamper.models import Model
 from mrdamper.streaming import FLAGS, Stepper, Stream, stream
 from mrdamper.tracing import Program
@@ -22,10 +23,6 @@ from mrdamper.tracing.tape import Table
 TOLERANCE = 1e-9  # of the largest force: the self-test forgives other compilers and libraries this much
 _SAMPLES = 400
 _SINGLE_STRIDE = 4  # points of a table per point kept for single precision: still within its rounding
-_SPELLED = str.maketrans(
-    {"−": "-", "–": "-", "·": "*", "²": "^2", "³": "^3", "√": "sqrt", "≤": "<=", "≥": ">=", "∈": " in "}
-    | {"α": "alpha", "β": "beta", "γ": "gamma", "δ": "delta", "η": "eta", "φ": "phi", "ζ": "zeta", "ω": "omega"}
-)
 
 
 class CExporter(Exporter):
@@ -106,10 +103,10 @@ def c_facts(made: Stream, name: str, rig: str, language: type[CWriter] = CWriter
     return {
         "name": name,
         "upper": name.upper(),
-        "rig": _comment(rig),
-        "title": _comment(made.title),
+        "rig": c_comment(rig),
+        "title": c_comment(made.title),
         "version": _version(),
-        "equation": textwrap.wrap(_comment((type(made.model).__doc__ or "").split("\n\n")[0]), 96)
+        "equation": textwrap.wrap(c_comment((type(made.model).__doc__ or "").split("\n\n")[0]), 96)
         if made.model
         else [],
         "flags": FLAGS,
@@ -168,8 +165,8 @@ def _parameter(info: Any, value: float) -> Mapping[str, str]:
     low, high = (f"{bound:g}" for bound in info.bounds)
     return {
         "name": info.name,
-        "meaning": _comment(info.meaning),
-        "unit": _comment(info.unit),
+        "meaning": c_comment(info.meaning),
+        "unit": c_comment(info.unit),
         "low": low,
         "high": high,
         "value": repr(value),
@@ -186,12 +183,6 @@ def _envelope(made: Stream) -> list[tuple[str, str, str]]:
             for name in ("current_A", "frequency_Hz", "amplitude_m", "peak_velocity_m_s")
         )
     ]
-
-
-def _comment(text: str) -> str:
-    """Text that cannot end a comment or leave its line; ASCII, as C99 sources are."""
-    plain = " ".join(text.translate(_SPELLED).split()).encode("ascii", "replace").decode()
-    return plain.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?").replace("\\", "/")
 
 
 def _version() -> str:

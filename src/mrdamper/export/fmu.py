@@ -18,7 +18,7 @@ from mrdamper.data import Floats
 from mrdamper.errors import InputError
 from mrdamper.export.base import Exporter, Written, identifier
 from mrdamper.export.c import c_facts, c_sources, reference_motion
-from mrdamper.export.fmu_description import c_bounds, description_facts, parameters_of_stream, plain, serial_fields
+from mrdamper.export.fmu_description import c_bounds, description_facts, parameters_of_stream, serial_fields
 from mrdamper.export.templates import render
 from mrdamper.export.toolchain import PLATFORMS, Platform, build_library
 from mrdamper.models import Model
@@ -194,7 +194,7 @@ def _facts(made: Stream, name: str, rig: str, fmi: int, known: Reference) -> dic
         "fmi": fmi,
         "most_steps": _MOST_STEPS,
         "stop_time": repr(known.step * (known.force.size - 1)),
-        "about": plain(f"{made.title}{f' of rig {rig}' if rig else ''}, made by mrdamper.".replace("\n", " ")),
+        "about": f"{made.title}{f' of rig {rig}' if rig else ''}, made by mrdamper.",
     }
 
 

@@ -242,10 +242,5 @@ def c_bounds(info: ParameterInfo) -> str:
     return " && ".join(checks + ([f"value <= {float(high)!r}"] if math.isfinite(high) else []))
 
 
-def plain(text: str) -> str:
-    """Text without the characters XML forbids."""
-    return re.sub(r"[^\t\n\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "?", text)
-
-
 def _sentence(text: str) -> str:
     return text[:1].upper() + text[1:]

@@ -9,13 +9,8 @@ from mrdamper.export.base import Exporter, Written, rig_of
 from mrdamper.export.formulas import formulas
 from mrdamper.export.latex_writer import equations, number, symbol, unit_text
 from mrdamper.export.templates import render
+from mrdamper.files.encoding import latex
 from mrdamper.models import Model
-
-_ESCAPED = str.maketrans(
-    {c: rf"\{c}" for c in "&%$#_{}"}
-    | {"~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
-    | {"\\": r"\textbackslash{}"}
-)
 
 
 class LatexExporter(Exporter):
@@ -27,10 +22,9 @@ class LatexExporter(Exporter):
 
     def export(self, damper: Damper | Model, name: str) -> Written:
         facts = document_facts(damper)
-        escaped = {key: text.translate(_ESCAPED) for key, text in facts.items() if isinstance(text, str)}
+        escaped = {key: latex(text) for key, text in facts.items() if isinstance(text, str)}
         rows = [
-            {**row, "meaning": row["meaning"].translate(_ESCAPED), "unit": unit_text(row["unit"])}
-            for row in facts["parameters"]
+            {**row, "meaning": latex(row["meaning"]), "unit": unit_text(row["unit"])} for row in facts["parameters"]
         ]
         text = render("equations.tex.j2", **{**facts, **escaped, "parameters": rows})
         return Written({f"{name}.tex": text.encode()}, ("numbers are rounded to five digits; model.json has them all",))

@@ -8,9 +8,8 @@ from mrdamper.dampers.base import Damper
 from mrdamper.export.base import Exporter, Written
 from mrdamper.export.latex import document_facts
 from mrdamper.export.templates import render
+from mrdamper.files.encoding import markdown
 from mrdamper.models import Model
-
-_ESCAPED = str.maketrans({c: f"\\{c}" for c in "\\`*_{}[]<>#|"})
 
 
 class MarkdownExporter(Exporter):
@@ -22,7 +21,7 @@ class MarkdownExporter(Exporter):
 
     def export(self, damper: Damper | Model, name: str) -> Written:
         facts = document_facts(damper)
-        facts["rig"] = facts["rig"].translate(_ESCAPED)
+        facts["rig"] = markdown(facts["rig"])
         rows = [{**row, "meaning": row["meaning"].replace("|", r"\|")} for row in facts["parameters"]]
         text = render("equations.md.j2", **{**facts, "parameters": rows})
         return Written({f"{name}.md": text.encode()}, ("numbers are rounded to five digits; model.json has them all",))

@@ -17,6 +17,7 @@ import numpy as np
 from mrdamper.data import Condition, Dataset, Run
 from mrdamper.errors import ColumnError, DatasetError, UnitError
 from mrdamper.files.atomic import write_folder
+from mrdamper.files.encoding import csv_text, csv_value
 
 if TYPE_CHECKING:
     import polars as pl
@@ -70,7 +71,7 @@ def save_dataset(dataset: Dataset, folder: str | Path, *, extra_files: dict[str,
     import polars as pl
 
     with write_folder(folder) as target:
-        pl.DataFrame([_row(run) for run in dataset], infer_schema_length=None).write_csv(target / "runs.csv")
+        (target / "runs.csv").write_text(csv_text([_row(run) for run in dataset]), encoding="utf-8")
         pl.concat(_samples(dataset), how="diagonal").write_parquet(
             target / "samples.parquet", compression="zstd", statistics=False
         )
@@ -117,7 +118,7 @@ def _runs_table(folder: Path) -> list[dict[str, Any]]:
         raise _missing_column("run_id", table.columns, path)
     if not table.height:
         raise DatasetError("no rows", where=str(path), mend="add one row a run")
-    return table.to_dicts()
+    return [{k: v and csv_value(v) for k, v in row.items()} for row in table.to_dicts()]
 
 
 def _holds_rig_files(folder: Path) -> bool:

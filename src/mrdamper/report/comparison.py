@@ -12,11 +12,12 @@ import numpy as np
 
 from mrdamper.data import Run
 from mrdamper.files.atomic import publish
+from mrdamper.files.encoding import csv_text, file_names
 from mrdamper.files.model_file import save_model
 from mrdamper.report.page import made_from, render_page
 from mrdamper.report.plots.comparison import overlaid_loops, ranking
 from mrdamper.report.plots.style import save_figure
-from mrdamper.report.tables import score_row, table_text
+from mrdamper.report.tables import score_row
 from mrdamper.study.comparison import Comparison, Entry, RigComparison
 from mrdamper.study.workflow import Progress
 
@@ -49,10 +50,10 @@ def write_comparison(
     def fill(work: Path) -> None:
         (work / "figures").mkdir()
         (work / "models").mkdir()
-        chapters = []
+        chapters, parts = [], file_names(rig.rig for rig in comparison.rigs)
         for number, rig in enumerate(comparison.rigs):
             progress(f"{rig.rig or 'rig'}: figures", number / len(comparison.rigs))
-            suffix = f"-{rig.rig}" if len(comparison.rigs) > 1 else ""
+            suffix = f"-{parts[rig.rig]}" if len(comparison.rigs) > 1 else ""
             chapters.append(_chapter(rig, work / "figures", suffix))
             for entry in rig.entries:
                 save_model(entry.damper, work / "models" / f"{entry.name.replace(':', '-')}{suffix}.json")
@@ -62,8 +63,8 @@ def write_comparison(
         page = render_page("comparison.html.j2", title, footer, chapters=chapters)
         (work / "comparison.html").write_text(page, encoding="utf-8")
         rows = summary_rows(comparison)
-        (work / "comparison.csv").write_text(table_text(rows), encoding="utf-8")
-        (work / "runs.csv").write_text(table_text(run_rows(comparison)), encoding="utf-8")
+        (work / "comparison.csv").write_text(csv_text(rows), encoding="utf-8")
+        (work / "runs.csv").write_text(csv_text(run_rows(comparison)), encoding="utf-8")
         (work / "comparison.json").write_text(json.dumps(rows, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
     written = publish(folder, "comparison.html", fill)

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.files.atomic import publish
+from mrdamper.files.encoding import csv_text, file_names
 from mrdamper.files.model_file import save_model
 from mrdamper.identification import Identification
 from mrdamper.report.distrust import doubts
@@ -20,7 +21,7 @@ from mrdamper.report.plots.model import parameter_curves, predicted_loops, resid
 from mrdamper.report.plots.reversal import force_since_reversal
 from mrdamper.report.plots.rig_tests import measured_loops, test_analysis, test_matrix
 from mrdamper.report.plots.style import Picture
-from mrdamper.report.tables import identification_rows, score_row, table_text
+from mrdamper.report.tables import identification_rows, score_row
 from mrdamper.study.workflow import Candidate, Progress, RigStudy, Study
 from mrdamper.validation import session_drift
 
@@ -52,11 +53,11 @@ def write_study(study: Study, folder: str | Path, progress: Progress = lambda wh
 
     def fill(work: Path) -> None:
         (work / "figures").mkdir()
-        chapters = []
+        chapters, parts = [], file_names(rig.rig for rig in study.rigs)
         for number, rig in enumerate(study.rigs):
             progress(f"{rig.rig or 'rig'}: report", number / len(study.rigs))
             drawn = study.finished[number] if study.finished else draw(rig)
-            suffix = f"-{rig.rig}" if len(study.rigs) > 1 else ""
+            suffix = f"-{parts[rig.rig]}" if len(study.rigs) > 1 else ""
             pictures = {name: picture.save(work / "figures" / f"{name}{suffix}") for name, picture in drawn.items()}
             save_model(rig.damper, work / f"model{suffix}.json")
             chapters.append(_chapter(rig, pictures))
@@ -65,7 +66,7 @@ def write_study(study: Study, folder: str | Path, progress: Progress = lambda wh
         page = render_page("study.html.j2", title, footer, chapters=chapters)
         (work / "report.html").write_text(page, encoding="utf-8")
         (work / "identifications.csv").write_text(
-            table_text(identification_rows(_all_identifications(study))), encoding="utf-8"
+            csv_text(identification_rows(_all_identifications(study))), encoding="utf-8"
         )
         (work / "validation.csv").write_text(_validation_table(study), encoding="utf-8")
 
@@ -92,7 +93,7 @@ def _validation_table(study: Study) -> str:
                     rows.append(
                         {"rig": rig.rig, "model": candidate.model, "way": candidate.way, "set": split, **score_row(run)}
                     )
-    return table_text(rows)
+    return csv_text(rows)
 
 
 def _figures(rig: RigStudy) -> dict[str, Figure]:

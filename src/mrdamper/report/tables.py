@@ -1,30 +1,16 @@
-"""Results as rows, and rows as CSV: what the command line and the pages print.
+"""Results as rows: what the command line and the pages print.
 
 Nothing here draws: a command that writes a table loads no plotting library.
 """
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from mrdamper.dampers.base import Prediction
 from mrdamper.identification import Identification
 from mrdamper.validation import RunScore
-
-
-def table_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    """CSV of rows; columns in order of first appearance, numbers exact."""
-    names = list(dict.fromkeys(name for row in rows for name in row))
-    text = io.StringIO()
-    writer = csv.DictWriter(text, names, lineterminator="\n", restval="")
-    writer.writeheader()
-    writer.writerows(
-        {k: ("" if v is None else repr(v) if isinstance(v, float) else v) for k, v in r.items()} for r in rows
-    )
-    return text.getvalue()
 
 
 def identification_rows(identifications: Sequence[Identification]) -> list[dict[str, Any]]:

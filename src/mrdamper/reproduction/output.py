@@ -12,12 +12,13 @@ from matplotlib.figure import Figure
 from mrdamper.data import Condition
 from mrdamper.errors import MissingExtraError
 from mrdamper.files.atomic import publish
+from mrdamper.files.encoding import csv_text
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.report.page import made_from, render_page
 from mrdamper.report.plots.model import predicted_loops
 from mrdamper.report.plots.rig_tests import measured_loops, test_analysis, test_matrix
 from mrdamper.report.plots.style import save_figure
-from mrdamper.report.tables import identification_rows, table_text
+from mrdamper.report.tables import identification_rows
 from mrdamper.reproduction.claims import Claim, judge
 from mrdamper.reproduction.figures import (
     damping_and_mass_figure,
@@ -82,7 +83,7 @@ def write_reproduction(
             progress(f"figure {name}", 0.2 + 0.8 * number / len(figures))
             pictures[name] = save_figure(figure, work / "figures" / name)
         for name, rows in tables.items():
-            (work / "tables" / f"{name}.csv").write_text(table_text(rows), encoding="utf-8")
+            (work / "tables" / f"{name}.csv").write_text(csv_text(rows), encoding="utf-8")
         page = _page(study, claims, tables, pictures, (*study.notes, *missing))
         (work / "reproduction.html").write_text(page, encoding="utf-8")
 

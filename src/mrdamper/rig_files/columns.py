@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.errors import ColumnError, UnitError
+from mrdamper.errors import ColumnError, UnitError, printable
 from mrdamper.rig_files.column_names import WORDS, role_of, says_nothing, split_name, unknown_unit
-from mrdamper.rig_files.readers.base import RawTable, RigFileError, printable
+from mrdamper.rig_files.readers.base import RawTable, RigFileError
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED
 from mrdamper.rig_files.units import DIMENSION, Unit, parse_unit
 

@@ -10,12 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.errors import ColumnError
+from mrdamper.errors import ColumnError, printable
 from mrdamper.rig_files.column_names import role_of, split_name
 from mrdamper.rig_files.columns import Assigned, assign, left_out
 from mrdamper.rig_files.profile import Profile, current_in_name
 from mrdamper.rig_files.readers import RawTable, RigFileError, suffixes
-from mrdamper.rig_files.readers.base import printable
 from mrdamper.rig_files.record import OPTIONAL, Finding, Record
 from mrdamper.rig_files.text.spool import rescale
 from mrdamper.rig_files.units import parse_unit

@@ -33,9 +33,10 @@ def register(app: typer.Typer) -> None:
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.dataset import load_dataset
+        from mrdamper.files.encoding import csv_text
         from mrdamper.identification.methods import method_named
         from mrdamper.models import model_type
-        from mrdamper.report.tables import identification_rows, table_text
+        from mrdamper.report.tables import identification_rows
         from mrdamper.study import workflow
 
         chosen_model, chosen_method = model_type(model), method_named(method, parse_pairs(setting, "--set"))
@@ -65,4 +66,4 @@ def register(app: typer.Typer) -> None:
             progress("identified", 1.0)
         for name, why in refused.items():
             typer.echo(f"not identified: {name}: {why}", err=True)
-        put(identification_rows(found), out, as_json, table_text)
+        put(identification_rows(found), out, as_json, csv_text)

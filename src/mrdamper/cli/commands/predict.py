@@ -40,9 +40,10 @@ def register(app: typer.Typer) -> None:
         from mrdamper.data import Condition
         from mrdamper.errors import InputError
         from mrdamper.files.atomic import require_writable
+        from mrdamper.files.encoding import csv_text
         from mrdamper.files.model_file import load_model
         from mrdamper.files.motion import load_motion
-        from mrdamper.report.tables import prediction_rows, table_text
+        from mrdamper.report.tables import prediction_rows
 
         if out is not None:
             require_writable(out)
@@ -65,4 +66,4 @@ def register(app: typer.Typer) -> None:
                 f"warning: {WARNINGS.get(flag, f'{flag} lies outside the tests this model was identified from')}",
                 err=True,
             )
-        put(prediction_rows(prediction), out, as_json, table_text)
+        put(prediction_rows(prediction), out, as_json, csv_text)

@@ -24,8 +24,9 @@ def register(app: typer.Typer) -> None:
         from mrdamper.errors import InputError, UnknownNameError
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.dataset import load_dataset
+        from mrdamper.files.encoding import csv_text
         from mrdamper.files.model_file import load_model
-        from mrdamper.report.tables import score_row, table_text
+        from mrdamper.report.tables import score_row
         from mrdamper.validation import validate as score
 
         if split not in (None, "train", "validate"):
@@ -46,7 +47,7 @@ def register(app: typer.Typer) -> None:
             typer.echo(f"not scored: {name}: {why}", err=True)
         if not validation.runs:
             raise InputError("no run could be scored", where=f"rig {wanted}", mend="see the lines above")
-        put([score_row(run) for run in validation.runs], out, as_json, table_text)
+        put([score_row(run) for run in validation.runs], out, as_json, csv_text)
         floors = [run.floor for run in validation.runs if run.floor is not None]
         outside = sum(bool(run.extrapolation) for run in validation.runs)
         typer.echo(

@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
+from mrdamper.files.encoding import xml
+
 
 def render(template: str, **facts: Any) -> str:
     """Fill a template of this folder; a gap without a fact is an error."""
@@ -15,9 +17,11 @@ def render(template: str, **facts: Any) -> str:
 def _environment() -> Any:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    return Environment(
+    made = Environment(
         loader=PackageLoader("mrdamper.export", "templates"),
         undefined=StrictUndefined,
         keep_trailing_newline=True,
-        autoescape=False,
+        autoescape=False,  # each place has its own encoding
     )
+    made.filters["xml"] = xml
+    return made

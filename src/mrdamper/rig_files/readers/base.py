@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import BinaryIO, ClassVar
 
 from mrdamper.data import Floats
-from mrdamper.errors import InputError
+from mrdamper.errors import InputError, printable
 from mrdamper.rig_files.record import Finding, LineNumbers
 
 MOST_COLUMNS = 1000
@@ -50,11 +50,6 @@ class RigFileError(InputError):
         self.file, self.line, self.column = file, line, column
         parts = [file, f"line {line}" if line is not None else "", f"column {column}" if column is not None else ""]
         super().__init__(found, where=", ".join(part for part in parts if part), mend=mend, code=code)
-
-
-def printable(text: str) -> str:
-    """A name from a file, with nothing in it that moves a cursor or turns the direction of writing."""
-    return "".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in text)
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mrdamper.errors import InputError
 from mrdamper.export import all_exporters
+from mrdamper.files.encoding import csv_text
 from mrdamper.files.model_file import dump_model, parse_model
-from mrdamper.report.tables import prediction_rows, table_text
+from mrdamper.report.tables import prediction_rows
 from mrdamper.web.api.model import Ask
 from mrdamper.web.bench_model import as_damper, predict_held
 from mrdamper.web.sessions import Current, Session
@@ -87,7 +88,7 @@ def document(key: str, held: Held, session: Current) -> dict[str, str]:
 def table(key: str, ask: Ask, session: Current) -> Response:
     """The loop at a condition as CSV."""
     prediction = predict_held(session.damper(key).damper, ask.condition, ask.held)
-    text = table_text(prediction_rows(prediction))
+    text = csv_text(prediction_rows(prediction))
     return _download(text.encode(), "prediction.csv", "text/csv; charset=utf-8")
 
 

@@ -1,0 +1,109 @@
+"""Text from data, written so that it stays text where it goes: one function a place.
+
+Names, ids, notes and units come from rig files, profiles, tables and saved models, so anybody
+may have written them. HTML is escaped by the page templates themselves; the terminal by
+`errors.printable`.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterable, Mapping, Sequence
+from hashlib import sha256
+from html import escape
+
+_SPELLED = str.maketrans(
+    {"−": "-", "–": "-", "·": "*", "²": "^2", "³": "^3", "√": "sqrt", "≤": "<=", "≥": ">=", "∈": " in "}
+    | {"α": "alpha", "β": "beta", "γ": "gamma", "δ": "delta", "η": "eta", "φ": "phi", "ζ": "zeta", "ω": "omega"}
+)
+_LATEX = str.maketrans(
+    {c: rf"\{c}" for c in "&%$#_{}"}
+    | {"~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "\\": r"\textbackslash{}"}
+    | {"<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}"}
+)
+_MARKDOWN = str.maketrans({c: f"\\{c}" for c in "!\"#$%&'()*+,-./:;<=>?@[\\]^_`{|}~"})
+_FORMULA = re.compile(r"'*[=+\-@\t\r]")  # what a spreadsheet computes instead of showing
+_DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)  # that Windows keeps for itself
+_LONGEST_NAME = 48  # characters; of four bytes each, with prefix, suffix and hash, below 255
+
+
+def c_comment(text: str) -> str:
+    """One line of ASCII that cannot end a comment: marks that mean something together stand apart."""
+    plain = " ".join(text.translate(_SPELLED).split()).encode("ascii", "replace").decode()
+    plain = re.sub(r"[^ -~]", "?", plain).replace("\\", "/")
+    return re.sub(r"(?<=[*/?])(?=[*/?])", " ", plain)
+
+
+def xml(text: str) -> str:
+    """Text or attribute of XML: without the characters it forbids, on one line."""
+    return escape(_one_line(text))
+
+
+def latex(text: str) -> str:
+    """Text of LaTeX, outside mathematics."""
+    return _one_line(text).translate(_LATEX)
+
+
+def markdown(text: str) -> str:
+    """Text of Markdown, also in a table and between dollar signs: every mark is escaped."""
+    return _one_line(text).translate(_MARKDOWN)
+
+
+def csv_cell(text: str) -> str:
+    """A cell a spreadsheet shows and does not compute; `csv_value` undoes it.
+
+    An apostrophe goes before =, +, -, @ and tab, as spreadsheets write it themselves; numbers stay.
+    """
+    return f"'{text}" if _FORMULA.match(text) and not _is_number(text) else text
+
+
+def csv_value(cell: str) -> str:
+    """What `csv_cell` was given."""
+    return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
+
+
+def csv_text(rows: Sequence[Mapping[str, object]], names: Iterable[str] | None = None) -> str:
+    """Rows as CSV; columns in order of first appearance, numbers exact, nothing as an empty cell.
+
+    Cells that hold a semicolon or a tab are quoted too: some countries' spreadsheets split there.
+    """
+    heads = list(names) if names is not None else list(dict.fromkeys(name for row in rows for name in row))
+    lines = [heads, *([row.get(name) for name in heads] for row in rows)]
+    return "".join(f"{','.join(map(_csv_field, line))}\n" for line in lines)
+
+
+def file_names(texts: Iterable[str]) -> dict[str, str]:
+    """A part of a file name for each text: safe on every system, no two alike.
+
+    Letters, digits, dot, dash and underscore stay; a text that was changed otherwise than by
+    replacing them, or would meet another's name, ends in a few digits of its hash.
+    """
+    made: dict[str, str] = {}
+    taken: set[str] = set()
+    for text in dict.fromkeys(texts):
+        name = re.sub(r"[^\w.\-]+", "_", unicodedata.normalize("NFC", text)).strip("._-") or "_"
+        if len(name) > _LONGEST_NAME or name.casefold() in taken or _DEVICES.fullmatch(name):
+            name = f"{name[:_LONGEST_NAME]}_{sha256(text.encode('utf-8', 'replace')).hexdigest()[:8]}"
+        taken.add(name.casefold())
+        made[text] = name
+    return made
+
+
+def _csv_field(value: object) -> str:
+    if value is None:
+        return ""
+    if not isinstance(value, str):
+        return repr(value) if isinstance(value, float) else str(value)
+    text = csv_cell(value)
+    return '"{}"'.format(text.replace('"', '""')) if re.search(r'[,"\n\r;\t]', text) else text
+
+
+def _one_line(text: str) -> str:
+    """Without line breaks, control characters, and marks that turn the direction of writing."""
+    plain = re.sub(r"\s+", " ", text)
+    return "".join("?" if unicodedata.category(c) in ("Cc", "Cf", "Cs", "Co", "Cn") else c for c in plain)
+
+
+def _is_number(text: str) -> bool:
+    return re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", text) is not None
