@@ -4,7 +4,7 @@ VENV   ?= .venv
 BIN    := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help study serve test test-all bench fuzz lint format clean
+.PHONY: help study serve test test-all bench fuzz lint format release-check clean
 
 help:  ## show this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -34,8 +34,11 @@ lint: $(VENV)/.dev  ## format check, lint, types, import order of the layers
 format: $(VENV)/.dev  ## format and mend what ruff can mend
 	$(BIN)/ruff format . && $(BIN)/ruff check --fix .
 
+release-check:  ## build twice, compare, install bare and locked, lowest versions, SBOM
+	bash release/check.sh
+
 clean:  ## remove environments and results
-	rm -rf $(VENV) result dist
+	rm -rf $(VENV) .venv-* result dist
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)

@@ -1,6 +1,7 @@
 """Streams: one sample after the other gives what the whole record gives."""
 
 import math
+import sys
 
 import numpy as np
 import pytest
@@ -69,6 +70,13 @@ def test_compiled_equals_interpreted(name):
     again = stepper(DAMPERS[name])
     again.run(*(c[:600] for c in channels(motion)))
     assert again.state.keys() == compiled.state.keys()
+
+
+def test_without_numba_a_run_is_stepped(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mrdamper.tracing.compiled", None)
+    motion, stream = wander(), stepper(joint_damper())
+    assert np.array_equal(stream.run(*channels(motion)), stepped(stepper(joint_damper()), motion))
+    assert stream.state["started"] == 1.0
 
 
 def test_a_run_can_be_cut_anywhere():

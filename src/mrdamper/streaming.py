@@ -334,7 +334,7 @@ class Stepper:
     def run(
         self, time: Floats, displacement: Floats, velocity: Floats, acceleration: Floats, current: Floats
     ) -> Floats:
-        """Force [N] along a sampled motion, from the state at hand, compiled where numba allows.
+        """Force [N] along a sampled motion, from the state at hand; compiled, or stepped where numba is missing.
 
         Parameters
         ----------
@@ -343,6 +343,9 @@ class Stepper:
         """
         channels = [np.ascontiguousarray(c, dtype=float) for c in (displacement, velocity, acceleration, current)]
         steps = np.diff(time, prepend=2 * time[0] - time[1])
+        if self._compiled is None:
+            rows = zip(*(channel.tolist() for channel in (*channels, steps)), strict=True)
+            return np.array([self.step_motion(*row) for row in rows])
         force, flags = np.empty(steps.size), np.empty(steps.size)
         memory = np.array(self._memory)
         failed = self._compiled(self._given, self._derived, memory, *channels, steps, force, flags)
@@ -355,8 +358,10 @@ class Stepper:
 
     @cached_property
     def _compiled(self) -> Any:
-        from mrdamper.tracing.compiled import compiled_run
-
+        try:
+            from mrdamper.tracing.compiled import compiled_run
+        except ImportError:
+            return None  # numba is the extra `fast`
         return compiled_run(self.stream.step)
 
     @property

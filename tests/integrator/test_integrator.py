@@ -1,10 +1,12 @@
 """The integrator keeps its tolerance, converges, stays stable where explicit methods do not, and refuses."""
 
+import sys
+
 import numpy as np
 import pytest
 
 from mrdamper.data import Condition
-from mrdamper.errors import ExcitationError, ParameterError
+from mrdamper.errors import ExcitationError, MissingExtraError, ParameterError
 from mrdamper.hysteresis import Shape, follow
 from mrdamper.integrator import integrate
 from mrdamper.models import Scale
@@ -119,3 +121,9 @@ def test_step_halving_at_the_search_bounds():
         model = Spencer.build({**values, "c1": 1e4})
         a, b = (model.force(motion, model.state(motion)) for motion in (coarse, fine))
         assert np.abs(a - b[::2]).max() < 1e-3 * np.abs(b).max(), values
+
+
+def test_without_numba_the_hint_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mrdamper.integrator.rosenbrock", None)
+    with pytest.raises(MissingExtraError, match=r"mrdamper\[fast\]"):
+        integrate(lambda *_: None, (), (np.arange(3.0),) * 4, (0.0,), (1.0,))

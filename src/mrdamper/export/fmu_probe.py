@@ -10,15 +10,16 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
-from fmpy import instantiate_fmu, read_model_description, simulate_fmu
-from fmpy.fmi1 import FMICallException
-from fmpy.validation import validate_fmu
 
 _INPUTS = ("displacement", "velocity", "current")
 
 
 def main(folder: str, report: str, tolerance: str, *binary: str) -> None:
     """Look at the FMU unpacked in `folder`, its binary too if told so."""
+    # Here, because finding the exporters imports this module, and FMPy is an extra.
+    from fmpy import instantiate_fmu, read_model_description, simulate_fmu
+    from fmpy.fmi1 import FMICallException
+    from fmpy.validation import validate_fmu
 
     def say(code: str, text: object = "") -> None:
         with Path(report).open("a", encoding="utf-8") as out:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.errors import ExcitationError, ParameterError
+from mrdamper.errors import ExcitationError, MissingExtraError, ParameterError
 from mrdamper.integrator.streamed import Rate, integrate_law, integrate_step
 from mrdamper.tracing import streamed
 
@@ -57,6 +57,8 @@ def integrate(
     ------
     ExcitationError
         If time does not increase.
+    MissingExtraError
+        If numba is not installed.
     ParameterError
         If the tolerance cannot be kept: the parameters make the model too stiff, or it runs away.
 
@@ -70,8 +72,12 @@ def integrate(
     if not np.all(np.diff(time) > 0):
         raise ExcitationError("time does not increase", mend="sort the samples and drop the repeated ones")
     out = np.empty((time.size, len(start)))
-    from mrdamper.integrator import rosenbrock  # compiles, or reads what was compiled before
-
+    try:
+        from mrdamper.integrator import rosenbrock  # compiles, or reads what was compiled before
+    except ImportError as error:
+        raise MissingExtraError(
+            "a model that is integrated needs numba for whole records", mend="pip install 'mrdamper[fast]'"
+        ) from error
     status, at = rosenbrock.path(
         rosenbrock.compiled(rate),
         np.array(parameters, dtype=float),
