@@ -125,5 +125,6 @@ def test_step_halving_at_the_search_bounds():
 
 def test_without_numba_the_hint_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "mrdamper.integrator.rosenbrock", None)
+    monkeypatch.delattr("mrdamper.integrator.rosenbrock", raising=False)
     with pytest.raises(MissingExtraError, match=r"mrdamper\[fast\]"):
         integrate(lambda *_: None, (), (np.arange(3.0),) * 4, (0.0,), (1.0,))
