@@ -63,7 +63,7 @@ class Scores:
 
     Attributes
     ----------
-    nrmse_pp, nrmse_std, wape : float
+    nrmse_pp, nrmse_std, wape, mean_relative_error : float
         See the functions of these names.
     peak_error, energy_error : float
         Relative error of half the peak-to-peak force and of the dissipated energy; positive
@@ -75,6 +75,7 @@ class Scores:
     wape: float
     peak_error: float
     energy_error: float
+    mean_relative_error: float
 
 
 def score(measured: Floats, predicted: Floats, velocity: Floats, time: Floats) -> Scores:
@@ -92,4 +93,5 @@ def score(measured: Floats, predicted: Floats, velocity: Floats, time: Floats) -
         wape=wape(measured, predicted),
         peak_error=peak_force(predicted) / peak_force(measured) - 1,
         energy_error=dissipated_power(predicted, velocity, time) / dissipated - 1 if dissipated else float("nan"),
+        mean_relative_error=mean_relative_error(measured, predicted),
     )

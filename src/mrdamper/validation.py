@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -62,6 +62,10 @@ class Validation:
     def worst(self, name: str = "nrmse_pp") -> RunScore:
         """The run with the largest magnitude of a score."""
         return max(self.runs, key=lambda run: abs(getattr(run.scores, name)))
+
+    def only(self, run_ids: Collection[str]) -> Validation:
+        """The scores of some runs."""
+        return replace(self, runs=tuple(run for run in self.runs if run.run_id in run_ids))
 
 
 def validate(damper: Damper, runs: Iterable[Run], title: str | None = None) -> Validation:

@@ -9,9 +9,14 @@ from support.dampers import joint_damper
 from mrdamper.dampers.joint import JointFit
 from mrdamper.optimizers.ending import Ending
 from mrdamper.report.distrust import doubts
+from mrdamper.study.recipe import Scored, play_and_bypass
 from mrdamper.validation import Validation
 
 NONE = Validation("none", ())
+
+
+def scored(fit):
+    return Scored(play_and_bypass(), fit.damper, fit, (), float("nan"), NONE, NONE, NONE, 0.1)
 
 
 @pytest.mark.parametrize(
@@ -24,7 +29,7 @@ NONE = Validation("none", ())
 )
 def test_a_search_that_did_not_converge_is_said_so_in_a_sentence(why, said):
     fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), why, 9, 0.1)
-    sentences = [s for s in doubts(fit.damper, fit, (), (), NONE, NONE) if "search" in s]
+    sentences = [s for s in doubts(scored(fit), ()) if "search" in s]
     assert len(sentences) == (said is not None)
     if said:
         assert said in sentences[0]
@@ -33,8 +38,8 @@ def test_a_search_that_did_not_converge_is_said_so_in_a_sentence(why, said):
 
 def test_a_run_described_far_worse_than_the_others_is_named_by_its_factor():
     fit = JointFit(joint_damper(), np.array([0.02, 0.02, 0.09]), ("d",), np.zeros(2), Ending.SETTLED, 9, 0.1)
-    sentences = doubts(fit.damper, fit, (), (), NONE, NONE)
+    sentences = doubts(scored(fit), ())
     assert any("4.5 times the median" in s for s in sentences)
     assert any("at a limit of their range: d" in s for s in sentences)
     calm = replace(fit, nrmse_pp=np.array([0.02, 0.02, 0.03]), at_bounds=())
-    assert not any("times the median" in s or "limit" in s for s in doubts(fit.damper, calm, (), (), NONE, NONE))
+    assert not any("times the median" in s or "limit" in s for s in doubts(scored(calm), ()))

@@ -21,8 +21,9 @@ from mrdamper.models.spencer import Spencer
 from mrdamper.motion import sine
 from mrdamper.report.comparison import summary_rows, write_comparison
 from mrdamper.streaming import stepper
-from mrdamper.study.comparison import compare, contestants
-from mrdamper.study.comparison.parallel import shortened
+from mrdamper.study.comparison import compare
+from mrdamper.study.parallel import shortened
+from mrdamper.study.recipe import recipes
 from mrdamper.validation import validate
 
 ALI = {  # of a plausible damper; identifying one takes a minute
@@ -72,11 +73,11 @@ def compared(dataset):
 def test_the_truth_wins_and_the_crudest_loses(compared):
     entries = compared.rigs[0].entries
     assert not compared.rigs[0].refused
-    assert entries[0].name == "bouc-wen"
+    assert entries[0].recipe.name == "bouc-wen"
     assert entries[0].left_out.median() < 0.02
     medians = [entry.left_out.median() for entry in entries]
     assert medians == sorted(medians)
-    bingham = next(entry for entry in entries if entry.name == "bingham")
+    bingham = next(entry for entry in entries if entry.recipe.name == "bingham")
     assert bingham.per_run > 2 * entries[0].per_run
 
 
@@ -92,7 +93,7 @@ def test_every_entry_is_judged_on_the_same_runs(compared, dataset):
 def test_one_process_gives_the_same_bits(compared, dataset):
     alone = compare(dataset, ["bingham", "bouc-wen", "dahl:joint", "lei-type", "kernel"], jobs=1)
     for a, b in zip(alone.rigs[0].entries, compared.rigs[0].entries, strict=True):
-        assert a.name == b.name
+        assert a.recipe.name == b.recipe.name
         assert [i.model for i in a.identifications] == [i.model for i in b.identifications]
         assert [r.scores for r in a.left_out.runs] == [r.scores for r in b.left_out.runs]
         assert [r.scores for r in a.held_out.runs] == [r.scores for r in b.held_out.runs]
@@ -116,7 +117,7 @@ def test_the_files_agree_with_each_other(compared, tmp_path):
 
 def test_unknown_models_are_named_with_near_ones(dataset):
     with pytest.raises(UnknownNameError, match="did you mean kwok"):
-        contestants(["kwock"])
+        recipes(["kwock"])
 
 
 def test_too_few_runs_are_refused(dataset):
@@ -125,9 +126,9 @@ def test_too_few_runs_are_refused(dataset):
 
 
 def test_genetic_entries_take_part_only_when_asked():
-    names = [c.name for c in contestants()]
+    names = [c.name for c in recipes()]
     assert not any("genetic" in name or ":paper" in name for name in names)
-    assert "bouc-wen:direct-genetic" in [c.name for c in contestants(genetic=True)]
+    assert "bouc-wen:direct-genetic" in [c.name for c in recipes(genetic=True)]
     assert {"kwok", "spencer", "lugre", "ali-type", "kernel", "play-bypass", "bouc-wen:joint"} <= set(names)
 
 
@@ -184,7 +185,7 @@ def test_on_the_bundled_data_single_runs_are_described_as_well_as_by_the_referen
     reference |= {("labcontrol", "bingham"): 0.089, ("labcontrol", "bouc-wen"): 0.044}
     for rig in result.rigs:
         for entry in rig.entries:
-            assert entry.per_run <= reference[rig.rig, entry.name]
+            assert entry.per_run <= reference[rig.rig, entry.recipe.name]
 
 
 def test_the_command_line_lists_and_explains_models():

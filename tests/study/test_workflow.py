@@ -32,7 +32,7 @@ def folder(study, tmp_path_factory):
 @pytest.mark.parametrize("rig", ["utfsm", "labcontrol"])
 def test_held_out_runs_are_predicted_better_than_by_bingham(study, rig):
     found = study.rig(rig)
-    bingham = [c for c in found.candidates if c.model == "bingham"]
+    bingham = [c for c in found.candidates if c.recipe.model == "bingham"]
     assert found.chosen.held_out.median() <= 0.05
     assert all(found.chosen.held_out.median() < other.held_out.median() for other in bingham)
     assert found.chosen.left_out.median() < min(other.left_out.median() for other in bingham)
@@ -76,7 +76,7 @@ def test_every_file_of_the_contract_is_there(folder):
         "validation.csv",
         "figures",
     }
-    assert {p.suffix for p in (folder / "figures").iterdir()} == {".png", ".svg"}
+    assert {p.suffix for p in (folder / "figures").iterdir()} == {".svg"}
 
 
 def test_saved_models_predict_what_the_study_predicted(folder, study, bundled):

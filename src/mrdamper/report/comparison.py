@@ -18,14 +18,15 @@ from mrdamper.report.page import made_from, render_page
 from mrdamper.report.plots.comparison import overlaid_loops, ranking
 from mrdamper.report.plots.style import save_figure
 from mrdamper.report.tables import score_row
-from mrdamper.study.comparison import Comparison, Entry, RigComparison
-from mrdamper.study.workflow import Progress
+from mrdamper.study.comparison import Comparison, RigComparison
+from mrdamper.study.recipe import Progress, Scored
+from mrdamper.validation import Validation
 
 _LOOPS, _OVERLAID = 3, 5
 
 
 def write_comparison(
-    comparison: Comparison, folder: str | Path, progress: Progress = lambda what, share: None
+    comparison: Comparison, folder: str | Path, progress: Progress = lambda what, share: None, *, png: bool = False
 ) -> list[Path]:
     """Write the comparison, whole or not at all.
 
@@ -35,6 +36,8 @@ def write_comparison(
     folder : path
         Made if missing; files of the same names are replaced together at the end.
     progress : callable
+    png : bool
+        Every figure as PNG beside the SVG.
 
     Returns
     -------
@@ -54,9 +57,9 @@ def write_comparison(
         for number, rig in enumerate(comparison.rigs):
             progress(f"{rig.rig or 'rig'}: figures", number / len(comparison.rigs))
             suffix = f"-{parts[rig.rig]}" if len(comparison.rigs) > 1 else ""
-            chapters.append(_chapter(rig, work / "figures", suffix))
+            chapters.append(_chapter(rig, work / "figures", suffix, png))
             for entry in rig.entries:
-                save_model(entry.damper, work / "models" / f"{entry.name.replace(':', '-')}{suffix}.json")
+                save_model(entry.damper, work / "models" / f"{entry.recipe.name.replace(':', '-')}{suffix}.json")
         took = f"compared in {comparison.seconds:.0f} s on {comparison.jobs} processes."
         footer = f"{made_from(comparison.dataset)}; {took}"
         title = f"MR damper models compared: {', '.join(r.rig for r in comparison.rigs) or comparison.dataset.name}"
@@ -82,48 +85,58 @@ def run_rows(comparison: Comparison) -> list[dict[str, Any]]:
     rows = []
     for rig in comparison.rigs:
         for entry in rig.entries:
-            head = {"rig": rig.rig, "model": entry.name}
+            head = {"rig": rig.rig, "model": entry.recipe.name}
             for found in entry.identifications:
                 rows.append({**head, "set": "per run", "run_id": found.run_id, "nrmse_pp": found.scores.nrmse_pp})
-            sets = {"train": entry.train, "left out": entry.left_out, "held out": entry.held_out, "other": entry.other}
+            held_out, other = held_out_sets(rig, entry)
+            sets = {"train": entry.train, "left out": entry.left_out, "held out": held_out, "other": other}
             for name, validation in sets.items():
                 rows += [{**head, "set": name, **score_row(run)} for run in validation.runs]
     return rows
 
 
+def held_out_sets(rig: RigComparison, entry: Scored) -> tuple[Validation, Validation]:
+    """Held-out sines, and held-out runs of other motion."""
+    others = {run.run_id for run in entry.held_out.runs} - rig.sines
+    return entry.held_out.only(rig.sines), entry.held_out.only(others)
+
+
 def _rows(rig: RigComparison) -> list[dict[str, Any]]:
-    return [
-        {
-            "rig": rig.rig,
-            "rank": rank,
-            "model": entry.name,
-            "title": entry.title,
-            "per_run_nrmse_pp": _plain(entry.per_run),
-            "train_nrmse_pp": _plain(entry.train.median()),
-            "left_out_nrmse_pp": _plain(entry.left_out.median()),
-            "held_out_nrmse_pp": _plain(entry.held_out.median()),
-            "other_motions_nrmse_pp": _plain(entry.other.median()),
-            "held_out_energy_error": _plain(entry.held_out.median("energy_error")),
-            "numbers_per_run": entry.numbers_per_run,
-            "numbers": entry.damper.parameter_count,
-            "conditions_needed": entry.runs_needed,
-            "forces_computed_per_run": _evaluations(entry),
-            "seconds": entry.seconds,
-            "limits": entry.limits,
-            "source": entry.source,
-            "reason": _reason(entry, rig.entries),
-        }
-        for rank, entry in enumerate(rig.entries, start=1)
-    ]
+    rows = []
+    for rank, entry in enumerate(rig.entries, start=1):
+        held_out, other = held_out_sets(rig, entry)
+        rows.append(
+            {
+                "rig": rig.rig,
+                "rank": rank,
+                "model": entry.recipe.name,
+                "title": entry.recipe.title,
+                "per_run_nrmse_pp": _plain(entry.per_run),
+                "train_nrmse_pp": _plain(entry.train.median()),
+                "left_out_nrmse_pp": _plain(entry.left_out.median()),
+                "held_out_nrmse_pp": _plain(held_out.median()),
+                "other_motions_nrmse_pp": _plain(other.median()),
+                "held_out_energy_error": _plain(held_out.median("energy_error")),
+                "numbers_per_run": entry.numbers_per_run,
+                "numbers": entry.damper.parameter_count,
+                "conditions_needed": entry.conditions_needed,
+                "forces_computed_per_run": _evaluations(entry),
+                "seconds": entry.seconds,
+                "limits": entry.recipe.limits,
+                "source": entry.recipe.source,
+                "reason": _reason(entry, rig.entries),
+            }
+        )
+    return rows
 
 
-def _evaluations(entry: Entry) -> int | None:
+def _evaluations(entry: Scored) -> int | None:
     """The budget of an identification: forces computed, median over runs."""
     counts = [i.evaluations for i in entry.identifications]
     return int(np.median(counts)) if counts else None
 
 
-def _reason(entry: Entry, entries: Sequence[Entry]) -> str:
+def _reason(entry: Scored, entries: Sequence[Scored]) -> str:
     """Say why it stands where it stands."""
     own, best = entry.left_out.median(), entries[0]
     text = f"{100 * own:.1f} % on left-out conditions with {entry.damper.parameter_count} numbers"
@@ -136,16 +149,19 @@ def _reason(entry: Entry, entries: Sequence[Entry]) -> str:
     ]
     if leaner and entry is not best:
         fewest = min(leaner, key=lambda e: e.damper.parameter_count)
-        text += f"; {fewest.title} is no worse with {fewest.damper.parameter_count}"
+        text += f"; {fewest.recipe.title} is no worse with {fewest.damper.parameter_count}"
     if math.isfinite(entry.per_run) and own > 1.5 * entry.per_run:
         text += f"; a single run is described to {100 * entry.per_run:.1f} %: the rest is lost between conditions"
     return text
 
 
-def _chapter(rig: RigComparison, folder: Path, suffix: str) -> dict[str, Any]:
-    scores = {e.title: (e.train.median(), e.left_out.median(), e.held_out.median()) for e in rig.entries}
+def _chapter(rig: RigComparison, folder: Path, suffix: str, png: bool) -> dict[str, Any]:
+    scores = {
+        e.recipe.title: (e.train.median(), e.left_out.median(), e.held_out.only(rig.sines).median())
+        for e in rig.entries
+    }
     runs = _shown(rig)
-    best = {entry.title: entry.damper for entry in rig.entries[:_OVERLAID]}
+    best = {entry.recipe.title: entry.damper for entry in rig.entries[:_OVERLAID]}
     figures = {"ranking": ranking(scores), "loops": overlaid_loops(runs, best)}
     first = rig.entries[0]
     return {
@@ -153,20 +169,20 @@ def _chapter(rig: RigComparison, folder: Path, suffix: str) -> dict[str, Any]:
         "rows": _rows(rig),
         "refused": rig.refused,
         "verdict": (
-            f"{first.title} predicts left-out conditions best: {100 * first.left_out.median():.1f} % of the "
+            f"{first.recipe.title} predicts left-out conditions best: {100 * first.left_out.median():.1f} % of the "
             f"peak-to-peak force, among {len(rig.entries)} models."
         ),
         "loops_caption": (
             f"Last cycle of {'held-out' if runs[0].split == 'validate' else 'train'} runs; the best {len(best)} models."
         ),
-        "figures": {name: save_figure(figure, folder / f"{name}{suffix}") for name, figure in figures.items()},
+        "figures": {name: save_figure(figure, folder / f"{name}{suffix}", png) for name, figure in figures.items()},
     }
 
 
 def _shown(rig: RigComparison) -> list[Run]:
     """Held-out sines, where there are any, over the currents."""
     entry = rig.entries[0]
-    scored = entry.held_out.runs or entry.train.runs
+    scored = entry.held_out.only(rig.sines).runs or entry.train.runs
     ordered = sorted(scored, key=lambda run: (run.condition.current_A, run.condition.peak_velocity))
     picks = np.unique(np.linspace(0, len(ordered) - 1, min(_LOOPS, len(ordered))).round().astype(int))
     return [rig.dataset[ordered[i].run_id] for i in picks]

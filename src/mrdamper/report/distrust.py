@@ -11,25 +11,20 @@ from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.identification import Identification
 from mrdamper.identification.loop_analysis import LoopAnalysis
+from mrdamper.study.recipe import Scored
 from mrdamper.validation import Validation
 
 _WEAK_FUNCTION = 0.9  # left-out error over spread from which a function hardly beats the mean
 
 
-def doubts(
-    damper: Damper,
-    fit: ModifiedFit | JointFit,
-    identifications: Sequence[Identification],
-    loops: Sequence[LoopAnalysis],
-    left_out: Validation,
-    held_out: Validation,
-) -> list[str]:
+def doubts(found: Scored, loops: Sequence[LoopAnalysis]) -> list[str]:
     """Sentences on where the model and its data deserve distrust, most consequential first."""
     return [
-        *_outside(damper),
-        *_runs(left_out, held_out),
-        *(_functions(fit) if isinstance(fit, ModifiedFit) else _joint(fit)),
-        *_identifications(identifications),
+        *_outside(found.damper),
+        *_runs(found.left_out, found.held_out),
+        *(_functions(found.fit) if isinstance(found.fit, ModifiedFit) else ()),
+        *(_joint(found.fit) if isinstance(found.fit, JointFit) else ()),
+        *_identifications(found.identifications),
         *_tests(loops),
     ]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,23 +23,35 @@ from mrdamper.report.plots.reversal import force_since_reversal
 from mrdamper.report.plots.rig_tests import measured_loops, test_analysis, test_matrix
 from mrdamper.report.plots.style import Picture
 from mrdamper.report.tables import identification_rows, score_row
-from mrdamper.study.workflow import Candidate, Progress, RigStudy, Study
+from mrdamper.study.parallel import HERE, Processes
+from mrdamper.study.recipe import Progress, Scored
+from mrdamper.study.workflow import RigStudy, Study
 from mrdamper.validation import session_drift
 
 _LOOPS_SHOWN = 6
 
 
-def write_study(study: Study, folder: str | Path, progress: Progress = lambda what, share: None) -> list[Path]:
+def write_study(
+    study: Study,
+    folder: str | Path,
+    progress: Progress = lambda what, share: None,
+    *,
+    png: bool = False,
+    processes: Processes = HERE,
+) -> list[Path]:
     """Write report.html, model files, identifications.csv, validation.csv and figures/.
 
     Parameters
     ----------
     study : Study
-        With `finish=draw` its figures are drawn already.
     folder : path
         Made if missing; files of the same names are replaced together at the end.
     progress : callable
         Told what is being done and the share done.
+    png : bool
+        Every figure as PNG beside the SVG.
+    processes : Processes
+        Where figures are drawn, rig by rig.
 
     Returns
     -------
@@ -50,17 +63,16 @@ def write_study(study: Study, folder: str | Path, progress: Progress = lambda wh
     OutputError
         If the folder cannot be written to.
     """
+    drawn = processes.map(partial(_draw, png=png), study.rigs, progress)
 
     def fill(work: Path) -> None:
         (work / "figures").mkdir()
         chapters, parts = [], file_names(rig.rig for rig in study.rigs)
-        for number, rig in enumerate(study.rigs):
-            progress(f"{rig.rig or 'rig'}: report", number / len(study.rigs))
-            drawn = study.finished[number] if study.finished else draw(rig)
+        for rig, pictures in zip(study.rigs, drawn, strict=True):
             suffix = f"-{parts[rig.rig]}" if len(study.rigs) > 1 else ""
-            pictures = {name: picture.save(work / "figures" / f"{name}{suffix}") for name, picture in drawn.items()}
+            saved = {name: picture.save(work / "figures" / f"{name}{suffix}") for name, picture in pictures.items()}
             save_model(rig.damper, work / f"model{suffix}.json")
-            chapters.append(_chapter(rig, pictures))
+            chapters.append(_chapter(rig, saved))
         footer = f"{made_from(study.dataset)}; identified and validated in {study.seconds:.1f} s."
         title = f"MR damper study: {', '.join(r.rig for r in study.rigs) or study.dataset.name}"
         page = render_page("study.html.j2", title, footer, chapters=chapters)
@@ -75,9 +87,14 @@ def write_study(study: Study, folder: str | Path, progress: Progress = lambda wh
     return written
 
 
-def draw(rig: RigStudy) -> dict[str, Picture]:
-    """Every figure of a rig, by name; as `finish` of `run_study` it draws where the rig is studied."""
-    return {name: Picture.of(figure) for name, figure in _figures(rig).items()}
+def _draw(rig: RigStudy, progress: Progress, *, png: bool) -> dict[str, Picture]:
+    """Every figure of a rig, by name."""
+    figures = _figures(rig)
+    pictures = {}
+    for number, (name, figure) in enumerate(figures.items()):
+        progress(f"{rig.rig or 'rig'}: figure {name}", number / len(figures))
+        pictures[name] = Picture.of(figure, png)
+    return pictures
 
 
 def _all_identifications(study: Study) -> list[Identification]:
@@ -91,7 +108,13 @@ def _validation_table(study: Study) -> str:
             for split, validation in (("left out", candidate.left_out), ("held out", candidate.held_out)):
                 for run in validation.runs:
                     rows.append(
-                        {"rig": rig.rig, "model": candidate.model, "way": candidate.way, "set": split, **score_row(run)}
+                        {
+                            "rig": rig.rig,
+                            "model": candidate.recipe.model,
+                            "way": candidate.recipe.way,
+                            "set": split,
+                            **score_row(run),
+                        }
                     )
     return csv_text(rows)
 
@@ -140,7 +163,7 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes]) -> dict[str, Any]:
         "candidates": rig.candidates,
         "floor": float(np.median(floors)) if floors else None,
         "doubts": [
-            *doubts(chosen.damper, chosen.fit, chosen.identifications, rig.loops, chosen.left_out, chosen.held_out),
+            *doubts(chosen, rig.loops),
             _drift(rig),
         ],
         "loops": rig.loops,
@@ -158,7 +181,7 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes]) -> dict[str, Any]:
     }
 
 
-def _mapped(rig: RigStudy) -> tuple[Candidate, ModifiedFit]:
+def _mapped(rig: RigStudy) -> tuple[Scored, ModifiedFit]:
     """The best candidate whose parameters are functions of the condition: its curves are shown."""
     return next((c, c.fit) for c in rig.candidates if isinstance(c.fit, ModifiedFit))
 

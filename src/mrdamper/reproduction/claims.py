@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.data import Floats, Run, same_motion
 from mrdamper.errors import IdentificationError
 from mrdamper.functions.fitting import fit_function
@@ -228,7 +229,7 @@ def _alpha(study: Reproduction) -> Claim:
         "α rises with the frequency and falls with the amplitude, in a plane beside its current law.",
         "Eq. 32–36",
     )
-    if fit is None or fit.functions["alpha"].function.form != "plane":
+    if not isinstance(fit, ModifiedFit) or fit.functions["alpha"].function.form != "plane":
         return Claim(text, source, "cannot be judged", "too few motions", "functions")
     found = fit.functions["alpha"]
     _, _, e1, e2, _ = found.function.coefficients
@@ -282,7 +283,7 @@ def _stroke_end(study: Reproduction) -> Claim:
 
 
 def _prediction(study: Reproduction) -> Claim:
-    errors = {c.title: c.held_out.median() for c in study.contenders}
+    errors = {c.recipe.title: c.held_out.median() for c in study.contenders}
     literal, traditional, consistent = errors[LITERAL], errors[TRADITIONAL], errors[CONSISTENT]
     slowest = errors[SLOWEST]
     verdict: Verdict = (
@@ -295,7 +296,7 @@ def _prediction(study: Reproduction) -> Claim:
         f"median nrmse_pp on the held-out runs: literal {100 * literal:.1f} %, "
         f"consistent {100 * consistent:.1f} %, traditional "
         f"{100 * traditional:.1f} % from the motion nearest in speed, {100 * slowest:.1f} % from the slowest; "
-        f"best is “{study.best.title}” with "
+        f"best is “{study.best.recipe.title}” with "
         f"{100 * study.best.held_out.median():.1f} %",
         "predicted",
     )

@@ -7,13 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
+from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.data import Floats, Run, same_motion
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.report.plots.style import MEASURED, MM, PALETTE, current_colours, house_style, label, new_figure, thin
 from mrdamper.reproduction.claims import friction_along
 from mrdamper.reproduction.sensitivity import OneAtATime, Sobol
 from mrdamper.reproduction.study import GeneticCheck, Reproduction
-from mrdamper.reproduction.ways import CONSISTENT, LITERAL, Contender
+from mrdamper.reproduction.ways import CONSISTENT, LITERAL
+from mrdamper.study.recipe import Scored
 
 
 def friction_figure(run: Run) -> Figure:
@@ -62,10 +64,10 @@ def damping_and_mass_figure(study: Reproduction) -> Figure:
         return figure
 
 
-def functions_figure(contender: Contender, names: Sequence[str]) -> Figure:
+def functions_figure(contender: Scored, names: Sequence[str]) -> Figure:
     """Identified values and the functions through them, with R²."""
     fit = contender.fit
-    assert fit is not None
+    assert isinstance(fit, ModifiedFit)
     shown = [name for name in names if name in fit.functions]
     units = {info.name: info.unit for info in BoucWen.parameters()} | {"yield_force": "N", "yield_displacement": "m"}
     with house_style():
@@ -130,7 +132,7 @@ def errors_figure(study: Reproduction) -> Figure:
                 ms=3,
                 lw=0.8,
                 color=PALETTE[place],
-                label=contender.title,
+                label=contender.recipe.title,
             )
         axes.set_ylim(bottom=0)
         label(axes, "Current (A)", "nrmse_pp of held-out runs (%)")

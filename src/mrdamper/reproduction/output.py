@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.data import Condition
 from mrdamper.errors import MissingExtraError
 from mrdamper.files.atomic import publish
@@ -33,7 +34,7 @@ from mrdamper.reproduction.figures import (
 from mrdamper.reproduction.sensitivity import OneAtATime, Sobol, one_at_a_time, sobol
 from mrdamper.reproduction.study import Reproduction
 from mrdamper.reproduction.ways import CONSISTENT, LITERAL, TRADITIONAL
-from mrdamper.study.workflow import Progress
+from mrdamper.study.recipe import Progress
 
 _GROUPS = {
     "paper": "paper (literal)",
@@ -97,18 +98,18 @@ def verdicts(study: Reproduction) -> Rows:
     rows = []
     for contender in study.contenders:
         held = contender.held_out
-        spread = study.seed_errors.get(contender.title)
+        spread = study.seed_errors.get(contender.recipe.title)
         rows.append(
             {
-                "verdict": _GROUPS[contender.group],
-                "method": contender.title,
+                "verdict": _GROUPS[contender.recipe.way],
+                "method": contender.recipe.title,
                 "numbers": contender.damper.parameter_count,
                 "nrmse_pp": held.median(),
                 "worst_nrmse_pp": held.worst().scores.nrmse_pp,
                 "nrmse_std": held.median("nrmse_std"),
                 "wape": held.median("wape"),
-                "mean_relative_error": float(np.median(contender.relative_errors)),
-                "per_run_nrmse_pp": _median([i.scores.nrmse_pp for i in contender.identifications]),
+                "mean_relative_error": held.median("mean_relative_error"),
+                "per_run_nrmse_pp": contender.per_run,
                 "seconds": contender.seconds,
                 "seeds": None if spread is None else spread.size,
                 "seed_median_nrmse_pp": None if spread is None else float(np.median(spread)),
@@ -171,14 +172,16 @@ def _tables(
             for loop in study.loops
         ],
         "table2_identifications": [
-            {"way": c.title, **row} for c in study.contenders for row in identification_rows(c.identifications)
+            {"way": c.recipe.title, **row} for c in study.contenders for row in identification_rows(c.identifications)
         ],
         "table3_functions": _function_rows(study),
         "table4_errors": [
-            {"method": c.title, "run_id": run.run_id, **_condition(run.condition), "mean_relative_error": relative,
-             "wape": run.scores.wape, "nrmse_pp": run.scores.nrmse_pp, "nrmse_std": run.scores.nrmse_std}
+            {"method": c.recipe.title, "run_id": run.run_id, **_condition(run.condition),
+             "mean_relative_error": run.scores.mean_relative_error,
+             "wape": run.scores.wape,
+             "nrmse_pp": run.scores.nrmse_pp, "nrmse_std": run.scores.nrmse_std}
             for c in study.contenders
-            for run, relative in zip(c.held_out.runs, c.relative_errors, strict=True)
+            for run in c.held_out.runs
         ],
         "table5_methods": verdicts(study),
         "claims": [{n: getattr(c, n) for n in ("text", "source", "verdict", "evidence", "figure")} for c in claims],
@@ -208,14 +211,14 @@ def _tables(
 def _function_rows(study: Reproduction) -> Rows:
     rows = []
     for contender in study.contenders:
-        if contender.fit is None:
+        if not isinstance(contender.fit, ModifiedFit):
             continue
         for name, found in contender.fit.functions.items():
             # A parameter that was held has nothing to explain.
             varies = np.ptp(contender.fit.values[name]) > 1e-9 * np.max(np.abs(contender.fit.values[name]), initial=0.0)
             rows.append(
                 {
-                    "method": contender.title,
+                    "method": contender.recipe.title,
                     "parameter": name,
                     "form": found.function.form,
                     "function": found.function.formula,

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mrdamper.dampers.paper import paper_functions
 from mrdamper.data import Condition, Dataset, Floats, Run
 from mrdamper.errors import IdentificationError, InputError, MissingExtraError
 from mrdamper.gas_spring import GasSpring
@@ -25,23 +26,24 @@ from mrdamper.identification.methods.paper import Paper
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.optimizers.generation import GeneticSettings
 from mrdamper.optimizers.genetic import GeneticMinimum
-from mrdamper.reproduction.literature import literature
 from mrdamper.reproduction.virtual_rig import CURRENTS, VirtualRig, friction_test, noisy_dataset, true_runs
 from mrdamper.reproduction.ways import (
     CONSISTENT,
     HALF,
     LITERAL,
     SAME_FORMS,
-    Contender,
+    SLOWEST,
+    TRADITIONAL,
     OnePerCurrent,
-    Settled,
     chosen_functions,
-    contenders,
     direct_genetic,
-    paper_functions,
-    traditional,
+    literature,
+    nearest_speed,
+    peak_velocity,
+    ways,
 )
-from mrdamper.study.workflow import Progress, usable_sines
+from mrdamper.study.recipe import Progress, Scored, Settled, follow_all
+from mrdamper.study.workflow import usable_sines
 from mrdamper.validation import validate
 
 SEEDS = 20
@@ -83,7 +85,8 @@ class Reproduction:
     loops : tuple of LoopAnalysis
     readings : tuple of ForceReading
         F0, phi, f0 of the train runs.
-    contenders : tuple of Contender
+    contenders : tuple of Scored
+        Their `recipe.title` tells them apart.
     genetic : tuple of GeneticCheck
     seed_errors : mapping of str to (S,) array
         Median nrmse_pp over the held-out runs, one a noise seed, by contender.
@@ -99,7 +102,7 @@ class Reproduction:
     friction: Run | None
     loops: tuple[LoopAnalysis, ...]
     readings: tuple[ForceReading, ...]
-    contenders: tuple[Contender, ...]
+    contenders: tuple[Scored, ...]
     genetic: tuple[GeneticCheck, ...]
     seed_errors: Mapping[str, Floats]
     notes: tuple[str, ...]
@@ -110,12 +113,12 @@ class Reproduction:
         """Measured conditions of the train runs."""
         return tuple(loop.condition for loop in self.loops if loop.split == "train")
 
-    def contender(self, title: str) -> Contender:
+    def contender(self, title: str) -> Scored:
         """The contender of that title."""
-        return next(c for c in self.contenders if c.title == title)
+        return next(c for c in self.contenders if c.recipe.title == title)
 
     @property
-    def best(self) -> Contender:
+    def best(self) -> Scored:
         """The contender that predicts the held-out runs best."""
         return min(self.contenders, key=lambda c: c.held_out.median())
 
@@ -160,11 +163,15 @@ def reproduce(
     assert dataset is not None
     train, held_out, notes = _splits(dataset)
     settled = Settled.of(train, gas)
-    ways = contenders(train, held_out, settled, lambda what, share: progress(what, 0.05 + 0.25 * share))
+    steps = ways(train, held_out, settled)
     if with_direct_genetic:
-        ways.append(direct_genetic(train, held_out, settled, lambda what, share: progress(what, 0.3 + 0.2 * share)))
+        steps += direct_genetic(train, held_out, settled)
     if with_models:
-        ways += literature(train, held_out, lambda what, share: progress(what, 0.3 + 0.2 * share))
+        steps += literature(train)
+    contenders, refused = follow_all(
+        steps, held_out, lambda what, share: progress(what, 0.05 + 0.45 * share), leave_out=False
+    )
+    left_out = tuple(f"left out: {name}: {why}" for name, why in refused.items())
     checks, missing = _genetic_checks(train, settled, lambda what, share: progress(what, 0.5 + 0.2 * share))
     spread = _seed_errors(rig, seeds, lambda what, share: progress(what, 0.7 + 0.3 * share)) if rig and seeds else {}
     progress("reproduced", 1.0)
@@ -177,10 +184,10 @@ def reproduce(
         friction=friction_test(rig) if rig else None,
         loops=tuple(analyse_loop(run) for run in (*train, *held_out)),
         readings=tuple(read_force(SineRecord.of(run)) for run in train),
-        contenders=tuple(ways),
+        contenders=tuple(contenders),
         genetic=checks,
         seed_errors=spread,
-        notes=(*notes, *settled.notes, *missing),
+        notes=(*notes, *settled.notes, *left_out, *missing),
         seconds=time.perf_counter() - begin,
     )
 
@@ -214,13 +221,13 @@ def _genetic_checks(
     checks = []
     for number, run in enumerate(picks):
         progress(f"genetic search, {run.id}", number / len(picks))
-        problem, begin = settled.problem(run), time.perf_counter()
+        problem, begin = settled.basis(Paper()).problem(run), time.perf_counter()
         try:
             found = Paper(genetic=GeneticSettings(seed=number)).genetic_search(problem)
         except MissingExtraError as error:
             return (), (f"the genetic search was left out: {error}",)
         seconds = time.perf_counter() - begin
-        best = settled.identify(run, Paper(search="optimum"))
+        best = settled.basis(Paper(search="optimum")).identify(run)
         ends = np.array([found.point, [getattr(best.model, name) for name in ("alpha", "beta")]])
         reached, optimum = Paper().cost(problem)(ends)
         checks.append(GeneticCheck(best.condition, found, float(reached), float(optimum), seconds))
@@ -245,12 +252,17 @@ def _seed_errors(rig: VirtualRig, seeds: int, progress: Progress) -> dict[str, F
             return [identify(run, BoucWen, method, gas=rig.gas) for run in runs]
 
         consistent = identified(Balance())
+        by_run = {one.run_id: one for one in consistent}
+        speeds = {TRADITIONAL: peak_velocity(held_out), SLOWEST: 0.0}
         dampers = {
             LITERAL: paper_functions(identified(literal)).damper,
             HALF: paper_functions(identified(replace(literal, force_amplitude="half-peak-to-peak"))).damper,
             SAME_FORMS: paper_functions(consistent).damper,
             CONSISTENT: chosen_functions(consistent).damper,
-            **{title: OnePerCurrent.of(found) for title, found in traditional(consistent, held_out).items()},
+            **{
+                title: OnePerCurrent.of([by_run[run.id] for run in nearest_speed(train, speed)])
+                for title, speed in speeds.items()
+            },
         }
         for title, damper in dampers.items():
             errors.setdefault(title, []).append(validate(damper, held_out).median())

@@ -7,79 +7,32 @@ object that plots, reports and files take from there.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from multiprocessing import get_context
-from typing import Any
-
-import numpy as np
+from functools import partial
 
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.joint import JointFit, JointProblem
-from mrdamper.dampers.modified import ModifiedFit, fit_modified, fit_modified_jointly
-from mrdamper.dampers.paper import Settled, paper_functions
 from mrdamper.data import Dataset, Run
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError
-from mrdamper.identification import Identification, identify, refuse_clipped
+from mrdamper.identification import refuse_clipped
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, dynamic_ranges
-from mrdamper.identification.methods.paper import Paper
 from mrdamper.motion import analyse_motion, equivalent_sine
-from mrdamper.validation import Validation, leave_one_condition_out, validate
+from mrdamper.study.parallel import HERE, Processes
+from mrdamper.study.recipe import (
+    JOINTLY,
+    Progress,
+    Recipe,
+    Scored,
+    Settled,
+    follow_all,
+    jointly,
+    literal,
+    modified,
+    play_and_bypass,
+)
 
-Progress = Callable[[str, float], None]
 _WORTH = 1.1  # more numbers must lower the left-out error by a tenth
-_MANY = 20  # runs from which on leaving one out is followed by a single step
-JOINTLY = "play-bypass"  # the model whose parameters hold for a whole damper
 STUDIED = ("bouc-wen", "bingham")  # the model of the method, and the one everybody compares with
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """One model of a rig: identified per run, mapped, validated.
-
-    Attributes
-    ----------
-    model : str
-        Name of the model type.
-    way : str
-        "run by run": functions through identified values; "paper, literal": the same by the
-        paper's recipe; "joint": fitted to the forces of
-        all train runs at once.
-    identifications : tuple of Identification
-        Of the train runs, one by one; empty for models that are identified jointly only.
-    fit : ModifiedFit or JointFit
-    left_out : Validation
-        Train runs, each predicted without its condition.
-    held_out : Validation
-        Validate runs.
-    seconds : float
-        Spent on identification, mapping and leave-one-out.
-    """
-
-    model: str
-    way: str
-    identifications: tuple[Identification, ...]
-    fit: ModifiedFit | JointFit
-    left_out: Validation
-    held_out: Validation
-    seconds: float
-
-    @property
-    def title(self) -> str:
-        """Model and way, for tables."""
-        return f"{self.damper.title}, {self.way}"
-
-    @property
-    def per_run_median(self) -> float:
-        """Median nrmse_pp of the run-by-run identifications: what one run allows this model."""
-        errors = [i.scores.nrmse_pp for i in self.identifications]
-        return float(np.median(errors)) if errors else float("nan")
-
-    @property
-    def damper(self) -> Damper:
-        """What predicts."""
-        return self.fit.damper
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,9 +46,11 @@ class RigStudy:
     loops : tuple of LoopAnalysis
         Of every sine run.
     ranges : tuple of DynamicRange
-    candidates : tuple of Candidate
+    candidates : tuple of Scored
         The chosen one first, the others by their error on left-out conditions.
     not_identified : mapping of run id to the reason
+    refused : mapping of recipe name to the reason
+        Recipes whose damper could not be determined from this rig's data.
     asked_for : bool
         The user named the model; the evidence did not choose it.
     """
@@ -104,12 +59,13 @@ class RigStudy:
     dataset: Dataset
     loops: tuple[LoopAnalysis, ...]
     ranges: tuple[DynamicRange, ...]
-    candidates: tuple[Candidate, ...]
-    not_identified: dict[str, str]
+    candidates: tuple[Scored, ...]
+    not_identified: Mapping[str, str]
+    refused: Mapping[str, str]
     asked_for: bool = False
 
     @property
-    def chosen(self) -> Candidate:
+    def chosen(self) -> Scored:
         """The candidate with the fewest numbers among those that predict left-out conditions about best."""
         return self.candidates[0]
 
@@ -128,14 +84,11 @@ class Study:
     dataset : Dataset
     rigs : tuple of RigStudy
     seconds : float
-    finished : tuple
-        What `finish` of `run_study` made of each rig; empty without it.
     """
 
     dataset: Dataset
     rigs: tuple[RigStudy, ...]
     seconds: float
-    finished: tuple[Any, ...] = ()
 
     @property
     def model(self) -> Damper:
@@ -157,16 +110,12 @@ class Study:
         return next(r for r in self.rigs if r.rig == name)
 
 
-Finish = Callable[[RigStudy], Any]
-
-
 def run_study(
     dataset: Dataset,
     progress: Progress = lambda what, share: None,
     *,
     model: str | None = None,
-    workers: int = 1,
-    finish: Finish | None = None,
+    processes: Processes = HERE,
 ) -> Study:
     """Study a dataset: identify, map, validate, rig by rig.
 
@@ -177,10 +126,8 @@ def run_study(
         Told what is being done and the share done, 0...1.
     model : str, optional
         Choose the best candidate of this model instead of the best of all.
-    workers : int
-        Rigs studied at once, each in a process of its own; the results are the same bits.
-    finish : callable, optional
-        More to make of a rig in the process that studied it: its figures, say. A function of a module.
+    processes : Processes
+        Where rigs are studied; the results are the same bits.
 
     Raises
     ------
@@ -190,42 +137,9 @@ def run_study(
         If a rig has too few runs to identify anything from.
     """
     begin = time.perf_counter()
-    count = len(dataset.rigs)
-    if workers > 1 and count > 1:
-        rigs, finished = zip(*_in_parallel(dataset, progress, model, min(workers, count), finish), strict=True)
-        return Study(dataset, rigs, time.perf_counter() - begin, finished if finish else ())
-    rigs = []
-    for number, name in enumerate(dataset.rigs):
-
-        def tell(what: str, share: float, number: int = number, name: str = name) -> None:
-            progress(f"{name or 'rig'}: {what}", (number + share) / count)
-
-        rigs.append(study_rig(dataset.rig(name), tell, model=model))
+    rigs = processes.map(partial(study_rig, model=model), [dataset.rig(name) for name in dataset.rigs], progress)
     progress("studied", 1.0)
-    finished = tuple(finish(rig) for rig in rigs) if finish else ()
-    return Study(dataset, tuple(rigs), time.perf_counter() - begin, finished)
-
-
-def _in_parallel(
-    dataset: Dataset, progress: Progress, model: str | None, workers: int, finish: Finish | None
-) -> list[tuple[RigStudy, Any]]:
-    # Spawned, not forked: a fork of a process whose libraries run threads can hang.
-    *others, own = dataset.rigs  # a process that starts has imports to do, so this one studies too
-    with ProcessPoolExecutor(workers - 1, mp_context=get_context("spawn")) as pool:
-        pending = [pool.submit(_study, dataset.rig(name), model, finish) for name in others]
-        share = workers / len(dataset.rigs)  # of the time, until this process is done
-        last = _study(dataset.rig(own), model, finish, lambda what, done: progress(f"{own}: {what}", share * done))
-        for done, future in enumerate(as_completed(pending), 1):
-            future.result()
-            progress(f"{done + 1} of {len(pending) + 1} rigs studied", share + (1 - share) * done / len(pending))
-        return [*(future.result() for future in pending), last]
-
-
-def _study(
-    dataset: Dataset, model: str | None, finish: Finish | None, progress: Progress = lambda what, share: None
-) -> tuple[RigStudy, Any]:
-    rig = study_rig(dataset, progress, model=model)
-    return rig, finish(rig) if finish else None
+    return Study(dataset, tuple(rigs), time.perf_counter() - begin)
 
 
 def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None, *, model: str | None = None) -> RigStudy:
@@ -233,7 +147,7 @@ def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None, *
     if model not in (None, *STUDIED, JOINTLY):
         raise UnknownNameError.of("studied model", str(model), (*STUDIED, JOINTLY))
     rig = dataset.rigs[0]
-    progress("loops", 0.0)
+    progress(f"{rig or 'rig'}: loops", 0.0)
     sines, refused = usable_sines(dataset)
     loops = tuple(analyse_loop(run) for run in sines)
     train = [run for run in sines if run.split == "train"]
@@ -243,23 +157,31 @@ def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None, *
             where=f"rig {rig or dataset.name}",
             mend="a model over conditions needs at least two; check the split column of runs.csv",
         )
-    candidates = []
-    for number, name in enumerate(STUDIED):
-
-        def tell(what: str, share: float, number: int = number, name: str = name) -> None:
-            progress(f"{name} {what}", 0.85 * (number + share) / len(STUDIED))
-
-        candidates += _candidates(name, dataset, train, tell)
-    progress("the paper's recipe", 0.85)
-    candidates += _paper_candidates(dataset, train)
-    progress("play-bypass jointly", 0.9)
-    candidates.append(_joint_candidate(dataset, train))
-    candidates.sort(key=lambda c: c.left_out.median())
-    eligible = [c for c in candidates if model in (None, c.model)]
-    near = [c for c in eligible if c.left_out.median() <= _WORTH * eligible[0].left_out.median()]
+    candidates, impossible = follow_all(
+        _steps(train),
+        dataset.split("validate"),
+        lambda what, share: progress(f"{rig or 'rig'}: {what}", share),
+    )
+    eligible = [c for c in candidates if model in (None, c.recipe.model)]
+    if not eligible:
+        name, reason = next(iter(impossible.items()))
+        raise IdentificationError(
+            f"no damper could be determined; {name}: {reason}",
+            where=f"rig {rig or dataset.name}",
+            mend="test more conditions, or leave this rig out of the dataset",
+        )
+    candidates.sort(key=_left_out)
+    near = [c for c in eligible if _left_out(c) <= _WORTH * min(map(_left_out, eligible))]
     chosen = min(near, key=lambda c: c.damper.parameter_count)
     candidates.sort(key=lambda c: c is not chosen)
-    return RigStudy(rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), refused, model is not None)
+    return RigStudy(
+        rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), refused, impossible, model is not None
+    )
+
+
+def _left_out(candidate: Scored) -> float:
+    """Median error on left-out conditions; of runs at one condition nothing can be left out."""
+    return candidate.left_out.median() if candidate.left_out.runs else float("inf")
 
 
 def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], dict[str, str]]:
@@ -280,75 +202,12 @@ def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], di
     return sines, refused
 
 
-def _candidates(model: str, dataset: Dataset, train: Sequence[Run], progress: Progress) -> list[Candidate]:
-    """Identify a model run by run, then map it in both ways."""
-    begin = time.perf_counter()
-    identifications = []
-    for number, run in enumerate(train):
-        progress(f"run {run.id}", 0.6 * number / len(train))
-        identifications.append(identify(run, model))
-    spent = time.perf_counter() - begin
-    conditions = [i.condition for i in identifications]
-    provenance = {"dataset": dataset.name, "method": identifications[0].method, "train runs": str(len(train))}
-    candidates = []
-    for way, share in (("run by run", 0.6), ("joint", 0.75)):
-        progress(f"over all conditions, {way}", share)
-        begin = time.perf_counter()
-        about = {**provenance, "functions": way}
-        if way == "joint":
-            fit, refit = fit_modified_jointly(train, identifications, about)
-        else:
-            fit = fit_modified(identifications, provenance=about)
-            refit = _refit_run_by_run(identifications)
-        left_out = leave_one_condition_out(train, conditions, refit, title=fit.damper.title)
-        seconds = spent + time.perf_counter() - begin
-        held_out = validate(fit.damper, dataset.split("validate"))
-        candidates.append(Candidate(model, way, tuple(identifications), fit, left_out, held_out, seconds))
-    return candidates
-
-
-def _paper_candidates(dataset: Dataset, train: Sequence[Run]) -> list[Candidate]:
-    """The literal recipe, for its verdict beside the others; it takes sines only.
-
-    Its alpha and beta are the optimum that the genetic search of the paper approaches. None
-    where under three runs are sines.
-    """
-    begin = time.perf_counter()
-    sines = [run for run in train if analyse_motion(run).is_sine]
-    if len(sines) < 3:
-        return []
-    settled = Settled.of(sines, None)
-    found = [settled.identify(run, Paper(search="optimum")) for run in sines]
-    fit = paper_functions(found)
-    left_out = leave_one_condition_out(
-        sines,
-        [i.condition for i in found],
-        lambda rest: paper_functions([found[i] for i in rest]).damper,
-        title=fit.damper.title,
-    )
-    seconds = time.perf_counter() - begin
-    held_out = validate(fit.damper, dataset.split("validate"))
-    return [Candidate("bouc-wen", "paper, literal", tuple(found), fit, left_out, held_out, seconds)]
-
-
-def _joint_candidate(dataset: Dataset, train: Sequence[Run]) -> Candidate:
-    """Identify the model that takes the current as an input from all train runs at once."""
-    begin = time.perf_counter()
-    conditions = [equivalent_sine(run).condition for run in train]
-    problem = JointProblem(train, JOINTLY)
-    fit = problem.fit()
-
-    def refit(rest: Sequence[int]) -> Damper:
-        # With many runs, one missing hardly moves the fit, and a single step finds where to.
-        if len(train) > _MANY:
-            return problem.without(fit, rest)
-        return problem.fit(rest, fit.point, rounds=1, most_steps=4).damper
-
-    left_out = leave_one_condition_out(train, conditions, refit, title=fit.damper.title)
-    seconds = time.perf_counter() - begin
-    held_out = validate(fit.damper, dataset.split("validate"))
-    return Candidate(JOINTLY, "joint", (), fit, left_out, held_out, seconds)
-
-
-def _refit_run_by_run(identifications: Sequence[Identification]) -> Callable[[Sequence[int]], Damper]:
-    return lambda rest: fit_modified([identifications[i] for i in rest]).damper
+def _steps(train: Sequence[Run]) -> list[tuple[Recipe, Sequence[Run]]]:
+    """The recipes of a study, and the runs each is followed on."""
+    steps: list[tuple[Recipe, Sequence[Run]]] = [
+        (make(name), train) for name in STUDIED for make in (modified, jointly)
+    ]
+    pure = [run for run in train if analyse_motion(run).is_sine]  # the paper's recipe takes no other
+    if len(pure) > 2:
+        steps.append((literal(Settled.of(pure, None)), pure))
+    return [*steps, (play_and_bypass(), train)]

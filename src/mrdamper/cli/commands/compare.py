@@ -19,6 +19,7 @@ def register(app: typer.Typer) -> None:
             False, "--genetic", help="Also by genetic algorithm, 60 generations; takes minutes."
         ),
         jobs: int | None = typer.Option(None, "--jobs", min=1, help="Processes; default one a core."),
+        png: bool = typer.Option(False, "--png", help="Figures as PNG beside the SVG."),
         as_json: bool = typer.Option(False, "--json", help="Print the table as JSON."),
     ) -> None:
         """Compare models: accuracy on train, left-out and held-out runs, numbers, data needed, time."""
@@ -27,10 +28,11 @@ def register(app: typer.Typer) -> None:
         from mrdamper.files.dataset import load_dataset
         from mrdamper.report.comparison import summary_rows, text_table, write_comparison
         from mrdamper.study import comparison as comparing
+        from mrdamper.study.recipe import recipes
 
         require_writable(out)
         names = [name.strip() for entry in models for name in entry.split(",") if name.strip()]
-        comparing.contestants(names)
+        recipes(names)  # refuses unknown names before anything is read
         dataset = load_dataset(data)
         with progress_on_stderr() as progress:
             result = comparing.compare(
@@ -40,7 +42,7 @@ def register(app: typer.Typer) -> None:
                 jobs=jobs,
                 progress=lambda what, share: progress(what, 0.9 * share),
             )
-            written = write_comparison(result, out, lambda what, share: progress(what, 0.9 + 0.1 * share))
+            written = write_comparison(result, out, lambda what, share: progress(what, 0.9 + 0.1 * share), png=png)
         rows = summary_rows(result)
         if as_json:
             import json

@@ -17,6 +17,7 @@ def register(app: typer.Typer) -> None:
         data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests of two dampers."),
         out: Path = typer.Option(..., "--out", help="Folder for report.html, model.json, tables and figures."),
         model: str | None = typer.Option(None, "--model", help="Save this model instead of the best."),
+        png: bool = typer.Option(False, "--png", help="Figures as PNG beside the SVG."),
         as_json: bool = typer.Option(False, "--json", help="Print a summary a program can read."),
     ) -> None:
         """Study a dataset: identify every run, map the parameters, validate; write report and models."""
@@ -24,20 +25,20 @@ def register(app: typer.Typer) -> None:
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.dataset import load_dataset
-        from mrdamper.report.study import draw, write_study
+        from mrdamper.report.study import write_study
+        from mrdamper.study.parallel import several
         from mrdamper.study.workflow import run_study
 
         require_writable(out)
         dataset = load_dataset(data)
-        with progress_on_stderr() as progress:
+        workers = min(os.cpu_count() or 1, len(dataset.rigs))
+        with progress_on_stderr() as progress, several(workers) as processes:
             result = run_study(
-                dataset,
-                lambda what, share: progress(what, 0.95 * share),
-                model=model,
-                workers=os.cpu_count() or 1,
-                finish=draw,
+                dataset, lambda what, share: progress(what, 0.85 * share), model=model, processes=processes
             )
-            written = write_study(result, out, lambda what, share: progress(what, 0.95 + 0.05 * share))
+            written = write_study(
+                result, out, lambda what, share: progress(what, 0.85 + 0.15 * share), png=png, processes=processes
+            )
         if as_json:
             import json
 
@@ -48,7 +49,7 @@ def register(app: typer.Typer) -> None:
             print(f"  {'nrmse_pp, median over runs':38}{'left out':>10}{'held out':>10}{'one by one':>12}")
             for candidate in rig.candidates:
                 held_out = percent(candidate.held_out.median() if candidate.held_out.runs else math.nan)
-                one_by_one = percent(candidate.per_run_median)
+                one_by_one = percent(candidate.per_run)
                 print(f"  {candidate.title:38}{percent(candidate.left_out.median()):>10}{held_out:>10}{one_by_one:>12}")
         print(f"report: {written[0]}")
 
@@ -61,7 +62,7 @@ def _summary(result, written: list[str]) -> dict:
                 "candidates": {
                     c.title: {
                         "parameters": c.damper.parameter_count,
-                        "per_run_nrmse_pp": c.per_run_median if c.identifications else None,
+                        "per_run_nrmse_pp": c.per_run if c.identifications else None,
                         "left_out_nrmse_pp": c.left_out.median(),
                         "held_out_nrmse_pp": c.held_out.median() if c.held_out.runs else None,
                     }

@@ -108,27 +108,29 @@ def thin(array: Floats, most: int = 400) -> Floats:
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure as the bytes of a PNG and of an SVG."""
+    """A figure as the bytes of an SVG, and of a PNG where one is wanted."""
 
-    png: bytes
     svg: bytes
+    png: bytes | None = None
 
     @classmethod
-    def of(cls, figure: Figure) -> Self:
-        """Draw a figure, once for each."""
-        png, svg = io.BytesIO(), io.BytesIO()
+    def of(cls, figure: Figure, png: bool = False) -> Self:
+        """Draw a figure; as PNG too costs as much again."""
+        vector, raster = io.BytesIO(), io.BytesIO()
         with house_style():
-            figure.savefig(png, pil_kwargs={"compress_level": 2})  # a fifth faster, a twentieth larger
-            figure.savefig(svg, format="svg", metadata={"Date": None})
-        return cls(png.getvalue(), svg.getvalue())
+            figure.savefig(vector, format="svg", metadata={"Date": None})
+            if png:
+                figure.savefig(raster, pil_kwargs={"compress_level": 2})  # a fifth faster, a twentieth larger
+        return cls(vector.getvalue(), raster.getvalue() if png else None)
 
     def save(self, stem: Path) -> bytes:
-        """Write both beside each other; returns the SVG."""
-        stem.with_suffix(".png").write_bytes(self.png)
-        stem.with_suffix(".svg").write_bytes(self.svg)
+        """Write what there is beside each other; returns the SVG."""
+        stem.with_name(f"{stem.name}.svg").write_bytes(self.svg)
+        if self.png is not None:
+            stem.with_name(f"{stem.name}.png").write_bytes(self.png)
         return self.svg
 
 
-def save_figure(figure: Figure, stem: Path) -> bytes:
-    """Write a figure as PNG and SVG; returns the SVG."""
-    return Picture.of(figure).save(stem)
+def save_figure(figure: Figure, stem: Path, png: bool = False) -> bytes:
+    """Write a figure as SVG, and as PNG where one is wanted; returns the SVG."""
+    return Picture.of(figure, png).save(stem)

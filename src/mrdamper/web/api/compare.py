@@ -11,9 +11,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mrdamper.data import Dataset
 from mrdamper.errors import InputError
-from mrdamper.study.comparison import Comparison, Entry, RigComparison, contestants
-from mrdamper.study.comparison.contestants import source
-from mrdamper.study.workflow import JOINTLY, STUDIED
+from mrdamper.report.comparison import held_out_sets
+from mrdamper.study.comparison import Comparison, RigComparison
+from mrdamper.study.recipe import JOINTLY, Scored, recipes
+from mrdamper.study.workflow import STUDIED
 from mrdamper.validation import RunScore, Validation
 from mrdamper.web.curves import measured_cycle, measured_window, predicted_on_run
 from mrdamper.web.frames import frame, number
@@ -39,11 +40,11 @@ def choices(session: Current) -> list[dict[str, Any]]:
     return [
         {
             "name": c.name,
-            "source": source(c),
+            "source": c.source,
             "slow": bool(c.basis and c.basis.costly),
-            "studied": c.name.split(":")[0] in (*STUDIED, JOINTLY),
+            "studied": c.model in (*STUDIED, JOINTLY),
         }
-        for c in contestants()
+        for c in recipes()
     ]
 
 
@@ -74,7 +75,7 @@ def overlaid(rig: int, key: str, session: Current) -> Response:
     for number_, entry in enumerate(found.entries):
         curve, flags = predicted_on_run(entry.damper, row.run)
         arrays |= {f"model{number_}.{k}": v for k, v in curve.items()}
-        shown.append({"title": entry.title, "extrapolation": flags})
+        shown.append({"title": entry.recipe.title, "extrapolation": flags})
     return frame({"id": row.run.id, "condition": condition_on_screen(row.condition), "models": shown}, arrays)
 
 
@@ -86,7 +87,7 @@ def _conclude(session: Session, choice: Choice, found: Comparison) -> dict[str, 
     entries = []
     for entry in rig.entries:
         note = f"left out {100 * entry.left_out.median():.1f} %"
-        entries.append(_entry(entry, session.add(entry.damper, "comparison", note).key, keys))
+        entries.append(_entry(rig, entry, session.add(entry.damper, "comparison", note).key, keys))
     return {
         "rig": rig.rig,
         "number": choice.rig,
@@ -98,21 +99,22 @@ def _conclude(session: Session, choice: Choice, found: Comparison) -> dict[str, 
     }
 
 
-def _entry(entry: Entry, key: str, keys: dict[str, str]) -> dict[str, Any]:
+def _entry(rig: RigComparison, entry: Scored, key: str, keys: dict[str, str]) -> dict[str, Any]:
+    held_out, other = held_out_sets(rig, entry)
     return {
         "damper": key,
-        "name": entry.name,
-        "title": entry.title,
-        "source": entry.source,
-        "limits": entry.limits,
+        "name": entry.recipe.name,
+        "title": entry.recipe.title,
+        "source": entry.recipe.source,
+        "limits": entry.recipe.limits,
         "numbers": entry.damper.parameter_count,
-        "runs_needed": entry.runs_needed,
+        "runs_needed": entry.conditions_needed,
         "train": _median(entry.train),
         "left_out": _median(entry.left_out),
-        "held_out": _median(entry.held_out),
-        "other": _median(entry.other),
+        "held_out": _median(held_out),
+        "other": _median(other),
         "seconds": round(entry.seconds, 2),
-        "scores": [_score(run, keys) for run in (*entry.held_out.runs, *entry.other.runs)],
+        "scores": [_score(run, keys) for run in (*held_out.runs, *other.runs)],
     }
 
 

@@ -5,20 +5,23 @@ from __future__ import annotations
 from inspect import signature
 from typing import Any
 
+import numpy as np
 from fastapi import APIRouter
 from fastapi.responses import Response
 from pydantic import BaseModel, ConfigDict, Field
 
+from mrdamper.dampers.joint import JointFit
 from mrdamper.errors import InputError
 from mrdamper.identification import Identification, all_methods, identify
 from mrdamper.models import all_models
-from mrdamper.study.workflow import JOINTLY, Candidate, Study
+from mrdamper.study.recipe import JOINTLY, Scored
+from mrdamper.study.workflow import Study
 from mrdamper.validation import Validation
 from mrdamper.web.curves import measured_cycle, modelled_cycle, predicted_on_run
 from mrdamper.web.frames import frame, number
 from mrdamper.web.rig_table import condition_on_screen
 from mrdamper.web.sessions import Current, Session
-from mrdamper.web.tasks import ALL_AT_ONCE, RUN_BY_RUN, Identified, identify_rig, study
+from mrdamper.web.tasks import ALL_AT_ONCE, RUN_BY_RUN, identify_rig, study
 
 router = APIRouter(prefix="/sessions/{session}")
 
@@ -73,26 +76,25 @@ def start_identification(choice: Choice, session: Current) -> dict[str, Any]:
         "identify",
         identify_rig,
         (table.dataset, names, choice.model, choice.method, choice.over),
-        lambda found: _conclude_identification(session, choice, found),
+        lambda found: _conclude_identification(session, choice, *found),
     )
 
 
 @router.get("/identified/runs/{number}")
 def residual(number: int, session: Current) -> Response:
     """Measured and identified force of one identified run, and the residual."""
-    found: Identified | None = session.results.get("identified")
     table = session.results.get("identified.table")
-    if found is None or table is None:
+    if table is None:
         raise InputError("nothing is identified yet", mend="start an identification", code="E_NO_RESULT")
-    if not 0 <= number < len(found.run_ids):
+    found, scored = session.results["identified"]
+    ids = [i.run_id for i in found] or [run.run_id for run in scored.train.runs]
+    if not 0 <= number < len(ids):
         raise InputError("no such run", mend="choose one from the table", code="E_NAME")
-    row = next(row for row in table.rows if row.run.id == found.run_ids[number])
-    if found.identifications:
-        one = found.identifications[number]
-        modelled = modelled_cycle(one.model, row.run, one.delay)
+    row = next(row for row in table.rows if row.run.id == ids[number])
+    if found:
+        modelled = modelled_cycle(found[number].model, row.run, found[number].delay)
     else:
-        assert found.joint is not None  # one or the other
-        modelled = predicted_on_run(found.joint.damper, row.run)[0]
+        modelled = predicted_on_run(scored.damper, row.run)[0]
     measured = measured_cycle(row.run)
     arrays = {f"measured.{k}": v for k, v in measured.items()} | {f"model.{k}": v for k, v in modelled.items()}
     arrays["residual"] = modelled["F"] - measured["F"]
@@ -114,37 +116,44 @@ def _conclude_study(session: Session, found: Study, written: list[Any]) -> dict[
     return {"rigs": rigs, "seconds": round(found.seconds, 1)}
 
 
-def _candidate(candidate: Candidate, key: str) -> dict[str, Any]:
+def _candidate(candidate: Scored, key: str) -> dict[str, Any]:
     return {
         "damper": key,
         "title": candidate.title,
         "numbers": candidate.damper.parameter_count,
-        "per_run": number(candidate.per_run_median),
+        "per_run": number(candidate.per_run),
         "left_out": number(candidate.left_out.median()),
         "held_out": number(candidate.held_out.median()) if candidate.held_out.runs else None,
         "seconds": round(candidate.seconds, 2),
     }
 
 
-def _conclude_identification(session: Session, choice: Choice, found: Identified) -> dict[str, Any]:
-    session.results["identified"] = found
+def _conclude_identification(
+    session: Session,
+    choice: Choice,
+    found: tuple[Identification, ...],
+    scored: Scored | str,
+    refused: dict[str, str],
+) -> dict[str, Any]:
+    session.results["identified"] = found, scored
     session.results["identified.table"] = session.table(choice.rig)
-    bench = None
-    if found.damper is not None:
-        note = f"held out {_percent(found.held_out)}" if found.held_out and found.held_out.runs else ""
-        bench = session.add(found.damper, "identification", note)
+    damper, held_out, bench = None, None, None
+    if isinstance(scored, Scored):
+        damper, held_out = scored.damper, scored.held_out
+        bench = session.add(damper, "identification", f"held out {_percent(held_out)}" if held_out.runs else "")
+    errors = [i.scores.nrmse_pp for i in found] or _joint_fit(scored).nrmse_pp.tolist()
     return {
         "rig": session.table(choice.rig).dataset.rigs[0],
         "damper": bench.key if bench else None,
-        "title": found.damper.title if found.damper else None,
-        "numbers": found.damper.parameter_count if found.damper else None,
-        "no_damper": found.no_damper,
-        "held_out": number(found.held_out.median()) if found.held_out else None,
-        "median": number(found.median),
-        "runs": [_identified(i) for i in found.identifications],
-        "joint": _joint(found),
-        "units": _units(found),
-        "refused": found.refused,
+        "title": damper.title if damper else None,
+        "numbers": damper.parameter_count if damper else None,
+        "no_damper": scored if isinstance(scored, str) else "",
+        "held_out": number(held_out.median()) if held_out else None,
+        "median": number(float(np.median(errors))),
+        "runs": [_identified(i) for i in found],
+        "joint": None if found else _joint(scored),
+        "units": _units(found, scored),
+        "refused": refused,
     }
 
 
@@ -162,28 +171,33 @@ def _identified(one: Identification) -> dict[str, Any]:
     }
 
 
-def _joint(found: Identified) -> dict[str, Any] | None:
-    if found.joint is None:
-        return None
-    model = found.joint.damper.model
+def _joint_fit(scored: Scored | str) -> JointFit:
+    """The fit of a model of one set of parameters: without identifications there is always one."""
+    assert isinstance(scored, Scored)
+    assert isinstance(scored.fit, JointFit)
+    return scored.fit
+
+
+def _joint(scored: Scored | str) -> dict[str, Any]:
+    fit = _joint_fit(scored)
+    assert isinstance(scored, Scored)
     return {
-        "values": {n: number(v) for n, v in model.values().items()},
-        "at_bounds": found.joint.at_bounds,
+        "values": {n: number(v) for n, v in fit.damper.model.values().items()},
+        "at_bounds": fit.at_bounds,
         "runs": [
-            {"id": name, "nrmse_pp": number(error)}
-            for name, error in zip(found.run_ids, found.joint.nrmse_pp.tolist(), strict=True)
+            {"id": run.run_id, "nrmse_pp": number(error)}
+            for run, error in zip(scored.train.runs, fit.nrmse_pp.tolist(), strict=True)
         ],
-        "message": str(found.joint.ending),
+        "message": str(fit.ending),
     }
 
 
-def _units(found: Identified) -> list[dict[str, str]]:
-    if found.identifications:
-        infos, free = found.identifications[0].model.parameters(), found.identifications[0].free
-    elif found.joint is not None:
-        infos, free = found.joint.damper.model.parameters(), found.joint.damper.free
+def _units(found: tuple[Identification, ...], scored: Scored | str) -> list[dict[str, str]]:
+    if found:
+        infos, free = found[0].model.parameters(), found[0].free
     else:
-        return []
+        damper = _joint_fit(scored).damper
+        infos, free = damper.model.parameters(), damper.free
     return [{"name": i.name, "unit": i.unit, "meaning": i.meaning} for i in infos if i.name in free]
 
 

@@ -1,36 +1,83 @@
-"""Identifications of many runs in several processes, bit for bit what one process gives."""
+"""Work in several processes, bit for bit what one process gives."""
 
 from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import fields, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, replace
 from multiprocessing import get_context
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from mrdamper.data import Run
 from mrdamper.errors import InputError
-from mrdamper.identification import Identification, Problem, conclude
+from mrdamper.identification import Identification, conclude
 from mrdamper.identification.methods import method_named
 from mrdamper.identification.methods.direct_genetic import DirectGenetic
 from mrdamper.identification.methods.paper import Paper
 from mrdamper.identification.methods.projection import Projection
 from mrdamper.models import model_type
 from mrdamper.motion import analyse_motion
-from mrdamper.study.comparison.contestants import Basis
-from mrdamper.study.workflow import Progress
+from mrdamper.study.recipe import Basis, Found, Progress
 
 _CYCLES = 2  # of a run that costly identifications see
 _PER_CYCLE = 200  # samples of a cycle they see
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
-Found = dict[tuple[Basis, str], tuple[Identification | str, float]]
+T = TypeVar("T")
+R = TypeVar("R")
 
 GENERATIONS = 60  # of a genetic search here, where the paper takes 500: a comparison has dozens of runs
+
+
+@dataclass(frozen=True)
+class Processes:
+    """Where independent pieces of work are done: here, and in a pool beside it if there is one. `several` makes one."""
+
+    pool: Executor | None = None
+
+    def map(
+        self, function: Callable[[T, Progress], R], items: Sequence[T], progress: Progress = lambda what, share: None
+    ) -> list[R]:
+        """Results of a function for every item, in order; it is a function of a module.
+
+        A process that starts has imports to do, so this one takes an item too, the last.
+        """
+        *others, own = items
+        if self.pool is None:
+            return [function(item, _part(progress, n, len(items))) for n, item in enumerate(items)]
+        pending = [self.pool.submit(_quietly, function, item) for item in others]
+        last = function(own, lambda what, share: progress(what, 0.9 * share))
+        for done, future in enumerate(as_completed(pending), 1):
+            future.result()
+            progress(f"{done + 1} of {len(items)} done", 0.9 + 0.1 * done / len(pending))
+        return [*(future.result() for future in pending), last]
+
+
+HERE = Processes()
+
+
+@contextmanager
+def several(count: int) -> Iterator[Processes]:
+    """As many processes as `count` says, this one among them, for the length of a block."""
+    if count < 2:
+        yield HERE
+        return
+    # Spawned, not forked: a fork of a process whose libraries run threads can hang.
+    with ProcessPoolExecutor(count - 1, mp_context=get_context("spawn")) as pool:
+        yield Processes(pool)
+
+
+def _part(progress: Progress, number: int, count: int) -> Progress:
+    return lambda what, share: progress(what, (number + share) / count)
+
+
+def _quietly(function: Callable[[T, Progress], R], item: T) -> R:
+    return function(item, lambda what, share: None)
 
 
 def identify_all(bases: Sequence[Basis], runs: Sequence[Run], workers: int, progress: Progress) -> Found:
@@ -74,14 +121,14 @@ def _identify_one(basis: Basis, run_id: str) -> tuple[Identification | str, floa
     run = _RUNS[run_id]
     begin = time.perf_counter()
     try:
-        method, cls = method_named(basis.method), model_type(basis.model)
+        method = method_named(basis.method) if isinstance(basis.method, str) else basis.method
         if isinstance(method, Paper | DirectGenetic):
             method = replace(method, genetic=replace(method.genetic, generations=GENERATIONS))
-        if cls.integrated:
+        if model_type(basis.model).integrated:
             method = Projection(refine_best=1)
         seen = shortened(run) if basis.costly else run
-        solution = method.solve(Problem.of(seen, cls, free=basis.free))
-        return conclude(Problem.of(run, cls, free=basis.free), method, solution), time.perf_counter() - begin
+        solution = method.solve(basis.problem(seen))
+        return conclude(basis.problem(run), method, solution), time.perf_counter() - begin
     except InputError as error:
         return str(error), time.perf_counter() - begin
 

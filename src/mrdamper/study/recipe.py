@@ -1,0 +1,473 @@
+"""Recipes: the ways from runs of one rig to a damper, and how the damper of each scores.
+
+A recipe says what is identified from single runs and how one damper over all conditions is
+made of it. A study, a comparison, the reproduction of the paper and the live bench take their
+recipes from here, so that one name means one way and every way is scored alike.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from mrdamper.dampers.base import Damper
+from mrdamper.dampers.joint import JointFit, JointProblem
+from mrdamper.dampers.modified import ModifiedFit, fit_modified, fit_modified_jointly
+from mrdamper.dampers.paper import paper_functions
+from mrdamper.dampers.published import ConditionedDamper, all_conditioned
+from mrdamper.data import Run
+from mrdamper.errors import IdentificationError, InputError, UnknownNameError
+from mrdamper.gas_spring import GasSpring
+from mrdamper.identification import Identification, Method, Problem, identify
+from mrdamper.identification.harmonic_balance import separate_mass
+from mrdamper.identification.methods.balance import Balance
+from mrdamper.identification.methods.paper import Paper
+from mrdamper.models import Scale, all_models, model_type
+from mrdamper.models.bouc_wen import BoucWen
+from mrdamper.motion import equivalent_sine
+from mrdamper.validation import Validation, leave_one_condition_out, validate
+
+Progress = Callable[[str, float], None]
+
+JOINTLY = "play-bypass"  # the model whose parameters hold for a whole damper
+GENETIC = ("bouc-wen:paper", "bouc-wen:direct-genetic")
+_MANY = 20  # runs from which on leaving one out is followed by a single step
+
+
+@dataclass(frozen=True)
+class Basis:
+    """What is identified from every single run.
+
+    Attributes
+    ----------
+    model : str
+    method : str or Method
+    free : tuple of str
+        Preset parameters to determine as well.
+    fixed : tuple of (str, float)
+        Parameters held at a value [SI].
+    gas : GasSpring or None
+        Known gas spring.
+    """
+
+    model: str
+    method: str | Method = "projection"
+    free: tuple[str, ...] = ()
+    fixed: tuple[tuple[str, float], ...] = ()
+    gas: GasSpring | None = None
+
+    def identify(self, run: Run) -> Identification:
+        """Identify it from one run."""
+        return identify(run, self.model, self.method, free=self.free, fixed=dict(self.fixed), gas=self.gas)
+
+    def problem(self, run: Run) -> Problem:
+        """What there is to identify from a run, for a method of one's own."""
+        fixed = dict(self.fixed)
+        return Problem.of(run, model_type(self.model), free=self.free, fixed=fixed, gas=self.gas)
+
+    @property
+    def costly(self) -> bool:
+        """Whether a few cycles of a run have to do where many runs are compared."""
+        return self.method != "projection" or model_type(self.model).integrated
+
+
+Found = dict[tuple[Basis, str], tuple[Identification | str, float]]  # or why there is none; seconds
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """What a recipe makes of runs.
+
+    Attributes
+    ----------
+    damper : Damper
+    refit : callable
+        Makes it again from the runs at some indices only.
+    fit : ModifiedFit, JointFit or None
+        What there is to say about its functions or its search.
+    """
+
+    damper: Damper
+    refit: Callable[[Sequence[int]], Damper]
+    fit: ModifiedFit | JointFit | None = None
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """A way from runs of one rig to a damper over all conditions.
+
+    Attributes
+    ----------
+    name : str
+        Model, and way where there are several: "bouc-wen:joint".
+    basis : Basis or None
+        What is identified from single runs, if anything.
+    make : callable
+        Makes the damper from runs and their identifications.
+    way : str
+        In words: "run by run", "joint".
+    title : str
+        For tables of many models.
+    source : str
+        Where it was published.
+    limits : str
+        What it cannot do.
+    """
+
+    name: str
+    basis: Basis | None
+    make: Callable[[Sequence[Run], Sequence[Identification]], Made] = field(compare=False)
+    way: str = ""
+    title: str = ""
+    source: str = ""
+    limits: str = ""
+
+    @property
+    def model(self) -> str:
+        """Name of the model behind it."""
+        return self.name.partition(":")[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """A recipe followed on one rig, and how its damper predicts.
+
+    Attributes
+    ----------
+    recipe : Recipe
+    damper : Damper
+    fit : ModifiedFit, JointFit or None
+    identifications : tuple of Identification
+        Of the train runs; empty where nothing is identified from single runs.
+    per_run : float
+        Median nrmse_pp of runs identified for themselves: what one run allows; NaN without.
+    train, left_out, held_out : Validation
+        Train runs; train runs predicted without their condition; held-out runs.
+    seconds : float
+        Spent on identification and the fit over conditions.
+    """
+
+    recipe: Recipe
+    damper: Damper
+    fit: ModifiedFit | JointFit | None
+    identifications: tuple[Identification, ...]
+    per_run: float
+    train: Validation
+    left_out: Validation
+    held_out: Validation
+    seconds: float
+
+    @property
+    def title(self) -> str:
+        """Damper and way, for tables."""
+        return f"{self.damper.title}, {self.recipe.way}" if self.recipe.way else self.damper.title
+
+    @property
+    def numbers_per_run(self) -> int:
+        """Parameters determined from a single run."""
+        return len(self.identifications[0].free) if self.identifications else 0
+
+    @property
+    def conditions_needed(self) -> int:
+        """As many conditions as the longest function has numbers; one fit of all needs currents, not conditions."""
+        if not isinstance(self.fit, ModifiedFit):
+            return 3
+        return max(len(f.function.coefficients) + len(f.function.rates) for f in self.fit.functions.values())
+
+
+def follow(
+    recipe: Recipe,
+    train: Sequence[Run],
+    identifications: Sequence[Identification],
+    held_out: Sequence[Run],
+    *,
+    spent: float = 0.0,
+    leave_out: bool = True,
+) -> Scored:
+    """Make a recipe's damper and score it.
+
+    Parameters
+    ----------
+    recipe : Recipe
+    train : sequence of Run, length N
+        Of one rig; the damper is made of these.
+    identifications : sequence of Identification
+        Of train runs, as `identified` gives them for the recipe's basis.
+    held_out : sequence of Run
+        Predicted only.
+    spent : float
+        Seconds the identifications took.
+    leave_out : bool
+        Predict every train run without its condition, too.
+
+    Raises
+    ------
+    InputError
+        If the damper cannot be determined from these runs.
+    """
+    begin = time.perf_counter()
+    made = recipe.make(train, identifications)
+    seconds = spent + time.perf_counter() - begin
+    title, left_out = made.damper.title, None
+    if leave_out:
+        conditions = [equivalent_sine(run).condition for run in train]
+        left_out = leave_one_condition_out(train, conditions, made.refit, title=title)
+    errors = [i.scores.nrmse_pp for i in identifications]
+    return Scored(
+        recipe=recipe,
+        damper=made.damper,
+        fit=made.fit,
+        identifications=tuple(identifications),
+        per_run=float(np.median(errors)) if errors else float("nan"),
+        train=validate(made.damper, train),
+        left_out=left_out or Validation(title, ()),
+        held_out=validate(made.damper, held_out),
+        seconds=seconds,
+    )
+
+
+def follow_all(
+    steps: Sequence[tuple[Recipe, Sequence[Run]]],
+    held_out: Sequence[Run],
+    progress: Progress = lambda what, share: None,
+    *,
+    leave_out: bool = True,
+    found: Found | None = None,
+) -> tuple[list[Scored], dict[str, str]]:
+    """Follow several recipes on one rig; what more than one of them starts from is identified once.
+
+    Parameters
+    ----------
+    steps : sequence of (Recipe, train runs)
+    held_out : sequence of Run
+    progress : callable
+    leave_out : bool
+    found : mapping, optional
+        Identifications there are already, by basis and run id; added to.
+
+    Returns
+    -------
+    scored : list of Scored
+    refused : mapping of recipe name to reason
+        Recipes whose damper cannot be determined from these runs.
+    """
+    found = {} if found is None else found
+    scored, refused = [], {}
+    for number, (recipe, runs) in enumerate(steps):
+
+        def tell(what: str, share: float, number: int = number, recipe: Recipe = recipe) -> None:
+            progress(f"{recipe.name}, {what}", (number + share) / len(steps))
+
+        try:
+            identifications, spent = identified(recipe.basis, runs, found, lambda what, share: tell(what, 0.5 * share))
+            tell("over all conditions", 0.5)
+            scored.append(follow(recipe, runs, identifications, held_out, spent=spent, leave_out=leave_out))
+        except InputError as error:
+            refused[recipe.name] = str(error)
+    return scored, refused
+
+
+def identified(
+    basis: Basis | None, runs: Sequence[Run], found: Found, progress: Progress = lambda what, share: None
+) -> tuple[list[Identification], float]:
+    """Identifications of runs, made where they are not found yet, and the seconds they took.
+
+    Raises
+    ------
+    IdentificationError
+        If a run was found to allow none.
+    """
+    if basis is None:
+        return [], 0.0
+    made, spent = [], 0.0
+    for number, run in enumerate(runs):
+        if (basis, run.id) not in found:
+            progress(f"run {run.id}", number / len(runs))
+            begin = time.perf_counter()
+            found[basis, run.id] = basis.identify(run), time.perf_counter() - begin
+        one, seconds = found[basis, run.id]
+        if isinstance(one, str):
+            raise IdentificationError(f"run {run.id}: {one}")
+        made.append(one)
+        spent += seconds
+    return made, spent
+
+
+def run_by_run(runs: Sequence[Run], identifications: Sequence[Identification]) -> Made:
+    """Parameter functions through the values identified from single runs."""
+    about = _about(runs, identifications, "run by run")
+    fit = fit_modified(identifications, provenance=about)
+    return Made(fit.damper, lambda rows: fit_modified([identifications[i] for i in rows]).damper, fit)
+
+
+def at_once(runs: Sequence[Run], identifications: Sequence[Identification]) -> Made:
+    """Parameter functions fitted to the forces of all runs at once."""
+    fit, refit = fit_modified_jointly(runs, identifications, _about(runs, identifications, "joint"))
+    return Made(fit.damper, refit, fit)
+
+
+def one_set(runs: Sequence[Run], identifications: Sequence[Identification]) -> Made:
+    """One set of parameters for every condition, of the model that takes the current as an input."""
+    problem = JointProblem(runs, JOINTLY)
+    fit = problem.fit()
+
+    def refit(rows: Sequence[int]) -> Damper:
+        # With many runs, one missing hardly moves the fit, and a single step finds where to.
+        if len(runs) > _MANY:
+            return problem.without(fit, rows)
+        return problem.fit(rows, fit.point, rounds=1, most_steps=4).damper
+
+    return Made(fit.damper, refit, fit)
+
+
+def by_the_paper(runs: Sequence[Run], identifications: Sequence[Identification]) -> Made:
+    """The paper's functions through the values identified from single runs [Qian et al. 2024, Eq. 23–43]."""
+    fit = paper_functions(identifications)
+    return Made(fit.damper, lambda rows: paper_functions([identifications[i] for i in rows]).damper, fit)
+
+
+def by_its_laws(cls: type[ConditionedDamper], runs: Sequence[Run], identifications: Sequence[Identification]) -> Made:
+    """The laws of a published damper, started from single runs and refined on all."""
+    about = {"train runs": str(len(runs))}
+
+    def refit(rows: Sequence[int]) -> Damper:
+        return cls.fit([runs[i] for i in rows], [identifications[i] for i in rows] if cls.basis else [], about)
+
+    return Made(refit(range(len(runs))), refit)
+
+
+def modified(name: str, method: str = "projection") -> Recipe:
+    """A model identified run by run, then functions through its parameters."""
+    cls = model_type(name)
+    stepped = "stepped, not closed; " if cls.integrated else ""
+    plain = method == "projection"
+    return Recipe(
+        name if plain else f"{name}:{method}",
+        Basis(name, method),
+        run_by_run,
+        "run by run",
+        cls.title if plain else f"{cls.title}, method {method}",
+        cls.source,
+        f"{stepped}parameter functions need the frequency and amplitude of a sine",
+    )
+
+
+def jointly(name: str) -> Recipe:
+    """A model whose parameter functions are fitted to all forces at once."""
+    apart, cls = modified(name), model_type(name)
+    title = f"{cls.title}, functions fitted jointly"
+    return Recipe(f"{name}:joint", apart.basis, at_once, "joint", title, cls.source, apart.limits)
+
+
+def play_and_bypass() -> Recipe:
+    """The model whose one set of parameters holds for every condition."""
+    cls = model_type(JOINTLY)
+    return Recipe(JOINTLY, None, one_set, "joint", cls.title, cls.source, "takes any motion and a current that varies")
+
+
+def conditioned(cls: type[ConditionedDamper]) -> Recipe:
+    """A published damper with its own laws over current, frequency and amplitude."""
+    basis = Basis(cls.basis, free=cls.basis_free) if cls.basis else None
+    return Recipe(cls.name, basis, partial(by_its_laws, cls), "", cls.heading, cls.source, cls.limits)
+
+
+@dataclass(frozen=True)
+class Settled:
+    """What is held in every identification by the paper's recipe: the gas spring, or what stands in for it.
+
+    Attributes
+    ----------
+    gas : GasSpring or None
+    fixed : tuple of (str, float)
+    free : tuple of str
+    notes : tuple of str
+        How it was settled, where the gas spring is not known.
+    """
+
+    gas: GasSpring | None
+    fixed: tuple[tuple[str, float], ...] = ()
+    free: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, train: Sequence[Run], gas: GasSpring | None) -> Settled:
+        """Take the gas spring, or separate stiffness and mass by the frequencies of the train runs."""
+        if gas is not None:
+            longest = max(float(np.ptp(run.displacement)) / 2 for run in train)
+            gas.force([-longest, longest])  # refuses motions that leave no gas volume
+            return cls(gas)
+        found = [identify(run, BoucWen, Balance()) for run in train]
+        stiffness = [float(i.model.k1) for i in found if isinstance(i.model, BoucWen)]
+        try:
+            apart = separate_mass([i.condition for i in found], stiffness)
+        except IdentificationError as error:
+            return cls(
+                None, notes=(f"the gas spring is unknown and {error}: the mass is left out, k1 holds k1 − m ω²",)
+            )
+        note = (
+            f"the gas spring is unknown: k1 = {apart.k1:.4g} N/m comes from a regression of the consistent in-phase "
+            f"stiffness k1 − m ω² over the frequencies (with m = {apart.m:.3g} kg); k2 = k3 = 0"
+        )
+        return cls(None, (("k1", apart.k1), ("k2", 0.0), ("k3", 0.0)), ("m",), (note,))
+
+    def basis(self, method: Method) -> Basis:
+        """Bouc–Wen by a method, with what is settled."""
+        return Basis("bouc-wen", method, self.free, self.fixed, self.gas)
+
+
+def literal(settled: Settled) -> Recipe:
+    """The paper's recipe to the letter, for its verdict beside the others; it takes sines only.
+
+    Its alpha and beta are the optimum that the genetic search of the paper approaches.
+    """
+    return Recipe("bouc-wen:literal", settled.basis(Paper(search="optimum")), by_the_paper, "paper, literal")
+
+
+def catalogue() -> Mapping[str, Recipe]:
+    """Every recipe that can be compared, by name; models and dampers dropped in are found."""
+    found = [modified(name) for name in all_models() if name != JOINTLY]
+    found += [jointly(name) for name in _closed_shapes()]
+    found += [modified(*name.split(":")) for name in GENETIC]
+    found += [play_and_bypass(), *(conditioned(cls) for cls in all_conditioned().values())]
+    return {recipe.name: recipe for recipe in found}
+
+
+def recipes(names: Sequence[str] = (), genetic: bool = False) -> list[Recipe]:
+    """Recipes of some names, or all.
+
+    Parameters
+    ----------
+    names : sequence of str
+    genetic : bool
+        Of all, also those that identify by a genetic algorithm, which take most of the time.
+
+    Raises
+    ------
+    UnknownNameError
+        With the near matches.
+    """
+    known = catalogue()
+    for name in names:
+        if name not in known:
+            raise UnknownNameError.of("model", name, known)
+    return [known[name] for name in (names or known) if names or genetic or name not in GENETIC]
+
+
+def _closed_shapes() -> list[str]:
+    """Models whose loop has at most one shape coordinate, the yield displacement: all runs fit at once."""
+    shapes = {
+        name: [
+            axis.name for axis in cls.search_axes(Scale(1.0, 1.0), [i.name for i in cls.parameters() if not i.preset])
+        ]
+        for name, cls in all_models().items()
+        if name != JOINTLY
+    }
+    return [name for name, axes in shapes.items() if axes in ([], ["yield_displacement"])]
+
+
+def _about(runs: Sequence[Run], identifications: Sequence[Identification], functions: str) -> dict[str, str]:
+    return {"method": identifications[0].method, "train runs": str(len(runs)), "functions": functions}
