@@ -38,6 +38,25 @@ _SYMBOLS = MappingProxyType(
         "i": "current", "U": "voltage", "T": "temperature",
     }
 )  # fmt: skip
+# Ends of compounds: Spulenstrom, Dämpferkraft, Kolbenweg.
+_COMPOUNDS = MappingProxyType(
+    {
+        "strom": "current", "kraft": "force", "weg": "displacement", "hub": "displacement", "zeit": "time",
+        "geschwindigkeit": "velocity", "beschleunigung": "acceleration", "spannung": "voltage",
+        "temperatur": "temperature", "druck": "pressure",
+    }
+)  # fmt: skip
+# What says that a column is made from a channel rather than being it.
+_MADE = frozenset(
+    ("rms", "peak", "pk", "filtered", "filter", "filt", "lowpass", "smoothed", "smooth", "average", "averaged", "avg",
+     "mean", "std", "sd", "abs", "amplitude", "ampl", "envelope", "spitze", "spitzenwert", "effektiv", "gefiltert",
+     "geglättet", "mittelwert", "mittel", "filtré", "filtrée", "moyenne", "filtrado", "filtrada", "filtrato", "delta",
+     "simulated", "model", "calc", "calculated", "theoretical", "ideal", "nominal")
+)  # fmt: skip
+_SET = frozenset(
+    ("set", "setpoint", "command", "cmd", "commanded", "soll", "sollwert", "target", "demand", "desired", "nominal",
+     "consigne", "consigna", "reference", "ref", "mean", "average", "avg", "mittel", "mittelwert")
+)  # fmt: skip
 _NOT_MEASURED = frozenset(
     ("command", "cmd", "commanded", "setpoint", "set", "target", "soll", "reference", "ref", "demand", "desired",
      "error", "count", "counts", "cycle", "cycles", "segment", "segments", "index", "offset", "limit", "max", "min",
@@ -80,20 +99,34 @@ def role_of(name: str) -> str | None:
         return None
     words = [w for w in re.split(r"[^\w]+|_|(?<=[a-zà-ÿ])(?=[A-Z])", name) if w]
     lower = [w.casefold().rstrip("0123456789") or w for w in words]
-    if any(word in _NOT_MEASURED for word in lower):
+    if any(word in _NOT_MEASURED or word in _MADE for word in lower):
         return None
     if len(words) == 1 and words[0] in _SYMBOLS:
         return _SYMBOLS[words[0]]
-    roles = [role for word in lower for role, known in WORDS.items() if word in known]
+    roles = [role for role in map(_role_of_word, lower) if role is not None]
     # "load displacement" is a displacement: the last word is the noun in the languages at hand.
     return roles[-1] if roles else None
+
+
+def _role_of_word(word: str) -> str | None:
+    exact = next((role for role, known in WORDS.items() if word in known), None)
+    if exact is not None or len(word) < 5:
+        return exact
+    return next((role for end, role in _COMPOUNDS.items() if word.endswith(end) and word != end), None)
+
+
+def names_condition(key: str, role: str) -> bool:
+    """Whether a line's or an attribute's name stands for a channel's value in the whole test, set or measured."""
+    words = [w for w in re.split(r"[^\w]+|_|(?<=[a-zà-ÿ])(?=[A-Z])", key[:_LONGEST_NAME]) if w]
+    kept = [word for word in words if word.casefold() not in _SET]
+    return bool(kept) and role_of(" ".join(kept)) == role
 
 
 def says_nothing(name: str) -> bool:
     """Whether a name holds no word of a channel or of a command."""
     words = [w.casefold().rstrip("0123456789") for w in re.split(r"[^\w]+|_", name) if w]
     known = {w for words_of in WORDS.values() for w in words_of}
-    return not any(word in _NOT_MEASURED or word in known for word in words)
+    return not any(word in _NOT_MEASURED or word in _MADE or word in known for word in words)
 
 
 def unknown_unit(header: str) -> str:

@@ -12,16 +12,15 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from mrdamper.errors import InputError
-from mrdamper.rig_files.readers.base import Hints
+from mrdamper.rig_files.conditions import amperes, currents_in
+from mrdamper.rig_files.file_form import NAME, FileForm, Table
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED
 from mrdamper.rig_files.units import DIMENSION, parse_unit
 
 _LARGEST = 64 * 1024  # bytes; a profile is a page
-_NAME = Annotated[str, StringConstraints(min_length=1, max_length=200)]
-_FILE_CURRENT = re.compile(r"(?<![0-9A-Za-z.,])([0-9]{1,3}(?:[.,xp][0-9]{1,4})?) ?(mA|A)(?:mps?)?(?![A-Za-z0-9])")
 
 
 class ProfileError(InputError):
@@ -30,48 +29,7 @@ class ProfileError(InputError):
     code = "E_PROFILE"
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-
-class FileForm(_Table):
-    """[file]: the form of the files.
-
-    Attributes
-    ----------
-    separator, decimal, encoding : str, optional
-        Of delimited text; a separator of one space stands for any run of spaces.
-    header_line, units_line, data_line : int, optional
-        Counted from one; a header_line of 0 says that there is none.
-    names : tuple of str
-        Names of all columns in order, where the files have none.
-    sheet : str, optional
-        Of workbooks.
-    blocks : "join" or "split", optional
-        Whether repeated acquisition blocks are one test or several.
-    sample_rate_Hz : float, optional
-        Of files without time stamps.
-    """
-
-    separator: Literal[",", ";", "\t", "|", " "] | None = None
-    decimal: Literal[".", ","] | None = None
-    encoding: _NAME | None = None
-    header_line: int | None = Field(default=None, ge=0, le=10_000)
-    units_line: int | None = Field(default=None, ge=1, le=10_000)
-    data_line: int | None = Field(default=None, ge=1, le=10_000)
-    names: tuple[str, ...] = Field(default=(), max_length=1000, strict=False)
-    sheet: _NAME | None = None
-    blocks: Literal["join", "split"] | None = None
-    sample_rate_Hz: float | None = Field(default=None, gt=0, allow_inf_nan=False)
-
-    @model_validator(mode="after")
-    def _separator_is_not_the_mark(self) -> FileForm:
-        if self.separator == "," and self.decimal == ",":
-            raise ValueError("separator and decimal are both a comma")
-        return self
-
-
-class Channel(_Table):
+class Channel(Table):
     """[channels.NAME]: where a channel is and what its numbers mean.
 
     Attributes
@@ -89,8 +47,8 @@ class Channel(_Table):
         How late the channel is, where it is known [ms].
     """
 
-    column: _NAME | Annotated[int, Field(ge=1, le=1000)] | None = None
-    unit: _NAME | None = None
+    column: NAME | Annotated[int, Field(ge=1, le=1000)] | None = None
+    unit: NAME | None = None
     sign: Literal[1, -1] = 1
     scale: float | None = Field(default=None, allow_inf_nan=False)
     offset: float = Field(default=0.0, allow_inf_nan=False)
@@ -112,7 +70,7 @@ class Channel(_Table):
         return self
 
 
-class CurrentSource(_Table):
+class CurrentSource(Table):
     """[current]: the coil current where no column holds it.
 
     Attributes
@@ -126,7 +84,7 @@ class CurrentSource(_Table):
     """
 
     value: float | None = Field(default=None, allow_inf_nan=False, ge=-1000, le=1000)
-    pattern: _NAME | None = None
+    pattern: NAME | None = None
     unit: Literal["A", "mA"] = "A"
 
     @model_validator(mode="after")
@@ -138,7 +96,7 @@ class CurrentSource(_Table):
         return self
 
 
-class Profile(_Table):
+class Profile(Table):
     """What a rig's files do not say.
 
     Attributes
@@ -153,7 +111,7 @@ class Profile(_Table):
     """
 
     rig: str = Field(default="", max_length=200)
-    excitation: _NAME = "sine"
+    excitation: NAME = "sine"
     split: Literal["train", "validate"] = "train"
     file: FileForm = FileForm()
     channels: dict[str, Channel] = Field(default_factory=dict)
@@ -175,15 +133,6 @@ class Profile(_Table):
     def current_is_given(self) -> bool:
         """Whether the current comes from here rather than from a column."""
         return self.current is not None
-
-    @property
-    def hints(self) -> Hints:
-        """What readers need of it."""
-        form = self.file
-        return Hints(
-            form.separator, form.decimal, form.encoding, form.header_line, form.units_line, form.data_line,
-            form.names, form.sheet, form.blocks, form.sample_rate_Hz,
-        )  # fmt: skip
 
 
 def load_profile(path: str | Path) -> Profile:
@@ -260,27 +209,48 @@ def current_in_name(name: str, profile: Profile) -> float | None:
         `A5_-0.3A-_1.csv`, `2Hz_0x25A.txt`, `run_500mA.csv`; an x or p may stand for the point.
     profile : Profile
         Its pattern is the only way where it has one.
+
+    Raises
+    ------
+    ProfileError
+        E_AMBIGUOUS if the number that the pattern finds has another unit behind it, or none
+        while the profile states none.
     """
     source = profile.current
-    if source is not None and source.pattern is not None:
-        match = re.fullmatch(_as_expression(source.pattern), name[:255])
-        return None if match is None else _amperes(match["current"], source.unit)
-    name = name[:255]
-    found = {_amperes(match[1], match[2]) for match in _FILE_CURRENT.finditer(name)}
-    # 0_5A may be five or half an ampere.
-    doubtful = re.search(r"(?<![0-9])[0-9]_[0-9]+ ?m?A(?![A-Za-z0-9])", name)
-    return found.pop() if len(found) == 1 and not doubtful else None
+    if source is None or source.pattern is None:
+        found = currents_in(name)
+        return found[0] if len(found) == 1 else None
+    match = re.fullmatch(_as_expression(source.pattern), name[:255])
+    if match is None:
+        return None
+    behind = re.match(r"[ _]?([A-Za-z°]+)", name[match.end("current") :])
+    unit = parse_unit(behind[1]) if behind else None
+    suffix = re.fullmatch(r"\.[A-Za-z0-9]{1,6}", name[match.end("current") :]) is not None
+    other = unit is not None and unit.dimension != "current" and not suffix
+    if other or ("unit" not in source.model_fields_set and (unit is None or unit.dimension != "current")):
+        what = f"is followed by {behind[1]!r}" if behind and other else "has no unit behind it"
+        raise ProfileError(
+            f"the pattern {source.pattern!r} finds {match['current']}, which {what}: is it a current?", where=name,
+            mend='correct the pattern, or say [current] unit = "A"' if not other else "correct the pattern",
+            code="E_AMBIGUOUS",
+        )  # fmt: skip
+    stated = "unit" not in source.model_fields_set and unit is not None
+    milli = unit.factor < 1 if stated and unit is not None else source.unit == "mA"
+    return amperes(match["current"], "mA" if milli else "A")
 
 
 def current_pattern(name: str) -> CurrentSource | None:
     """The pattern by which a file name states its current, None if it states none."""
-    amperes = current_in_name(name, Profile())
-    if amperes is None:
+    stated = current_in_name(name, Profile())
+    if stated is None:
         return None
-    match = next(_FILE_CURRENT.finditer(name[:255]))
+    match = re.search(r"(?<![0-9A-Za-z.,])([0-9]{1,4}(?:[.,xp][0-9]{1,4})?)([ _]?)(mA|A)(?![a-z0-9])", name[:255])
+    if match is None:
+        return None
     before = name[max(0, match.start() - 1) : match.start()]
-    source = CurrentSource(pattern=f"{'*' if match.start() else ''}{before}{{current}}{match[2]}*", unit=match[2])  # type: ignore[arg-type]
-    return source if current_in_name(name, Profile(current=source)) == amperes else None
+    star = "*" if match.start() else ""
+    source = CurrentSource(pattern=f"{star}{before}{{current}}{match[2]}{match[3]}*", unit=match[3])  # type: ignore[arg-type]
+    return source if current_in_name(name, Profile(current=source)) == stated else None
 
 
 def _as_expression(pattern: str) -> str:
@@ -288,11 +258,6 @@ def _as_expression(pattern: str) -> str:
     number = r"(?P<current>[+-]?[0-9]{1,4}(?:[.,xp][0-9]{1,4})?)"
     inner = "".join({"{current}": number, "*": ".*?"}.get(part, re.escape(part)) for part in parts)
     return inner if re.search(r"\.[A-Za-z0-9]{1,5}$|\*$", pattern) else inner + r"(?:\..*)?"
-
-
-def _amperes(number: str, unit: str) -> float:
-    value = float(re.sub("[,xp]", ".", number))
-    return value / 1000 if unit == "mA" else value
 
 
 def _toml(value: Any) -> str:

@@ -14,10 +14,11 @@ from mrdamper.data import Dataset
 from mrdamper.errors import ColumnError, InputError, UnitError
 from mrdamper.rig_files.columns import assign, propose
 from mrdamper.rig_files.long_records import judge_long
+from mrdamper.rig_files.parts import tests_of
 from mrdamper.rig_files.profile import Channel, Profile, current_pattern, load_profile, profile_hash
 from mrdamper.rig_files.readers import RawTable, RigFileError, raw_tables, suffixes
 from mrdamper.rig_files.record import Record
-from mrdamper.rig_files.rig_record import as_data, held_current, joined, record_of
+from mrdamper.rig_files.rig_record import as_data, held_current_of, joined, records_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,12 +107,12 @@ def guess_profile(path: str | Path, profile: Profile | str | Path | None = None)
         If the form of the file cannot be found.
     """
     profile = _profile(profile)
-    with raw_tables(path, profile.hints) as tables:
-        table, channels = _guess_channels(tables, profile)
+    with raw_tables(path, profile.file) as tables:
+        table, channels = _guess_channels(_parts(tables, profile), profile)
     form = {**table.form, **profile.file.model_dump(exclude_defaults=True)}
     if not any(table.names):
         form["names"] = tuple(f"column {i + 1}" for i in range(len(table.names)))
-    stated = "current" in channels or held_current(table) is not None
+    stated = "current" in channels or held_current_of(table) is not None
     pattern = None if stated else current_pattern(Path(path).name)
     update = {
         "file": type(profile.file)(**form),  # type: ignore[arg-type]
@@ -190,9 +191,9 @@ def _profile(profile: Profile | str | Path | None) -> Profile:
 
 
 def _unjudged(path: Path, profile: Profile) -> list[Record]:
-    with raw_tables(path, profile.hints) as tables:
-        tables = _tables_with_channels(tables, profile)
-        records = [record_of(table, profile, path) for table in tables]
+    with raw_tables(path, profile.file) as tables:
+        tables = _tables_with_channels(_parts(tables, profile), profile)
+        records = [record for table in tables for record in records_of(table, profile, path)]
         digest = _digest(path)
     records = joined(records, profile, tables)
     remarks = {"file": as_data(path.name), "sha256": digest}
@@ -202,6 +203,10 @@ def _unjudged(path: Path, profile: Profile) -> list[Record]:
     if len({record.id for record in records}) < len(records):
         records = [replace(record, id=f"{record.id}_{i}") for i, record in enumerate(records, 1)]
     return records
+
+
+def _parts(tables: list[RawTable], profile: Profile) -> list[RawTable]:
+    return [part for table in tables for part in ([table] if table.fallback else tests_of(table, profile.file))]
 
 
 def _tables_with_channels(tables: list[RawTable], profile: Profile) -> list[RawTable]:

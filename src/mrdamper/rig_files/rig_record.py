@@ -9,28 +9,62 @@ from pathlib import Path
 
 import numpy as np
 
-from mrdamper.data import Floats
+from mrdamper.data import Floats, held_current
 from mrdamper.errors import ColumnError, printable
 from mrdamper.rig_files.column_names import role_of, split_name
 from mrdamper.rig_files.columns import Assigned, assign, left_out
+from mrdamper.rig_files.conditions import Statement, agreed, contradicts, currents_in, stated_by_lines
+from mrdamper.rig_files.parts import stretches_of_time
 from mrdamper.rig_files.profile import Profile, current_in_name
 from mrdamper.rig_files.readers import RawTable, RigFileError, suffixes
 from mrdamper.rig_files.record import OPTIONAL, Finding, Record
 from mrdamper.rig_files.text.spool import rescale
 from mrdamper.rig_files.units import parse_unit
 
+_LEFT_OUT = "the current channel is left out"
 _LENIENT = ("acceleration", "voltage", "temperature")  # a damaged cell there costs the channel, not the run
 
 
-def record_of(table: RawTable, profile: Profile, path: Path) -> Record:
-    """The record a table holds, not yet judged.
+def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
+    """The records a table of one test holds, not yet judged: several where its time starts again and again.
 
     Raises
     ------
-    RigFileError, ColumnError, UnitError
-        If a channel is missing, has no unit, or holds something else than numbers.
+    InputError
+        If a channel is missing, has no unit, or holds something else than numbers, or if two
+        places contradict each other about the current.
     """
     found = assign(table, profile)
+    raw, findings, lines = _read(table, found)
+    channels = {name: _si(raw[entry.column], entry) for name, entry in found.items()}
+    size = next(iter(raw.values())).size
+    if "time" not in channels:
+        channels["time"] = np.arange(size) / (profile.file.sample_rate_Hz or 1.0)
+    stretches = [slice(0, size)] if profile.file.blocks == "join" else stretches_of_time(channels["time"])
+    remarks = _remarks(table, found)
+    for name, why in left_out(table, profile, found).items():
+        findings.append(Finding("W_COLUMN", f"the {name} channel is left out: {why}"))
+    records = []
+    for number, stretch in enumerate(stretches, 1):
+        part = {name: values[stretch] for name, values in channels.items()}
+        part, its_lines = _aligned(part, found, None if lines is None else lines.part(stretch.start, stretch.stop))
+        current, whence = current_of(table, profile, path, part.get("current"))
+        noticed = findings
+        if current is not None:
+            part["current"] = _constant(current, part["time"])
+            noticed = [f for f in findings if not f.text.startswith(_LEFT_OUT)]
+        records.append(
+            Record(
+                id=_run_id(table, path) + (f"_{number}" if len(stretches) > 1 else ""),
+                findings=tuple(_unique(noticed)), provenance={**remarks, **whence}, rig=profile.rig,
+                excitation=profile.excitation, split=profile.split, lines=its_lines, **part,  # type: ignore[arg-type]
+            )
+        )  # fmt: skip
+    return records
+
+
+def _read(table: RawTable, found: dict[str, Assigned]):
+    """The columns' numbers, what was noticed, the lines; a damaged cell of a further channel costs that channel."""
     content = table.read([entry.column for name, entry in found.items() if name not in _LENIENT])
     raw = dict(content.values)
     findings = list(content.findings)
@@ -41,24 +75,7 @@ def record_of(table: RawTable, profile: Profile, path: Path) -> Record:
             code = "W_ENCODING" if error.code == "E_ENCODING" else "W_COLUMN"
             findings.append(Finding(code, f"the {name} channel is left out: {error.found}"))
             del found[name]
-    channels = {name: _si(raw[entry.column], entry) for name, entry in found.items()}
-    size = next(iter(raw.values())).size
-    if "time" not in channels:
-        channels["time"] = np.arange(size) / (profile.file.sample_rate_Hz or 1.0)
-    channels, lines = _aligned(channels, found, content.lines)
-    remarks = _remarks(table, found)
-    if "current" not in channels:
-        current, whence = _current(table, path, profile)
-        if current is not None:
-            channels["current"] = _constant(current, channels["time"])
-            remarks["current_from"] = whence
-    for name, why in left_out(table, profile, found).items():
-        if name != "current" or "current" not in channels:
-            findings.append(Finding("W_COLUMN", f"the {name} channel is left out: {why}"))
-    return Record(
-        id=_run_id(table, path), findings=tuple(_unique(findings)), provenance=remarks, rig=profile.rig,
-        excitation=profile.excitation, split=profile.split, lines=lines, **channels,  # type: ignore[arg-type]
-    )  # fmt: skip
+    return raw, findings, content.lines
 
 
 def _si(values: Floats, entry: Assigned) -> Floats:
@@ -91,18 +108,59 @@ def _constant(value: float, like: Floats) -> Floats:
     return np.broadcast_to(np.float64(value), like.shape)
 
 
-def _current(table: RawTable, path: Path, profile: Profile) -> tuple[float | None, str]:
+def current_of(
+    table: RawTable, profile: Profile, path: Path, channel: Floats | None
+) -> tuple[float | None, dict[str, str]]:
+    """The current [A] that a test states beside its columns, and where; None where the channel has it, or nothing does.
+
+    Raises
+    ------
+    InputError
+        E_AMBIGUOUS if two statements contradict each other, E_CURRENT_CONTRADICTS if one
+        contradicts the channel, E_RANGE if one is no coil current.
+    """
     if profile.current is not None and profile.current.value is not None:
-        return profile.current.value, "profile"
-    if profile.current is None and (held := held_current(table)) is not None:
-        return held, "a number in the file"
-    found = current_in_name(path.name, profile)
-    if found is None and profile.current is None:
-        found = current_in_name(table.source.name.removeprefix(f"{path.name}:"), profile)  # of an archive's member
-    return found, "file name"
+        return profile.current.value, {"current_from": "profile"}
+    if profile.current is not None:
+        found = current_in_name(path.name, profile)
+        statements = [] if found is None else [Statement(found, "file name")]
+    else:
+        statements = _statements(table, path)
+    where = printable(table.source.name)
+    mend = "correct the name or the line, or say [current] value = ... in a profile"
+    try:
+        stated = agreed(statements)
+    except ValueError as error:
+        code = "E_RANGE" if "no coil current" in str(error) else "E_AMBIGUOUS"
+        raise ColumnError(printable(str(error)), where=where, mend=mend, code=code) from None
+    if channel is not None and stated is not None:
+        known = channel[np.isfinite(channel)]
+        mean, change = held_current(known) if known.size >= 3 else (stated.amperes, "")
+        if not change and contradicts(mean, stated.amperes):
+            raise ColumnError(
+                printable(f"{stated.whence} gives {stated.amperes:g} A, the current channel {mean:g} A"), where=where,
+                mend=f"if the channel is right, rename; else say [current] value = {stated.amperes:g} in a profile",
+                code="E_CURRENT_CONTRADICTS",
+            )  # fmt: skip
+    if channel is not None or stated is None:
+        return None, {}
+    return stated.amperes, {"current_from": as_data(stated.whence)}
 
 
-def held_current(table: RawTable) -> float | None:
+def _statements(table: RawTable, path: Path) -> list[Statement]:
+    """Every current that stands beside the columns, the surest place first."""
+    held = held_current_of(table)
+    found = [] if held is None else [Statement(held, "a number in the file")]
+    found += stated_by_lines(table.remarks, table.form.get("decimal"))  # type: ignore[arg-type]
+    member = table.source.name.removeprefix(f"{path.name}:").removeprefix(f"{path.name}, sheet ")
+    for text, whence in ((table.label, "the title"), (path.name, "file name"), (member, "file name")):
+        stated = currents_in(text)
+        if len(stated) == 1:
+            found.append(Statement(stated[0], whence if whence == "file name" else f"{whence} {text!r}"))
+    return found
+
+
+def held_current_of(table: RawTable) -> float | None:
     """Coil current [A] that a file holds as one number beside its columns, `current_A = 0.5`; None if it does not."""
     held = set()
     for name, value in table.constants.items():

@@ -18,14 +18,14 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mrdamper.errors import MissingExtraError
-from mrdamper.rig_files.readers.base import MOST_RATIO, Content, Hints, RawTable, Reader, RigFileError, Source
+from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.readers.base import MOST_RATIO, Content, RawTable, Reader, RigFileError, Source, Words
 from mrdamper.rig_files.record import Finding, LineNumbers
 
 _SECONDS = 0.25  # processor time of the child for the smallest file
@@ -39,14 +39,14 @@ _START = (
 
 
 @contextlib.contextmanager
-def guarded_tables(source: Source, reader: Reader, hints: Hints) -> Iterator[list[RawTable]]:
+def guarded_tables(source: Source, reader: Reader, form: FileForm) -> Iterator[list[RawTable]]:
     """The tables of a file, read by a process of its own.
 
     Parameters
     ----------
     source : Source
     reader : Reader
-    hints : Hints
+    form : FileForm
 
     Raises
     ------
@@ -64,7 +64,7 @@ def guarded_tables(source: Source, reader: Reader, hints: Hints) -> Iterator[lis
             "bytes": _BYTES + _BYTES_PER_BYTE * source.size,
         }
         asked = _Asked(sandbox, source, reader.title, limits["seconds"] * _PATIENCE + 30)
-        answer = asked({**request, **limits, "hints": asdict(hints)})
+        answer = asked({**request, **limits, "form": form.model_dump()})
         yield [asked.table(i, table) for i, table in enumerate(answer["tables"])]
 
 
@@ -100,9 +100,14 @@ class _Asked:
             lines = answer["lines"] and LineNumbers(answer["lines"][0], *map(tuple, answer["lines"][1:]))
             return Content(values, lines, tuple(Finding(*finding) for finding in answer["findings"]))
 
+        def words(column: int) -> Words:
+            answer = self({"table": index, "words": column})
+            return Words(self._sandbox.receive(answer["size"]).astype(np.int32), tuple(answer["labels"]))
+
         return RawTable(
             self._source, tuple(table["names"]), tuple(table["units"]), read,
             table["line"], table["label"], table["form"], table["fallback"], table["constants"], tuple(table["odd"]),
+            tuple(table["remarks"]), tuple(table["over"]), words,
         )  # fmt: skip
 
 

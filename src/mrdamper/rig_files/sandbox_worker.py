@@ -13,7 +13,8 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from mrdamper.errors import MissingExtraError
-from mrdamper.rig_files.readers.base import Hints, RawTable, Reader, RigFileError, Source
+from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.readers.base import RawTable, Reader, RigFileError, Source
 
 
 def serve() -> None:
@@ -31,6 +32,8 @@ def serve() -> None:
                     keep.close()
                     tables = _open(request, keep)
                     _send(replies, {"tables": [_described(table) for table in tables]})
+                elif "words" in request:
+                    _send_words(replies, tables[request["table"]], request["words"])
                 else:
                     _send_columns(replies, tables[request["table"]], request["columns"])
             except MissingExtraError as error:
@@ -62,8 +65,8 @@ def _open(request: dict[str, Any], keep: ExitStack) -> list[RawTable]:
     path = Path(request["path"])
     file = keep.enter_context(path.open("rb"))
     source = Source(path, request["name"], request["suffix"], file, path.stat().st_size, keep)
-    hints = request["hints"]
-    return reader.tables(source, Hints(**{**hints, "names": tuple(hints["names"])}))
+    form = request["form"]
+    return reader.tables(source, FileForm.model_validate(form))
 
 
 def _limit(seconds: float | None, size: float = 0) -> None:
@@ -107,8 +110,16 @@ def _send_columns(replies: BinaryIO, table: RawTable, columns: list[int]) -> Non
     replies.flush()
 
 
+def _send_words(replies: BinaryIO, table: RawTable, column: int) -> None:
+    assert table.words is not None
+    words = table.words(column)
+    _send(replies, {"size": words.codes.size, "labels": list(words.labels)})
+    replies.write(words.codes.astype(np.float64).data)
+    replies.flush()
+
+
 def _described(table: RawTable) -> dict[str, Any]:
     return {
         name: getattr(table, name)
-        for name in ("names", "units", "line", "label", "form", "fallback", "constants", "odd")
+        for name in ("names", "units", "line", "label", "form", "fallback", "constants", "odd", "remarks", "over")
     }

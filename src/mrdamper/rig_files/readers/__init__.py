@@ -10,8 +10,9 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from mrdamper.discovery import subclasses_in
+from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.archive import opened
-from mrdamper.rig_files.readers.base import Hints, RawTable, Reader, RigFileError, Source
+from mrdamper.rig_files.readers.base import RawTable, Reader, RigFileError, Source
 from mrdamper.rig_files.sandbox import guarded_tables
 
 if TYPE_CHECKING:
@@ -49,13 +50,13 @@ _PICKLE = tuple(bytes((0x80, protocol)) for protocol in range(2, 6))
 
 
 @contextmanager
-def raw_tables(path: str | Path, hints: Hints | None = None) -> Iterator[list[RawTable]]:
+def raw_tables(path: str | Path, form: FileForm | None = None) -> Iterator[list[RawTable]]:
     """Open a rig's file, whatever its format, and give its tables.
 
     Parameters
     ----------
     path : path
-    hints : Hints, optional
+    form : FileForm, optional
         What a profile says about the form of the file.
 
     Yields
@@ -72,9 +73,9 @@ def raw_tables(path: str | Path, hints: Hints | None = None) -> Iterator[list[Ra
     with opened(Path(path)) as source:
         reader = reader_of(source)
         if not reader.library:
-            yield reader.tables(source, hints or Hints())
+            yield reader.tables(source, form or FileForm())
             return
-        with guarded_tables(source, reader, hints or Hints()) as tables:
+        with guarded_tables(source, reader, form or FileForm()) as tables:
             yield tables
 
 
@@ -121,7 +122,7 @@ def suffixes() -> tuple[str, ...]:
 
 
 __all__ = [
-    "Hints",
+    "FileForm",
     "RawTable",
     "Reader",
     "RigFileError",

@@ -22,6 +22,7 @@ from mrdamper.rig_files.readers.base import (
     RawTable,
     RigFileError,
     Source,
+    Words,
 )
 
 _NO_NUMBERS = {"b": "truth values", "c": "complex numbers", "V": "bytes"}
@@ -41,6 +42,7 @@ def array_table(
     title: str = "",
     fallback: bool = False,
     constants: Mapping[str, float] | None = None,
+    remarks: Sequence[str] = (),
 ) -> RawTable:
     """A table whose columns are loaded as arrays, one by one.
 
@@ -66,7 +68,28 @@ def array_table(
             raise source.refuse("E_NO_DATA", "columns without samples", mend="export the file again")
         return Content(values)
 
-    return RawTable(source, tuple(names), tuple(units), read, label=label, fallback=fallback, constants=constants or {})
+    def words(column: int) -> Words:
+        with refusing_damage(source, title):
+            array = np.asarray(load(column))
+        return words_of([_word(item) for item in array.reshape(-1).tolist()])
+
+    return RawTable(
+        source, tuple(names), tuple(units), read, label=label, fallback=fallback, constants=constants or {},
+        remarks=tuple(remarks), words=words,
+    )  # fmt: skip
+
+
+def words_of(cells: Sequence[str]) -> Words:
+    """A column of words from its cells."""
+    known: dict[str, int] = {}
+    codes = np.fromiter((known.setdefault(cell, len(known)) for cell in cells), dtype=np.int32, count=len(cells))
+    return Words(codes, tuple(known))
+
+
+def _word(item: object) -> str:
+    if isinstance(item, bytes):
+        return item.decode("utf-8", "replace").strip()
+    return f"{item:g}" if isinstance(item, float) else str(item).strip()
 
 
 def as_floats(source: Source, array: np.ndarray, name: str, column: int) -> Floats:

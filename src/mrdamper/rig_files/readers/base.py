@@ -13,8 +13,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO, ClassVar
 
+import numpy as np
+
 from mrdamper.data import Floats
 from mrdamper.errors import InputError, printable
+from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.record import Finding, LineNumbers
 
 MOST_COLUMNS = 1000
@@ -50,38 +53,6 @@ class RigFileError(InputError):
         self.file, self.line, self.column = file, line, column
         parts = [file, f"line {line}" if line is not None else "", f"column {column}" if column is not None else ""]
         super().__init__(found, where=", ".join(part for part in parts if part), mend=mend, code=code)
-
-
-@dataclass(frozen=True, slots=True)
-class Hints:
-    """What a rig profile says about the form of its files; None where it may be sniffed.
-
-    Attributes
-    ----------
-    separator, decimal, encoding : str
-        Of delimited text.
-    header_line, units_line, data_line : int
-        Counted from one; a header line of 0 says that there is none.
-    names : tuple of str
-        Names of the columns where the file has none, or wrong ones.
-    sheet : str
-        Of a workbook.
-    blocks : "join" or "split"
-        What repeated acquisition blocks are.
-    sample_rate : float
-        [Hz] of files without time stamps.
-    """
-
-    separator: str | None = None
-    decimal: str | None = None
-    encoding: str | None = None
-    header_line: int | None = None
-    units_line: int | None = None
-    data_line: int | None = None
-    names: tuple[str, ...] = ()
-    sheet: str | None = None
-    blocks: str | None = None
-    sample_rate: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +115,22 @@ class Content:
 
 
 @dataclass(frozen=True, eq=False)
+class Words:
+    """A column of words, each distinct one kept once.
+
+    Attributes
+    ----------
+    codes : (N,) int array
+        Position in `labels` of every row's word.
+    labels : tuple of str
+        In the order they appear.
+    """
+
+    codes: np.ndarray
+    labels: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class RawTable:
     """Named columns of a file, read when they are asked for.
 
@@ -161,13 +148,19 @@ class RawTable:
     label : str
         Tells apart several tables of one file.
     form : mapping
-        What was sniffed, in the words of `Hints`.
+        What was sniffed, in the words of `FileForm`.
     fallback : bool
         Looked at only if no other table of the file holds a test.
     constants : mapping of str to float
         Single numbers by name that the file holds beside the columns.
     odd : tuple of str
         One a column where it is known: what stands in it instead of numbers, else empty.
+    remarks : tuple of str
+        What the file says beside the columns: the lines above them, attributes, properties.
+    over : tuple of str
+        One a column where a row of titles stands above the names of columns.
+    words : callable, optional
+        Takes the position of a column, returns its `Words`.
     """
 
     source: Source
@@ -180,6 +173,9 @@ class RawTable:
     fallback: bool = False
     constants: Mapping[str, float] = field(default_factory=dict)
     odd: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+    over: tuple[str, ...] = ()
+    words: Callable[[int], Words] | None = None
 
 
 class Reader(ABC):
@@ -201,7 +197,7 @@ class Reader(ABC):
         """Whether the content, not the name, is of this format."""
 
     @abstractmethod
-    def tables(self, source: Source, hints: Hints) -> list[RawTable]:
+    def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """The tables of the file.
 
         Raises

@@ -8,11 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from mrdamper.rig_files.readers.base import Content, Hints, RawTable, Reader, Source
+from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.readers.base import Content, RawTable, Reader, Source, Words
 from mrdamper.rig_files.record import Finding, LineNumbers
 from mrdamper.rig_files.text.blocks import Block, find_blocks
 from mrdamper.rig_files.text.bulk import read_bulk
-from mrdamper.rig_files.text.cells import Form, field_count, read_cells
+from mrdamper.rig_files.text.cells import Form, field_count, read_cells, split_rows
+from mrdamper.rig_files.text.labview import is_labview, named, stated_form
 from mrdamper.rig_files.text.layout import Layout, find_layout, split
 from mrdamper.rig_files.text.spool import Spool
 from mrdamper.rig_files.text.stream import LONGEST_LINE, TextStream, open_text, too_long
@@ -26,16 +28,16 @@ class DelimitedText(Reader):
 
     name = "text"
     title = "delimited text"
-    suffixes = (".csv", ".txt", ".dat", ".tsv", ".asc", ".prn", ".log", ".tab")
+    suffixes = (".csv", ".txt", ".dat", ".tsv", ".asc", ".prn", ".log", ".tab", ".lvm")
     binary = False
 
     def recognises(self, source: Source) -> bool:
         """Text is what no other format claims."""
         return True
 
-    def tables(self, source: Source, hints: Hints) -> list[RawTable]:
+    def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """One table a block of rows."""
-        stream = open_text(source, hints)
+        stream = open_text(source, form)
         head = stream.head()
         raw = head.split(b"\n")
         long = next((i for i, line in enumerate(raw) if len(line) > LONGEST_LINE), None)
@@ -43,7 +45,10 @@ class DelimitedText(Reader):
             raise too_long(source, long + 1)
         whole = stream.start + len(head) >= stream.stop
         lines = [stream.decode(line).rstrip("\r") for line in (raw if whole else raw[:-1])[:_HEAD_LINES]]
-        layout = find_layout(lines, source, hints)
+        if is_labview(lines):
+            layout = named(find_layout(lines, source, stated_form(lines, form)), lines)
+        else:
+            layout = find_layout(lines, source, form)
         start = stream.start + sum(len(line) + 1 for line in raw[: layout.data_line - 1])
         blocks = find_blocks(stream, layout, start, stream.stop)
         return [self._table(stream, layout, block, i, len(blocks)) for i, block in enumerate(blocks)]
@@ -51,6 +56,9 @@ class DelimitedText(Reader):
     def _table(self, stream: TextStream, layout: Layout, block: Block, index: int, count: int) -> RawTable:
         def read(columns: Sequence[int]) -> Content:
             return _read(stream, layout, block, tuple(columns))
+
+        def words(column: int) -> Words:
+            return _words(stream, layout, block, column)
 
         units = tuple("s" if k == "stamp" else u for k, u in zip(layout.kinds, layout.units, strict=True))
         return RawTable(
@@ -62,6 +70,9 @@ class DelimitedText(Reader):
             f"block {index + 1}" if count > 1 else "",
             _form(stream, layout),
             odd=layout.odd,
+            remarks=block.remarks or layout.remarks,
+            over=layout.over,
+            words=words,
         )
 
 
@@ -98,6 +109,21 @@ def _read(stream: TextStream, layout: Layout, block: Block, columns: tuple[int, 
         text = f"bytes that are no {'UTF-8' if stream.encoding == 'utf-8' else 'ASCII'} in columns that are not needed"
         findings = (*findings, Finding("W_ENCODING", text))
     return Content(spool.arrays(), LineNumbers(size, tuple(starts), tuple(numbers)), findings)
+
+
+def _words(stream: TextStream, layout: Layout, block: Block, column: int) -> Words:
+    form = Form(stream, layout, (column,))
+    block, _ = _without_cut_row(form, block)
+    known: dict[str, int] = {}
+    codes: list[np.ndarray] = []
+    line, at = block.line, block.start
+    for chunk in stream.chunks(block.start, block.stop):
+        at += len(chunk)
+        texts = stream.decode(chunk).split("\n")
+        rows, _ = split_rows(texts, line, form, at >= stream.stop)
+        codes.append(np.array([known.setdefault(row[column], len(known)) for row in rows], dtype=np.int32))
+        line += chunk.count(b"\n")
+    return Words(np.concatenate(codes) if codes else np.empty(0, dtype=np.int32), tuple(known))
 
 
 def _stretches(lines: np.ndarray, expected: int | None) -> np.ndarray:

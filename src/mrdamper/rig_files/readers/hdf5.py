@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.arrays import array_table, check_unpacked, expand, load, pick, refusing_damage
-from mrdamper.rig_files.readers.base import MOST_COLUMNS, Hints, RawTable, Reader, Source
+from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
 
 # pyright: reportMissingImports=false, reportAttributeAccessIssue=false
 
@@ -30,7 +31,7 @@ class Hdf5(Reader):
         """By the mark at the start."""
         return source.head(8) == HDF5_MARK
 
-    def tables(self, source: Source, hints: Hints) -> list[RawTable]:
+    def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """One table a group of datasets, and one of all together if no group holds a test."""
         return hdf5_tables(source, self.title)
 
@@ -47,7 +48,7 @@ class Matlab73(Reader):
         """By the mark behind MATLAB's own header."""
         return source.head(520)[512:] == HDF5_MARK
 
-    def tables(self, source: Source, hints: Hints) -> list[RawTable]:
+    def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """As of HDF5: a struct is a group."""
         return hdf5_tables(source, self.title)
 
@@ -70,7 +71,7 @@ def hdf5_tables(source: Source, title: str) -> list[RawTable]:
     tables = []
     for group, columns in groups.items():
         constants = {**found.constants.get("", {}), **found.constants.get(group, {})}
-        tables.append(_table(source, columns, title, group, constants))
+        tables.append(_table(source, columns, title, group, constants, remarks=_above(found.remarks, group)))
     if len(groups) > 1:
         every = [column for columns in groups.values() for column in columns]
         tables.append(_table(source, every, title, "", found.constants.get("", {}), fallback=True))
@@ -81,7 +82,14 @@ def hdf5_tables(source: Source, title: str) -> list[RawTable]:
 
 
 def _table(
-    source: Source, columns: list[Any], title: str, label: str, constants: dict[str, float], *, fallback: bool = False
+    source: Source,
+    columns: list[Any],
+    title: str,
+    label: str,
+    constants: dict[str, float],
+    *,
+    fallback: bool = False,
+    remarks: list[str] | None = None,
 ) -> RawTable:
     names = [name for name, _, _, _ in columns]
     units = [unit for _, unit, _, _ in columns]
@@ -96,8 +104,14 @@ def _table(
 
     label = label.strip("/").replace("/", "_")
     return array_table(
-        source, names, units, column_of, label=label, title=title, fallback=fallback, constants=constants
-    )
+        source, names, units, column_of, label=label, title=title, fallback=fallback, constants=constants,
+        remarks=remarks or (),
+    )  # fmt: skip
+
+
+def _above(remarks: dict[str, list[str]], group: str) -> list[str]:
+    """What the attributes of a group, and of the groups around it, say."""
+    return [line for path, lines in remarks.items() if f"{group}/".startswith(f"{path}/") for line in lines]
 
 
 def _upright(dataset: Any) -> np.ndarray:
@@ -114,6 +128,7 @@ class _Found:
     groups: dict[str, list[tuple]] = field(default_factory=dict)
     constants: dict[str, dict[str, float]] = field(default_factory=dict)
     objects: list[str] = field(default_factory=list)
+    remarks: dict[str, list[str]] = field(default_factory=dict)
     seen: int = 0
     numbers: int = 0
 
@@ -121,6 +136,7 @@ class _Found:
 def _walk(group: Any, path: str, found: _Found) -> None:
     import h5py
 
+    found.remarks[path] = _attributes(group)
     for name in group:
         found.seen += 1
         if found.seen > _MOST_OBJECTS or path.count("/") > _DEEPEST:
@@ -141,6 +157,18 @@ def _walk(group: Any, path: str, found: _Found) -> None:
             columns = _columns(item, str(name), path, found)
             if columns:
                 found.groups.setdefault(path, []).extend(columns)
+
+
+def _attributes(item: Any) -> list[str]:
+    """The attributes of a group or a dataset as lines: numbers and short texts."""
+    lines = []
+    for name in list(item.attrs)[:MOST_COLUMNS]:
+        value = np.asarray(item.attrs[name])
+        if value.size == 1 and value.dtype.kind in "iufSUO":
+            lines.append(
+                f"{name}: {_text(item.attrs[name]) if value.dtype.kind in 'SUO' else value.reshape(-1)[0]}"[:200]
+            )
+    return lines
 
 
 def _columns(dataset: Any, name: str, path: str, found: _Found) -> list[tuple]:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.arrays import array_table, check_unpacked, expand, pick, refusing_damage
-from mrdamper.rig_files.readers.base import MOST_COLUMNS, Hints, RawTable, Reader, Source
+from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
 from mrdamper.rig_files.readers.hdf5 import HDF5_MARK, hdf5_tables
 
 _NUMERIC = ("double", "single", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
-_OBJECTS = ("cell", "object", "opaque", "function", "unknown")
+_OBJECTS = ("object", "opaque", "function", "unknown")
 _DEEPEST = 4
+MOST_STRUCTS = 2000  # of an array of structs
 
 
 class Matlab(Reader):
@@ -30,7 +34,7 @@ class Matlab(Reader):
             head.startswith(b"MATLAB") or head[512:] == HDF5_MARK or (source.suffix == ".mat" and _is_version_4(head))
         )
 
-    def tables(self, source: Source, hints: Hints) -> list[RawTable]:
+    def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """The variables as one table, and one more a struct."""
         if source.head(520)[512:] == HDF5_MARK:
             return hdf5_tables(source, self.title)
@@ -40,63 +44,76 @@ class Matlab(Reader):
             source.file.seek(0)
             variables = whosmat(source.file)
             check_unpacked(source, 8 * sum(int(np.prod(shape, dtype=object)) for _, shape, _ in variables))
-            wanted = [name for name, _, kind in variables if kind in (*_NUMERIC, "struct")]
+            wanted = [name for name, _, kind in variables if kind in (*_NUMERIC, "struct", "char", "cell")]
             source.file.seek(0)
             values = loadmat(
                 source.file, variable_names=wanted, struct_as_record=True, verify_compressed_data_integrity=True
             )
-        tables: dict[str, dict[str, np.ndarray]] = {}
-        single: dict[str, dict[str, float]] = {}
+        found = _Found()
         for name in wanted:
             if name in values:
-                _gather(values[name], name, "", tables, single)
+                _gather(values[name], name, "", found)
         others = [name for name, _, kind in variables if kind in _OBJECTS]
-        if not tables:
-            code, found = (
-                ("E_UNSAFE", f"only objects ({others[0]})") if others else ("E_NO_DATA", "no array of numbers")
-            )
-            raise source.refuse(code, found, mend="save the channels as arrays of numbers")
+        if not found.columns:
+            code, what = ("E_UNSAFE", f"only objects ({others[0]})") if others else ("E_NO_DATA", "no array of numbers")
+            raise source.refuse(code, what, mend="save the channels as arrays of numbers")
         for name in others:
-            tables.setdefault("", {})[name] = np.empty(2, dtype=object)  # never loaded; refused if it is asked for
-        return [
-            _table(source, columns, label, self.title, {**single.get("", {}), **single.get(label, {})})
-            for label, columns in tables.items()
-        ]
+            found.columns.setdefault("", {})[name] = np.empty(2, dtype=object)  # refused if it is asked for
+        return [_table(source, columns, label, self.title, found) for label, columns in found.columns.items()]
 
 
-def _table(
-    source: Source, columns: dict[str, np.ndarray], label: str, title: str, constants: dict[str, float]
-) -> RawTable:
-    found = [(name, array, part) for key, array in columns.items() for name, part in expand(key, array.shape)]
+@dataclass
+class _Found:
+    """By the label of a table its columns, single numbers and texts."""
+
+    columns: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
+    single: dict[str, dict[str, float]] = field(default_factory=dict)
+    remarks: dict[str, list[str]] = field(default_factory=dict)
+
+    def above(self, label: str) -> Iterator[str]:
+        """Labels of the structs a table lies in, from the file down to its own."""
+        return (known for known in ("", *self.single, *self.remarks) if label == known or _inside(label, known))
+
+
+def _inside(label: str, outer: str) -> bool:
+    return outer == "" or label.startswith(f"{outer}_")
+
+
+def _table(source: Source, columns: dict[str, np.ndarray], label: str, title: str, found: _Found) -> RawTable:
+    parts = [(name, array, part) for key, array in columns.items() for name, part in expand(key, array.shape)]
+    above = list(dict.fromkeys(found.above(label)))
     return array_table(
         source,
-        [name for name, _, _ in found],
-        [""] * len(found),
-        lambda column: pick(found[column][1], found[column][2]),
+        [name for name, _, _ in parts],
+        [""] * len(parts),
+        lambda column: pick(parts[column][1], parts[column][2]),
         label=label,
         title=title,
-        constants=constants,
+        constants={name: value for known in above for name, value in found.single.get(known, {}).items()},
+        remarks=[line for known in above for line in found.remarks.get(known, [])],
     )
 
 
-def _gather(
-    value: Any,
-    name: str,
-    label: str,
-    tables: dict[str, dict[str, np.ndarray]],
-    single: dict[str, dict[str, float]],
-    depth: int = 0,
-) -> None:
-    """Collect arrays and single numbers by name; the fields of a struct are a table of their own."""
+def _gather(value: Any, name: str, label: str, found: _Found, depth: int = 0) -> None:
+    """Collect arrays, single numbers and texts by name; a struct is a table of its own, and so is each of an array."""
     array = np.asarray(value)
-    if array.dtype.names and array.size == 1 and depth < _DEEPEST:
-        inner = f"{label}_{name}" if label else name
-        for field in array.dtype.names:
-            _gather(array.reshape(-1)[0][field], field, inner, tables, single, depth + 1)
-    elif array.dtype.kind in "iufcO" and array.size > 1:
-        tables.setdefault(label, {})[name] = array  # objects and complex numbers are refused if they are asked for
-    elif array.dtype.kind in "iuf" and array.size == 1 and len(single) < MOST_COLUMNS:
-        single.setdefault(label, {})[name] = float(array.reshape(-1)[0])
+    kind, size = array.dtype.kind, array.size
+    if array.dtype.names and size and depth < _DEEPEST:
+        items = array.reshape(-1)[:MOST_STRUCTS]
+        for number, item in enumerate(items, 1):
+            own = f"{name}_{number}" if size > 1 else name
+            inner = f"{label}_{own}" if label else own
+            for part in array.dtype.names:
+                _gather(item[part], part, inner, found, depth + 1)
+    elif kind == "O" and size and depth < _DEEPEST and all(np.asarray(item).dtype.names for item in array.flat):
+        for number, item in enumerate(array.reshape(-1)[:MOST_STRUCTS], 1):
+            _gather(item, f"{name}_{number}", label, found, depth + 1)
+    elif kind in "iufcO" and size > 1:
+        found.columns.setdefault(label, {})[name] = array  # objects and complex numbers are refused if asked for
+    elif kind in "iuf" and size == 1 and len(found.single.setdefault(label, {})) < MOST_COLUMNS:
+        found.single[label][name] = float(array.reshape(-1)[0])
+    elif kind in "US" and size == 1:
+        found.remarks.setdefault(label, []).append(f"{name}: {array.reshape(-1)[0]}"[:200])
 
 
 def _is_version_4(head: bytes) -> bool:

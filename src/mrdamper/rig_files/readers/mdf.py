@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.arrays import array_table, check_unpacked, load, refusing_damage
-from mrdamper.rig_files.readers.base import MOST_COLUMNS, Hints, RawTable, Reader, Source
+from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
 
 # pyright: reportMissingImports=false
 
@@ -24,7 +25,7 @@ class Mdf(Reader):
         """By the mark at the start, also of a file that was not closed."""
         return source.head(8) in (b"MDF     ", b"UnFinMF ")
 
-    def tables(self, source: Source, hints: Hints) -> list[RawTable]:
+    def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """The groups as tables."""
         if source.head(8) == b"UnFinMF ":
             raise source.refuse("E_TRUNCATED", "the measurement was not closed", mend="close it with its own program")

@@ -6,9 +6,10 @@ import zipfile
 
 import numpy as np
 
+from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.archive import UNREADABLE_ZIP, check_sizes, is_arrays, zipped_names
 from mrdamper.rig_files.readers.arrays import array_table, damaged, expand, pick, refusing_damage
-from mrdamper.rig_files.readers.base import MOST_COLUMNS, Hints, RawTable, Reader, Source
+from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
 
 _Column = tuple[str, str, tuple[str, int | str | None]]
 
@@ -29,7 +30,7 @@ class Npz(Reader):
         except UNREADABLE_ZIP:
             return source.suffix in self.suffixes
 
-    def tables(self, source: Source, hints: Hints) -> list[RawTable]:
+    def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """The arrays as columns; a matrix gives numbered ones, a structured array its fields."""
         with refusing_damage(source, self.title):
             columns, single = _columns(source)

@@ -7,8 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.arrays import array_table, check_unpacked, damaged, refusing_damage
-from mrdamper.rig_files.readers.base import Hints, RawTable, Reader, Source
+from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 
 _MAGIC = b"PAR1"
 
@@ -37,7 +38,7 @@ class Parquet(Reader):
         """By the mark at the start."""
         return source.head(4) == _MAGIC
 
-    def tables(self, source: Source, hints: Hints) -> list[RawTable]:
+    def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """The one table."""
         import polars as pl
 

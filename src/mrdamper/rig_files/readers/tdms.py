@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.arrays import array_table, check_unpacked, damaged, load, refusing_damage
-from mrdamper.rig_files.readers.base import Hints, RawTable, Reader, Source
+from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 
 # pyright: reportMissingImports=false
 
@@ -27,7 +28,7 @@ class Tdms(Reader):
         """By the mark at the start."""
         return source.head(4) == b"TDSm"
 
-    def tables(self, source: Source, hints: Hints) -> list[RawTable]:
+    def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """One table a group; raw volts are refused later, by their unit."""
         nptdms = load("nptdms", self.title)
         with refusing_damage(source, self.title):
@@ -42,7 +43,7 @@ class Tdms(Reader):
             if getattr(file, "file_status", None) is not None and file.file_status.incomplete_final_segment:
                 raise damaged(source, self.title, "the last segment is incomplete")
         tables = [
-            _table(source, group.name, list(group.channels()), self.title)
+            _table(source, group, {**file.properties, **group.properties}, self.title)
             for group in file.groups()
             if group.channels()
         ]
@@ -51,7 +52,8 @@ class Tdms(Reader):
         return tables
 
 
-def _table(source: Source, group: str, channels: list[Any], title: str) -> RawTable:
+def _table(source: Source, group: Any, properties: dict[str, Any], title: str) -> RawTable:
+    channels = list(group.channels())
     names = [channel.name for channel in channels]
     units = [_unit(channel) for channel in channels]
     step = next((s for s in (_step(channel) for channel in channels) if s), None)
@@ -67,7 +69,8 @@ def _table(source: Source, group: str, channels: list[Any], title: str) -> RawTa
         data = np.asarray(channels[column][:])
         return data if data.dtype.kind in "iufMm" else np.empty(data.shape, dtype="U1")
 
-    return array_table(source, names, units, column_of, label=group, title=title)
+    remarks = [f"{name}: {value}"[:200] for name, value in properties.items() if isinstance(value, (str, int, float))]
+    return array_table(source, names, units, column_of, label=group.name, title=title, remarks=remarks)
 
 
 def _unit(channel: Any) -> str:

@@ -9,9 +9,10 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from mrdamper.errors import InputError
+from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.archive import UNREADABLE_ZIP, check_sizes, is_workbook, zipped_names
 from mrdamper.rig_files.readers.arrays import damaged, load, refusing_damage
-from mrdamper.rig_files.readers.base import MOST_COLUMNS, Hints, RawTable, Reader, Source
+from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
 from mrdamper.rig_files.readers.delimited import DelimitedText
 from mrdamper.rig_files.readers.scratch import Scratch
 
@@ -36,7 +37,7 @@ class Workbook(Reader):
         except UNREADABLE_ZIP:
             return source.suffix in self.suffixes
 
-    def tables(self, source: Source, hints: Hints) -> list[RawTable]:
+    def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """One table a sheet that holds one."""
         try:
             with zipfile.ZipFile(source.file) as archive:
@@ -45,8 +46,8 @@ class Workbook(Reader):
             raise damaged(source, self.title, "end of file not found") from error
         check_sizes(source, members)
         with refusing_damage(source, self.title):
-            sheets = _sheets(source, hints)
-        form = replace(hints, separator="\t", encoding="utf-8", decimal=None)
+            sheets = _sheets(source, form)
+        form = form.model_copy(update={"separator": "\t", "encoding": "utf-8"})
         found: list[RawTable] = []
         first: InputError | None = None
         for name, sheet in sheets:
@@ -63,21 +64,21 @@ def _labelled(table: RawTable, sheet: str, source: Source) -> RawTable:
     return replace(table, label=table.label or sheet, form={"sheet": sheet})
 
 
-def _sheets(source: Source, hints: Hints) -> list[tuple[str, Source]]:
+def _sheets(source: Source, form: FileForm) -> list[tuple[str, Source]]:
     source.file.seek(0)
     book = load("openpyxl", Workbook.title).load_workbook(
         source.file, read_only=True, data_only=True, keep_links=False, keep_vba=False
     )
     names = [sheet.title for sheet in book.worksheets]
-    if hints.sheet is not None and hints.sheet not in names:
+    if form.sheet is not None and form.sheet not in names:
         raise source.refuse(
             "E_COLUMN",
-            f"no sheet {hints.sheet!r} (found {', '.join(names)})",
+            f"no sheet {form.sheet!r} (found {', '.join(names)})",
             mend="correct [file] sheet of the profile",
         )
     texts = []
     for sheet in book.worksheets:
-        if hints.sheet is None or sheet.title == hints.sheet:
+        if form.sheet is None or sheet.title == form.sheet:
             sheet.reset_dimensions()
             text = _as_text(source, sheet.title, sheet.iter_rows(values_only=True))
             if text.size:

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import csv
+import re
 from dataclasses import dataclass
 
 from mrdamper.rig_files.text.layout import Layout, is_comment, split, units_in
 from mrdamper.rig_files.text.stream import TextStream
 from mrdamper.rig_files.text.tokens import looks_numeric
 
+_SEGMENT = re.compile(r"(?:Channels|Samples|Date|Time|Y_Unit_Label|X_Dimension|X0|Delta_X|\*{3}End_of_Header)\b")
 _LOOK_BACK = 64 * 1024  # bytes of remarks there may be above a repeated header
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Bytes of the text between which rows stand, and the line they start at."""
+    """Bytes of the text between which rows stand, the line they start at, and the remarks above a repeated header."""
 
     start: int
     stop: int
     line: int
+    remarks: tuple[str, ...] = ()
 
 
 def find_blocks(stream: TextStream, layout: Layout, start: int, stop: int) -> list[Block]:
@@ -29,6 +32,7 @@ def find_blocks(stream: TextStream, layout: Layout, start: int, stop: int) -> li
     blocks: list[Block] = []
     at, line, begin, begin_line = start, layout.data_line, start, layout.data_line
     tail = b""
+    remarks: tuple[str, ...] = ()
     for chunk in stream.chunks(start, stop):
         stream.check(chunk, line)
         found = chunk.find(header)
@@ -38,7 +42,9 @@ def find_blocks(stream: TextStream, layout: Layout, start: int, stop: int) -> li
             line_end = len(chunk) if line_end < 0 else line_end + 1
             if chunk[line_start:line_end].strip() == header.strip():
                 before = (tail + chunk[:line_start])[-_LOOK_BACK:]
-                blocks.append(Block(begin, at + line_start - _remarks(before, stream, layout), begin_line))
+                above = _remarks(before, stream, layout)
+                blocks.append(Block(begin, at + line_start - above, begin_line, remarks))
+                remarks = _lines(before[len(before) - above :], stream)
                 header_line = line + chunk.count(b"\n", 0, line_start)
                 size, skipped = _units_below(stream, layout, at + line_end, header_line)
                 begin, begin_line = at + line_end + size, header_line + 1 + skipped
@@ -46,7 +52,7 @@ def find_blocks(stream: TextStream, layout: Layout, start: int, stop: int) -> li
         line += chunk.count(b"\n")
         at += len(chunk)
         tail = chunk[-_LOOK_BACK:]
-    blocks.append(Block(begin, stop, begin_line))
+    blocks.append(Block(begin, stop, begin_line, remarks))
     return [block for block in blocks if block.stop > block.start]
 
 
@@ -86,9 +92,13 @@ def _remarks(before: bytes, stream: TextStream, layout: Layout) -> int:
     return min(size, len(before))
 
 
+def _lines(text: bytes, stream: TextStream) -> tuple[str, ...]:
+    return tuple(line for line in stream.decode(text).replace("\r", "").split("\n") if line.strip())
+
+
 def _is_data(text: str, layout: Layout) -> bool:
     """Whether a line is a row, even a damaged one: those must not pass for remarks."""
-    if not text.strip() or is_comment(text):
+    if not text.strip() or is_comment(text) or _SEGMENT.match(text):
         return False
     try:
         cells = split(text, layout.separator)

@@ -77,7 +77,7 @@ def read_cells(block: bytes, line: int, form: Form, *, final: bool = False) -> R
         raise too_long(form.stream.source, line + next(i for i, r in enumerate(raw) if len(r) > LONGEST_LINE))
     plain = block.isascii()
     texts = form.stream.decode(block).split("\n")
-    rows, lines = _split_rows(texts, line, form, final)
+    rows, lines = split_rows(texts, line, form, final)
     values = {}
     for column in form.wanted:
         cells = [row[column] for row in rows]
@@ -94,7 +94,7 @@ def read_row(text: str, line: int, form: Form) -> list[float]:
     RigFileError
         As `read_cells`.
     """
-    rows, lines = _split_rows([text], line, form, False)
+    rows, lines = split_rows([text], line, form, False)
     return [float(_numbers([row[c] for row in rows], c, lines, form)[0]) for row in rows for c in form.wanted]
 
 
@@ -119,7 +119,14 @@ def field_count(form: Form, found: int, line: int, final: bool) -> RigFileError:
     )
 
 
-def _split_rows(texts: Sequence[str], line: int, form: Form, final: bool) -> tuple[list[list[str]], list[int]]:
+def split_rows(texts: Sequence[str], line: int, form: Form, final: bool) -> tuple[list[list[str]], list[int]]:
+    """The cells of every row among lines of text, and the lines they stand in.
+
+    Raises
+    ------
+    RigFileError
+        E_QUOTE, E_FIELD_COUNT, E_TRUNCATED.
+    """
     separator, width = form.layout.separator, form.layout.width + form.layout.trailing
     rows: list[list[str]] = []
     lines: list[int] = []

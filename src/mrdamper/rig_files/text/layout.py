@@ -13,7 +13,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from mrdamper.rig_files.readers.base import MOST_COLUMNS, Hints, RigFileError, Source
+from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.readers.base import MOST_COLUMNS, RigFileError, Source
 from mrdamper.rig_files.text.tokens import looks_numeric, stamp
 from mrdamper.rig_files.units import is_unit
 
@@ -47,6 +48,10 @@ class Layout:
         The line of names as it stands, to find it again where it is repeated.
     odd : tuple of str
         One a column: a sampled cell of a column of kind "text", else empty.
+    remarks : tuple of str
+        The lines above the names of columns.
+    over : tuple of str
+        One a column where the line above the names holds titles of groups of columns.
     """
 
     separator: str
@@ -60,6 +65,8 @@ class Layout:
     trailing: bool
     header: str = ""
     odd: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+    over: tuple[str, ...] = ()
 
     @property
     def width(self) -> int:
@@ -67,7 +74,7 @@ class Layout:
         return len(self.names)
 
 
-def find_layout(lines: Sequence[str], source: Source, hints: Hints) -> Layout:
+def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
     """Sniff the layout from the first lines of a text.
 
     Parameters
@@ -76,7 +83,7 @@ def find_layout(lines: Sequence[str], source: Source, hints: Hints) -> Layout:
         Without line ends.
     source : Source
         For messages.
-    hints : Hints
+    form : FileForm
         Wins over what is sniffed.
 
     Raises
@@ -84,20 +91,21 @@ def find_layout(lines: Sequence[str], source: Source, hints: Hints) -> Layout:
     RigFileError
         E_NO_DATA, E_AMBIGUOUS, E_FIELD_COUNT, E_TOO_MANY_COLUMNS, E_QUOTE.
     """
-    separator = hints.separator or _separator(lines, source)
-    first, width, trailing = _first_row(lines, separator, source, hints)
+    separator = form.separator or _separator(lines, source)
+    first, width, trailing = _first_row(lines, separator, source, form)
     if width > MOST_COLUMNS:
         raise source.refuse("E_TOO_MANY_COLUMNS", f"{width} columns", line=first + 1, mend="is one sample one line?")
     rows = _rows(lines[first:], separator, width, trailing)
-    decimal = hints.decimal or _decimal(rows, separator, source, first)
-    header, unit_row = _header_lines(lines, first, separator, width, source, hints)
+    decimal = form.decimal or _decimal(rows, separator, source, first)
+    header, unit_row = _header_lines(lines, first, separator, width, source, form)
     _refuse_open_quote(lines, header, separator, source)
-    names = hints.names or (_cells(lines[header], separator, width) if header is not None else ("",) * width)
+    names = form.names or (_cells(lines[header], separator, width) if header is not None else ("",) * width)
     if len(names) != width:
         raise _mismatch(source, separator, len(names), width, first, lines)
     units = _cells(lines[unit_row], separator, width) if unit_row is not None else ("",) * width
     columns = [[row[i] for row in rows if len(row) > i] for i in range(width)]
     kinds: tuple[Kind, ...] = tuple(_kind(column) for column in columns)
+    above = lines[: min(first, len(lines)) if header is None else header]
     return Layout(
         separator,
         decimal,
@@ -110,7 +118,22 @@ def find_layout(lines: Sequence[str], source: Source, hints: Hints) -> Layout:
         trailing,
         lines[header] if header is not None and not is_comment(lines[header]) else "",
         tuple(next(filter(None, c), "") if k == "text" else "" for c, k in zip(columns, kinds, strict=True)),
+        tuple(line for line in above if line.strip()),
+        _titles(above, separator, width),
     )
+
+
+def _titles(above: Sequence[str], separator: str, width: int) -> tuple[str, ...]:
+    """Titles of groups of columns, one a column: each stands over its group's first column."""
+    if not above or separator == SPACES or is_comment(above[-1]):
+        return ()
+    cells = _try_split(above[-1], separator)[:width]
+    if sum(map(bool, cells)) < 2 or not cells[0] or len(cells) < width // 2:
+        return ()
+    titles = [""] * width
+    for i in range(width):
+        titles[i] = (cells[i] if i < len(cells) else "") or titles[i - 1]
+    return tuple(titles)
 
 
 def split(line: str, separator: str) -> list[str]:
@@ -189,9 +212,9 @@ def _is_row(cells: Sequence[str]) -> bool:
     return numeric >= 1 and (numeric >= 2 or len(filled) <= 2) and 3 * numeric >= len(filled)
 
 
-def _first_row(lines: Sequence[str], separator: str, source: Source, hints: Hints) -> tuple[int, int, bool]:
+def _first_row(lines: Sequence[str], separator: str, source: Source, form: FileForm) -> tuple[int, int, bool]:
     """Index of the first row of data, number of columns, whether rows end with a separator."""
-    above = (hints.data_line or 1) - 1 if hints.data_line else (hints.header_line or 0)
+    above = (form.data_line or 1) - 1 if form.data_line else (form.header_line or 0)
     content = [(i, line) for i, line in _content(lines) if i >= above]
     sample = [_try_split(line, separator) for _, line in content[-_SAMPLE:]]
     rows = [cells for cells in sample if _is_row(cells)]
@@ -250,12 +273,12 @@ def _decimal(rows: Sequence[Sequence[str]], separator: str, source: Source, firs
 
 
 def _header_lines(
-    lines: Sequence[str], first: int, separator: str, width: int, source: Source, hints: Hints
+    lines: Sequence[str], first: int, separator: str, width: int, source: Source, form: FileForm
 ) -> tuple[int | None, int | None]:
     """Indices of the line of names and of the line of units above the data."""
-    if hints.header_line is not None:
-        header = hints.header_line - 1 if hints.header_line else None
-        units = hints.units_line - 1 if hints.units_line else None
+    if form.header_line is not None:
+        header = form.header_line - 1 if form.header_line else None
+        units = form.units_line - 1 if form.units_line else None
         for index in (header, units):
             if index is not None and not 0 <= index < len(lines):
                 raise source.refuse("E_PROFILE", f"there is no line {index + 1}", mend="correct [file] of the profile")
@@ -273,11 +296,11 @@ def _header_lines(
             break
         if _is_units(_cells(lines[last], separator, width)):
             return (fitting[-2] if len(fitting) > 1 else None), last
-        return last, (hints.units_line - 1 if hints.units_line else None)
+        return last, (form.units_line - 1 if form.units_line else None)
     naming = [i for i in plain if _names_columns(lines[i], separator)]
-    if naming and not hints.names:
+    if naming and not form.names:
         raise _mismatch(source, separator, len(_fields(lines[naming[-1]], separator, width)), width, first, lines)
-    return None, (hints.units_line - 1 if hints.units_line else None)
+    return None, (form.units_line - 1 if form.units_line else None)
 
 
 def _refuse_open_quote(lines: Sequence[str], header: int | None, separator: str, source: Source) -> None:

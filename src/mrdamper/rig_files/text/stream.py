@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import BinaryIO
 
-from mrdamper.rig_files.readers.base import Hints, RigFileError, Source
+from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.readers.base import RigFileError, Source
 from mrdamper.rig_files.readers.scratch import Scratch
 
 LONGEST_LINE = 64 * 1024
@@ -116,7 +117,7 @@ class TextStream:
         )
 
 
-def open_text(source: Source, hints: Hints) -> TextStream:
+def open_text(source: Source, form: FileForm) -> TextStream:
     """Find the encoding, and give the text as UTF-8 or as it is.
 
     Raises
@@ -127,7 +128,7 @@ def open_text(source: Source, hints: Hints) -> TextStream:
     head = source.head(_HEAD)
     if not head.strip(b" \t\r\n"):
         raise source.refuse("E_EMPTY", "the file is empty", mend="export it again")
-    encoding, mark = _encoding(source, head, hints)
+    encoding, mark = _encoding(source, head, form)
     file, size, start = source.file, source.size, mark
     if encoding.startswith(("utf-16", "utf-32")) or (b"\n" not in head and b"\r" in head):
         file, size = _as_utf8(source, encoding, mark)
@@ -150,17 +151,17 @@ def too_long(source: Source, line: int | None) -> RigFileError:
     )
 
 
-def _encoding(source: Source, head: bytes, hints: Hints) -> tuple[str, int]:
+def _encoding(source: Source, head: bytes, form: FileForm) -> tuple[str, int]:
     """Name of the encoding and length of the byte order mark."""
     for mark, name in _BOMS:
         if head.startswith(mark):
             return name, len(mark)
-    if hints.encoding:
+    if form.encoding:
         try:
-            return codecs.lookup(hints.encoding).name, 0
+            return codecs.lookup(form.encoding).name, 0
         except LookupError as error:
             raise source.refuse(
-                "E_PROFILE", f"no encoding is called {hints.encoding!r}", mend="use utf-8, utf-16 or cp1252"
+                "E_PROFILE", f"no encoding is called {form.encoding!r}", mend="use utf-8, utf-16 or cp1252"
             ) from error
     start = head[:2048]
     if len(start) >= 8:

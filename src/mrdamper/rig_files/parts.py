@@ -1,0 +1,272 @@
+"""Several tests in one table: told apart by a column of runs, or as groups of columns beside each other."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+
+from mrdamper.rig_files.column_names import role_of, split_name
+from mrdamper.rig_files.conditions import currents_in
+from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.readers.base import Content, RawTable
+from mrdamper.rig_files.record import LineNumbers
+from mrdamper.rig_files.units import DIMENSION, parse_unit
+
+MOST_RUNS = 2000
+_FEWEST_ROWS = 5  # of a test, on average
+_RUN_WORDS = frozenset(
+    ("run", "test", "specimen", "experiment", "trial", "versuch", "prüfung", "prüflauf", "lauf", "messung", "essai",
+     "éprouvette", "ensayo", "prova", "teste", "тест", "试验", "試験", "measurement", "recording", "record")
+)  # fmt: skip
+_NUMBER_WORDS = frozenset(("no", "nr", "num", "number", "nummer", "id", "name", "index", "n", "label", "the", "of"))
+
+
+def tests_of(table: RawTable, form: FileForm) -> list[RawTable]:
+    """The table of every test that a table holds; the table itself where it is one.
+
+    Raises
+    ------
+    RigFileError
+        E_COLUMN if the profile's column of runs is not there, E_BLOCKS if it holds too many.
+    """
+    if form.blocks == "join" and form.run_column is None:
+        return [table]
+    column = _run_column(table, form)
+    if column is not None:
+        parts = _by_run(table, column, stated=form.run_column is not None)
+        if parts:
+            return parts
+    return _groups(table, form) or [table]
+
+
+def _run_column(table: RawTable, form: FileForm) -> int | None:
+    wanted = form.run_column
+    if wanted is None:
+        named = [i for i, name in enumerate(table.names) if _names_runs(name)]
+        return named[0] if named and table.words is not None else None
+    if isinstance(wanted, int):
+        found = [wanted - 1] if wanted <= len(table.names) else []
+    else:
+        found = [i for i, name in enumerate(table.names) if name.strip().casefold() == wanted.strip().casefold()]
+    if not found:
+        shown = ", ".join(name for name in table.names if name)
+        raise table.source.refuse(
+            "E_COLUMN", f"no column {wanted!r} of runs (found {shown})", mend="correct run_column under [file]"
+        )
+    return found[0]
+
+
+def _names_runs(name: str) -> bool:
+    words = [w.casefold() for w in re.split(r"[^\w]+|_|(?<=[a-zà-ÿ])(?=[A-Z])", name[:60]) if w]
+    words = [word.rstrip("0123456789") for word in words]
+    return any(w in _RUN_WORDS for w in words) and all(w in _RUN_WORDS or w in _NUMBER_WORDS for w in words)
+
+
+def _by_run(table: RawTable, column: int, *, stated: bool) -> list[RawTable]:
+    assert table.words is not None
+    words = table.words(column)
+    codes, labels = words.codes, list(words.labels)
+    if "" in labels and labels[0] != "":  # named in its first row only
+        blank = labels.index("")
+        at = np.maximum.accumulate(np.where(codes == blank, 0, np.arange(codes.size)))
+        codes = codes[at]
+    runs = list(dict.fromkeys(codes.tolist())) if codes.size else []
+    if not stated and (len(runs) < 2 or _FEWEST_ROWS * len(runs) > codes.size):
+        return []
+    if len(runs) > MOST_RUNS:
+        raise table.source.refuse(
+            "E_BLOCKS", f"{len(runs)} runs in column {table.names[column]!r}", mend=f"at most {MOST_RUNS} a file"
+        )
+    read = _remembered(table)
+    others = [i for i in range(len(table.names)) if i != column]
+    return [_rows(table, read, others, np.flatnonzero(codes == code), _tidy(labels[code])) for code in runs]
+
+
+def _tidy(label: str) -> str:
+    return re.sub(r"^([0-9]+)[.,]0+$", r"\1", label.strip()) or "unnamed"
+
+
+def _remembered(table: RawTable) -> Callable[[tuple[int, ...]], Content]:
+    """The table's columns, kept while its tests are taken out one by one."""
+    return lru_cache(maxsize=2)(lambda columns: table.read(columns))
+
+
+def _rows(
+    table: RawTable, read: Callable[[tuple[int, ...]], Content], columns: Sequence[int], rows: np.ndarray, label: str
+) -> RawTable:
+    whole = slice(int(rows[0]), int(rows[-1]) + 1) if rows[-1] - rows[0] + 1 == rows.size else rows
+
+    def part(wanted: Sequence[int]) -> Content:
+        content = read(tuple(columns[i] for i in wanted))
+        values = {i: np.array(content.values[columns[i]][whole]) for i in wanted}
+        return Content(values, _lines(content.lines, whole), content.findings)
+
+    return _with_columns(table, columns, part, label)
+
+
+def _lines(lines: LineNumbers | None, rows: slice | np.ndarray) -> LineNumbers | None:
+    if lines is None:
+        return None
+    if isinstance(rows, slice):
+        return lines.part(rows.start, rows.stop)
+    at = np.asarray(lines[rows])
+    starts = np.concatenate([[0], np.flatnonzero(np.diff(at) != 1) + 1])
+    return LineNumbers(at.size, tuple(map(int, starts)), tuple(int(at[i]) for i in starts))
+
+
+def _with_columns(
+    table: RawTable, columns: Sequence[int], read: Callable[[Sequence[int]], Content], label: str
+) -> RawTable:
+    def pick(values: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(values[i] for i in columns) if values else ()
+
+    return replace(
+        table, names=pick(table.names), units=pick(table.units), odd=pick(table.odd), over=(), read=read, words=None,
+        label="_".join(part for part in (table.label, label) if part),
+    )  # fmt: skip
+
+
+def _groups(table: RawTable, form: FileForm) -> list[RawTable]:
+    """Groups of columns beside each other, each a test; empty if the table has none.
+
+    A group has its own displacement and force. What tells a test from a second sensor is a
+    time of its own, or a title that states a current.
+    """
+    members = _members(table)
+    if len(members) < 2:
+        return []
+    own_time = all("time" in roles for roles in members.values())
+    titles = {key: _title(table, key, roles) for key, roles in members.items()}
+    stated = all(currents_in(title) for title in titles.values())
+    if not (own_time or stated or form.blocks == "split"):
+        return []
+    shared = _shared(table, members)
+    read = _remembered(table)
+    return [
+        _filled(table, read, sorted({*roles.values(), *shared}), roles, titles[key])
+        for key, roles in members.items()
+    ]  # fmt: skip
+
+
+def _members(table: RawTable) -> dict[str, dict[str, int]]:
+    """By group its columns by channel, where displacement and force come as often as each other."""
+    by_role: dict[str, list[tuple[int, str]]] = {}
+    for i, (name, unit) in enumerate(zip(table.names, table.units, strict=True)):
+        bare, unit = split_name(name, unit)
+        role = role_of(bare)
+        known = parse_unit(unit) if unit else None
+        if role is not None and (known is None or known.dimension == DIMENSION[role]):
+            by_role.setdefault(role, []).append((i, _key(bare, role)))
+    moved, loads = by_role.get("displacement", []), by_role.get("force", [])
+    if len(moved) < 2 or len(moved) != len(loads):
+        return {}
+    members: dict[str, dict[str, int]] = {}
+    for role, columns in by_role.items():
+        keys = [key for _, key in columns]
+        if len(columns) == len(moved) and len(set(keys)) == 1:  # of one name: told apart by their order
+            columns = [(i, f"{n}") for n, (i, _) in enumerate(columns, 1)]
+        elif len(set(keys)) < len(keys):
+            if role in ("displacement", "force"):
+                return {}
+            continue
+        for i, key in columns:
+            members.setdefault(key, {})[role] = i
+    members = {key: roles for key, roles in members.items() if {"displacement", "force"} <= set(roles)}
+    return members if len(members) == len(moved) else {}
+
+
+def _key(name: str, role: str) -> str:
+    """What a name says beside its channel: the group's number or condition."""
+    words = [w for w in re.split(r"[\s_:;/|()\[\]-]+", name) if w]
+    rest = [w for w in words if role_of(w) != role or w.rstrip("0123456789") != w]
+    rest = [re.sub(r"^[^\W\d]+(?=[0-9]+$)", "", w) if role_of(w) == role else w for w in rest]
+    return " ".join(rest).casefold()
+
+
+def _title(table: RawTable, key: str, roles: dict[str, int]) -> str:
+    over = table.over[min(roles.values())] if table.over else ""
+    return over or key
+
+
+def _shared(table: RawTable, members: dict[str, dict[str, int]]) -> list[int]:
+    """The one time or current that belongs to every group."""
+    grouped = {i for roles in members.values() for i in roles.values()}
+    shared = []
+    for role in ("time", "current"):
+        columns = [i for i, name in enumerate(table.names) if role_of(split_name(name, table.units[i])[0]) == role]
+        if len(columns) == 1 and columns[0] not in grouped:
+            shared.append(columns[0])
+    return shared
+
+
+def _filled(
+    table: RawTable,
+    read: Callable[[tuple[int, ...]], Content],
+    columns: Sequence[int],
+    roles: dict[str, int],
+    label: str,
+) -> RawTable:
+    """A group's columns down to its last row: shorter groups end in empty cells."""
+
+    @lru_cache(maxsize=1)
+    def size() -> int:
+        both = tuple(sorted((roles["displacement"], roles["force"])))
+        values = read(both).values
+        there = np.flatnonzero(np.isfinite(values[both[0]]) | np.isfinite(values[both[1]]))
+        if not there.size:
+            raise table.source.refuse("E_NO_DATA", f"no numbers in the columns of {label!r}", mend="leave them out")
+        return int(there[-1]) + 1
+
+    def part(wanted: Sequence[int]) -> Content:
+        content, stop = read(tuple(columns[i] for i in wanted)), size()
+        values = {i: np.array(content.values[columns[i]][:stop]) for i in wanted}
+        lines = None if content.lines is None else content.lines.part(0, stop)
+        return Content(values, lines, content.findings)
+
+    return _with_columns(table, columns, part, label)
+
+
+def stretches_of_time(time: np.ndarray) -> list[slice]:
+    """Where a time starts again from its first value, again and again: a test each.
+
+    One stretch where it does not. A clock that wraps, midnight, a change of daylight time or
+    swapped rows are no new test: they do not come back to the first value, or they leave from
+    a count's end.
+    """
+    known = np.flatnonzero(np.isfinite(time))
+    whole = [slice(0, time.size)]
+    if known.size < 2 * _FEWEST_ROWS:
+        return whole
+    stamps = time[known]
+    steps = np.diff(stamps)
+    back = np.flatnonzero(steps < 0)
+    if not back.size or back.size > MOST_RUNS:
+        return whole
+    step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+    bounds = np.concatenate([[0], back + 1, [stamps.size]])
+    again = np.abs(stamps[back + 1] - stamps[0]) <= 5 * step
+    if not again.all() or np.diff(bounds).min() < 4 * _FEWEST_ROWS:
+        return whole
+    if any(np.max(steps[i + 1 : i + 4], initial=0.0) > 10 * step for i in back):  # a stray stamp: it goes on as before
+        return whole
+    if any(_wraps(float(stamps[i]) + step - float(stamps[0]), step) for i in back):
+        return whole
+    at = [0, *(int(known[i + 1]) for i in back), time.size]
+    return [slice(a, b) for a, b in pairwise(at)]
+
+
+def _wraps(end: float, step: float) -> bool:
+    """Whether a time ends where a counter does: at a power of two, wherever the decimal point is."""
+    if end <= 0:
+        return False
+    for bits in (8, 12, 15, 16, 24, 31, 32):
+        scale = end / 2.0**bits
+        decade = 10.0 ** np.round(np.log10(scale))
+        if abs(scale / decade - 1) * 2.0**bits * decade <= 1.5 * step:
+            return True
+    return False

@@ -1,0 +1,60 @@
+"""LabVIEW measurement files (.lvm): two headers that say separator, decimal mark, units and where the names stand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.text.layout import Layout
+
+_MARK = "LabVIEW Measurement"
+_NAMES = "X_Value"
+_SEPARATORS: Mapping[str, str] = {"tab": "\t", "comma": ",", "semicolon": ";"}
+
+
+def is_labview(lines: Sequence[str]) -> bool:
+    """Whether a text is of this kind."""
+    return bool(lines) and lines[0].lstrip("\ufeff").startswith(_MARK)
+
+
+def stated_form(lines: Sequence[str], form: FileForm) -> FileForm:
+    """The form with what the headers say, where the profile says nothing."""
+    says = _entries(lines)
+    names = next((i for i, line in enumerate(lines, 1) if line.startswith(_NAMES)), None)
+    known = {
+        "separator": _SEPARATORS.get(says.get("Separator", "").lower()),
+        "decimal": says.get("Decimal_Separator") if says.get("Decimal_Separator") in (".", ",") else None,
+        "header_line": names,
+    }
+    return form.model_copy(update={k: v for k, v in known.items() if v is not None and getattr(form, k) is None})
+
+
+def named(layout: Layout, lines: Sequence[str]) -> Layout:
+    """The layout with the time's name for X_Value, and the units of the second header."""
+    if not layout.names or layout.names[0] != _NAMES:
+        return layout
+    above = lines[: layout.header_line]
+    units = next((line.split(layout.separator) for line in reversed(above) if line.startswith("Y_Unit_Label")), [])
+    dimension = next((line.split(layout.separator)[1:2] for line in reversed(above) if line.startswith("X_Dim")), [])
+    timed = not dimension or dimension[0].strip() in ("Time", "")
+    stated = [unit.strip() for unit in units[1:]] + [""] * layout.width
+    return replace(
+        layout,
+        names=(("Time" if timed else _NAMES), *layout.names[1:]),
+        units=("s" if timed else "", *(unit or own for unit, own in zip(stated, layout.units[1:], strict=False))),
+    )
+
+
+def _entries(lines: Sequence[str]) -> dict[str, str]:
+    """What the first header says, key by key, whatever it separates them with."""
+    entries = {}
+    for line in lines[1:]:
+        if line.startswith("***End_of_Header***"):
+            break
+        for mark in ("\t", ",", ";"):
+            key, found, value = line.partition(mark)
+            if found:
+                entries[key.strip()] = value.strip() if key == "Decimal_Separator" else value.strip("\t ,;")
+                break
+    return entries
