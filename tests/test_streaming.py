@@ -170,9 +170,10 @@ def test_the_modified_model_says_when_the_frequency_was_not_tested():
 
 
 def test_a_damper_without_a_form_for_one_sample_says_so():
-    from mrdamper.dampers.published.kernel import KernelBaseline
+    from mrdamper.dampers.kernel import KernelDamper, KernelLaw
 
-    damper = KernelBaseline("bench", {}, Condition(0.5, 1.0, 0.01), joint_damper().envelope)
+    law = KernelLaw(np.zeros((1, 4)), np.ones(1), np.ones(4), 0.0, 1.0)
+    damper = KernelDamper("bench", law, joint_damper().envelope)
     with pytest.raises(ParameterError, match="one sample"):
         stepper(damper)
 

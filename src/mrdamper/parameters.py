@@ -6,6 +6,7 @@ Fitting, the command line, reports, exports and the documentation all ask the fi
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields
 from functools import cache
@@ -36,6 +37,8 @@ class ParameterInfo:
         Held at its default unless the user frees it.
     default : float or None
         Value when none is given.
+    symbol : str
+        Letter in equations, as LaTeX.
     """
 
     name: str
@@ -46,6 +49,7 @@ class ParameterInfo:
     linear: bool
     preset: bool
     default: float | None
+    symbol: str
 
 
 def param(
@@ -57,9 +61,14 @@ def param(
     linear: bool = False,
     preset: bool = False,
     default: float | None = None,
+    symbol: str = "",
 ) -> Any:
-    """Declare a model parameter as a dataclass field (see `ParameterInfo` for the meanings)."""
-    metadata = {_KEY: dict(unit=unit, meaning=meaning, bounds=bounds, scale=scale, linear=linear, preset=preset)}
+    """Declare a model parameter as a dataclass field (see `ParameterInfo` for the meanings).
+
+    Without a `symbol` the name is read as one (`latex_symbol`).
+    """
+    facts = dict(unit=unit, meaning=meaning, bounds=bounds, scale=scale, linear=linear, preset=preset, symbol=symbol)
+    metadata = {_KEY: facts}
     if default is None:
         return field(metadata=metadata)
     return field(default=default, metadata=metadata)
@@ -98,4 +107,33 @@ def with_values(kind: type[T], values: Mapping[str, float]) -> T:
 
 def _info(f: Field[Any]) -> ParameterInfo:
     default = None if f.default is MISSING else float(f.default)
-    return ParameterInfo(name=f.name, default=default, **f.metadata[_KEY])
+    facts = f.metadata[_KEY]
+    return ParameterInfo(
+        **{**facts, "name": f.name, "default": default, "symbol": facts["symbol"] or latex_symbol(f.name)}
+    )
+
+
+_GREEK = (
+    "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "kappa", "lambda", "mu", "rho", "sigma", "tau", "phi",
+    "omega",
+)  # fmt: skip
+
+
+_WORDS = {"yield_force": "Fz", "yield_displacement": "xz"}
+
+
+def latex_symbol(name: str) -> str:
+    r"""A name as a letter with an index: alpha, k1, kappa_x and fy0 as \alpha, k_1, \kappa_x and f_{y0}."""
+    word = next((known for known in _WORDS if name.startswith(known)), "")
+    head, _, tail = name.removeprefix(word).partition("_")
+    if word:
+        text, first = _WORDS[word][0], _WORDS[word][1] + head
+    elif spelled := re.fullmatch(r"([a-z]{4,})(\d*)", head):
+        greek = spelled[1] in _GREEK
+        text, first = (rf"\{spelled[1]}" if greek else rf"\mathrm{{{spelled[1]}}}"), spelled[2]
+    else:
+        letter = next((greek for greek in _GREEK if head.startswith(greek)), "")
+        text, first = rf"\{letter}" if letter else head[0], head[len(letter) or 1 :]
+    parts = [rf"\mathrm{{{part}}}" if len(part) > 2 and part.isalpha() else part for part in (first, *tail.split("_"))]
+    index = ",".join(part for part in parts if part)
+    return text if not index else f"{text}_{index}" if len(index) == 1 else f"{text}_{{{index}}}"

@@ -1,18 +1,39 @@
-"""The force of a model for a motion: the only place that steps time."""
+"""The force of a model for a motion, and its steady loop."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import ExcitationError
-from mrdamper.models.base import Model
 from mrdamper.motion import Excitation, sine
+from mrdamper.parameters import ParameterInfo
 
 _CLOSURE = 1e-9  # relative gap at which a loop counts as closed
 _MOST_CYCLES = 512
+
+
+class ForceLaw(Protocol):
+    """What a `Model` is to those that only ask for its force."""
+
+    def parameters(self) -> tuple[ParameterInfo, ...]:
+        """What is known of each parameter."""
+        ...
+
+    def values(self) -> dict[str, float]:
+        """Parameter values by name."""
+        ...
+
+    def state(self, motion: Excitation) -> Floats:
+        """Internal state along a motion."""
+        ...
+
+    def force(self, motion: Excitation, state: Floats) -> Floats:
+        """Force [N] along a motion, given the state there."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,13 +52,13 @@ class Response:
     state: Floats
 
 
-def simulate(model: Model, excitation: Excitation) -> Response:
+def simulate(model: ForceLaw, excitation: Excitation) -> Response:
     """Force of a model along any motion, starting at rest with no memory."""
     state = model.state(excitation)
     return Response(excitation, model.force(excitation, state), state)
 
 
-def steady_loop(model: Model, condition: Condition, samples_per_cycle: int = 1000) -> Response:
+def steady_loop(model: ForceLaw, condition: Condition, samples_per_cycle: int = 1000) -> Response:
     """One closed loop of the steady response to a sine.
 
     Cycles are run until the state closes on itself to 1e-9 of its range.

@@ -14,44 +14,16 @@ from typing import Any
 
 import numpy as np
 
-from mrdamper.dampers.base import SLACK, Damper, Envelope
-from mrdamper.dampers.coil import Coil, field_step
-from mrdamper.dampers.joint import JointDamper
-from mrdamper.dampers.modified import ModifiedModel
-from mrdamper.dampers.published import ConditionedDamper
-from mrdamper.data import Condition, Floats
+from mrdamper.dampers.base import Damper, Envelope
+from mrdamper.dampers.causal import trace
+from mrdamper.dampers.joint import damper_of
+from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, ParameterError, UnknownNameError
 from mrdamper.models import Model
-from mrdamper.tracing import Program, Tape, Traced, program
+from mrdamper.tracing import Program, Tape, program
 from mrdamper.tracing.python import python_functions, python_source
 
 FLAGS = ("current", "amplitude", "velocity", "frequency")  # bit 0, 1, 2, 3
-_STEADY = 1e-18  # mean square displacement under which nothing moves [m²]
-
-
-@dataclass(frozen=True, eq=False)
-class TracedStep(Traced):
-    """A channel that enters by its step from sample to sample only: the path, or time."""
-
-    tape: Tape
-    step: Any
-    rate: Any = None
-
-
-@dataclass(frozen=True, eq=False)
-class TracedMotion(Traced):
-    """What an `Excitation` is for one sample."""
-
-    tape: Tape
-    displacement: Any
-    velocity: Any
-    acceleration: Any
-    current: Any
-    time: TracedStep
-    path: TracedStep
-
-    def __len__(self) -> int:
-        return 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,47 +55,18 @@ class Stream:
 def stream(damper: Damper | Model) -> Stream:
     """Trace a damper, or a model, into programs for one sample.
 
-    A model and a joint damper keep their parameters free to be set. The modified model, and the
-    published condition-dependent ones, take frequency and amplitude from the motion so far, averaged
-    over about a cycle of the slowest tested frequency, and stay inside the tested ranges with both.
+    A model and a joint damper keep their parameters free to be set. Dampers whose parameters
+    follow the condition take frequency and amplitude from the motion so far (`mrdamper.dampers.causal`).
 
     Raises
     ------
     ParameterError
         If the damper is of a kind that has no form for one sample.
     """
-    tape = Tape()
-    envelope = None if isinstance(damper, Model) else damper.envelope
-    coil = None if isinstance(damper, Model) else damper.coil
-    motion = _motion(tape, float(np.mean(envelope.current_A)) if envelope else 0.0, coil)
-    extra: Any = 0.0
-    if isinstance(damper, ModifiedModel) or (isinstance(damper, ConditionedDamper) and damper.has_model):
-        model, extra, free = *_running_model(damper, motion), None
-    elif isinstance(damper, Model | JointDamper):
-        free = damper if isinstance(damper, Model) else damper.model
-        model = type(free)(
-            **{info.name: tape.parameter(info.name, getattr(free, info.name)) for info in free.parameters()}
-        )
-    else:
-        raise ParameterError(
-            "no form for one sample",
-            where=damper.title,
-            mend="stream a damper with a model behind it",
-        )
-    force = model.force(motion, model.state(motion))  # type: ignore[arg-type]
-    flags = _flags(motion, abs(tape.inputs["current"]), envelope) + extra if envelope else 0.0
+    damper = damper_of(damper)
     drives = {"displacement": _from_displacement(), "velocity": _from_velocity()}
-    return Stream(damper.title, program(tape, {"force": force, "flags": flags}), drives, envelope, free)
-
-
-def _motion(tape: Tape, current: float, coil: Coil | None) -> TracedMotion:
-    """Inputs as a motion; its current is the one whose field is there, as `Damper.felt` gives it."""
-    x, v, a = (tape.input(name) for name in ("displacement", "velocity", "acceleration"))
-    I, dt = tape.input("current", current), tape.input("dt")
-    moved = x - tape.previous(x, "displacement")
-    felt = field_step(tape, dt, I, coil.rise_s, coil.fall_s) if coil else abs(I)
-    felt = tape.assume(felt, current)
-    return TracedMotion(tape, x, v, a, felt, TracedStep(tape, dt), TracedStep(tape, moved))
+    tested = damper.envelope if damper.envelope.tested else None
+    return Stream(damper.title, trace(damper), drives, tested, damper.one_model)
 
 
 def _from_displacement() -> Program:
@@ -146,50 +89,6 @@ def _from_velocity() -> Program:
     x = tape.select(tape.first, 0.0, held + 0.5 * dt * (v + last))
     tape.update(held, x)
     return program(tape, {"displacement": x, "velocity": v, "acceleration": (v - last) / dt})
-
-
-def _running_model(damper: ModifiedModel | ConditionedDamper, motion: TracedMotion) -> tuple[Model, Any]:
-    """The model at the sine the motion has resembled so far, and whether its frequency was tested.
-
-    ω² is the mean square velocity over the mean square displacement, A² twice the latter; the
-    means fade in two lags of one slowest period each, and are freed of their start.
-    """
-    tape, envelope = motion.tape, damper.envelope
-    low, high = envelope.frequency_Hz
-    keep = np.exp(-low * motion.time.step)
-
-    def faded(value: Any, name: str) -> Any:
-        for stage in ("once", "twice"):
-            held = tape.remember(f"{name}_{stage}")
-            value = keep * held + (1 - keep) * value
-            tape.update(held, value)
-        return value
-
-    weight = faded(1.0, "weight")
-    x2 = faded(motion.displacement**2, "displacement_squared") / weight
-    v2 = faded(motion.velocity**2, "velocity_squared") / weight
-    moving = x2 > _STEADY
-    frequency = tape.select(moving, np.sqrt(v2 / x2) / (2 * math.pi), math.sqrt(low * high))
-    amplitude = tape.select(moving, np.sqrt(2 * x2), math.sqrt(math.prod(envelope.amplitude_m)))
-    flag = tape.select((frequency < low * (1 - SLACK)) | (frequency > high * (1 + SLACK)), 8.0, 0.0)
-    middle = [math.sqrt(low * high), math.sqrt(math.prod(envelope.amplitude_m))]
-    f = tape.assume(np.clip(frequency, low, high), middle[0])
-    A = tape.assume(np.clip(amplitude, *envelope.amplitude_m), middle[1])
-    return damper.model_at(Condition(motion.current, f, A)), flag
-
-
-def _flags(motion: TracedMotion, current: Any, envelope: Envelope) -> Any:
-    """Extrapolation in current, amplitude and velocity as bits 0 to 2."""
-    tape, (low, high) = motion.tape, envelope.current_A
-    outside = (
-        (current < low - SLACK * high) | (current > high * (1 + SLACK)),
-        abs(motion.displacement) > envelope.amplitude_m[1] * (1 + SLACK),
-        abs(motion.velocity) > envelope.peak_velocity_m_s[1] * (1 + SLACK),
-    )
-    total: Any = 0.0
-    for bit, question in enumerate(outside):
-        total = total + tape.select(question, float(2**bit), 0.0)
-    return total
 
 
 class Stepper:

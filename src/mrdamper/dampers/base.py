@@ -8,21 +8,25 @@ extrapolation.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import ClassVar
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from mrdamper.dampers.causal import SLACK, causal_force
 from mrdamper.dampers.coil import Coil
 from mrdamper.data import Condition, Floats, Run
+from mrdamper.errors import InputError
+from mrdamper.functions.forms import ParameterFunction
+from mrdamper.models import Model
 from mrdamper.motion import Excitation, equivalent_sine, measured_motion
-from mrdamper.simulation import Response
+from mrdamper.simulation import ForceLaw, Response, simulate, steady_loop
 
 NOT_A_SINE = "not a sine"
 COARSE = "sampling"
+_SAME_CURRENT = 1e-3  # A; a current that varies less is one current
 _SAMPLES_IN_KNEE = 2  # below, the knee falls between samples
-SLACK = 0.02  # a test bench repeats a condition to a few per cent; within that nothing is extrapolated
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,16 @@ class Envelope:
             span([c.amplitude_m for c in conditions]),
             span([c.peak_velocity for c in conditions]),
         )
+
+    @property
+    def tested(self) -> bool:
+        """Whether the ranges are known; those of a bare model are not."""
+        return bool(np.isfinite([*self.current_A, *self.amplitude_m]).all())
+
+    @property
+    def middle(self) -> Condition:
+        """The condition in the middle of the ranges."""
+        return Condition(*(0.5 * (low + high) for low, high in (self.current_A, self.frequency_Hz, self.amplitude_m)))
 
     def flags(self, condition: Condition) -> tuple[str, ...]:
         """Which quantities of a condition lie outside: empty inside the envelope."""
@@ -109,10 +123,45 @@ class Prediction:
     extrapolation: tuple[str, ...]
 
 
+UNTESTED = Envelope(*[(-np.inf, np.inf)] * 4)
+
+
+@dataclass(frozen=True)
+class Saved:
+    """What a saved model says of one kind of damper, beside what all kinds share. Subclasses add fields.
+
+    Only numbers, texts, lists and mappings of them: the types are checked when a file is read.
+    """
+
+    __pydantic_config__: ClassVar = {"extra": "forbid", "allow_inf_nan": False}
+
+
 class Damper(ABC):
-    """An identified damper."""
+    """An identified damper. Subclasses are frozen dataclasses, found by their file.
+
+    Attributes
+    ----------
+    kind : str
+        What a saved model calls it.
+    saved : type of Saved
+        Schema of its part of a saved model.
+    conditional : bool
+        Whether the model behind it depends on frequency and amplitude; then motion that is no sine
+        is read as a sine that changes, sample by sample.
+    streams : bool
+        Whether it can be asked sample by sample.
+    rig : str
+    envelope : Envelope
+        Ranges of the tests it was identified from.
+    provenance : mapping of str to str
+    coil : Coil or None
+    """
 
     kind: ClassVar[str]
+    saved: ClassVar[type[Saved]]
+    conditional: ClassVar[bool] = False
+    streams: ClassVar[bool] = True
+
     rig: str
     envelope: Envelope
     provenance: Mapping[str, str]
@@ -128,23 +177,76 @@ class Damper(ABC):
     def parameter_count(self) -> int:
         """Numbers determined from the data."""
 
+    @abstractmethod
+    def model_at(self, condition: Condition) -> ForceLaw:
+        """What gives the force at a condition."""
+
+    @property
+    def source(self) -> str:
+        """Where its equations come from."""
+        return ""
+
+    @property
+    def equation(self) -> str:
+        """Its equations as LaTeX, hand-written, with a comma and a quad between them; empty where there are none."""
+        return ""
+
+    @property
+    def numbers(self) -> Mapping[str, float]:
+        """Coefficients in its equation that are neither parameters nor in functions."""
+        return {}
+
+    @property
+    def one_model(self) -> Model | None:
+        """The one model behind every condition; None where its parameters follow the condition."""
+        return None
+
+    @property
+    def functions(self) -> Mapping[str, ParameterFunction]:
+        """Parameter functions by what they give; none where the parameters are no such functions."""
+        return {}
+
     @property
     def knee(self) -> float | None:
         """Motion after a reversal in which the force turns over [m], where the model has such a length."""
         return None
 
     @abstractmethod
+    def to_saved(self) -> Saved:
+        """Its own part of a saved model."""
+
+    @classmethod
+    @abstractmethod
+    def from_saved(
+        cls, saved: Any, rig: str, envelope: Envelope, provenance: Mapping[str, str], coil: Coil | None
+    ) -> Self:
+        """The damper of what `to_saved` gave and what all kinds share.
+
+        Raises
+        ------
+        InputError
+            If it does not make a damper.
+        """
+
+    def holding(self, values: Mapping[str, float]) -> Damper:
+        """The damper with some of its own numbers held at a value.
+
+        Raises
+        ------
+        InputError
+            E_HELD if it is not made of them.
+        """
+        raise not_held(self, values)
+
     def loop(self, condition: Condition) -> Response:
         """Steady loop at a condition, one closed cycle."""
+        at = replace(condition, current_A=abs(condition.current_A))
+        return steady_loop(self.model_at(at), at)
 
-    @abstractmethod
     def force_along(self, motion: Excitation, condition: Condition) -> Floats:
         """Force [N] along a motion about mid-stroke that amounts to a condition."""
-
-    def predict(self, condition: Condition) -> Prediction:
-        """Steady loop at a condition, with its flags."""
-        response = self.loop(condition)
-        return Prediction(response.excitation, response.force, condition, self.envelope.flags(condition))
+        at = replace(condition, current_A=abs(condition.current_A))
+        return simulate(self.model_at(at), self.felt(motion)).force
 
     def felt(self, motion: Excitation) -> Excitation:
         """The motion with the current whose field is there: its magnitude, behind the coil's lags."""
@@ -152,8 +254,18 @@ class Damper(ABC):
             return motion.with_current(np.abs(motion.current))
         return motion.with_current(self.coil.along(motion.time, motion.current))
 
+    def predict(self, condition: Condition) -> Prediction:
+        """Steady loop at a condition, with its flags."""
+        response = self.loop(condition)
+        return Prediction(response.excitation, response.force, condition, self.envelope.flags(condition))
+
     def predict_run(self, run: Run) -> Prediction:
-        """Force along the measured motion of a run, with its flags. The measured force is not looked at."""
+        """Force along the measured motion of a run, with its flags. The measured force is not looked at.
+
+        Parameters that ask for a frequency and an amplitude get those of the run where it is a sine
+        of one current. Otherwise they follow the sine that the motion has resembled so far: an
+        approximation, flagged as such, and the force that a stream of the damper gives.
+        """
         found = equivalent_sine(run)
         motion = measured_motion(run).about(found.centre)
         flags = self.envelope.flags(found.condition)
@@ -161,4 +273,18 @@ class Damper(ABC):
             flags = (*self.envelope.motion_flags(motion), NOT_A_SINE)
         if self.knee is not None and samples_in_knee(motion, self.knee) < _SAMPLES_IN_KNEE:
             flags = (*flags, COARSE)
-        return Prediction(motion, self.force_along(motion, found.condition), found.condition, flags)
+        if self.conditional and not (found.is_sine and np.ptp(motion.current) <= _SAME_CURRENT):
+            force = causal_force(self, motion)
+        else:
+            force = self.force_along(motion, found.condition)
+        return Prediction(motion, force, found.condition, flags)
+
+
+def not_held(damper: Damper, names: Iterable[str]) -> InputError:
+    """The refusal of numbers a damper is not made of."""
+    return InputError(
+        f"{', '.join(names)} cannot be held in a saved model of this kind",
+        where=damper.title,
+        mend="release it on the Model page, or save the state of the bench instead",
+        code="E_HELD",
+    )

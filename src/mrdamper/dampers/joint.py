@@ -12,28 +12,37 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mrdamper.dampers.base import Damper, Envelope
+from mrdamper.dampers.base import UNTESTED, Damper, Envelope, Saved
 from mrdamper.dampers.coil import Coil
 from mrdamper.data import Condition, Floats, Run
-from mrdamper.errors import IdentificationError, RunError
+from mrdamper.errors import IdentificationError, ParameterError, RunError
 from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.models import Model, Scale, SearchAxis, model_type
 from mrdamper.motion import Excitation, equivalent_sine, measured_motion
 from mrdamper.optimizers.ending import Ending
 from mrdamper.optimizers.levenberg_marquardt import least_squares
 from mrdamper.optimizers.linear import on_one_blas_thread, solve_bounded, solve_linear
-from mrdamper.simulation import Response, simulate, steady_loop
 
 _ROWS = 400  # samples of a run that enter the least squares; its motion is followed in full
 _CYCLES = 4  # of a sine that enter: more repeat the same
 _WARM_UP = 1.5  # cycles before the scored samples in which the model forgets its start
 _SETTLED = 1e-6  # relative gain of a step at which the search ends
 _BEST = 1e-3  # nrmse_pp below which a run gains no more weight
+
+
+@dataclass(frozen=True)
+class SavedJoint(Saved):
+    """A joint damper in a saved model."""
+
+    model: str
+    parameters: dict[str, float]
+    parameter_units: dict[str, str]  # for the reader
+    free: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +62,7 @@ class JointDamper(Damper):
     """
 
     kind: ClassVar[str] = "joint"
+    saved: ClassVar[type[Saved]] = SavedJoint
 
     rig: str
     model: Model
@@ -73,11 +83,44 @@ class JointDamper(Damper):
     def knee(self) -> float | None:
         return self.model.knee
 
-    def loop(self, condition: Condition) -> Response:
-        return steady_loop(self.model, condition)
+    @property
+    def source(self) -> str:
+        return self.model.source
 
-    def force_along(self, motion: Excitation, condition: Condition) -> Floats:
-        return simulate(self.model, self.felt(motion)).force
+    @property
+    def equation(self) -> str:
+        return self.model.equation
+
+    @property
+    def one_model(self) -> Model:
+        return self.model
+
+    def model_at(self, condition: Condition) -> Model:
+        return self.model
+
+    def holding(self, values: Mapping[str, float]) -> JointDamper:
+        return replace(self, model=replace(self.model, **values))
+
+    def to_saved(self) -> SavedJoint:
+        units = {info.name: info.unit for info in self.model.parameters()}
+        return SavedJoint(self.model.name, self.model.values(), units, self.free)
+
+    @classmethod
+    def from_saved(
+        cls, saved: SavedJoint, rig: str, envelope: Envelope, provenance: Mapping[str, str], coil: Coil | None
+    ) -> Self:
+        try:
+            model = model_type(saved.model)(**saved.parameters)
+        except TypeError as error:
+            raise ParameterError(f"parameters do not fit the model: {error}", mend="write the model again") from error
+        return cls(rig, model, saved.free, envelope, provenance, coil)
+
+
+def damper_of(given: Damper | Model) -> Damper:
+    """A damper as it is; a bare model as a damper of no rig, tested nowhere."""
+    if isinstance(given, Model):
+        return JointDamper("", given, (), UNTESTED)
+    return given
 
 
 @dataclass(frozen=True, eq=False)

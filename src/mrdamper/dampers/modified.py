@@ -6,24 +6,42 @@ the hysteretic force twice, and each form chosen by how it predicts conditions l
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
-from mrdamper.dampers.base import NOT_A_SINE, Damper, Envelope, Prediction
+from mrdamper.dampers.base import Damper, Envelope, Saved, not_held
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.gram import Condensed, choose_forms, condense, fit_jointly
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.data import Condition, Floats, Run, same_condition, same_motion
-from mrdamper.errors import IdentificationError
+from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.functions.fitting import FunctionFit, assess, choose_function
-from mrdamper.functions.forms import FORMS
+from mrdamper.functions.forms import FORMS, ParameterFunction
 from mrdamper.identification import Identification
-from mrdamper.models import Model
-from mrdamper.motion import Excitation, running_sine
-from mrdamper.simulation import Response, simulate, steady_loop
+from mrdamper.models import Model, model_type
+
+
+@dataclass(frozen=True)
+class SavedFunction(Saved):
+    """A parameter function in a saved model."""
+
+    form: str
+    coefficients: tuple[float, ...]
+    rates: tuple[float, ...] = ()
+    log: bool = False
+    formula: str = ""  # for the reader; the coefficients count
+
+
+@dataclass(frozen=True)
+class SavedModified(Saved):
+    """A modified model in a saved model."""
+
+    model: str
+    functions: dict[str, SavedFunction]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +59,8 @@ class ModifiedModel(Damper):
     """
 
     kind: ClassVar[str] = "modified"
+    saved: ClassVar[type[Saved]] = SavedModified
+    conditional: ClassVar[bool] = True
 
     rig: str
     parameters: ParameterMap
@@ -56,39 +76,51 @@ class ModifiedModel(Damper):
     def parameter_count(self) -> int:
         return self.parameters.parameter_count
 
+    @property
+    def source(self) -> str:
+        return self.parameters.model_type.source
+
+    @property
+    def equation(self) -> str:
+        known = self.parameters.model_type.coordinates
+        relations = [known[name][1] for name in self.functions if name in known]
+        return r",\quad ".join([self.parameters.model_type.equation, *relations])
+
+    @property
+    def functions(self) -> Mapping[str, ParameterFunction]:
+        return self.parameters.functions
+
     def model_at(self, condition: Condition) -> Model:
         """The model at a condition."""
         return self.parameters.at(condition)
 
-    def loop(self, condition: Condition) -> Response:
-        return steady_loop(self.model_at(condition), condition)
+    def holding(self, values: Mapping[str, float]) -> ModifiedModel:
+        missing = [name for name in values if name not in self.functions]
+        if missing:
+            raise not_held(self, missing)
+        functions = dict(self.functions)
+        for name, value in values.items():
+            log = functions[name].log
+            functions[name] = ParameterFunction("constant", (math.log(value) if log else value,), log=log)
+        return replace(self, parameters=ParameterMap(self.parameters.model_type, functions))
 
-    def force_along(self, motion: Excitation, condition: Condition) -> Floats:
-        return simulate(self.model_at(condition), self.felt(motion)).force
+    def to_saved(self) -> SavedModified:
+        functions = {
+            name: SavedFunction(f.form, f.coefficients, f.rates, f.log, f.formula) for name, f in self.functions.items()
+        }
+        return SavedModified(self.parameters.model_type.name, functions)
 
-    def predict_run(self, run: Run) -> Prediction:
-        """Force along a run's motion: at its condition for a sine, at running estimates otherwise.
-
-        The functions ask for a frequency and an amplitude. Other motion gets those of the sine
-        it resembles from moment to moment: an approximation, flagged as such.
-        """
-        prediction = super().predict_run(run)
-        if NOT_A_SINE not in prediction.extrapolation:
-            return prediction
-        return replace(prediction, force=self._running(prediction.motion))
-
-    def _running(self, motion: Excitation) -> Floats:
-        """Blend the forces at a few frequencies and amplitudes, by the running estimate."""
-        frequency, amplitude = running_sine(motion)
-        shares_f, knots_f = _shares(np.clip(frequency, *self.envelope.frequency_Hz))
-        shares_a, knots_a = _shares(np.clip(amplitude, *self.envelope.amplitude_m))
-        current = float(np.mean(motion.current))
-        force = np.zeros(len(motion))
-        for share_f, f in zip(shares_f, knots_f, strict=True):
-            for share_a, a in zip(shares_a, knots_a, strict=True):
-                model = self.parameters.at(Condition(current, float(f), float(a)))
-                force += share_f * share_a * simulate(model, motion).force
-        return force
+    @classmethod
+    def from_saved(
+        cls, saved: SavedModified, rig: str, envelope: Envelope, provenance: Mapping[str, str], coil: Coil | None
+    ) -> Self:
+        functions = {n: ParameterFunction(f.form, f.coefficients, f.rates, f.log) for n, f in saved.functions.items()}
+        made = cls(rig, ParameterMap(model_type(saved.model), functions), envelope, provenance, coil)
+        try:
+            made.model_at(envelope.middle)
+        except TypeError as error:
+            raise ParameterError(f"functions do not fit the model: {error}", mend="write the model again") from error
+        return made
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,15 +242,6 @@ def fit_modified_jointly(
         name: assess(function, data.conditions, values[name]) for name, function in joint.parameters.functions.items()
     }
     return ModifiedFit(model(data, joint.parameters), fits, values, data.conditions), refit
-
-
-def _shares(values: Floats, most: int = 5) -> tuple[Floats, Floats]:
-    """Knots over the values, and the share of each knot at every value: straight between them."""
-    low, high = float(values.min()), float(values.max())
-    knots = np.geomspace(low, high, most) if high > 1.01 * low else np.array([np.sqrt(low * high)])
-    if knots.size == 1:
-        return np.ones((1, values.size)), knots
-    return np.stack([np.interp(np.log(values), np.log(knots), row) for row in np.eye(knots.size)]), knots
 
 
 def _uncertainty(identifications: Sequence[Identification], name: str, log: bool) -> Floats:

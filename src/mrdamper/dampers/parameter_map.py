@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from mrdamper.data import Condition
 from mrdamper.functions.forms import ParameterFunction
 from mrdamper.models import Model
-from mrdamper.tracing import plain
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +30,7 @@ class ParameterMap:
     def at(self, condition: Condition) -> Model:
         """The model at a condition; values a function drives past a parameter's bounds stop there."""
         point = (condition.current_A, condition.frequency_Hz, condition.amplitude_m)
-        bounds = {info.name: info.bounds for info in self.model_type.parameters()}
-        values = {}
-        for name, function in self.functions.items():
-            low, high = bounds.get(name, (-np.inf, np.inf))
-            values[name] = plain(np.clip(function(*point), low, high))
-        return self.model_type.build(values)
+        return self.model_type.nearest({name: function(*point) for name, function in self.functions.items()})
 
     @property
     def parameter_count(self) -> int:

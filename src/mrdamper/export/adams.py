@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import ClassVar
 
 from mrdamper.dampers.base import Damper
-from mrdamper.export.base import Exporter, Written, rig_of
+from mrdamper.dampers.joint import damper_of
+from mrdamper.export.base import Exporter, Written
 from mrdamper.export.curves import force_velocity
 from mrdamper.export.templates import render
 from mrdamper.models import Model
@@ -28,7 +29,11 @@ class AdamsExporter(Exporter):
             points = [*zip(1e3 * curve.velocity[:half], curve.force[:half], strict=True), (0.0, at_rest)]
             points += zip(1e3 * curve.velocity[half:], curve.force[half:], strict=True)
             text = render(
-                "damper.dmp.j2", rig=rig_of(damper), current=curve.current_A, amplitude=curve.amplitude_m, points=points
+                "damper.dmp.j2",
+                rig=damper_of(damper).rig,
+                current=curve.current_A,
+                amplitude=curve.amplitude_m,
+                points=points,
             )
             files[f"{name}_{curve.current_A:.3g}A.dmp".replace("-", "minus")] = text.encode("ascii", "replace")
         return Written(files, ("such a curve knows no hysteresis; c and fmu do",))

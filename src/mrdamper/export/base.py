@@ -75,11 +75,6 @@ def write_export(written: Written, out: str | Path, suffix: str) -> list[Path]:
     return [out / name for name in written.files]
 
 
-def rig_of(damper: Damper | Model) -> str:
-    """The rig a damper was tested on; a bare model has none."""
-    return "" if isinstance(damper, Model) else damper.rig
-
-
 def identifier(text: str) -> str:
     """A name for files and symbols out of any text.
 

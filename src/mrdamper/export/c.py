@@ -10,8 +10,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mrdamper.dampers.base import Damper
+from mrdamper.dampers.joint import damper_of
 from mrdamper.data import Floats
-from mrdamper.export.base import Exporter, Written, identifier, rig_of
+from mrdamper.export.base import Exporter, Written, identifier
 from mrdamper.export.c_writer import CWriter
 from mrdamper.export.templates import render
 from mrdamper.files.encoding import c_comment
@@ -33,7 +34,7 @@ class CExporter(Exporter):
 
     def export(self, damper: Damper | Model, name: str) -> Written:
         made = stream(damper)
-        files = {**c_sources(made, name, rig_of(damper)), f"{name}_test.c": self_test(made, name)}
+        files = {**c_sources(made, name, damper_of(damper).rig), f"{name}_test.c": self_test(made, name)}
         return Written({file: text.encode() for file, text in files.items()})
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrdamper.dampers.base import Damper
+from mrdamper.dampers.joint import damper_of
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import InputError
 from mrdamper.models import Model
@@ -61,7 +62,8 @@ def force_velocity(
     InputError
         E_EXPORT if the damper does not know where it was tested.
     """
-    if isinstance(damper, Model):
+    damper = damper_of(damper)
+    if not damper.envelope.tested:
         raise InputError("a model without tested ranges", mend="export a saved damper", code="E_EXPORT")
     envelope = damper.envelope
     amplitude = float(np.sqrt(np.prod(envelope.amplitude_m)))

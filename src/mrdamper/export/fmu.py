@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from mrdamper.dampers.base import Damper
+from mrdamper.dampers.joint import damper_of
 from mrdamper.data import Floats
 from mrdamper.errors import InputError
 from mrdamper.export.base import Exporter, Written, identifier
@@ -149,7 +150,7 @@ def fmu_texts(damper: Damper | Model, name: str, fmi: int) -> dict[str, bytes]:
     """All of an FMU but its binaries, by path. The token is a hash of the rest."""
     made = stream(damper)
     known = reference(made)
-    rig = damper.rig if isinstance(damper, Damper) else ""
+    rig = damper_of(damper).rig
     facts = _facts(made, name, rig, fmi, known)
     draft = _texts(made, facts, known, rig, token="")
     token = token_of(draft)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from mrdamper.dampers.base import Damper
-from mrdamper.export.base import Exporter, Written, rig_of
-from mrdamper.export.formulas import formulas
-from mrdamper.export.latex_writer import equations, number, symbol, unit_text
+from mrdamper.dampers.base import Damper, Envelope
+from mrdamper.dampers.joint import damper_of
+from mrdamper.export.base import Exporter, Written
+from mrdamper.export.equations import equations, number, unit_text
 from mrdamper.export.templates import render
 from mrdamper.files.encoding import latex
 from mrdamper.models import Model
+from mrdamper.parameters import latex_symbol
 
 
 class LatexExporter(Exporter):
@@ -30,27 +31,32 @@ class LatexExporter(Exporter):
         return Written({f"{name}.tex": text.encode()}, ("numbers are rounded to five digits; model.json has them all",))
 
 
-def document_facts(damper: Damper | Model) -> dict[str, Any]:
+def document_facts(given: Damper | Model) -> dict[str, Any]:
     """What a page of equations says of a damper, for any markup."""
-    made = formulas(damper)
+    damper = damper_of(given)
+    infos = damper.one_model.parameters() if damper.one_model else ()
+    values = damper.one_model.values() if damper.one_model else {}
+    rows = [
+        {"symbol": info.symbol, "value": number(values[info.name]), "unit": info.unit, "meaning": info.meaning}
+        for info in infos
+    ]
+    rows += [
+        {"symbol": latex_symbol(name), "value": number(value), "unit": "", "meaning": "SI"}
+        for name, value in damper.numbers.items()
+    ]
     return {
-        "title": made.title,
-        "source": made.source,
-        "rig": rig_of(damper),
-        "equations": equations(made),
-        "parameters": [
-            {"symbol": symbol(info.name), "value": number(value), "unit": info.unit, "meaning": info.meaning}
-            for info, value in made.parameters.items()
-            if not (info.preset and value == info.default)
-        ],
-        "ranges": _ranges(damper),
+        "title": damper.title,
+        "source": damper.source,
+        "rig": damper.rig,
+        "equations": equations(damper),
+        "parameters": rows,
+        "ranges": _ranges(damper.envelope),
     }
 
 
-def _ranges(damper: Damper | Model) -> list[tuple[str, str]]:
-    if isinstance(damper, Model):
+def _ranges(envelope: Envelope) -> list[tuple[str, str]]:
+    if not envelope.tested:
         return []
-    envelope = damper.envelope
     return [
         (title, f"{scale * low:.4g} to {scale * high:.4g} {unit}")
         for title, (low, high), scale, unit in (

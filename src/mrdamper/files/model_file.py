@@ -7,25 +7,17 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict, astuple, fields, replace
+from dataclasses import asdict
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
-import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
+from mrdamper.dampers import all_kinds
 from mrdamper.dampers.base import Damper, Envelope
 from mrdamper.dampers.coil import Coil, Driver
-from mrdamper.dampers.joint import JointDamper
-from mrdamper.dampers.modified import ModifiedModel
-from mrdamper.dampers.parameter_map import ParameterMap
-from mrdamper.dampers.published import ConditionedDamper, conditioned_type
-from mrdamper.data import Condition
 from mrdamper.errors import InputError, ModelFileError
 from mrdamper.files.atomic import write_file
-from mrdamper.functions.forms import ParameterFunction
-from mrdamper.models import model_type
-from mrdamper.motion import sine
 
 FORMAT = "mrdamper-model"
 MAJOR, MINOR = 1, 2
@@ -67,36 +59,6 @@ class _Coil(_Strict):
     driver: _Driver | None = None
 
 
-class _Function(_Strict):
-    form: str
-    coefficients: tuple[float, ...]
-    rates: tuple[float, ...] = ()
-    log: bool = False
-    formula: str = ""  # for the reader; the coefficients count
-
-
-class _Modified(_Strict):
-    kind: Literal["modified"]
-    model: str
-    functions: dict[str, _Function]
-
-
-class _Joint(_Strict):
-    kind: Literal["joint"]
-    model: str
-    parameters: dict[str, float]
-    parameter_units: dict[str, str]  # for the reader
-    free: tuple[str, ...]
-
-
-class _Conditioned(_Strict):
-    kind: Literal["conditioned"]
-    model: str
-    coefficients: dict[str, float]
-    reference: tuple[float, float, float]  # current [A], frequency [Hz], amplitude [m]
-    tables: dict[str, list[float] | list[list[float]]] = {}
-
-
 class _Document(_Strict):
     format: Literal["mrdamper-model"]
     version: str
@@ -105,7 +67,7 @@ class _Document(_Strict):
     envelope: _Envelope
     provenance: dict[str, str]
     coil: _Coil | None = None  # since 1.2
-    damper: _Modified | _Joint | _Conditioned = Field(discriminator="kind")
+    damper: dict[str, Any]  # its kind, and what that kind says
 
 
 def save_model(damper: Damper, path: str | Path) -> None:
@@ -130,7 +92,7 @@ def dump_model(damper: Damper) -> str:
         envelope=_Envelope(**{name: getattr(damper.envelope, name) for name in _Envelope.model_fields}),
         provenance=dict(damper.provenance),
         coil=_describe_coil(damper.coil),
-        damper=_describe(damper),
+        damper={"kind": damper.kind, **asdict(damper.to_saved())},
     )
     return json.dumps(document.model_dump(exclude_none=True), indent=1, ensure_ascii=False) + "\n"
 
@@ -169,17 +131,46 @@ def parse_model(text: str, where: str = "model") -> Damper:
             where=where,
             mend="update mrdamper",
         )
+    raw = _upgraded(raw)
+    document = _checked(_Document, raw, "", where)
+    kind, own = _kind(document.damper, where)
+    saved = _checked(kind.saved, own, "damper.", where)
     try:
-        document = _Document.model_validate_json(text)
-    except ValidationError as error:
-        first = error.errors()[0]
-        field = ".".join(str(part) for part in first["loc"] if part not in ("modified", "joint", "conditioned"))
-        raise ModelFileError(f"{field}: {first['msg']}", where=where, mend="write the model again") from error
-    try:
-        damper = _restore(document)
-        return replace(damper, coil=_restore_coil(document.coil)) if document.coil else damper  # type: ignore[type-var]
+        coil = _restore_coil(document.coil) if document.coil else None
+        envelope = Envelope(**document.envelope.model_dump())
+        return kind.from_saved(saved, document.rig, envelope, document.provenance, coil)
     except InputError as error:
         raise ModelFileError(error.found, where=where, mend=error.mend) from error
+
+
+def _checked(schema: Any, raw: dict[str, Any], prefix: str, where: str) -> Any:
+    try:
+        return TypeAdapter(schema).validate_python(raw)
+    except ValidationError as error:
+        first = error.errors()[0]
+        field = prefix + ".".join(str(part) for part in first["loc"])
+        raise ModelFileError(f"{field}: {first['msg']}", where=where, mend="write the model again") from error
+
+
+def _kind(described: dict[str, Any], where: str) -> tuple[type[Damper], dict[str, Any]]:
+    name, known = described.get("kind"), all_kinds()
+    if name not in known:
+        raise ModelFileError(
+            f"damper.kind is {name!r}", where=where, mend=f"known: {', '.join(known)}; write the model again"
+        )
+    return known[name], {key: value for key, value in described.items() if key != "kind"}
+
+
+def _upgraded(raw: dict[str, Any]) -> dict[str, Any]:
+    """What older minor versions said otherwise. Before 1.2 a kernel regression was a condition-dependent damper."""
+    damper = raw.get("damper")
+    if isinstance(damper, dict) and damper.get("kind") == "conditioned" and damper.get("model") == "kernel":
+        numbers, tables = damper.get("coefficients"), damper.get("tables")
+        if isinstance(numbers, dict) and isinstance(tables, dict):
+            spread = [numbers.get(f"spread_{n}") for n in ("displacement", "velocity", "acceleration", "current")]
+            whole = {"mean": numbers.get("mean"), "size": numbers.get("size"), "spread": spread}
+            return {**raw, "damper": {"kind": "kernel", **tables, **whole}}
+    return raw
 
 
 def _describe_coil(coil: Coil | None) -> _Coil | None:
@@ -194,70 +185,3 @@ def _describe_coil(coil: Coil | None) -> _Coil | None:
 def _restore_coil(saved: _Coil) -> Coil:
     known = saved.driver.model_dump(exclude_none=True) if saved.driver else None
     return Coil(saved.rise_s, saved.fall_s, Driver(**known) if known else None)
-
-
-def _describe(damper: Damper) -> _Modified | _Joint | _Conditioned:
-    if isinstance(damper, JointDamper):
-        return _Joint(
-            kind="joint",
-            model=damper.model.name,
-            parameters=damper.model.values(),
-            parameter_units={info.name: info.unit for info in damper.model.parameters()},
-            free=damper.free,
-        )
-    if isinstance(damper, ModifiedModel):
-        functions = {
-            name: _Function(form=f.form, coefficients=f.coefficients, rates=f.rates, log=f.log, formula=f.formula)
-            for name, f in damper.parameters.functions.items()
-        }
-        return _Modified(kind="modified", model=damper.parameters.model_type.name, functions=functions)
-    if isinstance(damper, ConditionedDamper):
-        values = {field.name: getattr(damper, field.name) for field in fields(damper)}
-        return _Conditioned(
-            kind="conditioned",
-            model=damper.name,
-            coefficients=dict(damper.coefficients),
-            reference=astuple(damper.reference),
-            tables={name: value.tolist() for name, value in values.items() if isinstance(value, np.ndarray)},
-        )
-    raise TypeError(f"no document for {type(damper).__name__}")
-
-
-def _restore(document: _Document) -> Damper:
-    described, envelope = document.damper, Envelope(**document.envelope.model_dump())
-    if isinstance(described, _Joint):
-        try:
-            model = model_type(described.model)(**described.parameters)
-        except TypeError as error:
-            raise ModelFileError(f"parameters do not fit the model: {error}", mend="write the model again") from error
-        return JointDamper(document.rig, model, described.free, envelope, document.provenance)
-    if isinstance(described, _Conditioned):
-        return _restore_conditioned(document, described, envelope)
-    functions = {
-        name: ParameterFunction(f.form, f.coefficients, f.rates, f.log) for name, f in described.functions.items()
-    }
-    damper = ModifiedModel(
-        rig=document.rig,
-        parameters=ParameterMap(model_type(described.model), functions),
-        envelope=envelope,
-        provenance=document.provenance,
-    )
-    middle = {name: (low + high) / 2 for name, (low, high) in document.envelope.model_dump().items()}
-    try:
-        damper.parameters.at(Condition(middle["current_A"], middle["frequency_Hz"], middle["amplitude_m"]))
-    except TypeError as error:
-        raise ModelFileError(f"functions do not fit the model: {error}", mend="write the model again") from error
-    return damper
-
-
-def _restore_conditioned(document: _Document, described: _Conditioned, envelope: Envelope) -> Damper:
-    reference = Condition(*described.reference)
-    tables = {name: np.array(table) for name, table in described.tables.items()}
-    try:
-        damper = conditioned_type(described.model)(
-            document.rig, described.coefficients, reference, envelope, document.provenance, **tables
-        )
-        damper.force_along(sine(reference, 1, 8), reference)
-    except (KeyError, TypeError, ValueError, IndexError) as error:
-        raise ModelFileError(f"coefficients do not fit the model: {error}", mend="write the model again") from error
-    return damper

@@ -25,15 +25,7 @@ def follow_step(tape: Tape, shape: Shape, path: Any, zeta0: ArrayLike = 0.0) -> 
     return reached
 
 
-def follow_law(tape: Tape, shape: Shape, path: Any, zeta0: ArrayLike = 0.0) -> Any:
-    """The differential equation behind `follow`."""
-    v, zeta, kappa = path.rate, tape.symbol("zeta"), tape.define("kappa", shape.kappa)
-    sigma, n = tape.define("sigma", shape.sigma), shape.n
-    pull = sigma * abs(v) * abs(zeta) ** (n - 1) * zeta + (1 - sigma) * v * abs(zeta) ** n
-    return tape.law("rate", zeta, kappa * (v - pull))
-
-
-@streamed(follow_step, follow_law)
+@streamed(follow_step)
 def follow(shape: Shape, path: Path, zeta0: ArrayLike = 0.0) -> Floats:
     """Hysteretic state along a motion.
 

@@ -14,11 +14,11 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, MissingExtraError, ParameterError
-from mrdamper.integrator.streamed import Rate, integrate_law, integrate_step
+from mrdamper.integrator.streamed import Rate, integrate_step
 from mrdamper.tracing import streamed
 
 
-@streamed(integrate_step, integrate_law)
+@streamed(integrate_step)
 def integrate(
     rate: Rate,
     parameters: Sequence[float],

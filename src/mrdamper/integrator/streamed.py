@@ -68,24 +68,6 @@ def integrate_step(
     return _Columns(later)
 
 
-def integrate_law(
-    tape: Tape,
-    rate: Rate,
-    parameters: Sequence[Any],
-    motion: tuple[Any, Any, Any, Any],
-    start: Sequence[float],
-    scale: Sequence[Any],
-    *,
-    tolerance: float = 1e-5,
-) -> Any:
-    """The differential equations themselves."""
-    _, x, v, current = motion
-    states = [tape.symbol(f"y{i + 1}") for i in range(len(start))]
-    rates: list[Any] = [0.0] * len(start)
-    rate(x, v, current, states, parameters, rates)
-    return _Columns([tape.law("rate", state, value) for state, value in zip(states, rates, strict=True)])
-
-
 def _between(ends: Sequence[tuple[Any, Any]], width: Any) -> Callable[[Any], tuple[Any, Any, Any]]:
     """Displacement, velocity and current between two samples: a cubic, its slope, a straight line."""
     (x0, x1), (v0, v1), (i0, i1) = ends

@@ -22,6 +22,7 @@ from mrdamper.errors import ParameterError
 from mrdamper.hysteresis import Shape
 from mrdamper.motion import Excitation
 from mrdamper.parameters import ParameterInfo, parameters_of
+from mrdamper.tracing import plain
 
 GENERAL_FORMS = (
     "constant",
@@ -114,6 +115,7 @@ class Model(ABC):
     title: ClassVar[str]
     equation: ClassVar[str]
     source: ClassVar[str]
+    coordinates: ClassVar[Mapping[str, tuple[str, str]]] = {}  # what `build` takes instead: symbol, relation (LaTeX)
     integrated: ClassVar[bool] = False  # the state is stepped: following a motion costs a hundred times more
     # Linear parameter whose column the state is, where the search moves no other column; None: no such one.
     state_column: ClassVar[str | None] = None
@@ -183,7 +185,20 @@ class Model(ABC):
     @classmethod
     def build(cls, values: Mapping[str, float]) -> Self:
         """Make the model from its parameters or from the coordinates it is searched in."""
-        return cls(**values)
+        return cls(**cls.resolved(values))
+
+    @classmethod
+    def resolved(cls, values: Mapping[str, float]) -> dict[str, float]:
+        """Parameters from parameters and coordinates; nothing is checked yet."""
+        return dict(values)
+
+    @classmethod
+    def nearest(cls, values: Mapping[str, float]) -> Self:
+        """Make the model as `build` does, every parameter stopped at its bounds."""
+        bounds = {info.name: info.bounds for info in cls.parameters()}
+        inside = {name: plain(np.clip(value, *bounds[name])) for name, value in values.items() if name in bounds}
+        made = cls.resolved({**values, **inside})
+        return cls(**{n: plain(np.clip(value, *bounds[n])) if n in bounds else value for n, value in made.items()})
 
     @classmethod
     def map_forms(cls) -> Mapping[str, tuple[str, ...]]:

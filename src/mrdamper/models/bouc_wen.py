@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 
@@ -41,6 +41,11 @@ class BoucWen(Model):
     )
     source: ClassVar[str] = "Wen 1976; Qian et al. 2024, Eq. 8"
     state_column: ClassVar[str | None] = "alpha"
+    coordinates: ClassVar[Mapping[str, tuple[str, str]]] = {
+        "yield_force": ("F_z", r"\alpha = F_z (\beta + \gamma)^{1/n}"),
+        "yield_displacement": ("x_z", r"\beta + \gamma = x_z^{-n}"),
+        "asymmetry": (r"\rho", r"\gamma - \beta = \rho (\beta + \gamma)"),
+    }
 
     c: float = param("N s/m", "post-yield viscous damping", bounds=(0, np.inf), linear=True)
     alpha: float = param("N/m", "hysteretic stiffness", bounds=(0, np.inf), linear=True)
@@ -124,8 +129,8 @@ class BoucWen(Model):
         return frozenset({"beta", "yield_displacement"})
 
     @classmethod
-    def build(cls, values: Mapping[str, float]) -> Self:
-        """Make the model from its parameters, or from physical coordinates in their place.
+    def resolved(cls, values: Mapping[str, float]) -> dict[str, float]:
+        """Parameters, from themselves or from physical coordinates in their place.
 
         `yield_displacement` [m] with `asymmetry` (default 0: gamma = beta), or with one of beta and
         gamma, stands for both; `yield_force` [N] for alpha.
@@ -147,4 +152,4 @@ class BoucWen(Model):
         if (force := given.pop("yield_force", None)) is not None:
             require_positive(cls.title, n=n)
             given["alpha"] = plain(force * (given["beta"] + given["gamma"]) ** (1 / n))
-        return cls(**given)
+        return given

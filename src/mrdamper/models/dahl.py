@@ -38,7 +38,7 @@ class Dahl(Model):
     kappa_x: float = param("N s/m", "post-yield viscous damping", bounds=(0, np.inf), linear=True)
     kappa_w: float = param("N", "yield force", bounds=(0, np.inf), linear=True)
     yield_displacement: float = param(
-        "m", "displacement in which the friction builds up, 1/rho", bounds=(1e-12, 1e3), scale="log"
+        "m", "displacement in which the friction builds up, 1/rho", bounds=(1e-12, 1e3), scale="log", symbol="x_y"
     )
     f0: float = param("N", "offset force", linear=True, default=0.0)
 

@@ -32,7 +32,10 @@ class Guo(Model):
 
     name: ClassVar[str] = "guo"
     title: ClassVar[str] = "algebraic (arctangent)"
-    equation: ClassVar[str] = r"F = \tfrac{2}{\pi} f_y \arctan[\kappa (v + v_0\,\mathrm{sgn}\,x)] + c\,v + k\,x + f_0"
+    equation: ClassVar[str] = (
+        r"F = \frac{2}{\pi} f_y \arctan[\kappa (v + v_0\,\sigma)] + c\,v + k\,x + f_0,\quad "
+        r"\sigma = \tanh(x/x_s)\;\mathrm{(}x_s = 0{:}\;\mathrm{sgn}\,x\mathrm{)}"
+    )
     source: ClassVar[str] = "Guo, Yang and Pan 2006"
     state_column: ClassVar[str | None] = "fy"
 

@@ -113,14 +113,7 @@ def flow_step(tape: Tape, speed: Any, m: Any) -> Any:
     return choose(speed > 0, flowing, lambda: 1.0)
 
 
-def flow_law(tape: Tape, speed: Any, m: Any) -> Any:
-    """The flow curve, the way it is published: the speed at a force."""
-    u: Any = tape.symbol("u")
-    tape.law("equals", u, _log_speed(u, m)[0], np.log(speed))
-    return 1 + np.exp(u)
-
-
-@streamed(flow_step, flow_law)
+@streamed(flow_step)
 def flow_curve(speed: Floats, m: float) -> Floats:
     """Force over yield force at a speed.
 

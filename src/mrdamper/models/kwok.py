@@ -32,7 +32,10 @@ class Kwok(Model):
 
     name: ClassVar[str] = "kwok"
     title: ClassVar[str] = "hyperbolic tangent"
-    equation: ClassVar[str] = r"F = c\,v + k\,x + \alpha \tanh(\beta v + \delta\,\mathrm{sgn}\,x) + f_0"
+    equation: ClassVar[str] = (
+        r"F = c\,v + k\,x + \alpha \tanh(\beta v + \delta\,\sigma) + f_0,\quad "
+        r"\sigma = \tanh(x/x_s)\;\mathrm{(}x_s = 0{:}\;\mathrm{sgn}\,x\mathrm{)}"
+    )
     source: ClassVar[str] = "Kwok et al. 2006"
     state_column: ClassVar[str | None] = "alpha"
 

@@ -34,17 +34,19 @@ class LuGre(Model):
     name: ClassVar[str] = "lugre"
     title: ClassVar[str] = "LuGre"
     equation: ClassVar[str] = (
-        r"F = F_c u + \sigma_1 \dot z + \sigma_2 v + f_0,\quad \dot z = v - |v| u / g(v),\ z = z_c u,"
-        r"\ g = 1 + (s-1) e^{-(v/v_s)^2}"
+        r"F = F_c u + \sigma_1 \dot z + \sigma_2 v + f_0,\quad \dot z = v - |v| u / g,\quad z = z_c u,\quad "
+        r"g = 1 + (s - 1) e^{-(v/v_s)^2}"
     )
     source: ClassVar[str] = "Canudas de Wit et al. 1995"
     integrated: ClassVar[bool] = True
 
-    fc: float = param("N", "yield force while sliding", bounds=(0, np.inf), linear=True)
+    fc: float = param("N", "yield force while sliding", bounds=(0, np.inf), linear=True, symbol="F_c")
     presliding: float = param(
-        "m", "deflection of the bristles while sliding, F_c/sigma0", bounds=(1e-9, 1), scale="log"
+        "m", "deflection of the bristles while sliding, F_c/sigma0", bounds=(1e-9, 1), scale="log", symbol="z_c"
     )
-    stribeck: float = param("-", "force at the onset of sliding over the sliding force", bounds=(0.2, 10), scale="log")
+    stribeck: float = param(
+        "-", "force at the onset of sliding over the sliding force", bounds=(0.2, 10), scale="log", symbol="s"
+    )
     vs: float = param("m/s", "velocity in which the onset force fades", bounds=(1e-6, 10), scale="log")
     sigma1: float = param("N s/m", "damping of the bristles", bounds=(0, np.inf), linear=True)
     sigma2: float = param("N s/m", "post-yield viscous damping", bounds=(0, np.inf), linear=True)

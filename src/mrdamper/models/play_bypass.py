@@ -44,7 +44,14 @@ class PlayBypass(Model):
     name: ClassVar[str] = "play-bypass"
     title: ClassVar[str] = "play and bypass"
     equation: ClassVar[str] = (
-        r"F = f_0 + k x (1 - S) + (c_0 + c_1 I) v + f_y(I) (S + q |S|) + m a,\quad T \dot S + S = s(\delta, v, I)"
+        r"F = f_0 + k x (1 - S) + (c_0 + c_1 I) v + f_y (S + q |S|) + m a,\quad "
+        r"f_y = f_{y0} + f_{y1} I \left(1 - e^{-I/(0.12\,\mathrm{A})}\right),\quad "
+        r"T \dot S + S = (1 - h) \varphi + \mathrm{sgn}\,v \left[h \frac{|v|}{|v| + v_h} \eta + (1 - \eta) b\right],"
+        r"\quad "
+        r"h = \min(1, \max(0, h_0 + h_1 I)),\quad "
+        r"\dot\delta = v \;\mathrm{where}\; |\delta| < d \;\mathrm{or}\; \delta v < 0,\;\mathrm{else}\; 0,\quad "
+        r"\varphi = \mathrm{sgn}\,\delta\, \max(0, |\delta| - (d - e))/e,\quad "
+        r"\eta = \max(0, \varphi\,\mathrm{sgn}\,v),\quad b = \frac{r}{\sqrt{1 + r^2}},\quad r = \frac{c_b |v|}{f_y}"
     )
     source: ClassVar[str] = "derived from the bundled tests"
 
@@ -62,7 +69,12 @@ class PlayBypass(Model):
     vh: float = param("m/s", "velocity at which that share has faded by half", bounds=(1e-5, 1), scale="log")
     T: float = param("s", "lag of the yield force", bounds=(0, 0.2), scale="log")
     asymmetry: float = param(
-        "-", "surplus of the yield force in extension over the mean", bounds=(-0.5, 0.5), linear=True, default=0.0
+        "-",
+        "surplus of the yield force in extension over the mean",
+        bounds=(-0.5, 0.5),
+        linear=True,
+        default=0.0,
+        symbol="q",
     )
     m: float = param("kg", "inertia", bounds=(0, np.inf), linear=True, default=0.0)
 
@@ -125,12 +137,7 @@ def play_step(tape: Tape, path: Any, limit: Any, start: float = 0.0) -> Any:
     return moved
 
 
-def play_law(tape: Tape, path: Any, limit: Any, start: float = 0.0) -> Any:
-    """What `play_position` follows."""
-    return tape.law("stop", tape.symbol("delta"), path.rate, limit)
-
-
-@streamed(play_step, play_law)
+@streamed(play_step)
 def play_position(path: Path, limit: float, start: float = 0.0) -> Floats:
     """Position δ of a stop operator along a path: it moves with the motion and stops at ±limit.
 

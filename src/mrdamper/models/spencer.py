@@ -36,24 +36,39 @@ class Spencer(Model):
     name: ClassVar[str] = "spencer"
     title: ClassVar[str] = "Spencer's modified Bouc–Wen"
     equation: ClassVar[str] = (
-        r"F = c_1 \dot y + k_1 (x - x_0),\quad \dot y = \frac{\alpha z + c_0 \dot x + k_0 (x - y)}{c_0 + c_1},"
-        r"\quad \dot z = A\dot r - \gamma |\dot r| z |z|^{n-1} - \beta \dot r |z|^n,\ r = x - y"
+        r"F = c_1 \dot y + k_1 x + f_0,\quad \dot y = \frac{v_z \zeta + \kappa_0 r + \nu_0 v}{1 + \nu_0},\quad "
+        r"x_z \dot\zeta = \dot r - \frac{1 - \rho}{2} |\dot r| |\zeta|^{n-1} \zeta"
+        r" - \frac{1 + \rho}{2} \dot r |\zeta|^n,\quad "
+        r"r = x - y"
     )
     source: ClassVar[str] = "Spencer et al. 1997"
+    coordinates: ClassVar[Mapping[str, tuple[str, str]]] = {
+        "c0": ("c_0", r"\nu_0 = c_0/c_1"),
+        "k0": ("k_0", r"\kappa_0 = k_0/c_1"),
+        "yield_force": ("F_z", "v_z = F_z/c_1"),
+    }
     integrated: ClassVar[bool] = True
 
     c1: float = param("N s/m", "viscous damping in series, seen at low velocity", bounds=(0, np.inf), linear=True)
-    c0_ratio: float = param("-", "c0/c1, viscous damping at high velocity", bounds=(1e-6, 1e3), scale="log")
-    k0_rate: float = param("1/s", "k0/c1, stiffness at high velocity", bounds=(0, 1e4))
+    c0_ratio: float = param(
+        "-", "c0/c1, viscous damping at high velocity", bounds=(1e-6, 1e3), scale="log", symbol=r"\nu_0"
+    )
+    k0_rate: float = param("1/s", "k0/c1, stiffness at high velocity", bounds=(0, 1e4), symbol=r"\kappa_0")
     creep: float = param(
-        "m/s", "velocity of the series damper under the full hysteretic force", bounds=(1e-9, 1e2), scale="log"
+        "m/s",
+        "velocity of the series damper under the full hysteretic force",
+        bounds=(1e-9, 1e2),
+        scale="log",
+        symbol="v_z",
     )
     yield_displacement: float = param(
-        "m", "displacement in which the hysteretic force is spent", bounds=(1e-9, 1), scale="log"
+        "m", "displacement in which the hysteretic force is spent", bounds=(1e-9, 1), scale="log", symbol="x_z"
     )
     k1: float = param("N/m", "stiffness of the accumulator", linear=True, default=0.0)
     f0: float = param("N", "offset force, −k1 x0", linear=True, default=0.0)
-    asymmetry: float = param("-", "(coefficient of v − of |v|)/(their sum)", bounds=(-1, 1), preset=True, default=0.0)
+    asymmetry: float = param(
+        "-", "(coefficient of v − of |v|)/(their sum)", bounds=(-1, 1), preset=True, default=0.0, symbol=r"\rho"
+    )
     n: float = param("-", "sharpness of the yield", bounds=(1, 10), preset=True, default=2.0)
 
     @property
@@ -184,15 +199,15 @@ class Spencer(Model):
         return frozenset({"c1", "c0", "yield_force", "yield_displacement"})
 
     @classmethod
-    def build(cls, values: Mapping[str, float]) -> Self:
-        """Make the model from its parameters, or from `c0` [N s/m], `k0` [N/m], `yield_force` [N] in their place."""
+    def resolved(cls, values: Mapping[str, float]) -> dict[str, float]:
+        """Parameters, from themselves or from `c0` [N s/m], `k0` [N/m], `yield_force` [N] in their place."""
         given = dict(values)
         if given.keys() & {"c0", "k0", "yield_force"}:
             require_positive(cls.title, c1=given["c1"])
         for letter, ratio in (("c0", "c0_ratio"), ("k0", "k0_rate"), ("yield_force", "creep")):
             if letter in given:
                 given[ratio] = given.pop(letter) / given["c1"]
-        return cls(**given)
+        return given
 
 
 def series_rate(x: float, v: float, current: float, state: Floats, p: Floats, out: Floats) -> None:

@@ -29,12 +29,7 @@ def lag_step(tape: Tape, time: Any, signal: Any, time_constant: Any) -> Any:
     return value
 
 
-def lag_law(tape: Tape, time: Any, signal: Any, time_constant: Any) -> Any:
-    """The differential equation behind `first_order_lag`."""
-    return tape.law("lag", tape.symbol("S"), tape.define("s", signal), time_constant)
-
-
-@streamed(lag_step, lag_law)
+@streamed(lag_step)
 def first_order_lag(time: Floats, signal: Floats, time_constant: float) -> Floats:
     """Y with T dy/dt + y = signal, from y = 0 at the first sample.
 

@@ -11,16 +11,14 @@ import numpy as np
 from mrdamper.dampers.base import Damper, Envelope
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.modified import ModifiedFit, fit_modified
-from mrdamper.dampers.published import all_conditioned
-from mrdamper.data import Condition, Floats, Run
+from mrdamper.dampers.published import all_published
+from mrdamper.data import Condition, Run
 from mrdamper.identification import Identification
 from mrdamper.identification.harmonic_balance import SineRecord
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.identification.methods.direct_genetic import DirectGenetic
 from mrdamper.identification.methods.paper import Paper
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.motion import Excitation
-from mrdamper.simulation import Response, simulate, steady_loop
 from mrdamper.study.recipe import (
     Basis,
     Made,
@@ -69,7 +67,7 @@ def direct_genetic(train: Sequence[Run], held_out: Sequence[Run], settled: Settl
 
 def literature(train: Sequence[Run]) -> Steps:
     """Bingham, hyperbolic tangent, every condition-dependent damper of the house, and play and bypass."""
-    found = [modified("bingham"), modified("kwok"), *(conditioned(cls) for cls in all_conditioned().values())]
+    found = [modified("bingham"), modified("kwok"), *(conditioned(cls) for cls in all_published().values())]
     found.append(play_and_bypass())
     return [(replace(recipe, way="literature"), train) for recipe in found]
 
@@ -131,15 +129,9 @@ class OnePerCurrent(Damper):
         # c, f0, alpha, beta and stiffness or mass; the rest is preset
         return 5 * len(self.models)
 
-    def at(self, condition: Condition) -> BoucWen:
+    def model_at(self, condition: Condition) -> BoucWen:
         """The model at the nearest current."""
         return min(self.models, key=lambda pair: abs(pair[0] - condition.current_A))[1]
-
-    def loop(self, condition: Condition) -> Response:
-        return steady_loop(self.at(condition), condition)
-
-    def force_along(self, motion: Excitation, condition: Condition) -> Floats:
-        return simulate(self.at(condition), self.felt(motion)).force
 
 
 def peak_velocity(runs: Sequence[Run]) -> float:

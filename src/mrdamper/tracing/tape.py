@@ -10,15 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import wraps
-from typing import Any, Literal, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.tracing.expression import CONSTANT, OPERATIONS, PARAMETER, SAMPLE, Expression, Traced, TraceError, plain
-from mrdamper.tracing.readable import shorter
 
 Floats = NDArray[np.float64]
 F = TypeVar("F", bound=Callable[..., Any])
@@ -54,28 +52,6 @@ class Table(Protocol):
         ...
 
 
-Kind = Literal["is", "rate", "lag", "stop", "equals"]
-
-
-@dataclass(frozen=True)
-class Law:
-    """What a symbol follows.
-
-    Attributes
-    ----------
-    kind : "is", "rate", "lag", "stop" or "equals"
-        The symbol is the value; changes at that rate; lags behind it by `constant`; moves at that
-        rate and stops at ±`constant`; is where `value`, a function of it, equals `constant`.
-    symbol : Expression
-    value, constant : Expression or float
-    """
-
-    kind: Kind
-    symbol: Expression
-    value: Any
-    constant: Any = None
-
-
 class Loop:
     """A bounded repetition: carried values change until the condition fails."""
 
@@ -97,15 +73,9 @@ class Tape:
         What each memory becomes after the sample.
     guards : list of (Expression, bool)
         Questions that were settled while tracing, with their answers.
-    laws : list of Law
-        Differential equations and definitions, on a tape that is to be read and not computed.
-    readable : bool
-        Write down laws instead of steps, and only the branch that the parameters at hand take.
     """
 
-    def __init__(self, readable: bool = False) -> None:
-        self.readable = readable
-        self.laws: list[Law] = []
+    def __init__(self) -> None:
         self.parameters: dict[str, Expression] = {}
         self.inputs: dict[str, Expression] = {}
         self.memory: dict[str, Expression] = {}
@@ -171,27 +141,10 @@ class Tape:
         if isinstance(question, Expression):
             self.guards.append((question, True))
 
-    def symbol(self, name: str, value: float | None = None) -> Expression:
-        """A quantity with a name of its own in laws."""
-        taken = {law.symbol.name for law in self.laws} | self.memory.keys() | self.parameters.keys()
-        unique = name if name not in taken else next(f"{name}_{i}" for i in range(2, 100) if f"{name}_{i}" not in taken)
-        return Expression(self, "memory", (), SAMPLE, value, unique)
-
-    def law(self, kind: Kind, symbol: Expression, value: Any, constant: Any = None) -> Expression:
-        """Write a law down; gives the symbol back."""
-        self.laws.append(Law(kind, symbol, value, constant))
-        return symbol
-
-    def define(self, name: str, value: Any) -> Any:
-        """Give an expression a name of its own."""
-        return self.law("is", self.symbol(name, value.value), value) if isinstance(value, Expression) else value
-
     def apply(self, op: str, *args: Any) -> Any:
         """Write an operation down, once; powers of small integers as products."""
         args = tuple(plain(a) for a in args)
-        if self.readable and (short := shorter(self.apply, op, args)) is not None:
-            return short
-        if op == "power" and not self.readable and isinstance(args[1], int | float) and args[1] in range(_UNROLLED + 1):
+        if op == "power" and isinstance(args[1], int | float) and args[1] in range(_UNROLLED + 1):
             return self._product(args[0], int(args[1]))
         if (simple := _simplified(op, args)) is not None:
             return simple
@@ -202,8 +155,6 @@ class Tape:
         then, otherwise = plain(then), plain(otherwise)
         if not isinstance(condition, Expression):
             return then if condition else otherwise
-        if self.readable and condition.value is not None:
-            return then if condition.value else otherwise
         return self._note("select", (condition, then, otherwise))
 
     def lookup(self, table: Table, x: Any) -> Expression:
@@ -249,15 +200,13 @@ class Tape:
         return next(f"{name}_{i}" for i in range(2, 1000) if f"{name}_{i}" not in taken)
 
 
-def streamed(step: Callable[..., Any], law: Callable[..., Any]) -> Callable[[F], F]:
-    """Give a function of arrays its form for one sample, and the law it follows.
+def streamed(step: Callable[..., Any]) -> Callable[[F], F]:
+    """Give a function of arrays its form for one sample.
 
     Parameters
     ----------
     step : function of (tape, *arguments)
         Writes what is remembered and computed at a sample; returns the value there.
-    law : function of (tape, *arguments)
-        Writes the law, for people; returns the symbol of the value.
     """
 
     def decorate(of_arrays: F) -> F:
@@ -266,7 +215,7 @@ def streamed(step: Callable[..., Any], law: Callable[..., Any]) -> Callable[[F],
             for arg in args:
                 one = arg[0] if isinstance(arg, tuple) and arg else arg
                 if isinstance(one, Traced):
-                    return (law if one.tape.readable else step)(one.tape, *args, **options)
+                    return step(one.tape, *args, **options)
             return of_arrays(*args, **options)
 
         return either  # type: ignore[return-value]

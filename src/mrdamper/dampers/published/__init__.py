@@ -9,19 +9,28 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING
 
+from mrdamper.dampers.kernel import KernelDamper
 from mrdamper.dampers.published.base import ConditionedDamper
 from mrdamper.discovery import named, subclasses_in
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-__all__ = ["ConditionedDamper", "all_conditioned", "conditioned_type"]
+__all__ = ["ConditionedDamper", "Published", "all_conditioned", "all_published", "conditioned_type"]
+
+Published = type[ConditionedDamper] | type[KernelDamper]
 
 
 @cache
 def all_conditioned() -> Mapping[str, type[ConditionedDamper]]:
     """Every condition-dependent damper by its name."""
     return subclasses_in(__name__, __path__, ConditionedDamper)
+
+
+def all_published() -> Mapping[str, Published]:
+    """What is fitted beside the models: the condition-dependent dampers, and a regression without physics."""
+    known = {**all_conditioned(), KernelDamper.name: KernelDamper}
+    return {name: known[name] for name in sorted(known)}
 
 
 def conditioned_type(name: str) -> type[ConditionedDamper]:

@@ -31,6 +31,15 @@ class AliType(ConditionedDamper):
     name: ClassVar[str] = "ali-type"
     heading: ClassVar[str] = "Ali-type (Spencer-based)"
     source: ClassVar[str] = "after Ali and Ramaswamy 2009; equations not seen"
+    equation: ClassVar[str] = (
+        r"F = c_1 \dot y + k_1 x + f_0,\quad \dot y = \frac{F_z \zeta + k_0 r + c_0 v}{c_0 + c_1},\quad "
+        r"r = x - y,\quad "
+        r"x_z \dot\zeta = \dot r - \frac{1}{2} |\dot r| |\zeta| \zeta - \frac{1}{2} \dot r \zeta^2,\quad "
+        r"x_z = \exp(x_{z,\mathrm{log}}),\quad "
+        r"c_0 = \max(c_{0,\mathrm{floor}}, c_{00} + c_{01} I + c_{02} I^2) (A/A_r)^{c_{0,p}} (f/f_r)^{c_{0,q}},\quad "
+        r"c_1 = \max(c_{1,\mathrm{floor}}, c_{10} + c_{11} I + c_{12} I^2) (A/A_r)^{c_{1,p}} (f/f_r)^{c_{1,q}},\quad "
+        r"F_z = \max(F_{z,\mathrm{floor}}, F_{z0} + F_{z1} I + F_{z2} I^2) (A/A_r)^{F_{z,p}} (f/f_r)^{F_{z,q}}"
+    )
     basis: ClassVar[str] = "spencer"
     limits: ClassVar[str] = "needs frequency and amplitude: sines only; stepped, not closed"
 

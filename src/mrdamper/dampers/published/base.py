@@ -4,24 +4,33 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, fields, replace
 from typing import ClassVar, Self
 
 import numpy as np
 
-from mrdamper.dampers.base import Damper, Envelope
+from mrdamper.dampers.base import Damper, Envelope, Saved
 from mrdamper.dampers.coil import Coil
+from mrdamper.dampers.piece import Piece
 from mrdamper.data import Condition, Floats, Run
-from mrdamper.errors import IdentificationError
+from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.identification import Identification
 from mrdamper.models import Model
-from mrdamper.motion import Excitation, equivalent_sine, measured_motion
+from mrdamper.motion import sine
 from mrdamper.optimizers.levenberg_marquardt import least_squares
-from mrdamper.simulation import Response, simulate, steady_loop
 
-_SAMPLES = 150  # a cycle, for the joint refinement
 _STEPS = 8
 _REACH = 0.8  # a coefficient may move by this share of its start, or of one
+
+
+@dataclass(frozen=True)
+class SavedConditioned(Saved):
+    """A condition-dependent damper in a saved model."""
+
+    model: str
+    coefficients: dict[str, float]
+    reference: tuple[float, float, float]  # current [A], frequency [Hz], amplitude [m]
+    tables: dict[str, list[float] | list[list[float]]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,9 +50,12 @@ class ConditionedDamper(Damper):
     """
 
     kind: ClassVar[str] = "conditioned"
+    saved: ClassVar[type[Saved]] = SavedConditioned
+    conditional: ClassVar[bool] = True
     name: ClassVar[str]
     heading: ClassVar[str]
-    source: ClassVar[str]
+    source: ClassVar[str]  # type: ignore[assignment]
+    equation: ClassVar[str]  # type: ignore[assignment]
     basis: ClassVar[str]  # model identified run by run, from which the coefficients start
     basis_free: ClassVar[tuple[str, ...]] = ()
     limits: ClassVar[str]  # what it cannot do, for tables
@@ -60,13 +72,13 @@ class ConditionedDamper(Damper):
         return self.heading
 
     @property
-    def has_model(self) -> bool:
-        """Whether a model stands behind it at every condition; a regression has none."""
-        return bool(self.basis)
-
-    @property
     def parameter_count(self) -> int:
         return len(self.coefficients)
+
+    @property
+    def numbers(self) -> Mapping[str, float]:
+        reference = dict(zip(("I_r", "f_r", "A_r"), astuple(self.reference), strict=True))
+        return {**self.coefficients, **reference}
 
     @classmethod
     @abstractmethod
@@ -129,41 +141,26 @@ class ConditionedDamper(Damper):
         found = least_squares(residual, centre, centre - _REACH, centre + _REACH, most_steps=_STEPS)
         return replace(self, coefficients=dict(zip(names, (found.point * size).tolist(), strict=True)))
 
-    def loop(self, condition: Condition) -> Response:
-        return steady_loop(self.model_at(condition), condition)
-
-    def force_along(self, motion: Excitation, condition: Condition) -> Floats:
-        return simulate(self.model_at(condition), self.felt(motion)).force
-
-
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """The last cycle of a run, thinned, and the motion that leads up to it."""
-
-    condition: Condition
-    motion: Excitation
-    scored: slice
-    force: Floats
-    scale: float
+    def to_saved(self) -> SavedConditioned:
+        own = {f.name: getattr(self, f.name) for f in fields(self)}
+        tables = {name: value.tolist() for name, value in own.items() if isinstance(value, np.ndarray)}
+        return SavedConditioned(self.name, dict(self.coefficients), astuple(self.reference), tables)
 
     @classmethod
-    def of(cls, run: Run) -> Piece:
-        """Cut it from a run."""
-        found = equivalent_sine(run)
-        last = int(np.flatnonzero(run.in_window)[-1])
-        period = 1 / found.condition.frequency_Hz
-        begin = int(np.searchsorted(run.time, run.time[last] - period))
-        lead = int(np.searchsorted(run.time, run.time[last] - 1.75 * period))
-        step = max(1, (last - begin) // _SAMPLES)
-        motion = measured_motion(run).about(found.centre).part(slice(lead, last + 1, step))
-        force = run.force[lead : last + 1 : step]
-        scored = slice((begin - lead) // step, None)
-        scale = float(np.ptp(force[scored])) * np.sqrt(force[scored].size)
-        return cls(found.condition, motion, scored, force[scored], scale)
+    def from_saved(
+        cls, saved: SavedConditioned, rig: str, envelope: Envelope, provenance: Mapping[str, str], coil: Coil | None
+    ) -> Self:
+        from mrdamper.dampers.published import conditioned_type  # imports every file, this one among them
 
-    def residual(self, model: Model) -> Floats:
-        """Predicted minus measured force over the force scale; its squares sum to nrmse_pp²."""
-        return (simulate(model, self.motion).force[self.scored] - self.force) / self.scale
+        known = conditioned_type(saved.model)
+        reference = Condition(*saved.reference)
+        tables = {name: np.array(table) for name, table in saved.tables.items()}
+        try:
+            made = known(rig, saved.coefficients, reference, envelope, provenance, coil=coil, **tables)
+            made.force_along(sine(reference, 1, 8), reference)
+        except (KeyError, TypeError, ValueError, IndexError) as error:
+            raise ParameterError(f"coefficients do not fit the model: {error}", mend="write the model again") from error
+        return made
 
 
 def quadratic(current: float, coefficients: Mapping[str, float], name: str) -> float:

@@ -37,6 +37,12 @@ class BoadaType(ConditionedDamper):
     name: ClassVar[str] = "boada-type"
     heading: ClassVar[str] = "Boada-type (arctangent, neural network)"
     source: ClassVar[str] = "after Boada et al.; equations not seen"
+    equation: ClassVar[str] = (
+        r"F = \frac{2}{\pi} f_y \arctan[\kappa (v + v_0\,\mathrm{sgn}\,x)] + c\,v + k\,x + f_0,\quad "
+        r"(\ln f_y, \ln \kappa, \ln v_0, c, k, f_0)_j = \mathrm{middle}_j + \mathrm{width}_j\, o_j,\quad "
+        r"o_j = \sum_{h} \mathrm{weight}_{jh} \tanh\left(\sum_{i} \mathrm{weight}_{hi} u_i\right),\quad "
+        r"u_i = (q_i - \mathrm{centre}_i)/\mathrm{spread}_i,\quad q = (I, \ln f, \ln A)"
+    )
     basis: ClassVar[str] = "guo"
     basis_free: ClassVar[tuple[str, ...]] = ("k",)
     limits: ClassVar[str] = "needs frequency and amplitude: sines only; a network does not extrapolate"

@@ -34,6 +34,16 @@ class DominguezType(ConditionedDamper):
     name: ClassVar[str] = "dominguez-type"
     heading: ClassVar[str] = "Dominguez-type"
     source: ClassVar[str] = "after Dominguez, Sedaghati and Stiharu 2008; equations not seen"
+    equation: ClassVar[str] = (
+        r"F = s \left[c\,v + (k_1 + k_2 I)\,x + \alpha z\right] + f_0,\quad "
+        r"s = (f/f_r)^{d_2} (A/A_r)^{d_4},\quad "
+        r"c = \max\left(0, c_4 + (c_1 - c_4) I_b + c_2 \left(1 - e^{-c_3 I_a}\right)\right),\quad "
+        r"\alpha = \max\left(0, \alpha_4 + (\alpha_1 - \alpha_4) I_b "
+        r"+ \alpha_2 \left(1 - e^{-\alpha_3 I_a}\right)\right),\quad "
+        r"I_b = \min(I, I_r)/I_r,\quad I_a = \max(0, I - I_r),\quad "
+        r"\dot z = v - \beta |v| |z| z - \gamma v z^2,\quad "
+        r"\gamma = \min(\beta, \max(-0.999 \beta, \gamma_1 - \gamma_2 I))"
+    )
     basis: ClassVar[str] = "bouc-wen"
     limits: ClassVar[str] = "needs frequency and amplitude: sines only; one power law for all forces"
 

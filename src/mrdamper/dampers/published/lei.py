@@ -25,6 +25,14 @@ class LeiType(ConditionedDamper):
     name: ClassVar[str] = "lei-type"
     heading: ClassVar[str] = "Lei-type (piecewise, quadratic in current)"
     source: ClassVar[str] = "after Lei et al.; equations not seen"
+    equation: ClassVar[str] = (
+        r"F = c_{po} v + f_y \max\left(-1, \min\left(1, \frac{v - v_h\,\mathrm{sgn}\,a}{v_y}\right)\right) + f_0,\quad "
+        r"v_y = \frac{f_y}{c_{pr} - c_{po}},\quad v_h = v_0 \frac{c_{pr} v_y}{f_y},\quad "
+        r"c_{po} = \max(0, c_{po0} + c_{po1} I + c_{po2} I^2),\quad "
+        r"c_{pr} = \max(1.01 c_{po} + 1, c_{pr0} + c_{pr1} I + c_{pr2} I^2),\quad "
+        r"f_y = \max(1, f_{y0} + f_{y1} I + f_{y2} I^2),\quad "
+        r"v_0 = \max(0, v_{00} + v_{01} I + v_{02} I^2)"
+    )
     basis: ClassVar[str] = "biviscous"
     limits: ClassVar[str] = "knows neither frequency nor amplitude; memoryless, sines only"
 

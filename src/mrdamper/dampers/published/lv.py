@@ -28,6 +28,12 @@ class LvType(ConditionedDamper):
     name: ClassVar[str] = "lv-type"
     heading: ClassVar[str] = "Lv-type (rheological)"
     source: ClassVar[str] = "after Lv et al.; equations not seen"
+    equation: ClassVar[str] = (
+        r"F = \frac{f_y}{T}\,\mathrm{sgn}\,v + f_0,\quad \frac{|v|}{v_c} = \frac{m}{2m+1} T^{-1/m}"
+        r" (1-T)^{1+1/m} \left(1 + \frac{m}{m+1} T\right),\quad "
+        r"f_y = \max(1, f_{y0} + f_{y1} I + f_{y2} I^2),\quad "
+        r"v_c = \left(f_y/\exp(\mathrm{consistency}_{\mathrm{log}})\right)^{1/m}"
+    )
     basis: ClassVar[str] = "bingham"
     limits: ClassVar[str] = "no hysteresis: a single curve over velocity"
 

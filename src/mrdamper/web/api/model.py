@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Condition
 from mrdamper.metrics import dissipated_power, peak_force
-from mrdamper.web.bench_model import follows_condition, held_model, middle, predict_held, sliders
+from mrdamper.web.bench_model import follows_condition, held_model, predict_held, sliders
 from mrdamper.web.curves import predicted_cycle
 from mrdamper.web.frames import frame, number
 from mrdamper.web.rig_table import condition_on_screen
@@ -54,7 +54,7 @@ def damper(key: str, session: Current) -> dict[str, Any]:
     """A damper's sliders and tested envelope."""
     bench = session.damper(key)
     found, e = bench.damper, bench.damper.envelope
-    start = middle(found)
+    start = found.envelope.middle
     table = session.table_of(found.rig)
     near = table.nearest(start, 1, anywhere=True) if table else []
     if near and near[0].condition:

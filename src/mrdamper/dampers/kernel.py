@@ -8,24 +8,73 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from mrdamper.dampers.base import Envelope
-from mrdamper.dampers.published.base import ConditionedDamper, Piece
+from mrdamper.dampers.base import Damper, Envelope, Saved
+from mrdamper.dampers.coil import Coil
+from mrdamper.dampers.piece import Piece
 from mrdamper.data import Condition, Floats, Run
-from mrdamper.errors import IdentificationError
+from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.identification import Identification
-from mrdamper.models import Model
-from mrdamper.motion import Excitation, sine
-from mrdamper.simulation import Response
+from mrdamper.motion import Excitation
+from mrdamper.parameters import ParameterInfo
 
 _CENTRES = 200
 _WIDTH = 1.2  # of a kernel, in standard deviations of the inputs
 _RIDGE = 1e-3
 _SLOW = 5e-3  # m/s; below it velocity counts straight, above it by its logarithm
 _SEED = 20240813
+_INPUTS = 4
 
 
 @dataclass(frozen=True, eq=False)
-class KernelBaseline(ConditionedDamper):
+class KernelLaw:
+    """A force of the instant: Gaussian kernels about centres.
+
+    Attributes
+    ----------
+    centres : (K, 4) array
+        Displacement, bent velocity, acceleration and current, each over its spread.
+    weights : (K,) array
+    spread : (4,) array
+    mean, size : float
+        Of the force [N].
+    """
+
+    centres: Floats
+    weights: Floats
+    spread: Floats
+    mean: float
+    size: float
+
+    def parameters(self) -> tuple[ParameterInfo, ...]:
+        """None that anybody could name."""
+        return ()
+
+    def values(self) -> dict[str, float]:
+        """None either."""
+        return {}
+
+    def state(self, motion: Excitation) -> Floats:
+        """No memory."""
+        return np.zeros(len(motion))
+
+    def force(self, motion: Excitation, state: Floats) -> Floats:
+        """Force [N] (N,) along a motion."""
+        return self.mean + self.size * (_kernel(_inputs(motion) / self.spread, self.centres) @ self.weights)
+
+
+@dataclass(frozen=True)
+class SavedKernel(Saved):
+    """A kernel regression in a saved model."""
+
+    centres: list[list[float]]
+    weights: list[float]
+    spread: list[float]
+    mean: float
+    size: float
+
+
+@dataclass(frozen=True, eq=False)
+class KernelDamper(Damper):
     """Gaussian kernels over displacement, velocity, acceleration and current; no model of a damper.
 
     What a smooth function of the instant can do. A physical model that is no better than this
@@ -37,22 +86,32 @@ class KernelBaseline(ConditionedDamper):
     Processes for Machine Learning", chapter 8.
     """
 
+    kind: ClassVar[str] = "kernel"
+    saved: ClassVar[type[Saved]] = SavedKernel
+    streams: ClassVar[bool] = False
     name: ClassVar[str] = "kernel"
     heading: ClassVar[str] = "kernel regression (no physics)"
-    source: ClassVar[str] = "Rasmussen and Williams 2006, chapter 8"
+    source: ClassVar[str] = "Rasmussen and Williams 2006, chapter 8"  # type: ignore[assignment]
     basis: ClassVar[str] = ""
+    basis_free: ClassVar[tuple[str, ...]] = ()
     limits: ClassVar[str] = "no memory, no extrapolation, hundreds of numbers"
 
-    centres: Floats = field(default_factory=lambda: np.zeros((0, 4)))
-    weights: Floats = field(default_factory=lambda: np.zeros(0))
+    rig: str
+    law: KernelLaw
+    envelope: Envelope
+    provenance: Mapping[str, str] = field(default_factory=dict)
+    coil: Coil | None = None
+
+    @property
+    def title(self) -> str:
+        return self.heading
 
     @property
     def parameter_count(self) -> int:
-        return self.weights.size + len(self.coefficients)
+        return self.law.weights.size + 2 + self.law.spread.size
 
-    @classmethod
-    def start(cls, identifications: Sequence[Identification], reference: Condition) -> dict[str, float]:
-        return {}
+    def model_at(self, condition: Condition) -> KernelLaw:
+        return self.law
 
     @classmethod
     def fit(
@@ -77,28 +136,24 @@ class KernelBaseline(ConditionedDamper):
         normal += 1e-10 * np.trace(normal) / len(centres) * np.eye(len(centres))
         weights = np.linalg.solve(normal, table.T @ ((force - mean) / size * trust) / len(inputs))
         conditions = [piece.condition for piece in pieces]
-        names = ("displacement", "velocity", "acceleration", "current")
-        coefficients = {
-            "mean": mean,
-            "size": size,
-            **{f"spread_{n}": float(s) for n, s in zip(names, spread, strict=True)},
-        }
-        return cls(
-            runs[0].rig, coefficients, conditions[0], Envelope.of(conditions), dict(provenance or {}), centres, weights
-        )
+        law = KernelLaw(centres, weights, spread, mean, size)
+        return cls(runs[0].rig, law, Envelope.of(conditions), dict(provenance or {}))
 
-    def model_at(self, condition: Condition) -> Model:
-        raise IdentificationError("there is no model behind it", where=self.heading, mend="use loop or force_along")
+    def to_saved(self) -> SavedKernel:
+        law = self.law
+        return SavedKernel(law.centres.tolist(), law.weights.tolist(), law.spread.tolist(), law.mean, law.size)
 
-    def force_along(self, motion: Excitation, condition: Condition) -> Floats:
-        given = self.coefficients
-        spread = np.array([given[f"spread_{n}"] for n in ("displacement", "velocity", "acceleration", "current")])
-        kernel = _kernel(_inputs(self.felt(motion)) / spread, self.centres)
-        return given["mean"] + given["size"] * (kernel @ self.weights)
-
-    def loop(self, condition: Condition) -> Response:
-        motion = sine(condition, 1)
-        return Response(motion, self.force_along(motion, condition), np.zeros(len(motion)))
+    @classmethod
+    def from_saved(
+        cls, saved: SavedKernel, rig: str, envelope: Envelope, provenance: Mapping[str, str], coil: Coil | None
+    ) -> Self:
+        try:
+            centres, weights, spread = (np.array(v, dtype=float) for v in (saved.centres, saved.weights, saved.spread))
+        except ValueError:
+            centres, weights, spread = np.zeros((0, 0)), np.zeros(0), np.zeros(0)
+        if spread.shape != (_INPUTS,) or centres.shape != (weights.size, _INPUTS) or not np.all(spread > 0):
+            raise ParameterError("centres, weights and spreads do not fit together", mend="write the model again")
+        return cls(rig, KernelLaw(centres, weights, spread, saved.mean, saved.size), envelope, provenance, coil)
 
 
 def _inputs(motion: Excitation) -> Floats:

@@ -1,0 +1,169 @@
+"""A damper one sample after the other: its own array code, run on symbols.
+
+What is traced here is streamed, leaves as C and FMU, and predicts motion that is no sine with
+parameters that ask for a frequency and an amplitude: one definition, looking back only.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mrdamper.dampers.coil import field_step
+from mrdamper.data import Condition, Floats
+from mrdamper.errors import ExcitationError, ParameterError
+from mrdamper.tracing import Program, Tape, Traced, program
+from mrdamper.tracing.python import python_functions
+
+if TYPE_CHECKING:
+    from mrdamper.dampers.base import Damper
+    from mrdamper.motion import Excitation
+
+SLACK = 0.02  # a test bench repeats a condition to a few per cent; within that nothing is extrapolated
+_STEADY = 1e-18  # mean square displacement under which nothing moves [m²]
+_LONG = 100_000  # samples from which compiling pays
+
+
+@dataclass(frozen=True, eq=False)
+class TracedStep(Traced):
+    """A channel that enters by its step from sample to sample only: the path, or time."""
+
+    tape: Tape
+    step: Any
+
+
+@dataclass(frozen=True, eq=False)
+class TracedMotion(Traced):
+    """What an `Excitation` is for one sample."""
+
+    tape: Tape
+    displacement: Any
+    velocity: Any
+    acceleration: Any
+    current: Any
+    time: TracedStep
+    path: TracedStep
+
+    def __len__(self) -> int:
+        return 1
+
+
+def trace(damper: Damper) -> Program:
+    """The program of one sample.
+
+    From displacement [m], velocity [m/s], acceleration [m/s²], current [A] and the step of time [s]
+    to force [N] and a flag of 8 where the frequency was not tested. One model for all conditions keeps
+    its parameters free to be set. Where parameters follow the condition, frequency and amplitude come
+    from the motion so far, averaged over about a cycle of the slowest tested frequency, and stay inside
+    the tested ranges.
+
+    Raises
+    ------
+    ParameterError
+        If the damper is of a kind that has no form for one sample.
+    """
+    if not damper.streams:
+        raise ParameterError(
+            "no form for one sample", where=damper.title, mend="stream a damper with a model behind it"
+        )
+    tape = Tape()
+    middle = float(np.mean(damper.envelope.current_A)) if damper.envelope.tested else 0.0
+    x, v, a = (tape.input(name) for name in ("displacement", "velocity", "acceleration"))
+    asked, dt = tape.input("current", middle), tape.input("dt")
+    moved = x - tape.previous(x, "displacement")
+    felt = field_step(tape, dt, asked, damper.coil.rise_s, damper.coil.fall_s) if damper.coil else abs(asked)
+    motion = TracedMotion(tape, x, v, a, tape.assume(felt, middle), TracedStep(tape, dt), TracedStep(tape, moved))
+    outside: Any = 0.0
+    if damper.one_model is not None:
+        free = damper.one_model
+        model = type(free)(**{i.name: tape.parameter(i.name, getattr(free, i.name)) for i in free.parameters()})
+    else:
+        running, outside = _running_condition(damper, motion)
+        model = damper.model_at(running)
+    force = model.force(motion, model.state(motion))  # type: ignore[arg-type]
+    return program(tape, {"force": force, "flags": _flags(motion, abs(asked), damper) + outside})
+
+
+def _running_condition(damper: Damper, motion: TracedMotion) -> tuple[Condition, Any]:
+    """The sine the motion has resembled so far, and whether its frequency was not tested.
+
+    ω² is the mean square velocity over the mean square displacement, A² twice the latter; the
+    means fade in two lags of one slowest period each, and are freed of their start.
+    """
+    tape, envelope = motion.tape, damper.envelope
+    low, high = envelope.frequency_Hz
+    keep = np.exp(-low * motion.time.step)
+
+    def faded(value: Any, name: str) -> Any:
+        for stage in ("once", "twice"):
+            held = tape.remember(f"{name}_{stage}")
+            value = keep * held + (1 - keep) * value
+            tape.update(held, value)
+        return value
+
+    weight = faded(1.0, "weight")
+    x2 = faded(motion.displacement**2, "displacement_squared") / weight
+    v2 = faded(motion.velocity**2, "velocity_squared") / weight
+    moving = x2 > _STEADY
+    frequency = tape.select(moving, np.sqrt(v2 / x2) / (2 * math.pi), math.sqrt(low * high))
+    amplitude = tape.select(moving, np.sqrt(2 * x2), math.sqrt(math.prod(envelope.amplitude_m)))
+    flag = tape.select((frequency < low * (1 - SLACK)) | (frequency > high * (1 + SLACK)), 8.0, 0.0)
+    f = tape.assume(np.clip(frequency, low, high), math.sqrt(low * high))
+    A = tape.assume(np.clip(amplitude, *envelope.amplitude_m), math.sqrt(math.prod(envelope.amplitude_m)))
+    return Condition(motion.current, f, A), flag
+
+
+def _flags(motion: TracedMotion, current: Any, damper: Damper) -> Any:
+    """Extrapolation in current, amplitude and velocity as bits 0 to 2."""
+    envelope = damper.envelope
+    if not envelope.tested:
+        return 0.0
+    tape, (low, high) = motion.tape, envelope.current_A
+    outside = (
+        (current < low - SLACK * high) | (current > high * (1 + SLACK)),
+        abs(motion.displacement) > envelope.amplitude_m[1] * (1 + SLACK),
+        abs(motion.velocity) > envelope.peak_velocity_m_s[1] * (1 + SLACK),
+    )
+    total: Any = 0.0
+    for bit, question in enumerate(outside):
+        total = total + tape.select(question, float(2**bit), 0.0)
+    return total
+
+
+def causal_force(damper: Damper, motion: Excitation) -> Floats:
+    """(N,) force [N] along any motion, sample by sample, as a stream of the damper gives it.
+
+    Raises
+    ------
+    ExcitationError
+        If there is no force at a sample.
+    """
+    made = trace(damper)
+    prepare, advance = python_functions(made)
+    given = tuple(float(e.value) for e in made.tape.parameters.values())
+    _, derived = prepare(given)
+    steps = np.diff(motion.time, prepend=2 * motion.time[0] - motion.time[1])
+    channels = (motion.displacement, motion.velocity, motion.acceleration, motion.current, steps)
+    starts = tuple(made.tape.starts.values())
+    if len(motion) > _LONG:
+        from mrdamper.tracing.compiled import compiled_run
+
+        force, flags = np.empty(steps.size), np.empty(steps.size)
+        inputs = [np.ascontiguousarray(channel, dtype=float) for channel in channels]
+        failed = compiled_run(made)(given, derived, np.array(starts), *inputs, force, flags)
+    else:
+        force, memory, failed = np.empty(steps.size), starts, -1
+        for i, sample in enumerate(zip(*(channel.tolist() for channel in channels), strict=True)):
+            status, (force[i], _), memory = advance(given, derived, memory, sample)
+            if status:
+                failed = i
+                break
+    if failed >= 0 or not np.isfinite(force).all():
+        at = failed if failed >= 0 else int(np.flatnonzero(~np.isfinite(force))[0])
+        raise ExcitationError(
+            f"no force at {motion.time[at]:.6g} s", where=damper.title, mend="bring the motion nearer to the tests"
+        )
+    return force

@@ -1,0 +1,44 @@
+"""The last cycle of a run: what a condition-dependent damper is refined on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrdamper.data import Condition, Floats, Run
+from mrdamper.models import Model
+from mrdamper.motion import Excitation, equivalent_sine, measured_motion
+from mrdamper.simulation import simulate
+
+_SAMPLES = 150  # a cycle
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """The last cycle of a run, thinned, and the motion that leads up to it."""
+
+    condition: Condition
+    motion: Excitation
+    scored: slice
+    force: Floats
+    scale: float
+
+    @classmethod
+    def of(cls, run: Run) -> Piece:
+        """Cut it from a run."""
+        found = equivalent_sine(run)
+        last = int(np.flatnonzero(run.in_window)[-1])
+        period = 1 / found.condition.frequency_Hz
+        begin = int(np.searchsorted(run.time, run.time[last] - period))
+        lead = int(np.searchsorted(run.time, run.time[last] - 1.75 * period))
+        step = max(1, (last - begin) // _SAMPLES)
+        motion = measured_motion(run).about(found.centre).part(slice(lead, last + 1, step))
+        force = run.force[lead : last + 1 : step]
+        scored = slice((begin - lead) // step, None)
+        scale = float(np.ptp(force[scored])) * np.sqrt(force[scored].size)
+        return cls(found.condition, motion, scored, force[scored], scale)
+
+    def residual(self, model: Model) -> Floats:
+        """Predicted minus measured force over the force scale; its squares sum to nrmse_pp²."""
+        return (simulate(model, self.motion).force[self.scored] - self.force) / self.scale

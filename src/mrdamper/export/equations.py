@@ -1,0 +1,61 @@
+"""The equations of a damper as LaTeX: those its model is written with, then its parameter functions."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from mrdamper.dampers.base import Damper
+from mrdamper.data import Condition
+from mrdamper.errors import ParameterError
+from mrdamper.functions.forms import ParameterFunction, form_named
+
+NOWHERE = Condition(0.0, 1.0, 0.01)  # any condition: a damper without ranges has one model for all
+
+
+def equations(damper: Damper) -> list[str]:
+    """One line of LaTeX an equation: force first, then the state, then what parameters follow.
+
+    Raises
+    ------
+    ParameterError
+        If there is no equation behind the damper that anybody could read.
+    """
+    if not damper.equation:
+        raise ParameterError("no equations to print", where=damper.title, mend="export a damper with a model behind it")
+    model: Any = damper.model_at(damper.envelope.middle if damper.envelope.tested else NOWHERE)
+    symbols = {name: letter for name, (letter, _) in type(model).coordinates.items()}
+    symbols |= {info.name: info.symbol for info in model.parameters()}
+    lines = [line.strip() for line in damper.equation.split(r",\quad")]
+    return lines + [f"{symbols[name]} = {function_text(function)}" for name, function in damper.functions.items()]
+
+
+def function_text(function: ParameterFunction) -> str:
+    """A parameter function of I, f and A as LaTeX, its numbers in it."""
+    parts = []
+    for value, term in zip(function.coefficients, form_named(function.form).terms, strict=True):
+        powers = {"I": term.current, "f": term.frequency, "A": term.amplitude}
+        factors = [name if power == 1 else f"{name}^{{{power}}}" for name, power in powers.items() if power]
+        exponents = [(term.decay_I, "I"), (term.decay_f, "f")]
+        factors += [f"e^{{{number(-function.rates[i])} \\, {name}}}" for i, name in exponents if i is not None]
+        if term.power_f is not None:
+            factors.append(f"f^{{{number(-function.rates[term.power_f])}}}")
+        product = r" \, ".join([number(abs(value)), *factors])
+        parts.append(f"- {product}" if value < 0 else f"+ {product}" if parts else product)
+    text = " ".join(parts).strip()
+    return rf"\exp\left({text}\right)" if function.log else text
+
+
+def number(value: float) -> str:
+    """A number to five digits."""
+    text = f"{value:.5g}"
+    if "e" not in text:
+        return text
+    digits, power = text.split("e")
+    ten = f"10^{{{int(power)}}}"
+    return {"1": ten, "-1": f"-{ten}"}.get(digits, rf"{digits} \cdot {ten}")
+
+
+def unit_text(unit: str) -> str:
+    """A unit with its powers raised."""
+    return re.sub(r"\^(-?\w+)", r"$^{\1}$", unit)
