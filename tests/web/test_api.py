@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from mrdamper.dampers.joint import JointProblem
+from mrdamper.dampers.kernel import KernelDamper
 from mrdamper.dampers.modified import fit_modified
-from mrdamper.dampers.published import conditioned_type
 from mrdamper.data import Condition
 from mrdamper.export import exporter
 from mrdamper.export.base import identifier
@@ -283,7 +283,7 @@ def test_any_rig_gives_files_a_name(rig):
 
 def test_a_damper_without_a_model_behind_it_moves_too(client, bench, bundled):
     rig = bundled.rig("utfsm")
-    kernel = conditioned_type("kernel").fit([run for run in rig.split("train")][:4], [])
+    kernel = KernelDamper.fit([run for run in rig.split("train")][:4], [])
     key = put_on(client, bench, kernel)
     assert client.get(f"{bench}/dampers/{key}").json()["parameters"] == []
     ask = {"current_A": 0.5, "frequency_Hz": 1.0, "amplitude_m": 0.01, "currents": 3}
