@@ -11,7 +11,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mrdamper.dampers.base import SLACK, Damper, Envelope
-from mrdamper.export.base import Exporter, Written, identifier, rig_of
+from mrdamper.dampers.joint import damper_of
+from mrdamper.export.base import Exporter, Written, identifier
 from mrdamper.export.c import TOLERANCE, c_facts, c_sources, reference_motion, shared_points
 from mrdamper.export.js_writer import JavaScriptWriter
 from mrdamper.export.templates import render
@@ -60,7 +61,7 @@ def _web_sources(made: Stream, name: str) -> dict[str, bytes]:
 
 def _facts(damper: Damper | Model, made: Stream, name: str, library: bytes | None) -> dict[str, Any]:
     """What the page's template says."""
-    rig = rig_of(damper)
+    rig = damper_of(damper).rig
     envelope = made.envelope
     computed = {
         "wasm": base64.b64encode(library).decode() if library else None,

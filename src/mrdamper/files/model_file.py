@@ -153,7 +153,7 @@ def _checked(schema: Any, raw: dict[str, Any], prefix: str, where: str) -> Any:
 
 
 def _kind(described: dict[str, Any], where: str) -> tuple[type[Damper], dict[str, Any]]:
-    name, known = described.get("kind"), all_kinds()
+    name, known = str(described.get("kind")), all_kinds()
     if name not in known:
         raise ModelFileError(
             f"damper.kind is {name!r}", where=where, mend=f"known: {', '.join(known)}; write the model again"
@@ -163,9 +163,9 @@ def _kind(described: dict[str, Any], where: str) -> tuple[type[Damper], dict[str
 
 def _upgraded(raw: dict[str, Any]) -> dict[str, Any]:
     """What older minor versions said otherwise. Before 1.2 a kernel regression was a condition-dependent damper."""
-    damper = raw.get("damper")
-    if isinstance(damper, dict) and damper.get("kind") == "conditioned" and damper.get("model") == "kernel":
-        numbers, tables = damper.get("coefficients"), damper.get("tables")
+    described = raw.get("damper")
+    if isinstance(described, dict) and described.get("kind") == "conditioned" and described.get("model") == "kernel":
+        numbers, tables = described.get("coefficients"), described.get("tables")
         if isinstance(numbers, dict) and isinstance(tables, dict):
             spread = [numbers.get(f"spread_{n}") for n in ("displacement", "velocity", "acceleration", "current")]
             whole = {"mean": numbers.get("mean"), "size": numbers.get("size"), "spread": spread}

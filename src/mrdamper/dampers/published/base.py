@@ -160,7 +160,7 @@ class ConditionedDamper(Damper):
             made.force_along(sine(reference, 1, 8), reference)
         except (KeyError, TypeError, ValueError, IndexError) as error:
             raise ParameterError(f"coefficients do not fit the model: {error}", mend="write the model again") from error
-        return made
+        return made  # type: ignore[return-value]
 
 
 def quadratic(current: float, coefficients: Mapping[str, float], name: str) -> float:
