@@ -211,12 +211,17 @@ class Damper(ABC):
         """Motion after a reversal in which the force turns over [m], where the model has such a length."""
         return None
 
-    @abstractmethod
     def to_saved(self) -> Saved:
-        """Its own part of a saved model."""
+        """Its own part of a saved model.
+
+        Raises
+        ------
+        InputError
+            If it is of a kind that lives in one study only.
+        """
+        raise InputError("this kind of damper is not saved", where=self.title, mend="save another damper")
 
     @classmethod
-    @abstractmethod
     def from_saved(
         cls, saved: Any, rig: str, envelope: Envelope, provenance: Mapping[str, str], coil: Coil | None
     ) -> Self:
@@ -227,6 +232,7 @@ class Damper(ABC):
         InputError
             If it does not make a damper.
         """
+        raise NotImplementedError(cls.kind)  # a kind that cannot be saved is not looked for in files
 
     def holding(self, values: Mapping[str, float]) -> Damper:
         """The damper with some of its own numbers held at a value.
