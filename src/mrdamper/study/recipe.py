@@ -18,7 +18,7 @@ from mrdamper.dampers.base import Damper
 from mrdamper.dampers.joint import JointFit, JointProblem
 from mrdamper.dampers.modified import ModifiedFit, fit_modified, fit_modified_jointly
 from mrdamper.dampers.paper import paper_functions
-from mrdamper.dampers.published import ConditionedDamper, all_conditioned
+from mrdamper.dampers.published import Published, all_published
 from mrdamper.data import Run
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError
 from mrdamper.gas_spring import GasSpring
@@ -330,7 +330,7 @@ def by_the_paper(runs: Sequence[Run], identifications: Sequence[Identification])
     return Made(fit.damper, lambda rows: paper_functions([identifications[i] for i in rows]).damper, fit)
 
 
-def by_its_laws(cls: type[ConditionedDamper], runs: Sequence[Run], identifications: Sequence[Identification]) -> Made:
+def by_its_laws(cls: Published, runs: Sequence[Run], identifications: Sequence[Identification]) -> Made:
     """The laws of a published damper, started from single runs and refined on all."""
     about = {"train runs": str(len(runs))}
 
@@ -369,7 +369,7 @@ def play_and_bypass() -> Recipe:
     return Recipe(JOINTLY, None, one_set, "joint", cls.title, cls.source, "takes any motion and a current that varies")
 
 
-def conditioned(cls: type[ConditionedDamper]) -> Recipe:
+def conditioned(cls: Published) -> Recipe:
     """A published damper with its own laws over current, frequency and amplitude."""
     basis = Basis(cls.basis, free=cls.basis_free) if cls.basis else None
     return Recipe(cls.name, basis, partial(by_its_laws, cls), "", cls.heading, cls.source, cls.limits)
@@ -432,7 +432,7 @@ def catalogue() -> Mapping[str, Recipe]:
     found = [modified(name) for name in all_models() if name != JOINTLY]
     found += [jointly(name) for name in _closed_shapes()]
     found += [modified(*name.split(":")) for name in GENETIC]
-    found += [play_and_bypass(), *(conditioned(cls) for cls in all_conditioned().values())]
+    found += [play_and_bypass(), *(conditioned(cls) for cls in all_published().values())]
     return {recipe.name: recipe for recipe in found}
 
 
