@@ -7,6 +7,6 @@ found = identify(run, "bouc-wen")
 print(f"{found.condition}: error {100 * found.scores.nrmse_pp:.2f} %, scatter of the rig {100 * found.floor:.2f} %")
 print(f"yield force {found.model.yield_force:.0f} N within {1e6 * found.model.yield_displacement:.0f} µm")
 print(f"c = {found.model.c:.0f} ± {found.standard_errors['c']:.0f} N s/m")
-print(found.message)
+print(found.ending)
 for note in found.notes:
     print(f"note: {note}")

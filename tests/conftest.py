@@ -25,6 +25,14 @@ def vectors():
     return json.loads((Path(__file__).parent / "vectors.json").read_text(encoding="utf-8"))
 
 
+@pytest.fixture(scope="session")
+def bundled_study(bundled):
+    """The whole method on the bundled data, computed once: ten seconds."""
+    from mrdamper.study.workflow import run_study
+
+    return run_study(bundled)
+
+
 @pytest.fixture
 def condition():
     return Condition(1.0, 1.0, 0.02)

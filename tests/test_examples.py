@@ -1,12 +1,28 @@
+"""Examples run as they stand; what they study of the bundled data was studied once for all tests."""
+
 import runpy
 from pathlib import Path
 
 import pytest
 
+from mrdamper.study import workflow
+
 EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("*.py"))
 
 
+@pytest.fixture
+def studied_once(bundled, bundled_study, monkeypatch):
+    def run_study(dataset):
+        if not {run.id for run in dataset} <= {run.id for run in bundled}:
+            return studied(dataset)
+        return workflow.Study(dataset, tuple(bundled_study.rig(name) for name in dataset.rigs), 0.0)
+
+    studied = workflow.run_study
+    monkeypatch.setattr(workflow, "run_study", run_study)
+
+
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda p: p.stem)
+@pytest.mark.usefixtures("studied_once")
 def test_example_runs(path, capsys):
     runpy.run_path(str(path), run_name="__main__")
     assert capsys.readouterr().out.strip()

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -13,13 +14,27 @@ from mrdamper.files.model_file import dump_model, load_model
 from mrdamper.identification.loop_analysis import analyse_loop, dynamic_ranges
 from mrdamper.report.study import write_study
 from mrdamper.study import workflow
+from mrdamper.study.parallel import several
 from mrdamper.study.workflow import run_study
 from mrdamper.validation import validate
 
 
 @pytest.fixture(scope="module")
-def study(bundled):
-    return run_study(bundled)
+def study(bundled_study):
+    return bundled_study
+
+
+@pytest.fixture(scope="module")
+def few(bundled):
+    """Eight runs of a real damper: enough for every recipe, quick to study."""
+    sines = [run for run in bundled.rig("utfsm") if run.excitation == "sine"]
+    train, held_out = ([run for run in sines if run.split == split] for split in ("train", "validate"))
+    return Dataset((*train[::2][:6], held_out[0]), "few")
+
+
+@pytest.fixture(scope="module")
+def small(few):
+    return run_study(few)
 
 
 @pytest.fixture(scope="module")
@@ -124,17 +139,26 @@ def test_report_is_one_file_without_scripts_or_links_outside(folder):
     assert len(text) < 6_000_000
 
 
-def test_a_study_is_the_same_twice(study, bundled):
-    again = run_study(bundled.rig("utfsm")).rigs[0]
-    before = study.rig("utfsm")
-    assert [dump_model(c.damper) for c in again.candidates] == [dump_model(c.damper) for c in before.candidates]
+def dumps(rig):
+    return [dump_model(c.damper) for c in rig.candidates], [r.scores for r in rig.chosen.left_out.runs]
 
 
-def test_hostile_names_are_text_in_the_report(tmp_path, bundled):
+def test_a_study_is_the_same_twice_and_in_another_process(small, few, tmp_path):
+    beside = Dataset(tuple(replace(run, id=f"other {run.id}", rig="other") for run in few.runs[:5]))
+    both = Dataset((*beside.runs, *few.runs), "both")
+    with several(2) as processes:
+        again = run_study(both, processes=processes)
+        write_study(again, tmp_path / "out", png=True, processes=processes)
+    assert dumps(again.rig("utfsm")) == dumps(small.rigs[0])
+    assert dumps(again.rig("other")) == dumps(run_study(beside).rigs[0])
+    drawn = sorted(p.suffix for p in (tmp_path / "out" / "figures").iterdir())
+    assert drawn.count(".png") == drawn.count(".svg") == 16
+
+
+def test_hostile_names_are_text_in_the_report(tmp_path, few):
     name = "<script>alert(1)</script>=cmd"
-    runs = [r for r in bundled.rig("utfsm") if r.excitation == "sine"]
     renamed = []
-    for number, run in enumerate(runs):
+    for number, run in enumerate(few):
         fields = {f: getattr(run, f) for f in run.__dataclass_fields__}
         renamed.append(Run(**{**fields, "rig": "rig", "id": f"{name}{number}"}))
     write_study(run_study(Dataset(tuple(renamed), name)), tmp_path / "out")
@@ -149,14 +173,14 @@ def test_one_train_run_is_not_enough(bundled):
         run_study(Dataset(tuple(runs)))
 
 
-def test_a_failed_report_leaves_nothing(study, tmp_path, monkeypatch):
+def test_a_failed_report_leaves_nothing(small, tmp_path, monkeypatch):
     monkeypatch.setattr("mrdamper.report.study.save_model", lambda *a: (_ for _ in ()).throw(RuntimeError("halt")))
     with pytest.raises(RuntimeError, match="halt"):
-        write_study(study, tmp_path / "out")
+        write_study(small, tmp_path / "out")
     assert list(tmp_path.iterdir()) == []
     (tmp_path / "file").write_text("x")
     with pytest.raises(OutputError):
-        write_study(study, tmp_path / "file" / "out")
+        write_study(small, tmp_path / "file" / "out")
 
 
 def test_our_own_faults_are_not_a_reason_to_leave_a_run_out(bundled, monkeypatch):
