@@ -84,13 +84,15 @@ def make_walk(elements: Sequence[Stage], control: Stage | None, signals: int, ma
     for index in reversed(range(len(elements))):
         stage = elements[index]
         given, derived, held = _cuts(ends[index], stage, machine)
-        first = compile_(_one(_step(stage, machine), given, derived, held, int(ends[index][2]), len(stage.start)))
+        keep = compile_(_keeper(int(ends[index][2]), len(stage.start)))
+        first = compile_(_one(_step(stage, machine), given, derived, held, keep))
         evaluate = compile_(_either(index, first, evaluate))
     command = compile_(_no_command)
     if control is not None:
         given, derived, held = _cuts((0, 0, 0), control, machine)
         seen = _cut(0, signals + 1, machine)
-        command = compile_(_command(_step(control, machine), given, derived, held, seen, len(control.start)))
+        keep = compile_(_keeper(0, len(control.start)))
+        command = compile_(_command(_step(control, machine), given, derived, held, seen, keep))
     search = compile_(_search(evaluate))
     return compile_(_walk(evaluate, command, search))
 
@@ -132,11 +134,22 @@ def _no_command(p, d, memory, y, out):
     return 0
 
 
-def _one(step: Step, given: Any, derived: Any, held: Any, begin: int, size: int) -> Any:
+def _keeper(begin: int, size: int) -> Any:
+    """A function that puts a tuple into an array; an empty tuple has no items to ask for, even in no turns."""
+    if size == 0:
+        return lambda values, new: None
+
+    def keep(values, new):
+        for i in range(size):
+            values[begin + i] = new[i]
+
+    return keep
+
+
+def _one(step: Step, given: Any, derived: Any, held: Any, keep: Any) -> Any:
     def one(p, d, memory, later, x, v, a, current, dt):
         status, out, new = step(given(p), derived(d), held(memory), (x, v, a, current, dt))
-        for i in range(size):
-            later[begin + i] = new[i]
+        keep(later, new)
         return status, out[0], out[1]
 
     return one
@@ -151,11 +164,10 @@ def _either(index: int, first: Any, rest: Any) -> Any:
     return either
 
 
-def _command(step: Step, given: Any, derived: Any, held: Any, inputs: Any, size: int) -> Any:
+def _command(step: Step, given: Any, derived: Any, held: Any, inputs: Any, keep: Any) -> Any:
     def command(p, d, memory, y, out):
         status, found, new = step(given(p), derived(d), held(memory), inputs(y))
-        for i in range(size):
-            memory[i] = new[i]
+        keep(memory, new)
         for i in range(len(found)):
             out[i] = found[i]
         return status

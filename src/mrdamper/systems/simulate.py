@@ -17,8 +17,10 @@ from mrdamper.errors import ExcitationError, StepError, StructureError
 from mrdamper.streaming import FLAGS
 from mrdamper.systems.controllers import Controller
 from mrdamper.systems.controllers.passive import Passive
+from mrdamper.systems.controllers.preview import Preview
 from mrdamper.systems.inputs import Input
 from mrdamper.systems.kernel import Numbers, Stage, make_walk
+from mrdamper.systems.linear import aims, linear_system
 from mrdamper.systems.links import contact_stage, damper_stage, stage_of
 from mrdamper.systems.structure import Link, System
 
@@ -110,6 +112,10 @@ class Simulation:
         """(N,) relative displacement [m] of a span of the system."""
         row, road = self.system.span(*self.system.spans[name])
         return self.x @ row + self.road @ road
+
+    def acceleration_of(self, point: str) -> Floats:
+        """(N,) absolute acceleration [m/s²] of a point that moves with the coordinates."""
+        return self.a @ self.system.point(point)[0]
 
     @property
     def energy_gap(self) -> float:
@@ -249,14 +255,18 @@ class Loop:
         x, v = np.zeros((samples, n)), np.zeros((samples, n))
         force, current, flags = (np.zeros((samples, len(self.links))) for _ in range(3))
         current[:] = self.control.start
-        numbers = numbers or self.numbers
-        control = Numbers.of(self._controllers)
-        failed = self._walk(machine)(
-            dt, S @ (2 / dt * system.M), -S @ system.K, R, self.B @ R, self.B, mean_load,
-            np.ascontiguousarray(road @ self.D.T), np.ascontiguousarray(road_rate @ self.D.T), H, seen,
-            numbers.given, numbers.derived, numbers.start.copy(), control.given, control.derived, control.start,
-            current, x, v, force, flags,
-        )  # fmt: skip
+        if isinstance(self.controller, Preview):
+            self._previewed(dt, S, mean_load, load, road, x, v, force)
+            failed = -1
+        else:
+            numbers = numbers or self.numbers
+            control = Numbers.of(self._controllers)
+            failed = self._walk(machine)(
+                dt, S @ (2 / dt * system.M), -S @ system.K, R, self.B @ R, self.B, mean_load,
+                np.ascontiguousarray(road @ self.D.T), np.ascontiguousarray(road_rate @ self.D.T), H, seen,
+                numbers.given, numbers.derived, numbers.start.copy(), control.given, control.derived, control.start,
+                current, x, v, force, flags,
+            )  # fmt: skip
         if failed >= 0 or not np.isfinite(x).all():
             raise StepError(
                 f"no solution at {time[max(failed, 0)]:.6g} s",
@@ -271,6 +281,32 @@ class Loop:
             v @ self.B.T + road_rate @ self.D.T, current, flags.astype(np.int64), road, road_rate,
             self._energy(dt, x, v, force, load, road), type(self.controller).name,
         )  # fmt: skip
+
+    def _previewed(
+        self, dt: float, S: Floats, mean_load: Floats, load: Floats, road: Floats, x: Floats, v: Floats, force: Floats
+    ) -> None:
+        """Fill x, v and force with the optimum for the whole input; stops and tyres push nothing."""
+        system, n = self.system, len(self.system.coordinates)
+        at = [i for i, link in enumerate(self.links) if link.role == "damper"]
+        # End velocity 2 m − v and displacement x + dt m, m the mean velocity of the step.
+        m = np.hstack([-S @ system.K, S @ (2 / dt * system.M)])
+        A = np.vstack([dt * m, 2 * m]) + np.kron(np.diag([1, -1]), np.eye(n))
+        push = -S @ self.B[at].T
+        assert isinstance(self.controller, Preview)
+        linear = linear_system(system, [self.links[i] for i in at])
+        aimed = np.zeros((load.shape[0], linear.aim[0].shape[0]))
+        pushed = load @ np.linalg.inv(system.M)
+        for k, aim in enumerate(aims(system)):
+            if aim.kind == "span":
+                aimed[:, k] = aim.weight * road @ system.span(*system.spans[aim.name])[1]
+            elif system.ground is None:
+                aimed[:, k] = aim.weight * pushed @ system.point(aim.name)[0]
+        driven = np.hstack([dt * mean_load, 2 * mean_load])
+        force[:, at] = self.controller.forces(A, np.vstack([dt * push, 2 * push]), driven, *linear.aim, aimed)
+        z = np.zeros(2 * n)
+        for k in range(1, x.shape[0]):
+            z = A @ z + np.concatenate([dt * push, 2 * push]) @ (force[k, at] + force[k - 1, at]) / 2 + driven[k]
+            x[k], v[k] = z[:n], z[n:]
 
     def _driven(self, time: Floats) -> tuple[Floats, Floats, Floats]:
         """Acceleration of the ground (N,), height and rate of the road (N, q)."""

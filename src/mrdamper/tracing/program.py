@@ -78,7 +78,7 @@ def program(tape: Tape, outputs: Mapping[str, Any]) -> Program:
     made = Program(tape, outputs)
     roots = [(value, False) for value in (*outputs.values(), *tape.updates.values())]
     roots += [(question, question.stage <= PARAMETER) for question, _ in tape.guards]
-    order = _postorder([root for root, _ in roots])
+    order = postorder([root for root, _ in roots])
     scopes, uses = _scopes(roots, order)
     _name(made, order, scopes, uses)
     _fill(made, order, scopes)
@@ -107,7 +107,7 @@ def dependencies(node: Expression | Loop) -> Iterator[tuple[Any, int | None]]:
         yield from ((arg, None) for arg in node.args)
 
 
-def _postorder(roots: list[Any]) -> list[Any]:
+def postorder(roots: list[Any]) -> list[Any]:
     """Nodes, each after what it is computed from."""
     seen: set[int] = set()
     order: list[Any] = []

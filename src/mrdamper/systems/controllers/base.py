@@ -6,13 +6,15 @@ same lines.
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from mrdamper.dampers.base import Damper
 from mrdamper.parameters import ParameterInfo, parameters_of
+from mrdamper.systems.inverse import check_monotone, invert_on
 from mrdamper.systems.structure import Link, System
 from mrdamper.tracing import Program, Tape, program
 
@@ -30,6 +32,8 @@ class Sight:
     damper : Damper
     low, high : float
         Currents it may be given [A].
+    shared : dict
+        What the laws of several dampers have in common.
     """
 
     tape: Tape
@@ -37,6 +41,7 @@ class Sight:
     damper: Damper
     low: float
     high: float
+    shared: dict[str, Any]
 
     def __call__(self, point: str, quantity: str) -> Any:
         """A signal: "position", "velocity" or "acceleration" (absolute) of a point.
@@ -44,30 +49,57 @@ class Sight:
         The point is a name in the system, or "above" or "below" the damper.
         """
         name = {"above": self.link.above, "below": self.link.below}.get(point, point)
-        return self._input(f"{name}.{quantity}")
+        return self.signal(f"{name}.{quantity}")
 
     @property
     def stroke(self) -> Any:
         """[m]"""
-        return self._input(f"{self.link.name}.stroke")
+        return self.signal(f"{self.link.name}.stroke")
 
     @property
     def stroke_rate(self) -> Any:
         """[m/s]"""
-        return self._input(f"{self.link.name}.stroke_rate")
+        return self.signal(f"{self.link.name}.stroke_rate")
 
     @property
     def force(self) -> Any:
         """Force of the damper as measured [N]."""
-        return self._input(f"{self.link.name}.force")
+        return self.signal(f"{self.link.name}.force")
 
     @property
     def dt(self) -> Any:
         """Time since the last sample [s]."""
-        return self._input("dt")
+        return self.signal("dt")
 
-    def _input(self, name: str) -> Any:
-        return self.tape.inputs[name] if name in self.tape.inputs else self.tape.input(name)
+    def on_off(self, on: Any) -> Any:
+        """The highest current where a condition holds, the lowest elsewhere."""
+        return self.tape.select(on, self.high, self.low)
+
+    def current_for(self, force: Any) -> Any:
+        """The current for a wanted force [N], positive against extension: see `invert`."""
+        rate, place = self.stroke_rate, identifier(self.link.name) + "_"
+        motion = {
+            "displacement": self.stroke,
+            "velocity": rate,
+            "acceleration": (rate - self.tape.previous(rate, f"{place}rate")) / self.dt,
+            "dt": self.dt,
+        }
+        width = check_monotone(self.damper, self.high)
+        return invert_on(self.tape, self.damper, place, motion, force, width, self.high).current
+
+    def signal(self, name: str) -> Any:
+        """A signal by its full name: POINT.position, .velocity, .acceleration; DAMPER.stroke, .stroke_rate, .force."""
+        known: dict[str, Any] = self.shared.setdefault("signals", {})
+        if name not in known:
+            known[name] = self.tape.input(identifier(name, self.tape.inputs))
+        return known[name]
+
+
+def identifier(name: str, taken: Container[str] = ()) -> str:
+    """A signal's or damper's name as one that every language takes."""
+    word = re.sub(r"\W", "_", name, flags=re.ASCII)
+    word = word if word[:1].isalpha() else f"s_{word}"
+    return word if word not in taken else next(f"{word}_{i}" for i in range(2, 1000) if f"{word}_{i}" not in taken)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,25 +145,25 @@ class Controller(ABC):
         self, system: System, links: Sequence[Link], dampers: Mapping[str, Damper], highest: float | None = None
     ) -> Control:
         """Trace the law of every damper into one program; `highest` caps the current [A]."""
-        ready, tape, outputs = self.designed(system, links), Tape(), {}
+        ready, tape, outputs, shared = self.designed(system, links), Tape(), {}, {}
         start = []
         for link in links:
             command: Any = 0.0
             if link.role == "damper":
                 damper = dampers[link.name]
-                see = Sight(tape, link, damper, *current_range(damper, highest))
+                see = Sight(tape, link, damper, *current_range(damper, highest), shared)
                 command = ready.law(see)
                 start.append(see.low)
             else:
                 start.append(0.0)
-            outputs[f"{link.name}.current"] = command
+            outputs[identifier(f"{link.name}.current", outputs)] = command
         if not tape.inputs and not tape.memory:
             return Control(None, (), tuple(float(value) for value in outputs.values()))
-        if "dt" in tape.inputs:  # comes last
-            tape.inputs["dt"] = tape.inputs.pop("dt")
-        else:
-            tape.input("dt")
-        return Control(program(tape, outputs), tuple(n for n in tape.inputs if n != "dt"), tuple(start))
+        signals = shared.setdefault("signals", {})
+        dt = signals.pop("dt", None)
+        tape.inputs.pop("dt", None)
+        tape.inputs["dt"] = tape.input("dt") if dt is None else dt  # comes last
+        return Control(program(tape, outputs), tuple(signals), tuple(start))
 
 
 def current_range(damper: Damper, highest: float | None) -> tuple[float, float]:

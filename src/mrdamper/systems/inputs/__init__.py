@@ -7,7 +7,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from mrdamper.discovery import named, subclasses_in
-from mrdamper.errors import RecordError
+from mrdamper.errors import RecordError, UnknownNameError
 from mrdamper.parameters import parameters_of, with_values
 from mrdamper.systems.inputs.base import Input
 
@@ -30,6 +30,15 @@ def bundled_records() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.csv"))}
 
 
+def made_inputs() -> dict[str, tuple[type[Input], Mapping[str, float]]]:
+    """Inputs made from numbers, by every name they go by, with the parameters the name stands for."""
+    found: dict[str, tuple[type[Input], Mapping[str, float]]] = {}
+    for name, kind in input_types().items():
+        if parameters_of(kind):
+            found |= {name: (kind, {}), **{variant: (kind, values) for variant, values in kind.variants().items()}}
+    return found
+
+
 def load_input(name: str | Path, values: Mapping[str, float] | None = None, time_scale: float = 1.0) -> Input:
     """An input by name: a record's file or the name of one that ships with the package, or a made one.
 
@@ -48,14 +57,15 @@ def load_input(name: str | Path, values: Mapping[str, float] | None = None, time
     """
     from mrdamper.systems.inputs.record import load_record
 
-    made = {kind: cls for kind, cls in input_types().items() if parameters_of(cls)}
+    made = made_inputs()
     if str(name) in made:
         if time_scale != 1.0:
             raise RecordError("a time scale for a made input", where=str(name), mend="set its own parameters instead")
-        return with_values(made[str(name)], values or {})
+        kind, preset = made[str(name)]
+        return with_values(kind, {**preset, **(values or {})})
     if values:
         raise RecordError(f"{', '.join(values)} for a record", where=str(name), mend="leave them out")
     known = bundled_records()
     if str(name) not in known and Path(name).suffix != ".csv" and not Path(name).exists():
-        named("input", str(name), {**made, **dict.fromkeys(known, Input)})
+        raise UnknownNameError.of("input", str(name), [*made, *known])
     return load_record(known.get(str(name), name), time_scale)

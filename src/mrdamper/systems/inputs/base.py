@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -23,6 +24,11 @@ class Input(ABC):
     title: ClassVar[str]
     kind: Literal["ground", "road"]
     speed_m_s: float = np.inf  # of travel along a road; without one every wheel meets it at once
+
+    @classmethod
+    def variants(cls) -> Mapping[str, Mapping[str, float]]:
+        """Further names it goes by, each with its parameters."""
+        return {}
 
     @property
     @abstractmethod

@@ -1,0 +1,80 @@
+"""Preview: the optimum with the whole record known, a bound that no controller can beat.
+
+Whatever a damper does is some history of force. The best history for the linear structure, of
+all there are and whether a damper could give it or not, costs at most as much.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from mrdamper.data import Floats
+from mrdamper.systems.controllers.base import Controller, Sight
+
+_SETTLED = 1e-13  # relative change at which the Riccati recursion has ended
+
+
+@dataclass(frozen=True)
+class Preview(Controller):
+    """Minimises the mean square of the aims (`linear.aims`) over all force histories.
+
+    A linear-quadratic problem with a known disturbance, solved backwards in the very steps that
+    the loop takes: the bound holds to rounding, as long as no stop is touched and no tyre lifts.
+
+    References
+    ----------
+    Bryson and Ho (1975), "Applied Optimal Control", chapter 5; for suspensions Hrovat (1997),
+    "Survey of advanced suspension developments", Automatica 33, 1781–1817.
+    """
+
+    name: ClassVar[str] = "preview"
+    title: ClassVar[str] = "optimum with the whole record known"
+    source: ClassVar[str] = "Bryson and Ho 1975; Hrovat 1997"
+
+    def law(self, see: Sight) -> Any:
+        return see.low
+
+    def forces(self, A: Floats, B: Floats, driven: Floats, C: Floats, D: Floats, aimed: Floats) -> Floats:
+        """(N, E) forces of least cost for z⁺ = A z + B (f + f⁺)/2 + driven⁺, y = C z + D f + aimed.
+
+        Parameters
+        ----------
+        A, B, C, D : arrays
+        driven, aimed : (N, 2n), (N, P) arrays
+            What the input adds to the state in the step that ends there, and to the aims.
+        """
+        n, count = B.shape
+        # The state takes the last force along; the next force is what is decided on.
+        F = np.block([[A, B / 2], [np.zeros((count, n + count))]])
+        G = np.vstack([B / 2, np.eye(count)])
+        Y = np.hstack([C, D])
+        samples = driven.shape[0]
+        P, p = Y.T @ Y, Y.T @ aimed[-1]
+        gains = np.zeros((samples, count, n + count))
+        offsets = np.zeros((samples, count))
+        settled = False
+        for k in range(samples - 1, 0, -1):
+            if not settled:
+                S = G.T @ P @ G
+                K = np.linalg.solve(S, G.T @ P @ F)
+                short = np.linalg.solve(S, G.T)
+                closed = F - G @ K
+                new = closed.T @ P @ closed + Y.T @ Y
+                new = 0.5 * (new + new.T)
+            gains[k] = K
+            push = P[:, :n] @ driven[k] + p
+            offsets[k] = short @ push
+            p = closed.T @ push + Y.T @ aimed[k - 1]
+            if not settled:
+                settled = bool(np.abs(new - P).max() <= _SETTLED * np.abs(P).max())
+                P = new
+        state, found = np.zeros(n + count), np.zeros((samples, count))
+        for k in range(1, samples):
+            u = -gains[k] @ state - offsets[k]
+            state = F @ state + G @ u
+            state[:n] += driven[k]
+            found[k] = u
+        return found

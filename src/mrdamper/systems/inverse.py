@@ -1,0 +1,236 @@
+"""From a wanted force to a current: the damper's own program, turned round.
+
+The inverse carries the damper's memory with it. At each sample it asks what the damper would
+answer to the lowest and the highest current (the reachable interval), searches between them,
+and commands the coil ahead of its lag. Where the force hardly depends on the current, as at a
+reversal, it keeps the current it had: there is nothing to be gained, and a search would jump.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mrdamper.dampers.base import Damper
+from mrdamper.dampers.coil import Coil, field_step
+from mrdamper.data import Floats
+from mrdamper.errors import ParameterError
+from mrdamper.streaming import stream
+from mrdamper.tracing import Program, Tape, program
+from mrdamper.tracing.graft import Graft
+from mrdamper.tracing.python import python_functions
+
+_ROUNDS = 2  # of the search after the two ends
+_BLUNT = 0.01  # of the widest reachable interval: below, the current is kept
+_QUICK = 0.1  # of the coil's lag in which the field is brought to where it should be
+_TURNS_BACK = 5e-3  # of the interval that a force may fall back with more current
+_GRID, _MOTION = 6, 960  # currents, samples of the motion they are tried on
+
+
+@dataclass(frozen=True)
+class Demand:
+    """What an inverse answers; expressions on a tape, or numbers.
+
+    Attributes
+    ----------
+    current : current to command [A]
+    force : force at the field that is there now [N]
+    lowest, highest : reachable interval [N]
+    """
+
+    current: Any
+    force: Any
+    lowest: Any
+    highest: Any
+
+
+def check_monotone(damper: Damper, highest: float | None = None) -> float:
+    """Widest reachable interval [N] along a tested sine; the force must not turn back with current.
+
+    Raises
+    ------
+    ParameterError
+        E_NOT_MONOTONE: with the current from which more gives less.
+    """
+    low, high = 0.0, damper.envelope.current_A[1] if highest is None else highest
+    if not high > low:
+        raise ParameterError(
+            "no range of currents", where=damper.title, mend="tests at several currents", code="E_NOT_MONOTONE"
+        )
+    made = stream(replace(damper, coil=None))  # type: ignore[type-var]
+    prepare, step = python_functions(made.step)
+    given = tuple(float(e.value) for e in made.step.tape.parameters.values())
+    derived, memory = prepare(given)[1], tuple(made.step.tape.starts.values())
+    amplitude = damper.envelope.amplitude_m[1]
+    omega = min(2 * math.pi * damper.envelope.frequency_Hz[1], damper.envelope.peak_velocity_m_s[1] / amplitude)
+    grid = np.linspace(low, high, _GRID)
+    forces, dt = [], 2 * math.pi / omega / _MOTION * 2
+    for phase in omega * dt * np.arange(_MOTION):
+        x, v = amplitude * math.sin(phase), amplitude * omega * math.cos(phase)
+        sample = (x, v, -(omega**2) * x)
+        forces.append([step(given, derived, memory, (*sample, float(I), dt))[1][0] for I in grid])
+        memory = step(given, derived, memory, (*sample, float(grid[_GRID // 2]), dt))[2]
+    table = np.array(forces[_MOTION // 2 :])
+    width = np.ptp(table, axis=1)
+    wide = width > 0.2 * width.max()
+    back = np.diff(table[wide], axis=1) * -np.sign(table[wide, -1] - table[wide, 0])[:, None]
+    worst = float((back / width[wide][:, None]).max())
+    if not width.max() > 0 or worst > _TURNS_BACK:
+        at = grid[int(np.argmax((back / width[wide][:, None]).max(axis=0)))] if width.max() > 0 else 0.0
+        raise ParameterError(
+            f"the force falls back by {100 * worst:.2g} % of its range above {at:.3g} A",
+            where=damper.title,
+            mend="cap the current there, or identify with forms that rise with current",
+            code="E_NOT_MONOTONE",
+        )
+    return float(width.max())
+
+
+def invert_on(
+    tape: Tape, damper: Damper, prefix: str, motion: dict[str, Any], wanted: Any, width: float, highest: float
+) -> Demand:
+    """Write the inverse of a damper on a tape.
+
+    Parameters
+    ----------
+    tape : Tape
+    damper : Damper
+    prefix : str
+        Of the names of its memory.
+    motion : dict of str to expression
+        displacement, velocity, acceleration, dt.
+    wanted : expression
+        [N]
+    width : float
+        As `check_monotone` gives it [N].
+    highest : float
+        Largest current [A].
+    """
+    bare = stream(replace(damper, coil=None)).step  # type: ignore[type-var]
+    copy = Graft(bare, tape, prefix, "current", **motion)
+    last = tape.remember(f"{prefix}wanted_current")
+    coil = damper.coil or Coil(0.0, 0.0)
+    ends = [(0.0, copy.answer(0.0)["force"]), (highest, copy.answer(highest)["force"])]
+    lowest, most = np.minimum(ends[0][1], ends[1][1]), np.maximum(ends[0][1], ends[1][1])
+    target = np.minimum(np.maximum(wanted, lowest), most)
+    current = _searched(tape, copy, ends, target)
+    span = most - lowest
+    trust = span * span / (span * span + (_BLUNT * width) ** 2)
+    steady = last + trust * (current - last)
+    tape.update(last, steady)
+    if coil.rise_s <= 0 and coil.fall_s <= 0:
+        return Demand(steady, copy.settle(steady)["force"], lowest, most)
+    field = tape.remember(f"{prefix}field")
+    lag = tape.select(steady > field, coil.rise_s, coil.fall_s)
+    ahead = steady + (steady - field) * lag / np.maximum(_QUICK * lag, 2 * motion["dt"])
+    command = np.minimum(np.maximum(ahead, 0.0), highest)
+    felt = field_step(tape, motion["dt"], command, coil.rise_s, coil.fall_s)
+    tape.update(field, felt)
+    return Demand(command, copy.settle(felt)["force"], lowest, most)
+
+
+def _searched(tape: Tape, copy: Graft, ends: list[tuple[Any, Any]], target: Any) -> Any:
+    """Regula falsi between the ends; one end's weight halved when it stays (Illinois)."""
+    (i0, f0), (i1, f1) = ends
+    g0, g1 = f0 - target, f1 - target
+    current: Any = 0.0
+    for round_ in range(_ROUNDS + 1):
+        across = g1 - g0
+        flat = abs(across) <= 1e-300
+        current = i0 - g0 * (i1 - i0) / tape.select(flat, 1.0, across)
+        current = tape.select(flat, i0, np.minimum(np.maximum(current, np.minimum(i0, i1)), np.maximum(i0, i1)))
+        if round_ == _ROUNDS:
+            break
+        g = copy.answer(current)["force"] - target
+        changed = g * g1 < 0
+        i0, g0 = tape.select(changed, i1, i0), tape.select(changed, g1, 0.5 * g0)
+        i1, g1 = current, g
+    return current
+
+
+class Inverse:
+    """A damper asked for a force, sample by sample; made by `invert`.
+
+    Parameters
+    ----------
+    program : Program
+        From displacement [m], velocity [m/s], acceleration [m/s²], wanted force [N] and dt [s] to
+        current [A], force [N] and the reachable interval [N].
+    """
+
+    def __init__(self, program: Program, title: str):
+        self.program, self.title = program, title
+        self.reset()
+
+    def reset(self) -> None:
+        """Back to rest."""
+        self._memory = tuple(self.program.tape.starts.values())
+
+    def step(self, displacement: float, velocity: float, acceleration: float, wanted: float, dt: float) -> Demand:
+        """Current for a wanted force at the next sample of a motion.
+
+        Raises
+        ------
+        ParameterError
+            If a value is not finite, dt is not positive, or the damper has no answer there.
+        """
+        sample = (float(displacement), float(velocity), float(acceleration), float(wanted), float(dt))
+        if not (all(map(math.isfinite, sample)) and dt > 0):
+            raise ParameterError(f"sample {sample}", where=self.title, mend="finite numbers, a positive time step")
+        status, found, memory = self._advance((), self._derived, self._memory, sample)
+        if status:
+            raise ParameterError(f"no force at {sample}", where=self.title, mend="come nearer to the last sample")
+        self._memory = memory
+        return Demand(*found)
+
+    def along(
+        self, time: Floats, displacement: Floats, velocity: Floats, acceleration: Floats, wanted: Floats
+    ) -> tuple[Floats, Floats, Floats, Floats]:
+        """Current [A], force and reachable interval [N] (N,) along a motion, from the state at hand."""
+        steps = np.diff(time, prepend=2 * time[0] - time[1])
+        channels = (displacement, velocity, acceleration, wanted, steps)
+        rows = [self.step(*sample) for sample in zip(*(c.tolist() for c in channels), strict=True)]
+        table = np.array([[r.current, r.force, r.lowest, r.highest] for r in rows])
+        return table[:, 0], table[:, 1], table[:, 2], table[:, 3]
+
+    @cached_property
+    def _functions(self) -> tuple[Any, Any]:
+        return python_functions(self.program)
+
+    @property
+    def _advance(self) -> Any:
+        return self._functions[1]
+
+    @cached_property
+    def _derived(self) -> tuple[float, ...]:
+        return self._functions[0](())[1]
+
+
+def invert(damper: Damper, highest: float | None = None) -> Inverse:
+    """The current for a wanted force.
+
+    Parameters
+    ----------
+    damper : Damper
+        With its coil, if it has one: its lag is compensated.
+    highest : float, optional
+        Largest current [A]. Default: the largest tested.
+
+    Raises
+    ------
+    ParameterError
+        E_NOT_MONOTONE if more current somewhere gives less force, or as `stream`.
+    """
+    width = check_monotone(damper, highest)
+    tape = Tape()
+    names = ("displacement", "velocity", "acceleration", "wanted", "dt")
+    inputs = {name: tape.input(name) for name in names}
+    wanted = inputs.pop("wanted")
+    most = damper.envelope.current_A[1] if highest is None else highest
+    found = invert_on(tape, damper, "", inputs, wanted, width, most)
+    outputs = {"current": found.current, "force": found.force, "lowest": found.lowest, "highest": found.highest}
+    return Inverse(program(tape, outputs), f"inverse of {damper.title}")

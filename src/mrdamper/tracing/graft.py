@@ -1,0 +1,114 @@
+"""A program written again on another tape, as often as one likes, with other inputs.
+
+So a law can ask what a damper would answer to a current without giving it that current: the
+answers share all that does not depend on what differs, and memory moves on once.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mrdamper.tracing.expression import SAMPLE, Expression
+from mrdamper.tracing.program import Program, dependencies, postorder
+from mrdamper.tracing.tape import Loop, Tape
+
+
+class Graft:
+    """A program on another tape.
+
+    Parameters
+    ----------
+    source : Program
+        Its parameters stay as they were traced.
+    tape : Tape
+        To write on.
+    prefix : str
+        Of the names of its memory there.
+    varying : str
+        The input that differs from answer to answer.
+    inputs : expressions
+        All other inputs.
+    """
+
+    def __init__(self, source: Program, tape: Tape, prefix: str, varying: str, **inputs: Any):
+        self.source, self.tape, self.varying = source, tape, varying
+        self.inputs = inputs
+        made = source.tape
+        self.memory = {name: tape.remember(f"{prefix}{name}", made.starts[name]) for name in made.memory}
+        questions = [question for question, _ in made.guards if question.stage == SAMPLE]
+        self.order = postorder([*source.outputs.values(), *made.updates.values(), *questions])
+        self.moving = self._moving()
+        self.still: dict[int, Any] = {}
+
+    def answer(self, value: Any) -> dict[str, Any]:
+        """Outputs were the varying input this; nothing is remembered."""
+        return self._outputs(self._copied(value))
+
+    def settle(self, value: Any) -> dict[str, Any]:
+        """Outputs for the value the varying input has, remembered; questions asked at a sample are asked again."""
+        known = self._copied(value)
+        for name, memory in self.memory.items():
+            if name in self.source.tape.updates:
+                update = self.source.tape.updates[name]
+                self.tape.update(memory, known[id(update)] if isinstance(update, Expression) else update)
+        for question, wanted in self.source.tape.guards:
+            if question.stage == SAMPLE and wanted:
+                self.tape.require(known[id(question)])
+        return self._outputs(known)
+
+    def _outputs(self, known: dict[int, Any]) -> dict[str, Any]:
+        outputs = self.source.outputs
+        return {n: known[id(value)] if isinstance(value, Expression) else value for n, value in outputs.items()}
+
+    def _moving(self) -> set[int]:
+        """Nodes that depend on the varying input; a loop's carried values do if the loop does."""
+        moving: set[int] = set()
+        while True:
+            before = len(moving)
+            for node in self.order:
+                if isinstance(node, Expression) and node.op == "carry":
+                    depends = id(node.args[0]) in moving
+                elif isinstance(node, Expression) and node.op == "input":
+                    depends = node.name == self.varying
+                else:
+                    depends = any(id(part) in moving for part, _ in dependencies(node))
+                if depends:
+                    moving.add(id(node))
+            if len(moving) == before:
+                return moving
+
+    def _copied(self, value: Any) -> dict[int, Any]:
+        known, loops = dict(self.still), dict[int, Loop]()
+        for node in self.order:
+            if id(node) not in known:
+                known[id(node)] = self._copy(node, known, loops, value)
+                if id(node) not in self.moving:
+                    self.still[id(node)] = known[id(node)]
+        return known
+
+    def _copy(self, node: Any, known: dict[int, Any], loops: dict[int, Loop], value: Any) -> Any:
+        def of(part: Any) -> Any:
+            return known[id(part)] if isinstance(part, Expression) else part
+
+        if isinstance(node, Loop):
+            loop = loops.setdefault(id(node), Loop((), node.most))
+            loop.start, loop.updates = tuple(map(of, node.start)), tuple(map(of, node.updates))
+            loop.going = of(node.going)
+            loop.carries = tuple(Expression(self.tape, "carry", (loop, i), SAMPLE) for i in range(len(node.start)))
+            return loop
+        if node.op == "carry":
+            loop = loops.setdefault(id(node.args[0]), Loop((), node.args[0].most))
+            return Expression(self.tape, "carry", (loop, node.args[1]), SAMPLE)
+        if node.op == "result":
+            return Expression(self.tape, "result", (known[id(node.args[0])], node.args[1]), SAMPLE)
+        if node.op == "parameter":
+            return float(node.value)
+        if node.op == "input":
+            return value if node.name == self.varying else self.inputs[node.name]
+        if node.op == "memory":
+            return self.memory[node.name]
+        if node.op == "lookup":
+            return self.tape.lookup(self.source.tape.tables[node.args[0]], of(node.args[1]))
+        if node.op == "select":
+            return self.tape.select(*map(of, node.args))
+        return self.tape.apply(node.op, *map(of, node.args))
