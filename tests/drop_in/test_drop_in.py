@@ -101,3 +101,17 @@ def test_an_export_format_is_offered_and_writes(house, tmp_path):
 def test_a_command_has_its_help_and_runs(house):
     assert "List the rigs of a dataset" in mrdamper(house, "--help").stdout
     assert mrdamper(house, "rigs").stdout.split() == ["labcontrol", "utfsm"]
+
+
+def test_a_control_law_and_an_input_take_part_in_a_simulation(house, tmp_path):
+    script = (
+        "from support.dampers import joint_damper\nfrom mrdamper.files.model_file import save_model\n"
+        f"save_model(joint_damper(), {str(tmp_path / 'model.json')!r})"
+    )
+    environment = {**os.environ, "PYTHONPATH": f"{house / 'src'}{os.pathsep}{house / 'tests'}"}
+    subprocess.run([sys.executable, "-c", script], env=environment, check=True, cwd=house / "tests")
+    chosen = ("simulate", "quarter-car", "--input", "kerb:height_m=0.02", "--damper", tmp_path / "model.json", "--json")
+    soft = json.loads(mrdamper(house, *chosen).stdout)
+    found = json.loads(mrdamper(house, *chosen, "--control", "firm-inwards").stdout)
+    assert found["controller"] == "firm-inwards"
+    assert found["peak_force_N"] > soft["peak_force_N"]

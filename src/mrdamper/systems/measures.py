@@ -36,7 +36,7 @@ def comfort(acceleration: Floats, step: float, weighting: str = "Wk") -> dict[st
     keep = np.exp(-step / _WINDOW)
     from scipy.signal import lfilter
 
-    running = lfilter([1 - keep], [1, -keep], squares)
+    running = np.asarray(lfilter([1 - keep], [1, -keep], squares))
     a_w = float(np.sqrt(squares.mean()))
     return {
         "a_w_m_s2": a_w,

@@ -79,7 +79,7 @@ def frequency_weighted(acceleration: Floats, step: float, weighting: str) -> Flo
     from scipy.fft import next_fast_len
 
     known = WEIGHTINGS[weighting]
-    size = next_fast_len(acceleration.size + int(_MEMORY / known.f1 / step), real=True)
+    size = int(next_fast_len(acceleration.size + int(_MEMORY / known.f1 / step), real=True) or acceleration.size)
     frequency = np.fft.rfftfreq(size, step)
     gain = np.zeros(frequency.size, dtype=complex)
     gain[1:] = known.response(frequency[1:])

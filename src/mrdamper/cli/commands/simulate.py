@@ -96,11 +96,13 @@ def _amperes(current: float | None, volts: float | None, dampers: dict[str, Damp
 
 
 def _figures(done: Simulation) -> dict[str, Any]:
+    from mrdamper.systems.measures import measures
+
     peaks = {f"peak_{name}": values.tolist() for name, values in done.peaks.items()}
     forces = dict(zip((link.name for link in done.dampers), peaks.pop("peak_force_N"), strict=True))
     return {
         "system": done.system.name,
-        "controller": done.controller,
+        "controller": type(done.controller).name,
         "coordinates": list(done.system.coordinates),
         "spans": list(done.system.spans),
         **peaks,
@@ -110,12 +112,16 @@ def _figures(done: Simulation) -> dict[str, Any]:
         "step_halving_change": done.halving,
         "energy_gap": done.energy_gap,
         "outside_tests": done.outside,
+        "timing": done.timing,
+        "measures": measures(done),
     }
 
 
 def _print(done: Simulation) -> None:
+    from mrdamper.streaming import FLAGS
+
     peaks = done.peaks
-    typer.echo(f"{done.system.title}, {done.controller}")
+    typer.echo(f"{done.system.title}, {type(done.controller).title}")
     for i, name in enumerate(done.system.coordinates):
         typer.echo(
             f"  {name:12} x {1e3 * peaks['displacement_m'][i]:9.3f} mm   a {peaks['acceleration_m_s2'][i]:8.3f} m/s²"
@@ -130,4 +136,13 @@ def _print(done: Simulation) -> None:
     )
     for name, shares in done.outside.items():
         for quantity, share in shares.items():
-            typer.echo(f"warning: {name}: {quantity} outside its tests {100 * share:.3g} % of the time", err=True)
+            what = f"{quantity} outside its tests" if quantity in FLAGS else quantity
+            typer.echo(f"warning: {name}: {what} {100 * share:.3g} % of the time", err=True)
+    if type(done.controller).calms:
+        for name, timing in done.timing.items():
+            if timing < 0:
+                typer.echo(
+                    f"warning: {name}: firm just when it shakes what it should calm (correlation {timing:.2f}); "
+                    "is a sign exchanged?",
+                    err=True,
+                )

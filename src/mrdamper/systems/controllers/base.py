@@ -127,6 +127,7 @@ class Controller(ABC):
     name: ClassVar[str]
     title: ClassVar[str]
     source: ClassVar[str]
+    calms: ClassVar[str] = ""  # "above" or "below", where it is made to calm one end of the damper
 
     @classmethod
     def parameters(cls) -> tuple[ParameterInfo, ...]:

@@ -73,7 +73,7 @@ class ClippedOptimal(Controller):
         n, count = linear.B.shape
         coupled = np.hstack([linear.A, linear.B, linear.E])
         still = np.zeros((coupled.shape[1] - n, coupled.shape[1]))
-        sampled = expm(self.sample_time_s * np.vstack([coupled, still]))
+        sampled: Any = expm(self.sample_time_s * np.vstack([coupled, still]))
         A, B, E = sampled[:n, :n], sampled[:n, n : n + count], sampled[:n, n + count :]
         z, f = linear.aim
         R = f.T @ f + self.effort * np.eye(count) / linear.mass**2

@@ -21,6 +21,7 @@ class Groundhook(Controller):
     name: ClassVar[str] = "groundhook"
     title: ClassVar[str] = "groundhook, on and off"
     source: ClassVar[str] = "Valášek, Novák, Šika and Vaculín 1997"
+    calms: ClassVar[str] = "below"
 
     def law(self, see: Sight) -> Any:
         return see.on_off(see("below", "velocity") * see.stroke_rate < 0)

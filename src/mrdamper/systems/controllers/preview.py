@@ -55,22 +55,19 @@ class Preview(Controller):
         P, p = Y.T @ Y, Y.T @ aimed[-1]
         gains = np.zeros((samples, count, n + count))
         offsets = np.zeros((samples, count))
-        settled = False
+        settled, K, short, closed = False, np.zeros((count, n + count)), G.T, F
         for k in range(samples - 1, 0, -1):
+            before = P
             if not settled:
                 S = G.T @ P @ G
-                K = np.linalg.solve(S, G.T @ P @ F)
-                short = np.linalg.solve(S, G.T)
+                K, short = np.linalg.solve(S, G.T @ P @ F), np.linalg.solve(S, G.T)
                 closed = F - G @ K
-                new = closed.T @ P @ closed + Y.T @ Y
-                new = 0.5 * (new + new.T)
-            gains[k] = K
+                before = closed.T @ P @ closed + Y.T @ Y
+                before = 0.5 * (before + before.T)
+                settled = bool(np.abs(before - P).max() <= _SETTLED * np.abs(P).max())
             push = P[:, :n] @ driven[k] + p
-            offsets[k] = short @ push
-            p = closed.T @ push + Y.T @ aimed[k - 1]
-            if not settled:
-                settled = bool(np.abs(new - P).max() <= _SETTLED * np.abs(P).max())
-                P = new
+            gains[k], offsets[k] = K, short @ push
+            P, p = before, closed.T @ push + Y.T @ aimed[k - 1]
         state, found = np.zeros(n + count), np.zeros((samples, count))
         for k in range(1, samples):
             u = -gains[k] @ state - offsets[k]

@@ -21,6 +21,7 @@ class Skyhook(Controller):
     name: ClassVar[str] = "skyhook"
     title: ClassVar[str] = "skyhook, on and off"
     source: ClassVar[str] = "Karnopp, Crosby and Harwood 1974"
+    calms: ClassVar[str] = "above"
 
     def law(self, see: Sight) -> Any:
         return see.on_off(see("above", "velocity") * see.stroke_rate > 0)

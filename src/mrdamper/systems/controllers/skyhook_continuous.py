@@ -23,6 +23,7 @@ class SkyhookContinuous(Controller):
     name: ClassVar[str] = "skyhook-continuous"
     title: ClassVar[str] = "skyhook, continuous"
     source: ClassVar[str] = "Karnopp, Crosby and Harwood 1974"
+    calms: ClassVar[str] = "above"
 
     c_sky: float = param("N s/m", "damping to the sky", bounds=(0, math.inf), default=2000.0)
 

@@ -1,0 +1,150 @@
+"""Laws of control: the inverse gives the force, nothing beats the preview, a wrong sign shows."""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from support.dampers import joint_damper, modified_damper
+
+from mrdamper.dampers.coil import Coil
+from mrdamper.errors import InputError, ParameterError
+from mrdamper.functions.forms import ParameterFunction
+from mrdamper.streaming import stepper
+from mrdamper.systems.controllers import controller_type, controller_types
+from mrdamper.systems.controllers.base import Controller
+from mrdamper.systems.controllers.passive import Passive
+from mrdamper.systems.controllers.preview import Preview
+from mrdamper.systems.inputs import load_input
+from mrdamper.systems.inverse import invert
+from mrdamper.systems.measures import cost
+from mrdamper.systems.simulate import Loop
+from mrdamper.systems.structure import quarter_car
+from mrdamper.systems.system_file import load_system
+
+CAR = quarter_car("car", 300, 40, 20e3, 200e3)
+ROAD = load_input("iso8608-b", {"length_s": 3.0, "speed_m_s": 15.0})
+LAWS = [name for name in controller_types() if name != "preview"]
+
+
+@pytest.fixture(scope="module")
+def preview():
+    return Loop(CAR, ROAD, {"damper": joint_damper()}, Preview()).run(1e-3)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_nothing_beats_the_preview(name, preview):
+    done = Loop(CAR, ROAD, {"damper": joint_damper()}, controller_type(name)()).run(1e-3, machine=False)
+    assert cost(preview) < cost(done)
+    assert done.energy_gap < 1e-6
+    assert done.current.min() >= 0
+    assert done.current.max() <= 1.0 + 1e-12
+    if name != "passive":
+        assert np.ptp(done.current[:, 0]) > 0.3
+
+
+def test_the_preview_is_where_its_cost_is_flat(preview):
+    loop = Loop(CAR, ROAD, {"damper": joint_damper()}, Preview())
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        way = np.cumsum(rng.standard_normal((preview.time.size, 1)), axis=0)
+        way[0] = 0
+
+        @dataclass(frozen=True)
+        class Nudged(Preview):
+            share: float = 0.0
+
+            def forces(self, *given):
+                return Preview.forces(self, *given) + self.share * way  # noqa: B023
+
+        loop.controller = Nudged(share=1.0)
+        more = cost(loop.run(1e-3))
+        loop.controller = Nudged(share=-1.0)
+        less = cost(loop.run(1e-3))
+        base = cost(preview)
+        assert min(more, less) > base
+        assert abs(more - less) < 1e-6 * (more + less - 2 * base)  # a parabola with its vertex here
+
+
+def test_a_skyhook_with_its_sign_exchanged_lets_energy_into_the_body():
+    @dataclass(frozen=True)
+    class Wrong(controller_type("skyhook")):
+        name: ClassVar[str] = "wrong"
+
+        def law(self, see):
+            return see.on_off(see("above", "velocity") * see.stroke_rate < 0)
+
+    right, wrong = (
+        Loop(CAR, ROAD, {"damper": joint_damper()}, law()).run(1e-3, machine=False)
+        for law in (controller_type("skyhook"), Wrong)
+    )
+    assert right.timing["damper"] > 0.2
+    assert wrong.timing["damper"] < -0.2
+    assert cost(wrong) > cost(right)
+
+
+DAMPERS = {
+    "joint": (joint_damper(), 0.01),
+    "joint, coil": (replace(joint_damper(), coil=Coil(5e-3, 5e-3)), 0.04),
+    "spencer, coil": (load_system("dyke1996").dampers["mr"], 0.04),
+}
+
+
+@pytest.mark.parametrize("case", DAMPERS)
+def test_the_inverse_gives_the_force_that_is_wanted(case):
+    damper, tolerance = DAMPERS[case]
+    highest, dt = damper.envelope.current_A[1], 1e-3
+    amplitude = 0.8 * damper.envelope.amplitude_m[1]
+    omega = 2 * np.pi * min(2.0, damper.envelope.frequency_Hz[1])
+    t = np.arange(0, 1.2, dt)
+    x, v, a = (
+        amplitude * np.sin(omega * t),
+        amplitude * omega * np.cos(omega * t),
+        -(omega**2) * amplitude * np.sin(omega * t),
+    )
+    known = highest * (0.5 + 0.35 * np.sin(2 * np.pi * 2.3 * t))
+    steps = stepper(damper)
+    wanted = np.array([steps.step_motion(*s, dt) for s in zip(x, v, a, known, strict=True)])
+    current, force, lowest, most = invert(damper).along(t, x, v, a, wanted)
+    steps.reset()
+    given = np.array([steps.step_motion(*s, dt) for s in zip(x, v, a, current, strict=True)])
+    assert given == pytest.approx(force, rel=1e-5, abs=1e-5 * np.abs(force).max())  # it knows what the damper does
+    inside = (wanted >= lowest) & (wanted <= most) & (t > 0.2)
+    assert inside.mean() > 0.6
+    assert np.sqrt(np.mean((given - wanted)[inside] ** 2)) < tolerance * np.sqrt(np.mean(wanted[inside] ** 2))
+    assert current.min() >= 0
+    assert current.max() <= highest
+    if damper.coil is None:  # no spike at a reversal: the current moves as the one that was there
+        assert np.abs(np.diff(current[200:])).max() < 0.12 * highest
+
+
+def test_out_of_reach_is_clipped_and_said():
+    damper = joint_damper()
+    inverse = invert(damper)
+    for k in range(60):
+        found = inverse.step(0.01 * np.sin(0.02 * k), 0.2 * np.cos(0.02 * k), 0.0, 1e6, 1e-3)
+    assert found.force == pytest.approx(found.highest)
+    assert found.current == pytest.approx(1.0, rel=1e-3)
+    with pytest.raises(ParameterError):
+        inverse.step(float("nan"), 0, 0, 0, 1e-3)
+
+
+def test_a_damper_that_turns_back_with_current_is_refused():
+    falling = modified_damper()
+    functions = {
+        **falling.parameters.functions,
+        "yield_force": ParameterFunction("quadratic-current-linear-speed", (-1500.0, 1500.0, 400.0, 0.0)),
+    }
+    turned = replace(falling, parameters=replace(falling.parameters, functions=functions))
+    with pytest.raises(InputError) as refused:
+        invert(turned)
+    assert refused.value.code == "E_NOT_MONOTONE"
+
+
+def test_every_law_says_where_it_comes_from():
+    for name, kind in controller_types().items():
+        assert issubclass(kind, Controller)
+        assert kind.title
+        assert kind.source or name == "passive"
+        assert kind.__doc__
+    assert Passive(0.3).current_A == 0.3
