@@ -52,6 +52,22 @@ class Condition:
         return f"{self.current_A:g} A, {self.frequency_Hz:.3g} Hz, {1e3 * self.amplitude_m:.3g} mm"
 
 
+def current_levels(currents: Sequence[float]) -> list[float]:
+    """The level of the test matrix each current belongs to [A].
+
+    Measured currents of one level differ by noise; those within 5 mA + 2 % of their neighbour are
+    one level, named by its median to three digits.
+    """
+    order = np.argsort(currents)
+    values = np.asarray(currents, dtype=float)[order]
+    begins = np.diff(values, prepend=-np.inf) > 5e-3 + 0.02 * np.abs(values)
+    level = np.cumsum(begins) - 1
+    names = [float(f"{np.median(values[level == i]):.3g}") for i in range(level[-1] + 1)] if values.size else []
+    found = np.empty(values.size)
+    found[order] = [0.0 if abs(names[i]) < 5e-3 else names[i] for i in level]
+    return found.tolist()
+
+
 def same_condition(conditions: Sequence[Condition]) -> list[list[int]]:
     """Group the indices of conditions that agree in current and, to 3 %, in frequency and amplitude."""
     return _grouped(

@@ -90,8 +90,9 @@ def test_every_file_of_the_contract_is_there(folder):
         "identifications.csv",
         "validation.csv",
         "figures",
+        "forces.csv",
     }
-    assert {p.suffix for p in (folder / "figures").iterdir()} == {".svg"}
+    assert {p.suffix for p in (folder / "figures").iterdir()} == {".svg", ".csv"}
 
 
 def test_saved_models_predict_what_the_study_predicted(folder, study, bundled):
@@ -135,7 +136,7 @@ def test_report_is_one_file_without_scripts_or_links_outside(folder):
     page.feed(text)
     assert page.outside == []
     assert page.scripts == 0
-    assert page.images == 16
+    assert page.images == 22
     assert len(text) < 6_000_000
 
 
@@ -148,11 +149,11 @@ def test_a_study_is_the_same_twice_and_in_another_process(small, few, tmp_path):
     both = Dataset((*beside.runs, *few.runs), "both")
     with several(2) as processes:
         again = run_study(both, processes=processes)
-        write_study(again, tmp_path / "out", png=True, processes=processes)
+        write_study(again, tmp_path / "out", also=("png",), processes=processes)
     assert dumps(again.rig("utfsm")) == dumps(small.rigs[0])
     assert dumps(again.rig("other")) == dumps(run_study(beside).rigs[0])
     drawn = sorted(p.suffix for p in (tmp_path / "out" / "figures").iterdir())
-    assert drawn.count(".png") == drawn.count(".svg") == 16
+    assert drawn.count(".png") == drawn.count(".svg") == 22
 
 
 def test_hostile_names_are_text_in_the_report(tmp_path, few):

@@ -13,11 +13,10 @@ from mrdamper.errors import OutputError
 
 
 @contextmanager
-def write_folder(folder: str | Path, *, replace: bool = False) -> Iterator[Path]:
+def write_folder(folder: str | Path) -> Iterator[Path]:
     """Give a temporary folder that takes the final name when the block ends without an error.
 
-    An existing folder is replaced only if it is empty, or if that is asked for: its other
-    files then move into the new one.
+    An existing folder is replaced only if it is empty.
 
     Raises
     ------
@@ -25,26 +24,13 @@ def write_folder(folder: str | Path, *, replace: bool = False) -> Iterator[Path]
         If the folder exists and is not empty, or cannot be made.
     """
     final = Path(folder)
-    taken = final.exists() and (not final.is_dir() or any(final.iterdir()))
-    if taken and not (replace and final.is_dir()):
+    if final.exists() and (not final.is_dir() or any(final.iterdir())):
         raise OutputError("exists already and is not empty", where=str(final), mend="choose another name or remove it")
     with _temporary_beside(final) as work:
         yield work
-        if not taken:
-            if final.exists():
-                final.rmdir()
-            work.replace(final)
-            return
-        for kept in final.iterdir():
-            if not (work / kept.name).exists():
-                (shutil.copytree if kept.is_dir() else shutil.copy2)(kept, work / kept.name)
-        with _temporary_beside(final) as aside:
-            final.replace(aside / final.name)
-            try:
-                work.replace(final)
-            except OSError:
-                (aside / final.name).replace(final)
-                raise
+        if final.exists():
+            final.rmdir()
+        work.replace(final)
 
 
 @contextmanager

@@ -6,11 +6,11 @@ The counterpart of the test analysis in section 2 of Qian et al. 2024.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mrdamper.data import Condition, Floats, Run, same_motion
+from mrdamper.data import Condition, Floats, Run, current_levels, same_motion
 from mrdamper.metrics import dissipated_power
 from mrdamper.motion import MotionAnalysis, analyse_motion, measured_motion
 
@@ -72,6 +72,15 @@ def analyse_loop(run: Run) -> LoopAnalysis:
         mean_force=float(np.mean(force)),
         dissipated_energy=energy,
         equivalent_damping=energy / (2 * np.pi**2 * frequency * amplitude**2),
+    )
+
+
+def at_levels(loops: Sequence[LoopAnalysis]) -> tuple[LoopAnalysis, ...]:
+    """The same loops, each at the current level of the test matrix it belongs to."""
+    levels = current_levels([loop.condition.current_A for loop in loops])
+    return tuple(
+        replace(loop, motion=replace(loop.motion, condition=replace(loop.condition, current_A=level)))
+        for loop, level in zip(loops, levels, strict=True)
     )
 
 

@@ -122,7 +122,9 @@ def equivalent_sine(run: Run) -> EquivalentSine:
         if np.ptp(centred) < _STILL:
             raise
         analysis = None
-    if analysis is not None and analysis.residual < 0.3 * np.std(centred):
+    # A ramp leaves no residual either: its drift explains it all, and the swing is nothing.
+    spread = float(np.std(centred))
+    if analysis is not None and analysis.residual < 0.3 * spread and analysis.condition.amplitude_m > 0.5 * spread:
         return EquivalentSine(analysis.condition, analysis.series.mean, True)
     motion = measured_motion(run)
     rms_x, rms_v = float(np.std(motion.displacement)), float(np.std(motion.velocity))

@@ -175,7 +175,10 @@ def _chapter(rig: RigComparison, folder: Path, suffix: str, png: bool) -> dict[s
         "loops_caption": (
             f"Last cycle of {'held-out' if runs[0].split == 'validate' else 'train'} runs; the best {len(best)} models."
         ),
-        "figures": {name: save_figure(figure, folder / f"{name}{suffix}", png) for name, figure in figures.items()},
+        "figures": {
+            name: save_figure(figure, folder / f"{name}{suffix}", ("png",) if png else ())
+            for name, figure in figures.items()
+        },
     }
 
 

@@ -45,6 +45,11 @@ def number(value: float | None, digits: int = 4) -> str:
     return "–" if value is None or not np.isfinite(value) else f"{value:.{digits}g}"
 
 
+def whole(value: float) -> str:
+    """A value without decimals, three digits where it is small, or a dash where there is none."""
+    return f"{value:.0f}" if abs(value) >= 100 else number(value, 3)
+
+
 def percent(share: float | None, digits: int = 1) -> str:
     """A share in per cent, or a dash where there is none."""
     return "–" if share is None or not np.isfinite(share) else f"{100 * share:.{digits}f}"
@@ -57,4 +62,10 @@ _ENVIRONMENT = jinja2.Environment(
     lstrip_blocks=True,
     undefined=jinja2.StrictUndefined,
 )
-_ENVIRONMENT.globals |= {"svg": inline_svg, "number": number, "percent": percent, "mm": lambda v: 1e3 * v}
+_ENVIRONMENT.globals |= {
+    "svg": inline_svg,
+    "number": number,
+    "whole": whole,
+    "percent": percent,
+    "mm": lambda v: 1e3 * v,
+}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,10 +12,14 @@ from matplotlib.figure import Figure
 
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
+from mrdamper.errors import IdentificationError
 from mrdamper.files.atomic import publish
 from mrdamper.files.encoding import csv_text, file_names
 from mrdamper.files.model_file import save_model
 from mrdamper.identification import Identification
+from mrdamper.identification.characteristics import Characteristics, characterise
+from mrdamper.report.about import About, Limit
+from mrdamper.report.damper_tests import facts_of_tests, figures_of_tests, force_rows, provenance
 from mrdamper.report.distrust import doubts
 from mrdamper.report.page import made_from, render_page
 from mrdamper.report.plots.model import parameter_curves, predicted_loops, residual_map, score_strip
@@ -36,10 +40,12 @@ def write_study(
     folder: str | Path,
     progress: Progress = lambda what, share: None,
     *,
-    png: bool = False,
+    about: About | None = None,
+    limits: Sequence[Limit] = (),
+    also: Sequence[str] = (),
     processes: Processes = HERE,
 ) -> list[Path]:
-    """Write report.html, model files, identifications.csv, validation.csv and figures/.
+    """Write report.html, model files, identifications.csv, validation.csv, forces.csv and figures/.
 
     Parameters
     ----------
@@ -48,8 +54,12 @@ def write_study(
         Made if missing; files of the same names are replaced together at the end.
     progress : callable
         Told what is being done and the share done.
-    png : bool
-        Every figure as PNG beside the SVG.
+    about : About, optional
+        Head of the report.
+    limits : sequence of Limit
+        Bands the measured damping force must lie in; a verdict is given only against these.
+    also : sequence of str
+        "png" and "pdf": every figure in that format too; with "pdf" comes report.pdf.
     processes : Processes
         Where figures are drawn, rig by rig.
 
@@ -63,20 +73,34 @@ def write_study(
     OutputError
         If the folder cannot be written to.
     """
-    drawn = processes.map(partial(_draw, png=png), study.rigs, progress)
+    drawn = processes.map(partial(_draw, also=tuple(also)), study.rigs, progress)
 
     def fill(work: Path) -> None:
         (work / "figures").mkdir()
         chapters, parts = [], file_names(rig.rig for rig in study.rigs)
+        vectors, forces = {}, []
         for rig, pictures in zip(study.rigs, drawn, strict=True):
             suffix = f"-{parts[rig.rig]}" if len(study.rigs) > 1 else ""
             saved = {name: picture.save(work / "figures" / f"{name}{suffix}") for name, picture in pictures.items()}
             save_model(rig.damper, work / f"model{suffix}.json")
-            chapters.append(_chapter(rig, saved))
+            key = f"rig-{len(chapters) + 1}"
+            vectors |= {f"{key}-{name}": p.files["pdf"] for name, p in pictures.items() if "pdf" in p.files}
+            chapters.append({**_chapter(rig, saved, limits), "key": key})
+            forces += force_rows(chapters[-1]["measured"] or {})
         footer = f"{made_from(study.dataset)}; identified and validated in {study.seconds:.1f} s."
         title = f"MR damper study: {', '.join(r.rig for r in study.rigs) or study.dataset.name}"
-        page = render_page("study.html.j2", title, footer, chapters=chapters)
+        head = about or About()
+        origin = provenance({rig.rig or rig.dataset.name: rig.dataset for rig in study.rigs})
+        page = render_page(
+            "study.html.j2", head.title or title, footer, chapters=chapters, about=head, provenance=origin
+        )
         (work / "report.html").write_text(page, encoding="utf-8")
+        if "pdf" in also:
+            from mrdamper.report.pdf import pdf_of
+
+            (work / "report.pdf").write_bytes(pdf_of(page, vectors))
+        if forces:
+            (work / "forces.csv").write_text(csv_text(forces), encoding="utf-8")
         (work / "identifications.csv").write_text(
             csv_text(identification_rows(_all_identifications(study))), encoding="utf-8"
         )
@@ -87,13 +111,13 @@ def write_study(
     return written
 
 
-def _draw(rig: RigStudy, progress: Progress, *, png: bool) -> dict[str, Picture]:
+def _draw(rig: RigStudy, progress: Progress, *, also: tuple[str, ...]) -> dict[str, Picture]:
     """Every figure of a rig, by name."""
     figures = _figures(rig)
     pictures = {}
     for number, (name, figure) in enumerate(figures.items()):
         progress(f"{rig.rig or 'rig'}: figure {name}", number / len(figures))
-        pictures[name] = Picture.of(figure, png)
+        pictures[name] = Picture.of(figure, also)
     return pictures
 
 
@@ -127,7 +151,9 @@ def _figures(rig: RigStudy) -> dict[str, Figure]:
         if candidate.held_out.runs:
             scores[f"{candidate.title}, held out"] = candidate.held_out
     train = [rig.dataset[run.run_id] for run in chosen.left_out.runs]
+    measured = _measured(rig)
     return {
+        **(figures_of_tests(rig.dataset, measured) if measured else {}),
         "matrix": test_matrix(rig.loops),
         "loops": measured_loops(rig.dataset, rig.loops),
         "analysis": test_analysis(rig.loops, rig.ranges),
@@ -150,13 +176,22 @@ def _shown(rig: RigStudy) -> list[Any]:
     return [ordered[i] for i in picks]
 
 
-def _chapter(rig: RigStudy, pictures: Mapping[str, bytes]) -> dict[str, Any]:
+def _measured(rig: RigStudy) -> dict[str, Characteristics]:
+    """What the tests say without a model; empty where no run holds a steady cycle."""
+    try:
+        return {rig.rig or rig.dataset.name: characterise(rig.dataset.runs)}
+    except IdentificationError:
+        return {}
+
+
+def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limit]) -> dict[str, Any]:
     chosen, (mapped, _) = rig.chosen, _mapped(rig)
     floors = [run.repeatability for run in rig.dataset if run.repeatability is not None]
     held = any(run.id in {loop.run_id for loop in rig.loops} for run in rig.dataset.split("validate"))
     return {
         "rig": rig.rig or rig.dataset.name,
         "verdict": _verdict(rig),
+        "measured": facts_of_tests(measured, limits=limits) if (measured := _measured(rig)) else None,
         "choice": _choice(rig),
         "tests": _tests(rig),
         "chosen": chosen,

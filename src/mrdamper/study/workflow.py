@@ -15,7 +15,7 @@ from mrdamper.dampers.base import Damper
 from mrdamper.data import Dataset, Run
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError
 from mrdamper.identification import refuse_clipped
-from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, dynamic_ranges
+from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, at_levels, dynamic_ranges
 from mrdamper.motion import analyse_motion, equivalent_sine
 from mrdamper.study.parallel import HERE, Processes
 from mrdamper.study.recipe import (
@@ -149,7 +149,7 @@ def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None, *
     rig = dataset.rigs[0]
     progress(f"{rig or 'rig'}: loops", 0.0)
     sines, refused = usable_sines(dataset)
-    loops = tuple(analyse_loop(run) for run in sines)
+    loops = at_levels([analyse_loop(run) for run in sines])
     train = [run for run in sines if run.split == "train"]
     if len(train) < 2:
         raise IdentificationError(

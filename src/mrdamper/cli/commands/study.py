@@ -17,6 +17,11 @@ def register(app: typer.Typer) -> None:
         data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests of two dampers."),
         out: Path = typer.Option(..., "--out", help="Folder for report.html, model.json, tables and figures."),
         model: str | None = typer.Option(None, "--model", help="Save this model instead of the best."),
+        about: Path | None = typer.Option(
+            None, "--about", help="TOML with title, customer, specimen, ...; makes a PDF."
+        ),
+        limits: Path | None = typer.Option(None, "--limits", help="TOML with bands the measured forces must lie in."),
+        pdf: bool = typer.Option(False, "--pdf", help="report.pdf too, and every figure as PDF."),
         png: bool = typer.Option(False, "--png", help="Figures as PNG beside the SVG."),
         as_json: bool = typer.Option(False, "--json", help="Print a summary a program can read."),
     ) -> None:
@@ -25,10 +30,13 @@ def register(app: typer.Typer) -> None:
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.dataset import load_dataset
+        from mrdamper.report.about import load_about, load_limits
         from mrdamper.report.study import write_study
         from mrdamper.study.parallel import several
         from mrdamper.study.workflow import run_study
 
+        head, bands = load_about(about) if about else None, load_limits(limits) if limits else ()
+        also = [kind for kind, wanted in (("pdf", pdf or about is not None), ("png", png)) if wanted]
         require_writable(out)
         dataset = load_dataset(data)
         workers = min(os.cpu_count() or 1, len(dataset.rigs))
@@ -37,7 +45,13 @@ def register(app: typer.Typer) -> None:
                 dataset, lambda what, share: progress(what, 0.85 * share), model=model, processes=processes
             )
             written = write_study(
-                result, out, lambda what, share: progress(what, 0.85 + 0.15 * share), png=png, processes=processes
+                result,
+                out,
+                lambda what, share: progress(what, 0.85 + 0.15 * share),
+                about=head,
+                limits=bands,
+                also=also,
+                processes=processes,
             )
         if as_json:
             import json

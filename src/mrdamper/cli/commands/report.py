@@ -1,0 +1,52 @@
+"""`mrdamper report`: a test report of one damper, or of several side by side."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+if TYPE_CHECKING:
+    from mrdamper.data import Dataset
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+
+    @app.command(epilog="Example: mrdamper report before/ after/ --about about.toml --out report/")
+    def report(
+        specimens: list[str] = typer.Argument(help="Dataset folders, one a damper; FOLDER:RIG where it holds several."),
+        out: Path = typer.Option(..., "--out", help="Folder for report.html, report.pdf, tables and figures."),
+        about: Path | None = typer.Option(None, "--about", help="TOML with title, customer, specimen, rig, logo, ..."),
+        limits: Path | None = typer.Option(None, "--limits", help="TOML with bands the forces must lie in."),
+        velocities: str = typer.Option("", "--velocities", help="Velocities of the table of forces, m/s: 0.05,0.1,0.2"),
+        png: bool = typer.Option(False, "--png", help="Figures as PNG beside SVG and PDF."),
+    ) -> None:
+        """Write a test report: forces at set velocities, peak force over velocity, cycles, friction, gas force."""
+        from mrdamper.cli.progress import progress_on_stderr
+        from mrdamper.files.atomic import require_writable
+        from mrdamper.report.about import load_about, load_limits, parse_ladder
+        from mrdamper.report.damper_tests import write_test_report
+
+        ladder = parse_ladder(velocities)
+        head = load_about(about) if about else None
+        bands = load_limits(limits) if limits else ()
+        require_writable(out)
+        with progress_on_stderr() as progress:
+            progress("reading", 0.0)
+            loaded = dict(_specimen(text) for text in specimens)
+            progress("report", 0.4)
+            written = write_test_report(loaded, out, about=head, limits=bands, ladder=ladder, png=png)
+            progress("written", 1.0)
+        print(f"report: {written[0]}")
+
+
+def _specimen(text: str) -> tuple[str, Dataset]:
+    from mrdamper.files.dataset import load_dataset
+
+    folder, _, rig = text.rpartition(":") if not Path(text).is_dir() and ":" in text else (text, "", "")
+    dataset = load_dataset(folder)
+    if rig:
+        return rig, dataset.rig(rig)
+    return dataset.name, dataset

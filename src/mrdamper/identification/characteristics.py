@@ -1,0 +1,207 @@
+"""What test engineers read off a damper: forces at set velocities, rebound and compression apart.
+
+Gas force is the force that does not change sign with the motion; friction is what remains at the
+lowest current as the motion becomes slow. Both are taken away or stated, never mixed into the
+damping forces. Extension is positive here, so rebound is the side of positive velocity and force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrdamper.data import Condition, Floats, Run, current_levels
+from mrdamper.errors import IdentificationError, InputError
+from mrdamper.identification.loop_analysis import analyse_loop, whole_cycles
+from mrdamper.motion import equivalent_sine, measured_motion
+
+SIDES = ("rebound", "compression")
+_STEPS = 6  # velocities of a ladder nobody gave
+_SLOW = 0.010  # peak velocity [m/s] up to which a test counts as slow: viscous force is then a few newtons
+_MIDDLE = 0.25  # share of the amplitude around mid-stroke where the force at mid-stroke is read
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """Figures of one run, sides apart, gas force not yet taken away.
+
+    Attributes
+    ----------
+    run_id : str
+    condition : Condition
+        Measured, its current rounded to the level of the test matrix.
+    peak_velocity : (float, float)
+        Of rebound and compression, both positive [m/s].
+    peak_force : (float, float)
+        Largest force in the direction of rebound and of compression, signed, median over the cycles [N].
+    mid_force : (float, float)
+        Force at mid-stroke, moving in rebound and in compression, signed [N].
+    zero_force_velocity : float
+        Half the width of the force–velocity loop: velocity at which the force, gas force taken
+        away, passes zero, mean of both sides [m/s].
+    energy : float
+        Dissipated per cycle [J].
+    """
+
+    run_id: str
+    condition: Condition
+    peak_velocity: tuple[float, float]
+    peak_force: tuple[float, float]
+    mid_force: tuple[float, float]
+    zero_force_velocity: float
+    energy: float
+
+    @property
+    def gas_force(self) -> float:
+        """Half the sum of the forces at mid-stroke [N]: what does not change sign with the motion."""
+        return (self.mid_force[0] + self.mid_force[1]) / 2
+
+
+@dataclass(frozen=True)
+class Characteristics:
+    """What the runs of one damper say, without any model.
+
+    Attributes
+    ----------
+    strokes : tuple of Stroke
+        By current and peak velocity.
+    currents : tuple of float
+        Levels of the test matrix [A].
+    gas_force, friction : float
+        [N]; friction is nan where the tests cannot tell.
+    gas_from, friction_from : str
+        How each was found.
+    passed_over : mapping of run id to the reason
+        Runs that hold no steady cycle at one current.
+    """
+
+    strokes: tuple[Stroke, ...]
+    currents: tuple[float, ...]
+    gas_force: float
+    friction: float
+    gas_from: str
+    friction_from: str
+    passed_over: Mapping[str, str]
+
+    def at(self, current: float) -> tuple[Stroke, ...]:
+        """The strokes of a level, slow to fast."""
+        return tuple(s for s in self.strokes if s.condition.current_A == current)
+
+    def damping_force(self, stroke: Stroke, side: int) -> float:
+        """Peak force of a side (0 rebound, 1 compression) with the gas force taken away, positive [N]."""
+        return abs(stroke.peak_force[side] - self.gas_force)
+
+    def at_velocity(self, current: float, velocity: float, side: int) -> float:
+        """Peak damping force at a peak velocity [N], straight between tested ones; nan outside them."""
+        strokes = self.at(current)
+        speeds = np.array([s.peak_velocity[side] for s in strokes])
+        forces = np.array([self.damping_force(s, side) for s in strokes])
+        order = np.argsort(speeds)
+        return float(np.interp(velocity, speeds[order], forces[order], left=np.nan, right=np.nan))
+
+    def ladder(self) -> tuple[float, ...]:
+        """Round velocities [m/s] spread over what most currents were tested at."""
+        slowest = [min(s.peak_velocity[side] for s in self.at(c)) for c in self.currents for side in (0, 1)]
+        fastest = [max(s.peak_velocity[side] for s in self.at(c)) for c in self.currents for side in (0, 1)]
+        low, high = float(np.median(slowest)), float(np.median(fastest))
+        unit = 10.0 ** np.floor(np.log10(max(high - low, 1e-3 * high)) - 1)
+        steps = np.linspace(np.ceil(low / unit), np.floor(high / unit), _STEPS).round() * unit
+        return tuple(sorted({float(f"{v:.6g}") for v in steps}))
+
+
+def characterise(runs: Sequence[Run]) -> Characteristics:
+    """Characterise one damper from its steady sine runs; other motion is passed over.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Of one rig.
+
+    Raises
+    ------
+    IdentificationError
+        If no run holds a steady cycle at one current.
+    """
+    usable, passed_over = [], {}
+    for run in runs:
+        try:
+            run.current_A  # noqa: B018
+            if equivalent_sine(run).is_sine:
+                usable.append(run)
+            else:
+                passed_over[run.id] = "the motion is no steady cycle"
+        except InputError as error:
+            passed_over[run.id] = f"{error.found} [{error.code}]"
+    if not usable:
+        raise IdentificationError("no run holds a steady cycle at one current", mend="see what mrdamper check says")
+    levels = current_levels([run.current_A for run in usable])
+    strokes = [_stroke(run, level) for run, level in zip(usable, levels, strict=True)]
+    strokes.sort(key=lambda s: (s.condition.current_A, s.condition.peak_velocity))
+    gas, gas_from = _gas_force(strokes)
+    friction, friction_from = _friction(strokes)
+    currents = tuple(sorted(set(levels)))
+    return Characteristics(tuple(strokes), currents, gas, friction, gas_from, friction_from, passed_over)
+
+
+def _stroke(run: Run, current: float) -> Stroke:
+    loop = analyse_loop(run)
+    steady = run.steady()
+    whole = whole_cycles(steady.time, loop.condition.frequency_Hz)
+    motion = measured_motion(steady).about(loop.motion.series.mean).part(whole)
+    force = steady.force[whole]
+    rebound, compression = motion.velocity > 0, motion.velocity < 0
+    cycles = max(1, round(float(np.ptp(motion.time)) * loop.condition.frequency_Hz))
+    mid = tuple(_at_mid_stroke(motion.displacement, force, side) for side in (rebound, compression))
+    condition = Condition(current, loop.condition.frequency_Hz, loop.condition.amplitude_m)
+    return Stroke(
+        run.id,
+        condition,
+        (_median_of_cycles(motion.velocity, cycles, np.max), -_median_of_cycles(motion.velocity, cycles, np.min)),
+        (_median_of_cycles(force, cycles, np.max), _median_of_cycles(force, cycles, np.min)),
+        (mid[0], mid[1]),
+        _zero_force_velocity(motion.velocity, force - (mid[0] + mid[1]) / 2),
+        loop.dissipated_energy,
+    )
+
+
+def _median_of_cycles(values: Floats, cycles: int, extreme: Callable[[Floats], float]) -> float:
+    return float(np.median([extreme(part) for part in np.array_split(values, cycles)]))
+
+
+def _at_mid_stroke(displacement: Floats, force: Floats, side: np.ndarray) -> float:
+    near = side & (np.abs(displacement) < _MIDDLE * np.abs(displacement).max())
+    table = np.column_stack([np.ones(near.sum()), displacement[near], displacement[near] ** 2])
+    return float(np.linalg.lstsq(table, force[near], rcond=None)[0][0])
+
+
+def _zero_force_velocity(velocity: Floats, force: Floats) -> float:
+    crossing = np.flatnonzero((force[1:] > 0) != (force[:-1] > 0))
+    if not crossing.size:
+        return float("nan")
+    share = force[crossing] / (force[crossing] - force[crossing + 1])
+    at = velocity[crossing] + share * (velocity[crossing + 1] - velocity[crossing])
+    return float(np.median(np.abs(at)))
+
+
+def _gas_force(strokes: Sequence[Stroke]) -> tuple[float, str]:
+    slow = [s for s in strokes if max(s.peak_velocity) <= _SLOW]
+    if slow:
+        tests = f"from {len(slow)} slow tests, up to {1e3 * _SLOW:g} mm/s"
+        return float(np.median([s.gas_force for s in slow])), tests
+    return float(np.median([s.gas_force for s in strokes])), "from the symmetry of the loops at mid-stroke, median"
+
+
+def _friction(strokes: Sequence[Stroke]) -> tuple[float, str]:
+    lowest = [s for s in strokes if s.condition.current_A == min(s.condition.current_A for s in strokes)]
+    half = np.array([(s.mid_force[0] - s.mid_force[1]) / 2 for s in lowest])
+    speed = np.array([s.condition.peak_velocity for s in lowest])
+    level = f"{lowest[0].condition.current_A:g} A"
+    if speed.min() <= _SLOW:
+        return float(half[speed <= _SLOW].mean()), f"from slow tests at {level}"
+    if np.ptp(speed) > 0.5 * speed.min() and speed.size >= 3:
+        line = np.polyfit(speed, half, 1)
+        if line[1] >= 0:
+            return float(line[1]), f"at {level}, drawn to zero velocity: it holds the fluid's remaining yield force too"
+    return float("nan"), "not known: no slow test, and too few velocities at the lowest current"

@@ -1,0 +1,185 @@
+"""What a report says of the tests beyond their records: specimen, rig, customer, limits.
+
+Both come from small TOML files a user writes. Nothing is required and nothing is invented.
+"""
+
+from __future__ import annotations
+
+import base64
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from mrdamper.errors import InputError
+
+_LARGEST_LOGO = 500_000  # bytes; it stands in every page
+_LARGEST_FILE = 100_000  # bytes of a TOML file
+_PICTURES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg"}
+
+
+class AboutError(InputError):
+    """A file about the tests, or of limits, cannot be used."""
+
+    code = "E_ABOUT"
+
+
+@dataclass(frozen=True)
+class About:
+    """The head of a report; what was not given is empty.
+
+    Attributes
+    ----------
+    title, customer, maker, type, serial, rig, operator, date, temperature_C, standard, notes : str
+    logo : str
+        The picture as a data address.
+    """
+
+    title: str = ""
+    customer: str = ""
+    maker: str = ""
+    type: str = ""
+    serial: str = ""
+    rig: str = ""
+    operator: str = ""
+    date: str = ""
+    temperature_C: str = ""
+    standard: str = ""
+    notes: str = ""
+    logo: str = ""
+
+    @property
+    def rows(self) -> list[tuple[str, str]]:
+        """What is known, with its name on the page."""
+        named = {"temperature_C": "temperature", "type": "type", "rig": "test rig"}
+        given = [(f.name, getattr(self, f.name)) for f in fields(self) if f.name not in ("title", "logo")]
+        return [(named.get(n, n), f"{v} °C" if n == "temperature_C" else v) for n, v in given if v]
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A band the damping force must lie in.
+
+    Attributes
+    ----------
+    current_A, velocity_m_s : float
+    side : str
+        "rebound" or "compression".
+    lower_N, upper_N : float
+        Of the force with the gas force taken away, positive.
+    """
+
+    current_A: float
+    velocity_m_s: float
+    side: str
+    lower_N: float
+    upper_N: float
+
+
+def load_about(path: str | Path) -> About:
+    """Read the head of a report from a TOML file.
+
+    Raises
+    ------
+    AboutError
+        If it cannot be read, holds an unknown field or a field that is no text or number, or names
+        a logo that is no PNG or JPEG or is too large.
+    """
+    path = Path(path)
+    table = _toml(path)
+    known = [f.name for f in fields(About)]
+    for name, value in table.items():
+        if name not in known:
+            near = get_close_matches(name, known, n=1)
+            mend = f"did you mean {near[0]}?" if near else f"known: {', '.join(known)}"
+            raise AboutError(f"unknown field {name!r}", where=str(path), mend=mend)
+        if isinstance(value, (dict, list, bool)):
+            raise AboutError(f"{name} is no text", where=str(path), mend=f'write {name} = "..."')
+    texts = {name: str(value).strip() for name, value in table.items()}
+    if texts.get("logo"):
+        texts["logo"] = _picture(path.parent / texts["logo"])
+    return About(**texts)
+
+
+def load_limits(path: str | Path) -> tuple[Limit, ...]:
+    """Read tolerance bands: a TOML file with one `[[limit]]` a band.
+
+    Raises
+    ------
+    AboutError
+        If it cannot be read, or a band is incomplete, no number, of no side, or upside down.
+    """
+    path = Path(path)
+    table = _toml(path)
+    entries = table.get("limit")
+    if not isinstance(entries, list) or not entries or set(table) != {"limit"}:
+        raise AboutError("no [[limit]] tables", where=str(path), mend=f"write one [[limit]] a band with {_FIELDS}")
+    return tuple(_limit(entry, f"{path}, limit {number}") for number, entry in enumerate(entries, 1))
+
+
+_FIELDS = "current_A, velocity_m_s, side, lower_N, upper_N"
+
+
+def _limit(entry: Any, where: str) -> Limit:
+    if not isinstance(entry, dict) or set(entry) != set(_FIELDS.split(", ")):
+        raise AboutError(f"fields {', '.join(sorted(map(str, entry)))}", where=where, mend=f"give just {_FIELDS}")
+    if entry["side"] not in ("rebound", "compression"):
+        raise AboutError(f"side is {entry['side']!r}", where=where, mend="write rebound or compression")
+    numbers = {name: value for name, value in entry.items() if name != "side"}
+    for name, value in numbers.items():
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value) or value < 0:
+            raise AboutError(f"{name} is {value!r}", where=where, mend="give a number, zero or more")
+    if entry["lower_N"] > entry["upper_N"]:
+        raise AboutError(
+            f"lower_N {entry['lower_N']:g} lies above upper_N {entry['upper_N']:g}", where=where, mend="exchange them"
+        )
+    return Limit(side=entry["side"], **{name: float(value) for name, value in numbers.items()})
+
+
+def _toml(path: Path) -> Mapping[str, Any]:
+    try:
+        if path.stat().st_size > _LARGEST_FILE:
+            raise AboutError(f"{path.stat().st_size:,} bytes", where=str(path), mend="a few lines of TOML are expected")
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise AboutError(error.strerror or str(error), where=str(path), mend="give a TOML file that exists") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        mend = 'write one `name = "text"` a line, in UTF-8'
+        raise AboutError(f"is no TOML: {str(error).splitlines()[0]}", where=str(path), mend=mend) from error
+
+
+def _picture(path: Path) -> str:
+    try:
+        size = path.stat().st_size
+        data = path.read_bytes() if size <= _LARGEST_LOGO else b""
+    except OSError as error:
+        raise AboutError(error.strerror or str(error), where=f"logo {path.name}", mend="correct its path") from error
+    if size > _LARGEST_LOGO:
+        raise AboutError(
+            f"{size / 1e6:.1f} MB", where=f"logo {path.name}", mend=f"give a picture under {_LARGEST_LOGO // 1000} kB"
+        )
+    kind = next((kind for start, kind in _PICTURES.items() if data.startswith(start)), None)
+    if kind is None:
+        raise AboutError("neither PNG nor JPEG", where=f"logo {path.name}", mend="save it as PNG")
+    return f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"
+
+
+def parse_ladder(text: str) -> tuple[float, ...]:
+    """Velocities [m/s] of a table of forces from "0.05, 0.1, 0.2"; empty for the default.
+
+    Raises
+    ------
+    AboutError
+        If one is no positive number, or over 20 are given.
+    """
+    words = [word for word in text.replace(",", " ").split() if word]
+    try:
+        steps = [float(word) for word in words]
+    except ValueError:
+        steps = [math.nan]
+    if any(not (0 < step < math.inf) for step in steps) or len(steps) > 20:
+        raise AboutError(f"velocities {text!r}", where="--velocities", mend="give up to 20 positive numbers in m/s")
+    return tuple(sorted(set(steps)))

@@ -1,0 +1,263 @@
+"""A test report: what was tested and what it showed, one specimen or several side by side, no model."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from mrdamper.data import Dataset, Run, same_motion
+from mrdamper.errors import IdentificationError, InputError
+from mrdamper.files.atomic import publish
+from mrdamper.files.encoding import csv_text
+from mrdamper.identification.characteristics import SIDES, Characteristics, Stroke, characterise
+from mrdamper.report.about import About, Limit
+from mrdamper.report.page import made_from, number, render_page
+from mrdamper.report.plots.characteristics import continuous_velocity_plot, figures_over_current, peak_velocity_plot
+from mrdamper.report.plots.style import Picture
+
+_SOURCES = ("source", "file", "source_file")  # notes of a run that name where it came from
+_SAME = 0.03  # currents this close to a limit's are that current
+
+
+def write_test_report(
+    specimens: Mapping[str, Dataset],
+    folder: str | Path,
+    *,
+    about: About | None = None,
+    limits: Sequence[Limit] = (),
+    ladder: Sequence[float] = (),
+    png: bool = False,
+) -> list[Path]:
+    """Write report.html, report.pdf, forces.csv, tests.csv and figures/ of one or several specimens.
+
+    Parameters
+    ----------
+    specimens : mapping of str to Dataset
+        By the name they get in the report; each holds the tests of one damper.
+    folder : path
+    about : About, optional
+    limits : sequence of Limit
+        Bands the damping force must lie in; a verdict is given only against these.
+    ladder : sequence of float
+        Velocities of the table of forces [m/s]; default: round values inside the first specimen's tests.
+    png : bool
+        Every figure as PNG too.
+
+    Raises
+    ------
+    IdentificationError
+        If a specimen holds no steady cycle, or the tests of several dampers.
+    OutputError
+        If the folder cannot be written to.
+    """
+    from mrdamper.report.pdf import pdf_of
+
+    found = {name: _characterised(name, dataset) for name, dataset in specimens.items()}
+    facts = facts_of_tests(found, ladder, limits)
+    first = next(iter(specimens.values()))
+    about = about or About()
+
+    def fill(work: Path) -> None:
+        (work / "figures").mkdir()
+        also = ("pdf", "png") if png else ("pdf",)
+        pictures = {key: Picture.of(figure, also) for key, figure in figures_of_tests(first, found).items()}
+        saved = {key: picture.save(work / "figures" / key) for key, picture in pictures.items()}
+        page = render_page(
+            "tests.html.j2",
+            about.title or f"Damper test report: {', '.join(found)}",
+            made_from(first) + ".",
+            about=about,
+            provenance=provenance(specimens),
+            names=", ".join(found),
+            t=facts,
+            pictures=saved,
+            passed_over={run: why for specimen in found.values() for run, why in specimen.passed_over.items()},
+        )
+        (work / "report.html").write_text(page, encoding="utf-8")
+        (work / "report.pdf").write_bytes(pdf_of(page, {key: p.files["pdf"] for key, p in pictures.items()}))
+        (work / "forces.csv").write_text(csv_text(force_rows(facts)), encoding="utf-8")
+        (work / "tests.csv").write_text(csv_text(_test_rows(found)), encoding="utf-8")
+
+    return publish(folder, "report.html", fill)
+
+
+def figures_of_tests(first: Dataset, specimens: Mapping[str, Characteristics]) -> dict[str, Figure]:
+    """The figures of a test report, by name; force through the cycle is that of the first specimen."""
+    return {
+        "peak_velocity": peak_velocity_plot(specimens),
+        "cycle": continuous_velocity_plot(first, next(iter(specimens.values()))),
+        "energy": figures_over_current(specimens),
+    }
+
+
+def facts_of_tests(
+    specimens: Mapping[str, Characteristics], ladder: Sequence[float] = (), limits: Sequence[Limit] = ()
+) -> dict[str, Any]:
+    """What the template of the tests prints: summary, ladder, forces, currents, verdicts."""
+    steps = tuple(ladder) or next(iter(specimens.values())).ladder()
+    forces = [
+        {
+            "specimen": name,
+            "current_A": current,
+            "side": SIDES[side],
+            "forces": [specimen.at_velocity(current, velocity, side) for velocity in steps],
+        }
+        for name, specimen in specimens.items()
+        for current in specimen.currents
+        for side in (0, 1)
+    ]
+    return {
+        "summary": " ".join(_summary(name, specimen) for name, specimen in specimens.items()),
+        "ladder": steps,
+        "forces": forces,
+        "currents": [_current_row(name, s, c) for name, s in specimens.items() for c in s.currents],
+        "verdicts": [_verdict(name, s, limit) for name, s in specimens.items() for limit in limits],
+    }
+
+
+def force_rows(facts: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The table of forces, one row a specimen, current, side and velocity."""
+    return [
+        {
+            "specimen": row["specimen"],
+            "current_A": row["current_A"],
+            "side": row["side"],
+            "velocity_m_s": velocity,
+            "damping_force_N": None if np.isnan(force) else force,
+        }
+        for row in facts.get("forces", ())
+        for velocity, force in zip(facts["ladder"], row["forces"], strict=True)
+    ]
+
+
+def provenance(specimens: Mapping[str, Dataset]) -> list[tuple[str, str]]:
+    """Where a report's numbers come from: runs, rates, dates, files and a hash of the samples."""
+    rows = []
+    for name, dataset in specimens.items():
+        rates = sorted({float(number(_rate(run))) for run in dataset.runs})
+        span = f"{rates[0]:g} Hz" if len(rates) == 1 else f"{rates[0]:g} to {rates[-1]:g} Hz"
+        notes = [run.notes for run in dataset.runs]
+        files = sorted({note[key] for note in notes for key in _SOURCES if note.get(key)})
+        dates = sorted({note["recorded_at"][:10] for note in notes if note.get("recorded_at")})
+        rows.append((name, f"{len(dataset)} runs at {span}" + (f", recorded {_span(dates)}" if dates else "")))
+        if files:
+            rows.append((f"{name}: files", ", ".join(files)))
+        rows.append((f"{name}: SHA-256 of the samples", data_hash(dataset.runs)))
+    return [*rows, ("software", f"mrdamper {version('mrdamper')}")]
+
+
+def _span(dates: Sequence[str]) -> str:
+    return dates[0] if len(dates) == 1 else f"{dates[0]} to {dates[-1]}"
+
+
+def data_hash(runs: Sequence[Run]) -> str:
+    """A hash of what was measured: the same samples give the same, however they are stored."""
+    digest = hashlib.sha256()
+    for run in sorted(runs, key=lambda run: run.id):
+        digest.update(run.id.encode())
+        for channel in (run.time, run.displacement, run.force, run.current):
+            digest.update(np.ascontiguousarray(channel, dtype="<f8").tobytes())
+    return digest.hexdigest()
+
+
+def _rate(run: Run) -> float:
+    return float((run.time.size - 1) / (run.time[-1] - run.time[0]))
+
+
+def _characterised(name: str, dataset: Dataset) -> Characteristics:
+    if len(dataset.rigs) > 1:
+        raise IdentificationError(
+            f"holds the tests of {len(dataset.rigs)} dampers: {', '.join(dataset.rigs)}",
+            where=name,
+            mend="name one: FOLDER:RIG",
+        )
+    try:
+        return characterise(dataset.runs)
+    except InputError as error:
+        error.where = error.where or name
+        raise
+
+
+def _summary(name: str, specimen: Characteristics) -> str:
+    friction = "" if np.isnan(specimen.friction) else f"{specimen.friction:.0f} N "
+    return (
+        f"{name}: {len(specimen.strokes)} tests at {', '.join(f'{c:g}' for c in specimen.currents)} A. "
+        f"Gas force {specimen.gas_force:.0f} N ({specimen.gas_from}). Friction {friction}({specimen.friction_from})."
+    )
+
+
+def _current_row(name: str, specimen: Characteristics, current: float) -> dict[str, Any]:
+    strokes = specimen.at(current)
+    speeds = [s.condition.peak_velocity for s in strokes]
+    energies = [s.energy for s in strokes]
+    return {
+        "specimen": name,
+        "current_A": current,
+        "tests": len(strokes),
+        "slowest": min(speeds),
+        "fastest": max(speeds),
+        "rebound": max(specimen.damping_force(s, 0) for s in strokes),
+        "compression": max(specimen.damping_force(s, 1) for s in strokes),
+        "least_energy": min(energies),
+        "most_energy": max(energies),
+        "width": 1e3 * float(np.median([s.zero_force_velocity for s in strokes])),
+        "dynamic_range": _dynamic_range(specimen, current),
+    }
+
+
+def _dynamic_range(specimen: Characteristics, current: float) -> float:
+    lowest = specimen.currents[0]
+    ratios = []
+    for group in same_motion([s.condition for s in specimen.strokes]):
+        members = {specimen.strokes[i].condition.current_A: specimen.strokes[i] for i in group}
+        if lowest in members and current in members:
+            ratios.append(_both_sides(specimen, members[current]) / _both_sides(specimen, members[lowest]))
+    return float(np.median(ratios)) if ratios else float("nan")
+
+
+def _both_sides(specimen: Characteristics, stroke: Stroke) -> float:
+    return (specimen.damping_force(stroke, 0) + specimen.damping_force(stroke, 1)) / 2
+
+
+def _verdict(name: str, specimen: Characteristics, limit: Limit) -> dict[str, Any]:
+    near = [c for c in specimen.currents if abs(c - limit.current_A) <= 5e-3 + _SAME * abs(limit.current_A)]
+    side = SIDES.index(limit.side)
+    force = specimen.at_velocity(near[0], limit.velocity_m_s, side) if near else float("nan")
+    verdict = "not tested" if np.isnan(force) else "pass" if limit.lower_N <= force <= limit.upper_N else "fail"
+    return {
+        "specimen": name,
+        "current_A": limit.current_A,
+        "velocity_m_s": limit.velocity_m_s,
+        "side": limit.side,
+        "lower_N": limit.lower_N,
+        "upper_N": limit.upper_N,
+        "measured_N": force,
+        "verdict": verdict,
+    }
+
+
+def _test_rows(specimens: Mapping[str, Characteristics]) -> list[dict[str, Any]]:
+    return [
+        {
+            "specimen": name,
+            "run_id": s.run_id,
+            "current_A": s.condition.current_A,
+            "frequency_Hz": s.condition.frequency_Hz,
+            "amplitude_m": s.condition.amplitude_m,
+            "peak_velocity_rebound_m_s": s.peak_velocity[0],
+            "peak_velocity_compression_m_s": s.peak_velocity[1],
+            "damping_force_rebound_N": specimen.damping_force(s, 0),
+            "damping_force_compression_N": specimen.damping_force(s, 1),
+            "gas_force_N": s.gas_force,
+            "energy_J": s.energy,
+            "zero_force_velocity_m_s": s.zero_force_velocity,
+        }
+        for name, specimen in specimens.items()
+        for s in specimen.strokes
+    ]

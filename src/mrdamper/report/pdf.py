@@ -1,0 +1,354 @@
+"""A page of ours as a PDF: the same words and tables, pages numbered, figures as vectors.
+
+The page is the one source: what `render_page` wrote is walked element by element, so nothing is
+said twice and nothing is folded away. fpdf2 sets the text; figures come as PDF pages of their own
+and are laid into the places kept for them.
+"""
+
+from __future__ import annotations
+
+import io
+import logging
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+from fpdf import FPDF, FontFace
+from fpdf.enums import TableBordersLayout, TextEmphasis
+from fpdf.outline import OutlineSection
+
+_MARGIN = 18.0  # mm
+_INK, _FAINT, _RULE = (27, 31, 36), (91, 101, 112), (217, 222, 227)
+_SIZES = {"h1": 18.0, "h2": 14.0, "h3": 11.0, "p": 9.5, "table": 8.0, "caption": 8.0}  # pt
+_SMALLEST = 5.0  # pt, below which a table turns its page instead
+_KEEP = 42.0  # mm a heading wants below itself, so that it never ends a page
+_VOID = frozenset({"br", "img", "meta", "link", "hr", "input"})
+_INLINE = frozenset({"b", "strong", "code", "a", "span", "br", "em", "i", "sup", "sub"})
+_CONTENTS_PER_PAGE = 40
+
+
+@dataclass
+class _Element:
+    tag: str
+    attributes: Mapping[str, str | None] = field(default_factory=dict)
+    children: list[_Element | str] = field(default_factory=list)
+
+    def elements(self, *tags: str) -> Iterator[_Element]:
+        """Every element below of one of some kinds, in the order of the page."""
+        for child in self.children:
+            if isinstance(child, _Element):
+                if child.tag in tags:
+                    yield child
+                else:
+                    yield from child.elements(*tags)
+
+    @property
+    def text(self) -> str:
+        """The text inside; a line break stays one."""
+        parts = [c if isinstance(c, str) else "\n" if c.tag == "br" else c.text for c in self.children]
+        lines = "".join(p if p == "\n" else " ".join(p.split(" ")).replace("\n", " ") for p in parts).split("\n")
+        return "\n".join(" ".join(line.split()) for line in lines).strip()
+
+
+class _Tree(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__(convert_charrefs=True)
+        self.root = _Element("page")
+        self._open = [self.root]
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        element = _Element(tag, dict(attrs))
+        self._open[-1].children.append(element)
+        if tag not in _VOID:
+            self._open.append(element)
+
+    def handle_endtag(self, tag: str) -> None:
+        if any(element.tag == tag for element in self._open[1:]):
+            while self._open.pop().tag != tag:
+                continue
+
+    def handle_data(self, data: str) -> None:
+        self._open[-1].children.append(data)
+
+
+class _Paper(FPDF):
+    def __init__(self, footer: str) -> None:
+        super().__init__(format="A4")
+        fonts = _fonts()
+        for style, name in (("", "DejaVuSans.ttf"), ("B", "DejaVuSans-Bold.ttf")):
+            self.add_font("text", style, str(fonts / name))
+        self.add_font("code", "", str(fonts / "DejaVuSansMono.ttf"))
+        self.set_margins(_MARGIN, _MARGIN)
+        self.set_auto_page_break(True, _MARGIN)
+        self.alias_nb_pages()
+        self._footer_text = footer
+
+    def footer(self) -> None:
+        self.set_y(-_MARGIN + 5)
+        self.set_font("text", size=7)
+        self.set_text_color(*_FAINT)
+        half = self.epw / 2
+        self.cell(half, 4, self._footer_text)
+        self.cell(half, 4, f"page {self.page_no()} of {{nb}}", align="R")
+        self.set_text_color(*_INK)
+
+
+def pdf_of(page: str, figures: Mapping[str, bytes]) -> bytes:
+    """A PDF of a page.
+
+    Parameters
+    ----------
+    page : str
+        HTML as `render_page` makes it.
+    figures : mapping of str to bytes
+        Each figure of the page as a PDF of one page, by the `id` of its `figure` element.
+
+    Returns
+    -------
+    bytes
+        A4, with a list of contents, bookmarks and numbered pages.
+    """
+    tree = _Tree()
+    tree.feed(page)
+    logging.getLogger("fpdf").setLevel(logging.ERROR)  # a character that no font holds is drawn as a box
+    logging.getLogger("fontTools").setLevel(logging.ERROR)
+    title = next(tree.root.elements("h1")).text
+    paper = _Paper(title)
+    paper.set_title(title)
+    paper.set_text_color(*_INK)
+    writer = _Writer(paper, figures)
+    paper.add_page()
+    headings = sum(1 for _ in tree.root.elements("h2", "h3"))
+    for part in ("header", "main", "footer"):
+        for element in tree.root.elements(part):
+            writer.block(element)
+            if part == "header" and headings > 3:
+                _reserve_contents(paper, headings)
+    return _with_figures(bytes(paper.output()), writer.places, figures)
+
+
+class _Writer:
+    def __init__(self, paper: _Paper, figures: Mapping[str, bytes]) -> None:
+        self.paper, self.figures = paper, figures
+        self.kept = 0.0  # mm that a heading wants below itself for what follows it
+        self.places: list[tuple[str, int, float, float, float]] = []  # figure, page, left, bottom [mm], width
+
+    def block(self, element: _Element) -> None:
+        """Set an element; what is no block of its own is set child by child."""
+        if element.tag in ("style", "script", "nav"):
+            return
+        known = {"h1": self.heading, "h2": self.heading, "h3": self.heading, "table": self.table}
+        known |= {"figure": self.figure, "li": self.item, "p": self.paragraph, "summary": self.folded}
+        if element.tag in known:
+            known[element.tag](element)
+        elif "big" in (element.attributes.get("class") or ""):
+            self.numbers(element)
+        else:
+            loose = [c for c in element.children if isinstance(c, str) or c.tag in _INLINE]
+            if any(c.strip() if isinstance(c, str) else True for c in loose) and element.tag != "page":
+                self.paragraph(_Element("p", element.attributes, list(loose)))
+            blocks = [c for c in element.children if isinstance(c, _Element) and c.tag not in _INLINE]
+            for child, following in zip(blocks, [*blocks[1:], None], strict=True):
+                self.kept = self._height(following)
+                self.block(child)
+
+    def heading(self, element: _Element) -> None:
+        """A heading, with room below it for what it heads."""
+        paper, size = self.paper, _SIZES[element.tag]
+        if paper.will_page_break(max(_KEEP, self.kept + 0.8 * size)) and element.tag != "h1":
+            paper.add_page()
+        elif paper.get_y() > _MARGIN + 1:
+            paper.ln(0.35 * size)
+        paper.set_font("text", "B", size)
+        if element.tag != "h1":
+            paper.start_section(element.text, level=int(element.tag[1]) - 2)
+        paper.multi_cell(0, 0.45 * size, element.text, align="L", new_x="LMARGIN", new_y="NEXT")
+        paper.ln(0.12 * size)
+
+    def paragraph(self, element: _Element, size: float = _SIZES["p"], indent: float = 0.0) -> None:
+        """Running text, with bold and code inside."""
+        paper = self.paper
+        faint = (element.attributes.get("class") or "") in ("faint", "caption")
+        paper.set_text_color(*(_FAINT if faint else _INK))
+        paper.set_left_margin(_MARGIN + indent)
+        paper.set_x(_MARGIN + indent)
+        self._runs(element, size, "")
+        paper.set_left_margin(_MARGIN)
+        paper.ln(0.5 * size)
+        paper.ln(0.15 * size)
+        paper.set_text_color(*_INK)
+
+    def _runs(self, element: _Element, size: float, style: str) -> None:
+        for child in element.children:
+            if isinstance(child, str):
+                words = " ".join(child.split())
+                lead = " " if child[:1].isspace() and words else ""
+                trail = " " if child[-1:].isspace() else ""
+                self.paper.set_font("code" if style == "code" else "text", "B" if style == "B" else "", size)
+                self.paper.write(0.45 * size, lead + words + trail)
+            elif child.tag == "br":
+                self.paper.ln(0.45 * size)
+            else:
+                self._runs(child, size, {"b": "B", "strong": "B", "code": "code"}.get(child.tag, style))
+
+    def folded(self, element: _Element) -> None:
+        """What a folded part of the page is called; here the part stands open."""
+        if self.paper.will_page_break(_KEEP):
+            self.paper.add_page()
+        self.paragraph(_Element("p", {}, [_Element("b", {}, [element.text])]))
+
+    def _height(self, element: _Element | None) -> float:
+        """What a figure takes [mm]; nothing for other blocks, which may run over pages."""
+        if element is None or element.tag != "figure" or element.attributes.get("id") not in self.figures:
+            return 0.0
+        wide, tall = _size_of(self.figures[str(element.attributes["id"])])
+        caption = next(element.elements("figcaption"), None)
+        lines = len(caption.text) // 110 + 1 if caption else 0
+        return tall * min(1.0, self.paper.epw / wide) + 6.0 + 4.0 * lines
+
+    def item(self, element: _Element) -> None:
+        """An item of a list."""
+        self.paragraph(_Element("p", element.attributes, ["•  ", *element.children]), indent=3.0)
+
+    def numbers(self, element: _Element) -> None:
+        """The large figures of a summary, one a line."""
+        for box in element.elements("div"):
+            value = next(box.elements("b")).text
+            self.paragraph(_Element("p", {}, [_Element("b", {}, [value]), f"  {next(box.elements('span')).text}"]))
+
+    def figure(self, element: _Element) -> None:
+        """A figure and its caption, on one page."""
+        name = element.attributes.get("id") or ""
+        paper = self.paper
+        caption = next(element.elements("figcaption"), None)
+        if name in self.figures:
+            wide, tall = _size_of(self.figures[name])
+            width = min(paper.epw, wide)
+            height = tall * width / wide
+            if paper.will_page_break(self._height(element)):
+                paper.add_page()
+            bottom = paper.h - paper.get_y() - height
+            self.places.append((name, paper.page_no() - 1, _MARGIN, bottom, width))
+            paper.set_y(paper.get_y() + height + 1)
+        if caption:
+            self.paragraph(_Element("p", {"class": "caption"}, caption.children), _SIZES["caption"])
+
+    def table(self, element: _Element) -> None:
+        """A table whose headings stand on every page it runs over."""
+        paper = self.paper
+        caption = next(element.elements("caption"), None)
+        rows = [list(row.elements("th", "td")) for row in element.elements("tr")]
+        if not rows:
+            return
+        texts = [[cell.text for cell in row] for row in rows]
+        size, widths = self._fitted(texts, rows)
+        turned = size < _SMALLEST and paper.cur_orientation == "P"
+        if turned:
+            paper.add_page(orientation="L")
+            size, widths = self._fitted(texts, rows)
+        elif paper.will_page_break(14 + 0.5 * size * min(len(rows), 4)):
+            paper.add_page()
+        if caption:
+            self.paragraph(_Element("p", {"class": "caption"}, caption.children), _SIZES["caption"])
+        size = max(size, _SMALLEST)
+        paper.set_font("text", size=size)
+        paper.set_draw_color(*_RULE)
+        headed = bool(rows[0]) and rows[0][0].tag == "th"
+        with paper.table(
+            col_widths=tuple(widths),
+            width=min(sum(widths), paper.epw),
+            align="LEFT",
+            borders_layout=TableBordersLayout.HORIZONTAL_LINES,
+            first_row_as_headings=headed,
+            headings_style=FontFace(emphasis=TextEmphasis.B),
+            line_height=0.5 * size,
+            padding=(0.4, 0.8),
+        ) as table:
+            for row, words in zip(rows, texts, strict=True):
+                line = table.row()
+                for cell, text in zip(row, words, strict=True):
+                    line.cell(text, align=_alignment(cell, first=cell is row[0]))
+        paper.ln(2)
+        if turned:
+            paper.add_page(orientation="P")
+
+    def _fitted(self, texts: list[list[str]], rows: list[list[_Element]]) -> tuple[float, list[float]]:
+        """Size of type at which a table fits the page, and its columns' widths [mm]."""
+        paper, size = self.paper, _SIZES["table"]
+        columns = max(len(row) for row in texts)
+        while True:
+            paper.set_font("text", "B", size)
+            widths, wraps = [0.0] * columns, [False] * columns
+            for row, cells in zip(texts, rows, strict=True):
+                for i, (text, cell) in enumerate(zip(row, cells, strict=True)):
+                    wide = max(paper.get_string_width(line) for line in text.split("\n")) + 2.5
+                    wraps[i] |= "wrap" in (cell.attributes.get("class") or "")
+                    widths[i] = max(widths[i], wide)
+            free = sum(w for w, wrap in zip(widths, wraps, strict=True) if wrap)
+            kept = sum(w for w, wrap in zip(widths, wraps, strict=True) if not wrap)
+            room = paper.epw - kept
+            if free <= room:
+                return size, widths
+            least = 28.0 * sum(wraps)
+            if any(wraps) and room >= least:
+                shared = zip(widths, wraps, strict=True)
+                return size, [max(28.0, w * room / free) if wrap else w for w, wrap in shared]
+            if size <= _SMALLEST:
+                scale = paper.epw / (free + kept)
+                return _SMALLEST - 0.1, [w * scale for w in widths]
+            size -= 0.5
+
+
+def _alignment(cell: _Element, *, first: bool) -> str:
+    kinds = (cell.attributes.get("class") or "").split()
+    return "LEFT" if first or "text" in kinds or "wrap" in kinds else "RIGHT"
+
+
+def _reserve_contents(paper: _Paper, headings: int) -> None:
+    def render(pdf: FPDF, outline: list[OutlineSection]) -> None:
+        pdf.set_font("text", "B", _SIZES["h3"])
+        pdf.set_x(_MARGIN)
+        pdf.cell(0, 7, "Contents", new_x="LMARGIN", new_y="NEXT")
+        for entry in outline:
+            pdf.set_font("text", "B" if entry.level == 0 else "", 8.5)
+            link = pdf.add_link(page=entry.page_number)
+            pdf.set_x(_MARGIN + 5 * entry.level)
+            wide = pdf.epw - 5 * entry.level - 12
+            name = entry.name
+            while pdf.get_string_width(name) > wide - 2:
+                name = name[:-2] + "…"
+            pdf.cell(wide, 5.2, name, link=link)
+            pdf.cell(12, 5.2, str(entry.page_number), align="R", link=link, new_x="LMARGIN", new_y="NEXT")
+
+    paper.insert_toc_placeholder(render, pages=headings // _CONTENTS_PER_PAGE + 1)
+
+
+def _size_of(figure: bytes) -> tuple[float, float]:
+    """Width and height [mm] of a PDF of one page."""
+    from pypdf import PdfReader
+
+    box = PdfReader(io.BytesIO(figure)).pages[0].mediabox
+    return float(box.width) * 25.4 / 72, float(box.height) * 25.4 / 72
+
+
+def _with_figures(text: bytes, places: list[Any], figures: Mapping[str, bytes]) -> bytes:
+    from pypdf import PdfReader, PdfWriter, Transformation
+
+    whole = PdfWriter(clone_from=io.BytesIO(text))
+    point = 72 / 25.4
+    for name, page, left, bottom, width in places:
+        figure = PdfReader(io.BytesIO(figures[name])).pages[0]
+        scale = width * point / float(figure.mediabox.width)
+        moved = Transformation().scale(scale).translate(left * point, bottom * point)
+        whole.pages[page].merge_transformed_page(figure, moved)
+    made = io.BytesIO()
+    whole.write(made)
+    return made.getvalue()
+
+
+def _fonts() -> Path:
+    import matplotlib
+
+    return Path(matplotlib.get_data_path()) / "fonts" / "ttf"
