@@ -6,6 +6,8 @@ Anything that is not an `InputError` is our fault, not the user's.
 
 from __future__ import annotations
 
+import errno
+import re
 import unicodedata
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -154,3 +156,44 @@ class StepError(InputError):
     """The time step of a simulation is too coarse, or a step has no solution."""
 
     code = "E_STEP"
+
+
+class ResourceError(InputError):
+    """The machine has run out of room, memory, files or processes; the code says of what."""
+
+    code = "E_RESOURCE"
+
+
+_RESOURCES = {
+    errno.ENOSPC: ("E_DISK_FULL", "the disk is full", "make room, or choose another disk"),
+    errno.EDQUOT: ("E_DISK_FULL", "the disk quota is used up", "make room, or choose another disk"),
+    errno.EFBIG: ("E_FILE_SIZE", "the file grows beyond the limit for files", "raise the limit (ulimit -f)"),
+    errno.ENOMEM: (
+        "E_MEMORY",
+        "the memory does not suffice",
+        "close other programs, or take less data",
+    ),
+    errno.EMFILE: ("E_OPEN_FILES", "too many files are open", "raise the limit (ulimit -n)"),
+    errno.ENFILE: ("E_OPEN_FILES", "too many files are open", "close other programs"),
+    errno.EAGAIN: ("E_PROCESSES", "no further process can be started", "close other programs, or raise the limit"),
+    errno.EIO: ("E_DISK", "the disk does not answer", "choose another disk"),
+}
+
+
+def resource_error(error: BaseException, where: str = "") -> ResourceError | None:
+    """What the machine has run out of, if that is what an exception says; libraries say it in several ways."""
+    number = getattr(error, "errno", None)
+    if found := re.search(r"\(os error (\d+)\)", str(error)):
+        number = int(found[1])
+    if isinstance(error, MemoryError) or "out of memory" in str(error).lower():
+        number = errno.ENOMEM
+    if isinstance(error, FileNotFoundError) and "temporary directory" in str(error):
+        return ResourceError(
+            "there is no folder for temporary files", mend="set TMPDIR to one you may write to", code="E_TEMP"
+        )
+    if isinstance(error, RuntimeError) and "start new thread" in str(error):
+        number = errno.EAGAIN
+    if number not in _RESOURCES:
+        return None
+    code, text, mend = _RESOURCES[number]
+    return ResourceError(text, where=where, mend=mend, code=code)

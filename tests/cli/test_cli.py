@@ -2,6 +2,8 @@
 
 import csv
 import json
+import os
+import signal
 import subprocess
 import sys
 
@@ -150,3 +152,41 @@ def test_bad_input_is_one_line_and_exit_two(model, tmp_path):
         assert len([line for line in done.stderr.splitlines() if line.startswith("mrdamper: ")]) == 1, done.stderr
         assert "Traceback" not in done.stderr
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "model.json", "newer.json"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals as POSIX knows them")
+@pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", 129)])
+def test_a_signal_ends_a_command_with_its_number_and_one_line(name, code):
+    script = (
+        "import time, mrdamper.cli as c\n"
+        "def busy(prog_name):\n    print('up', flush=True)\n    time.sleep(60)\n"
+        "c.application = lambda: busy\nc.main()"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout.readline() == "up\n"
+    process.send_signal(getattr(signal, name))
+    _, said = process.communicate(timeout=20)
+    assert process.returncode == code
+    assert said == f"mrdamper: ended by {name}; what was not finished is not written\n"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="limits as POSIX knows them")
+def test_too_small_a_limit_of_memory_is_refused_at_once():
+    """Under it, libraries for tables abort or sleep for ever."""
+    done = subprocess.run(
+        ["bash", "-c", f"ulimit -v 1000000; exec {sys.executable} -m mrdamper.cli check"],
+        capture_output=True, text=True, check=False, timeout=60,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "[E_MEMORY]" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_reader_that_goes_away_is_no_fault():
+    done = subprocess.run(
+        ["bash", "-c", f"{sys.executable} -m mrdamper.cli models --json | head -c 1"],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.stderr == ""

@@ -1,15 +1,32 @@
-"""Files and folders that appear whole or not at all."""
+"""Files and folders that appear whole or not at all, whenever the process is killed.
+
+What is written stands complete and synced in a hidden folder beside its place, named
+`.NAME.….partial` and locked by its process; one rename or exchange puts it there. What a
+killed process left behind is not locked any more, and goes when the same place is next
+written to.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
+import errno
+import json
 import os
 import shutil
+import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
-from mrdamper.errors import OutputError
+from mrdamper.errors import OutputError, resource_error
+
+MADE = "made.json"  # which files of a folder are a result's, and what differs from run to run: times
+_PARTIAL = ".partial"
+_FEW = 200  # foreign files of a folder that are carried over into its successor
+_ELSEWHERE = "choose a folder you may write to"
 
 
 @contextmanager
@@ -24,18 +41,18 @@ def write_folder(folder: str | Path) -> Iterator[Path]:
         If the folder exists and is not empty, or cannot be made.
     """
     final = Path(folder)
-    if final.exists() and (not final.is_dir() or any(final.iterdir())):
-        raise OutputError("exists already and is not empty", where=str(final), mend="choose another name or remove it")
-    with _temporary_beside(final) as work:
+    _require_absent(final)
+    with _beside(final) as work:
         yield work
-        if final.exists():
-            final.rmdir()
+        _sync(work)
+        _require_absent(final)
         work.replace(final)
+        _sync_entry(final.absolute().parent)
 
 
 @contextmanager
 def write_into(folder: str | Path) -> Iterator[Path]:
-    """Give a temporary folder whose files move into `folder` together when the block ends.
+    """Give a temporary folder whose files come to `folder` in one step when the block ends.
 
     Files of the same name are replaced; others stay.
 
@@ -45,19 +62,19 @@ def write_into(folder: str | Path) -> Iterator[Path]:
         If the folder cannot be made or written to.
     """
     final = Path(folder)
-    with _temporary_beside(final) as work:
+    with _beside(final) as work:
         yield work
-        try:
-            for source in sorted(p for p in work.rglob("*") if p.is_file()):
-                target = final / source.relative_to(work)
-                target.parent.mkdir(parents=True, exist_ok=True)
-                source.replace(target)
-        except OSError as error:
-            raise OutputError(error.strerror or str(error), where=str(final), mend="choose another folder") from error
+        _sync(work)
+        _put(work, final, frozenset())
 
 
-def publish(folder: str | Path, first: str, fill: Callable[[Path], None]) -> list[Path]:
-    """Have `fill` write files that move into a folder together, as `write_into`.
+def publish(
+    folder: str | Path, first: str, fill: Callable[[Path], None], facts: Mapping[str, Any] | None = None
+) -> list[Path]:
+    """Have `fill` write a result that takes the place of an earlier one in one step.
+
+    Files of the earlier result that this one does not have are gone afterwards; files of others
+    stay. `made.json` says which are the result's, and holds `facts`.
 
     Parameters
     ----------
@@ -66,6 +83,8 @@ def publish(folder: str | Path, first: str, fill: Callable[[Path], None]) -> lis
         Name of the page that comes first in the list.
     fill : callable
         Writes into the temporary folder it is given.
+    facts : mapping, optional
+        What differs from run to run, such as times: it stands nowhere else.
 
     Returns
     -------
@@ -75,12 +94,20 @@ def publish(folder: str | Path, first: str, fill: Callable[[Path], None]) -> lis
     Raises
     ------
     OutputError
-        As `write_into`.
+        If the folder cannot be made or written to.
     """
-    with write_into(folder) as work:
+    final = Path(folder)
+    with _beside(final) as work:
         fill(work)
-        written = [p.relative_to(work) for p in work.rglob("*") if p.is_file()]
-    return [Path(folder) / p for p in sorted(written, key=lambda p: (p.name != first, len(p.parts), str(p)))]
+        written = sorted(
+            (p.relative_to(work) for p in work.rglob("*") if p.is_file()),
+            key=lambda p: (p.name != first, len(p.parts), str(p)),
+        )
+        made = {"files": [p.as_posix() for p in written], **(facts or {})}
+        (work / MADE).write_text(json.dumps(made, indent=1) + "\n", encoding="utf-8")
+        _sync(work)
+        _put(work, final, _earlier(final))
+    return [Path(folder) / p for p in written]
 
 
 @contextmanager
@@ -92,13 +119,20 @@ def write_file(path: str | Path) -> Iterator[Path]:
     OutputError
         If the file cannot be written.
     """
-    final = Path(path)
+    final = Path(path).resolve() if Path(path).is_symlink() else Path(path)
     if final.is_dir():
         raise OutputError("is a folder", where=str(final), mend="give a file name")
-    with _temporary_beside(final) as work:
+    if final.exists() and not final.is_file():  # a device or a pipe: nothing to replace
+        with _coded(final), tempfile.TemporaryDirectory() as folder:
+            yield Path(folder) / final.name
+            final.write_bytes((Path(folder) / final.name).read_bytes())
+        return
+    with _beside(final) as work:
         inner = work / final.name
         yield inner
+        _sync(work)
         inner.replace(final)
+        _sync_entry(final.absolute().parent)
 
 
 def require_writable(path: str | Path) -> None:
@@ -109,25 +143,190 @@ def require_writable(path: str | Path) -> None:
     OutputError
         If the path lies in a place that cannot be written to.
     """
-    with _temporary_beside(Path(path)):
-        pass
-    if Path(path).is_dir() and not os.access(path, os.W_OK):
-        raise OutputError("not writable", where=str(path), mend="choose a folder you may write to")
+    final = Path(path)
+    if final.exists() and not final.is_dir() and not final.is_file():
+        return
+    with _beside(final) as work:
+        (work / "tried").write_bytes(b"\0")
+    if final.exists() and not os.access(final, os.W_OK):
+        raise OutputError("not writable", where=str(final), mend=_ELSEWHERE)
 
 
 @contextmanager
-def _temporary_beside(final: Path) -> Iterator[Path]:
-    """Make a scratch folder on the same file system, so that a rename suffices."""
+def _beside(final: Path) -> Iterator[Path]:
+    """A scratch folder on the same file system, so that a rename suffices; gone and unlocked at the end."""
     parent = final.absolute().parent
-    try:
+    with _coded(final):
         parent.mkdir(parents=True, exist_ok=True)
-        work = Path(tempfile.mkdtemp(prefix=f".{final.name}.", dir=parent))
-        work.chmod(0o755)
-    except OSError as error:
-        raise OutputError(
-            error.strerror or str(error), where=str(final), mend="choose a folder you may write to"
-        ) from error
+        _sweep(parent, final.name)
+        work, lock = _locked_folder(parent, final.name)
+        if final.is_dir():
+            with contextlib.suppress(OSError):
+                shutil.copymode(final, work)
+        try:
+            yield work
+        finally:
+            shutil.rmtree(work, ignore_errors=True)
+            if lock is not None:
+                os.close(lock)
+
+
+@contextmanager
+def _coded(final: Path) -> Iterator[None]:
+    """Say with a code what the system refuses; errors of reading elsewhere pass."""
     try:
-        yield work
+        yield
+    except OSError as error:
+        typed = resource_error(error, str(final))
+        if typed is not None:
+            raise typed from error
+        place = final.absolute().parent
+        names = [os.fsdecode(name) for name in (error.filename, error.filename2) if isinstance(name, str | bytes)]
+        if any(Path(name).absolute().is_relative_to(place) for name in names):
+            raise OutputError(error.strerror or str(error), where=str(final), mend=_ELSEWHERE) from error
+        raise
+
+
+def _locked_folder(parent: Path, name: str) -> tuple[Path, int | None]:
+    while True:
+        work = Path(tempfile.mkdtemp(prefix=f".{name[:40]}.", suffix=_PARTIAL, dir=parent))
+        umask = os.umask(0)
+        os.umask(umask)
+        work.chmod(0o777 & ~umask)
+        lock = _lock(work)
+        if work.exists():  # else another process swept it before it was locked
+            return work, lock
+
+
+def _lock(folder: Path) -> int | None:
+    """An open lock on a folder; None if another process has one, or the system knows none."""
+    if os.name != "posix":
+        return None
+    import fcntl
+
+    try:
+        found = os.open(folder, os.O_RDONLY)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(found, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(found)
+        return None
+    return found
+
+
+def _sweep(parent: Path, name: str) -> None:
+    """Remove what killed processes left of this name."""
+    with os.scandir(parent) as entries:
+        left = [e.path for e in entries if e.name.startswith(f".{name[:40]}.") and e.name.endswith(_PARTIAL)]
+    for path in left:
+        lock = _lock(Path(path))
+        if lock is not None:
+            shutil.rmtree(path, ignore_errors=True)
+            os.close(lock)
+
+
+def _require_absent(final: Path) -> None:
+    if final.exists() and (not final.is_dir() or any(final.iterdir())):
+        raise OutputError("exists already and is not empty", where=str(final), mend="choose another name or remove it")
+
+
+def _earlier(final: Path) -> frozenset[str]:
+    """Files of the result that stands there."""
+    try:
+        files = json.loads((final / MADE).read_text(encoding="utf-8"))["files"]
+        return frozenset({MADE, *(str(name) for name in files)})
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+        return frozenset()
+
+
+def _put(work: Path, final: Path, stale: frozenset[str]) -> None:
+    """Move the finished folder to its place: by a rename, by an exchange, or file by file where neither will do."""
+    final = final.absolute()
+    if not final.exists():
+        try:
+            work.rename(final)
+            return _sync_entry(final.parent)
+        except OSError:
+            if not final.is_dir():  # else another process was first
+                raise
+    if not final.is_dir():
+        raise OutputError("is no folder", where=str(final), mend=_ELSEWHERE)
+    final = final.resolve()
+    if _carried(final, work, stale) and _exchange(work, final):
+        _sync_entry(final.parent)
+        _carried(work, final, stale)  # what was put there in between
+        return None
+    return _move(work, final, stale)
+
+
+def _carried(old: Path, new: Path, stale: frozenset[str]) -> bool:
+    """Link the files of others into the new folder; False where there are too many, or more than files."""
+    if old == Path.cwd() or old in Path.cwd().parents or os.path.ismount(old):
+        return False
+    foreign = []
+    for folder, folders, files in os.walk(old):
+        here = Path(folder).relative_to(old)
+        names = [here / name for name in files]
+        foreign += [p for p in names if p.as_posix() not in stale and not os.path.lexists(new / p)]
+        if len(foreign) > _FEW or any((old / here / name).is_symlink() for name in folders):
+            return False
+        if not names and not folders and str(here) != "." and not (new / here).exists():
+            foreign.append(here)
+    try:
+        for path in foreign:
+            (new / path).parent.mkdir(parents=True, exist_ok=True)
+            if (old / path).is_dir():
+                (new / path).mkdir(exist_ok=True)
+            else:
+                os.link(old / path, new / path, follow_symlinks=False)
+    except OSError:
+        return False
+    return True
+
+
+def _exchange(one: Path, other: Path) -> bool:
+    """Swap two folders in one step, where the system can."""
+    if sys.platform != "linux":
+        return False
+    with contextlib.suppress(OSError, AttributeError):
+        here, swap = -100, 2  # AT_FDCWD, RENAME_EXCHANGE
+        return ctypes.CDLL(None).renameat2(here, os.fsencode(one), here, os.fsencode(other), swap) == 0
+    return False
+
+
+def _move(work: Path, final: Path, stale: frozenset[str]) -> None:
+    """File by file, the page last: the way of a folder that must stay the same one."""
+    moved = sorted((p.relative_to(work) for p in work.rglob("*") if p.is_file()), key=lambda p: -len(p.parts))
+    for path in moved:
+        (final / path).parent.mkdir(parents=True, exist_ok=True)
+        (work / path).replace(final / path)
+    for name in stale - {path.as_posix() for path in moved}:
+        inside = final / name
+        if ".." not in Path(name).parts and not Path(name).is_absolute():
+            inside.unlink(missing_ok=True)
+    _sync_entry(final)
+
+
+def _sync(folder: Path) -> None:
+    """Have the disk hold a folder and all in it."""
+    for path in [*folder.rglob("*"), folder]:
+        if path.is_file() and not path.is_symlink():
+            with path.open("rb") as file:
+                os.fsync(file.fileno())
+        elif path.is_dir():
+            _sync_entry(path)
+
+
+def _sync_entry(folder: Path) -> None:
+    if os.name != "posix":
+        return
+    found = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(found)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP, errno.EBADF):  # file systems that know none for folders
+            raise
     finally:
-        shutil.rmtree(work, ignore_errors=True)
+        os.close(found)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
-from multiprocessing import get_context
 from typing import Any, TypeVar
 
 import numpy as np
@@ -22,6 +21,7 @@ from mrdamper.identification.methods.paper import Paper
 from mrdamper.identification.methods.projection import Projection
 from mrdamper.models import model_type
 from mrdamper.motion import analyse_motion
+from mrdamper.study.processes import processes
 from mrdamper.study.recipe import Basis, Found, Progress
 
 _CYCLES = 2  # of a run that costly identifications see
@@ -67,8 +67,7 @@ def several(count: int) -> Iterator[Processes]:
     if count < 2:
         yield HERE
         return
-    # Spawned, not forked: a fork of a process whose libraries run threads can hang.
-    with ProcessPoolExecutor(count - 1, mp_context=get_context("spawn")) as pool:
+    with processes(count - 1) as pool:
         yield Processes(pool)
 
 
@@ -88,9 +87,7 @@ def identify_all(bases: Sequence[Basis], runs: Sequence[Run], workers: int, prog
     before = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update(dict.fromkeys(_THREADS, "1"))
     try:
-        with ProcessPoolExecutor(
-            workers, get_context("spawn"), initializer=_receive, initargs=([_packed(run) for run in runs],)
-        ) as pool:
+        with processes(workers, _receive, ([_packed(run) for run in runs],)) as pool:
             waiting = {pool.submit(_identify_one, *task): task for task in tasks}
             found: Found = {}
             for done in as_completed(waiting):

@@ -1,0 +1,185 @@
+"""What is written appears in one step, whenever the process is killed."""
+
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+
+import pytest
+
+from mrdamper.errors import InputError, OutputError, ResourceError, resource_error
+from mrdamper.files import atomic
+from mrdamper.files.atomic import MADE, publish, require_writable, write_file, write_folder, write_into
+
+posix = pytest.mark.skipif(os.name != "posix", reason="kills and locks as POSIX knows them")
+
+
+def result(names, text):
+    def fill(work):
+        (work / "figures").mkdir()
+        for name in names:
+            (work / name).write_text(text)
+
+    return fill
+
+
+def files(folder):
+    return {p.relative_to(folder).as_posix(): p.read_text() for p in folder.rglob("*") if p.is_file()}
+
+
+@pytest.mark.parametrize("here", [False, True], ids=["exchanged", "file by file"])
+def test_a_result_takes_the_place_of_the_earlier_one_and_files_of_others_stay(tmp_path, monkeypatch, here):
+    out = tmp_path / "out"
+    publish(out, "page", result(["page", "model-a.json", "model-b.json", "figures/a.svg"], "old"))
+    (out / "mine.txt").write_text("mine")
+    (out / "figures" / "mine.svg").write_text("mine")
+    if here:
+        monkeypatch.chdir(out)
+    listed = publish(out, "page", result(["page", "model.json", "figures/b.svg"], "new"), {"seconds": 1.5})
+    assert [p.relative_to(out).as_posix() for p in listed] == ["page", "model.json", "figures/b.svg"]
+    found = files(out)
+    assert json.loads(found.pop(MADE)) == {"files": ["page", "model.json", "figures/b.svg"], "seconds": 1.5}
+    new = dict.fromkeys(["page", "model.json", "figures/b.svg"], "new")
+    assert found == new | dict.fromkeys(["mine.txt", "figures/mine.svg"], "mine")
+    assert os.listdir(tmp_path) == ["out"]  # noqa: PTH208  hidden ones too
+
+
+def test_an_error_leaves_what_stood_there(tmp_path):
+    publish(tmp_path / "out", "page", result(["page"], "old"))
+    before = files(tmp_path / "out")
+
+    def fill(work):
+        (work / "page").write_text("new")
+        raise RuntimeError("a fault")
+
+    with pytest.raises(RuntimeError):
+        publish(tmp_path / "out", "page", fill)
+    assert files(tmp_path) == {f"out/{name}": text for name, text in before.items()}
+
+
+KILLED = textwrap.dedent("""
+    import os, signal, sys
+    from pathlib import Path
+    from mrdamper.files import atomic
+    at, calls = int(sys.argv[2]), 0
+    def counted(real):
+        def call(*arguments, **named):
+            global calls
+            calls += 1
+            if calls == at:
+                os.kill(os.getpid(), signal.SIGKILL)
+            return real(*arguments, **named)
+        return call
+    for name in ("mkdir", "rename", "replace", "link", "fsync", "unlink", "rmdir"):
+        setattr(os, name, counted(getattr(os, name)))
+    atomic._exchange = counted(atomic._exchange)
+    def fill(work):
+        (work / "figures").mkdir()
+        for name in ("page", "model.json", "figures/a.svg"):
+            (work / name).write_text("new")
+    atomic.publish(sys.argv[1], "page", fill)
+    print(calls)
+""")
+
+
+@posix
+def test_killed_at_any_step_it_is_the_old_result_or_the_new_one(tmp_path):
+    out, at = tmp_path / "out", 0
+    seen = set()
+    while True:
+        at += 1
+        publish(out, "page", result(["page", "model-a.json", "figures/b.svg"], "old"))
+        (out / "mine.txt").write_text("mine")
+        done = subprocess.run(
+            [sys.executable, "-c", KILLED, str(out), str(at)], capture_output=True, text=True, check=False
+        )
+        found = files(out)
+        assert found.pop("mine.txt") == "mine"
+        found.pop(MADE)
+        old = dict.fromkeys(["page", "model-a.json", "figures/b.svg"], "old")
+        new = dict.fromkeys(["page", "model.json", "figures/a.svg"], "new")
+        assert found in (old, new), (at, found)
+        seen.add(found == new)
+        if done.returncode == 0:
+            break
+        assert done.returncode == -signal.SIGKILL, done.stderr
+    assert at > 10
+    assert seen == {True, False}
+    publish(out, "page", result(["page"], "old"))  # sweeps what the killed ones left
+    assert os.listdir(tmp_path) == ["out"]  # noqa: PTH208
+
+
+@posix
+def test_litter_of_the_living_stays(tmp_path):
+    with write_into(tmp_path / "out") as work:
+        (work / "a").write_text("first")
+        with write_into(tmp_path / "out") as other:
+            (other / "b").write_text("second")
+        assert (work / "a").read_text() == "first"
+    assert files(tmp_path / "out") == {"a": "first", "b": "second"}
+
+
+def test_the_second_of_two_processes_gets_a_code(tmp_path):
+    def write(text, meanwhile=lambda: None):
+        with write_folder(tmp_path / "out") as work:
+            (work / "a").write_text(text)
+            meanwhile()
+
+    with pytest.raises(OutputError):
+        write("mine", lambda: write("other's"))
+    assert files(tmp_path) == {"out/a": "other's"}
+
+
+def test_a_device_is_written_to_and_not_replaced(tmp_path):
+    with write_file(os.devnull) as path:
+        path.write_text("x")
+    require_writable(os.devnull)
+    (tmp_path / "target.txt").write_text("old")
+    (tmp_path / "link.txt").symlink_to(tmp_path / "target.txt")
+    with write_file(tmp_path / "link.txt") as path:
+        path.write_text("new")
+    assert (tmp_path / "link.txt").is_symlink()
+    assert (tmp_path / "target.txt").read_text() == "new"
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (OSError(errno.ENOSPC, "full"), "E_DISK_FULL"),
+        (OSError(errno.EFBIG, "big"), "E_FILE_SIZE"),
+        (MemoryError(), "E_MEMORY"),
+        (RuntimeError("can't start new thread"), "E_PROCESSES"),
+        (OSError("No space left on device (os error 28)"), "E_DISK_FULL"),
+        (FileNotFoundError(errno.ENOENT, "No usable temporary directory found in ['/tmp']"), "E_TEMP"),
+    ],
+)
+def test_what_runs_out_has_a_code(tmp_path, error, code):
+    assert resource_error(error).code == code
+    if isinstance(error, OSError) and code != "E_TEMP":
+        with pytest.raises(ResourceError, match=code), write_into(tmp_path / "out"):
+            raise error
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_has_not_run_out_is_not_said_to(tmp_path):
+    assert resource_error(OSError(errno.ENOENT, "no")) is None
+    with pytest.raises(FileNotFoundError), write_into(tmp_path / "out"):
+        (tmp_path.parent / "elsewhere").read_text()
+
+
+@pytest.mark.parametrize("place", ["file/out", "file"])
+def test_what_cannot_be_a_folder_is_refused_with_a_code(tmp_path, place):
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(InputError) as caught, write_into(tmp_path / place) as work:
+        (work / "a").write_text("x")
+    assert caught.value.code == "E_OUTPUT"
+
+
+def test_without_an_exchange_the_files_move_one_by_one(tmp_path, monkeypatch):
+    monkeypatch.setattr(atomic, "_exchange", lambda one, other: False)
+    publish(tmp_path / "out", "page", result(["page", "a"], "old"))
+    publish(tmp_path / "out", "page", result(["page"], "new"))
+    assert {k: v for k, v in files(tmp_path / "out").items() if k != MADE} == {"page": "new"}
