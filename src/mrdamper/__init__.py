@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from mrdamper.files.model_file import load_model, save_model
     from mrdamper.gas_spring import GasSpring
     from mrdamper.identification import identify
+    from mrdamper.report.plots.loops import plot_force, plot_loop
     from mrdamper.simulation import simulate
     from mrdamper.streaming import stepper
     from mrdamper.study.workflow import run_study
@@ -35,6 +36,8 @@ _HOME = {
     "identify": "identification",
     "load_dataset": "files.dataset",
     "load_model": "files.model_file",
+    "plot_force": "report.plots.loops",
+    "plot_loop": "report.plots.loops",
     "run_study": "study.workflow",
     "save_dataset": "files.dataset",
     "save_model": "files.model_file",

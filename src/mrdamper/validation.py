@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Prediction
-from mrdamper.data import Condition, Run, same_condition
+from mrdamper.data import Condition, Run, Shown, same_condition
 from mrdamper.errors import InputError, RunError
 from mrdamper.metrics import Scores, score
 
@@ -38,8 +39,8 @@ class RunScore:
     extrapolation: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Validation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Validation(Shown):
     """Scores of several runs.
 
     Attributes
@@ -54,6 +55,22 @@ class Validation:
     title: str
     runs: tuple[RunScore, ...]
     refused: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def headline(self) -> str:
+        """Title, runs, and the median error."""
+        refused = f", {len(self.refused)} refused" if self.refused else ""
+        return f"{self.title}: {len(self.runs)} runs{refused}, median nrmse_pp {100 * self.median():.2f} %"
+
+    @property
+    def table(self) -> Mapping[str, Sequence[Any]]:
+        """A row a run."""
+        names = ("nrmse_pp", "nrmse_std", "wape", "energy_error", "peak_error")
+        return {
+            "run_id": [run.run_id for run in self.runs],
+            **{name: [float(getattr(run.scores, name)) for run in self.runs] for name in names},
+            "extrapolation": [" ".join(run.extrapolation) for run in self.runs],
+        }
 
     def median(self, name: str = "nrmse_pp") -> float:
         """Median of a score over the runs; signed errors count by magnitude."""

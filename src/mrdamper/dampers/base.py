@@ -7,7 +7,7 @@ extrapolation.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
@@ -16,7 +16,7 @@ import numpy as np
 
 from mrdamper.dampers.causal import SLACK, causal_force
 from mrdamper.dampers.coil import Coil
-from mrdamper.data import Condition, Floats, Run
+from mrdamper.data import Condition, Floats, Run, Shown
 from mrdamper.errors import InputError
 from mrdamper.functions.forms import ParameterFunction
 from mrdamper.models import Model
@@ -102,8 +102,8 @@ def samples_in_knee(motion: Excitation, knee: float) -> float:
     return float(np.median(inside[1:])) if inside.size > 1 else np.inf
 
 
-@dataclass(frozen=True, eq=False)
-class Prediction:
+@dataclass(frozen=True, eq=False, repr=False)
+class Prediction(Shown):
     """A predicted force.
 
     Attributes
@@ -122,6 +122,25 @@ class Prediction:
     condition: Condition
     extrapolation: tuple[str, ...]
 
+    @property
+    def headline(self) -> str:
+        """Condition, peak forces and what is extrapolated."""
+        low, high = float(np.min(self.force)), float(np.max(self.force))
+        outside = f"; outside the tests in {', '.join(self.extrapolation)}" if self.extrapolation else ""
+        return f"prediction at {self.condition}: {low:.4g} to {high:.4g} N{outside}"
+
+    @property
+    def table(self) -> Mapping[str, Floats]:
+        """A row a sample, SI."""
+        motion = self.motion
+        return {
+            "time_s": motion.time,
+            "displacement_m": motion.displacement,
+            "velocity_m_s": motion.velocity,
+            "current_A": motion.current,
+            "force_N": self.force,
+        }
+
 
 UNTESTED = Envelope(*[(-np.inf, np.inf)] * 4)
 
@@ -136,7 +155,7 @@ class Saved:
     __pydantic_config__: ClassVar = {"extra": "forbid", "allow_inf_nan": False}
 
 
-class Damper(ABC):
+class Damper(Shown):
     """An identified damper. Subclasses are frozen dataclasses, found by their file.
 
     Attributes
@@ -171,6 +190,21 @@ class Damper(ABC):
     @abstractmethod
     def title(self) -> str:
         """What to call it in a report."""
+
+    @property
+    def headline(self) -> str:
+        """What it is, whose, and how many numbers the tests determined."""
+        return f"{self.title} of rig {self.rig}: {self.parameter_count} numbers from tests"
+
+    @property
+    def table(self) -> Mapping[str, Sequence[Any]]:
+        """A row a quantity: the ranges it was tested in."""
+        ranges = vars(self.envelope)
+        return {
+            "tested": list(ranges),
+            "lowest": [low for low, _ in ranges.values()],
+            "highest": [high for _, high in ranges.values()],
+        }
 
     @property
     @abstractmethod

@@ -45,7 +45,7 @@ class SavedJoint(Saved):
     free: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class JointDamper(Damper):
     """One model for all currents and motions of a damper.
 

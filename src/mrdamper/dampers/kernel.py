@@ -73,7 +73,7 @@ class SavedKernel(Saved):
     size: float
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class KernelDamper(Damper):
     """Gaussian kernels over displacement, velocity, acceleration and current; no model of a damper.
 

@@ -44,7 +44,7 @@ class SavedModified(Saved):
     functions: dict[str, SavedFunction]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ModifiedModel(Damper):
     """A model whose parameters are functions of current, frequency and amplitude.
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from mrdamper.data import Condition, Floats, Run
+from mrdamper.data import Condition, Floats, Run, Shown
 from mrdamper.errors import IdentificationError, UnknownNameError
 from mrdamper.gas_spring import GasSpring
 from mrdamper.metrics import Scores
@@ -169,8 +169,8 @@ class Method(ABC):
         """Determine the free parameters of a problem."""
 
 
-@dataclass(frozen=True, eq=False)
-class Identification:
+@dataclass(frozen=True, eq=False, repr=False)
+class Identification(Shown):
     """A model identified from one run.
 
     Attributes
@@ -224,4 +224,26 @@ class Identification:
     ending: Ending
     seed: int | None
     notes: tuple[str, ...]
-    residual: Floats = field(repr=False)
+    residual: Floats
+
+    @property
+    def headline(self) -> str:
+        """Model, run, condition and residual."""
+        fault = f"{100 * self.scores.nrmse_pp:.2f} %"
+        return f"{self.model.name} from run {self.run_id} at {self.condition}: {fault} of the peak-to-peak force"
+
+    @property
+    def table(self) -> Mapping[str, Sequence[Any]]:
+        """A row a parameter."""
+        infos = self.model.parameters()
+        return {
+            "parameter": [info.name for info in infos],
+            "value": [float(getattr(self.model, info.name)) for info in infos],
+            "unit": [info.unit for info in infos],
+            "standard_error": [self.standard_errors.get(info.name) for info in infos],
+            "state": [
+                "at a bound" if info.name in self.at_bounds else "determined" if info.name in self.free else "held"
+                for info in infos
+            ],
+            "meaning": [info.meaning for info in infos],
+        }

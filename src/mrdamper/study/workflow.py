@@ -10,9 +10,10 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 from mrdamper.dampers.base import Damper
-from mrdamper.data import Dataset, Run
+from mrdamper.data import Dataset, Run, Shown
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError
 from mrdamper.identification import refuse_clipped
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, at_levels, dynamic_ranges
@@ -35,8 +36,8 @@ _WORTH = 1.1  # more numbers must lower the left-out error by a tenth
 STUDIED = ("bouc-wen", "bingham")  # the model of the method, and the one everybody compares with
 
 
-@dataclass(frozen=True, eq=False)
-class RigStudy:
+@dataclass(frozen=True, eq=False, repr=False)
+class RigStudy(Shown):
     """The study of one rig.
 
     Attributes
@@ -65,6 +66,24 @@ class RigStudy:
     asked_for: bool = False
 
     @property
+    def headline(self) -> str:
+        """Rig, chosen model and its errors."""
+        left, held = (100 * scores.median() for scores in (self.chosen.left_out, self.chosen.held_out))
+        return f"rig {self.rig}: {self.chosen.title}, left out {left:.2f} %, held out {held:.2f} % (median nrmse_pp)"
+
+    @property
+    def table(self) -> Mapping[str, Sequence[Any]]:
+        """A row a candidate, the chosen one first."""
+        candidates = self.candidates
+        return {
+            "rig": [self.rig] * len(candidates),
+            "model": [c.title for c in candidates],
+            "numbers": [c.damper.parameter_count for c in candidates],
+            "left_out_nrmse_pp": [c.left_out.median() for c in candidates],
+            "held_out_nrmse_pp": [c.held_out.median() for c in candidates],
+        }
+
+    @property
     def chosen(self) -> Scored:
         """The candidate with the fewest numbers among those that predict left-out conditions about best."""
         return self.candidates[0]
@@ -75,8 +94,8 @@ class RigStudy:
         return self.chosen.damper
 
 
-@dataclass(frozen=True, eq=False)
-class Study:
+@dataclass(frozen=True, eq=False, repr=False)
+class Study(Shown):
     """A study of a dataset, rig by rig.
 
     Attributes
@@ -89,6 +108,17 @@ class Study:
     dataset: Dataset
     rigs: tuple[RigStudy, ...]
     seconds: float
+
+    @property
+    def headline(self) -> str:
+        """What was chosen, rig by rig."""
+        return f"study of {self.dataset.name} — " + "; ".join(rig.headline for rig in self.rigs)
+
+    @property
+    def table(self) -> Mapping[str, Sequence[Any]]:
+        """A row a candidate of every rig."""
+        tables = [rig.table for rig in self.rigs]
+        return {name: [value for table in tables for value in table[name]] for name in tables[0]}
 
     @property
     def model(self) -> Damper:

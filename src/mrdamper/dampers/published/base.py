@@ -33,7 +33,7 @@ class SavedConditioned(Saved):
     tables: dict[str, list[float] | list[list[float]]] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ConditionedDamper(Damper):
     """A damper whose model is written down for every condition. Subclasses are final.
 

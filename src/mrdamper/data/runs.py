@@ -10,12 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mrdamper.data.shown import Shown
 from mrdamper.errors import NonFiniteError, RunError, TimeOrderError, UnknownNameError, printable
 
 Floats = NDArray[np.float64]
@@ -99,8 +100,8 @@ def _agree_in_motion(a: Condition, b: Condition, tolerance: float) -> bool:
     return abs(a.frequency_Hz / b.frequency_Hz - 1) <= tolerance and abs(a.amplitude_m / b.amplitude_m - 1) <= tolerance
 
 
-@dataclass(frozen=True, eq=False)
-class Run:
+@dataclass(frozen=True, eq=False, repr=False)
+class Run(Shown):
     """One recorded test.
 
     Attributes
@@ -176,6 +177,21 @@ class Run:
             raise RunError(f"split is {self.split!r}", where=self._where, mend="use train or validate")
         object.__setattr__(self, "segments", tuple(self.segments) or ((0, size),))
         object.__setattr__(self, "notes", dict(self.notes))
+
+    @property
+    def headline(self) -> str:
+        """Id, rig, length, current and split."""
+        low, high = float(np.min(self.current)), float(np.max(self.current))
+        current = f"{low:.3g}" if high - low <= 1e-3 + 0.01 * abs(high) else f"{low:.3g}–{high:.3g}"
+        seconds = self.time[-1] - self.time[0]
+        return f"run {self.id} of rig {self.rig}: {self.time.size} samples, {seconds:.4g} s, {current} A, {self.split}"
+
+    @property
+    def table(self) -> Mapping[str, Floats]:
+        """A row a sample, SI."""
+        channels = {"time_s": self.time, "displacement_m": self.displacement, "force_N": self.force}
+        velocity = {} if self.velocity is None else {"velocity_m_s": self.velocity}
+        return {**channels, **velocity, "current_A": self.current}
 
     @property
     def current_A(self) -> float:
@@ -365,8 +381,8 @@ def _resolution(current: Floats) -> float:
     return step if step <= _COARSEST * 1.001 else 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class Dataset:
+@dataclass(frozen=True, eq=False, repr=False)
+class Dataset(Shown):
     """Runs that belong together.
 
     Attributes
@@ -394,6 +410,28 @@ class Dataset:
             if run.id in seen:
                 raise RunError(f"two runs are called {run.id}", where=f"dataset {self.name}", mend="rename one")
             seen.add(run.id)
+
+    @property
+    def headline(self) -> str:
+        """Name, runs a rig, and how many are held out."""
+        rigs = ", ".join(f"{len(self.rig(name))} of rig {name}" for name in self.rigs)
+        return f"dataset {self.name}: {len(self)} runs, {rigs}; {len(self.split('validate'))} held out"
+
+    @property
+    def table(self) -> Mapping[str, Sequence[Any]]:
+        """A row a run."""
+        runs = self.runs
+        return {
+            "run_id": [run.id for run in runs],
+            "rig": [run.rig for run in runs],
+            "excitation": [run.excitation for run in runs],
+            "split": [run.split for run in runs],
+            "samples": [run.time.size for run in runs],
+            "duration_s": [float(run.time[-1] - run.time[0]) for run in runs],
+            "mean_current_A": [float(np.mean(run.current)) for run in runs],
+            "stroke_m": [float(np.ptp(run.displacement)) for run in runs],
+            "peak_force_N": [float(np.max(np.abs(run.force))) for run in runs],
+        }
 
     def __iter__(self) -> Iterator[Run]:
         return iter(self.runs)

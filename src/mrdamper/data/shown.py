@@ -1,0 +1,56 @@
+"""What a notebook shows of data and results, and how their tables leave."""
+
+from __future__ import annotations
+
+import importlib
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import Any
+
+import numpy as np
+
+_ROWS_SHOWN = 30  # of a table in a notebook
+
+
+class Shown(ABC):
+    """What a notebook shows of an object: a headline, and a table that can leave as a data frame."""
+
+    @property
+    @abstractmethod
+    def headline(self) -> str:
+        """The object in a line."""
+
+    @property
+    @abstractmethod
+    def table(self) -> Mapping[str, Sequence[Any]]:
+        """Columns by name, all of one length; units are part of the names."""
+
+    def __repr__(self) -> str:
+        return f"<{self.headline}>"
+
+    def _repr_html_(self) -> str:
+        """The headline and the first rows, for notebooks."""
+        head = "".join(f"<th>{escape(name)}</th>" for name in self.table)
+        rows = list(zip(*self.table.values(), strict=True))
+        body = "".join(
+            f"<tr>{''.join(f'<td>{escape(_cell(value))}</td>' for value in row)}</tr>" for row in rows[:_ROWS_SHOWN]
+        )
+        more = f"<p>… {len(rows) - _ROWS_SHOWN} more rows</p>" if len(rows) > _ROWS_SHOWN else ""
+        table = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+        return f"<p><b>{escape(self.headline)}</b></p>{table}{more}"
+
+    # By name, so that the numerics depend on no library of tables: the caller asks for one.
+    def to_polars(self) -> Any:
+        """The table as a `polars.DataFrame`."""
+        return importlib.import_module("polars").DataFrame(dict(self.table))
+
+    def to_pandas(self) -> Any:
+        """The table as a `pandas.DataFrame`; pandas must be installed."""
+        return importlib.import_module("pandas").DataFrame(dict(self.table))
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, float | np.floating):
+        return f"{value:.4g}"
+    return "" if value is None else str(value)

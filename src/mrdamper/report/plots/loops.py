@@ -1,0 +1,81 @@
+"""Loops and forces drawn into axes of one's own, for notebooks."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from matplotlib.axes import Axes
+
+from mrdamper.dampers.base import Prediction
+from mrdamper.data import Floats, Run
+from mrdamper.errors import UnknownNameError
+from mrdamper.motion import measured_motion
+from mrdamper.report.plots.style import KN, MM, house_style, label
+
+_OVER = {"displacement": ("Displacement (mm)", MM), "velocity": ("Velocity (mm/s)", MM)}
+
+
+def plot_loop(
+    what: Run | Prediction,
+    axes: Axes | None = None,
+    over: Literal["displacement", "velocity"] = "displacement",
+    **line: Any,
+) -> Axes:
+    """Draw the force [kN] of a run or a prediction over displacement [mm] or velocity [mm/s].
+
+    Parameters
+    ----------
+    what : Run or Prediction
+        Of a run, the part inside its steady window.
+    axes : matplotlib Axes, optional
+        To draw into; new ones by default.
+    over : "displacement" or "velocity"
+    **line
+        Handed to `Axes.plot`.
+
+    Returns
+    -------
+    matplotlib Axes
+
+    Raises
+    ------
+    UnknownNameError
+        If `over` is neither.
+
+    Examples
+    --------
+    >>> from mrdamper import load_dataset, plot_loop
+    >>> axes = plot_loop(load_dataset()["utf_5mm4Hz_1A"], over="velocity", label="measured")
+    >>> axes.get_xlabel()
+    'Velocity (mm/s)'
+    """
+    if over not in _OVER:
+        raise UnknownNameError.of("way to draw a loop", over, _OVER)
+    steady = what.steady() if isinstance(what, Run) else what
+    motion = measured_motion(steady) if isinstance(steady, Run) else steady.motion
+    name, factor = _OVER[over]
+    return _drawn(axes, factor * getattr(motion, over), steady.force, name, line)
+
+
+def plot_force(what: Run | Prediction, axes: Axes | None = None, **line: Any) -> Axes:
+    """Draw the force [kN] of a run or a prediction over time [s]; arguments as for `plot_loop`.
+
+    Examples
+    --------
+    >>> from mrdamper import load_dataset, plot_force
+    >>> plot_force(load_dataset()["utf_5mm4Hz_1A"]).get_ylabel()
+    'Force (kN)'
+    """
+    time = what.time if isinstance(what, Run) else what.motion.time
+    return _drawn(axes, time, what.force, "Time (s)", line)
+
+
+def _drawn(axes: Axes | None, x: Floats, force: Floats, name: str, line: dict[str, Any]) -> Axes:
+    with house_style():
+        if axes is None:
+            from matplotlib import pyplot
+
+            axes = pyplot.subplots()[1]
+        axes.plot(x, KN * force, **line)
+        label(axes, name, "Force (kN)")
+    return axes
