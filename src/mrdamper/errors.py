@@ -32,6 +32,15 @@ class InputError(ValueError):
         What the user can do about it.
     code : str, optional
         Replaces the class's code where one exception serves a family of findings.
+
+    Examples
+    --------
+    >>> from mrdamper import InputError, load_dataset
+    >>> try:
+    ...     load_dataset("no/such/folder")
+    ... except InputError as error:
+    ...     print(error.code)
+    E_DATASET
     """
 
     code = "E_INPUT"

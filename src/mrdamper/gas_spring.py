@@ -41,6 +41,13 @@ class GasSpring:
     ------
     ParameterError
         If a value is not positive.
+
+    Examples
+    --------
+    >>> from mrdamper import GasSpring
+    >>> gas = GasSpring(pressure=2e6, volume=1e-4, rod_area=8e-5, exponent=1.4)  # [Pa], [m³], [m²]
+    >>> round(float(gas.force(0.01)), 1)  # [N] at a displacement [m]
+    1.8
     """
 
     pressure: float

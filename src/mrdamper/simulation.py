@@ -53,7 +53,35 @@ class Response:
 
 
 def simulate(model: ForceLaw, excitation: Excitation) -> Response:
-    """Force of a model along any motion, starting at rest with no memory."""
+    """Force of a model along any motion, starting at rest with no memory.
+
+    Parameters
+    ----------
+    model : Model
+        Or any other force law.
+    excitation : Excitation
+        Time [s], displacement [m], velocity [m/s], acceleration [m/s²], current [A], (N,) each.
+
+    Returns
+    -------
+    Response
+        Force [N] (N,) and the model's internal state.
+
+    Raises
+    ------
+    ParameterError
+        If an integrated model is too stiff or runs away.
+
+    Examples
+    --------
+    >>> from mrdamper import Condition, simulate
+    >>> from mrdamper.models.bingham import Bingham
+    >>> from mrdamper.motion import sine
+    >>> motion = sine(Condition(current_A=0.0, frequency_Hz=1.0, amplitude_m=0.01), 2, 200)
+    >>> response = simulate(Bingham(c=1000.0, fy=300.0), motion)
+    >>> round(float(response.force.max()))  # 300 N + 1000 N s/m · 0.0628 m/s
+    363
+    """
     state = model.state(excitation)
     return Response(excitation, model.force(excitation, state), state)
 

@@ -270,5 +270,23 @@ class Stepper:
 
 
 def stepper(damper: Damper | Model) -> Stepper:
-    """A damper or model to be asked sample by sample; raises as `stream`."""
+    """A damper or model to be asked sample by sample.
+
+    Parameters
+    ----------
+    damper : Damper or Model
+
+    Raises
+    ------
+    ParameterError
+        If it has no form for one sample.
+
+    Examples
+    --------
+    >>> from mrdamper import stepper
+    >>> from mrdamper.models.bingham import Bingham
+    >>> damper = stepper(Bingham(c=1000.0, fy=300.0))
+    >>> [damper.step(displacement=x, current=0.0, dt=1e-3) for x in (0.0, 1e-4, 3e-4)]  # [m], [A], [s] to [N]
+    [0.0, 400.0, 500.0]
+    """
     return Stepper(stream(damper))

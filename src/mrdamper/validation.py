@@ -88,7 +88,30 @@ class Validation(Shown):
 def validate(damper: Damper, runs: Iterable[Run], title: str | None = None) -> Validation:
     """Predict runs from their measured motion and score them inside their steady windows.
 
-    A run that cannot be predicted, for want of motion say, does not stop the others.
+    A run that cannot be predicted, for want of motion say, does not stop the others: it is among
+    the `refused`, with the reason.
+
+    Parameters
+    ----------
+    damper : Damper
+    runs : iterable of Run
+    title : str, optional
+        Default: the damper's.
+
+    Raises
+    ------
+    RunError
+        If none of the runs can be predicted.
+
+    Examples
+    --------
+    >>> from mrdamper import identify, load_dataset, validate
+    >>> from mrdamper.dampers.modified import fit_modified
+    >>> runs = load_dataset().rig("utfsm").split("train")[:8]
+    >>> damper = fit_modified([identify(run, "bingham") for run in runs]).damper
+    >>> scores = validate(damper, load_dataset().rig("utfsm").split("validate"))
+    >>> bool(scores.median("nrmse_pp") < 0.2)  # RMS error over the peak-to-peak force
+    True
     """
     scored, refused = [], {}
     for run in runs:

@@ -38,6 +38,14 @@ class Condition:
         Frequency of the motion [Hz].
     amplitude_m : float
         Displacement amplitude, half the peak-to-peak stroke [m].
+
+    Examples
+    --------
+    >>> from mrdamper import Condition
+    >>> print(Condition(current_A=0.5, frequency_Hz=2.0, amplitude_m=0.01))
+    0.5 A, 2 Hz, 10 mm
+    >>> round(Condition(0.5, 2.0, 0.01).peak_velocity, 4)  # [m/s]
+    0.1257
     """
 
     current_A: float
@@ -135,6 +143,15 @@ class Run(Shown):
     ------
     RunError, TimeOrderError, NonFiniteError
         If the channels differ in length, time is not increasing, or values are not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mrdamper import Run
+    >>> t = np.linspace(0.0, 2.0, 401)  # [s]
+    >>> x = 0.01 * np.sin(2 * np.pi * t)  # [m]
+    >>> Run("r1", time=t, displacement=x, force=5e4 * x, current=0.5, rig="bench")
+    <run r1 of rig bench: 401 samples, 2 s, 0.5 A, train>
     """
 
     id: str
@@ -396,6 +413,17 @@ class Dataset(Shown):
     ------
     RunError
         If there are no runs or two share an id.
+
+    Examples
+    --------
+    >>> from mrdamper import load_dataset
+    >>> tests = load_dataset()
+    >>> tests.rigs
+    ('labcontrol', 'utfsm')
+    >>> len(tests.rig("utfsm").split("validate"))
+    5
+    >>> tests["utf_5mm4Hz_1A"].current_A  # [A]
+    1.0
     """
 
     runs: tuple[Run, ...]

@@ -49,6 +49,12 @@ def load_dataset(folder: str | Path | None = None) -> Dataset:
         If a file, column or run is missing, or a unit is not SI.
     RunError, TimeOrderError, NonFiniteError
         If the channels of a run do not fit together.
+
+    Examples
+    --------
+    >>> from mrdamper import load_dataset
+    >>> load_dataset()
+    <dataset bundled tests of two dampers: 53 runs, 34 of rig labcontrol, 19 of rig utfsm; 12 held out>
     """
     if folder is None:
         with as_file(files("mrdamper.files.bundled") / BUNDLED) as bundled:
@@ -67,6 +73,22 @@ def save_dataset(dataset: Dataset, folder: str | Path, *, extra_files: dict[str,
         Must not exist, or be an empty folder.
     extra_files : dict, optional
         Further text files by name, for example licences.
+    replace : bool
+        Put it in the place of the dataset there, whose other files stay.
+
+    Raises
+    ------
+    OutputError
+        If the folder is not empty or cannot be written.
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> from mrdamper import load_dataset, save_dataset
+    >>> folder = mkdtemp()
+    >>> save_dataset(load_dataset().rig("labcontrol"), folder)
+    >>> len(load_dataset(folder))
+    34
     """
     import polars as pl
 

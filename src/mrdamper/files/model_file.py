@@ -77,6 +77,18 @@ def save_model(damper: Damper, path: str | Path) -> None:
     ------
     OutputError
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import mkdtemp
+    >>> from mrdamper import identify, load_dataset, load_model, save_model
+    >>> from mrdamper.dampers.modified import fit_modified
+    >>> runs = load_dataset().rig("utfsm").split("train")[:8]
+    >>> path = Path(mkdtemp()) / "model.json"
+    >>> save_model(fit_modified([identify(run, "bingham") for run in runs]).damper, path)
+    >>> load_model(path)
+    <modified Bingham of rig utfsm: 6 numbers from tests>
     """
     with write_file(path) as target:
         target.write_text(dump_model(damper), encoding="utf-8")
@@ -104,6 +116,15 @@ def load_model(path: str | Path) -> Damper:
     ------
     ModelFileError
         If the file is missing, damaged, of a newer major version, or has unknown fields.
+
+    Examples
+    --------
+    See `save_model`.
+
+    >>> from mrdamper import load_model
+    >>> load_model("nowhere.json")
+    Traceback (most recent call last):
+    mrdamper.errors.ModelFileError: nowhere.json: No such file or directory; give a model.json ...
     """
     path = Path(path)
     try:

@@ -63,6 +63,18 @@ def identify(
         If the steady window holds under one cycle.
     IdentificationError
         If the run cannot determine what is asked for.
+
+    Examples
+    --------
+    >>> from mrdamper import identify, load_dataset
+    >>> run = load_dataset()["utf_5mm4Hz_1A"]
+    >>> identify(run, "bingham")
+    <bingham from run utf_5mm4Hz_1A at 1 A, 4.07 Hz, 4.38 mm: 11.02 % of the peak-to-peak force>
+    >>> found = identify(run)  # Bouc–Wen
+    >>> found.free
+    ('c', 'alpha', 'beta', 'f0', 'k1', 'k3')
+    >>> round(found.model.c, -3)  # post-yield damping [N s/m]
+    7000.0
     """
     refuse_clipped(run, clipped)
     chosen_model = model_type(model) if isinstance(model, str) else model

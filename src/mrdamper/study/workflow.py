@@ -165,6 +165,17 @@ def run_study(
         If no candidate is of that model.
     IdentificationError
         If a rig has too few runs to identify anything from.
+
+    Examples
+    --------
+    >>> from mrdamper import Condition, load_dataset, run_study
+    >>> tests = load_dataset().rig("utfsm")
+    >>> study = run_study(tests.only([run for run in tests if run.excitation == "sine"][:4]))
+    >>> study.model
+    <play and bypass of rig utfsm: 15 numbers from tests>
+    >>> prediction = study.model.predict(Condition(current_A=0.5, frequency_Hz=2.0, amplitude_m=0.01))
+    >>> bool(prediction.force.max() > 500)  # [N]
+    True
     """
     begin = time.perf_counter()
     rigs = processes.map(partial(study_rig, model=model), [dataset.rig(name) for name in dataset.rigs], progress)

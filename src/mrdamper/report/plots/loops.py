@@ -58,7 +58,20 @@ def plot_loop(
 
 
 def plot_force(what: Run | Prediction, axes: Axes | None = None, **line: Any) -> Axes:
-    """Draw the force [kN] of a run or a prediction over time [s]; arguments as for `plot_loop`.
+    """Draw the force [kN] of a run or a prediction over time [s].
+
+    Parameters
+    ----------
+    what : Run or Prediction
+    axes : matplotlib Axes, optional
+        To draw into; new ones by default.
+    **line
+        Handed to `Axes.plot`.
+
+    Raises
+    ------
+    AttributeError
+        If matplotlib does not know a property of `line`.
 
     Examples
     --------

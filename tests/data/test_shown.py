@@ -1,0 +1,62 @@
+"""What a notebook shows: a line, a table, data frames, loops in axes of one's own."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas
+import polars
+import pytest
+from support.dampers import all_dampers, joint_damper
+
+from mrdamper import identify, plot_force, plot_loop, validate
+from mrdamper.dampers.base import Damper
+from mrdamper.data import Condition
+from mrdamper.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def shown(bundled):
+    run, damper = bundled["utf_5mm4Hz_1A"], joint_damper()
+    return {
+        "run": run,
+        "dataset": bundled,
+        "identification": identify(run),
+        "prediction": damper.predict(Condition(0.5, 2.0, 0.01)),
+        "validation": validate(damper, [run]),
+        **{f"damper {name}": d for name, d in all_dampers().items() if isinstance(d, Damper)},
+    }
+
+
+def test_a_line_a_table_and_data_frames(shown):
+    for name, one in shown.items():
+        assert len(repr(one)) < 200, name
+        html = one._repr_html_()
+        assert 0 < html.count("<tr>") <= 31
+        assert len(html) < 20_000
+        frames = one.to_polars(), one.to_pandas()
+        assert isinstance(frames[0], polars.DataFrame)
+        assert isinstance(frames[1], pandas.DataFrame)
+        for frame in frames:
+            assert list(frame.columns) == list(one.table)
+            assert len(frame) == len(next(iter(one.table.values())))
+
+
+def test_names_from_files_are_text(bundled):
+    run = replace(bundled["utf_5mm4Hz_1A"], rig="</td><script>alert(1)</script>")
+    assert "<script>" not in bundled.only([run])._repr_html_()
+
+
+def test_loops_are_drawn_into_given_axes(bundled):
+    from matplotlib.figure import Figure
+
+    axes = Figure().subplots()
+    run = bundled["utf_5mm4Hz_1A"]
+    assert plot_loop(run, axes, over="velocity", color="black") is axes
+    assert plot_loop(joint_damper().predict_run(run), axes, over="velocity") is axes
+    measured, predicted = axes.lines
+    assert measured.get_color() == "black"
+    assert np.array_equal(measured.get_ydata(), 1e-3 * run.steady().force)
+    assert predicted.get_xdata().size == run.time.size
+    assert plot_force(run, Figure().subplots()).get_xlabel() == "Time (s)"
+    with pytest.raises(InputError, match="speed"):
+        plot_loop(run, axes, over="speed")
