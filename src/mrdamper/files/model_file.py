@@ -73,6 +73,12 @@ class _Document(_Strict):
 def save_model(damper: Damper, path: str | Path) -> None:
     """Write a damper as JSON, whole or not at all.
 
+    Parameters
+    ----------
+    damper : Damper
+    path : path
+        Replaced if it exists.
+
     Raises
     ------
     OutputError
@@ -111,6 +117,11 @@ def dump_model(damper: Damper) -> str:
 
 def load_model(path: str | Path) -> Damper:
     """Read a saved damper.
+
+    Parameters
+    ----------
+    path : path
+        A model.json of `save_model` or `mrdamper study`.
 
     Raises
     ------
