@@ -73,8 +73,6 @@ def save_dataset(dataset: Dataset, folder: str | Path, *, extra_files: dict[str,
         Must not exist, or be an empty folder.
     extra_files : dict, optional
         Further text files by name, for example licences.
-    replace : bool
-        Put it in the place of the dataset there, whose other files stay.
 
     Raises
     ------
