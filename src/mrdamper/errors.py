@@ -57,6 +57,31 @@ class InputError(ValueError):
         return printable(f"{text} [{self.code}]")
 
 
+class CombinedError(InputError):
+    """Several things wrong with one input; its code is that of the first.
+
+    Attributes
+    ----------
+    errors : tuple of InputError
+        At least two.
+    """
+
+    def __init__(self, errors: Iterable[InputError]):
+        self.errors = tuple(errors)
+        first = self.errors[0]
+        super().__init__(first.found, where=first.where, mend=first.mend, code=first.code)
+
+    def __str__(self) -> str:
+        return "; also: ".join(map(str, self.errors))
+
+    @classmethod
+    def raise_from(cls, errors: Iterable[InputError]) -> None:
+        """Raise what was found: nothing, the one error, or all together."""
+        errors = tuple(errors)
+        if errors:
+            raise errors[0] if len(errors) == 1 else cls(errors)
+
+
 class DatasetError(InputError):
     """The dataset folder is missing, or one of its tables cannot be read."""
 

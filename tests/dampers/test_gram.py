@@ -144,3 +144,26 @@ def test_other_motion_gets_running_estimates_and_is_flagged(runs, identification
     assert "not a sine" in prediction.extrapolation
     expected = simulate(truth(Condition(1.0, 1.0, 0.03)), motion).force
     assert np.sqrt(np.mean((prediction.force - expected) ** 2)) < 0.04 * np.ptp(expected)
+
+
+@pytest.mark.parametrize("knee", [2e-5, 4e-3, 8e-3])
+def test_a_knee_of_any_length_is_fitted_jointly_as_run_by_run(knee):
+    """The ladder of yield displacements follows the motions; it once ended at 3 mm, in silence."""
+    made = [
+        BoucWen.build({"c": 1e3, "yield_force": 300 + 900 * c.current_A, "yield_displacement": knee, "f0": 50.0})
+        for c in MATRIX
+    ]
+    soft = [
+        synthetic_run(c, cycles=3, samples_per_cycle=300, model=m, id=f"k{i}", rig="soft")
+        for i, (c, m) in enumerate(zip(MATRIX, made, strict=True))
+    ]
+    found = [identify(run) for run in soft]
+    jointly, _ = fit_modified_jointly(soft, found)
+    assert validate(jointly.damper, soft).median() < 1e-3
+    assert jointly.damper.model_at(MATRIX[4]).yield_displacement == pytest.approx(knee, rel=0.02)
+    assert not jointly.at_bounds
+
+
+def test_a_function_that_leaves_what_was_looked_for_says_so(runs):
+    fit = fit_jointly(condense(runs, BoucWen), FORMS, ParameterFunction("constant", (np.log(1.0),), log=True))
+    assert fit.at_bounds == ("yield_displacement",)

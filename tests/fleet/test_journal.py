@@ -84,7 +84,7 @@ def test_a_table_that_does_not_fit_leaves_the_old_one(tmp_path, monkeypatch):
     import polars as pl
 
     path = tmp_path / "dampers.parquet"
-    write_table([{"serial": "a"}], [], path)
+    write_table([{"serial": "a"}], [], None, path)
     before = path.read_bytes()
 
     def full(*_, **__):
@@ -92,7 +92,7 @@ def test_a_table_that_does_not_fit_leaves_the_old_one(tmp_path, monkeypatch):
 
     monkeypatch.setattr(pl.LazyFrame, "sink_parquet", full)
     with pytest.raises(OutputError) as refused:
-        write_table([{"serial": "b"}], [], path)
+        write_table([{"serial": "b"}], [], None, path)
     assert refused.value.code == "E_DISK_FULL"
     assert path.read_bytes() == before
     assert [p.name for p in tmp_path.iterdir()] == ["dampers.parquet"]

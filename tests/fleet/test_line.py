@@ -165,3 +165,38 @@ def test_the_command_says_what_came_and_who_is_in_trouble(line, tmp_path):
     assert json.loads(done.stdout)["done"] == 1
     assert "empty" in done.stderr
     assert "E_NO_DATA" in done.stderr
+
+
+def test_the_fast_lane_ends_where_a_cold_search_does(line, identified, tmp_path):
+    found = run_fleet(line, tmp_path / "cold", workers=1, cold=True)
+    fast, cold = pl.read_parquet(identified.table), pl.read_parquet(found.table)
+    assert set(fast["lane"]) <= {"fast", "full"}
+    assert set(cold["lane"]) <= {"cold", "full"}
+    ratio = (fast["cost"] / cold["cost"]).to_numpy() - 1
+    same = abs(ratio) < 1e-6
+    # A search from nothing may end in a worse minimum nearby, never the line's.
+    assert same.sum() >= 4
+    assert (ratio[~same] < 0).sum() >= (ratio[~same] > 0).sum()
+
+
+def test_what_is_studied_in_full_stands_out(line, identified):
+    table = pl.read_parquet(identified.table)
+    fault = next(d.serial for d in Line(dampers=6, sessions=2, golden=1, faults={"wrong coil": 1}, seed=3) if d.fault)
+    full = table.filter(pl.col("lane") == "full")
+    assert full["serial"].to_list() == [fault]
+    assert full["study"].is_not_null().all()
+    assert table.sort("loop_deviation")["serial"].last() == fault
+
+
+def test_forces_of_the_line_are_those_of_its_records(line, identified):
+    table = pl.read_parquet(identified.table)
+    truth = {(d.serial, d.session): d for d in Line(dampers=6, sessions=2, golden=1, faults={"wrong coil": 1}, seed=3)}
+    names = [c for c in table.columns if c.startswith("rebound_N") and c.endswith("_1A")]
+    top = max(names, key=lambda name: float(name.split("_")[2][:-1]))
+    for row in table.iter_rows(named=True):
+        damper = truth[row["serial"], row["session"]]
+        run = next(r for r in damper.dataset() if r.id == "2Hz-1A")
+        fastest = run.force[run.time > 1 / 2][::1]
+        assert row[top] == pytest.approx(fastest.max(), rel=0.06)
+        assert row["gas_force_N"] == pytest.approx(damper.rig.offset_force, abs=6)
+        assert row["friction_N"] == pytest.approx(damper.rig.friction_high + damper.rig.yield_off, rel=0.3)

@@ -16,6 +16,7 @@ from mrdamper.errors import IdentificationError, ModelFileError, UnknownNameErro
 from mrdamper.export.equations import equations
 from mrdamper.files.model_file import dump_model, parse_model
 from mrdamper.identification import identify
+from mrdamper.models import all_models
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.models.spencer import Spencer
 from mrdamper.motion import sine
@@ -197,7 +198,11 @@ def test_the_command_line_lists_and_explains_models():
     assert "c0_ratio" in shown.stdout
     assert "Spencer, Dyke, Sain and Carlson" in shown.stdout
     as_json = json.loads(runner.invoke(application(), ["models", "--json"]).stdout)
-    assert all(entry["parameters"] and entry["source"] for entry in as_json)
+    assert {entry["name"] for entry in as_json} == {*all_models(), *all_published()}
+    assert all(entry["source"] and (entry["parameters"] or entry["limits"]) for entry in as_json)
+    for name in all_published():
+        assert all_published()[name].limits in runner.invoke(application(), ["models", name]).stdout
+        assert name in listed.stdout
 
 
 @pytest.fixture(scope="module")

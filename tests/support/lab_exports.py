@@ -364,8 +364,8 @@ KINDS = {
     function.__name__: function
     for function in (
         current_column, file_names, header_lines, run_column, specimen_names, side_by_side, numbered_groups,
-        concatenated,        repeated_headers, lvm, asc, sheets, struct_array, hdf5_groups, tdms_groups, parquet, npz,
-        zipped_files,
+        concatenated, tests_table, repeated_headers, lvm, asc, sheets, struct_array, hdf5_groups, tdms_groups,
+        parquet, npz, zipped_files,
     )
 }  # fmt: skip
 

@@ -28,7 +28,9 @@ from mrdamper.models import Model, Scale
 from mrdamper.optimizers.levenberg_marquardt import least_squares
 from mrdamper.optimizers.linear import on_one_blas_thread, solve_linear
 
-_LADDER = np.geomspace(2e-6, 3e-3, 41)  # yield displacements [m]; between them Gram matrices are interpolated
+_RUNG = 1500 ** (1 / 40)  # from one yield displacement to the next; between them Gram matrices are interpolated
+_LATTICE = 2e-6  # m, one of the rungs, whatever the data
+_SHORTEST = 5e-4  # yield displacement looked for, in the smallest amplitude; the longest is the largest amplitude
 _AT_ONCE = 2**17  # states held at a time
 _RIDGE = 1e-7  # interpolated Gram matrices of nearly parallel columns may lose positivity by less
 
@@ -48,6 +50,8 @@ class Condensed:
     conditions : tuple of Condition, length R
     scale : (R,) array
         Peak-to-peak force [N].
+    ladder : (K,) array
+        Values of the shape coordinate, evenly in the logarithm.
     gram : (R, K, L+1, L+1) array
         Mean products of the columns and, last, the measured force over its peak-to-peak
         value, at each value of the ladder.
@@ -59,6 +63,7 @@ class Condensed:
     run_ids: tuple[str, ...]
     conditions: tuple[Condition, ...]
     scale: Floats
+    ladder: Floats
     gram: Floats
 
     def only(self, rows: Sequence[int]) -> Condensed:
@@ -74,9 +79,10 @@ class Condensed:
 
     def at(self, shape_values: Floats) -> Floats:
         """(R, L+1, L+1) Gram matrices at one shape value a run: cubic in its logarithm."""
-        logs = np.log(_LADDER)
-        u = np.clip((np.log(shape_values) - logs[0]) / (logs[1] - logs[0]), 0, _LADDER.size - 1)
-        first = np.clip(np.floor(u).astype(int) - 1, 0, _LADDER.size - 4)
+        size = self.ladder.size
+        logs = np.log(self.ladder)
+        u = np.clip((np.log(shape_values) - logs[0]) / (logs[1] - logs[0]), 0, size - 1)
+        first = np.clip(np.floor(u).astype(int) - 1, 0, size - 4)
         t = u - first
         weights = np.stack(
             [
@@ -110,29 +116,38 @@ def condense(runs: Sequence[Run], model_type: type[Model]) -> Condensed:
         )
     shape = axes[0].name if axes else ""
     linear = tuple(name for name in coordinates if name != shape)
-    gram = np.stack([_gram(problem, linear, shape) for problem in problems])
+    conditions = tuple(problem.analysis.condition for problem in problems)
+    ladder = _ladder([c.amplitude_m for c in conditions]) if shape else np.geomspace(1.0, 8.0, 4)
+    gram = np.stack([_gram(problem, linear, shape, ladder) for problem in problems])
     return Condensed(
         model_type,
         linear,
         shape,
         tuple(run.id for run in runs),
-        tuple(problem.analysis.condition for problem in problems),
+        conditions,
         np.array([np.ptp(problem.force) for problem in problems]),
+        ladder,
         gram,
     )
 
 
-def _gram(problem: Problem, linear: tuple[str, ...], shape: str) -> Floats:
+def _ladder(amplitudes: Sequence[float]) -> Floats:
+    """Rungs [m] from far inside the smallest amplitude to the largest."""
+    low, high = (np.log(v / _LATTICE) / np.log(_RUNG) for v in (_SHORTEST * min(amplitudes), max(amplitudes)))
+    return _LATTICE * _RUNG ** np.arange(np.floor(low), np.ceil(high) + 1)
+
+
+def _gram(problem: Problem, linear: tuple[str, ...], shape: str, ladder: Floats) -> Floats:
     target = problem.force / np.ptp(problem.force)
     if not shape:
         table, _ = _columns(problem, linear, {})
         table = np.column_stack([table, target])
-        return np.stack([table.T @ table / target.size] * _LADDER.size)
-    table, bare = _columns(problem, linear, {shape: float(_LADDER[0])})
+        return np.stack([table.T @ table / target.size] * ladder.size)
+    table, bare = _columns(problem, linear, {shape: float(ladder[0])})
     if bare.shape is not None and "yield_force" in linear:  # its column is zeta, the only one the ladder changes
         table = np.column_stack([table, target])
-        return _gram_of_shapes(problem, table, linear.index("yield_force"), bare.shape)
-    tables = [np.column_stack([_columns(problem, linear, {shape: float(v)})[0], target]) for v in _LADDER]
+        return _gram_of_shapes(problem, table, linear.index("yield_force"), bare.shape, ladder)
+    tables = [np.column_stack([_columns(problem, linear, {shape: float(v)})[0], target]) for v in ladder]
     return np.stack([table.T @ table / target.size for table in tables])
 
 
@@ -146,13 +161,13 @@ def _columns(problem: Problem, linear: tuple[str, ...], shape: Mapping[str, floa
     return np.column_stack(columns), bare
 
 
-def _gram_of_shapes(problem: Problem, table: Floats, moving: int, shape: Shape) -> Floats:
+def _gram_of_shapes(problem: Problem, table: Floats, moving: int, shape: Shape, ladder: Floats) -> Floats:
     """The same matrices, all shapes followed at once; only the rows of the moving column differ."""
-    grams = np.stack([table.T @ table] * _LADDER.size)
+    grams = np.stack([table.T @ table] * ladder.size)
     few = max(1, _AT_ONCE // len(problem.motion))
-    for begin in range(0, _LADDER.size, few):
+    for begin in range(0, ladder.size, few):
         part = slice(begin, begin + few)
-        zeta = follow_alike(shape.n, float(shape.rho), 1 / _LADDER[part], problem.motion.path)[:, problem.scored]
+        zeta = follow_alike(shape.n, float(shape.rho), 1 / ladder[part], problem.motion.path)[:, problem.scored]
         grams[part, moving, :] = grams[part, :, moving] = zeta @ table
         grams[part, moving, moving] = np.einsum("kn,kn->k", zeta, zeta)
     return grams / len(table)
@@ -167,10 +182,13 @@ class JointFit:
     parameters : ParameterMap
     nrmse_pp : (R,) array
         Error of each run (of the condensed runs; the linear parameters unbounded).
+    at_bounds : tuple of str
+        The shape coordinate, where its function leaves what was looked for.
     """
 
     parameters: ParameterMap
     nrmse_pp: Floats
+    at_bounds: tuple[str, ...] = ()
 
 
 @on_one_blas_thread
@@ -197,13 +215,13 @@ def fit_jointly(
     """
     design = _Design(data, forms)
     if start is None:
-        solution = _reweighted(design, data.at(np.full(data.scale.size, _LADDER[0])), reweightings)
+        solution = _reweighted(design, data.at(np.full(data.scale.size, data.ladder[0])), reweightings)
         return _finish(design, solution, {})
     columns = FORMS[start.form].columns(*features(data.conditions), start.rates)
     scale = np.linalg.norm(columns, axis=0) / np.sqrt(columns.shape[0])
 
     def shape_values(u: Floats) -> Floats:
-        return np.exp(np.clip(columns @ (u / scale), np.log(_LADDER[0]), np.log(_LADDER[-1])))
+        return np.exp(np.clip(columns @ (u / scale), np.log(data.ladder[0]), np.log(data.ladder[-1])))
 
     centre = np.array(start.coefficients) * scale
     reach = np.full(centre.size, 6.0)
@@ -219,7 +237,10 @@ def fit_jointly(
         solution = design.solve(data.at(shape_values(centre)), weights)
         weights = 1.0 / np.sqrt(np.maximum(solution.nrmse_pp, 1e-4))
     function = ParameterFunction(start.form, tuple((centre / scale).tolist()), start.rates, log=True)
-    return _finish(design, solution, {data.shape: function})
+    made = _finish(design, solution, {data.shape: function})
+    reached, ends = shape_values(centre), data.ladder[[0, -1]]
+    outside = np.any((reached <= ends[0] * _RUNG**0.01) | (reached >= ends[1] / _RUNG**0.01))
+    return replace(made, at_bounds=(data.shape,)) if outside else made
 
 
 @on_one_blas_thread
@@ -234,7 +255,7 @@ def leave_out_errors(
     shapes = (
         fit.parameters.functions[data.shape](*features(data.conditions))
         if data.shape
-        else np.full(data.scale.size, _LADDER[0])
+        else np.full(data.scale.size, data.ladder[0])
     )
     gram = data.at(shapes)
     weights = 1.0 / np.sqrt(np.maximum(fit.nrmse_pp, 1e-4))
@@ -275,12 +296,21 @@ class _Design:
         """Coefficients of least weighted squares; residuals are those of the condensed runs."""
         size = np.sqrt(np.maximum(np.einsum("rii->ri", gram), 1e-300))
         scaled = gram / size[:, :, None] / size[:, None, :]
-        factor = np.linalg.cholesky(scaled + _RIDGE * np.eye(gram.shape[1])).transpose(0, 2, 1) * size[:, None, :]
+        factor = _factor(scaled + _RIDGE * np.eye(gram.shape[1])) * size[:, None, :]
         table = factor @ self.matrix
         weighted = (weights[:, None, None] * table).reshape(-1, table.shape[2])
         solution = solve_linear(weighted[:, :-1], weighted[:, -1], rank_limit=1e-10)
         error = table[:, :, :-1] @ solution - table[:, :, -1]
         return _Solution(solution, (weights[:, None] * error).ravel(), np.sqrt(np.sum(error**2, axis=1)))
+
+
+def _factor(gram: Floats) -> Floats:
+    """(R, K, K) matrices T with Tᵀ T the given ones, or the nearest that have such."""
+    try:
+        return np.linalg.cholesky(gram).transpose(0, 2, 1)
+    except np.linalg.LinAlgError:  # a model that fits to rounding: interpolation took more than the ridge gave
+        values, vectors = np.linalg.eigh(gram)
+        return np.sqrt(np.maximum(values, _RIDGE))[:, :, None] * vectors.transpose(0, 2, 1)
 
 
 def _reweighted(design: _Design, gram: Floats, reweightings: int) -> _Solution:

@@ -192,7 +192,12 @@ class JointProblem:
 
     @on_one_blas_thread
     def fit(
-        self, rows: Sequence[int] | None = None, start: Floats | None = None, rounds: int = 3, most_steps: int = 15
+        self,
+        rows: Sequence[int] | None = None,
+        start: Floats | None = None,
+        rounds: int = 3,
+        most_steps: int = 15,
+        settled: float = _SETTLED,
     ) -> JointFit:
         """Identify from all runs, or from those at some indices.
 
@@ -203,6 +208,8 @@ class JointProblem:
             Where to begin on the search axes: the result of a fit to more runs, say.
         rounds, most_steps : int
             Rounds of robust weights, and steps of the search in each.
+        settled : float
+            Relative gain of a step at which the search ends; below the default its curvature is learnt too.
         """
         begin = time.perf_counter()
         table = _Table(self, self.parts if rows is None else [self.parts[i] for i in rows])
@@ -211,7 +218,15 @@ class JointProblem:
         evaluations, ending = 0, Ending.SOLVED
         for _ in range(rounds):
             if self.axes:
-                found = least_squares(lambda u: table.solve(u).residual, point, lower, upper, most_steps, _SETTLED)
+                found = least_squares(
+                    lambda u: table.solve(u).residual,
+                    point,
+                    lower,
+                    upper,
+                    most_steps,
+                    settled,
+                    curved=settled < _SETTLED,
+                )
                 point, ending = found.point, found.ending
                 evaluations += found.evaluations
             table.weights = 1.0 / np.sqrt(np.maximum(table.solve(point).nrmse_pp, _BEST))
@@ -241,7 +256,7 @@ class JointProblem:
         rows : sequence of int
             Runs to keep.
         """
-        residual, jacobian, owner = self._linearised(fit)
+        residual, jacobian, owner = self.linearised(fit)
         kept = np.isin(owner, list(rows))
         step = solve_linear(jacobian[kept], -residual[kept], rank_limit=1e-12)
         lower, upper = self._box()
@@ -250,7 +265,7 @@ class JointProblem:
         solved = table.solve(np.clip(fit.point + step[: len(self.axes)], lower, upper))
         return self._damper(solved.model, table.parts)
 
-    def _linearised(self, fit: JointFit) -> tuple[Floats, Floats, NDArray[np.intp]]:
+    def linearised(self, fit: JointFit) -> tuple[Floats, Floats, NDArray[np.intp]]:
         """Residual at a fit, its derivatives by all free parameters, and the run of each row."""
         if self._linearisation is None or self._linearisation[0] is not fit:
             table = _Table(self, self.parts)

@@ -134,12 +134,15 @@ class ModifiedFit:
     values : mapping of str to (N,) array
         The identified values behind each function.
     conditions : tuple of Condition
+    at_bounds : tuple of str
+        Coordinates whose function leaves what was looked for.
     """
 
     damper: ModifiedModel
     functions: Mapping[str, FunctionFit]
     values: Mapping[str, Floats]
     conditions: tuple[Condition, ...]
+    at_bounds: tuple[str, ...] = ()
 
     @property
     def few_motions(self) -> bool:
@@ -241,7 +244,7 @@ def fit_modified_jointly(
     fits = {
         name: assess(function, data.conditions, values[name]) for name, function in joint.parameters.functions.items()
     }
-    return ModifiedFit(model(data, joint.parameters), fits, values, data.conditions), refit
+    return ModifiedFit(model(data, joint.parameters), fits, values, data.conditions, joint.at_bounds), refit
 
 
 def _uncertainty(identifications: Sequence[Identification], name: str, log: bool) -> Floats:

@@ -30,16 +30,21 @@ _ELSEWHERE = "choose a folder you may write to"
 
 
 @contextmanager
-def write_folder(folder: str | Path) -> Iterator[Path]:
+def write_folder(folder: str | Path, *, replace: bool = False) -> Iterator[Path]:
     """Give a temporary folder that takes the final name when the block ends without an error.
 
-    An existing folder is replaced only if it is empty.
+    An existing folder is replaced only if it is empty, or if that is asked for: its other
+    files then move into the new one.
 
     Raises
     ------
     OutputError
         If the folder exists and is not empty, or cannot be made.
     """
+    if replace:
+        with write_into(folder) as work:
+            yield work
+        return
     final = Path(folder)
     _require_absent(final)
     with _beside(final) as work:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ import numpy as np
 
 from mrdamper.data import Condition, Dataset, Run
 from mrdamper.errors import ColumnError, DatasetError, UnitError
-from mrdamper.files.atomic import write_folder
+from mrdamper.files.atomic import write_file, write_folder
 from mrdamper.files.encoding import csv_text, csv_value
 
 if TYPE_CHECKING:
@@ -63,16 +63,20 @@ def load_dataset(folder: str | Path | None = None) -> Dataset:
     return _load(folder, folder.name or str(folder))
 
 
-def save_dataset(dataset: Dataset, folder: str | Path, *, extra_files: dict[str, str] | None = None) -> None:
+def save_dataset(
+    dataset: Dataset, folder: str | Path, *, extra_files: dict[str, str] | None = None, replace: bool = False
+) -> None:
     """Write a dataset folder, whole or not at all.
 
     Parameters
     ----------
     dataset : Dataset
     folder : path
-        Must not exist, or be an empty folder.
+        Must not exist, or be an empty folder, unless a dataset there is to be replaced.
     extra_files : dict, optional
         Further text files by name, for example licences.
+    replace : bool
+        Put it in the place of the dataset there, whose other files stay.
 
     Raises
     ------
@@ -90,13 +94,29 @@ def save_dataset(dataset: Dataset, folder: str | Path, *, extra_files: dict[str,
     """
     import polars as pl
 
-    with write_folder(folder) as target:
+    with write_folder(folder, replace=replace) as target:
         (target / "runs.csv").write_text(csv_text([_row(run) for run in dataset]), encoding="utf-8")
         pl.concat(_samples(dataset), how="diagonal").write_parquet(
             target / "samples.parquet", compression="zstd", statistics=False
         )
         for name, text in (extra_files or {}).items():
             (target / name).write_text(text, encoding="utf-8")
+
+
+def store_split(folder: str | Path, held_out: Collection[str]) -> None:
+    """Write into a dataset's runs.csv which runs are held out; nothing else changes.
+
+    Raises
+    ------
+    DatasetError
+        If runs.csv is missing or cannot be read.
+    """
+    folder = Path(folder)
+    rows = _runs_table(folder)
+    for row in rows:
+        row["split"] = "validate" if row["run_id"] in held_out else "train"
+    with write_file(folder / "runs.csv") as path:
+        path.write_text(csv_text(rows), encoding="utf-8")
 
 
 def _load(folder: Path, name: str) -> Dataset:

@@ -6,19 +6,27 @@ It speaks JSON on both sides, so that it runs here, in a process that can be kil
 from __future__ import annotations
 
 import time
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from mrdamper.dampers.joint import JointFit, JointProblem
-from mrdamper.data import Condition, Dataset, Floats, Run
+from mrdamper.data import Condition, Dataset, Floats, Run, same_condition
 from mrdamper.errors import InputError
 from mrdamper.fleet.items import FleetError, Item, digest_of
+from mrdamper.fleet.loops import Test, by_test, deviation, gas_and_friction, measured_loop, velocity_ladder
+from mrdamper.models import SearchAxis
 from mrdamper.motion import equivalent_sine
 
-ROUNDS = 1  # no reweighting: the optimum is then that of one least squares, whatever the search starts from
+_ROUNDS, _STEPS, _SETTLED = 1, 40, 1e-8  # one least squares without reweighting, searched to its end: the optimum
+# is then the same to 1e-6 whatever near start it was found from
 _SPEED_STEPS = (0.25, 0.5, 0.75, 1.0)  # of the velocity ladder, over the line's highest test speed
+_CANDIDATES = 2  # of the line's start
+_WORTH = 0.02  # relative rise of the squared error by which a parameter counts as determined
+_RIDGE = 1e-12  # keeps the curvature of what changes nothing invertible
+_FAR = 6.0  # robust standard deviations from the line at which a damper is studied in full
 
 
 @dataclass(frozen=True)
@@ -31,10 +39,13 @@ class Settings:
         Identified jointly from all runs of a damper.
     rig_profile : str
         Of rig files, as TOML text.
+    cold : bool
+        Begin every search from the model's own start, not from the line.
     """
 
     model: str = "play-bypass"
     rig_profile: str = ""
+    cold: bool = False
 
 
 @dataclass(frozen=True)
@@ -46,27 +57,46 @@ class Plan:
 
     Attributes
     ----------
-    start, spread : tuple of float
-        Median of the search axes, and 1.48 times the median deviation from it.
-    axes : tuple of str
-    error, error_spread : float
-        The same of the median nrmse_pp.
-    conditions : tuple of (current [A], frequency [Hz], amplitude [m])
-        The line's test matrix.
+    start : tuple of float
+        Median of the free search axes.
+    held : mapping of str to float
+        Parameters that the line's tests do not determine, at the line's value.
+    error, error_spread, deviation, deviation_spread : float
+        Median, and 1.48 times the median deviation from it, of the median nrmse_pp and of the distance
+        of the measured loops from the line's.
+    matrix : tuple of (current [A], frequency [Hz], amplitude [m])
+        The line's tests.
+    loops : tuple of tuple of float
+        Median measured loop of each [N].
     speeds : tuple of float
         Velocity ladder [m/s].
     references : tuple of str
-        Serial numbers it was made from.
+        Names of the dampers it was made from.
+    draft : bool
+        Made to try a start: nothing stands out yet.
     """
 
     start: tuple[float, ...]
-    spread: tuple[float, ...]
-    axes: tuple[str, ...]
+    held: dict[str, float]
     error: float
     error_spread: float
-    conditions: tuple[tuple[float, float, float], ...]
+    deviation: float
+    deviation_spread: float
+    matrix: tuple[Test, ...]
+    loops: tuple[tuple[float, ...], ...]
     speeds: tuple[float, ...]
-    references: tuple[str, ...] = field(default=())
+    references: tuple[str, ...] = ()
+    draft: bool = False
+
+    @property
+    def currents(self) -> tuple[float, ...]:
+        """The line's test currents [A]."""
+        return tuple(sorted({round(test[0], 3) for test in self.matrix}))
+
+    @property
+    def amplitude(self) -> float:
+        """Of the ladder's sines [m]."""
+        return float(np.median([test[2] for test in self.matrix]))
 
 
 def measure(job: dict[str, Any]) -> dict[str, Any]:
@@ -147,28 +177,100 @@ def read(item: Item, settings: Settings) -> tuple[Dataset, tuple[str, ...]]:
 
 def _identify(dataset: Dataset, settings: Settings, plan: Plan | None) -> dict[str, Any]:
     train = _usable(dataset)
-    problem = JointProblem(train, settings.model)
-    start = None if plan is None else np.array(plan.start)
-    fit = problem.fit(start=start, rounds=ROUNDS)
-    lane = "fast" if plan is not None else "reference"
-    if plan is not None and _stands_out(fit, plan):
-        cold = problem.fit(rounds=ROUNDS)
-        fit, lane = min(fit, cold, key=lambda f: float(np.sum(f.nrmse_pp**2))), "full"
-    conditions = [equivalent_sine(run).condition for run in train]
+    problem = JointProblem(train, settings.model, {} if plan is None else plan.held)
+    lane = "reference" if plan is None else "cold" if settings.cold else "fast"
+    start = np.array(plan.start) if plan is not None and lane == "fast" else None
+    fit = _fit(problem, start)
+    tests = [_test_of(run) for run in train]
+    loops = np.array([measured_loop(run) for run in train])
+    more: dict[str, Any] = {}
+    if plan is not None:
+        own = _loops_by_test(tests, loops, plan)
+        more["loop_deviation"] = max(
+            (deviation(a, np.array(b)) for a, b in zip(own, plan.loops, strict=True) if a is not None), default=0.0
+        )
+        if _stands_out(fit, more["loop_deviation"], plan):
+            problem, lane = JointProblem(train, settings.model), "full"
+            fit = _fit(problem, None)
+            more |= _study(dataset)
+        more |= _beside_the_line(fit, own, plan)
+        if plan.draft:
+            more |= {
+                "axes": [axis.name for axis in problem.axes],
+                "changes": [_change(axis) for axis in problem.axes],
+                "curvature": _curvature(problem, fit),
+            }
     row: dict[str, Any] = {
         "rig": dataset.rigs[0],
         "lane": lane,
         "model": settings.model,
         "runs": len(train),
+        "cost": _cost(fit),
         "nrmse_pp": float(np.median(fit.nrmse_pp)),
         "nrmse_pp_worst": float(np.max(fit.nrmse_pp)),
         "at_bounds": " ".join(fit.at_bounds),
         "parameters": dict(fit.damper.model.values()),
         "point": fit.point.tolist(),
-        "axes": [axis.name for axis in problem.axes],
-        "conditions": [(c.current_A, c.frequency_Hz, c.amplitude_m) for c in conditions],
+        "tests": tests,
+        "loops": np.round(loops, 3).tolist(),
+        **more,
     }
     return row
+
+
+def _fit(problem: JointProblem, start: Floats | None) -> JointFit:
+    return problem.fit(start=start, rounds=_ROUNDS, most_steps=_STEPS, settled=_SETTLED)
+
+
+def _cost(fit: JointFit) -> float:
+    return float(np.sum(fit.nrmse_pp**2))
+
+
+def _test_of(run: Run) -> Test:
+    condition = equivalent_sine(run).condition
+    return condition.current_A, condition.frequency_Hz, condition.amplitude_m
+
+
+def _loops_by_test(tests: list[Test], loops: Floats, plan: Plan) -> list[Floats | None]:
+    """The measured loop of each of the line's tests; None where the damper missed it."""
+    return [None if not like else np.mean(loops[like], axis=0) for like in by_test(tests, plan.matrix)]
+
+
+def _beside_the_line(fit: JointFit, own: list[Floats | None], plan: Plan) -> dict[str, Any]:
+    """Forces at the line's velocity ladder, and the loops of the line's tests."""
+    ladder = velocity_ladder(fit.damper.model, plan.currents, plan.speeds, plan.amplitude)
+    gas, friction = gas_and_friction(ladder, plan.speeds)
+    return {
+        "ladder": [force for pair in ladder.values() for force in pair],
+        "gas_force_N": gas,
+        "friction_N": friction,
+        "tests_missing": sum(loop is None for loop in own),
+        "loops": [None if loop is None else np.round(loop, 3).tolist() for loop in own],
+    }
+
+
+def _curvature(problem: JointProblem, fit: JointFit) -> list[list[float]]:
+    """Second derivatives of the squared error along the search axes, linear parameters following, over that error."""
+    residual, jacobian, _ = problem.linearised(fit)
+    own, linear = np.split(jacobian, [len(problem.axes)], axis=1)
+    own = own - linear @ np.linalg.lstsq(linear, own, rcond=1e-10)[0]
+    return (own.T @ own / (residual @ residual)).tolist()
+
+
+def _change(axis: SearchAxis) -> float:
+    """A change of a search axis that would matter to an engineer."""
+    return 0.2 if axis.log else 0.05 * (axis.upper - axis.lower)
+
+
+def _study(dataset: Dataset) -> dict[str, Any]:
+    """What the full study says of a damper that stands out; which candidates it has is its own affair."""
+    from mrdamper.study.workflow import study_rig
+
+    try:
+        chosen = study_rig(dataset).chosen
+    except InputError as error:
+        return {"study": str(error)}
+    return {"study": chosen.title, "study_left_out_nrmse_pp": float(chosen.left_out.median())}
 
 
 def _usable(dataset: Dataset) -> list[Run]:
@@ -185,46 +287,107 @@ def _usable(dataset: Dataset) -> list[Run]:
     raise first or FleetError("no train run", where=dataset.name, mend="check the column split", code="E_FLEET_EMPTY")
 
 
-def _stands_out(fit: JointFit, plan: Plan) -> bool:
-    """Whether a damper lies so far from the line that its search should begin from nothing."""
-    away = np.abs(fit.point - np.array(plan.start)) > 6 * np.maximum(np.array(plan.spread), 0.05)
-    poor = float(np.median(fit.nrmse_pp)) > plan.error + 6 * max(plan.error_spread, 0.1 * plan.error)
-    return bool(away.any() or poor or not fit.ending.converged)
+def _stands_out(fit: JointFit, away: float, plan: Plan) -> bool:
+    """Whether a damper lies so far from the line that it deserves a full study."""
+    if plan.draft:
+        return False
+    poor = float(np.median(fit.nrmse_pp)) > plan.error + _FAR * max(plan.error_spread, 0.1 * plan.error)
+    odd = away > plan.deviation + _FAR * max(plan.deviation_spread, 0.5 * plan.deviation)
+    return bool(poor or odd or not fit.ending.converged)
 
 
-def make_plan(rows: dict[str, dict[str, Any]]) -> Plan:
-    """The plan from the rows of the reference dampers by name."""
-    points = np.array([row["point"] for row in rows.values()])
-    errors = np.array([row["nrmse_pp"] for row in rows.values()])
-    matrix = _matrix([tuple(c) for row in rows.values() for c in row["conditions"]], len(rows))
-    top = max(Condition(*c).peak_velocity for c in matrix)
-    return Plan(
-        start=_median(points),
-        spread=_spread(points),
-        axes=tuple(next(iter(rows.values()))["axes"]),
-        error=float(np.median(errors)),
-        error_spread=float(1.4826 * np.median(np.abs(errors - np.median(errors)))),
-        conditions=matrix,
-        speeds=tuple(float(f"{step * top:.2g}") for step in _SPEED_STEPS),
-        references=tuple(rows),
+def drafts(rows: dict[str, dict[str, Any]]) -> list[Plan]:
+    """Plans from the rows of the reference dampers by name, one for each start worth a try.
+
+    A search finds the minimum next to its start, and there may be several: the line starts where
+    most of its dampers end lowest, and the points of those best described are tried.
+    """
+    tests = [[_as_test(t) for t in row["tests"]] for row in rows.values()]
+    matrix = _matrix([test for some in tests for test in some], len(rows))
+    found: list[list[Floats]] = [[] for _ in matrix]
+    for some, row in zip(tests, rows.values(), strict=True):
+        for number, like in enumerate(by_test(some, matrix)):
+            found[number] += [np.array(row["loops"][i]) for i in like]
+    top = max(Condition(*test).peak_velocity for test in matrix)
+    best = sorted(rows.values(), key=lambda row: row["cost"])[:_CANDIDATES]
+    return [
+        Plan(
+            start=tuple(row["point"]),
+            held={},
+            error=0.0,
+            error_spread=0.0,
+            deviation=0.0,
+            deviation_spread=0.0,
+            matrix=matrix,
+            loops=tuple(tuple(np.round(np.median(some, axis=0), 3).tolist()) for some in found),
+            speeds=tuple(float(f"{step * top:.2g}") for step in _SPEED_STEPS),
+            references=tuple(rows),
+            draft=True,
+        )
+        for row in best
+    ]
+
+
+def holding(plan: Plan, rows: Sequence[dict[str, Any]]) -> Plan:
+    """The draft that holds, at the line's value, what the line's tests do not determine.
+
+    A few records cannot tell all parameters of a model from each other. One that could change by a
+    fifth (on an axis that is no logarithm, by a twentieth of its width) while the others make up for
+    it and the squared error rises by less than a fiftieth is held, the least determined first.
+    What is left has one minimum, the same from any start near the line, and can be compared.
+    """
+    curvature = np.array([row["curvature"] for row in rows])
+    free = list(range(curvature.shape[1]))
+    while free:
+        some = [c[np.ix_(free, free)] for c in curvature]
+        inverse = [np.linalg.inv(c + _RIDGE * (1 + np.trace(c)) * np.eye(len(free))) for c in some]
+        rises = np.median([1 / np.diag(i) for i in inverse], axis=0)
+        rises = rises * np.array([rows[0]["changes"][i] for i in free]) ** 2
+        if rises.min() > _WORTH:
+            break
+        del free[int(np.argmin(rises))]
+    names = rows[0]["axes"]
+    held = {
+        name: float(np.median([row["parameters"][name] for row in rows]))
+        for i, name in enumerate(names)
+        if i not in free
+    }
+    points = np.array([row["point"] for row in rows])
+    return replace(plan, start=tuple(np.median(points[:, free], axis=0).tolist()), held=held)
+
+
+def settled(plan: Plan, rows: Sequence[dict[str, Any]]) -> Plan:
+    """The plan from what the reference dampers came to under its draft."""
+    start = np.median([row["point"] for row in rows], axis=0)
+    error, error_spread = _middle(np.array([row["nrmse_pp"] for row in rows]))
+    away, away_spread = _middle(np.array([row["loop_deviation"] for row in rows]))
+    return replace(
+        plan,
+        start=tuple(start.tolist()),
+        error=float(error),
+        error_spread=float(error_spread),
+        deviation=float(away),
+        deviation_spread=float(away_spread),
+        draft=False,
     )
 
 
-def _median(points: Floats) -> tuple[float, ...]:
-    return tuple(np.median(points, axis=0).tolist())
+def _middle(values: Floats) -> tuple[Floats, Floats]:
+    """Median, and 1.48 times the median deviation from it: what robust statistics take for mean and deviation."""
+    middle = np.median(values, axis=0)
+    return middle, 1.4826 * np.median(np.abs(values - middle), axis=0)
 
 
-def _spread(points: Floats) -> tuple[float, ...]:
-    return tuple((1.4826 * np.median(np.abs(points - np.median(points, axis=0)), axis=0)).tolist())
-
-
-def _matrix(conditions: list[tuple[float, float, float]], dampers: int) -> tuple[tuple[float, float, float], ...]:
-    """Conditions that half the dampers or more were tested at, each the median of its like."""
-    from mrdamper.data import same_condition
-
-    groups = same_condition([Condition(*c) for c in conditions])
+def _matrix(tests: list[Test], dampers: int) -> tuple[Test, ...]:
+    """Tests that half the dampers or more went through, each the median of its like."""
+    groups = same_condition([Condition(*test) for test in tests])
     common = [g for g in groups if 2 * len(g) >= dampers] or groups
-    return tuple(sorted(_median(np.array([conditions[i] for i in g])) for g in common))  # type: ignore[arg-type]
+    return tuple(sorted(_as_test(np.median([tests[i] for i in g], axis=0).tolist()) for g in common))
+
+
+def _as_test(values: Sequence[float]) -> Test:
+    current, frequency, amplitude = values
+    return current, frequency, amplitude
 
 
 def as_job(item: Item, digest: str, settings: Settings, plan: Plan | None) -> dict[str, Any]:

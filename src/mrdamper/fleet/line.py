@@ -19,14 +19,15 @@ from mrdamper.files.atomic import require_writable
 from mrdamper.fleet.engine import Submit, cluster_engine, local_engine
 from mrdamper.fleet.guard import Limits
 from mrdamper.fleet.items import Item, digest_of, find_items
-from mrdamper.fleet.job import Plan, Settings, as_job, make_plan, refused
+from mrdamper.fleet.job import Plan, Settings, as_job, drafts, holding, refused, settled
 from mrdamper.fleet.journal import FORMAT, Journal
 from mrdamper.fleet.profile import FleetProfile
 from mrdamper.fleet.table import write_table
 from mrdamper.models import model_type
+from mrdamper.rig_files.profile import load_profile
 
 Progress = Callable[[str, float], None]
-REFERENCES = 15  # dampers that make the plan
+REFERENCES = 11  # dampers that make the plan
 _AHEAD = 2  # jobs that wait for each that runs
 
 
@@ -60,6 +61,7 @@ def run_fleet(
     *,
     profile: FleetProfile | None = None,
     model: str = "play-bypass",
+    cold: bool = False,
     workers: int = 1,
     scheduler: str | None = None,
     security: dict[str, str] | None = None,
@@ -80,6 +82,8 @@ def run_fleet(
     profile : FleetProfile, optional
     model : str
         Identified jointly from all runs of a damper.
+    cold : bool
+        Begin every search from the model's own start instead of the line's.
     workers : int
         Processes on this machine.
     scheduler : str, optional
@@ -106,7 +110,7 @@ def run_fleet(
     require_writable(out)
     profile = profile or FleetProfile()
     items = [_absolute(item) for item in find_items(source, profile)]
-    settings = Settings(model, "" if profile.rig is None else Path(profile.rig).read_text(encoding="utf-8-sig"))
+    settings = Settings(model, _rig_profile(profile), cold)
     journal = Journal(out)
     try:
         line = _Line(items, settings, journal, progress)
@@ -116,7 +120,7 @@ def run_fleet(
         with engine as (submit, slots):
             line.run(submit, slots)
         table = out / "dampers.parquet"
-        write_table(line.rows(), parameters, table)
+        write_table(line.rows(), parameters, line.plan, table)
         return line.result(table)
     finally:
         journal.close()
@@ -127,7 +131,7 @@ class _Line:
 
     def __init__(self, items: Sequence[Item], settings: Settings, journal: Journal, progress: Progress):
         self._items, self._settings, self._journal, self._progress = items, settings, journal, progress
-        self._plan: Plan | None = None
+        self.plan: Plan | None = None
         self._digests: dict[int, str] = {}
         self._failed: dict[int, dict[str, Any]] = {}  # of this run: done again by the next
         self._already = 0
@@ -142,8 +146,8 @@ class _Line:
             if number % 100 == 0:
                 self._progress(f"reading {len(self._items)} dampers", 0.0)
         self._make_plan(submit, slots)
-        if self._plan is not None:
-            self._measure(list(self._digests), self._plan, submit, slots, count=True)
+        if self.plan is not None:
+            self._measure(list(self._digests), self.plan, submit, slots, count=True)
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """One row a damper, in the order of serial numbers and sessions."""
@@ -157,7 +161,7 @@ class _Line:
                 done += 1
             else:
                 troubled.append((item.name, row["status"], row["reason"]))
-        return Fleet(table, len(self._items), done, self._already, tuple(troubled), self._plan)
+        return Fleet(table, len(self._items), done, self._already, tuple(troubled), self.plan)
 
     def _row(self, number: int) -> dict[str, Any]:
         error = self._items[number].error
@@ -165,7 +169,7 @@ class _Line:
             return refused(error)
         if number in self._failed:
             return self._failed[number]
-        for plan in (self._plan, None):
+        for plan in (self.plan, None):
             row = self._journal.result(self._key(number, plan))
             if row is not None:
                 return row
@@ -173,10 +177,10 @@ class _Line:
 
     def _make_plan(self, submit: Submit, slots: int) -> None:
         """From the first dampers that can be identified, in an order that their names alone decide."""
-        key = _hash("plan", asdict(self._settings), version("mrdamper"), FORMAT)
+        key = _hash("plan", asdict(self._for(None)), version("mrdamper"), FORMAT)
         kept = self._journal.plan(key)
         if kept is not None:
-            self._plan = Plan(**{k: _deep_tuple(v) for k, v in kept.items()})
+            self.plan = Plan(**{k: _deep_tuple(v) for k, v in kept.items()})
             return
         order = sorted(self._digests, key=lambda n: _hash(self._items[n].serial, self._items[n].session))
         found: dict[str, dict[str, Any]] = {}
@@ -190,8 +194,19 @@ class _Line:
             if len(found) >= REFERENCES:
                 break
         if found:
-            self._plan = make_plan(found)
-            self._journal.keep_plan(key, asdict(self._plan))
+            tried = [(plan, self._under(plan, order, found, submit, slots)) for plan in drafts(found)]
+            draft = holding(*min(tried, key=lambda t: sum(row["cost"] for row in t[1])))
+            self.plan = settled(draft, self._under(draft, order, found, submit, slots))
+            self._journal.keep_plan(key, asdict(self.plan))
+
+    def _under(
+        self, plan: Plan, order: Sequence[int], found: dict[str, dict[str, Any]], submit: Submit, slots: int
+    ) -> list[dict[str, Any]]:
+        """Rows of the reference dampers under a draft of the plan."""
+        numbers = [n for n in order if self._items[n].name in found]
+        self._measure(numbers, plan, submit, slots)
+        rows = [self._journal.result(self._key(n, plan)) for n in numbers]
+        return [row for row in rows if row is not None and row["status"] == "done"]
 
     def _measure(
         self, numbers: Sequence[int], plan: Plan | None, submit: Submit, slots: int, count: bool = False
@@ -204,7 +219,7 @@ class _Line:
         todo, done, begin = iter(waiting), 0, time.monotonic()
         while True:
             while len(running) < _AHEAD * slots and (number := next(todo, None)) is not None:
-                job = as_job(self._items[number], self._digests[number], self._settings, plan)
+                job = as_job(self._items[number], self._digests[number], self._for(plan), plan)
                 running[submit(job)] = number
             if not running:
                 return
@@ -232,9 +247,13 @@ class _Line:
                 good.append((self._key(number, plan), row))
         self._journal.keep(good)
 
+    def _for(self, plan: Plan | None) -> Settings:
+        """The settings; a plan is made in the same way for fast and for cold searches."""
+        return replace(self._settings, cold=self._settings.cold and plan is not None and not plan.draft)
+
     def _key(self, number: int, plan: Plan | None) -> str:
         about = None if plan is None else asdict(plan)
-        return _hash(self._digests[number], asdict(self._settings), version("mrdamper"), FORMAT, about)
+        return _hash(self._digests[number], asdict(self._for(plan)), version("mrdamper"), FORMAT, about)
 
 
 def _pace(done: int, total: int, seconds: float, reference: bool) -> tuple[str, float]:
@@ -243,6 +262,13 @@ def _pace(done: int, total: int, seconds: float, reference: bool) -> tuple[str, 
     time_left = f"{left / 3600:.1f} h" if left >= 3600 else f"{left / 60:.0f} min" if left >= 60 else f"{left:.0f} s"
     what = "reference dampers" if reference else "dampers"
     return f"{done} of {total} {what}, {rate:.3g} a second, {time_left} left", done / total
+
+
+def _rig_profile(profile: FleetProfile) -> str:
+    if profile.rig is None:
+        return ""
+    load_profile(profile.rig)
+    return Path(profile.rig).read_text(encoding="utf-8-sig")
 
 
 def _absolute(item: Item) -> Item:

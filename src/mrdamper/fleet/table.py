@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from mrdamper.errors import OutputError
 from mrdamper.files.atomic import write_file
+from mrdamper.fleet.job import Plan
 
 if TYPE_CHECKING:
     import polars as pl
@@ -17,12 +18,14 @@ _AT_ONCE = 10_000  # rows held in memory, and rows of a group in the file
 TIMES = ("wall_time_s", "cpu_time_s", "finished_time_utc", "host_name")  # differ from run to run; nothing else does
 _TEXT = (
     "serial", "session", "batch", "date", "golden", "rig", "status", "code", "reason", "findings", "lane", "model",
-    "at_bounds",
+    "at_bounds", "study",
 )  # fmt: skip
-_NUMBERS = ("nrmse_pp", "nrmse_pp_worst")
+_NUMBERS = (
+    "cost", "nrmse_pp", "nrmse_pp_worst", "study_left_out_nrmse_pp", "gas_force_N", "friction_N", "loop_deviation",
+)  # fmt: skip
 
 
-def write_table(rows: Iterable[dict[str, Any]], parameters: Iterable[str], path: Path) -> None:
+def write_table(rows: Iterable[dict[str, Any]], parameters: Iterable[str], plan: Plan | None, path: Path) -> None:
     """Write rows as Parquet, whole or not at all.
 
     Parameters
@@ -30,6 +33,8 @@ def write_table(rows: Iterable[dict[str, Any]], parameters: Iterable[str], path:
     rows : iterable of dict
     parameters : iterable of str
         Names of the model's parameters; each becomes a column `p_NAME`.
+    plan : Plan, optional
+        Its velocity ladder becomes columns `rebound_N_0.1m_s_1A` and `compression_N_...`.
     path : path
 
     Raises
@@ -39,13 +44,14 @@ def write_table(rows: Iterable[dict[str, Any]], parameters: Iterable[str], path:
     """
     import polars as pl
 
-    schema = _schema(tuple(parameters))
+    forces = () if plan is None else force_columns(plan)
+    schema = _schema(tuple(parameters), forces)
     try:
         with write_file(path) as target:
             parts = target.parent / "parts"
             parts.mkdir()
             for number, some in enumerate(_chunks(rows)):
-                part = pl.DataFrame([_flat(row) for row in some], schema=schema)
+                part = pl.DataFrame([_flat(row, forces) for row in some], schema=schema)
                 part.write_parquet(parts / f"{number:06}.parquet", compression="zstd")
             pl.scan_parquet(parts / "*.parquet").sink_parquet(target, compression="zstd", row_group_size=_AT_ONCE)
     except OSError as error:
@@ -63,16 +69,28 @@ def _chunks(rows: Iterable[dict[str, Any]]) -> Iterator[list[dict[str, Any]]]:
         yield some
 
 
-def _schema(parameters: tuple[str, ...]) -> dict[str, pl.DataType]:
+def force_columns(plan: Plan) -> tuple[str, ...]:
+    """Names of the forces of a velocity ladder, in its order."""
+    return tuple(
+        f"{way}_N_{speed:g}m_s_{current:g}A"
+        for current in plan.currents
+        for speed in plan.speeds
+        for way in ("rebound", "compression")
+    )
+
+
+def _schema(parameters: tuple[str, ...], forces: tuple[str, ...]) -> dict[str, pl.DataType]:
     import polars as pl
 
     kinds: dict[str, Any] = dict.fromkeys(_TEXT, pl.String)
     kinds["golden"] = pl.Boolean
-    kinds["runs"] = pl.Int64
-    kinds |= dict.fromkeys((*_NUMBERS, *(f"p_{name}" for name in parameters)), pl.Float64)
+    kinds |= dict.fromkeys(("runs", "tests_missing"), pl.Int64)
+    kinds |= dict.fromkeys((*_NUMBERS, *(f"p_{name}" for name in parameters), *forces), pl.Float64)
+    kinds["loops"] = pl.List(pl.List(pl.Float64))
     kinds |= {name: pl.Float64 if name.endswith("_s") else pl.String for name in TIMES}
     return kinds
 
 
-def _flat(row: dict[str, Any]) -> dict[str, Any]:
-    return {**row, **{f"p_{name}": value for name, value in (row.get("parameters") or {}).items()}}
+def _flat(row: dict[str, Any], forces: tuple[str, ...]) -> dict[str, Any]:
+    parameters = {f"p_{name}": value for name, value in (row.get("parameters") or {}).items()}
+    return {**row, **parameters, **dict(zip(forces, row.get("ladder") or (), strict=False))}

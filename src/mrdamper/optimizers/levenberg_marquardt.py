@@ -79,7 +79,8 @@ def least_squares(
         gradient = jacobian.T @ r
         if curved and before is not None:
             extra = _learnt_curvature(extra, point - before[0], gradient - before[1], jacobian)
-        free = ~(((point <= lower) & (gradient > 0)) | ((point >= upper) & (gradient < 0)))
+        held = ((point <= lower) & (gradient > 0)) | ((point >= upper) & (gradient < 0))
+        free = ~held & jacobian.any(axis=0)  # a coordinate that changes nothing has no step
         if not free.any():
             ending = Ending.AT_BOUNDS
             break

@@ -72,6 +72,8 @@ def _functions(fit: ModifiedFit) -> list[str]:
                 f"The function of {name} hardly predicts conditions left out of it "
                 f"(error {found.left_out:.2f} of the spread)."
             )
+    if fit.at_bounds:
+        sentences.append(f"The function of {', '.join(fit.at_bounds)} leaves what was looked for.")
     levels = len({round(c.current_A, 3) for c in fit.conditions})
     if levels < 4:
         sentences.append(f"Only {levels} currents were tested: what happens between them is an assumption of the form.")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.errors import ColumnError, UnitError, printable
+from mrdamper.errors import ColumnError, CombinedError, InputError, UnitError, printable
 from mrdamper.rig_files.column_names import WORDS, role_of, says_nothing, split_name, unknown_unit
 from mrdamper.rig_files.readers.base import RawTable, RigFileError
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED
@@ -77,24 +77,35 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
         if channel is not None and channel.column is not None:
             found[role] = _named(table, headers, channel.column, role)
     taken = set(found.values())
+    problems: list[InputError] = []
     for role in ROLES:
         if role in found or (role == "time" and profile.file.sample_rate_Hz):
             continue
         if role == "current" and profile.current_is_given:
             continue
-        choice = _choose(table, headers, role, taken)
+        try:
+            choice = _choose(table, headers, role, taken)
+        except InputError as error:
+            problems.append(error)
+            continue
         if choice is not None:
             found[role] = choice
             taken.add(choice)
-    _require_all(table, headers, found, profile)
+    if not problems:
+        problems += _missing(table, headers, found, profile)
     assigned = {}
     for role, column in found.items():
         channel = profile.channels.get(role)
-        if role in REQUIRED and not isinstance(channel.column if channel else None, int):
-            _refuse_two_values(table, headers, column)
-        entry = _convert(table, headers, role, column, channel)
+        try:
+            if role in REQUIRED and not isinstance(channel.column if channel else None, int):
+                _refuse_two_values(table, headers, column)
+            entry = _convert(table, headers, role, column, channel)
+        except InputError as error:
+            problems.append(error)
+            continue
         if entry is not None:
             assigned[role] = entry
+    CombinedError.raise_from(problems)
     return assigned
 
 
@@ -185,25 +196,28 @@ def _named(table: RawTable, headers: Sequence[tuple[str, str]], column: str | in
     )
 
 
-def _require_all(
+def _missing(
     table: RawTable, headers: Sequence[tuple[str, str]], found: Mapping[str, int], profile: Profile
-) -> None:
+) -> list[InputError]:
+    """A refusal for every channel that no column is known to be."""
     missing = [r for r in REQUIRED if r not in found and not (r == "time" and profile.file.sample_rate_Hz)]
-    if not missing:
-        return
-    if not any(table.names):
-        raise _refusal(
-            UnitError, table, f"{len(headers)} columns without names or units",
-            "name them in a profile: [file] names = [...], [channels.force] unit = ...", "E_UNITS_MISSING",
-        )  # fmt: skip
-    for role in missing:
-        shown = ", ".join(name or f"column {i}" for i, name in enumerate(table.names, 1))
-        units = "" if any(unit for _, unit in headers) else ", without units"
-        rate = " or, with a fixed rate, [file] sample_rate_Hz = ..." if role == "time" else ""
-        raise _refusal(
+    if missing and not any(table.names):
+        return [
+            _refusal(
+                UnitError, table, f"{len(headers)} columns without names or units",
+                "name them in a profile: [file] names = [...], [channels.force] unit = ...", "E_UNITS_MISSING",
+            )
+        ]  # fmt: skip
+    shown = ", ".join(name or f"column {i}" for i, name in enumerate(table.names, 1))
+    units = "" if any(unit for _, unit in headers) else ", without units"
+    return [
+        _refusal(
             ColumnError, table, f"no column is known to be {role} (found {shown}{units})",
-            f'say [channels.{role}] column = "..."{rate} in a profile',
-        )  # fmt: skip
+            f'say [channels.{role}] column = "..."'
+            + (" or, with a fixed rate, [file] sample_rate_Hz = ..." if role == "time" else "") + " in a profile",
+        )
+        for role in missing
+    ]  # fmt: skip
 
 
 def _ambiguous(table: RawTable, role: str, names: Sequence[str]) -> Exception:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from mrdamper.data import Dataset
-from mrdamper.errors import ColumnError, InputError, UnitError
+from mrdamper.errors import ColumnError, InputError
 from mrdamper.rig_files.columns import assign, propose
 from mrdamper.rig_files.long_records import judge_long
 from mrdamper.rig_files.parts import tests_of
@@ -19,6 +19,8 @@ from mrdamper.rig_files.profile import Channel, Profile, current_pattern, load_p
 from mrdamper.rig_files.readers import RawTable, RigFileError, raw_tables, suffixes
 from mrdamper.rig_files.record import Record
 from mrdamper.rig_files.rig_record import as_data, held_current_of, joined, records_of
+from mrdamper.rig_files.tests_table import NAME as TESTS
+from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +128,7 @@ def _guess_channels(tables: list[RawTable], profile: Profile) -> tuple[RawTable,
     try:
         table = _tables_with_channels(tables, profile)[0]
         places = {name: (entry.column, entry.unit) for name, entry in assign(table, profile).items()}
-    except (ColumnError, UnitError, RigFileError):
+    except InputError:
         table = tables[0]
         places = {name: place for name, place in propose(table).items() if name not in profile.channels}
     channels = {}
@@ -141,8 +143,14 @@ def first_file(paths: Sequence[str | Path]) -> Path:
     return _files(paths)[0]
 
 
-def import_files(paths: Iterable[str | Path], profile: Profile | str | Path | None = None) -> ImportResult:
-    """Read and judge files and folders of files; a refused file does not stop the others.
+def import_files(
+    paths: Iterable[str | Path],
+    profile: Profile | str | Path | None = None,
+    *,
+    tests: str | Path | None = None,
+    progress: Callable[[str, float], None] = lambda what, share: None,
+) -> ImportResult:
+    """Read and judge files and folders of files; a refused file or test does not stop the others.
 
     Parameters
     ----------
@@ -150,23 +158,86 @@ def import_files(paths: Iterable[str | Path], profile: Profile | str | Path | No
         Of a folder, every file with a suffix of a known format is read, in the order of names.
     profile : Profile or path, optional
         For all of them.
+    tests : path, optional
+        Table of tests; default: `tests.csv` of the folder, if it holds one.
+    progress : callable
+        Is told the file and the share done.
 
     Raises
     ------
     InputError
-        If the profile cannot be read, or a folder holds no rig's file.
+        If the profile or the table of tests cannot be read, or a folder holds no rig's file.
     """
     profile = _profile(profile)
+    paths = list(map(Path, paths))
+    beside = [path / TESTS for path in paths if (path / TESTS).is_file()]
+    table = load_tests(tests) if tests is not None else load_tests(beside[0]) if beside else None
+    files = [path for path in _files(paths) if path.name != TESTS]
+    records: list[Record] = []
+    refusals: list[Refusal] = []
+    met: list[tuple[Path, str]] = []
+    for number, path in enumerate(files):
+        progress(path.name, number / len(files))
+        good, refused, names = _read_judged(path, profile, table)
+        records += good
+        refusals += refused
+        met += [(path, name) for name in names or [""]]
+    if table is not None:
+        table.require_found(met)
+    return ImportResult(_with_unique_ids(records), tuple(refusals))
+
+
+def found_tests(
+    paths: Iterable[str | Path], profile: Profile | str | Path | None = None
+) -> tuple[tuple[Record, ...], tuple[Refusal, ...]]:
+    """Every test that files hold, not judged, and the files that cannot be read: for a table of tests."""
     records: list[Record] = []
     refusals: list[Refusal] = []
     for path in _files(paths):
+        if path.name == TESTS:
+            continue
         try:
-            read = read_runs(path, profile)
-            _require_current(read, path)
-            records.extend(read)
+            records += _unjudged(path, _profile(profile))
         except InputError as error:
             refusals.append(Refusal(str(path), error))
-    return ImportResult(_with_unique_ids(records), tuple(refusals))
+    return tuple(records), tuple(refusals)
+
+
+def _read_judged(
+    path: Path, profile: Profile, table: TestsTable | None
+) -> tuple[list[Record], list[Refusal], list[str]]:
+    """A file's good tests, everything that is wrong with it, and the names of all its tests."""
+    from mrdamper.rig_files.quality import judge
+
+    good: list[Record] = []
+    refusals: list[Refusal] = []
+    with np.errstate(all="ignore"):  # numbers near the end of the range overflow in sums and are refused as such
+        try:
+            records = _unjudged(path, profile)
+        except InputError as error:
+            return [], [Refusal(str(path), one) for one in getattr(error, "errors", (error,))], []
+        for record in records:
+            where = str(path) if len(records) == 1 else f"{path}, {record.id}"
+            problems: list[InputError] = []
+            judged = record
+            for step in (
+                lambda record: applied(record, table.of(path, record.id), table) if table is not None else record,
+                _with_current_known,
+                lambda record: judge_long(record, judge),
+            ):
+                try:
+                    judged = step(judged)
+                except InputError as error:
+                    problems.append(error)
+            refusals += [Refusal(where, problem) for problem in problems]
+            if not problems:
+                good.append(judged)
+    return good, refusals, [record.id for record in records]
+
+
+def _with_current_known(record: Record) -> Record:
+    _require_current([record], Path(record.provenance.get("file", record.id)))
+    return record
 
 
 def to_dataset(records: Sequence[Record], name: str = "dataset") -> Dataset:
@@ -264,8 +335,8 @@ def _require_current(records: Sequence[Record], path: Path) -> None:
         raise ColumnError(
             why[0] if why else "no coil current in a column or in the file name",
             where=path.name,
-            mend='say [current] value = 0.5, [current] pattern = "*_{current}A_*" or '
-            '[channels.current] column = "..." in a profile',
+            mend='say [current] value = 0.5, [current] pattern = "*_{current}A_*" or [channels.current] column = "..." '
+            "in a profile, or write it into tests.csv (--write-tests)",
             code="E_CURRENT_MISSING",
         )
 

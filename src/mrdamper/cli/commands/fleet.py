@@ -26,6 +26,7 @@ def register(app: typer.Typer) -> None:
             None, "--profile", help="Fleet profile (TOML): where serial numbers stand, golden dampers, rig profile."
         ),
         model: str = typer.Option("play-bypass", "--model", help="Identified from all runs of a damper."),
+        cold: bool = typer.Option(False, "--cold", help="Begin every search from nothing, to check the fast lane."),
         as_json: bool = typer.Option(False, "--json", help="Print a summary a program can read."),
     ) -> None:
         """Identify every damper of a fleet into one table; interrupted at any moment, the same command goes on."""
@@ -43,6 +44,7 @@ def register(app: typer.Typer) -> None:
                     out,
                     profile=load_fleet_profile(profile),
                     model=model,
+                    cold=cold,
                     workers=workers or os.cpu_count() or 1,
                     scheduler=scheduler,
                     progress=progress,

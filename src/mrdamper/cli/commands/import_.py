@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import typer
 
 if TYPE_CHECKING:
+    from mrdamper.data import Dataset
     from mrdamper.rig_files.profile import Profile
     from mrdamper.rig_files.record import Record
-    from mrdamper.rig_files.rig_import import ImportResult
+    from mrdamper.rig_files.rig_import import ImportResult, Refusal
 
 
 def register(app: typer.Typer) -> None:
@@ -19,55 +20,91 @@ def register(app: typer.Typer) -> None:
     @app.command(
         "import",
         epilog="Example: mrdamper import tests/*.csv --profile rig.toml --out DATASET; "
-        "mrdamper import tests/a.csv --write-profile rig.toml",
+        "mrdamper import tests/a.csv --write-profile rig.toml; mrdamper import tests --write-tests tests/tests.csv",
     )
     def import_(
         files: list[Path] = typer.Argument(..., help="Files of a rig, or folders of them."),
         out: Path | None = typer.Option(None, "--out", help="Dataset folder to write."),
+        add: bool = typer.Option(False, "--add", help="Add to the dataset there instead of writing a new one."),
         profile: Path | None = typer.Option(None, "--profile", help="Rig profile (TOML): what the files do not say."),
+        tests: Path | None = typer.Option(
+            None, "--tests", help="Table of tests: current, split, session of each; default: tests.csv of the folder."
+        ),
         write_profile: Path | None = typer.Option(
             None, "--write-profile", help="Write how the first file was read as a profile; - for standard output."
         ),
+        write_tests: Path | None = typer.Option(
+            None, "--write-tests", help="Write the tests found as a table to be completed; - for standard output."
+        ),
         skip_refused: bool = typer.Option(False, "--skip-refused", help="Write the good files, list the others."),
+        quiet: bool = typer.Option(False, "--quiet", help="No progress."),
         as_json: bool = typer.Option(False, "--json", help="Print JSON a program can read."),
     ) -> None:
         """Read a rig's files, judge every test, and write them as a dataset: all, or nothing."""
+        from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.errors import InputError
         from mrdamper.rig_files.profile import Profile, load_profile
         from mrdamper.rig_files.rig_import import import_files
 
-        if out is None and write_profile is None:
-            raise InputError("nothing to write", mend="give --out DATASET, --write-profile FILE or both")
-        _refuse_taken(out)
+        if out is None and write_profile is None and write_tests is None:
+            raise InputError("nothing to write", mend="give --out DATASET, --write-profile FILE or --write-tests FILE")
+        _refuse_taken(out, add)
         known = load_profile(profile) if profile is not None else Profile()
         if write_profile is not None:
             _write_profile(files, known, write_profile)
+        if write_tests is not None:
+            _write_tests(files, known, write_tests)
         if out is None:
             return
-        result = import_files(files, known)
+        with progress_on_stderr(quiet or as_json) as progress:
+            result = import_files(files, known, tests=tests, progress=progress)
         wrong = bool(result.refusals) and not skip_refused
         written = bool(result.records) and not wrong
-        if written:
-            _write_dataset(result, known, out)
+        total = _write_dataset(result, known, out, add) if written else 0
         if as_json:
             import json
 
             print(json.dumps(_summary(result, out if written else None), indent=1, ensure_ascii=False))
         else:
-            _print(result, out if written else None)
+            _print(result, out if written else None, total)
         if wrong or not result.records:
             raise typer.Exit(2)
 
 
-def _refuse_taken(out: Path | None) -> None:
+def _refuse_taken(out: Path | None, add: bool) -> None:
     from mrdamper.errors import OutputError
     from mrdamper.files.atomic import require_writable
 
     if out is None:
         return
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise OutputError("exists already and is not empty", where=str(out), mend="choose another name or remove it")
+    if add and not (out / "runs.csv").is_file():
+        raise OutputError("no dataset to add to", where=str(out), mend="leave --add out to write a new one")
+    if not add and out.exists() and (not out.is_dir() or any(out.iterdir())):
+        hint = ", or add to it with --add" if (out / "runs.csv").is_file() else ""
+        raise OutputError(
+            "exists already and is not empty", where=str(out), mend=f"choose another name or remove it{hint}"
+        )
     require_writable(out)
+
+
+def _write_tests(files: list[Path], known: Profile, target: Path) -> None:
+    """Every test that can be read, also those whose current is not known yet."""
+    from mrdamper.errors import InputError
+    from mrdamper.files.atomic import write_file
+    from mrdamper.rig_files.rig_import import found_tests
+    from mrdamper.rig_files.tests_table import tests_text
+
+    records, refusals = found_tests(files, known)
+    for refusal in refusals:
+        typer.echo(f"not in the table: {refusal.error}", err=True)
+    if not records:
+        raise InputError("no test can be read", mend="mend what is refused above, or give a profile")
+    if str(target) == "-":
+        print(tests_text(records), end="")
+        return
+    with write_file(target) as path:
+        path.write_text(tests_text(records), encoding="utf-8")
+    print(f"table of {len(records)} tests: {target}; complete it, then import with it")
 
 
 def _write_profile(files: list[Path], known: Profile, target: Path) -> None:
@@ -89,16 +126,48 @@ def _write_profile(files: list[Path], known: Profile, target: Path) -> None:
         path.write_text(text, encoding="utf-8")
 
 
-def _write_dataset(result: ImportResult, profile: Profile, out: Path) -> None:
-    from mrdamper.files.dataset import save_dataset
+def _write_dataset(result: ImportResult, profile: Profile, out: Path, add: bool) -> int:
+    """Write or add; the number of runs in the dataset then."""
+    from mrdamper.files.dataset import load_dataset, save_dataset
     from mrdamper.rig_files.profile import Profile, profile_text
     from mrdamper.rig_files.rig_import import to_dataset
 
+    dataset = to_dataset(result.records, out.name)
+    if add:
+        dataset = _joined(load_dataset(out), dataset)
+        save_dataset(dataset, out, replace=True)
+        return len(dataset)
     extra = {"rig.toml": profile_text(profile)} if profile != Profile() else None
-    save_dataset(to_dataset(result.records, out.name), out, extra_files=extra)
+    save_dataset(dataset, out, extra_files=extra)
+    return len(dataset)
 
 
-def _print(result: ImportResult, out: Path | None) -> None:
+def _joined(old: Dataset, new: Dataset) -> Dataset:
+    """Both datasets' runs, told apart by their names; a file that was imported before is refused."""
+    from dataclasses import replace
+
+    from mrdamper.data import Dataset
+    from mrdamper.errors import OutputError
+
+    known = {(run.notes.get("sha256"), run.id) for run in old if run.notes.get("sha256")}
+    again = [run.id for run in new if (run.notes.get("sha256"), run.id) in known]
+    if again:
+        raise OutputError(
+            f"{len(again)} of the tests are there already: {', '.join(again[:5])}{' ...' if again[5:] else ''}",
+            where=f"dataset {old.name}", mend="give the new files only",
+        )  # fmt: skip
+    taken = {run.id for run in old}
+    runs = list(old.runs)
+    for run in new:
+        name, count = run.id, 2
+        while name in taken:
+            name, count = f"{run.id}_{count}", count + 1
+        taken.add(name)
+        runs.append(run if name == run.id else replace(run, id=name))
+    return Dataset(tuple(runs), old.name)
+
+
+def _print(result: ImportResult, out: Path | None, total: int) -> None:
     for record in result.records:
         known = record.time[~(record.time != record.time)]
         seconds = float(known[-1] - known[0])
@@ -106,17 +175,39 @@ def _print(result: ImportResult, out: Path | None) -> None:
         print(f"{record.id}: {record.time.size} samples, {seconds:.4g} s, {current}{record.provenance['columns']}")
         for finding in record.findings:
             print(f"  {finding}")
-    for refusal in result.refusals:
-        print(f"refused: {refusal.error}")
+    for line in _refused_lines(result):
+        print(line)
     if any("profile" in refusal.error.mend for refusal in result.refusals):
         print(
             "a profile answers once for all files: mrdamper import FILE --write-profile rig.toml, "
             "correct rig.toml, import with --profile rig.toml"
         )
+    tests = {record.provenance.get("file", "") for record in result.records}
     if out is not None:
-        print(f"dataset: {out} ({len(result.records)} runs)")
+        more = f", {len(result.records)} of them new" if total > len(result.records) else ""
+        whence = more or f" from {len(tests)} file{'s' * (len(tests) != 1)}"
+        print(f"dataset: {out} ({total} runs{whence})")
     else:
         print("nothing written; mend or leave out the refused files, or give --skip-refused")
+
+
+def _refused_lines(result: ImportResult) -> list[str]:
+    """One line a refusal; the same refusal of several files is one line with their number."""
+    alike: dict[tuple[str, str, str], list[Refusal]] = {}
+    for refusal in result.refusals:
+        error = refusal.error
+        alike.setdefault((error.code, error.found, error.mend), []).append(refusal)
+    lines = []
+    for refusals in alike.values():
+        error = refusals[0].error
+        if len(refusals) == 1:
+            lines.append(f"refused: {error}")
+            continue
+        names = [Path(refusal.file).name for refusal in refusals]
+        shown = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if names[3:] else "")
+        mend = f"; {error.mend}" if error.mend else ""
+        lines.append(f"refused {len(names)} times ({shown}): {error.found}{mend} [{error.code}]")
+    return lines
 
 
 def _current(record: Record) -> str:

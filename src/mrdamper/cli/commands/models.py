@@ -13,10 +13,13 @@ def register(app: typer.Typer) -> None:
         name: str | None = typer.Argument(None, help="Show this model in full; default: list all."),
         as_json: bool = typer.Option(False, "--json", help="Print JSON a program can read."),
     ) -> None:
-        """List the damper models, or show one: equation, parameters with units and bounds, source."""
-        from mrdamper.models import all_models, model_type
+        """List the damper models and published dampers, or show one: equation, parameters, source."""
+        from mrdamper.dampers.published import all_published
+        from mrdamper.discovery import named
+        from mrdamper.models import all_models
 
-        chosen = [model_type(name)] if name else list(all_models().values())
+        known = {**all_models(), **all_published()}
+        chosen = [named("model", name, known)] if name else list(known.values())
         if as_json:
             import json
 
@@ -29,11 +32,20 @@ def register(app: typer.Typer) -> None:
 
 
 def _line(model) -> str:
+    if not hasattr(model, "parameters"):
+        start = f"laws over the condition, from {model.basis} run by run" if model.basis else "a regression"
+        return f"{model.name:18} {model.heading:30} {start}"
     free = [info.name for info in model.parameters() if not info.preset]
     return f"{model.name:18} {model.title:30} {len(free):2} free: {' '.join(free)}"
 
 
 def _page(model) -> str:
+    if not hasattr(model, "parameters"):
+        notes = (model.__doc__ or "").strip().replace("\n    ", "\n")
+        facts = [f"limits: {model.limits}", f"source: {model.source}"]
+        equation = model.__dict__.get("equation", "")
+        lines = [f"{model.name}: {model.heading}", "", notes, "", *facts]
+        return "\n".join([*lines, "", f"LaTeX: {equation}"] if equation else lines)
     rows = [("parameter", "unit", "bounds", "determined", "meaning")]
     for info in model.parameters():
         low, high = info.bounds
@@ -55,6 +67,16 @@ def _entry(model) -> dict:
     def plain(value):
         return value if value is not None and math.isfinite(value) else None
 
+    if not hasattr(model, "parameters"):
+        return {
+            "name": model.name,
+            "title": model.heading,
+            "equation": model.__dict__.get("equation", ""),
+            "source": model.source,
+            "limits": model.limits,
+            "basis": model.basis or None,
+            "parameters": [],
+        }
     return {
         "name": model.name,
         "title": model.title,

@@ -1,0 +1,257 @@
+"""`tests.csv`: what a laboratory knows of its tests beside the files: current, temperature, split, session, notes."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path, PurePath
+
+from mrdamper.data import held_current
+from mrdamper.errors import CombinedError, InputError
+from mrdamper.rig_files.column_names import role_of, split_name
+from mrdamper.rig_files.conditions import LARGEST_STATED, contradicts
+from mrdamper.rig_files.record import Record
+from mrdamper.rig_files.units import parse_unit
+
+NAME = "tests.csv"
+COLUMNS = ("file", "run", "current_A", "temperature_C", "split", "session", "specimen", "notes")
+_LARGEST = 4 * 2**20  # bytes
+_FILE = frozenset(("file", "filename", "file name", "datei", "dateiname", "fichier", "archivo"))
+_RUN = frozenset(("run", "run_id", "test", "versuch", "essai"))
+_NUMBER = re.compile(r"\s*([+-]?[0-9]+(?:[.,][0-9]+)?)\s*([A-Za-z°]{0,8})\s*")
+
+
+class TestsTableError(InputError):
+    """A table of tests cannot be used."""
+
+    code = "E_TESTS"
+    __test__ = False
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """What the table says of a test; None where it says nothing."""
+
+    line: int
+    file: str
+    run: str
+    current: float | None = None
+    split: str | None = None
+    rig: str | None = None
+    notes: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class TestsTable:
+    """A table of tests, and where it stands."""
+
+    path: Path
+    rows: tuple[Row, ...]
+    __test__ = False
+
+    def of(self, path: Path, run: str) -> Row | None:
+        """The row of a test: of its run, else of its file."""
+        own = [row for row in self.rows if _is_file(row.file, path) and row.run in ("", run)]
+        own.sort(key=lambda row: row.run == "")
+        return own[0] if own else None
+
+    def require_found(self, tests: Iterable[tuple[Path, str]]) -> None:
+        """Refuse rows of files or runs that are not there.
+
+        Raises
+        ------
+        TestsTableError
+            Naming every one of them.
+        """
+        tests = list(tests)
+        absent = [
+            row
+            for row in self.rows
+            if not any(_is_file(row.file, path) and row.run in ("", run) for path, run in tests)
+            and not (row.file and (self.path.parent / row.file).is_file() and not row.run)
+        ]
+        if absent:
+            shown = ", ".join(f"{' '.join(filter(None, (r.file, r.run)))!r} (line {r.line})" for r in absent[:10])
+            raise TestsTableError(
+                f"no such test: {shown}{' ...' if absent[10:] else ''}", where=self.path.name,
+                mend="correct the names, or remove the rows",
+            )  # fmt: skip
+
+
+def _is_file(name: str, path: Path) -> bool:
+    if not name:
+        return True
+    parts = PurePath(name.replace("\\", "/")).parts
+    return path.parts[-len(parts) :] == parts or (len(parts) == 1 and path.stem == name)
+
+
+def load_tests(path: str | Path) -> TestsTable:
+    """Read a table of tests.
+
+    Columns: file or run, or both; current and temperature with their unit in the name or the
+    cell; split (train, validate), session, specimen, rig; further columns become notes.
+
+    Raises
+    ------
+    TestsTableError
+        E_TESTS, with everything that is wrong.
+    """
+    path = Path(path)
+    rows = _cells(path)
+    names = [name.strip() for name in rows[0][1]]
+    keys = [_key(name) for name in names]
+    problems: list[InputError] = []
+    if "file" not in keys and "run" not in keys:
+        problems.append(_wrong(path, 1, "neither a column file nor a column run", f"name one of {', '.join(COLUMNS)}"))
+    found = [_row(path, line, cells, names, keys, problems) for line, cells in rows[1:]]
+    seen: dict[tuple[str, str], int] = {}
+    for row in found:
+        if not row.file and not row.run:
+            problems.append(_wrong(path, row.line, "names neither file nor run", "fill the cell or remove the row"))
+        elif (row.file, row.run) in seen:
+            what = " ".join(filter(None, (row.file, row.run)))
+            problems.append(
+                _wrong(path, row.line, f"{what!r} stands in line {seen[row.file, row.run]} already", "remove one row")
+            )
+        seen.setdefault((row.file, row.run), row.line)
+    CombinedError.raise_from(problems)
+    return TestsTable(path, tuple(found))
+
+
+def applied(record: Record, row: Row | None, table: TestsTable) -> Record:
+    """A record with what its row says.
+
+    Raises
+    ------
+    TestsTableError
+        E_CURRENT_CONTRADICTS if the record's own current channel is another.
+    """
+    if row is None:
+        return record
+    if row.current is not None:
+        record = _with_current(record, row.current, table, row.line)
+    changes = {name: value for name, value in (("split", row.split), ("rig", row.rig)) if value}
+    return replace(record, provenance={**record.provenance, **row.notes}, **changes)  # type: ignore[arg-type]
+
+
+def _with_current(record: Record, current: float, table: TestsTable, line: int) -> Record:
+    import numpy as np
+
+    measured = record.current is not None and "current_from" not in record.provenance
+    if measured and record.current is not None:
+        known = record.current[np.isfinite(record.current)]
+        mean, change = held_current(known) if known.size >= 3 else (current, "")
+        if not change and contradicts(mean, current):
+            raise TestsTableError(
+                f"line {line} gives {current:g} A, the current channel of {record.id} {mean:g} A",
+                where=table.path.name, mend="correct the one that is wrong, or leave the cell empty",
+                code="E_CURRENT_CONTRADICTS",
+            )  # fmt: skip
+        return record
+    held = np.broadcast_to(np.float64(current), record.time.shape)
+    return replace(record, current=held, provenance={**record.provenance, "current_from": table.path.name})
+
+
+def tests_text(records: Sequence[Record]) -> str:
+    """The table of tests that were read, to be completed and used with the same files."""
+    rows = []
+    for record in records:
+        current = None
+        if record.current is not None:
+            mean, change = held_current(record.current[record.present])
+            current = None if change else mean
+        notes = record.provenance
+        rows.append(
+            {
+                "file": notes.get("file", ""), "run": record.id, "current_A": "" if current is None else f"{current:g}",
+                "temperature_C": notes.get("temperature_C", ""), "split": record.split,
+                "session": notes.get("session", ""), "specimen": notes.get("specimen", ""), "notes": "",
+            }
+        )  # fmt: skip
+    target = io.StringIO()
+    writer = csv.DictWriter(target, COLUMNS, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return target.getvalue()
+
+
+def _cells(path: Path) -> list[tuple[int, list[str]]]:
+    """Line and cells of every row that holds something."""
+    try:
+        if path.stat().st_size > _LARGEST:
+            raise TestsTableError("over 4 MiB", where=path.name, mend="is this a table of tests?")
+        text = path.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        raise TestsTableError(error.strerror or str(error), where=str(path), mend="give a CSV file") from error
+    except UnicodeDecodeError as error:
+        raise TestsTableError("is no UTF-8 text", where=path.name, mend="save it as CSV UTF-8") from error
+    first = text.split("\n", 1)[0]
+    separator = max(";\t,", key=first.count)
+    try:
+        reader = csv.reader(io.StringIO(text), delimiter=separator, strict=True)
+        rows = [(reader.line_num, cells) for cells in reader if any(cell.strip() for cell in cells)]
+    except csv.Error as error:
+        raise TestsTableError(str(error), where=path.name, mend="save it as CSV again") from error
+    if len(rows) < 2:
+        raise TestsTableError("no rows", where=path.name, mend=f"write one row a test: {', '.join(COLUMNS)}")
+    return rows
+
+
+def _key(name: str) -> str:
+    bare = split_name(name)[0].casefold()
+    if bare in _FILE:
+        return "file"
+    if bare in _RUN:
+        return "run"
+    role = role_of(split_name(name)[0])
+    return role if role in ("current", "temperature") else bare
+
+
+def _row(path: Path, line: int, cells: list[str], names: list[str], keys: list[str], problems: list[InputError]) -> Row:
+    if len(cells) > len(names) and any(cell.strip() for cell in cells[len(names) :]):
+        problems.append(_wrong(path, line, f"{len(cells)} cells under {len(names)} names", "quote cells with commas"))
+    says = {}
+    notes = {}
+    for name, key, cell in zip(names, keys, cells, strict=False):
+        cell = cell.strip()
+        if not cell:
+            continue
+        if key in ("current", "temperature"):
+            value = _quantity(path, line, key, name, cell, problems)
+            if value is not None:
+                says[key] = value
+        elif key in ("file", "run", "split", "rig"):
+            says[key] = cell
+        else:
+            notes[name if name not in ("file", "sha256") else f"{name}_stated"] = cell
+    split = says.get("split")
+    if split not in (None, "train", "validate"):
+        problems.append(_wrong(path, line, f"split is {split!r}", "write train or validate"))
+    if "temperature" in says:
+        notes["temperature_C"] = f"{says['temperature']:g}"
+    return Row(line, says.get("file", ""), says.get("run", ""), says.get("current"), split, says.get("rig"), notes)
+
+
+def _quantity(path: Path, line: int, key: str, name: str, cell: str, problems: list[InputError]) -> float | None:
+    match = _NUMBER.fullmatch(cell)
+    unit = (match[2] if match else "") or split_name(name)[1]
+    known = parse_unit(unit) if unit else None
+    if match is None:
+        problems.append(_wrong(path, line, f"{name} is {cell!r}", "write a number"))
+    elif known is None or known.dimension != key:
+        example = "current_A or current_mA" if key == "current" else "temperature_C"
+        problems.append(_wrong(path, line, f"{name} {cell} has no unit of {key}", f"name the column {example}"))
+    else:
+        value = known.factor * float(match[1].replace(",", ".")) + known.offset
+        if key == "current" and abs(value) > LARGEST_STATED:
+            problems.append(_wrong(path, line, f"{name} is {value:g} A", "no damper's coil takes that: mA?"))
+            return None
+        return value
+    return None
+
+
+def _wrong(path: Path, line: int, found: str, mend: str) -> TestsTableError:
+    return TestsTableError(found, where=f"{path.name}, line {line}", mend=mend)

@@ -1,0 +1,164 @@
+"""Which runs to hold out for validation: as told, or a stratified fifth of the conditions."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from mrdamper.data import Condition, Dataset, Run, same_condition
+from mrdamper.errors import InputError, UnknownNameError
+from mrdamper.motion import equivalent_sine
+
+SHARE = 0.2  # of the conditions, by default
+_FEWEST = 2  # conditions to identify from
+_NEAR_A, _NEAR = 0.02, 0.05  # of a current named: [A], and of it
+
+
+class SplitError(InputError):
+    """A split that cannot be made, or that leaves nothing to identify from."""
+
+    code = "E_SPLIT"
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """What is held out and why.
+
+    Attributes
+    ----------
+    held_out : frozenset of str
+        Ids of the runs.
+    reason : str
+    shown : dict of str to str
+        By run, its condition.
+    """
+
+    held_out: frozenset[str]
+    reason: str
+    shown: dict[str, str]
+
+
+def hold_out(
+    dataset: Dataset,
+    *,
+    runs: Sequence[str] = (),
+    currents: Sequence[float] = (),
+    conditions: Sequence[str] = (),
+    every: int | None = None,
+    none: bool = False,
+    replace: bool = False,
+) -> Chosen:
+    """Choose the runs to hold out; without any wish, a stratified fifth of the conditions.
+
+    Raises
+    ------
+    SplitError
+        E_SPLIT if nothing is there to be held out, nothing is left to identify from, or the
+        dataset has a split already that is not to be given up.
+    UnknownNameError
+        If a run is not there.
+    """
+    where = f"dataset {dataset.name}"
+    before = [run.id for run in dataset if run.split == "validate"]
+    if before and not replace:
+        raise SplitError(f"{len(before)} runs are held out already", where=where, mend="give --replace to choose anew")
+    known = {run.id: _condition(run) for run in dataset}
+    held: set[str] = set()
+    reasons = []
+    for name in runs:
+        if name not in known:
+            raise UnknownNameError.of("run", name, known)
+        held.add(name)
+    if runs:
+        reasons.append("by hand")
+    for amperes in currents:
+        found = [run.id for run in dataset if abs(run.mean_current - amperes) <= _NEAR_A + _NEAR * abs(amperes)]
+        if not found:
+            levels = sorted({round(run.mean_current, 2) for run in dataset})
+            raise SplitError(f"no run at {amperes:g} A", where=where, mend=f"currents: {', '.join(map(str, levels))} A")
+        held.update(found)
+        reasons.append(f"all at {amperes:g} A")
+    for text in conditions:
+        wanted = _stated(text)
+        found = [name for name, c in known.items() if c is not None and len(same_condition([wanted, c])) == 1]
+        if not found:
+            raise SplitError(f"no run at {wanted}", where=where, mend="mrdamper check shows the conditions")
+        held.update(found)
+        reasons.append(f"all at {wanted}")
+    if every is not None:
+        held.update(run.id for run in dataset.runs[every - 1 :: every])
+        reasons.append(f"every {every}th run")
+    if not reasons and not none:
+        held, reason = _stratified(known, where)
+        reasons.append(reason)
+    left = [c for name, c in known.items() if name not in held and c is not None]
+    if held and len(same_condition(left)) < _FEWEST:
+        raise SplitError(
+            f"{len(same_condition(left))} conditions left to identify from", where=where, mend="hold fewer runs out"
+        )
+    shown = {name: "no sine" if c is None else str(c) for name, c in known.items()}
+    return Chosen(frozenset(held), ", ".join(reasons) or "nothing", shown)
+
+
+def _condition(run: Run) -> Condition | None:
+    try:
+        return None if run.current_changes else equivalent_sine(run).condition
+    except InputError:
+        return None
+
+
+def _stated(text: str) -> Condition:
+    try:
+        current, frequency, amplitude = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise SplitError(f"{text!r} is no condition", mend="write A,Hz,mm: 0.5,1,20") from error
+    return Condition(current, frequency, amplitude / 1e3)
+
+
+def _stratified(known: dict[str, Condition | None], where: str) -> tuple[set[str], str]:
+    """A fifth of the conditions, spread over currents and motions, all of which stay in the identification."""
+    names = [name for name, c in known.items() if c is not None]
+    conditions = [c for c in known.values() if c is not None]
+    groups = same_condition(conditions)
+    at_rest = [Condition(0.0, c.frequency_Hz, c.amplitude_m) for c in conditions]
+    current_of = _levels([Condition(c.current_A, 1.0, 1.0) for c in conditions])
+    motion_of = _levels(at_rest)
+    left_current = Counter(current_of[group[0]] for group in groups)
+    left_motion = Counter(motion_of[group[0]] for group in groups)
+    order = sorted(left_current, key=lambda level: min(conditions[i].current_A for i in range(len(conditions))
+                                                      if current_of[i] == level))  # fmt: skip
+    ends = {order[0], order[-1]} if order else set()
+    target, chosen = max(1, round(SHARE * len(groups))), []
+    taken_current: Counter[int] = Counter()
+    taken_motion: Counter[int] = Counter()
+    while len(chosen) < target:
+        free = [
+            g for g in groups
+            if g not in chosen and left_current[current_of[g[0]]] > 1 and left_motion[motion_of[g[0]]] > 1
+        ]  # fmt: skip
+        if not free:
+            break
+        best = min(
+            free,
+            key=lambda g: (
+                taken_current[current_of[g[0]]] + taken_motion[motion_of[g[0]]], current_of[g[0]] in ends, g[0]
+            ),
+        )  # fmt: skip
+        chosen.append(best)
+        for level, left, taken in (
+            (current_of[best[0]], left_current, taken_current), (motion_of[best[0]], left_motion, taken_motion)
+        ):  # fmt: skip
+            left[level] -= 1
+            taken[level] += 1
+    if not chosen:
+        raise SplitError(
+            "no condition can be held out without losing a current or a motion", where=where,
+            mend="say which: --run, --current or --condition",
+        )  # fmt: skip
+    held = {names[i] for group in chosen for i in group}
+    return held, f"stratified, {len(chosen)} of {len(groups)} conditions; every current and every motion stays in"
+
+
+def _levels(conditions: Sequence[Condition]) -> dict[int, int]:
+    return {i: level for level, group in enumerate(same_condition(conditions)) for i in group}

@@ -1,0 +1,159 @@
+"""`tests.csv`, adding to a dataset and holding runs out: by the command line, as users do."""
+
+import pytest
+from support import lab_exports
+from support.lab_exports import Lab, campaign
+from support.rig_files import text, write
+from typer.testing import CliRunner
+
+from mrdamper.cli import application
+from mrdamper.errors import InputError
+from mrdamper.files.dataset import load_dataset
+from mrdamper.rig_files.tests_table import load_tests
+
+
+def run(*arguments):
+    return CliRunner().invoke(application(), list(map(str, arguments)))
+
+
+@pytest.fixture(scope="module")
+def lab():
+    return Lab(campaign(2, currents=(0.0, 0.6, 1.2), points=60, cycles=3))
+
+
+@pytest.fixture
+def rig(lab, tmp_path):
+    folder = tmp_path / "rig"
+    folder.mkdir()
+    lab_exports.tests_table(lab, folder)
+    return folder
+
+
+@pytest.fixture
+def dataset(rig, tmp_path):
+    done = run("import", rig, "--out", tmp_path / "ds")
+    assert done.exit_code == 0, done.output
+    return tmp_path / "ds"
+
+
+def test_the_table_beside_the_files_is_used(dataset, lab):
+    runs = load_dataset(dataset)
+    assert [item.current_A for item in runs] == [test.current for test in lab.tests]
+    assert runs["t01"].notes["temperature_C"] == "24"
+    assert runs["t01"].notes["session"] == "monday"
+    assert runs["t01"].notes["current_from"] == "tests.csv"
+
+
+def test_a_template_is_written_completed_and_used(rig, tmp_path):
+    (rig / "tests.csv").unlink()
+    assert run("import", rig, "--out", tmp_path / "ds").exit_code == 2
+    table = tmp_path / "table.csv"
+    assert run("import", rig, "--write-tests", table).exit_code == 0
+    lines = table.read_text().splitlines()
+    assert lines[0] == "file,run,current_A,temperature_C,split,session,specimen,notes"
+    completed = [lines[0], *(line.replace(",,,train", ",0.5,,validate", 1) for line in lines[1:])]
+    table.write_text("\n".join(completed) + "\n")
+    done = run("import", rig, "--out", tmp_path / "ds", "--tests", table)
+    assert done.exit_code == 0, done.output
+    assert {(item.current_A, item.split) for item in load_dataset(tmp_path / "ds")} == {(0.5, "validate")}
+
+
+@pytest.mark.parametrize(
+    ("table", "found"),
+    {
+        "absent file": ("file,current_A\nt01.csv,0\nt99.csv,1\n", "no such test: 't99.csv' (line 3)"),
+        "one run twice": ("file,current_A\nt01.csv,0\nt01.csv,1\n", "stands in line 2 already"),
+        "current without unit": ("file,current\nt01.csv,0.5\n", "has no unit of current"),
+        "an amplitude for a current": ("file,current_A\nt01.csv,20\n", "no damper's coil takes that"),
+        "unknown split": ("file,current_A,split\nt01.csv,0.5,test\n", "write train or validate"),
+        "no number": ("file,current_A\nt01.csv,half\n", "write a number"),
+        "neither file nor run": ("current_A\n0.5\n", "neither a column file nor a column run"),
+        "no rows": ("file,current_A\n", "no rows"),
+    }.values(),
+)
+def test_a_wrong_table_is_one_line_and_nothing_is_written(rig, tmp_path, table, found):
+    (rig / "tests.csv").write_text(table)
+    with pytest.raises(InputError) as caught:
+        run_raising("import", rig, "--out", tmp_path / "ds", "--quiet")
+    assert found in str(caught.value)
+    assert not (tmp_path / "ds").exists()
+
+
+def run_raising(*arguments):
+    result = run(*arguments)
+    raise result.exception
+
+
+def test_everything_wrong_with_a_table_is_said_at_once(tmp_path):
+    path = write(tmp_path, "tests.csv", "file,current,split\na.csv,0.5,\nb.csv,x,best\n")
+    with pytest.raises(InputError) as caught:
+        load_tests(path)
+    assert len(caught.value.errors) == 3
+    assert caught.value.code == "E_TESTS"
+
+
+def test_a_table_that_contradicts_the_channel_is_refused(tmp_path):
+    table = "file,current_A\na.csv,1\n"
+    rows = [f"{line},{'current_A' if i == 0 else '0.500'}" for i, line in enumerate(text().splitlines())]
+    (tmp_path / "rig").mkdir()
+    write(tmp_path / "rig", "a.csv", "\n".join(rows) + "\n")
+    write(tmp_path / "rig", "tests.csv", table)
+    done = run("import", tmp_path / "rig", "--out", tmp_path / "ds")
+    assert done.exit_code == 2
+    assert "E_CURRENT_CONTRADICTS" in done.output
+
+
+def test_files_are_added_to_a_dataset_and_never_twice(dataset, rig, tmp_path):
+    assert run("import", rig, "--out", dataset, "--add").exit_code != 0
+    write(tmp_path, "new_0.3A.csv", text())
+    (dataset / "LICENCE.txt").write_text("ours")
+    done = run("import", tmp_path / "new_0.3A.csv", "--out", dataset, "--add")
+    assert done.exit_code == 0, done.output
+    assert "(10 runs, 1 of them new)" in done.output
+    assert len(load_dataset(dataset)) == 10
+    assert (dataset / "LICENCE.txt").read_text() == "ours"
+
+
+@pytest.mark.parametrize(
+    ("options", "held"),
+    [
+        (("--current", "0.6"), {"t04", "t05", "t06"}),
+        (("--run", "t01", "--run", "t09"), {"t01", "t09"}),
+        (("--condition", "1.2,1,20"), {"t08"}),
+        (("--every", "4"), {"t04", "t08"}),
+        (("--none",), set()),
+    ],
+)
+def test_runs_are_held_out_as_told(dataset, options, held):
+    assert run("split", dataset, *options).exit_code == 0
+    assert {item.id for item in load_dataset(dataset) if item.split == "validate"} == held
+
+
+def test_by_default_every_current_and_every_motion_stays_in(dataset):
+    done = run("split", dataset)
+    assert done.exit_code == 0, done.output
+    runs = load_dataset(dataset)
+    held = [item for item in runs if item.split == "validate"]
+    left = [item for item in runs if item.split == "train"]
+    assert len(held) == 2
+    assert {item.current_A for item in left} == {item.current_A for item in runs}
+    assert "stratified" in done.output
+    assert run("split", dataset, "--none").exit_code != 0  # a split is not given up unasked
+    assert run("split", dataset, "--none", "--replace").exit_code == 0
+
+
+def test_a_split_that_leaves_nothing_is_refused_and_changes_nothing(dataset):
+    before = (dataset / "runs.csv").read_bytes()
+    everything = [option for item in load_dataset(dataset) for option in ("--run", item.id)]
+    for options in (everything, ["--current", "7"], ["--condition", "1,2"], ["--run", "nix"]):
+        assert run("split", dataset, *options).exit_code != 0
+    assert (dataset / "runs.csv").read_bytes() == before
+
+
+def test_the_same_refusal_of_many_files_is_one_line(tmp_path):
+    for i in range(5):
+        write(tmp_path, f"a{i}.csv", text(header=("time,disp,force",)))
+    done = run("import", tmp_path, "--out", tmp_path / "ds", "--quiet")
+    refused = [line for line in done.output.splitlines() if line.startswith("refused")]
+    assert len(refused) == 3  # a line a channel: all that is wrong is said at once
+    assert all(line.startswith("refused 5 times (a0.csv, a1.csv, a2.csv and 2 more)") for line in refused)
