@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from mrdamper.errors import OutputError
+from mrdamper.errors import ResourceError
 from mrdamper.fleet import journal as journals
 from mrdamper.fleet.journal import Journal, JournalError, file_system
 from mrdamper.fleet.table import write_table
@@ -72,7 +72,7 @@ def test_a_full_disk_is_one_error_and_loses_nothing(tmp_path):
     kept.keep([("a", {"x": 1})])
     pages = kept._base.execute("PRAGMA page_count").fetchone()[0]
     kept._base.execute(f"PRAGMA max_page_count = {pages}")
-    with pytest.raises(OutputError) as refused:
+    with pytest.raises(ResourceError) as refused:
         kept.keep([(f"key {n}", {"x": "x" * 1000}) for n in range(100)])
     assert refused.value.code == "E_DISK_FULL"
     assert kept.result("a") == {"x": 1}
@@ -91,7 +91,7 @@ def test_a_table_that_does_not_fit_leaves_the_old_one(tmp_path, monkeypatch):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(pl.LazyFrame, "sink_parquet", full)
-    with pytest.raises(OutputError) as refused:
+    with pytest.raises(ResourceError) as refused:
         write_table([{"serial": "b"}], [], None, path)
     assert refused.value.code == "E_DISK_FULL"
     assert path.read_bytes() == before

@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from mrdamper.errors import InputError, OutputError
+from mrdamper.errors import InputError, OutputError, ResourceError
 
 FORMAT = 1
 _APPLICATION = 0x6D726466  # "mrdf"
@@ -74,7 +74,7 @@ class Journal:
 
         Raises
         ------
-        OutputError
+        ResourceError
             E_DISK_FULL if the disk is full.
         """
         self._write("INSERT OR REPLACE INTO results VALUES (?, ?)", [(key, _text(row)) for key, row in rows])
@@ -141,7 +141,7 @@ class Journal:
     def _refusal(self, error: sqlite3.Error) -> InputError:
         name = getattr(error, "sqlite_errorname", "")
         if name == "SQLITE_FULL" or name.startswith("SQLITE_IOERR_WRITE"):
-            return OutputError(
+            return ResourceError(
                 "the disk is full", where=str(self._path), code="E_DISK_FULL",
                 mend="make room and run the same command again; what was finished is safe",
             )  # fmt: skip

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mrdamper.errors import OutputError
 from mrdamper.files.atomic import write_file
 from mrdamper.fleet.job import Plan
 
@@ -39,28 +39,21 @@ def write_table(rows: Iterable[dict[str, Any]], parameters: Iterable[str], plan:
 
     Raises
     ------
-    OutputError
+    OutputError, ResourceError
         If the file cannot be written; E_DISK_FULL if the disk is full.
     """
     import polars as pl
 
     forces = () if plan is None else force_columns(plan)
     schema = _schema(tuple(parameters), forces)
-    try:
-        with write_file(path) as target:
-            parts = target.parent / "parts"
-            parts.mkdir()
-            for number, some in enumerate(_chunks(rows)):
-                part = pl.DataFrame([_flat(row, forces) for row in some], schema=schema)
-                part.write_parquet(parts / f"{number:06}.parquet", compression="zstd")
-            pl.scan_parquet(parts / "*.parquet").sink_parquet(target, compression="zstd", row_group_size=_AT_ONCE)
-    except OSError as error:
-        full = "No space left" in str(error)
-        raise OutputError(
-            "the disk is full" if full else str(error), where=str(path),
-            mend="make room and run the same command again; what was finished is safe",
-            code="E_DISK_FULL" if full else None,
-        ) from error  # fmt: skip
+    with write_file(path) as target:
+        parts = target.parent / "parts"
+        parts.mkdir()
+        for number, some in enumerate(_chunks(rows)):
+            part = pl.DataFrame([_flat(row, forces) for row in some], schema=schema)
+            part.write_parquet(parts / f"{number:06}.parquet", compression="zstd")
+        pl.scan_parquet(parts / "*.parquet").sink_parquet(target, compression="zstd", row_group_size=_AT_ONCE)
+        shutil.rmtree(parts)
 
 
 def _chunks(rows: Iterable[dict[str, Any]]) -> Iterator[list[dict[str, Any]]]:
