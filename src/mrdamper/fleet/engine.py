@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import atexit
+import logging
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from mrdamper.errors import InputError, MissingExtraError
@@ -53,6 +55,28 @@ def local_engine(workers: int, limits: Limits) -> Iterator[tuple[Submit, int]]:
         pool.shutdown(wait=True)
 
 
+def outcome(future: Future[Row]) -> Row:
+    """The row of a finished job; a job whose cluster workers died one after the other failed.
+
+    Raises
+    ------
+    ClusterError
+        If the scheduler is lost.
+    """
+    from mrdamper.fleet.job import refused
+
+    try:
+        return future.result()
+    except CancelledError as error:
+        raise ClusterError(
+            "the scheduler is lost", mend="start it again and run the same command; what was finished is safe"
+        ) from error
+    except Exception as error:
+        if type(error).__name__ != "KilledWorker":
+            raise
+        return refused(JobError(_first_line(error), mend="run the same command again"))
+
+
 def guarded(guard: Guard, job: Row) -> Row:
     """The row of a job that is run under a guard, whatever becomes of it."""
     from mrdamper.fleet.job import refused
@@ -65,7 +89,7 @@ def guarded(guard: Guard, job: Row) -> Row:
 
 @contextmanager
 def cluster_engine(
-    address: str, limits: Limits, security: dict[str, str] | None = None
+    address: str, limits: Limits, tls: str | Path | None = None, patience: float = 10.0
 ) -> Iterator[tuple[Submit, int]]:
     """Jobs on a Dask cluster, each in a process that can be killed beside its worker; yields as `local_engine`.
 
@@ -81,20 +105,22 @@ def cluster_engine(
     except ModuleNotFoundError as error:
         raise MissingExtraError("Dask is not installed", mend="pip install 'mrdamper[fleet]'") from error
     options: dict[str, Any] = {}
-    if security:
-        options["security"] = distributed.Security(require_encryption=True, **security)
+    if tls is not None:
+        ca, cert, key = (str(Path(tls) / name) for name in ("ca.pem", "cert.pem", "key.pem"))
+        options["security"] = distributed.Security(
+            require_encryption=True, tls_ca_file=ca, tls_client_cert=cert, tls_client_key=key
+        )
     try:
-        client = distributed.Client(address, timeout=10, set_as_default=False, **options)
+        client = distributed.Client(address, timeout=patience, set_as_default=False, **options)
     except (OSError, TypeError, ValueError, RuntimeError) as error:
         raise ClusterError(
             f"no scheduler answers: {_first_line(error)}", where=address,
             mend="mrdamper cluster shows how to start one",
         ) from error  # fmt: skip
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what it would say comes as an error of ours
     try:
-        slots = sum(
-            client.scheduler_info(n_workers=-1)["workers"][w]["nthreads"]
-            for w in client.scheduler_info(n_workers=-1)["workers"]
-        )
+        workers = client.scheduler_info(n_workers=-1)["workers"]
+        slots = sum(worker["nthreads"] for worker in workers.values())
         if not slots:
             raise ClusterError(
                 "the cluster has no worker", where=address, mend="mrdamper cluster shows how to start one"

@@ -5,9 +5,11 @@ It speaks JSON on both sides, so that it runs here, in a process that can be kil
 
 from __future__ import annotations
 
+import socket
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -108,6 +110,11 @@ def measure(job: dict[str, Any]) -> dict[str, Any]:
         If its records cannot be used.
     """
     begin = time.perf_counter(), time.process_time()
+    if job["version"] != version("mrdamper"):
+        raise FleetError(
+            f"mrdamper {version('mrdamper')} here, {job['version']} where the fleet was started",
+            where=socket.gethostname(), mend="install the same version on every machine", code="E_CLUSTER_VERSION",
+        )  # fmt: skip
     item = item_of(job)
     settings = Settings(**job["settings"])
     plan = None if job["plan"] is None else Plan(**job["plan"])
@@ -118,6 +125,7 @@ def measure(job: dict[str, Any]) -> dict[str, Any]:
         )  # fmt: skip
     dataset, findings = read(item, settings)
     row = {**_identify(dataset, settings, plan), "findings": " ".join(findings)}
+    row["host_name"] = socket.gethostname()
     row["wall_time_s"] = time.perf_counter() - begin[0]
     row["cpu_time_s"] = time.process_time() - begin[1]
     return row
@@ -134,7 +142,7 @@ def attempt(job: dict[str, Any]) -> dict[str, Any]:
 def refused(error: InputError) -> dict[str, Any]:
     """The row of a damper that cannot be used, or whose job failed."""
     # Neither says anything about the records that would be true the next time.
-    passing = error.code.startswith("E_JOB") or error.code in ("E_EXTRA", "E_FLEET_CHANGED")
+    passing = error.code.startswith("E_JOB") or error.code in ("E_EXTRA", "E_FLEET_CHANGED", "E_CLUSTER_VERSION")
     return {"status": "failed" if passing else "refused", "code": error.code, "reason": str(error)}
 
 
@@ -396,6 +404,7 @@ def as_job(item: Item, digest: str, settings: Settings, plan: Plan | None) -> di
     return {
         "item": bare,
         "digest": digest,
+        "version": version("mrdamper"),
         "settings": asdict(settings),
         "plan": None if plan is None else asdict(plan),
     }

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import socket
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
@@ -16,7 +15,7 @@ from typing import Any
 
 from mrdamper.errors import InputError
 from mrdamper.files.atomic import require_writable
-from mrdamper.fleet.engine import Submit, cluster_engine, local_engine
+from mrdamper.fleet.engine import Submit, cluster_engine, local_engine, outcome
 from mrdamper.fleet.guard import Limits
 from mrdamper.fleet.items import Item, digest_of, find_items
 from mrdamper.fleet.job import Plan, Settings, as_job, drafts, holding, refused, settled
@@ -64,7 +63,8 @@ def run_fleet(
     cold: bool = False,
     workers: int = 1,
     scheduler: str | None = None,
-    security: dict[str, str] | None = None,
+    tls: str | Path | None = None,
+    patience: float = 10.0,
     limits: Limits | None = None,
     progress: Progress = lambda what, share: None,
 ) -> Fleet:
@@ -88,8 +88,10 @@ def run_fleet(
         Processes on this machine.
     scheduler : str, optional
         Address of a Dask scheduler; its workers have to see `source` under the same path.
-    security : dict, optional
-        tls_ca_file, tls_client_cert, tls_client_key of a tls:// scheduler.
+    tls : path, optional
+        Folder with ca.pem, cert.pem and key.pem, for a tls:// scheduler.
+    patience : float
+        Time in which a scheduler has to answer [s].
     limits : Limits, optional
         Of one damper's job.
     progress : callable
@@ -114,7 +116,7 @@ def run_fleet(
     journal = Journal(out)
     try:
         line = _Line(items, settings, journal, progress)
-        engine = cluster_engine(scheduler, limits or Limits(), security) if scheduler else local_engine(
+        engine = cluster_engine(scheduler, limits or Limits(), tls, patience) if scheduler else local_engine(
             workers, limits or Limits()
         )  # fmt: skip
         with engine as (submit, slots):
@@ -224,7 +226,7 @@ class _Line:
             if not running:
                 return
             finished = wait(running, return_when=FIRST_COMPLETED).done
-            self._keep([(running.pop(future), future.result()) for future in finished], plan)
+            self._keep([(running.pop(future), outcome(future)) for future in finished], plan)
             done += len(finished)
             self._progress(*_pace(done, len(waiting), time.monotonic() - begin, plan is None))
 
@@ -240,7 +242,7 @@ class _Line:
         good = []
         for number, row in rows:
             stamp = datetime.now(UTC).isoformat(timespec="seconds")
-            row = {**row, "finished_time_utc": stamp, "host_name": row.get("host_name", socket.gethostname())}
+            row = {**row, "finished_time_utc": stamp}
             if row["status"] == "failed":
                 self._failed[number] = row
             else:

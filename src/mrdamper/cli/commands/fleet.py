@@ -22,6 +22,9 @@ def register(app: typer.Typer) -> None:
         scheduler: Optional[str] = typer.Option(  # noqa: UP045
             None, "--scheduler", help="Address of a Dask scheduler (mrdamper cluster shows how to start one)."
         ),
+        tls: Optional[Path] = typer.Option(  # noqa: UP045
+            None, "--tls", help="Folder with ca.pem, cert.pem and key.pem, for a tls:// scheduler."
+        ),
         profile: Optional[Path] = typer.Option(  # noqa: UP045
             None, "--profile", help="Fleet profile (TOML): where serial numbers stand, golden dampers, rig profile."
         ),
@@ -47,6 +50,7 @@ def register(app: typer.Typer) -> None:
                     cold=cold,
                     workers=workers or os.cpu_count() or 1,
                     scheduler=scheduler,
+                    tls=tls,
                     progress=progress,
                 )
         except KeyboardInterrupt:

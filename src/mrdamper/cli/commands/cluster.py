@@ -1,0 +1,42 @@
+"""`mrdamper cluster`: how to start a cluster for `mrdamper fleet`."""
+
+from __future__ import annotations
+
+import typer
+
+_TEXT = """\
+A cluster is a scheduler and any number of workers; fleets run on Dask: pip install 'mrdamper[fleet]'
+on every machine, the same version. All of them have to see the records under the same path.
+
+1. One private network, or one machine (whoever reaches the port can run code there):
+
+   on one machine      dask scheduler --host {host} --port {port} --no-dashboard
+   on every machine    dask worker tcp://{host}:{port} --nworkers auto --nthreads 1 --no-dashboard
+   then                mrdamper fleet records/ --out line/ --scheduler tcp://{host}:{port}
+
+2. Over a network others use: encrypted, and only for who holds a certificate of yours.
+
+   once                openssl req -x509 -newkey rsa:3072 -nodes -days 365 -subj /CN=mrdamper-fleet \\
+                         -addext "basicConstraints=critical,CA:TRUE" -keyout tls/key.pem -out tls/cert.pem
+                       cp tls/cert.pem tls/ca.pem        # copy the folder tls/ to every machine; keep it secret
+   on one machine      dask scheduler --host tls://{host} --port {port} --no-dashboard \\
+                         --tls-ca-file tls/ca.pem --tls-cert tls/cert.pem --tls-key tls/key.pem
+   on every machine    dask worker tls://{host}:{port} --nworkers auto --nthreads 1 --no-dashboard \\
+                         --tls-ca-file tls/ca.pem --tls-cert tls/cert.pem --tls-key tls/key.pem
+   then                mrdamper fleet records/ --out line/ --scheduler tls://{host}:{port} --tls tls/
+
+The journal lies where mrdamper fleet runs, on a local disk. A worker, the scheduler or the command may
+die: run the same command again. On Slurm, PBS or Kubernetes, dask-jobqueue and dask-kubernetes start
+the same scheduler and workers."""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+
+    @app.command(epilog="Example: mrdamper cluster --host 10.0.0.5")
+    def cluster(
+        host: str = typer.Option("127.0.0.1", "--host", help="Address of the machine the scheduler will run on."),
+        port: int = typer.Option(8786, "--port", min=1, max=65535, help="Its port."),
+    ) -> None:
+        """Print how to start a cluster for `mrdamper fleet --scheduler`; start nothing."""
+        print(_TEXT.format(host=host, port=port))
