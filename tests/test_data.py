@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from mrdamper.data import Condition, Dataset, Run, same_condition
-from mrdamper.errors import NonFiniteError, RunError, TimeOrderError, UnknownNameError
+from mrdamper.errors import ConditionError, NonFiniteError, RunError, TimeOrderError, UnknownNameError
 
 
 def run(**changes):
@@ -67,3 +67,16 @@ def test_dataset_refuses_twins_and_offers_near_names():
 def test_conditions_agree_to_three_per_cent():
     a, b, c = Condition(0.5, 1.0, 0.01), Condition(0.5, 1.02, 0.0102), Condition(0.5, 1.2, 0.01)
     assert same_condition([a, b, c]) == [[0, 1], [2]]
+
+
+@pytest.mark.parametrize(
+    "values", [(float("nan"), 1, 0.01), (0.5, -1, 0.01), (0.5, 1, -0.01), (0.5, float("inf"), 0.01), (0.5, 1, 10.0)]
+)
+def test_conditions_no_test_can_have_are_refused(values):
+    with pytest.raises(ConditionError) as error:
+        Condition(*values)
+    assert "give" in error.value.mend
+
+
+def test_a_measured_current_may_be_negative():
+    assert Condition(-0.5, 1.0, 0.01).current_A == -0.5

@@ -138,6 +138,12 @@ class UnknownNameError(InputError):
         return cls(f"no {kind} is called {name!r}", mend=mend)
 
 
+class ConditionError(InputError):
+    """A current, frequency or amplitude that no test can have."""
+
+    code = "E_CONDITION"
+
+
 class ExcitationError(InputError):
     """The motion does not allow what was asked: under a cycle, not a sine, no motion."""
 

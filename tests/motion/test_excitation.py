@@ -119,8 +119,13 @@ def test_random_motion_is_reproducible_and_has_its_rms():
 
 
 def test_impossible_motion_is_refused():
-    with pytest.raises(ExcitationError, match="amplitude_m is -1"):
-        sine(Condition(0.0, 1.0, -1))
+    with pytest.raises(ExcitationError, match="amplitude_m is 0"):
+        sine(Condition(0.0, 1.0, 0.0))
+
+
+def test_a_ramp_is_no_sine():
+    time = np.linspace(0, 1, 200)
+    assert not equivalent_sine(Run("ramp", time, 0.01 * time, time, 0.0)).is_sine
 
 
 def test_bundled_sines_are_measured_as_their_authors_measured_them(bundled):

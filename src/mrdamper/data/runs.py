@@ -7,9 +7,11 @@ code further up trusts it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
+from numbers import Real
 from typing import Any, Literal, TypeVar
 from weakref import WeakKeyDictionary
 
@@ -17,12 +19,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mrdamper.data.shown import Shown
-from mrdamper.errors import NonFiniteError, RunError, TimeOrderError, UnknownNameError, printable
+from mrdamper.errors import ConditionError, NonFiniteError, RunError, TimeOrderError, UnknownNameError, printable
 
 Floats = NDArray[np.float64]
 T = TypeVar("T")
 Split = Literal["train", "validate"]
 _LONGEST_NAME = 255
+_LONGEST = 2.0  # amplitude of a damper [m]; more is a slip of the unit
 _SAME = 0.03  # frequencies and amplitudes this close are one condition of the test matrix
 
 
@@ -39,6 +42,11 @@ class Condition:
     amplitude_m : float
         Displacement amplitude, half the peak-to-peak stroke [m].
 
+    Raises
+    ------
+    ConditionError
+        If a value is not finite, the frequency or the amplitude negative, or the amplitude over 2 m.
+
     Examples
     --------
     >>> from mrdamper import Condition
@@ -51,6 +59,15 @@ class Condition:
     current_A: float
     frequency_Hz: float
     amplitude_m: float
+
+    def __post_init__(self) -> None:
+        # A traced model is asked at symbols in place of numbers; these have no size.
+        given = (("current", self.current_A, -math.inf), ("frequency", self.frequency_Hz, 0.0))
+        for name, value, least in (*given, ("amplitude", self.amplitude_m, 0.0)):
+            if isinstance(value, Real) and not (least < value < math.inf or value == 0.0):
+                raise ConditionError(f"{name} is {value}", mend="give a number, zero or more")
+        if isinstance(self.amplitude_m, Real) and self.amplitude_m > _LONGEST:
+            raise ConditionError(f"amplitude is {self.amplitude_m} m", mend="give metres: 10 mm are 0.01")
 
     @property
     def peak_velocity(self) -> float:

@@ -20,7 +20,6 @@ from mrdamper.report.plots.style import save_figure
 from mrdamper.report.tables import score_row
 from mrdamper.study.comparison import Comparison, RigComparison
 from mrdamper.study.recipe import Progress, Scored
-from mrdamper.validation import Validation
 
 _LOOPS, _OVERLAID = 3, 5
 
@@ -88,23 +87,15 @@ def run_rows(comparison: Comparison) -> list[dict[str, Any]]:
             head = {"rig": rig.rig, "model": entry.recipe.name}
             for found in entry.identifications:
                 rows.append({**head, "set": "per run", "run_id": found.run_id, "nrmse_pp": found.scores.nrmse_pp})
-            held_out, other = held_out_sets(rig, entry)
-            sets = {"train": entry.train, "left out": entry.left_out, "held out": held_out, "other": other}
+            sets = {"train": entry.train, "left out": entry.left_out, "held out": entry.held_out}
             for name, validation in sets.items():
                 rows += [{**head, "set": name, **score_row(run)} for run in validation.runs]
     return rows
 
 
-def held_out_sets(rig: RigComparison, entry: Scored) -> tuple[Validation, Validation]:
-    """Held-out sines, and held-out runs of other motion."""
-    others = {run.run_id for run in entry.held_out.runs} - rig.sines
-    return entry.held_out.only(rig.sines), entry.held_out.only(others)
-
-
 def _rows(rig: RigComparison) -> list[dict[str, Any]]:
     rows = []
     for rank, entry in enumerate(rig.entries, start=1):
-        held_out, other = held_out_sets(rig, entry)
         rows.append(
             {
                 "rig": rig.rig,
@@ -114,9 +105,8 @@ def _rows(rig: RigComparison) -> list[dict[str, Any]]:
                 "per_run_nrmse_pp": _plain(entry.per_run),
                 "train_nrmse_pp": _plain(entry.train.median()),
                 "left_out_nrmse_pp": _plain(entry.left_out.median()),
-                "held_out_nrmse_pp": _plain(held_out.median()),
-                "other_motions_nrmse_pp": _plain(other.median()),
-                "held_out_energy_error": _plain(held_out.median("energy_error")),
+                "held_out_nrmse_pp": _plain(entry.held_out.median()),
+                "held_out_energy_error": _plain(entry.held_out.median("energy_error")),
                 "numbers_per_run": entry.numbers_per_run,
                 "numbers": entry.damper.parameter_count,
                 "conditions_needed": entry.conditions_needed,
@@ -156,10 +146,7 @@ def _reason(entry: Scored, entries: Sequence[Scored]) -> str:
 
 
 def _chapter(rig: RigComparison, folder: Path, suffix: str, png: bool) -> dict[str, Any]:
-    scores = {
-        e.recipe.title: (e.train.median(), e.left_out.median(), e.held_out.only(rig.sines).median())
-        for e in rig.entries
-    }
+    scores = {e.recipe.title: (e.train.median(), e.left_out.median(), e.held_out.median()) for e in rig.entries}
     runs = _shown(rig)
     best = {entry.recipe.title: entry.damper for entry in rig.entries[:_OVERLAID]}
     figures = {"ranking": ranking(scores), "loops": overlaid_loops(runs, best)}

@@ -238,16 +238,17 @@ def _joint_table(fit: JointFit) -> list[dict[str, Any]]:
 def _drift(rig: RigStudy) -> str:
     drift = session_drift(rig.damper, [rig.dataset[run.run_id] for run in rig.chosen.left_out.runs])
     return (
-        f"Between runs the measured force differs from the prediction by gains of {100 * drift.gain:.1f} % and offsets "
-        f"of {drift.offset:.0f} N (standard deviations). A gain and an offset of each run's own would leave "
-        f"{100 * drift.floor:.1f} %: while sessions drift like this, no model of the damper goes below."
+        f"From run to run the measured force differs from the prediction by gains of {100 * drift.gain:.1f} % and "
+        f"offsets of {drift.offset:.0f} N (standard deviations): the session's, or the model's own misfit at that "
+        f"condition; these tests alone do not tell which. A gain and an offset of each run's own would leave "
+        f"{100 * drift.floor:.1f} %."
     )
 
 
 def _verdict(rig: RigStudy) -> str:
     chosen, best = rig.chosen, rig.chosen.damper
     train, validate = len(chosen.left_out.runs), len(chosen.held_out.runs)
-    text = f"The model “{best.title}” predicts this damper's force best. It was identified from {train} train runs"
+    text = f"The model “{best.title}” was identified from {train} train runs"
     if validate:
         text += (
             f" and predicts {validate} held-out runs with a median error of "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import typer
@@ -38,13 +39,16 @@ def register(app: typer.Typer) -> None:
         from mrdamper.cli.output import put
         from mrdamper.dampers.coil import Coil
         from mrdamper.data import Condition
-        from mrdamper.errors import InputError
+        from mrdamper.errors import ConditionError, InputError
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.encoding import csv_text
         from mrdamper.files.model_file import load_model
         from mrdamper.files.motion import load_motion
         from mrdamper.report.tables import prediction_rows
 
+        for name, value in (("--current", current), ("--frequency", frequency), ("--amplitude", amplitude)):
+            if value is not None and not 0 <= value < math.inf:
+                raise ConditionError(f"{name} {value:g}", mend="give zero or more; a field does not know a sign")
         if out is not None:
             require_writable(out)
         damper = load_model(model)

@@ -11,7 +11,6 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mrdamper.data import Dataset
 from mrdamper.errors import InputError
-from mrdamper.report.comparison import held_out_sets
 from mrdamper.study.comparison import Comparison, RigComparison
 from mrdamper.study.recipe import JOINTLY, Scored, recipes
 from mrdamper.study.workflow import STUDIED
@@ -100,7 +99,6 @@ def _conclude(session: Session, choice: Choice, found: Comparison) -> dict[str, 
 
 
 def _entry(rig: RigComparison, entry: Scored, key: str, keys: dict[str, str]) -> dict[str, Any]:
-    held_out, other = held_out_sets(rig, entry)
     return {
         "damper": key,
         "name": entry.recipe.name,
@@ -111,10 +109,9 @@ def _entry(rig: RigComparison, entry: Scored, key: str, keys: dict[str, str]) ->
         "runs_needed": entry.conditions_needed,
         "train": _median(entry.train),
         "left_out": _median(entry.left_out),
-        "held_out": _median(held_out),
-        "other": _median(other),
+        "held_out": _median(entry.held_out),
         "seconds": round(entry.seconds, 2),
-        "scores": [_score(run, keys) for run in (*held_out.runs, *other.runs)],
+        "scores": [_score(run, keys) for run in entry.held_out.runs],
     }
 
 

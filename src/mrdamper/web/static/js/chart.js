@@ -4,7 +4,7 @@ import { paint } from "./colours.js";
 import { h, renew } from "./dom.js";
 import { legend } from "./legend.js";
 
-const LOOK = { margin: { l: 64, r: 16, t: 8, b: 50 }, pad: 0.04, growth: 0.25 };
+const LOOK = { margin: { l: 64, r: 16, t: 30, b: 50 }, pad: 0.04, growth: 0.25 };
 let loading = null;
 
 /** Load the library once. */
@@ -143,7 +143,8 @@ export class Chart {
   config() {
     return {
       displaylogo: false, responsive: false,
-      modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "toImage"],
+      // Just these: the library's own choice offers to send a chart to its maker.
+      modeBarButtons: [["zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "resetScale2d"]],
     };
   }
 }

@@ -140,7 +140,6 @@ class CompareView {
       { title: "Model", value: (e) => h("span", { title: e.source }, e.title) },
       { title: "Left out", number: true, value: (e) => percent(e.left_out) },
       ...known("held_out", "Held out"),
-      ...known("other", "Other motion"),
       { title: "Numbers", number: true, value: (e) => String(e.numbers) },
       { title: "Runs needed", number: true, value: (e) => String(e.runs_needed) },
       { title: "Time", number: true, value: (e) => seconds(e.seconds) },
