@@ -18,7 +18,9 @@ WORDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "displacement": ("displacement", "disp", "displ", "position", "pos", "stroke", "travel", "weg", "hub",
                          "verschiebung", "auslenkung", "läge", "förskjutning", "déplacement", "deplacement", "course",
                          "desplazamiento", "posicion", "posición", "spostamento", "corsa", "deslocamento", "lvdt",
-                         "extension", "przemieszczenie", "перемещение", "位移", "変位"),
+                         "extension",
+                         "compression", "jounce", "einfederung", "einfederweg",
+                         "przemieszczenie", "перемещение", "位移", "変位"),
         "force": ("force", "load", "kraft", "fuerza", "forza", "força", "forca", "charge", "carga", "carico", "siła",
                   "loadcell", "last", "kracht", "effort", "сила", "力", "荷重"),
         "velocity": ("velocity", "vel", "speed", "geschwindigkeit", "vitesse", "velocidad", "velocità",
@@ -62,6 +64,7 @@ _NOT_MEASURED = frozenset(
      "error", "count", "counts", "cycle", "cycles", "segment", "segments", "index", "offset", "limit", "max", "min",
      "consigne", "consigna", "sollwert", "rate", "id", "status", "state", "flag")
 )  # fmt: skip
+_COMPRESSION = ("compress", "jounce", "bump", "druckkraft", "druckweg", "einfeder", "compresi", "druckstufe")
 _BRACKETED = re.compile(r"^(?P<name>.*?)\s*[\[({<](?P<unit>[^\[\](){}<>]{1,40})[\])}>]\s*$", re.DOTALL)
 _SLASHED = re.compile(r"^(?P<name>.*\S)\s*(?:\s/\s*|,\s*|\s+in\s+|\s*;\s*)(?P<unit>\S{1,20})$", re.DOTALL)
 _LONGEST_NAME = 200  # beyond, it is no name, and matching it could take long
@@ -113,6 +116,12 @@ def _role_of_word(word: str) -> str | None:
     if exact is not None or len(word) < 5:
         return exact
     return next((role for end, role in _COMPOUNDS.items() if word.endswith(end) and word != end), None)
+
+
+def names_compression(name: str) -> bool:
+    """Whether a name speaks of compression, which most rigs that do count positive."""
+    words = re.split(r"[^\w]+|_|(?<=[a-zà-ÿ])(?=[A-Z])", name[:_LONGEST_NAME])
+    return any(word.casefold().startswith(_COMPRESSION) for word in words if word)
 
 
 def names_condition(key: str, role: str) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import ColumnError, CombinedError, InputError, UnitError, printable
-from mrdamper.rig_files.column_names import WORDS, role_of, says_nothing, split_name, unknown_unit
+from mrdamper.rig_files.column_names import WORDS, names_compression, role_of, says_nothing, split_name, unknown_unit
 from mrdamper.rig_files.readers.base import RawTable, RigFileError
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED
 from mrdamper.rig_files.units import DIMENSION, Unit, parse_unit
@@ -105,6 +105,8 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
             continue
         if entry is not None:
             assigned[role] = entry
+    if not problems and "time" in assigned and (profile.channels.get("time") is None):
+        problems += _second_clock(table, headers, assigned["time"])
     CombinedError.raise_from(problems)
     return assigned
 
@@ -244,6 +246,13 @@ def _convert(
             return None
     if channel is None or not channel.unit:
         _refuse_two_units(table, role, column, unit)
+    unsigned = channel is None or "sign" not in channel.model_fields_set
+    if unsigned and role in ("displacement", "force") and names_compression(table.names[column]):
+        raise _refusal(
+            ColumnError, table, f"column {table.names[column]!r} may count compression positive",
+            f"say [channels.{role}] sign = -1 in a profile, or sign = 1 if it counts extension positive",
+            "E_SIGN_CONVENTION",
+        )  # fmt: skip
     si = parse_unit(unit) or Unit("", 1.0)
     sign = channel.sign if channel is not None else 1
     scale, offset = (channel.scale or 1.0, channel.offset) if channel is not None else (1.0, 0.0)
@@ -309,6 +318,29 @@ def _refuse_two_values(table: RawTable, headers: Sequence[tuple[str, str]], colu
             file=table.source.name, line=table.line, column=same[1] + 1,
             mend="rename one, or say which by its number: column = 2 in a profile",
         )  # fmt: skip
+
+
+def _second_clock(table: RawTable, headers: Sequence[tuple[str, str]], time: Assigned) -> list[InputError]:
+    """The refusal of a file with another time that runs otherwise."""
+    others = [
+        i for i, (name, unit) in enumerate(headers)
+        if i != time.column and role_of(name) == "time" and _dimension(unit) == "time"
+    ]  # fmt: skip
+    for other in others[:3]:
+        try:
+            values = table.read([time.column, other]).values
+        except RigFileError:
+            continue
+        unit = parse_unit(headers[other][1])
+        one, two = time.factor * values[time.column], (unit.factor if unit else 1.0) * values[other]
+        there = np.isfinite(one) & np.isfinite(two)
+        if np.count_nonzero(there) < 3:
+            continue
+        one, two = one[there] - one[there][0], two[there] - two[there][0]
+        coarse = float(np.max(np.abs(np.diff(two)), initial=0.0))  # a clock that shows whole seconds
+        if np.ptp(two) > 0 and np.max(np.abs(one - two)) > 1.5 * coarse + 1e-3 * float(np.ptp(one)):
+            return [_ambiguous(table, "time", [table.names[time.column], table.names[other]])]
+    return []
 
 
 def _agree(a: Floats, unit_a: str, b: Floats, unit_b: str) -> bool:

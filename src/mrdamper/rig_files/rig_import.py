@@ -12,6 +12,7 @@ import numpy as np
 
 from mrdamper.data import Dataset
 from mrdamper.errors import ColumnError, InputError
+from mrdamper.rig_files.column_names import names_compression
 from mrdamper.rig_files.columns import assign, propose
 from mrdamper.rig_files.long_records import judge_long
 from mrdamper.rig_files.parts import tests_of
@@ -134,7 +135,11 @@ def _guess_channels(tables: list[RawTable], profile: Profile) -> tuple[RawTable,
     channels = {}
     for name, (column, unit) in places.items():
         says = {"column": None if column is None else _column(table, column), "unit": unit or None}
-        channels[name] = profile.channels.get(name, Channel()).model_copy(update=says)
+        if name in ("displacement", "force") and column is not None and names_compression(table.names[column]):
+            says = {"sign": -1, **says}
+        known = profile.channels.get(name)
+        stated = known.model_dump(exclude_unset=True, exclude_none=True) if known is not None else {}
+        channels[name] = Channel(**{**says, **stated})
     return table, channels
 
 

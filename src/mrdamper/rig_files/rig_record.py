@@ -67,6 +67,14 @@ def _read(table: RawTable, found: dict[str, Assigned]):
     """The columns' numbers, what was noticed, the lines; a damaged cell of a further channel costs that channel."""
     content = table.read([entry.column for name, entry in found.items() if name not in _LENIENT])
     raw = dict(content.values)
+    for column, values in raw.items():
+        if content.lines is not None and thousands_in(values):
+            raise RigFileError(
+                "E_AMBIGUOUS",
+                f"column {table.names[column] or column + 1!r} goes from hundreds to ones with three decimals: "
+                "points of thousands?", file=table.source.name, column=column + 1,
+                mend="export it without separators of thousands",
+            )  # fmt: skip
     findings = list(content.findings)
     for name in [name for name in found if name in _LENIENT]:
         try:
@@ -76,6 +84,27 @@ def _read(table: RawTable, found: dict[str, Assigned]):
             findings.append(Finding(code, f"the {name} channel is left out: {error.found}"))
             del found[name]
     return raw, findings, content.lines
+
+
+def thousands_in(values: Floats) -> bool:
+    """Whether marks of thousands were read as decimal marks: 998, 1.003 for 1003, 1.012, ...
+
+    Integers up to 999 beside numbers from 1 on with three decimals, and a fall from the one to the other.
+    """
+    some = np.asarray(values[:200_000])
+    some = np.abs(some[np.isfinite(some)])
+    whole = some == np.round(some)
+    if not some.size or not 0.003 < np.mean(whole) < 0.999:
+        return False
+    broken = some[~whole]
+    thousandths = 1e3 * broken
+    if broken.min() < 1 or some[whole].max() > 999 or np.any(np.abs(thousandths - np.round(thousandths)) > 1e-6):
+        return False
+    if np.mean(np.round(thousandths) % 5 != 0) < 0.5:  # halves, fifths, eighths: a coarse channel's own
+        return False
+    falls = whole[:-1] & ~whole[1:] & (some[:-1] >= 100) & (some[1:] < 100) & (some[:-1] > 5 * some[1:])
+    rises = whole[1:] & ~whole[:-1] & (some[1:] >= 100) & (some[:-1] < 100) & (some[1:] > 5 * some[:-1])
+    return bool(np.any(falls | rises))
 
 
 def _si(values: Floats, entry: Assigned) -> Floats:

@@ -19,6 +19,7 @@ from mrdamper.rig_files.quality import (
     current,
     flat,
     force_lag,
+    leaps,
     loop,
     motion,
     presence,
@@ -42,7 +43,10 @@ CHECKS: tuple[Check, ...] = (
     clock.gaps_in_time,
     motion.moves,
     ranges.exchanged_or_out_of_range,
+    leaps.spikes,
+    leaps.wraps,
     loop.dissipates,
+    loop.keeps_its_sign,
     velocity_lag.velocity_channel,
     flat.clipped,
     flat.frozen,
@@ -80,7 +84,7 @@ def judge(record: Record) -> Record:
     QualityError
         If the record cannot be used; the code says why: E_NO_DATA, E_NONFINITE, E_SENTINEL,
         E_MISSING, E_TIME_ORDER, E_TIME_DUPLICATE, E_RANGE, E_NO_EXCITATION,
-        E_DISSIPATION_SIGN, E_CHANNEL_LAG.
+        E_SPIKE, E_LEAP, E_DISSIPATION_SIGN, E_CHANNEL_LAG.
     """
     view = View(record)
     for check in (*CHECKS, *_dropped_in()):

@@ -10,10 +10,14 @@ from mrdamper.errors import QualityError
 from mrdamper.motion.harmonics import fit_harmonics
 from mrdamper.rig_files.quality.motion import LEAST_CYCLES, cycles_of
 from mrdamper.rig_files.quality.noise import sample_noise
+from mrdamper.rig_files.quality.presence import runs_of
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding
 
 GIVING = -0.05  # share of the force in phase with the velocity, below which the loop gives energy
+_CLEARLY = 0.3  # share of the force that opposes, or pushes, in a cycle that surely does
+_FEWEST = 20  # samples of a cycle
+_LONG = 0.08  # of a cycle: a stretch of the other sign that no timing makes
 POOR_REPEATABILITY = 0.05  # of the peak-to-peak force; good rigs have 0.2 to 1.5 %
 _POINTS = 200  # per cycle, at which cycles are compared
 
@@ -41,6 +45,43 @@ def dissipates(view: View) -> None:
             mend=mend,
             code="E_DISSIPATION_SIGN",
         )
+
+
+def keeps_its_sign(view: View) -> None:
+    """Refuse a force that changes its sign within the record: cycle against cycle, or stretches of one."""
+    motion = view.motion
+    if motion is None or motion.cycles < 2 - 0.05:
+        return
+    period = 1 / motion.condition.frequency_Hz
+    time = view.run.time
+    starts = float(view.steady.time[0]) + period * np.arange(int(motion.cycles + 0.05))
+    starts = starts[view.without_leap(starts, starts + period)]
+    cycles = [tuple(map(int, np.searchsorted(time, (start, start + period)))) for start in starts]
+    if len(cycles) < 2 or min(b - a for a, b in cycles) < _FEWEST:
+        return
+    shares = [_damping_share(view, a, b) for a, b in cycles]
+    flipped = [cycle for cycle, share in zip(cycles, shares, strict=True) if share < -_CLEARLY]
+    if flipped and max(shares) > _CLEARLY:
+        raise _flip(view, time[flipped[0][0]], len(flipped), len(cycles))
+    if len(cycles) < 3:
+        return
+    phase = np.linspace(0.0, period, _POINTS, endpoint=False)
+    folded = np.array([np.interp(start + phase, time, view.run.force) for start in starts])
+    usual = np.median(folded, axis=0)
+    counts = np.abs(usual) > 0.3 * np.max(np.abs(usual))
+    against = counts & (np.abs(folded + usual) < 0.3 * np.abs(folded - usual))
+    for start, row in zip(starts, against, strict=True):
+        begins, ends = runs_of(row)
+        if begins.size and np.max(ends - begins) > _LONG * _POINTS:
+            raise _flip(view, start + phase[begins[np.argmax(ends - begins)]], 1, len(cycles))
+
+
+def _flip(view: View, time: float, count: int, cycles: int) -> QualityError:
+    return QualityError(
+        f"the force changes its sign within the record, from {time:.4g} s on ({count} of {cycles} cycles): the load "
+        "cell or its amplifier was changed over",
+        where=view.where, mend="cut the record there", code="E_DISSIPATION_SIGN",
+    )  # fmt: skip
 
 
 def damping_share(view: View) -> float:

@@ -188,6 +188,13 @@ def refusing_damage(source: Source, title: str) -> Iterator[None]:
         raise damaged(source, title, str(error)) from error
 
 
+def twice(source: Source, name: str) -> RigFileError:
+    """The refusal of a file that holds two things of one name, of which a library gives either."""
+    return source.refuse(
+        "E_DUPLICATE_COLUMN", f"{name!r} is stored twice", mend="save the file again, with one of them"
+    )
+
+
 def damaged(source: Source, title: str, why: str) -> RigFileError:
     """The refusal of a file that starts as it should and does not go on so."""
     early = any(word in why.lower() for word in _EARLY_END)

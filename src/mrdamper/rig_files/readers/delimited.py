@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -15,10 +16,13 @@ from mrdamper.rig_files.text.blocks import Block, find_blocks
 from mrdamper.rig_files.text.bulk import read_bulk
 from mrdamper.rig_files.text.cells import Form, field_count, read_cells, split_rows
 from mrdamper.rig_files.text.labview import is_labview, named, stated_form
-from mrdamper.rig_files.text.layout import Layout, find_layout, split
+from mrdamper.rig_files.text.layout import Layout, find_layout, is_comment, split
 from mrdamper.rig_files.text.spool import Spool
 from mrdamper.rig_files.text.stream import LONGEST_LINE, TextStream, open_text, too_long
+from mrdamper.rig_files.text.tokens import looks_numeric
 
+_ODD = re.compile("[\udc80-\udcff\ufffd\x80-\x9fÿþðÞÐ¤¦¬¸¨÷×]")  # bytes of another encoding, as they come out
+_HEADER_LINES, _BREAKS = 200, 12  # lines in which a quoted name may be broken, and into how many
 _HEAD_LINES = 4000  # in which the data must have begun
 BULK_FROM = 2**19  # bytes; below, reading cell by cell takes less time than loading the fast reader
 
@@ -45,6 +49,7 @@ class DelimitedText(Reader):
             raise too_long(source, long + 1)
         whole = stream.start + len(head) >= stream.stop
         lines = [stream.decode(line).rstrip("\r") for line in (raw if whole else raw[:-1])[:_HEAD_LINES]]
+        lines = _with_whole_quotes(lines)
         if is_labview(lines):
             layout = named(find_layout(lines, source, stated_form(lines, form)), lines)
         else:
@@ -76,6 +81,24 @@ class DelimitedText(Reader):
         )
 
 
+def _with_whole_quotes(lines: list[str]) -> list[str]:
+    """The lines with a quoted cell of the header on one line, where it was broken: earlier lines become empty."""
+    lines = list(lines)
+    for i, line in enumerate(lines[:_HEADER_LINES]):
+        if line.count('"') % 2 == 0 or is_comment(line):
+            continue
+        parts = [line]
+        for j in range(i + 1, min(i + _BREAKS + 1, len(lines))):
+            parts.append(lines[j])
+            if sum(part.count('"') for part in parts) % 2 == 0:
+                whole = " ".join(parts)
+                if not any(looks_numeric(cell) for cell in whole.replace('"', "").replace(";", ",").split(",")):
+                    lines[i:j] = [""] * (j - i)
+                    lines[j] = whole
+                break
+    return lines
+
+
 def _form(stream: TextStream, layout: Layout) -> dict[str, str | int]:
     """What a profile may keep: not the place of the header, which differs from file to file."""
     form: dict[str, str | int] = {"separator": layout.separator, "decimal": layout.decimal}
@@ -105,7 +128,8 @@ def _read(stream: TextStream, layout: Layout, block: Block, columns: tuple[int, 
         line += chunk.count(b"\n")
     if not size:
         raise stream.source.refuse("E_NO_DATA", "a header without data", mend="export the file again")
-    if odd:
+    damaged = any(_ODD.search(name) for i, name in enumerate(layout.names) if i not in columns)
+    if odd or damaged:
         text = f"bytes that are no {'UTF-8' if stream.encoding == 'utf-8' else 'ASCII'} in columns that are not needed"
         findings = (*findings, Finding("W_ENCODING", text))
     return Content(spool.arrays(), LineNumbers(size, tuple(starts), tuple(numbers)), findings)

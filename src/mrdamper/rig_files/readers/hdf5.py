@@ -16,6 +16,7 @@ from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Sour
 HDF5_MARK = b"\x89HDF\r\n\x1a\n"
 _MOST_OBJECTS = 10_000
 _DEEPEST = 8  # groups within groups
+_PACKING = ("scale_factor", "add_offset", "_FillValue", "missing_value")
 _UNIT_NAMES = ("units", "unit", "Units", "Unit", "UNIT", "UNITS", "unit_string")
 
 
@@ -100,7 +101,7 @@ def _table(
             return np.empty(2, dtype=object)  # a link, refused if it is asked for
         if isinstance(part, str):
             return dataset[part]
-        return pick(_upright(dataset), part)
+        return _unpacked(dataset, pick(_upright(dataset), part))
 
     label = label.strip("/").replace("/", "_")
     return array_table(
@@ -112,6 +113,19 @@ def _table(
 def _above(remarks: dict[str, list[str]], group: str) -> list[str]:
     """What the attributes of a group, and of the groups around it, say."""
     return [line for path, lines in remarks.items() if f"{group}/".startswith(f"{path}/") for line in lines]
+
+
+def _unpacked(dataset: Any, values: np.ndarray) -> np.ndarray:
+    """Numbers as netCDF and others pack them: scale_factor, add_offset, and a code for missing ones."""
+    says = {name: dataset.attrs[name] for name in _PACKING if name in dataset.attrs}
+    if not says or values.dtype.kind not in "iuf":
+        return values
+    numbers = values.astype(np.float64)
+    for name in ("_FillValue", "missing_value"):
+        if name in says:
+            numbers[np.isin(values, np.asarray(says[name]))] = np.nan
+    factor, offset = (float(np.reshape(says.get(n, d), -1)[0]) for n, d in (("scale_factor", 1), ("add_offset", 0)))
+    return factor * numbers + offset
 
 
 def _upright(dataset: Any) -> np.ndarray:

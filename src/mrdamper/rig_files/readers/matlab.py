@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.rig_files.file_form import FileForm
-from mrdamper.rig_files.readers.arrays import array_table, check_unpacked, expand, pick, refusing_damage
+from mrdamper.rig_files.readers.arrays import array_table, check_unpacked, expand, pick, refusing_damage, twice
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
 from mrdamper.rig_files.readers.hdf5 import HDF5_MARK, hdf5_tables
 
@@ -43,6 +43,9 @@ class Matlab(Reader):
 
             source.file.seek(0)
             variables = whosmat(source.file)
+            names = [name for name, _, _ in variables]
+            if len(set(names)) < len(names):
+                raise twice(source, next(name for name in names if names.count(name) > 1))
             check_unpacked(source, 8 * sum(int(np.prod(shape, dtype=object)) for _, shape, _ in variables))
             wanted = [name for name, _, kind in variables if kind in (*_NUMERIC, "struct", "char", "cell")]
             source.file.seek(0)

@@ -8,7 +8,7 @@ import numpy as np
 
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.archive import UNREADABLE_ZIP, check_sizes, is_arrays, zipped_names
-from mrdamper.rig_files.readers.arrays import array_table, damaged, expand, pick, refusing_damage
+from mrdamper.rig_files.readers.arrays import array_table, damaged, expand, pick, refusing_damage, twice
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
 
 _Column = tuple[str, str, tuple[str, int | str | None]]
@@ -63,6 +63,9 @@ def _columns(source: Source) -> tuple[list[_Column], list[str]]:
         check_sizes(source, archive.infolist())
         found: list[_Column] = []
         single: list[str] = []
+        names = [member.filename for member in archive.infolist()]
+        if len(set(names)) < len(names):
+            raise twice(source, next(name for name in names if names.count(name) > 1).removesuffix(".npy"))
         for member in archive.infolist():
             name = member.filename.removesuffix(".npy")
             with archive.open(member) as stream:

@@ -56,10 +56,18 @@ def _table(source: Source, group: Any, properties: dict[str, Any], title: str) -
     channels = list(group.channels())
     names = [channel.name for channel in channels]
     units = [_unit(channel) for channel in channels]
-    step = next((s for s in (_step(channel) for channel in channels) if s), None)
+    steps = {_step(channel) for channel in channels} - {None}
+    begins = {_begin(channel) for channel in channels if _step(channel)}
     sizes = {len(channel) for channel in channels if len(channel)}
-    wave = step is not None and len({s for s in (_step(c) for c in channels) if s}) == 1 and len(sizes) == 1
-    wave = wave and not any(name.casefold().startswith(("time", "zeit")) for name in names)
+    timed = any(name.casefold().startswith(("time", "zeit")) for name in names)
+    if not timed and (len(steps) > 1 or len(begins) > 1):
+        what = "steps" if len(steps) > 1 else "starts"
+        raise source.refuse(
+            "E_RASTER", f"the channels of group {group.name!r} have different {what} of time",
+            mend="export them with one clock",
+        )  # fmt: skip
+    step = next(iter(steps), None)
+    wave = step is not None and len(sizes) == 1 and not timed
     if wave:
         names, units = [*names, _WAVE_TIME], [*units, "s"]
 
@@ -80,5 +88,13 @@ def _unit(channel: Any) -> str:
 
 
 def _step(channel: Any) -> float | None:
+    """Step of a waveform [s]; one of exactly a second without a start is what LabVIEW writes where nobody set it."""
     step = channel.properties.get("wf_increment")
-    return float(step) if isinstance(step, (int, float)) and step > 0 else None
+    if not isinstance(step, (int, float)) or not step > 0:
+        return None
+    return None if step == 1.0 and "wf_xname" not in channel.properties else float(step)
+
+
+def _begin(channel: Any) -> tuple[float, str]:
+    """Where a waveform begins: its offset [s] and its time of day."""
+    return float(channel.properties.get("wf_start_offset") or 0.0), str(channel.properties.get("wf_start_time", ""))

@@ -1,0 +1,194 @@
+"""Files that were once read wrongly without a word: each is refused for its reason, or read right."""
+
+import io
+import warnings
+import zipfile
+
+import numpy as np
+import pytest
+from support.rig_files import channels, tdms_bytes, text, write
+from support.rig_records import clean_record, codes_of, random_record, with_channel
+
+from mrdamper.errors import InputError
+from mrdamper.rig_files.rig_import import guess_profile, read_run
+from mrdamper.rig_files.rig_record import thousands_in
+
+TRUE = channels()
+T, X, F = TRUE["time"], 1e3 * TRUE["displacement"], TRUE["force"]
+NAMES = {"time [s]": T, "disp [mm]": X, "force [N]": F}
+
+
+def table(columns, separator=","):
+    cells = [[v if isinstance(v, str) else f"{v:.6f}" for v in values] for values in columns.values()]
+    return "\n".join([separator.join(columns), *map(separator.join, zip(*cells, strict=True))]) + "\n"
+
+
+def code(path):
+    with pytest.raises(InputError) as caught:
+        read_run(path)
+    return caught.value.code
+
+
+BIG = 20 * F
+
+
+@pytest.mark.parametrize(
+    ("columns", "separator", "codes"),
+    {
+        "quoted English thousands": ({**NAMES, "force [N]": [f'"{v:,.1f}"' for v in BIG]}, ",", {"E_NUMBER"}),
+        "English thousands of one column": (
+            {**NAMES, "force [N]": [f"{v:,.0f}" for v in BIG]}, ";", {"E_AMBIGUOUS", "E_NUMBER"}),
+        "German thousands beside points": (
+            {**NAMES, "force [N]": [f"{v:,.0f}".replace(",", ".") for v in BIG]}, "\t", {"E_AMBIGUOUS"}),
+        "Swiss thousands": ({**NAMES, "force [N]": [f"{v:,.1f}".replace(",", "'") for v in BIG]}, ";", {"E_NUMBER"}),
+        "RMS of the force": ({"time [s]": T, "disp [mm]": X, "force RMS [N]": np.abs(F)}, ",", {"E_COLUMN"}),
+        "filtered force": ({"time [s]": T, "disp [mm]": X, "Kraft gefiltert [N]": F}, ",", {"E_COLUMN"}),
+        "set point": ({"time [s]": T, "disp [mm]": X, "force setpoint [N]": F}, ",", {"E_COLUMN"}),
+        "compression": ({"time [s]": T, "compression [mm]": X, "force [N]": F}, ",", {"E_SIGN_CONVENTION"}),
+        "compressive force": ({"time [s]": T, "disp [mm]": X, "compressive force [N]": F}, ",", {"E_SIGN_CONVENTION"}),
+        "two clocks": ({**NAMES, "timestamp [s]": 1.1 * T}, ",", {"E_AMBIGUOUS"}),
+        "another current than the name": ({**NAMES, "current [A]": 0 * T + 1}, ",", {"E_CURRENT_CONTRADICTS"}),
+        "a force that wraps": ({**NAMES, "force [N]": (F + 900) % 1800 - 900}, ",",
+                               {"E_LEAP", "E_DISSIPATION_SIGN", "E_SPIKE"}),
+        "a displacement that wraps once": (
+            {**NAMES, "disp [mm]": X - 65.536 * (np.arange(T.size) > 300)}, ",", {"E_LEAP"}),
+        "a sign that flips": ({**NAMES, "force [N]": np.where(T < 2, F, -F)}, ",", {"E_DISSIPATION_SIGN"}),
+        "a sign that flips for a quarter cycle": (
+            {**NAMES, "force [N]": np.where((T > 2.25) & (T < 2.5), -F, F)}, ",", {"E_DISSIPATION_SIGN"}),
+        "a spike of 100 mm": ({**NAMES, "disp [mm]": X + 100 * (np.arange(T.size) == 222)}, ",", {"E_SPIKE"}),
+        "a spike of force": ({**NAMES, "force [N]": F + 2e4 * (np.arange(T.size) == 222)}, ",", {"E_SPIKE"}),
+    }.values(),
+)  # fmt: skip
+def test_text_is_refused_for_its_reason(columns, separator, codes, tmp_path):
+    assert code(write(tmp_path, "a_0.5A.csv", table(columns, separator))) in codes
+
+
+def test_what_is_named_beside_the_force_does_not_disturb(tmp_path):
+    more = {**NAMES, "force peak [N]": np.abs(F), "force filtered [N]": 0.5 * F, "time of day [s]": T + 36000}
+    record = read_run(write(tmp_path, "a_0.5A.csv", table(more)))
+    np.testing.assert_allclose(record.force, F, atol=1e-5)
+
+
+def test_a_sign_that_is_stated_settles_compression(tmp_path):
+    path = write(tmp_path, "a_0.5A.csv", table({"time [s]": T, "compression [mm]": -X, "force [N]": F}))
+    profile = guess_profile(path)
+    assert profile.channels["displacement"].sign == -1
+    np.testing.assert_allclose(read_run(path, profile).displacement, 1e-3 * X, atol=1e-8)
+
+
+def test_a_current_in_per_cent_is_no_current(tmp_path):
+    record = read_run(write(tmp_path, "a.csv", table({**NAMES, "current [%]": 0 * T + 50})))
+    assert record.current is None
+    assert [finding.code for finding in record.findings] == ["W_COLUMN"]
+
+
+def test_a_line_break_in_a_quoted_name_is_read(tmp_path):
+    names = {'"time\n[s]"': T, '"disp\n[mm]"': X, '"force\n[N]"': F}
+    record = read_run(write(tmp_path, "a_0.5A.csv", table(names)))
+    np.testing.assert_allclose(record.force, F, atol=1e-5)
+
+
+def test_odd_bytes_in_a_name_nobody_needs_are_said(tmp_path):
+    content = table({**NAMES, "n\udcffte": 0 * T}).encode("utf-8", "surrogateescape")
+    record = read_run(write(tmp_path, "a_0.5A.csv", content))
+    assert [finding.code for finding in record.findings] == ["W_ENCODING"]
+
+
+def test_thousands_are_told_from_three_decimals():
+    assert thousands_in(np.array([998.0, 999.0, 1.004, 1.012] * 50))
+    for step in (0.125, 0.5, 0.001, 0.2):
+        assert not thousands_in(np.round(40 * np.sin(np.linspace(0, 20, 4000)) / step) * step)
+    assert not thousands_in(np.round(-30 + 20 * np.sin(np.linspace(0, 20, 4000)), 3))
+
+
+def test_a_variable_stored_twice_is_refused(tmp_path):
+    from scipy.io import savemat
+
+    target = io.BytesIO()
+    with zipfile.ZipFile(target, "w") as archive, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for name, values in (("time_s", T), ("disp_mm", X), ("force_N", F), ("force_N", 2 * F)):
+            member = io.BytesIO()
+            np.save(member, values)
+            archive.writestr(f"{name}.npy", member.getvalue())
+    assert code(write(tmp_path, "a_0.5A.npz", target.getvalue())) == "E_DUPLICATE_COLUMN"
+    one, two = io.BytesIO(), io.BytesIO()
+    savemat(one, {"time_s": T, "disp_mm": X, "force_N": F})
+    savemat(two, {"force_N": 2 * F})
+    assert code(write(tmp_path, "a_0.5A.mat", one.getvalue() + two.getvalue()[128:])) == "E_DUPLICATE_COLUMN"
+
+
+def test_packed_numbers_are_unpacked(tmp_path):
+    import h5py
+
+    path = tmp_path / "a_0.5A.nc"
+    with h5py.File(path, "w") as file:
+        for name, unit, values in (("time", "s", T), ("disp", "mm", X)):
+            file.create_dataset(name, data=values).attrs["units"] = unit
+        packed = np.round((F - 100) / 0.5).astype("i2")
+        packed[50] = -32768
+        force = file.create_dataset("force", data=packed)
+        force.attrs.update({"units": "N", "scale_factor": 0.5, "add_offset": 100.0, "_FillValue": np.int16(-32768)})
+    record = read_run(path)
+    assert np.flatnonzero(np.isnan(record.force)).tolist() == [50]
+    np.testing.assert_allclose(np.delete(record.force, 50), np.delete(F, 50), atol=0.26)
+
+
+@pytest.mark.parametrize(
+    ("properties", "expected"),
+    [
+        ([{"wf_increment": 0.005}, {"wf_increment": 0.005, "wf_start_offset": 0.1}], "E_RASTER"),
+        ([{"wf_increment": 0.005}, {"wf_increment": 0.006}], "E_RASTER"),
+        ([{"wf_increment": 1.0}] * 2, "E_COLUMN"),
+    ],
+)
+def test_waveforms_of_different_clocks_are_refused(properties, expected, tmp_path):
+    from nptdms import ChannelObject, RootObject, TdmsWriter
+
+    path = tmp_path / "a_0.5A.tdms"
+    with TdmsWriter(path) as writer:
+        channels_of = [
+            ChannelObject("T", name, values, properties={"unit_string": unit, "wf_start_offset": 0.0, **more})
+            for (name, unit, values), more in zip((("disp", "mm", X), ("force", "N", F)), properties, strict=True)
+        ]
+        writer.write_segment([RootObject(), *channels_of])
+    assert code(path) == expected
+    good = write(tmp_path, "b_0.5A.tdms", tdms_bytes({"disp": X, "force": F}, {"disp": "mm", "force": "N"}, wave=True))
+    assert read_run(good).force.size == F.size
+
+
+def test_invalid_samples_of_a_measuring_system_are_missing(tmp_path):
+    from asammdf import MDF, Signal
+
+    bits = np.zeros(T.size, dtype=bool)
+    bits[[40, 90]] = True
+    file = MDF(version="4.10")
+    file.append([Signal(X, T, unit="mm", name="disp"), Signal(F, T, unit="N", name="force", invalidation_bits=bits)])
+    file.save(tmp_path / "a_0.5A.mf4")
+    file.close()
+    record = read_run(tmp_path / "a_0.5A.mf4")
+    assert np.flatnonzero(np.isnan(record.force)).tolist() == [40, 90]
+
+
+def test_clean_records_show_no_leaps_and_no_spikes():
+    for seed in range(40):
+        record = clean_record(seed, sensor=5e-6 * (seed % 3))
+        assert codes_of(record) == []
+    assert codes_of(random_record()) == ["W_NOT_SINE"]
+    coarse = with_channel(clean_record(2, points=100), "displacement", lambda x: np.round(x, 3, out=x))
+    assert not {"E_SPIKE", "E_LEAP"} & set(codes_of(coarse))
+
+
+def test_a_number_in_a_pattern_with_another_unit_is_refused(tmp_path):
+    from mrdamper.rig_files.profile import parse_profile
+
+    path = write(tmp_path, "run_20mm_1Hz.csv", text())
+    for pattern, said in (("run_{current}*", "followed by 'mm'"), ("run_20mm_{current}*", "followed by 'Hz'")):
+        with pytest.raises(InputError, match=said) as caught:
+            read_run(path, parse_profile(f'[current]\npattern = "{pattern}"\n'))
+        assert caught.value.code == "E_AMBIGUOUS"
+    bare = write(tmp_path, "run_20_1.csv", text())
+    with pytest.raises(InputError, match="no unit behind it"):
+        read_run(bare, parse_profile('[current]\npattern = "run_{current}_*"\n'))
+    with pytest.raises(InputError, match="no coil current of a damper"):
+        read_run(bare, parse_profile('[current]\npattern = "run_{current}_*"\nunit = "A"\n'))
