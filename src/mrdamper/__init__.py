@@ -25,6 +25,10 @@ if TYPE_CHECKING:
     from mrdamper.simulation import simulate
     from mrdamper.streaming import stepper
     from mrdamper.study.workflow import run_study
+    from mrdamper.systems.inputs import load_input
+    from mrdamper.systems.inverse import invert
+    from mrdamper.systems.simulate import simulate_system
+    from mrdamper.systems.system_file import load_system
     from mrdamper.validation import validate
 
 _HOME = {
@@ -34,14 +38,18 @@ _HOME = {
     "InputError": "errors",
     "Run": "data",
     "identify": "identification",
+    "invert": "systems.inverse",
     "load_dataset": "files.dataset",
+    "load_input": "systems.inputs",
     "load_model": "files.model_file",
+    "load_system": "systems.system_file",
     "plot_force": "report.plots.loops",
     "plot_loop": "report.plots.loops",
     "run_study": "study.workflow",
     "save_dataset": "files.dataset",
     "save_model": "files.model_file",
     "simulate": "simulation",
+    "simulate_system": "systems.simulate",
     "stepper": "streaming",
     "validate": "validation",
 }

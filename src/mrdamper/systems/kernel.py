@@ -222,7 +222,9 @@ def _search(evaluate: Any) -> Any:
 
 
 def _walk(evaluate: Any, command: Any, search: Any) -> Any:
-    def walk(dt, P, Q, R, G, B, loads, road, road_rate, H, seen, p, d, memory, cp, cd, cm, currents, x, v, f, flags):
+    def walk(
+        dt, every, P, Q, R, G, B, loads, road, road_rate, H, seen, p, d, memory, cp, cd, cm, currents, x, v, f, flags
+    ):
         """Fill x, v (N, n), f, currents, flags (N, E) from their first rows on; the step that failed, or −1.
 
         End velocity of the points is 2 (P v + Q x + load − R f_mean) − v. `loads` (N, n) is the
@@ -237,17 +239,17 @@ def _walk(evaluate: Any, command: Any, search: Any) -> Any:
         signals, held = np.zeros(H.shape[0] + 1), currents[0].copy()
         state = np.zeros(2 * n + count)
         for i in range(1, samples):
-            if H.shape[0] > 0:
+            if H.shape[0] > 0 and (i - 1) % every == 0:
                 state[:n], state[n : 2 * n], state[2 * n :] = x[i - 1], v[i - 1], f[i - 1]
                 for s in range(H.shape[0]):
                     total = seen[i - 1, s]
                     for k in range(state.size):
                         total += H[s, k] * state[k]
                     signals[s] = total
-                signals[H.shape[0]] = dt
+                signals[H.shape[0]] = every * dt
                 if command(cp, cd, cm, signals, held) != 0:
                     return i
-                currents[i] = held
+            currents[i] = held
             for r in range(n):
                 total = loads[i, r]
                 for k in range(n):

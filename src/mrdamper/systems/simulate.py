@@ -25,6 +25,7 @@ from mrdamper.systems.linear import aims, linear_system
 from mrdamper.systems.links import contact_stage, damper_stage, stage_of
 from mrdamper.systems.structure import Link, System
 
+PERIOD = 1e-3  # s between two looks of a control law, as usual on a real-time target
 HALVING = 5e-3  # change of a peak when the step is halved that is still called settled
 _COARSEST, _FINEST = 1e-3, 1e-5  # s
 _STEPS_A_PERIOD = 40  # of the highest natural frequency, to begin with
@@ -206,6 +207,8 @@ class Loop:
     ----------
     system, source, dampers, controller, highest
         As `simulate_system`.
+    period : float
+        Time between two looks of the control law [s].
     """
 
     def __init__(
@@ -215,9 +218,10 @@ class Loop:
         dampers: Mapping[str, Damper],
         controller: Controller,
         highest: float | None = None,
+        period: float = PERIOD,
     ):
         _fit(system, source, dampers)
-        self.system, self.source, self.controller = system, source, controller
+        self.system, self.source, self.controller, self.period = system, source, controller, period
         self.links = tuple(link for link in system.links if link.role != "damper" or link.name in dampers)
         self.stages = [
             damper_stage(dampers[link.name]) if link.role == "damper" else contact_stage(link) for link in self.links
@@ -226,7 +230,7 @@ class Loop:
         rows = [system.span(link.above, link.below) for link in self.links]
         self.B = np.array([row for row, _ in rows]).reshape(len(rows), len(system.coordinates))
         self.D = np.array([road for _, road in rows]).reshape(len(rows), len(system.channels))
-        self.control = controller.prepare(system, self.links, dampers, highest)
+        self.control = controller.prepare(system, self.links, dampers, period, highest)
         self._walks: dict[bool, Any] = {}
 
     @property
@@ -234,7 +238,8 @@ class Loop:
         """The step to begin with: the input's, the highest mode's share, or a millisecond."""
         highest = float(self.system.frequencies_Hz().max())
         step = min(_COARSEST, self.source.step, 1 / (_STEPS_A_PERIOD * highest) if highest else _COARSEST)
-        return self.source.step / math.ceil(self.source.step / step - 1e-9)
+        whole = self.period if self.control.program else self.source.step
+        return whole / math.ceil(whole / step - 1e-9)
 
     def run(self, dt: float, machine: bool | None = None, numbers: Numbers | None = None) -> Simulation:
         """The whole input at one step.
@@ -281,8 +286,9 @@ class Loop:
         else:
             numbers = numbers or self.numbers
             control = Numbers.of(self._controllers)
+            every = max(1, round(self.period / dt))
             failed = self._walk(machine)(
-                dt, S @ (2 / dt * system.M), -S @ system.K, R, self.B @ R, self.B, mean_load,
+                dt, every, S @ (2 / dt * system.M), -S @ system.K, R, self.B @ R, self.B, mean_load,
                 np.ascontiguousarray(road @ self.D.T), np.ascontiguousarray(road_rate @ self.D.T), H, seen,
                 numbers.given, numbers.derived, numbers.start.copy(), control.given, control.derived, control.start,
                 current, x, v, force, flags,

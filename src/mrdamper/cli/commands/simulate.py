@@ -9,6 +9,7 @@ import typer
 
 if TYPE_CHECKING:
     from mrdamper.dampers.base import Damper
+    from mrdamper.systems.controllers import Controller
     from mrdamper.systems.simulate import Simulation
 
 
@@ -34,6 +35,12 @@ def register(app: typer.Typer) -> None:
         without: bool = typer.Option(False, "--without-damper", help="Take the dampers out."),
         time_scale: float = typer.Option(1.0, "--time-scale", help="How many times faster a record is played."),
         step: Optional[float] = typer.Option(None, "--step", help="Time step [s]; default: found by halving."),  # noqa: UP045
+        beside: Optional[list[str]] = typer.Option(  # noqa: UP045
+            None, "--beside", help="More controllers for the report, or all: side by side, up to the preview bound."
+        ),
+        out: Optional[Path] = typer.Option(  # noqa: UP045
+            None, "--out", help="Folder for simulation.html, time histories and measures."
+        ),
         as_json: bool = typer.Option(False, "--json", help="Print JSON, SI units."),
     ) -> None:
         """Simulate a building or a vehicle with its dampers, and print what they let through."""
@@ -41,6 +48,7 @@ def register(app: typer.Typer) -> None:
 
         from mrdamper.cli.output import parse_named
         from mrdamper.errors import InputError
+        from mrdamper.files.atomic import require_writable
         from mrdamper.files.model_file import load_model
         from mrdamper.parameters import with_values
         from mrdamper.systems.controllers import controller_type
@@ -48,6 +56,10 @@ def register(app: typer.Typer) -> None:
         from mrdamper.systems.simulate import simulate_system
         from mrdamper.systems.system_file import load_system
 
+        if out is not None:
+            require_writable(out)
+        elif beside:
+            raise InputError("--beside without --out", mend="give a folder for the report")
         found = load_system(system)
         shaken_by = load_input(*parse_named(source, "--input"), time_scale=time_scale)
         dampers: dict[str, Damper] = {} if without else dict(found.dampers)
@@ -62,16 +74,41 @@ def register(app: typer.Typer) -> None:
                 code="E_NO_DAMPER",
             )
         highest = _amperes(current, volts, dampers)
-        name, values = parse_named(control, "--control")
-        if name == "passive" and highest is not None:
-            values = {"current_A": highest, **values}
-        controller = with_values(controller_type(name), values)
+        controller = _controller(control)
+        if control == "passive" and highest is not None:
+            controller = with_values(controller_type("passive"), {"current_A": highest})
+        others = [_controller(text) for text in _all_of(beside or [])]
+        if others and not dampers:
+            raise InputError("controllers without a damper", mend="leave out --without-damper or --beside")
         done = simulate_system(found.system, shaken_by, dampers, controller, step, highest)
-        figures = _figures(done)
+        if out is not None:
+            from mrdamper.report.simulation import write_simulation
+            from mrdamper.systems.contest import contest
+
+            table = contest(found.system, shaken_by, dampers, others, done.step, highest) if others else None
+            for path in write_simulation(done, out, table):
+                typer.echo(f"{path}", err=True)
         if as_json:
-            print(json.dumps(figures, indent=1))
+            print(json.dumps(_figures(done), indent=1))
         else:
             _print(done)
+
+
+def _all_of(names: list[str]) -> list[str]:
+    """The names, "all" as every law there is."""
+    from mrdamper.systems.controllers import controller_types
+
+    laws = [name for name in controller_types() if name not in ("passive", "preview")]
+    return list(dict.fromkeys(name for given in names for name in (laws if given == "all" else [given])))
+
+
+def _controller(text: str) -> Controller:
+    from mrdamper.cli.output import parse_named
+    from mrdamper.parameters import with_values
+    from mrdamper.systems.controllers import controller_type
+
+    name, values = parse_named(text, "--control")
+    return with_values(controller_type(name), values)
 
 
 def _amperes(current: float | None, volts: float | None, dampers: dict[str, Damper]) -> float | None:

@@ -32,6 +32,8 @@ class Sight:
     damper : Damper
     low, high : float
         Currents it may be given [A].
+    period : float
+        Between two samples [s].
     shared : dict
         What the laws of several dampers have in common.
     """
@@ -41,6 +43,7 @@ class Sight:
     damper: Damper
     low: float
     high: float
+    period: float
     shared: dict[str, Any]
 
     def __call__(self, point: str, quantity: str) -> Any:
@@ -138,21 +141,26 @@ class Controller(ABC):
     def law(self, see: Sight) -> Any:
         """Current [A] of one damper from now on, from what can be seen now."""
 
-    def designed(self, system: System, links: Sequence[Link]) -> Controller:
-        """The controller with what it must know of the system."""
+    def designed(self, system: System, links: Sequence[Link], period: float) -> Controller:
+        """The controller with what it must know of the system; it is asked every `period` [s]."""
         return self
 
     def prepare(
-        self, system: System, links: Sequence[Link], dampers: Mapping[str, Damper], highest: float | None = None
+        self,
+        system: System,
+        links: Sequence[Link],
+        dampers: Mapping[str, Damper],
+        period: float,
+        highest: float | None = None,
     ) -> Control:
         """Trace the law of every damper into one program; `highest` caps the current [A]."""
-        ready, tape, outputs, shared = self.designed(system, links), Tape(), {}, {}
+        ready, tape, outputs, shared = self.designed(system, links, period), Tape(), {}, {}
         start = []
         for link in links:
             command: Any = 0.0
             if link.role == "damper":
                 damper = dampers[link.name]
-                see = Sight(tape, link, damper, *current_range(damper, highest), shared)
+                see = Sight(tape, link, damper, *current_range(damper, highest), period, shared)
                 command = ready.law(see)
                 start.append(see.low)
             else:

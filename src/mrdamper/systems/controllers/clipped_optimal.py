@@ -63,17 +63,16 @@ class ClippedOptimal(Controller):
         "-", "weight of the forces, in accelerations of the whole mass", bounds=(1e-12, math.inf), default=1e-3
     )
     noise_ratio: float = param("-", "input over sensor noise, as densities", bounds=(1e-9, math.inf), default=50.0)
-    sample_time_s: float = param("s", "of the controller", bounds=(1e-6, 1), default=1e-3)
     design: Design | None = None
 
-    def designed(self, system: System, links: Sequence[Link]) -> Controller:
+    def designed(self, system: System, links: Sequence[Link], period: float) -> Controller:
         from scipy.linalg import expm, solve_discrete_are
 
         linear = linear_system(system, [link for link in links if link.role == "damper"])
         n, count = linear.B.shape
         coupled = np.hstack([linear.A, linear.B, linear.E])
         still = np.zeros((coupled.shape[1] - n, coupled.shape[1]))
-        sampled: Any = expm(self.sample_time_s * np.vstack([coupled, still]))
+        sampled: Any = expm(period * np.vstack([coupled, still]))
         A, B, E = sampled[:n, :n], sampled[:n, n : n + count], sampled[:n, n + count :]
         z, f = linear.aim
         R = f.T @ f + self.effort * np.eye(count) / linear.mass**2
@@ -84,8 +83,8 @@ class ClippedOptimal(Controller):
         lowest = 2 * math.pi * system.frequencies_Hz()[0]
         size = np.append(np.ones(len(system.coordinates)), np.full(count, lowest**2))
         C, D = C * size[:, None], D * size[:, None]
-        V = np.eye(size.size) / self.noise_ratio / self.sample_time_s
-        W = E @ E.T / self.sample_time_s + 1e-15 * np.eye(n)
+        V = np.eye(size.size) / self.noise_ratio / period
+        W = E @ E.T / period + 1e-15 * np.eye(n)
         S = solve_discrete_are(A.T, C.T, W, V)
         L = np.linalg.solve(C @ S @ C.T + V, C @ S @ A.T).T
         names = tuple(link.name for link in links if link.role == "damper")
@@ -97,14 +96,10 @@ class ClippedOptimal(Controller):
         return see.on_off((see.shared["wanted"][see.link.name] - see.force) * see.force > 0)
 
     def _optimal(self, see: Sight) -> dict[str, Any]:
-        """f* of every damper, from an observer that steps at the controller's own sample time."""
+        """f* of every damper, from an observer of the structure."""
         design, tape = self.design, see.tape
         assert design is not None
         z = [tape.remember(f"estimate{i}") for i in range(design.A.shape[0])]
-        clock = tape.remember("clock")
-        waited = clock + see.dt
-        due = waited >= self.sample_time_s * (1 - 1e-6)
-        tape.update(clock, tape.select(due, np.maximum(waited - self.sample_time_s, 0.0), waited))
         f = [see.signal(f"{name}.force") for name in design.dampers]
         y = [see(name, "acceleration") for name in design.coordinates]
         y += [see.signal(f"{name}.stroke") for name in design.dampers]
@@ -113,7 +108,7 @@ class ClippedOptimal(Controller):
             for size, seen, c, d in zip(design.size, y, design.C, design.D, strict=True)
         ]
         for i, (a, b, gain) in enumerate(zip(design.A, design.B, design.L, strict=True)):
-            tape.update(z[i], tape.select(due, _sum(a, z) + _sum(b, f) + _sum(gain, gap), z[i]))
+            tape.update(z[i], _sum(a, z) + _sum(b, f) + _sum(gain, gap))
         return {name: -_sum(g, z) for name, g in zip(design.dampers, design.G, strict=True)}
 
 

@@ -1,0 +1,57 @@
+"""A damper at work: histories, spectra, the damper's loop, controllers between doing nothing and the bound."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from mrdamper.report.plots.style import MM, PALETTE, house_style, label, new_figure
+from mrdamper.systems.simulate import Simulation
+
+_POINTS = 4000  # of a history that are drawn
+
+
+def histories(runs: Mapping[str, Simulation]) -> Figure:
+    """Acceleration of the last coordinate's end, the widest span, and damper force over time; the first runs."""
+    shown = dict(list(runs.items())[:4])
+    first = next(iter(shown.values()))
+    point = int(np.argmax(first.peaks["acceleration_m_s2"])) if first.system.ground is not None else 0
+    span = list(first.system.spans)[int(np.argmax(first.peaks["drift_m"]))]
+    with house_style():
+        figure, (top, middle, bottom) = new_figure(3, 1, 6.4)
+        for colour, (title, run) in zip(PALETTE, shown.items(), strict=False):
+            every = slice(None, None, max(1, run.time.size // _POINTS))
+            top.plot(run.time[every], run.a[every, point], color=colour, lw=0.8, label=title)
+            middle.plot(run.time[every], MM * run.span(span)[every], color=colour, lw=0.8)
+            for i, link in enumerate(run.links):
+                if link.role == "damper":
+                    bottom.plot(run.time[every], run.force[every, i], color=colour, lw=0.8)
+        top.legend(ncols=2)
+        label(top, "", "acceleration (m/s²)", first.system.coordinates[point])
+        label(middle, "", "displacement (mm)", span)
+        label(bottom, "time (s)", "damper force (N)")
+        return figure
+
+
+def spectra(runs: Mapping[str, Simulation]) -> Figure:
+    """Power spectral density of the accelerations that are aimed at."""
+    from scipy.signal import welch
+
+    first = next(iter(runs.values()))
+    point = int(np.argmax(first.peaks["acceleration_m_s2"])) if first.system.ground is not None else 0
+    with house_style():
+        figure, (left, right) = new_figure(1, 2, 3.0)
+        for colour, (title, run) in zip(PALETTE, runs.items(), strict=False):
+            size = min(run.time.size, int(4 / run.step))
+            f, density = welch(run.a[:, point], 1 / run.step, nperseg=size)
+            inside = (f > 0) & (f < 60)
+            left.loglog(f[inside], density[inside], color=colour, lw=0.9, label=title)
+            for i, link in enumerate(run.links):
+                if link.role == "damper":
+                    right.plot(1e3 * run.stroke[:, i], run.force[:, i], color=colour, lw=0.5)
+        left.legend(fontsize=6)
+        label(left, "frequency (Hz)", "PSD of acceleration (m²/s³)", first.system.coordinates[point])
+        label(right, "stroke (mm)", "force (N)", "damper")
+        return figure

@@ -1,0 +1,98 @@
+"""A simulation as files: simulation.html, histories.csv, measures.csv and figures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from mrdamper.files.atomic import publish
+from mrdamper.files.encoding import csv_text
+from mrdamper.report.page import render_page
+from mrdamper.report.plots.simulation import histories, spectra
+from mrdamper.report.plots.style import save_figure
+from mrdamper.systems.contest import Contest
+from mrdamper.systems.measures import benchmark_ratios, measures
+from mrdamper.systems.simulate import Simulation
+
+_ROWS = 20_000  # of histories.csv
+
+
+def write_simulation(done: Simulation, folder: str | Path, beside: Contest | None = None) -> list[Path]:
+    """Write a simulation, whole or not at all.
+
+    Parameters
+    ----------
+    done : Simulation
+    folder : path
+        Made if missing.
+    beside : Contest, optional
+        Controllers to show beside it.
+
+    Returns
+    -------
+    list of Path
+        What was written, the page first.
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be written to.
+    """
+    runs: dict[str, Simulation] = {type(done.controller).title: done}
+    if beside is not None:
+        runs |= beside.runs
+
+    def fill(work: Path) -> None:
+        (work / "figures").mkdir()
+        figures = {
+            "histories": save_figure(histories(runs), work / "figures/histories"),
+            "spectra": save_figure(spectra(runs), work / "figures/spectra"),
+        }
+        columns = {title: measures(run) for title, run in runs.items()}
+        names = list(dict.fromkeys(name for found in columns.values() for name in found))
+        shares = {title: beside.share(title) for title in beside.runs} if beside else {}
+        page = render_page(
+            "simulation.html.j2",
+            f"{done.system.title or done.system.name}: {type(done.controller).title}",
+            f"mrdamper {version('mrdamper')}; step {1e3 * done.step:.3g} ms",
+            done=done,
+            columns=columns,
+            names=names,
+            shares=shares,
+            ratios=_ratios(runs, beside),
+            figures=figures,
+        )
+        (work / "simulation.html").write_text(page, encoding="utf-8")
+        rows = [{"measure": name, **{title: found.get(name) for title, found in columns.items()}} for name in names]
+        (work / "measures.csv").write_text(csv_text(rows), encoding="utf-8")
+        (work / "histories.csv").write_text(csv_text(history_rows(done)), encoding="utf-8")
+
+    return publish(folder, "simulation.html", fill)
+
+
+def history_rows(done: Simulation) -> list[dict[str, float]]:
+    """Time histories in SI units, every sample or as many as make twenty thousand rows."""
+    table = {"time_s": done.time}
+    for i, name in enumerate(done.system.coordinates):
+        table |= {f"{name}.x": done.x[:, i], f"{name}.v": done.v[:, i], f"{name}.a": done.a[:, i]}
+    for i, link in enumerate(done.links):
+        table |= {f"{link.name}.stroke": done.stroke[:, i], f"{link.name}.force": done.force[:, i]}
+        if link.role == "damper":
+            table[f"{link.name}.current_A"] = done.current[:, i]
+    every = slice(None, None, -(-done.time.size // _ROWS))
+    lists = [column[every].tolist() for column in table.values()]
+    return [dict(zip(table, row, strict=True)) for row in zip(*lists, strict=True)]
+
+
+def _ratios(runs: Mapping[str, Simulation], beside: Contest | None) -> dict[str, dict[str, float]]:
+    """J ratios of a building to no current; none for a car or a single run."""
+    if beside is None or next(iter(runs.values())).system.ground is None:
+        return {}
+    still = beside.runs["no current"]
+    return {
+        title: {name: value for name, value in benchmark_ratios(run, still).items() if np.isfinite(value)}
+        for title, run in runs.items()
+    }

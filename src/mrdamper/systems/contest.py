@@ -1,0 +1,70 @@
+"""Controllers side by side on one system and one input, between doing nothing and the preview bound."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from mrdamper.dampers.base import Damper
+from mrdamper.systems.controllers import Controller
+from mrdamper.systems.controllers.passive import Passive
+from mrdamper.systems.controllers.preview import Preview
+from mrdamper.systems.inputs import Input
+from mrdamper.systems.measures import cost
+from mrdamper.systems.simulate import Loop, Simulation, simulate_system
+from mrdamper.systems.structure import System
+
+
+@dataclass(frozen=True, eq=False)
+class Contest:
+    """Runs of one system at one step.
+
+    Attributes
+    ----------
+    runs : mapping of str to Simulation
+        By title; no current and the highest current first, the preview last.
+    """
+
+    runs: Mapping[str, Simulation]
+
+    def share(self, title: str) -> float:
+        """How far a run has come from no current (0) to the preview bound (1), in mean square of the aims."""
+        costs = {name: cost(run) for name, run in self.runs.items()}
+        worst, best = next(iter(costs.values())), list(costs.values())[-1]
+        return (worst - costs[title]) / (worst - best) if worst > best else 1.0
+
+
+def contest(
+    system: System,
+    source: Input,
+    dampers: Mapping[str, Damper],
+    controllers: Sequence[Controller],
+    step: float | None = None,
+    highest: float | None = None,
+) -> Contest:
+    """Run controllers one after the other, all at the step that the first one settles at.
+
+    Parameters
+    ----------
+    system, source, dampers, step, highest
+        As `simulate_system`.
+    controllers : sequence of Controller
+        Beside no current, the highest current, and the preview.
+    """
+    if highest is None:
+        highest = max(damper.envelope.current_A[1] for damper in dampers.values())
+    first = simulate_system(system, source, dampers, Passive(), step, highest)
+    runs = {"no current": first}
+    between = {f"{highest:.3g} A": Passive(highest), **{_title(c): c for c in controllers}}
+    for title, controller in {**between, Preview.title: Preview()}.items():
+        runs[title] = replace(Loop(system, source, dampers, controller, highest).run(first.step), halving=first.halving)
+    return Contest(runs)
+
+
+def _title(controller: Controller) -> str:
+    changed = [
+        f"{info.name} {getattr(controller, info.name):g}"
+        for info in controller.parameters()
+        if getattr(controller, info.name) != info.default
+    ]
+    return ", ".join([type(controller).title, *changed])
