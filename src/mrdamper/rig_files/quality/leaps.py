@@ -88,8 +88,10 @@ def leaps_in(values: Floats, of_range: float, *, against: bool) -> np.ndarray:
         return np.empty(0, dtype=int)
     own = float(np.max(np.abs(steps), where=~big, initial=0.0))
     at = np.flatnonzero(big & (np.abs(steps) > _FAR * own))
+    at = at[(at >= 3) & (at < steps.size - 3)]
+    # A channel that stood still leaps to where it would have been: it was frozen, which is said elsewhere.
+    at = at[(steps[at - 1] != 0) & (steps[at + 1] != 0)]
     if against:
-        at = at[(at >= 3) & (at < steps.size - 3)]
         at = np.array([i for i in at if _against(steps, int(i))], dtype=int)
     return there[at]
 

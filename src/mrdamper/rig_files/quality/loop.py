@@ -50,8 +50,8 @@ def dissipates(view: View) -> None:
 def keeps_its_sign(view: View) -> None:
     """Refuse a force that changes its sign within the record: cycle against cycle, or stretches of one."""
     motion = view.motion
-    if motion is None or motion.cycles < 2 - 0.05:
-        return
+    if motion is None or motion.cycles < 2 - 0.05 or view.noticed("W_FROZEN"):
+        return  # a force that stands still opposes its own other half cycle
     period = 1 / motion.condition.frequency_Hz
     time = view.run.time
     starts = float(view.steady.time[0]) + period * np.arange(int(motion.cycles + 0.05))
