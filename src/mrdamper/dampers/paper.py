@@ -32,17 +32,24 @@ PAPER_FORMS = {
 _SHORTER = ("quadratic-current", "linear-current", "constant")
 
 
-def paper_functions(found: Sequence[Identification]) -> ModifiedFit:
+def paper_functions(found: Sequence[Identification], mass_law: str = "exponential") -> ModifiedFit:
     """The paper's functions [Qian et al. 2024, Eq. 23–43] by plain least squares.
 
     Shorter ones where the tests cannot tell the terms apart. beta spans decades and must stay
     positive: its function gives the logarithm.
+
+    Parameters
+    ----------
+    found : sequence of Identification
+    mass_law : {"exponential", "inverse-square", "power"}
+        Reading of Eq. 29, which the text leaves open.
     """
+    forms = {**PAPER_FORMS, "m": f"mass-{mass_law}"}
     conditions = tuple(i.condition for i in found)
     values = {name: np.array([float(getattr(i.model, name)) for i in found]) for name in PAPER_FORMS}
     functions = {
         name: _first_determined((form, *_SHORTER), conditions, values[name], log=name == "beta")
-        for name, form in PAPER_FORMS.items()
+        for name, form in forms.items()
     }
     damper = ModifiedModel(
         rig=found[0].rig,

@@ -1,25 +1,71 @@
-"""Figures of the study that no other page has."""
+"""The paper's figures by their numbers, and those that only this study has.
+
+Figures 1, 2, 7 and 8 of the paper are photographs and sketches. Which of 13 to 23 shows which
+parameter was not seen; the order here is that of the equations.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from mrdamper.dampers.modified import ModifiedFit
-from mrdamper.data import Floats, Run, same_motion
-from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.report.plots.style import MEASURED, MM, PALETTE, current_colours, house_style, label, new_figure, thin
+from mrdamper.data import Condition, Floats, Run, same_motion
+from mrdamper.errors import IdentificationError
+from mrdamper.functions.fitting import FunctionFit, fit_function
+from mrdamper.identification import Identification
+from mrdamper.identification.loop_analysis import dynamic_ranges
+from mrdamper.motion import Excitation, equivalent_sine, measured_motion
+from mrdamper.report.plots.rig_tests import test_analysis, test_matrix
+from mrdamper.report.plots.style import (
+    MEASURED,
+    MM,
+    PALETTE,
+    PREDICTED,
+    current_colours,
+    house_style,
+    label,
+    new_figure,
+    thin,
+)
 from mrdamper.reproduction.claims import friction_along
 from mrdamper.reproduction.sensitivity import OneAtATime, Sobol
 from mrdamper.reproduction.study import GeneticCheck, Reproduction
-from mrdamper.reproduction.ways import CONSISTENT, LITERAL
-from mrdamper.study.recipe import Scored
+from mrdamper.reproduction.ways import CONSISTENT, LITERAL, TRADITIONAL
+from mrdamper.simulation import simulate
+
+Made = Figure | str  # or why there is none
+_SAME = 0.08
+_LIMITED = 8  # motions told apart in one panel
 
 
-def friction_figure(run: Run) -> Figure:
+def figures(study: Reproduction) -> tuple[dict[str, tuple[Figure, str]], dict[str, str]]:
+    """Every figure with its caption, by name, and why the others cannot be drawn."""
+    drawn: dict[str, tuple[Figure, str]] = {}
+    missing: dict[str, str] = {}
+    for name, caption, make in _FIGURES:
+        made = make(study)
+        if isinstance(made, str):
+            missing[name] = made
+        else:
+            drawn[name] = made, caption
+    single, indices = study.sensitivity, study.sobol
+    if single:
+        drawn["sensitivity"] = (
+            sensitivity_figure(single, indices),
+            "Change of the force when one coordinate changes by a tenth: the others held (bars), identified anew "
+            "(marks)" + ("; total Sobol indices with 95 % intervals (right)." if indices else "."),
+        )
+    return drawn, missing
+
+
+def friction_figure(study: Reproduction) -> Made:
     """Slow test: force over displacement, and the friction in it along the stroke."""
+    run = study.friction
+    if run is None:
+        return "the data hold no friction test"
     with house_style():
         figure, axes = new_figure(1, 2, 2.9)
         axes[0].plot(MM * thin(run.displacement, 1500), thin(run.force, 1500), color=MEASURED, lw=0.6)
@@ -31,77 +77,213 @@ def friction_figure(run: Run) -> Figure:
         return figure
 
 
-def first_harmonic_figure(study: Reproduction) -> Figure:
-    """F0 and phi over current, one colour a motion."""
+def loops_by(vary: str) -> Callable[[Reproduction], Made]:
+    """Measured loops of runs that differ in one quantity; the largest such group of the tests."""
+
+    def make(study: Reproduction) -> Made:
+        group = _group_varying(study, vary)
+        if len(group) < 2:
+            return f"no two runs differ in {vary} alone"
+        with house_style():
+            figure, axes = new_figure(1, 2, 3.2, right=1.5)
+            shades = current_colours([float(k) for k in range(len(group))])
+            for k, (run, condition) in enumerate(group):
+                motion, force = last_cycle(run, condition)
+                axes[0].plot(MM * motion.displacement, force, color=shades[float(k)], lw=0.9)
+                axes[1].plot(motion.velocity, force, color=shades[float(k)], lw=0.9, label=_named(condition, vary))
+            label(axes[0], "Displacement (mm)", "Force (N)", _fixed(group[0][1], vary))
+            label(axes[1], "Velocity (m/s)", "")
+            axes[1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7)
+            return figure
+
+    return make
+
+
+def identified_over(channel: str) -> Callable[[Reproduction], Made]:
+    """Tested loops with those of the literal and the consistent identification of the same run."""
+
+    def make(study: Reproduction) -> Made:
+        shown = _spread(study.train)
+        found = {
+            t: {i.run_id: i for i in c.identifications} for t in (LITERAL, CONSISTENT) if (c := study.contender(t))
+        }
+        shown = [run for run in shown if all(run.id in known for known in found.values())]
+        if not shown or not found:
+            return "no run was identified both ways"
+        curves = {title: [_identified_force(known[run.id], run) for run in shown] for title, known in found.items()}
+        return _loops_beside(study, shown, curves, channel)
+
+    return make
+
+
+def predicted_over(channel: str) -> Callable[[Reproduction], Made]:
+    """Held-out loops as measured, and as the literal, the consistent and the traditional model predict them."""
+
+    def make(study: Reproduction) -> Made:
+        shown = _spread(study.held_out)
+        ways = [c for title in (LITERAL, CONSISTENT, TRADITIONAL) if (c := study.contender(title))]
+        if not shown or not ways:
+            return "nothing predicts a held-out run"
+        curves = {c.recipe.title: [c.damper.predict_run(run).force for run in shown] for c in ways}
+        return _loops_beside(study, shown, curves, channel)
+
+    return make
+
+
+def readings_figure(name: str, text: str, fit: str = "") -> Callable[[Reproduction], Made]:
+    """F0, phi or f0 over current, motion by motion, with a function and its R² where one is asked for."""
+
+    def make(study: Reproduction) -> Made:
+        values = np.array([getattr(r, name) for r in study.readings])
+        return by_motion(study, values, text, fit)
+
+    return make
+
+
+def parameter_figure(name: str, text: str, fit: str = "") -> Callable[[Reproduction], Made]:
+    """A parameter of the literal identifications over current: fits motion by motion, or the one function of all."""
+
+    def make(study: Reproduction) -> Made:
+        contender = study.contender(LITERAL)
+        if contender is None:
+            return "the literal recipe could not be followed"
+        values = np.array(
+            [study.switches.scaled(name, float(getattr(i.model, name))) for i in contender.identifications]
+        )
+        whole = None
+        if not fit:
+            if not isinstance(contender.fit, ModifiedFit) or name not in contender.fit.functions:
+                return f"{name} has no function"
+            whole = contender.fit.functions[name]
+        scale = study.switches.scaled(name, 1.0)
+        return by_motion(study, values, text, fit, whole, log=name == "beta", scale=scale)
+
+    return make
+
+
+def by_motion(
+    study: Reproduction,
+    values: Floats,
+    text: str,
+    fit: str = "",
+    whole: FunctionFit | None = None,
+    *,
+    log: bool = False,
+    scale: float = 1.0,
+) -> Made:
+    """Values over current, one colour a motion; the fit of every motion, or one function of all, with its R²."""
     with house_style():
-        figure, axes = new_figure(1, 2, 3.0, right=1.45)
-        for name, points, colour in _by_motion(study):
-            currents = [study.conditions[i].current_A for i in points]
-            axes[0].plot(currents, [study.readings[i].amplitude for i in points], "o-", ms=3, lw=0.7, color=colour)
-            phases = [study.readings[i].phase for i in points]
-            axes[1].plot(currents, phases, "o-", ms=3, lw=0.7, color=colour, label=name)
-        axes[1].axhspan(1.4, 1.5, color="#eeeeee", zorder=0)
-        label(axes[0], "Current (A)", "F0 (N)")
-        label(axes[1], "Current (A)", "Phase φ (rad)")
-        axes[1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7)
+        figure, (axes,) = new_figure(1, 1, 3.4, right=2.3)
+        for motion, points, colour in _by_motion(study):
+            conditions = [study.conditions[i] for i in points]
+            currents = np.array([c.current_A for c in conditions])
+            axes.plot(currents, values[points], "o", ms=3.5, color=colour)
+            dense = np.linspace(currents.min(), currents.max(), 60)
+            name = motion
+            try:
+                curve, r2 = None, float("nan")
+                if fit:
+                    found = fit_function(fit, conditions, values[points], log=log)
+                    curve, r2 = found.function, found.r2
+                elif whole is not None:
+                    curve, r2 = whole.function, _r2(values[points] / scale, whole, conditions, log)
+                if curve is not None:
+                    shape = curve(dense, conditions[0].frequency_Hz, conditions[0].amplitude_m)
+                    axes.plot(dense, scale * shape if whole is not None else shape, lw=0.9, color=colour)
+                    name = f"{motion}: R² {r2:.3f}" if np.isfinite(r2) else motion
+            except IdentificationError:
+                name = f"{motion}: too few currents"
+            axes.plot([], [], "o-", ms=3.5, lw=0.9, color=colour, label=name)
+        if log:
+            axes.set_yscale("log")
+        title = "" if whole is None else f"{whole.function.form}: R² {whole.r2:.3f} over all runs"
+        label(axes, "Current (A)", text, title)
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7)
         return figure
 
 
-def damping_and_mass_figure(study: Reproduction) -> Figure:
-    """C and m over current: closed form and consistent balance."""
+def over_motion(
+    values_of: str, over: str, text: str, form: str, source: Callable[[Reproduction], Floats | None]
+) -> Callable[[Reproduction], Made]:
+    """What is left of a parameter beside its common current law, over frequency or speed, with the fit and its R²."""
+
+    def make(study: Reproduction) -> Made:
+        values = source(study)
+        if values is None or values.size != len(study.conditions):
+            return f"{values_of} was not identified on every run"
+        try:
+            rest = beside_current_law(study.conditions, values)
+        except IdentificationError as error:
+            return str(error)
+        conditions = [study.conditions[group[0]] for group in _motions(study)]
+        level = np.array([float(np.mean(rest[group])) for group in _motions(study)])
+        axis = _OVER[over]
+        x = np.array([axis[0](c) for c in conditions])
+        with house_style():
+            figure, (axes,) = new_figure(1, 1, 3.0, right=2.0)
+            shades = current_colours([c.peak_velocity for c in conditions])
+            for c, u, v in zip(conditions, x, level, strict=True):
+                name = f"{c.frequency_Hz:.2g} Hz, {MM * c.amplitude_m:.3g} mm"
+                axes.plot(u, v, "o", ms=4, color=shades[c.peak_velocity], label=name)
+            try:
+                found = fit_function(form, [Condition(0.0, c.frequency_Hz, c.amplitude_m) for c in conditions], level)
+                title = f"{form}: R² {found.r2:.3f}"
+                order = np.argsort(x)
+                fitted = np.array([float(found.function(0.0, c.frequency_Hz, c.amplitude_m)) for c in conditions])
+                axes.plot(x[order], fitted[order], "-", lw=0.9, color=PALETTE[1])
+            except IdentificationError as error:
+                title = f"no fit: {error.found}"
+            label(axes, axis[1], text, title)
+            axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7)
+            return figure
+
+    return make
+
+
+def beside_current_law(conditions: Sequence[Condition], values: Floats) -> Floats:
+    """Values less the terms in I and I² that all motions share [Qian et al. 2024, Eq. 24, 28, 33].
+
+    Raises
+    ------
+    IdentificationError
+        If fewer than three currents were tested.
+    """
+    currents = np.array([c.current_A for c in conditions])
+    if len(np.unique(np.round(currents, 3))) < 3:
+        raise IdentificationError("fewer than three currents", mend="test more of them")
+    levels = np.zeros((len(conditions), 0))
+    for group in same_motion(conditions, tolerance=_SAME):
+        levels = np.column_stack([levels, np.isin(np.arange(len(conditions)), group)])
+    found = np.linalg.lstsq(np.column_stack([currents**2, currents, levels]), values, rcond=None)[0]
+    return values - currents**2 * found[0] - currents * found[1]
+
+
+def accuracy_rate(study: Reproduction) -> Made:
+    """Median and worst held-out error, and seconds an identification takes, by way."""
+    ways = [c for c in study.contenders if c.held_out.runs]
+    if not ways:
+        return "nothing predicts a held-out run"
     with house_style():
-        figure, axes = new_figure(2, 2, 5.0)
-        for row, (name, text) in enumerate((("c", "c (N s/m)"), ("m", "m (kg)"))):
-            for column, title in enumerate((LITERAL, CONSISTENT)):
-                panel = axes[2 * row + column]
-                found = study.contender(title).identifications
-                for motion, points, colour in _by_motion(study):
-                    currents = [study.conditions[i].current_A for i in points]
-                    values = [getattr(found[i].model, name) for i in points]
-                    panel.plot(currents, values, "o-", ms=3, lw=0.7, color=colour, label=motion)
-                label(panel, "Current (A)", text, title)
-        axes[1].legend(fontsize=6, loc="lower right")
+        figure, axes = new_figure(1, 2, 1.0 + 0.26 * len(ways), left=2.4)
+        rows = np.arange(len(ways))[::-1]
+        axes[0].barh(rows, [100 * c.held_out.median() for c in ways], color=PALETTE[6], label="median")
+        axes[0].plot([100 * c.held_out.worst().scores.nrmse_pp for c in ways], rows, "k|", ms=8, label="worst run")
+        axes[0].set_yticks(rows, [c.recipe.title for c in ways])
+        axes[0].legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, fontsize=7)
+        label(axes[0], "Held-out nrmse_pp (%)", "")
+        rates = [c.seconds / max(len(c.identifications), 1) for c in ways]
+        axes[1].barh(rows, rates, color=PALETTE[3])
+        axes[1].set_xscale("log")
+        axes[1].set_yticks(rows, [""] * len(ways))
+        label(axes[1], "Identification, s a run", "")
         return figure
 
 
-def functions_figure(contender: Scored, names: Sequence[str]) -> Figure:
-    """Identified values and the functions through them, with R²."""
-    fit = contender.fit
-    assert isinstance(fit, ModifiedFit)
-    shown = [name for name in names if name in fit.functions]
-    units = {info.name: info.unit for info in BoucWen.parameters()} | {"yield_force": "N", "yield_displacement": "m"}
-    with house_style():
-        rows = -(-len(shown) // 2)
-        figure, axes = new_figure(rows, 2, 2.5 * rows)
-        groups = same_motion(fit.conditions, tolerance=0.08)[:8]
-        shades = current_colours([fit.conditions[g[0]].peak_velocity for g in groups])
-        dense = np.linspace(*fit.damper.envelope.current_A, 60)
-        for panel, name in zip(axes, shown, strict=False):
-            found = fit.functions[name]
-            for group in groups:
-                first = fit.conditions[group[0]]
-                colour = shades[first.peak_velocity]
-                panel.plot(
-                    [fit.conditions[i].current_A for i in group], fit.values[name][group], "o", ms=3, color=colour
-                )
-                curve = found.function(dense, first.frequency_Hz, first.amplitude_m)
-                panel.plot(dense, curve, lw=0.8, color=colour)
-            if found.function.log:
-                panel.set_yscale("log")
-            varies = np.ptp(fit.values[name]) > 1e-9 * np.max(np.abs(fit.values[name]))
-            label(
-                panel,
-                "Current (A)",
-                f"{name} ({units[name]})",
-                f"{found.function.form}, R² {found.r2:.3f}" if varies else "held",
-            )
-        for unused in axes[len(shown) :]:
-            unused.set_visible(False)
-        return figure
-
-
-def genetic_figure(checks: Sequence[GeneticCheck]) -> Figure:
+def genetic_figure(study: Reproduction) -> Made:
     """Lowest error over the generations, above the least there is."""
+    checks: Sequence[GeneticCheck] = study.genetic
+    if not checks:
+        return "no genetic search was made"
     with house_style():
         figure, (axes,) = new_figure(1, 1, 2.8)
         for check, colour in zip(checks, PALETTE[1:], strict=False):
@@ -117,7 +299,7 @@ def genetic_figure(checks: Sequence[GeneticCheck]) -> Figure:
         return figure
 
 
-def errors_figure(study: Reproduction) -> Figure:
+def errors_figure(study: Reproduction) -> Made:
     """Error of every held-out run by contender, over current."""
     with house_style():
         figure, (axes,) = new_figure(1, 1, 3.2, right=2.6)
@@ -140,8 +322,11 @@ def errors_figure(study: Reproduction) -> Figure:
         return figure
 
 
-def seeds_figure(errors: dict[str, Floats]) -> Figure:
+def seeds_figure(study: Reproduction) -> Made:
     """Held-out error over noise seeds."""
+    errors = study.seed_errors
+    if not errors:
+        return "noise seeds need a virtual rig"
     with house_style():
         figure, (axes,) = new_figure(1, 1, 2.4, left=2.2)
         for row, values in enumerate(errors.values()):
@@ -176,6 +361,108 @@ def sensitivity_figure(single: Sequence[OneAtATime], indices: Sobol | None) -> F
         return figure
 
 
+def last_cycle(run: Run, condition: Condition) -> tuple[Excitation, Floats]:
+    """Motion and force of the last cycle inside a run's steady window."""
+    end = run.window[1] if run.window else float(run.time[-1])
+    last = (run.time <= end) & (run.time >= end - 1.02 / condition.frequency_Hz)
+    pick = np.flatnonzero(last)
+    pick = pick[:: max(1, pick.size // 400)]
+    return measured_motion(run).part(pick), run.force[pick]
+
+
+def _loops_beside(study: Reproduction, runs: Sequence[Run], curves: dict[str, list[Floats]], channel: str) -> Figure:
+    with house_style():
+        figure, axes = new_figure(1, len(runs), 3.1)
+        for k, (run, panel) in enumerate(zip(runs, axes, strict=True)):
+            motion = measured_motion(run)
+            condition = equivalent_sine(run).condition
+            end = run.window[1] if run.window else float(run.time[-1])
+            last = (run.time <= end) & (run.time >= end - 1.02 / condition.frequency_Hz)
+            x = MM * motion.displacement[last] if channel == "displacement" else motion.velocity[last]
+            panel.plot(thin(x), thin(run.force[last]), color=MEASURED, lw=1.4, alpha=0.6, label="tested")
+            for (title, forces), colour in zip(curves.items(), (PREDICTED, PALETTE[1], PALETTE[3]), strict=False):
+                panel.plot(thin(x), thin(forces[k][last]), color=colour, lw=0.9, label=title)
+            label(
+                panel,
+                "Displacement (mm)" if channel == "displacement" else "Velocity (m/s)",
+                "Force (N)" if k == 0 else "",
+                str(condition),
+            )
+            panel.title.set_fontsize(7)
+        axes[0].legend(loc="upper left", fontsize=6.5)
+        return figure
+
+
+def _identified_force(found: Identification, run: Run) -> Floats:
+    return simulate(found.model, measured_motion(run)).force
+
+
+def _spread(runs: Sequence[Run], most: int = 3) -> list[Run]:
+    """Some runs over the currents."""
+    ordered = sorted(runs, key=lambda run: float(np.mean(run.current)))
+    picks = np.unique(np.linspace(0, len(ordered) - 1, min(most, len(ordered))).round().astype(int)) if ordered else []
+    return [ordered[i] for i in picks]
+
+
+def _group_varying(study: Reproduction, vary: str) -> list[tuple[Run, Condition]]:
+    """Largest group of runs that differ in one of current, frequency and amplitude alone, in its order."""
+    runs = {run.id: run for run in (*study.train, *study.held_out)}
+    keys = {"current": lambda c: round(c.current_A, 2), "frequency": lambda c: round(np.log(c.frequency_Hz) / _SAME),
+            "amplitude": lambda c: round(np.log(c.amplitude_m) / _SAME)}  # fmt: skip
+    groups: dict[tuple[object, ...], dict[object, tuple[Run, Condition]]] = {}
+    for loop in study.loops:
+        if loop.run_id not in runs:
+            continue
+        fixed = tuple(key(loop.condition) for name, key in keys.items() if name != vary)
+        groups.setdefault(fixed, {}).setdefault(keys[vary](loop.condition), (runs[loop.run_id], loop.condition))
+    largest = max(groups.values(), key=lambda g: (len(g), max(c.current_A for _, c in g.values())))
+    return [largest[key] for key in sorted(largest)][: _LIMITED + 1]  # type: ignore[type-var]
+
+
+def _named(condition: Condition, vary: str) -> str:
+    texts = {"current": f"{condition.current_A:.3g} A", "frequency": f"{condition.frequency_Hz:.3g} Hz",
+             "amplitude": f"{MM * condition.amplitude_m:.3g} mm"}  # fmt: skip
+    return texts[vary]
+
+
+def _fixed(condition: Condition, vary: str) -> str:
+    return ", ".join(_named(condition, name) for name in ("current", "frequency", "amplitude") if name != vary)
+
+
+def _motions(study: Reproduction) -> list[list[int]]:
+    return same_motion(study.conditions, tolerance=_SAME)
+
+
+def _r2(values: Floats, whole: FunctionFit, conditions: Sequence[Condition], log: bool) -> float:
+    """R² of a function of all runs on the runs of one motion."""
+    found = np.array([float(whole.function(c.current_A, c.frequency_Hz, c.amplitude_m)) for c in conditions])
+    target, found = (np.log(values), np.log(found)) if log else (values, found)
+    spread = float(np.sum((target - target.mean()) ** 2))
+    return 1 - float(np.sum((found - target) ** 2)) / spread if spread > 0 else float("nan")
+
+
+def _literal(name: str) -> Callable[[Reproduction], Floats | None]:
+    def values(study: Reproduction) -> Floats | None:
+        contender = study.contender(LITERAL)
+        if contender is None:
+            return None
+        return np.array([study.switches.scaled(name, float(getattr(i.model, name))) for i in contender.identifications])
+
+    return values
+
+
+def _log_literal(name: str) -> Callable[[Reproduction], Floats | None]:
+    def values(study: Reproduction) -> Floats | None:
+        found = _literal(name)(study)
+        return None if found is None else np.log(np.maximum(found, 1e-12))
+
+    return values
+
+
+def _readings(study: Reproduction) -> Floats:
+    return np.array([r.amplitude for r in study.readings])
+
+
 def _by_motion(study: Reproduction) -> list[tuple[str, list[int], tuple[float, ...]]]:
     groups = same_motion(study.conditions, tolerance=0.08)
     shades = current_colours([study.conditions[g[0]].peak_velocity for g in groups])
@@ -187,3 +474,87 @@ def _by_motion(study: Reproduction) -> list[tuple[str, list[int], tuple[float, .
             (f"{first.frequency_Hz:.2g} Hz, {MM * first.amplitude_m:.3g} mm", ordered, shades[first.peak_velocity])
         )
     return found
+
+
+_OVER: dict[str, tuple[Callable[[Condition], float], str]] = {
+    "frequency": (lambda c: c.frequency_Hz, "Frequency (Hz)"),
+    "speed": (lambda c: MM * c.frequency_Hz * c.amplitude_m, "f · A (mm Hz)"),
+}
+_FIGURES: tuple[tuple[str, str, Callable[[Reproduction], Made]], ...] = (
+    (
+        "fig03_friction",
+        "Fig. 3. Friction test at 0.01 mm/s; right: half the force between the strokes.",
+        friction_figure,
+    ),
+    ("fig04_loops_current", "Fig. 4. Loops over current.", loops_by("current")),
+    ("fig05_loops_frequency", "Fig. 5. Loops over frequency.", loops_by("frequency")),
+    ("fig06_loops_amplitude", "Fig. 6. Loops over amplitude.", loops_by("amplitude")),
+    (
+        "fig09_identified_displacement",
+        "Fig. 9. Identified against tested, over displacement.",
+        identified_over("displacement"),
+    ),
+    ("fig10_identified_velocity", "Fig. 10. Identified against tested, over velocity.", identified_over("velocity")),
+    (
+        "fig11_F0",
+        "Fig. 11. F0 over current, a quadratic for every motion [Eq. 23].",
+        readings_figure("amplitude", "F0 (N)", "quadratic-current"),
+    ),
+    ("fig12_phase", "Fig. 12. Phase of the first harmonic over current.", readings_figure("phase", "Phase φ (rad)")),
+    ("fig13_f0", "Fig. 13. Offset force over current.", readings_figure("offset", "f0 (N)", "constant")),
+    (
+        "fig14_F0_shift",
+        "Fig. 14. F0 beside its common current law, over f · A [Eq. 24–25].",
+        over_motion("F0", "speed", "b (N)", "quadratic-current-speed", _readings),
+    ),
+    ("fig15_c", "Fig. 15. c by the closed form, and its function [Eq. 26].", parameter_figure("c", "c (N s/m)")),
+    (
+        "fig16_m",
+        "Fig. 16. m by the closed form, a quadratic for every motion [Eq. 27].",
+        parameter_figure("m", "m (kg)", "quadratic-current"),
+    ),
+    (
+        "fig17_m3",
+        "Fig. 17. m beside its common current law, over frequency [Eq. 29–30].",
+        over_motion("m", "frequency", "m3 (kg)", "mass-exponential", _literal("m")),
+    ),
+    ("fig18_m_function", "Fig. 18. m and its function [Eq. 31].", parameter_figure("m", "m (kg)")),
+    (
+        "fig19_alpha",
+        "Fig. 19. α, a quadratic for every motion [Eq. 32].",
+        parameter_figure("alpha", "α (N/m)", "quadratic-current"),
+    ),
+    (
+        "fig20_alpha_d",
+        "Fig. 20. α beside its common current law, over frequency [Eq. 33–35].",
+        over_motion("alpha", "frequency", "d (N/m)", "plane", _literal("alpha")),
+    ),
+    (
+        "fig21_beta",
+        "Fig. 21. β, an exponential for every motion [Eq. 37].",
+        parameter_figure("beta", "β (m⁻ⁿ)", "decaying-current"),
+    ),
+    (
+        "fig22_beta_q",
+        "Fig. 22. ln β beside its common current law, over frequency [Eq. 39–40].",
+        over_motion("beta", "frequency", "ln β (–)", "mass-exponential", _log_literal("beta")),
+    ),
+    ("fig23_alpha_function", "Fig. 23. α and its function [Eq. 36].", parameter_figure("alpha", "α (N/m)")),
+    ("fig23_beta_function", "Fig. 23. β and its function [Eq. 40].", parameter_figure("beta", "β (m⁻ⁿ)")),
+    (
+        "fig24_predicted_displacement",
+        "Fig. 24. Held-out runs predicted, over displacement.",
+        predicted_over("displacement"),
+    ),
+    ("fig25_predicted_velocity", "Fig. 25. Held-out runs predicted, over velocity.", predicted_over("velocity")),
+    ("fig26_accuracy_rate", "Fig. 26. Accuracy on held-out runs and time of an identification.", accuracy_rate),
+    ("matrix", "Test matrix; hollow marks are held out.", lambda study: test_matrix(study.loops)),
+    (
+        "analysis",
+        "Peak force, energy, equivalent damping and dynamic range before any model.",
+        lambda study: test_analysis(study.loops, dynamic_ranges(study.loops)),
+    ),
+    ("genetic", "Genetic search with the paper's settings, 500 generations of 100 in each box.", genetic_figure),
+    ("errors", "Error of every held-out run.", errors_figure),
+    ("seeds", "Median held-out error over noise seeds.", seeds_figure),
+)

@@ -2,38 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.data import Condition
-from mrdamper.errors import MissingExtraError
+from mrdamper.errors import InputError
 from mrdamper.files.atomic import publish
 from mrdamper.files.encoding import csv_text
+from mrdamper.identification.harmonic_balance import SineRecord
+from mrdamper.models import Model
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.report.page import made_from, render_page
-from mrdamper.report.plots.model import predicted_loops
-from mrdamper.report.plots.rig_tests import measured_loops, test_analysis, test_matrix
 from mrdamper.report.plots.style import save_figure
 from mrdamper.report.tables import identification_rows
-from mrdamper.reproduction.claims import Claim, judge
-from mrdamper.reproduction.figures import (
-    damping_and_mass_figure,
-    errors_figure,
-    first_harmonic_figure,
-    friction_figure,
-    functions_figure,
-    genetic_figure,
-    seeds_figure,
-    sensitivity_figure,
-)
-from mrdamper.reproduction.sensitivity import OneAtATime, Sobol, one_at_a_time, sobol
+from mrdamper.reproduction.claims import Claim, judge_all
+from mrdamper.reproduction.figures import figures
 from mrdamper.reproduction.study import Reproduction
-from mrdamper.reproduction.ways import CONSISTENT, LITERAL, TRADITIONAL
+from mrdamper.reproduction.ways import CONSISTENT, LITERAL
 from mrdamper.study.recipe import Progress
 
 _GROUPS = {
@@ -43,12 +32,11 @@ _GROUPS = {
     "traditional": "traditional",
     "literature": "literature",
 }
-_SOBOL_SAMPLES = 128
 Rows = list[dict[str, Any]]
 
 
 def write_reproduction(
-    study: Reproduction, folder: str | Path, progress: Progress = lambda what, share: None
+    study: Reproduction, folder: str | Path, progress: Progress = lambda what, share: None, *, png: bool = False
 ) -> list[Path]:
     """Write reproduction.html, tables/ and figures/.
 
@@ -59,6 +47,8 @@ def write_reproduction(
         Made if missing; files of the same names are replaced together at the end.
     progress : callable
         Told what is being done and the share done.
+    png : bool
+        Every figure as PNG beside the SVG.
 
     Returns
     -------
@@ -70,27 +60,43 @@ def write_reproduction(
     OutputError
         If the folder cannot be written to.
     """
-    progress("claims and sensitivity", 0.0)
-    claims = judge(study)
-    single, indices, missing = _sensitivity(study)
-    figures = _figures(study, single, indices)
-    tables = _tables(study, claims, single, indices)
+    progress("claims", 0.0)
+    claims = judge_all(study)
+    drawn, missing = figures(study)
+    notes = tuple(f"{name} is not drawn: {why}" for name, why in missing.items())
+    tables, absent = _tables(study, claims)
+    notes += tuple(f"{name} is not made: {why}" for name, why in absent.items())
 
     def fill(work: Path) -> None:
         (work / "figures").mkdir()
         (work / "tables").mkdir()
         pictures = {}
-        for number, (name, figure) in enumerate(figures.items()):
-            progress(f"figure {name}", 0.2 + 0.8 * number / len(figures))
-            pictures[name] = save_figure(figure, work / "figures" / name)
+        for number, (name, (figure, caption)) in enumerate(drawn.items()):
+            progress(f"figure {name}", 0.2 + 0.8 * number / len(drawn))
+            pictures[name] = caption, save_figure(figure, work / "figures" / name, png)
         for name, rows in tables.items():
             (work / "tables" / f"{name}.csv").write_text(csv_text(rows), encoding="utf-8")
-        page = _page(study, claims, tables, pictures, (*study.notes, *missing))
+        page = _page(study, claims, tables, pictures, (*study.notes, *notes))
         (work / "reproduction.html").write_text(page, encoding="utf-8")
 
     written = publish(folder, "reproduction.html", fill)
     progress("written", 1.0)
     return written
+
+
+def summary(study: Reproduction) -> dict[str, Any]:
+    """Verdicts and claims, for a program."""
+    claims = [
+        {"claim": c.text, "verdict": c.verdict, "said": c.said, "evidence": c.evidence, "threshold": c.threshold}
+        for c in judge_all(study)
+    ]
+    return {
+        "synthetic": study.rig is not None,
+        "verdicts": verdicts(study),
+        "claims": claims,
+        "notes": list(study.notes),
+        "seconds": study.seconds,
+    }
 
 
 def verdicts(study: Reproduction) -> Rows:
@@ -105,7 +111,7 @@ def verdicts(study: Reproduction) -> Rows:
                 "method": contender.recipe.title,
                 "numbers": contender.damper.parameter_count,
                 "nrmse_pp": held.median(),
-                "worst_nrmse_pp": held.worst().scores.nrmse_pp,
+                "worst_nrmse_pp": held.worst().scores.nrmse_pp if held.runs else float("nan"),
                 "nrmse_std": held.median("nrmse_std"),
                 "wape": held.median("wape"),
                 "mean_relative_error": held.median("mean_relative_error"),
@@ -120,51 +126,9 @@ def verdicts(study: Reproduction) -> Rows:
     return rows
 
 
-def _sensitivity(study: Reproduction) -> tuple[tuple[OneAtATime, ...], Sobol | None, tuple[str, ...]]:
-    """At the run in the middle of the consistent identifications."""
-    found = study.contender(CONSISTENT).identifications
-    middle = sorted(found, key=lambda i: i.condition.current_A * i.condition.peak_velocity)[len(found) // 2]
-    model, condition = middle.model, middle.condition
-    assert isinstance(model, BoucWen)
-    single = one_at_a_time(model, condition)
-    try:
-        return single, sobol(model, condition, samples=_SOBOL_SAMPLES), ()
-    except MissingExtraError as error:
-        return single, None, (f"Sobol indices were left out: {error}",)
-
-
-def _figures(study: Reproduction, single: tuple[OneAtATime, ...], indices: Sobol | None) -> dict[str, Figure]:
-    by_current = sorted(study.held_out, key=lambda run: run.mean_current)
-    picks = np.unique(np.linspace(0, len(by_current) - 1, 3).round().astype(int))
-    shown = [by_current[i] for i in picks]
-    functions = ("c", "m", "alpha", "beta", "f0")
-    figures = {} if study.friction is None else {"friction": friction_figure(study.friction)}
-    figures |= {
-        "matrix": test_matrix(study.loops),
-        "loops": measured_loops(study.dataset, study.loops),
-        "analysis": test_analysis(study.loops, ()),
-        "first_harmonic": first_harmonic_figure(study),
-        "c_m": damping_and_mass_figure(study),
-        "functions": functions_figure(study.contender(LITERAL), functions),
-        "functions_consistent": functions_figure(
-            study.contender(CONSISTENT), ("c", "m", "yield_force", "yield_displacement", "k1", "f0")
-        ),
-        "sensitivity": sensitivity_figure(single, indices),
-        "predicted": predicted_loops(study.contender(LITERAL).damper, shown),
-        "predicted_consistent": predicted_loops(study.contender(CONSISTENT).damper, shown),
-        "predicted_traditional": predicted_loops(study.contender(TRADITIONAL).damper, shown),
-        "errors": errors_figure(study),
-    }
-    if study.genetic:
-        figures["genetic"] = genetic_figure(study.genetic)
-    if study.seed_errors:
-        figures["seeds"] = seeds_figure(dict(study.seed_errors))
-    return figures
-
-
-def _tables(
-    study: Reproduction, claims: tuple[Claim, ...], single: tuple[OneAtATime, ...], indices: Sobol | None
-) -> dict[str, Rows]:
+def _tables(study: Reproduction, claims: tuple[Claim, ...]) -> tuple[dict[str, Rows], dict[str, str]]:
+    """The paper's tables by their numbers and those only this study has; and why others are not made."""
+    names = ("key", "text", "source", "verdict", "said", "evidence", "threshold", "figure")
     tables: dict[str, Rows] = {
         "table1_tests": [
             {"run_id": loop.run_id, "split": loop.split, **_condition(loop.condition), "peak_force_N": loop.peak_force,
@@ -174,38 +138,85 @@ def _tables(
         "table2_identifications": [
             {"way": c.recipe.title, **row} for c in study.contenders for row in identification_rows(c.identifications)
         ],
-        "table3_functions": _function_rows(study),
+        "table3_parameters": parameter_rows(study),
         "table4_errors": [
             {"method": c.recipe.title, "run_id": run.run_id, **_condition(run.condition),
-             "mean_relative_error": run.scores.mean_relative_error,
-             "wape": run.scores.wape,
+             "mean_relative_error": run.scores.mean_relative_error, "wape": run.scores.wape,
              "nrmse_pp": run.scores.nrmse_pp, "nrmse_std": run.scores.nrmse_std}
             for c in study.contenders
             for run in c.held_out.runs
         ],
         "table5_methods": verdicts(study),
-        "claims": [{n: getattr(c, n) for n in ("text", "source", "verdict", "evidence", "figure")} for c in claims],
-        "sensitivity": _sensitivity_rows(single, indices),
-    }  # fmt: skip
-    if study.genetic:
-        tables["genetic"] = [
+        "functions": _function_rows(study),
+        "claims": [{name: getattr(c, name) for name in names} for c in claims],
+        "sensitivity": _sensitivity_rows(study),
+        "genetic": [
             {**_condition(g.condition), "reached_rmse_N": g.reached, "least_rmse_N": g.optimum,
              "evaluations": g.minimum.evaluations, "seconds": g.seconds, "alpha": float(g.minimum.point[0]),
              "beta": float(g.minimum.point[1])}
             for g in study.genetic
-        ]  # fmt: skip
-    if study.seed_errors:
-        tables["seeds"] = [
+        ],
+        "genetic_runs": [
+            {"run_id": e.run_id, "seed": e.seed, "alpha_over_optimum": e.alpha, "beta_over_optimum": e.beta,
+             "error_over_least": e.error, "seconds": e.seconds}
+            for e in study.ended
+        ],
+        "seeds": [
             {"method": title, "seed": number, "nrmse_pp": float(value)}
             for title, values in study.seed_errors.items()
             for number, value in enumerate(values, 1)
-        ]
-    if study.rig is not None:
-        tables["virtual_rig"] = [
+        ],
+        "virtual_rig": [
             {"parameter": i.name, "value": getattr(study.rig, i.name), "unit": i.unit, "meaning": i.meaning}
-            for i in study.rig.parameters()
-        ]
-    return tables
+            for i in (study.rig.parameters() if study.rig else ())
+        ],
+    }  # fmt: skip
+    reasons = {
+        "genetic": "no genetic search was made",
+        "genetic_runs": "no genetic search was made",
+        "seeds": "noise seeds need the virtual rig",
+        "virtual_rig": "the data are not of the virtual rig",
+    }
+    absent = {name: reasons.get(name, "the data allow no row of it") for name, rows in tables.items() if not rows}
+    return {name: rows for name, rows in tables.items() if rows}, absent
+
+
+def parameter_rows(study: Reproduction) -> Rows:
+    """Parameter values at every held-out condition (80 mm, 1 Hz on the virtual rig), way by way.
+
+    "By the functions" are predicted; "identified there" come from the held-out run itself and serve
+    to compare, never to fit.
+    """
+    rows: Rows = []
+    for run in study.held_out:
+        condition = SineRecord.of(run).condition
+        for contender in study.contenders:
+            try:
+                model = contender.damper.model_at(condition)
+            except InputError:
+                continue
+            if not isinstance(model, BoucWen):
+                continue
+            rows.append(_parameter_row(study, contender.recipe.title, "by the functions", run.id, condition, model))
+        for title in (LITERAL, CONSISTENT):
+            contender = study.contender(title)
+            if contender is None or contender.recipe.basis is None:
+                continue
+            try:
+                found = contender.recipe.basis.identify(run)
+            except InputError:
+                continue
+            rows.append(_parameter_row(study, title, "identified there", run.id, condition, found.model))
+    return rows
+
+
+def _parameter_row(
+    study: Reproduction, method: str, values: str, run_id: str, condition: Condition, model: Model
+) -> dict[str, Any]:
+    row: dict[str, Any] = {"method": method, "values": values, "run_id": run_id, **_condition(condition)}
+    for info in model.parameters():
+        row[f"{info.name} [{info.unit}]"] = study.switches.scaled(info.name, float(getattr(model, info.name)))
+    return {**row, "A [-]": study.switches.A}
 
 
 def _function_rows(study: Reproduction) -> Rows:
@@ -230,14 +241,19 @@ def _function_rows(study: Reproduction) -> Rows:
     return rows
 
 
-def _sensitivity_rows(single: tuple[OneAtATime, ...], indices: Sobol | None) -> Rows:
-    rows = []
-    for effect in single:
+def _sensitivity_rows(study: Reproduction) -> Rows:
+    rows, indices = [], study.sobol
+    for effect in study.sensitivity:
         row = {"parameter": effect.name, "change": effect.change, "effect": effect.effect,
                "left_after_identifying_anew": effect.left if np.isfinite(effect.left) else None}  # fmt: skip
-        if indices is not None:
+        if indices is not None and effect.name in indices.names:
             at = indices.names.index(effect.name)
-            row |= {"sobol_first": float(indices.first[at]), "sobol_total": float(indices.total[at])}
+            row |= {
+                "sobol_first": float(indices.first[at]),
+                "sobol_first_half_width": float(indices.first_confidence[at]),
+                "sobol_total": float(indices.total[at]),
+                "sobol_total_half_width": float(indices.total_confidence[at]),
+            }
         rows.append(row)
     return rows
 
@@ -250,7 +266,7 @@ def _page(
     study: Reproduction,
     claims: tuple[Claim, ...],
     tables: Mapping[str, Rows],
-    pictures: Mapping[str, bytes],
+    pictures: Mapping[str, tuple[str, bytes]],
     notes: tuple[str, ...],
 ) -> str:
     return render_page(
@@ -264,11 +280,5 @@ def _page(
         pictures=pictures,
         notes=notes,
         best=study.best,
-        literal=study.contender(LITERAL),
-        consistent=study.contender(CONSISTENT),
         synthetic=study.rig is not None,
     )
-
-
-def _median(values: Sequence[float]) -> float:
-    return float(np.median(values)) if values else float("nan")

@@ -1,5 +1,9 @@
 """How much each parameter matters at a condition, and what presetting it costs.
 
+The loop is varied in coordinates that no unit of length changes: yield force, yield
+displacement, exponent n and asymmetry (gamma − beta)/(gamma + beta). A change of n with beta
+and gamma held would move the yield displacement by a power of the unit chosen.
+
 A parameter may be preset if changing it hardly changes the force, or if the others make up
 for it when they are identified anew. The two are told apart here: the second is why A = 1
 costs nothing at all.
@@ -20,7 +24,8 @@ from mrdamper.identification.methods.balance import Balance
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.motion import sine
 
-NAMES = ("c", "alpha", "beta", "gamma", "A", "n", "k1", "k3", "m", "f0")
+LOOP = ("yield_force", "yield_displacement", "n", "asymmetry")
+NAMES = ("c", *LOOP, "k1", "k3", "m", "f0")
 _SAMPLES = 256  # of the loop
 
 
@@ -72,9 +77,9 @@ class Sobol:
 def one_at_a_time(
     model: BoucWen,
     condition: Condition,
-    names: Sequence[str] = NAMES,
+    names: Sequence[str] = (*NAMES, "A"),
     change: float = 0.1,
-    refit: Sequence[str] = ("gamma", "A", "n"),
+    refit: Sequence[str] = ("asymmetry", "A", "n"),
 ) -> tuple[OneAtATime, ...]:
     """Change one parameter after the other, and identify the others anew for those that may be preset.
 
@@ -83,9 +88,9 @@ def one_at_a_time(
     model : BoucWen
     condition : Condition
     names : sequence of str
-        Parameters, and "A", the factor of v that the model keeps at 1.
+        Coordinates, and "A", the factor of v that the model keeps at 1.
     change : float
-        Relative change.
+        Relative change; of the asymmetry, which runs from -1 to 1, a difference.
     refit : sequence of str
         Parameters whose change the others are given the chance to make up for.
 
@@ -110,7 +115,7 @@ def sobol(
     condition: Condition,
     names: Sequence[str] = NAMES,
     spread: float = 0.2,
-    samples: int = 256,
+    samples: int = 512,
     seed: int = 0,
 ) -> Sobol:
     """Sobol indices by Saltelli's scheme.
@@ -152,16 +157,28 @@ def sobol(
 
 
 def _varied(model: BoucWen, factors: dict[str, float]) -> BoucWen:
-    """The model with parameters multiplied; a factor A is absorbed: z → z/A."""
-    values = model.values()
+    """The model with coordinates multiplied, the asymmetry moved by the factor less one.
+
+    A factor A acts as on the printed equation with alpha, beta and gamma held.
+    """
+    plain = {name: value for name, value in model.values().items() if name not in ("alpha", "beta", "gamma")}
+    values = plain | {
+        "yield_force": float(model.yield_force),
+        "yield_displacement": float(model.yield_displacement),
+        "asymmetry": float(model.shape.rho),
+    }
     for name in factors:
         if name != "A" and name not in values:
             raise UnknownNameError.of("parameter", name, (*values, "A"))
-    values |= {name: values[name] * factor for name, factor in factors.items() if name != "A"}
-    A = factors.get("A", 1.0)
-    shrink = A ** (values["n"] - 1)
-    values |= {"alpha": values["alpha"] * A, "beta": values["beta"] * shrink, "gamma": values["gamma"] * shrink}
-    return BoucWen(**values)
+    for name, factor in factors.items():
+        if name == "asymmetry":
+            values[name] = float(np.clip(values[name] + factor - 1, -0.98, 0.98))
+        elif name != "A":
+            values[name] *= factor
+    A, n = factors.get("A", 1.0), values["n"]
+    values["yield_force"] *= A ** (1 / n)
+    values["yield_displacement"] *= A ** (1 / n - 1)
+    return BoucWen.build(values)
 
 
 def _loop(model: BoucWen, condition: Condition) -> Floats:
@@ -172,7 +189,7 @@ def _loop(model: BoucWen, condition: Condition) -> Floats:
 
 
 def _left_after_refit(model: BoucWen, changed: BoucWen, condition: Condition) -> float:
-    """Identify c, alpha, beta, f0 from the changed model with the old gamma/beta and n."""
+    """Identify c, yield force and displacement and f0 from the changed model with the old gamma/beta and n."""
     motion = sine(condition, 1.25, _SAMPLES).part(slice(_SAMPLES // 4, -1))
     theta = 2 * np.pi * condition.frequency_Hz * motion.time
     z = changed.yield_displacement * steady_loop(changed.shape, condition.amplitude_m, theta)

@@ -8,6 +8,7 @@ rig gives is synthetic.
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -26,6 +27,8 @@ from mrdamper.identification.methods.paper import Paper
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.optimizers.generation import GeneticSettings
 from mrdamper.optimizers.genetic import GeneticMinimum
+from mrdamper.reproduction.sensitivity import OneAtATime, Sobol, one_at_a_time, sobol
+from mrdamper.reproduction.switches import Switches
 from mrdamper.reproduction.virtual_rig import CURRENTS, VirtualRig, friction_test, noisy_dataset, true_runs
 from mrdamper.reproduction.ways import (
     CONSISTENT,
@@ -35,24 +38,27 @@ from mrdamper.reproduction.ways import (
     SLOWEST,
     TRADITIONAL,
     OnePerCurrent,
+    Steps,
     chosen_functions,
-    direct_genetic,
+    comparators,
     literature,
     nearest_speed,
     peak_velocity,
     ways,
 )
-from mrdamper.study.recipe import Progress, Scored, Settled, follow_all
+from mrdamper.study.parallel import identify_all
+from mrdamper.study.recipe import Basis, Found, Progress, Scored, Settled, follow_all
 from mrdamper.study.workflow import usable_sines
 from mrdamper.validation import validate
 
 SEEDS = 20
+_SOBOL_SAMPLES = 512
 SEED_CURRENTS = (0.0, 0.5, 1.0, 1.5, 2.0)
 
 
 @dataclass(frozen=True)
 class GeneticCheck:
-    """The genetic search on one run beside the optimum it is after.
+    """The genetic search with the paper's settings on one run beside the optimum it is after.
 
     Attributes
     ----------
@@ -67,6 +73,29 @@ class GeneticCheck:
     minimum: GeneticMinimum
     reached: float
     optimum: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Ended:
+    """Where a genetic search of fewer generations ended on a run, over the optimum.
+
+    Attributes
+    ----------
+    run_id : str
+    seed : int
+    alpha, beta : float
+        Parameter reached over that of the optimum.
+    error : float
+        RMSE reached over the lowest there is.
+    seconds : float
+    """
+
+    run_id: str
+    seed: int
+    alpha: float
+    beta: float
+    error: float
     seconds: float
 
 
@@ -88,8 +117,14 @@ class Reproduction:
     contenders : tuple of Scored
         Their `recipe.title` tells them apart.
     genetic : tuple of GeneticCheck
+    ended : tuple of Ended
+        Genetic searches over all train runs, one seed each.
+    switches : Switches
     seed_errors : mapping of str to (S,) array
         Median nrmse_pp over the held-out runs, one a noise seed, by contender.
+    sensitivity : tuple of OneAtATime
+        At the run in the middle of the consistent identifications.
+    sobol : Sobol or None
     notes : tuple of str
     seconds : float
     """
@@ -104,7 +139,11 @@ class Reproduction:
     readings: tuple[ForceReading, ...]
     contenders: tuple[Scored, ...]
     genetic: tuple[GeneticCheck, ...]
+    ended: tuple[Ended, ...]
+    switches: Switches
     seed_errors: Mapping[str, Floats]
+    sensitivity: tuple[OneAtATime, ...]
+    sobol: Sobol | None
     notes: tuple[str, ...]
     seconds: float
 
@@ -113,9 +152,9 @@ class Reproduction:
         """Measured conditions of the train runs."""
         return tuple(loop.condition for loop in self.loops if loop.split == "train")
 
-    def contender(self, title: str) -> Scored:
-        """The contender of that title."""
-        return next(c for c in self.contenders if c.recipe.title == title)
+    def contender(self, title: str) -> Scored | None:
+        """The contender of that title, where the data allowed it."""
+        return next((c for c in self.contenders if c.recipe.title == title), None)
 
     @property
     def best(self) -> Scored:
@@ -127,9 +166,11 @@ def reproduce(
     dataset: Dataset | None = None,
     gas: GasSpring | None = None,
     *,
-    with_direct_genetic: bool = False,
+    switches: Switches | None = None,
+    with_comparators: bool = True,
     with_models: bool = False,
     seeds: int = SEEDS,
+    jobs: int | None = None,
     progress: Progress = lambda what, share: None,
 ) -> Reproduction:
     """Run the study.
@@ -141,39 +182,49 @@ def reproduce(
     gas : GasSpring, optional
         Of the dataset's rig. Unknown: k1 and m are taken from a regression of the consistent
         in-phase stiffness over the frequencies, k2 = k3 = 0.
-    with_direct_genetic : bool
-        Also identify all parameters at once by the genetic algorithm; takes minutes.
+    switches : Switches, optional
+        What the paper's text leaves open.
+    with_comparators : bool
+        The paper's own comparators: all parameters by the genetic algorithm, and Ali's model.
     with_models : bool
         Also the other models of the literature, over the same conditions.
     seeds : int
         Noise seeds of the virtual rig over which held-out errors are spread.
+    jobs : int, optional
+        Processes for the costly identifications; default one a core. Any number gives the same bits.
     progress : callable
         Told what is being done and the share done.
 
     Raises
     ------
     IdentificationError
-        If the data hold no sine runs of one of the splits.
+        If the data hold no sine runs of one of the splits, or allow no way at all.
     """
     begin = time.perf_counter()
+    chosen = switches or Switches()
     progress("tests", 0.0)
     rig = VirtualRig() if dataset is None else None
     if rig is not None:
         dataset, gas = noisy_dataset(rig, true_runs(rig, CURRENTS), 0), rig.gas
     assert dataset is not None
     train, held_out, notes = _splits(dataset)
-    settled = Settled.of(train, gas)
-    steps = ways(train, held_out, settled)
-    if with_direct_genetic:
-        steps += direct_genetic(train, held_out, settled)
-    if with_models:
-        steps += literature(train)
+    settled = Settled.of(train, gas).preset(chosen.fixed)
+    found: Found = {}
+    costly: Steps = comparators(train, held_out, settled) if with_comparators else []
+    searches = _searches(train, settled, chosen) if with_comparators else []
+    tasks = [(r.basis, run) for r, runs in costly for run in runs if r.basis] + searches
+    found |= identify_all(tasks, jobs or os.cpu_count() or 1, lambda what, share: progress(what, 0.05 + 0.4 * share))
+    steps = [*ways(train, held_out, settled, chosen), *costly, *(literature(train) if with_models else ())]
     contenders, refused = follow_all(
-        steps, held_out, lambda what, share: progress(what, 0.05 + 0.45 * share), leave_out=False
+        steps, held_out, lambda what, share: progress(what, 0.45 + 0.2 * share), leave_out=False, found=found
     )
-    left_out = tuple(f"left out: {name}: {why}" for name, why in refused.items())
-    checks, missing = _genetic_checks(train, settled, lambda what, share: progress(what, 0.5 + 0.2 * share))
-    spread = _seed_errors(rig, seeds, lambda what, share: progress(what, 0.7 + 0.3 * share)) if rig and seeds else {}
+    if not contenders:
+        name, why = next(iter(refused.items()))
+        raise IdentificationError(f"no way could be followed; {name}: {why}", where=dataset.name)
+    impossible = tuple(f"left out: {name}: {why}" for name, why in refused.items())
+    checks, missing = _genetic_checks(train, settled, chosen, lambda what, share: progress(what, 0.65 + 0.1 * share))
+    spread = _seed_errors(rig, chosen, seeds, lambda what, share: progress(what, 0.75 + 0.25 * share)) if rig else {}
+    single, indices, unknown = _sensitivity(contenders)
     progress("reproduced", 1.0)
     return Reproduction(
         dataset=dataset,
@@ -181,13 +232,17 @@ def reproduce(
         gas=gas,
         train=tuple(train),
         held_out=tuple(held_out),
-        friction=friction_test(rig) if rig else None,
+        friction=friction_test(rig, filled=chosen.friction_test == "filled") if rig else None,
         loops=tuple(analyse_loop(run) for run in (*train, *held_out)),
         readings=tuple(read_force(SineRecord.of(run)) for run in train),
         contenders=tuple(contenders),
         genetic=checks,
+        ended=_ended(searches, found, settled, chosen),
+        switches=chosen,
         seed_errors=spread,
-        notes=(*notes, *settled.notes, *left_out, *missing),
+        sensitivity=single,
+        sobol=indices,
+        notes=(*notes, *settled.notes, *impossible, *missing, *unknown),
         seconds=time.perf_counter() - begin,
     )
 
@@ -212,36 +267,81 @@ def _splits(dataset: Dataset) -> tuple[list[Run], list[Run], tuple[str, ...]]:
     return train, held_out, tuple(f"not used: {name}: {why}" for name, why in refused.items())
 
 
+def _searches(train: Sequence[Run], settled: Settled, switches: Switches) -> list[tuple[Basis, Run]]:
+    """The genetic search for alpha and beta on every train run, each with a seed of its own."""
+    tasks = []
+    for seed, run in enumerate(train):
+        method = Paper(bounds=switches.bounds, genetic=GeneticSettings(seed=seed), explain=False)
+        tasks.append((settled.basis(method), run))
+    return tasks
+
+
+def _ended(
+    searches: Sequence[tuple[Basis, Run]], found: Found, settled: Settled, switches: Switches
+) -> tuple[Ended, ...]:
+    """Where the searches ended, over the optimum of the same runs."""
+    optimum = settled.basis(Paper(search="optimum", bounds=switches.bounds))
+    ends = []
+    for basis, run in searches:
+        one, seconds = found[basis, run.id]
+        best, _ = found.get((optimum, run.id), ("", 0.0))
+        if isinstance(one, str) or isinstance(best, str) or one.seed is None:
+            continue
+        a, b = (getattr(one.model, name) / getattr(best.model, name) for name in ("alpha", "beta"))
+        error = one.scores.nrmse_pp / best.scores.nrmse_pp
+        ends.append(Ended(run.id, one.seed, float(a), float(b), float(error), seconds))
+    return tuple(ends)
+
+
 def _genetic_checks(
-    train: Sequence[Run], settled: Settled, progress: Progress
+    train: Sequence[Run], settled: Settled, switches: Switches, progress: Progress
 ) -> tuple[tuple[GeneticCheck, ...], tuple[str, ...]]:
     """The genetic search with the paper's settings on two runs of different force."""
     ordered = sorted(train, key=lambda run: float(np.ptp(run.force)))
-    picks = [ordered[int(share * (len(ordered) - 1))] for share in (0.3, 0.7)]
+    picks = list(dict.fromkeys(int(share * (len(ordered) - 1)) for share in (0.3, 0.7)))
     checks = []
-    for number, run in enumerate(picks):
+    for number, run in enumerate(ordered[i] for i in picks):
         progress(f"genetic search, {run.id}", number / len(picks))
-        problem, begin = settled.basis(Paper()).problem(run), time.perf_counter()
+        method = Paper(genetic=GeneticSettings(seed=number), bounds=switches.bounds, explain=False)
+        problem, begin = settled.basis(method).problem(run), time.perf_counter()
         try:
-            found = Paper(genetic=GeneticSettings(seed=number)).genetic_search(problem)
+            found = method.genetic_search(problem)
         except MissingExtraError as error:
             return (), (f"the genetic search was left out: {error}",)
         seconds = time.perf_counter() - begin
-        best = settled.basis(Paper(search="optimum")).identify(run)
+        best = settled.basis(replace(method, search="optimum")).identify(run)
         ends = np.array([found.point, [getattr(best.model, name) for name in ("alpha", "beta")]])
-        reached, optimum = Paper().cost(problem)(ends)
+        reached, optimum = method.cost(problem)(ends)
         checks.append(GeneticCheck(best.condition, found, float(reached), float(optimum), seconds))
     return tuple(checks), ()
 
 
-def _seed_errors(rig: VirtualRig, seeds: int, progress: Progress) -> dict[str, Floats]:
+def _sensitivity(
+    contenders: Sequence[Scored],
+) -> tuple[tuple[OneAtATime, ...], Sobol | None, tuple[str, ...]]:
+    """At the run in the middle of the consistent identifications."""
+    contender = next((c for c in contenders if c.recipe.title == CONSISTENT), None)
+    if contender is None:
+        return (), None, ("sensitivity was left out: the consistent way could not be followed",)
+    found = contender.identifications
+    middle = sorted(found, key=lambda i: i.condition.current_A * i.condition.peak_velocity)[len(found) // 2]
+    model, condition = middle.model, middle.condition
+    assert isinstance(model, BoucWen)
+    try:
+        single = one_at_a_time(model, condition)
+        return single, sobol(model, condition, samples=_SOBOL_SAMPLES), ()
+    except InputError as error:
+        return (), None, (f"sensitivity was left out: {error}",)
+
+
+def _seed_errors(rig: VirtualRig, switches: Switches, seeds: int, progress: Progress) -> dict[str, Floats]:
     """Held-out error over noise seeds, on a thinner matrix: every other current, two cycles.
 
     The joint fit is left out: choosing its forms anew for every seed would take as long as all
     the rest.
     """
     truth = true_runs(rig, SEED_CURRENTS, cycles=2)
-    literal = Paper(search="optimum", explain=False)
+    literal = Paper(search="optimum", explain=False, bounds=switches.bounds)
     errors: dict[str, list[float]] = {}
     for seed in range(1, seeds + 1):
         progress(f"noise seed {seed} of {seeds}", (seed - 1) / seeds)
@@ -249,15 +349,17 @@ def _seed_errors(rig: VirtualRig, seeds: int, progress: Progress) -> dict[str, F
         train, held_out = dataset.split("train"), dataset.split("validate")
 
         def identified(method: Method, runs: Sequence[Run] = train) -> list[Identification]:
-            return [identify(run, BoucWen, method, gas=rig.gas) for run in runs]
+            return [identify(run, BoucWen, method, gas=rig.gas, fixed=dict(switches.fixed)) for run in runs]
 
         consistent = identified(Balance())
         by_run = {one.run_id: one for one in consistent}
         speeds = {TRADITIONAL: peak_velocity(held_out), SLOWEST: 0.0}
         dampers = {
-            LITERAL: paper_functions(identified(literal)).damper,
-            HALF: paper_functions(identified(replace(literal, force_amplitude="half-peak-to-peak"))).damper,
-            SAME_FORMS: paper_functions(consistent).damper,
+            LITERAL: paper_functions(identified(literal), switches.mass_law).damper,
+            HALF: paper_functions(
+                identified(replace(literal, force_amplitude="half-peak-to-peak")), switches.mass_law
+            ).damper,
+            SAME_FORMS: paper_functions(consistent, switches.mass_law).damper,
             CONSISTENT: chosen_functions(consistent).damper,
             **{
                 title: OnePerCurrent.of([by_run[run.id] for run in nearest_speed(train, speed)])

@@ -9,7 +9,7 @@ numbers of the damper are ours, chosen to lie where such dampers lie.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -197,7 +197,9 @@ def noisy_dataset(rig: VirtualRig, runs: Sequence[tuple[Condition, Excitation, F
     return Dataset(tuple(recorded), "virtual rig (synthetic)")
 
 
-def friction_test(rig: VirtualRig | None = None, amplitude: float = 0.020, seed: int = 0) -> Run:
+def friction_test(
+    rig: VirtualRig | None = None, amplitude: float = 0.020, seed: int = 0, *, filled: bool = False
+) -> Run:
     """One cycle at 0.01 mm/s without current [Qian et al. 2024, section 2]; synthetic.
 
     Parameters
@@ -206,8 +208,12 @@ def friction_test(rig: VirtualRig | None = None, amplitude: float = 0.020, seed:
     amplitude : float
         [m]
     seed : int
+    filled : bool
+        With fluid in the damper. The paper's test is without: no yield and no viscous force is in it.
     """
     chosen = rig or VirtualRig()
+    if not filled:
+        chosen = replace(chosen, yield_off=0.0, yield_per_ampere=0.0, viscosity=0.0, viscosity_per_ampere=0.0)
     condition = Condition(0.0, SLOW_SPEED / (4 * amplitude), amplitude)
     motion = triangle(condition, 1.25, 8000)
     return chosen.record(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -16,9 +17,9 @@ from mrdamper.data import Condition, Run
 from mrdamper.identification import Identification
 from mrdamper.identification.harmonic_balance import SineRecord
 from mrdamper.identification.methods.balance import Balance
-from mrdamper.identification.methods.direct_genetic import DirectGenetic
 from mrdamper.identification.methods.paper import Paper
 from mrdamper.models.bouc_wen import BoucWen
+from mrdamper.reproduction.switches import Switches
 from mrdamper.study.recipe import (
     Basis,
     Made,
@@ -36,21 +37,24 @@ CONSISTENT, JOINT = "consistent", "joint"
 TRADITIONAL = "traditional, nearest speed"
 SLOWEST = "traditional, slowest motion"
 DIRECT = "direct genetic, nearest speed"
+ALI = "Ali-type (Spencer-based)"
 
 Steps = list[tuple[Recipe, Sequence[Run]]]
 
 
-def ways(train: Sequence[Run], held_out: Sequence[Run], settled: Settled) -> Steps:
-    """Every way but those that take minutes, and the train runs each needs; `way` says to which group it belongs."""
-    literal = Paper(search="optimum")
-    half = Paper(search="optimum", force_amplitude="half-peak-to-peak")
+def ways(train: Sequence[Run], held_out: Sequence[Run], settled: Settled, switches: Switches) -> Steps:
+    """Every way but the costly ones, and the train runs each needs; `way` says to which group it belongs."""
+    literal = Paper(search="optimum", bounds=switches.bounds)
+    half = replace(literal, force_amplitude="half-peak-to-peak")
     consistent = settled.basis(Balance())
+    by_paper = partial(by_the_paper, mass_law=switches.mass_law)
+    plain = Basis("bouc-wen", Balance(), fixed=switches.fixed)
     steps: Steps = [
-        (Recipe("bouc-wen:literal", settled.basis(literal), by_the_paper, "paper", LITERAL), train),
-        (Recipe("bouc-wen:half", settled.basis(half), by_the_paper, "paper", HALF), train),
-        (Recipe("bouc-wen:same-forms", consistent, by_the_paper, "consistent", SAME_FORMS), train),
+        (Recipe("bouc-wen:literal", settled.basis(literal), by_paper, "paper", LITERAL), train),
+        (Recipe("bouc-wen:half", settled.basis(half), by_paper, "paper", HALF), train),
+        (Recipe("bouc-wen:same-forms", consistent, by_paper, "consistent", SAME_FORMS), train),
         (Recipe("bouc-wen:consistent", consistent, through_chosen, "consistent", CONSISTENT), train),
-        (Recipe("bouc-wen:joint", Basis("bouc-wen", Balance()), at_once, "joint", JOINT), train),
+        (Recipe("bouc-wen:joint", plain, at_once, "joint", JOINT), train),
     ]
     for title, speed in ((TRADITIONAL, peak_velocity(held_out)), (SLOWEST, 0.0)):
         recipe = Recipe(f"bouc-wen:{title}", consistent, one_per_current, "traditional", title)
@@ -58,17 +62,20 @@ def ways(train: Sequence[Run], held_out: Sequence[Run], settled: Settled) -> Ste
     return steps
 
 
-def direct_genetic(train: Sequence[Run], held_out: Sequence[Run], settled: Settled) -> Steps:
-    """All parameters at once by the genetic algorithm, one run a current; it takes minutes."""
-    basis = settled.basis(DirectGenetic())
-    recipe = Recipe("bouc-wen:direct-genetic", basis, one_per_current, "traditional", DIRECT)
-    return [(recipe, nearest_speed(train, peak_velocity(held_out)))]
+def comparators(train: Sequence[Run], held_out: Sequence[Run], settled: Settled) -> Steps:
+    """What the paper compares with: every parameter by the genetic algorithm, one run a current; and Ali's model."""
+    direct = Recipe("bouc-wen:direct-genetic", settled.basis("direct-genetic"), one_per_current, "traditional", DIRECT)
+    ali = conditioned(all_published()["ali-type"])
+    return [
+        (direct, nearest_speed(train, peak_velocity(held_out))),
+        (replace(ali, way="literature", title=ALI), train),
+    ]
 
 
 def literature(train: Sequence[Run]) -> Steps:
-    """Bingham, hyperbolic tangent, every condition-dependent damper of the house, and play and bypass."""
-    found = [modified("bingham"), modified("kwok"), *(conditioned(cls) for cls in all_published().values())]
-    found.append(play_and_bypass())
+    """Bingham, hyperbolic tangent, the other condition-dependent dampers of the house, and play and bypass."""
+    found = [modified("bingham"), modified("kwok"), play_and_bypass()]
+    found += [conditioned(cls) for name, cls in all_published().items() if name != "ali-type"]
     return [(replace(recipe, way="literature"), train) for recipe in found]
 
 

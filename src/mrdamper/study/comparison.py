@@ -97,7 +97,8 @@ def compare(
             )
     runs = [run for sines, _ in sorted_runs for run in sines]
     bases = list(dict.fromkeys(recipe.basis for recipe in chosen if recipe.basis))
-    found = identify_all(bases, runs, workers, lambda what, share: progress(what, 0.7 * share))
+    tasks = [(basis, run) for basis in bases for run in runs]
+    found = identify_all(tasks, workers, lambda what, share: progress(what, 0.7 * share))
     compared = []
     for number, (rig, (sines, refused)) in enumerate(zip(rigs, sorted_runs, strict=True)):
 

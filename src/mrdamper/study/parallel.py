@@ -79,16 +79,17 @@ def _quietly(function: Callable[[T, Progress], R], item: T) -> R:
     return function(item, lambda what, share: None)
 
 
-def identify_all(bases: Sequence[Basis], runs: Sequence[Run], workers: int, progress: Progress) -> Found:
-    """Every basis from every run, in processes of one thread each, so that their number changes no bit."""
-    tasks = [(basis, run.id) for basis in sorted(bases, key=lambda b: not b.costly) for run in runs]
+def identify_all(tasks: Sequence[tuple[Basis, Run]], workers: int, progress: Progress) -> Found:
+    """Every basis from its run, in processes of one thread each, so that their number changes no bit."""
+    named = [(basis, run.id) for basis, run in sorted(tasks, key=lambda task: not task[0].costly)]
+    runs = {run.id: run for _, run in tasks}.values()
     if not tasks:
         return {}
     before = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update(dict.fromkeys(_THREADS, "1"))
     try:
         with processes(workers, _receive, ([_packed(run) for run in runs],)) as pool:
-            waiting = {pool.submit(_identify_one, *task): task for task in tasks}
+            waiting = {pool.submit(_identify_one, *task): task for task in named}
             found: Found = {}
             for done in as_completed(waiting):
                 task = waiting[done]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -28,7 +28,7 @@ from mrdamper.identification.methods.balance import Balance
 from mrdamper.identification.methods.paper import Paper
 from mrdamper.models import Scale, all_models, model_type
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.motion import equivalent_sine
+from mrdamper.motion import analyse_motion, equivalent_sine
 from mrdamper.validation import Validation, leave_one_condition_out, validate
 
 Progress = Callable[[str, float], None]
@@ -125,6 +125,7 @@ class Recipe:
     title: str = ""
     source: str = ""
     limits: str = ""
+    pure: bool = False  # identified from pure sines only; scored on every run all the same
 
     @property
     def model(self) -> str:
@@ -263,7 +264,8 @@ def follow_all(
             progress(f"{recipe.name}, {what}", (number + share) / len(steps))
 
         try:
-            identifications, spent = identified(recipe.basis, runs, found, lambda what, share: tell(what, 0.5 * share))
+            seen = [run for run in runs if analyse_motion(run).is_sine] if recipe.pure else runs
+            identifications, spent = identified(recipe.basis, seen, found, lambda what, share: tell(what, 0.5 * share))
             tell("over all conditions", 0.5)
             scored.append(follow(recipe, runs, identifications, held_out, spent=spent, leave_out=leave_out))
         except InputError as error:
@@ -324,10 +326,15 @@ def one_set(runs: Sequence[Run], identifications: Sequence[Identification]) -> M
     return Made(fit.damper, refit, fit)
 
 
-def by_the_paper(runs: Sequence[Run], identifications: Sequence[Identification]) -> Made:
+def by_the_paper(runs: Sequence[Run], identifications: Sequence[Identification], mass_law: str = "exponential") -> Made:
     """The paper's functions through the values identified from single runs [Qian et al. 2024, Eq. 23–43]."""
-    fit = paper_functions(identifications)
-    return Made(fit.damper, lambda rows: paper_functions([identifications[i] for i in rows]).damper, fit)
+    fit = paper_functions(identifications, mass_law)
+
+    def refit(rows: Sequence[int]) -> Damper:
+        kept = {runs[i].id for i in rows}
+        return paper_functions([i for i in identifications if i.run_id in kept], mass_law).damper
+
+    return Made(fit.damper, refit, fit)
 
 
 def by_its_laws(cls: Published, runs: Sequence[Run], identifications: Sequence[Identification]) -> Made:
@@ -414,9 +421,13 @@ class Settled:
         )
         return cls(None, (("k1", apart.k1), ("k2", 0.0), ("k3", 0.0)), ("m",), (note,))
 
-    def basis(self, method: Method) -> Basis:
+    def basis(self, method: str | Method) -> Basis:
         """Bouc–Wen by a method, with what is settled."""
         return Basis("bouc-wen", method, self.free, self.fixed, self.gas)
+
+    def preset(self, presets: Sequence[tuple[str, float]]) -> Settled:
+        """The same with more parameters held."""
+        return replace(self, fixed=(*self.fixed, *presets))
 
 
 def literal(settled: Settled) -> Recipe:
@@ -424,7 +435,8 @@ def literal(settled: Settled) -> Recipe:
 
     Its alpha and beta are the optimum that the genetic search of the paper approaches.
     """
-    return Recipe("bouc-wen:literal", settled.basis(Paper(search="optimum")), by_the_paper, "paper, literal")
+    basis = settled.basis(Paper(search="optimum"))
+    return Recipe("bouc-wen:literal", basis, by_the_paper, "paper, literal", pure=True)
 
 
 def catalogue() -> Mapping[str, Recipe]:

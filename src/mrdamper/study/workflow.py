@@ -250,5 +250,5 @@ def _steps(train: Sequence[Run]) -> list[tuple[Recipe, Sequence[Run]]]:
     ]
     pure = [run for run in train if analyse_motion(run).is_sine]  # the paper's recipe takes no other
     if len(pure) > 2:
-        steps.append((literal(Settled.of(pure, None)), pure))
+        steps.append((literal(Settled.of(pure, None)), train))
     return [*steps, (play_and_bypass(), train)]

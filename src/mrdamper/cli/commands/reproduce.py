@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import typer
 
@@ -17,13 +18,21 @@ def register(app: typer.Typer) -> None:
         out: Path = typer.Option(..., "--out", help="Folder for reproduction.html, tables and figures."),
         data: Path | None = typer.Option(None, "--data", help="Dataset folder; default: the virtual rig, synthetic."),
         rig: str | None = typer.Option(None, "--rig", help="Rig of the dataset; needed where it holds several."),
-        with_direct_genetic: bool = typer.Option(
-            False,
-            "--with-direct-genetic",
-            help="Also identify all parameters at once by the genetic algorithm (minutes).",
+        comparators: bool = typer.Option(
+            True, "--comparators/--no-comparators", help="The direct genetic search and Ali's model (half the time)."
         ),
         with_models: bool = typer.Option(False, "--with-models", help="Also the other models of the literature."),
         seeds: int = typer.Option(20, "--seeds", min=0, help="Noise seeds of the virtual rig."),
+        preset: list[str] = typer.Option(
+            [], "--preset", help="A=, n= or gamma= (SI; gamma is tied to beta unless given); may be repeated."
+        ),
+        mass_law: str = typer.Option("exponential", "--mass-law", help="Eq. 29: exponential, inverse-square or power."),
+        friction: str = typer.Option("dry", "--friction-test", help="dry, as in the paper, or filled."),
+        box: list[str] = typer.Option(
+            [], "--box", help="alpha=LOW:HIGH or beta=LOW:HIGH of the genetic search; may be repeated."
+        ),
+        jobs: int | None = typer.Option(None, "--jobs", min=1, help="Processes; default one a core."),
+        png: bool = typer.Option(False, "--png", help="Figures as PNG beside the SVG."),
         as_json: bool = typer.Option(False, "--json", help="Print the verdicts and claims for a program."),
     ) -> None:
         """Example: mrdamper reproduce --out result/"""
@@ -33,11 +42,11 @@ def register(app: typer.Typer) -> None:
         from mrdamper.errors import InputError
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.dataset import load_dataset
-        from mrdamper.reproduction import reproduce as run_reproduction
-        from mrdamper.reproduction.claims import judge
-        from mrdamper.reproduction.output import verdicts, write_reproduction
+        from mrdamper.reproduction.output import summary, write_reproduction
+        from mrdamper.reproduction.study import reproduce as run_reproduction
 
         require_writable(out)
+        switches = _switches(preset, box, mass_law, friction)
         dataset = None if data is None else load_dataset(data)
         if dataset is None and rig is not None:
             raise InputError("--rig without --data", mend="give --data DATASET, or leave --rig out")
@@ -49,19 +58,49 @@ def register(app: typer.Typer) -> None:
         with progress_on_stderr() as progress:
             study = run_reproduction(
                 dataset,
-                with_direct_genetic=with_direct_genetic,
+                switches=switches,
+                with_comparators=comparators,
                 with_models=with_models,
                 seeds=seeds,
+                jobs=jobs,
                 progress=lambda what, share: progress(what, 0.85 * share),
             )
-            written = write_reproduction(study, out, lambda what, share: progress(what, 0.85 + 0.15 * share))
+            written = write_reproduction(study, out, lambda what, share: progress(what, 0.85 + 0.15 * share), png=png)
+        found = summary(study)
         if as_json:
-            claims = [{"claim": c.text, "verdict": c.verdict, "evidence": c.evidence} for c in judge(study)]
-            found = {"synthetic": study.rig is not None, "verdicts": verdicts(study), "claims": claims}
-            print(json.dumps(found | {"seconds": study.seconds, "files": [str(p) for p in written]}, indent=1))
+            print(json.dumps(found | {"files": [str(p) for p in written]}, indent=1))
             return
         if study.rig is not None:
             print("virtual rig: every number is synthetic")
-        for row in verdicts(study):
-            print(f"  {row['method']:56} held out nrmse_pp {100 * row['nrmse_pp']:5.2f} %  {row['seconds']:6.1f} s")
+        print(f"  {'held out, nrmse_pp':52}{'median':>9}{'worst':>9}{'s':>8}")
+        for row in found["verdicts"]:
+            shown = f"{100 * row['nrmse_pp']:7.2f} %{100 * row['worst_nrmse_pp']:7.2f} %"
+            print(f"  {row['method']:52}{shown}{row['seconds']:8.1f}")
+        for claim in found["claims"]:
+            print(f"  {claim['said']:20} {claim['claim']}")
         print(f"page: {written[0]}")
+
+
+def _switches(preset: list[str], box: list[str], mass_law: str, friction: str):
+    from mrdamper.cli.output import parse_pairs
+    from mrdamper.errors import InputError, UnknownNameError
+    from mrdamper.reproduction.switches import Switches
+
+    given: dict[str, Any] = {"mass_law": mass_law, "friction_test": friction}
+    for option, pairs, names in (("--preset", preset, ("A", "n", "gamma")), ("--box", box, ("alpha", "beta"))):
+        for name, text in parse_pairs(pairs, option).items():
+            if name not in names:
+                raise UnknownNameError.of(f"name after {option}", name, names)
+            try:
+                numbers = tuple(float(part) for part in text.split(":"))
+                given[name if option == "--preset" else f"{name}_box"] = _one(numbers, option)
+            except ValueError as error:
+                form = "NAME=NUMBER" if option == "--preset" else "NAME=LOW:HIGH"
+                raise InputError(f"{option} {name}={text}", mend=f"write {option} {form}") from error
+    return Switches(**given)
+
+
+def _one(numbers: tuple[float, ...], option: str) -> float | tuple[float, ...]:
+    if len(numbers) != (1 if option == "--preset" else 2):
+        raise ValueError("wrong count")
+    return numbers[0] if option == "--preset" else numbers

@@ -1,0 +1,158 @@
+"""Verdicts as pure functions of a few numbers, and every threshold in one table.
+
+A claim holds where each of its numbers meets its limit, holds in part where some do or come
+within the wider limit, and does not hold where none comes near. A claim without all of its
+numbers cannot be judged. What a virtual rig was built with cannot be confirmed by it: such a
+property is recovered, in part, or not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal
+
+from mrdamper.errors import UnknownNameError
+
+Verdict = Literal["holds", "holds in part", "does not hold", "cannot be judged"]
+RECOVERED: Mapping[str, str] = MappingProxyType(
+    {"holds": "recovered", "holds in part": "recovered in part", "does not hold": "not recovered"}
+)
+
+
+@dataclass(frozen=True)
+class Limit:
+    """One number's limit.
+
+    Attributes
+    ----------
+    number : str
+        What it is, in words.
+    sense : {"below", "above"}
+    holds : float
+        The number must be on this side of it, the limit itself included.
+    near : float
+        Wider limit, within which the claim holds in part; the same where there is none.
+    """
+
+    number: str
+    sense: Literal["below", "above"]
+    holds: float
+    near: float
+
+    def grade(self, value: float) -> int:
+        """2 within the limit, 1 within the wider one, 0 beyond both."""
+        sign = 1.0 if self.sense == "below" else -1.0
+        return 2 if sign * value <= sign * self.holds else 1 if sign * value <= sign * self.near else 0
+
+    @property
+    def text(self) -> str:
+        """The threshold in words."""
+        sign = "≤" if self.sense == "below" else "≥"
+        wider = "" if self.near == self.holds else f" (in part: {sign} {self.near:g})"
+        return f"{self.number} {sign} {self.holds:g}{wider}"
+
+
+def _below(number: str, holds: float, near: float | None = None) -> Limit:
+    return Limit(number, "below", holds, holds if near is None else near)
+
+
+def _above(number: str, holds: float, near: float | None = None) -> Limit:
+    return Limit(number, "above", holds, holds if near is None else near)
+
+
+LIMITS: Mapping[str, tuple[Limit, ...]] = MappingProxyType(
+    {
+        "gas series": (_below("error of the series over the gas force", 0.02, 0.05),),
+        "friction": (
+            _above("least friction, N", 25.0, 15.0),
+            _below("largest friction, N", 100.0, 150.0),
+            _below("mean friction over the smallest peak force", 0.05, 0.15),
+        ),
+        "bulge": (_above("share of loops wider at x = 0 than at 0.8 X", 1.0, 0.8),),
+        "energy": (
+            _above("share of current steps that raise the energy", 1.0, 0.9),
+            _above("share of frequency steps that raise the energy", 1.0, 0.9),
+        ),
+        "stroke end": (_above("lost length at the fast motion over that at the slow one", 1.2, 1.0),),
+        "phase": (
+            _above("share of runs within 1.4–1.5 rad", 1.0, 0.5),
+            _below("largest change with the current at one motion, rad", 0.02, 0.05),
+        ),
+        "quadratic": (_above("least R² of a motion", 0.98, 0.9),),
+        "speed shift": (_above("R² of one surface for all runs", 0.98, 0.9),),
+        "saturation": (_below("slope above 1.5 A over slope below 1 A", 0.4, 0.7),),
+        "viscosity": (_below("median of closed form over consistent c", 1.1, 1.5),),
+        "mass": (
+            _above("R² of m over current and frequency", 0.9, 0.6),
+            _below("largest spread of m over amplitudes, over its mean", 0.2, 0.5),
+            _above("least m, kg", 0.0),
+        ),
+        "alpha": (
+            _above("sign of the slope over frequency", 1.0),
+            _below("sign of the slope over amplitude", -1.0),
+            _above("R²", 0.9, 0.6),
+        ),
+        "beta": (
+            _below("scatter of ln β at the highest current over that at the lowest", 0.5, 0.8),
+            _above("R² of ln β", 0.9, 0.6),
+            _below("share of runs at the limit of the box", 0.1, 0.3),
+        ),
+        "presets": (
+            _below("error left by a wrong n, others identified anew", 0.02, 0.05),
+            _below("error left by a wrong γ/β, others identified anew", 0.02, 0.05),
+            _below("error left by a wrong A, others identified anew", 1e-6, 1e-3),
+        ),
+        "search": (
+            _below("median factor by which α misses the optimum", 1.1, 2.0),
+            _below("median factor by which β misses the optimum", 1.1, 2.0),
+        ),
+        "accuracy": (_below("median error of identification over that of the traditional Bouc–Wen", 1.1, 1.5),),
+        "few parameters": (
+            _below("median held-out error over the Ali-type's", 1.1, 1.5),
+            _below("searched parameters a run over the Ali-type's", 0.99),
+        ),
+        "fast": (_below("time of an identification over that of the traditional Bouc–Wen", 0.99, 1.5),),
+        "generalisation": (
+            _below("median held-out error over the median error of identification", 1.5, 2.5),
+            _below("worst held-out error, nrmse_pp", 0.1, 0.2),
+        ),
+    }
+)
+
+
+def judge(key: str, numbers: Mapping[str, float]) -> Verdict:
+    """The verdict on a claim.
+
+    Parameters
+    ----------
+    key : str
+        Of `LIMITS`.
+    numbers : mapping of str to float
+        By the words of the limits; NaN where one is missing.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such claim, or a number is not one of its own.
+    """
+    if key not in LIMITS:
+        raise UnknownNameError.of("claim", key, LIMITS)
+    limits = LIMITS[key]
+    for name in numbers:
+        if name not in {limit.number for limit in limits}:
+            raise UnknownNameError.of(f"number of claim {key}", name, [limit.number for limit in limits])
+    values = [float(numbers.get(limit.number, math.nan)) for limit in limits]
+    if not all(map(math.isfinite, values)):
+        return "cannot be judged"
+    grades = [limit.grade(value) for limit, value in zip(limits, values, strict=True)]
+    if min(grades) == 2:
+        return "holds"
+    return "does not hold" if max(grades) == 0 else "holds in part"
+
+
+def thresholds(key: str) -> str:
+    """Every threshold of a claim, in words."""
+    return "; ".join(limit.text for limit in LIMITS[key])
