@@ -83,3 +83,50 @@ def test_truncated_and_missing_files(damper, tmp_path):
 def test_a_folder_is_no_place_for_a_model(damper, tmp_path):
     with pytest.raises(OutputError, match="is a folder"):
         save_model(damper, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[" * 100_000 + "]" * 100_000, "nested deeper"),
+        ('{"a":' * 90 + "1" + "}" * 90, "nested deeper"),
+        ('{"format": "mrdamper-model", "version": "1.2", "version": "1.2"}', "'version' stands twice"),
+        ('{"format": NaN}', "NaN is no number"),
+        ('{"format": -Infinity}', "-Infinity is no number"),
+        ('{"format": 1e999}', "too large a number"),
+        ('{"format": ' + "9" * 5000 + "}", "a whole number of 5000 digits"),
+        ("", "not JSON at line 1"),
+        ("null", "not a saved model"),
+    ],
+)
+def test_json_that_readers_understand_differently_is_refused(text, said):
+    with pytest.raises(ModelFileError, match=said):
+        parse_model(text)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "said"),
+    [
+        ("version", "", "version is ''"),
+        ("version", "-1", "version is '-1'"),
+        ("version", "0.9", "version is '0.9'"),
+        ("version", 1.2, "version: "),
+        ("version", "9" * 5000 + ".0", "version is '9999"),
+        ("units.displacement", "mm", "units are not those"),
+        ("units.more", "N", "units are not those"),
+        ("rig", "a\x1b[31m", "the rig is"),
+        ("rig", "a" * 300, "the rig is"),
+        ("envelope.current_A", [1.0, 0.0], "the lower end comes first"),
+        ("envelope.frequency_Hz", [-1.0, 2.0], "-1 is negative"),
+        ("envelope.current_A", ["0", "1"], "envelope.current_A"),
+        ("envelope.current_A", [False, True], "envelope.current_A"),
+        ("damper.functions.c.coefficients", ["1", "2"], "damper.functions.c.coefficients"),
+        ("damper.functions.c.log", "yes", "damper.functions.c.log"),
+        ("damper.functions.c.coefficients", [True, 1.0], "damper.functions.c.coefficients"),
+    ],
+)
+def test_what_only_looks_like_a_model_is_refused(damper, path, value, said):
+    document = json.loads(dump_model(damper))
+    change(document, path, value)
+    with pytest.raises(ModelFileError, match=said):
+        parse_model(json.dumps(document))

@@ -7,20 +7,24 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from mrdamper.dampers import all_kinds
 from mrdamper.dampers.base import Damper, Envelope
 from mrdamper.dampers.coil import Coil, Driver
+from mrdamper.data import require_name
 from mrdamper.errors import InputError, ModelFileError
 from mrdamper.files.atomic import write_file
+from mrdamper.files.strict_json import parse_json
 
 FORMAT = "mrdamper-model"
 MAJOR, MINOR = 1, 2
+_LARGEST = 64_000_000  # bytes of a file
 UNITS = {
     "time": "s",
     "displacement": "m",
@@ -36,11 +40,24 @@ class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-Range = tuple[float, float]
+def _ascending(range_: tuple[float, float]) -> tuple[float, float]:
+    if range_[0] > range_[1]:
+        raise ValueError(f"{range_[0]:g} to {range_[1]:g}: the lower end comes first")
+    return range_
+
+
+def _not_negative(range_: tuple[float, float]) -> tuple[float, float]:
+    if range_[0] < 0:
+        raise ValueError(f"{range_[0]:g} is negative")
+    return range_
+
+
+Signed = Annotated[tuple[float, float], AfterValidator(_ascending)]
+Range = Annotated[Signed, AfterValidator(_not_negative)]
 
 
 class _Envelope(_Strict):
-    current_A: Range
+    current_A: Signed
     frequency_Hz: Range
     amplitude_m: Range
     peak_velocity_m_s: Range
@@ -139,6 +156,8 @@ def load_model(path: str | Path) -> Damper:
     """
     path = Path(path)
     try:
+        if path.is_file() and path.stat().st_size > _LARGEST:
+            raise ModelFileError(f"over {_LARGEST // 10**6} MB", where=str(path), mend="is this a model.json?")
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
@@ -149,25 +168,28 @@ def load_model(path: str | Path) -> Damper:
 def parse_model(text: str, where: str = "model") -> Damper:
     """Read a damper from the text of its document; raises as `load_model`."""
     try:
-        raw = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise ModelFileError(
-            f"not JSON at line {error.lineno}: {error.msg}", where=where, mend="copy the file again"
-        ) from error
+        raw = parse_json(text)
+    except ValueError as error:
+        raise ModelFileError(str(error), where=where, mend="copy the file again") from error
     if not isinstance(raw, dict) or raw.get("format") != FORMAT:
         raise ModelFileError("not a saved model", where=where, mend="give a model.json written by mrdamper")
-    major = str(raw.get("version", "")).split(".")[0]
-    if major.isdecimal() and int(major) > MAJOR:
+    version = re.fullmatch(r"(\d{1,4})\.\d{1,4}", str(raw.get("version")))
+    if version and int(version[1]) > MAJOR:
         raise ModelFileError(
             f"written by a newer mrdamper (format {raw['version']}, this one reads {MAJOR}.x)",
             where=where,
             mend="update mrdamper",
         )
+    if version is None or int(version[1]) < 1:
+        raise ModelFileError(f"version is {raw.get('version')!r:.40}", where=where, mend="write the model again")
     raw = _upgraded(raw)
     document = _checked(_Document, raw, "", where)
+    if document.units != UNITS:
+        raise ModelFileError("units are not those of the format", where=where, mend="convert the model to SI units")
     kind, own = _kind(document.damper, where)
     saved = _checked(kind.saved, own, "damper.", where)
     try:
+        require_name("rig", document.rig)
         coil = _restore_coil(document.coil) if document.coil else None
         envelope = Envelope(**document.envelope.model_dump())
         return kind.from_saved(saved, document.rig, envelope, document.provenance, coil)
@@ -177,7 +199,8 @@ def parse_model(text: str, where: str = "model") -> Damper:
 
 def _checked(schema: Any, raw: dict[str, Any], prefix: str, where: str) -> Any:
     try:
-        return TypeAdapter(schema).validate_python(raw)
+        # As JSON: there, strict takes arrays for tuples, and neither text nor truth for numbers.
+        return TypeAdapter(schema).validate_json(json.dumps(raw), strict=True)
     except ValidationError as error:
         first = error.errors()[0]
         field = prefix + ".".join(str(part) for part in first["loc"])
