@@ -31,8 +31,8 @@ def named(kind: str, name: str, known: Mapping[str, N]) -> N:
     UnknownNameError
         With the near matches.
     """
-    if name not in known:
-        raise UnknownNameError.of(kind, name, known)
+    if not isinstance(name, str) or name not in known:
+        raise UnknownNameError.of(kind, str(name)[:100], known)
     return known[name]
 
 

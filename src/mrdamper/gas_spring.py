@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+import numbers
 from dataclasses import dataclass
 from typing import Literal
 
@@ -58,10 +59,9 @@ class GasSpring:
 
     def __post_init__(self) -> None:
         for name in ("pressure", "volume", "rod_area", "exponent"):
-            if not getattr(self, name) > 0:
-                raise ParameterError(f"gas {name} is {getattr(self, name)}", mend="give a positive SI value")
-        if self.force_area is not None and not self.force_area > 0:
-            raise ParameterError(f"gas force_area is {self.force_area}", mend="give a positive SI value")
+            _require_positive(name, getattr(self, name))
+        if self.force_area is not None:
+            _require_positive("force_area", self.force_area)
 
     @property
     def _force_area(self) -> float:
@@ -107,3 +107,8 @@ class GasSpring:
         x = np.array([-amplitude, amplitude])
         series = k1 * x + k2 * x**2 + k3 * x**3
         return float(np.max(np.abs(series - exact)) / np.max(np.abs(exact))) if amplitude else math.nan
+
+
+def _require_positive(name: str, value: object) -> None:
+    if not (isinstance(value, numbers.Real) and not isinstance(value, bool) and 0 < value < math.inf):
+        raise ParameterError(f"gas {name} is {value!r:.60}", mend="give a positive SI value")

@@ -6,6 +6,7 @@ Fitting, the command line, reports, exports and the documentation all ask the fi
 from __future__ import annotations
 
 import math
+import numbers
 import re
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields
@@ -72,6 +73,13 @@ def param(
     if default is None:
         return field(metadata=metadata)
     return field(default=default, metadata=metadata)
+
+
+def is_number(value: object) -> bool:
+    """Whether something is a single real number, or stands for one while code is traced."""
+    if isinstance(value, bool):
+        return False
+    return isinstance(value, numbers.Real) or hasattr(value, "tape")
 
 
 @cache

@@ -118,7 +118,7 @@ class ModifiedModel(Damper):
         made = cls(rig, ParameterMap(model_type(saved.model), functions), envelope, provenance, coil)
         try:
             made.model_at(envelope.middle)
-        except TypeError as error:
+        except (TypeError, KeyError) as error:
             raise ParameterError(f"functions do not fit the model: {error}", mend="write the model again") from error
         return made
 

@@ -202,7 +202,8 @@ class Run(Shown):
                 mend="sort the samples or drop the repeated ones",
             )
         channels = {name: self._channel(name, getattr(self, name), size) for name in ("displacement", "force")}
-        channels["current"] = self._channel("current", np.broadcast_to(self.current, size), size)
+        current = np.full(size, self.current) if np.ndim(self.current) == 0 else self.current
+        channels["current"] = self._channel("current", current, size)
         if self.velocity is not None:
             channels["velocity"] = self._channel("velocity", self.velocity, size)
         for name, value in {"time": time, **channels}.items():
@@ -304,7 +305,13 @@ class Run(Shown):
         return f"run {self.id}"
 
     def _channel(self, name: str, values: ArrayLike, size: int | None = None) -> Floats:
-        array = np.asarray(values, dtype=np.float64)
+        try:
+            given = np.asarray(values)
+            if given.dtype.kind not in "biuf":
+                raise ValueError
+            array = given.astype(np.float64, copy=False)
+        except (TypeError, ValueError):
+            raise RunError(f"{name} is no array of numbers", where=self._where, mend="pass 1-D arrays") from None
         if array.ndim != 1:
             raise RunError(f"{name} has {array.ndim} dimensions", where=self._where, mend="pass 1-D arrays")
         if size is not None and array.size != size:

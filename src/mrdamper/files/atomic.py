@@ -29,6 +29,19 @@ _FEW = 200  # foreign files of a folder that are carried over into its successor
 _ELSEWHERE = "choose a folder you may write to"
 
 
+def path_of(path: object) -> Path:
+    """A path, of what a user gave for one.
+
+    Raises
+    ------
+    OutputError
+        E_PATH if it is none.
+    """
+    if isinstance(path, str | os.PathLike) and "\0" not in os.fspath(path):
+        return Path(path)
+    raise OutputError(f"{path!r:.60} is no path", mend="give the name of a file or folder", code="E_PATH")
+
+
 @contextmanager
 def write_folder(folder: str | Path, *, replace: bool = False) -> Iterator[Path]:
     """Give a temporary folder that takes the final name when the block ends without an error.

@@ -16,7 +16,7 @@ import numpy as np
 
 from mrdamper.data import Condition, Dataset, Run
 from mrdamper.errors import ColumnError, DatasetError, UnitError
-from mrdamper.files.atomic import write_file, write_folder
+from mrdamper.files.atomic import path_of, write_file, write_folder
 from mrdamper.files.encoding import csv_text, csv_value
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def load_dataset(folder: str | Path | None = None) -> Dataset:
     if folder is None:
         with as_file(files("mrdamper.files.bundled") / BUNDLED) as bundled:
             return _load(Path(bundled), "bundled tests of two dampers")
-    folder = Path(folder)
+    folder = path_of(folder)
     return _load(folder, folder.name or str(folder))
 
 

@@ -19,7 +19,7 @@ from mrdamper.dampers.base import Damper, Envelope
 from mrdamper.dampers.coil import Coil, Driver
 from mrdamper.data import require_name
 from mrdamper.errors import InputError, ModelFileError
-from mrdamper.files.atomic import write_file
+from mrdamper.files.atomic import path_of, write_file
 from mrdamper.files.strict_json import parse_json
 
 FORMAT = "mrdamper-model"
@@ -154,7 +154,7 @@ def load_model(path: str | Path) -> Damper:
     Traceback (most recent call last):
     mrdamper.errors.ModelFileError: nowhere.json: No such file or directory; give a model.json ...
     """
-    path = Path(path)
+    path = path_of(path)
     try:
         if path.is_file() and path.stat().st_size > _LARGEST:
             raise ModelFileError(f"over {_LARGEST // 10**6} MB", where=str(path), mend="is this a model.json?")

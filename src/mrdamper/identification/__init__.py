@@ -83,7 +83,18 @@ def identify(
     run.current_A  # noqa: B018  refuses a varying current before anything is computed
     if np.ptp(problem.force) == 0:
         raise IdentificationError("the force does not change", where=f"run {run.id}", mend="check the channel")
-    return conclude(problem, chosen_method, chosen_method.solve(problem))
+    where = f"run {run.id}"
+    try:
+        found = conclude(problem, chosen_method, chosen_method.solve(problem))
+    except (np.linalg.LinAlgError, ArithmeticError) as error:
+        raise IdentificationError(
+            f"the samples do not determine the parameters ({error})",
+            where=where,
+            mend="record more cycles, or more samples a cycle, and check the units",
+        ) from error
+    if not np.isfinite(found.scores.nrmse_pp):
+        raise IdentificationError("the error of the fit is no number", where=where, mend="check the units of the force")
+    return found
 
 
 def refuse_clipped(run: Run, clipped: bool = False) -> None:

@@ -21,7 +21,7 @@ from mrdamper.data import Floats
 from mrdamper.errors import ParameterError
 from mrdamper.hysteresis import Shape
 from mrdamper.motion import Excitation
-from mrdamper.parameters import ParameterInfo, parameters_of
+from mrdamper.parameters import ParameterInfo, is_number, parameters_of
 from mrdamper.tracing import plain
 
 GENERAL_FORMS = (
@@ -124,6 +124,8 @@ class Model(ABC):
         for info in self.parameters():
             value = getattr(self, info.name)
             low, high = info.bounds
+            if not is_number(value):
+                raise ParameterError(f"{info.name} = {value!r:.60}", where=self.title, mend="give a number")
             if not (low <= value <= high and -math.inf < value < math.inf):
                 raise ParameterError(
                     f"{info.name} = {value:g} {info.unit}",
