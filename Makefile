@@ -4,7 +4,7 @@ VENV   ?= .venv
 BIN    := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help study serve test test-all bench fuzz lint format release-check clean
+.PHONY: help study serve test test-all bench fuzz attack lint format release-check clean
 
 help:  ## show this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -27,6 +27,10 @@ bench: $(VENV)/.dev  ## timings beside the peers that are installed
 MUTANTS ?= 20000
 fuzz: $(VENV)/.dev  ## damage rig files at random: each is read, or refused with a code (MUTANTS=200000)
 	$(BIN)/python -m fuzz.fuzz_import --mutants $(MUTANTS)
+
+SHARE ?= 1
+attack: $(VENV)/.dev  ## hostile names, models, tables, calls; killed and starved commands: counts a kind (SHARE=0.1)
+	$(BIN)/python -m fuzz.attack --share $(SHARE)
 
 lint: $(VENV)/.dev  ## format check, lint, types, import order of the layers
 	$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/pyright --pythonpath $(BIN)/python && $(BIN)/lint-imports

@@ -33,11 +33,50 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import numpy as np
 
 NASTY = (
-    "*/", "*\\/", "*\\/ int canary(void){return 1;} /*", "/*", "//", "??/", "\\", "\n", "\r", "\0", "\x1b[2J", "\u202e", "\u2028",
-    "<script>canary()</script>", "]]>", "<!--", "&", '"', "'", "<", ">", "=cmd|' /C calc'!A0", "+1", "-1+cmd", "@SUM(A1)", "\t",
-    ";=1", ",", "\\input{canary}", "\\write18{canary}", "$", "^^5c", "%", "#", "{", "}", "`", "|", "![a](javascript:canary)", "[a](b)",
-    "../../canary", "..", "/", "C:\\", "con", "a" * 300, "é", "漢", "\U0001f600", " ", "", "MTS 810/25kN", "{{7*7}}", "{% raw %}", "%s%n",
-)  # fmt: skip
+    *(
+        "*/",
+        "*\\/",
+        "*\\/ int canary(void){return 1;} /*",
+        "/*",
+        "//",
+        "??/",
+        "\\",
+        "\n",
+        "\r",
+        "\0",
+        "\x1b[2J",
+        "\u202e",
+    ),
+    *(
+        "<script>canary()</script>",
+        "]]>",
+        "<!--",
+        "&",
+        '"',
+        "'",
+        "<",
+        ">",
+        "=cmd|' /C calc'!A0",
+        "+1",
+        "-1+cmd",
+        "\u2028",
+    ),
+    *("@SUM(A1)", "\t", ";=1", ",", "\\input{canary}", "\\write18{canary}", "$", "^^5c", "%", "#", "{", "}", "`", "|"),
+    *(
+        "![a](javascript:canary)",
+        "[a](b)",
+        "../../canary",
+        "..",
+        "/",
+        "C:\\",
+        "con",
+        "a" * 300,
+        "é",
+        "漢",
+        "\U0001f600",
+    ),
+    *(" ", "", "MTS 810/25kN", "{{7*7}}", "{% raw %}", "%s%n"),
+)
 
 
 @dataclass

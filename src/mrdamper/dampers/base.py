@@ -10,6 +10,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -67,6 +68,11 @@ class Envelope:
     def middle(self) -> Condition:
         """The condition in the middle of the ranges."""
         return Condition(*(0.5 * (low + high) for low, high in (self.current_A, self.frequency_Hz, self.amplitude_m)))
+
+    @property
+    def corners(self) -> list[Condition]:
+        """The conditions at the ends of the ranges."""
+        return [Condition(*ends) for ends in product(self.current_A, self.frequency_Hz, self.amplitude_m)]
 
     def flags(self, condition: Condition) -> tuple[str, ...]:
         """Which quantities of a condition lie outside: empty inside the envelope."""

@@ -155,6 +155,7 @@ def _chapter(rig: RigComparison, folder: Path, suffix: str, png: bool) -> dict[s
         "rig": rig.rig or rig.dataset.name,
         "rows": _rows(rig),
         "refused": rig.refused,
+        "not_identified": rig.not_identified,
         "verdict": (
             f"{first.recipe.title} predicts left-out conditions best: {100 * first.left_out.median():.1f} % of the "
             f"peak-to-peak force, among {len(rig.entries)} models."

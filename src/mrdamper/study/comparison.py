@@ -19,7 +19,7 @@ from mrdamper.errors import IdentificationError
 from mrdamper.identification import Identification
 from mrdamper.study.parallel import identify_all
 from mrdamper.study.recipe import Basis, Found, Progress, Recipe, Scored, follow_all, recipes
-from mrdamper.study.workflow import usable_sines
+from mrdamper.study.workflow import believed, usable_sines
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +120,8 @@ def _compare_rig(
 ) -> RigComparison:
     train = [run for run in sines if run.split == "train"]
     steps = [(recipe, train) for recipe in chosen]
-    entries, refused = follow_all(steps, rig.split("validate"), progress, found=found)
+    held_out = [run for run in believed(rig)[0] if run.split == "validate"]
+    entries, refused = follow_all(steps, held_out, progress, found=found)
     if not entries:
         name, reason = next(iter(refused.items()))
         raise IdentificationError(

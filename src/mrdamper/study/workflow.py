@@ -10,7 +10,10 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from hashlib import sha256
 from typing import Any
+
+import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Dataset, Run, Shown
@@ -18,6 +21,7 @@ from mrdamper.errors import IdentificationError, InputError, UnknownNameError
 from mrdamper.identification import refuse_clipped
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, at_levels, dynamic_ranges
 from mrdamper.motion import analyse_motion, equivalent_sine
+from mrdamper.rig_files.quality.table import refusal
 from mrdamper.study.parallel import HERE, Processes
 from mrdamper.study.recipe import (
     JOINTLY,
@@ -32,6 +36,8 @@ from mrdamper.study.recipe import (
     play_and_bypass,
 )
 
+_SAMPLES_A_CYCLE = 8  # below, neither the velocity nor a loop can be told
+_DISTORTED = 0.35  # harmonics over the fundamental: a triangle has 0.12, a square wave 0.48
 _WORTH = 1.1  # more numbers must lower the left-out error by a tenth
 STUDIED = ("bouc-wen", "bingham")  # the model of the method, and the one everybody compares with
 
@@ -200,7 +206,7 @@ def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None, *
         )
     candidates, impossible = follow_all(
         _steps(train),
-        dataset.split("validate"),
+        [run for run in believed(dataset)[0] if run.split == "validate"],
         lambda what, share: progress(f"{rig or 'rig'}: {what}", share),
     )
     eligible = [c for c in candidates if model in (None, c.recipe.model)]
@@ -225,18 +231,46 @@ def _left_out(candidate: Scored) -> float:
     return candidate.left_out.median() if candidate.left_out.runs else float("inf")
 
 
+def believed(dataset: Dataset) -> tuple[list[Run], dict[str, str]]:
+    """The runs that physics allows to believe, each once, and why the others are left out of everything."""
+    kept: list[Run] = []
+    refused: dict[str, str] = {}
+    seen: dict[bytes, str] = {}
+    for run in dataset:
+        samples = sha256()
+        for channel in (run.time, run.displacement, run.force):
+            samples.update(np.ascontiguousarray(channel).tobytes())
+        first = seen.setdefault(samples.digest(), run.id)
+        error = refusal(run)
+        if first != run.id:
+            refused[run.id] = f"the same samples as run {first}: a test counts once [E_TWICE]"
+        elif error is not None:
+            refused[run.id] = str(error)
+        else:
+            kept.append(run)
+    return kept, refused
+
+
 def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], dict[str, str]]:
     """The runs whose motion is a sine at one current, and why the others are not used."""
-    sines, refused = [], {}
-    for run in dataset:
+    sines = []
+    kept, refused = believed(dataset)
+    for run in kept:
         try:
             refuse_clipped(run, clipped)
             run.current_A  # noqa: B018
             found = equivalent_sine(run)
+            rate = (run.time.size - 1) / float(run.time[-1] - run.time[0])
+            if found.is_sine and rate < _SAMPLES_A_CYCLE * found.condition.frequency_Hz:
+                raise IdentificationError(
+                    f"{rate / found.condition.frequency_Hz:.1f} samples a cycle",
+                    where=f"run {run.id}",
+                    mend=f"record at least {_SAMPLES_A_CYCLE}",
+                )
         except InputError as error:
             refused[run.id] = str(error)
             continue
-        if found.is_sine:
+        if found.is_sine and analyse_motion(run).distortion < _DISTORTED:
             sines.append(run)
         else:
             refused[run.id] = "the motion is no sine: it is predicted, but not identified from"

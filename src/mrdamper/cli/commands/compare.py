@@ -44,6 +44,9 @@ def register(app: typer.Typer) -> None:
             )
             written = write_comparison(result, out, lambda what, share: progress(what, 0.9 + 0.1 * share), png=png)
         rows = summary_rows(result)
+        for rig in result.rigs:
+            for name, why in rig.not_identified.items():
+                typer.echo(f"not identified: {name}: {why}", err=True)
         if as_json:
             import json
 

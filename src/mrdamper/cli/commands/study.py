@@ -53,6 +53,9 @@ def register(app: typer.Typer) -> None:
                 also=also,
                 processes=processes,
             )
+        for rig in result.rigs:
+            for name, why in rig.not_identified.items():
+                typer.echo(f"not identified: {name}: {why}", err=True)
         if as_json:
             import json
 

@@ -158,7 +158,9 @@ class ConditionedDamper(Damper):
         try:
             made = known(rig, saved.coefficients, reference, envelope, provenance, coil=coil, **tables)
             made.force_along(sine(reference, 1, 8), reference)
-        except (KeyError, TypeError, ValueError, IndexError) as error:
+            for condition in envelope.corners:
+                made.force_along(sine(condition, 1, 8), condition)
+        except (KeyError, TypeError, ValueError, IndexError, ArithmeticError) as error:
             raise ParameterError(f"coefficients do not fit the model: {error}", mend="write the model again") from error
         return made  # type: ignore[return-value]
 

@@ -107,7 +107,10 @@ def _misfit(phase: Floats, columns: Floats, ramp: Floats, force: Floats) -> floa
     # A triangle of the size of the columns holds all that the fit needs of the rows.
     gram = np.einsum("ij,ik->jk", table, table)  # too small a product to share among threads
     gram[np.diag_indices_from(gram)] *= 1 + 1e-12
-    triangle = np.linalg.cholesky(gram).T
+    try:
+        triangle = np.linalg.cholesky(gram).T
+    except np.linalg.LinAlgError:  # the motion has too few different values, as a square wave
+        return np.inf
     either = triangle[:, : 2 + _FREE]
     left = nnls(np.column_stack([either, -either, triangle[:, 2 + _FREE : -1]]), triangle[:, -1])[1]
     return float(left / np.linalg.norm(force))

@@ -1,0 +1,64 @@
+"""A study, a comparison and an identification judge stored runs as the import does."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mrdamper.study.workflow import believed, usable_sines
+
+
+@pytest.fixture(scope="module")
+def runs(bundled):
+    return [run for run in bundled.rig("utfsm") if run.excitation == "sine"][:4]
+
+
+def sampled(run, time, displacement, force):
+    channels = {"time": time, "displacement": displacement, "force": force, "current": np.full(time.size, 0.5)}
+    return replace(run, **channels, velocity=None, window=None, segments=())
+
+
+def square(run):
+    t = np.arange(2000) / 500
+    return sampled(run, t, 0.01 * np.sign(np.sin(6 * t)), 500 * np.sign(np.cos(6 * t)))
+
+
+def coarse(run):
+    t = np.arange(60) / 3.1
+    return sampled(run, t, 0.01 * np.sin(2 * np.pi * t), 500 * np.cos(2 * np.pi * t))
+
+
+def noise(run):
+    return replace(run, force=500 * np.random.default_rng(1).normal(size=run.time.size))
+
+
+@pytest.mark.parametrize(
+    ("harm", "code"),
+    [
+        (lambda run: replace(run, force=-run.force), "E_DISSIPATION_SIGN"),
+        (noise, "E_NOISE"),
+        (lambda run: replace(run, force=np.zeros(run.time.size)), ""),
+        (square, ""),
+        (coarse, ""),
+    ],
+    ids=["force reversed", "noise", "no force", "square wave", "three samples a cycle"],
+)
+def test_a_run_that_cannot_be_believed_is_left_out_by_name(bundled, runs, harm, code):
+    harmed = replace(harm(runs[0]), id="harmed")
+    sines, refused = usable_sines(bundled.only([harmed, *runs[1:]]))
+    assert [run.id for run in sines] == [run.id for run in runs[1:]]
+    assert list(refused) == ["harmed"]
+    assert code in refused["harmed"]
+
+
+def test_the_same_samples_count_once_and_leak_into_nothing(bundled, runs):
+    again = replace(runs[0], id="again", split="validate")
+    kept, refused = believed(bundled.only([*runs, again]))
+    assert [run.id for run in kept] == [run.id for run in runs]
+    assert "the same samples as run " + runs[0].id in refused["again"]
+
+
+def test_all_bundled_runs_are_believed(bundled):
+    kept, refused = believed(bundled)
+    assert len(kept) == len(bundled)
+    assert not refused
