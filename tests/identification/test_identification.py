@@ -148,3 +148,9 @@ def test_a_clipped_record_is_refused_unless_wanted(bundled):
         identify(run)
     assert identify(run, clipped=True).scores.nrmse_pp < 0.1
     assert usable_sines(Dataset((run,)))[1].keys() == {run.id}
+
+
+def test_a_dataset_in_place_of_a_run_is_told_what_to_call(bundled):
+    with pytest.raises(IdentificationError) as error:
+        identify(bundled)
+    assert "run_study(dataset)" in error.value.mend

@@ -76,6 +76,9 @@ def identify(
     >>> round(found.model.c, -3)  # post-yield damping [N s/m]
     7000.0
     """
+    if not isinstance(run, Run):
+        mend = 'identify one run, identify(dataset["ID"]); run_study(dataset) identifies them all'
+        raise IdentificationError(f"a {type(run).__name__} in place of a run", mend=mend)
     refuse_clipped(run, clipped)
     chosen_model = model_type(model) if isinstance(model, str) else model
     chosen_method = method_named(method) if isinstance(method, str) else method
