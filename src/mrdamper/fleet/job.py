@@ -18,7 +18,15 @@ from mrdamper.dampers.joint import JointFit, JointProblem
 from mrdamper.data import Condition, Dataset, Floats, Run, same_condition
 from mrdamper.errors import InputError
 from mrdamper.fleet.items import FleetError, Item, digest_of
-from mrdamper.fleet.loops import Test, by_test, deviation, gas_and_friction, measured_loop, velocity_ladder
+from mrdamper.fleet.loops import (
+    Test,
+    by_test,
+    deviation,
+    gas_and_friction,
+    measured_loop,
+    shape_deviation,
+    velocity_ladder,
+)
 from mrdamper.models import SearchAxis
 from mrdamper.motion import equivalent_sine
 
@@ -194,9 +202,9 @@ def _identify(dataset: Dataset, settings: Settings, plan: Plan | None) -> dict[s
     more: dict[str, Any] = {}
     if plan is not None:
         own = _loops_by_test(tests, loops, plan)
-        more["loop_deviation"] = max(
-            (deviation(a, np.array(b)) for a, b in zip(own, plan.loops, strict=True) if a is not None), default=0.0
-        )
+        pairs = [(a, np.array(b)) for a, b in zip(own, plan.loops, strict=True) if a is not None]
+        more["loop_deviation"] = max((deviation(*pair) for pair in pairs), default=0.0)
+        more["shape_deviation"] = max((shape_deviation(*pair) for pair in pairs), default=0.0)
         if _stands_out(fit, more["loop_deviation"], plan):
             problem, lane = JointProblem(train, settings.model), "full"
             fit = _fit(problem, None)

@@ -48,6 +48,12 @@ def deviation(loop: Floats, reference: Floats) -> float:
     return float(np.sqrt(np.mean((loop - reference) ** 2)) / np.ptp(reference))
 
 
+def shape_deviation(loop: Floats, reference: Floats) -> float:
+    """The same of what is left when the loop is scaled and shifted onto the reference: its shape alone."""
+    columns = np.column_stack([loop, np.ones(loop.size)])
+    return deviation(columns @ np.linalg.lstsq(columns, reference, rcond=None)[0], reference)
+
+
 def velocity_ladder(
     model: Model, currents: Iterable[float], speeds: Sequence[float], amplitude: float
 ) -> dict[tuple[float, float], tuple[float, float]]:

@@ -28,6 +28,9 @@ def register(app: typer.Typer) -> None:
         profile: Optional[Path] = typer.Option(  # noqa: UP045
             None, "--profile", help="Fleet profile (TOML): where serial numbers stand, golden dampers, rig profile."
         ),
+        limits: Optional[Path] = typer.Option(  # noqa: UP045
+            None, "--limits", help="Limits (TOML), [limits.COLUMN] lower and upper: what passes and what fails."
+        ),
         model: str = typer.Option("play-bypass", "--model", help="Identified from all runs of a damper."),
         cold: bool = typer.Option(False, "--cold", help="Begin every search from nothing, to check the fast lane."),
         as_json: bool = typer.Option(False, "--json", help="Print a summary a program can read."),
@@ -37,8 +40,9 @@ def register(app: typer.Typer) -> None:
 
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.fleet.line import run_fleet
-        from mrdamper.fleet.profile import load_fleet_profile
+        from mrdamper.fleet.profile import load_fleet_profile, load_limits
 
+        bounds = {} if limits is None else load_limits(limits)
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         try:
             with progress_on_stderr() as progress:
@@ -53,6 +57,11 @@ def register(app: typer.Typer) -> None:
                     tls=tls,
                     progress=progress,
                 )
+                progress("page", 1.0)
+                from mrdamper.fleet.page import write_page
+
+                page = found.table.with_name("fleet.html")
+                said = write_page(found.table, found.plan, bounds, page)
         except KeyboardInterrupt:
             typer.echo("stopped; what was finished is safe: run the same command again to go on", err=True)
             raise typer.Exit(130) from None
@@ -61,10 +70,11 @@ def register(app: typer.Typer) -> None:
         if as_json:
             import json
 
-            print(json.dumps(_summary(found), indent=1, ensure_ascii=False))
+            print(json.dumps({**_summary(found), "page": str(page), "said": said}, indent=1, ensure_ascii=False))
         else:
             print(f"{found.done} of {found.dampers} dampers identified ({found.already} were already)")
-            print(f"table: {found.table}")
+            print("\n".join(said), end="\n" if said else "")
+            print(f"table: {found.table}\npage: {page}")
         if not found.done:
             raise typer.Exit(2)
 

@@ -1,0 +1,184 @@
+"""Control charts, capability and gauge study: the standard formulas, in a few lines each.
+
+References
+----------
+NIST/SEMATECH e-Handbook of Statistical Methods, 6.1.6 (capability), 6.3.2.2 (individuals), 6.3.2.4
+(EWMA); ISO 22514-2 (percentiles of what is not normal); Bissell 1990, Applied Statistics 39, 331
+(interval of a capability index).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrdamper.data import Floats
+
+_D2, _D4 = 1.128, 3.267  # of moving ranges of two, as printed in the tables
+_FEWEST_NORMALITY, _MOST_NORMALITY = 8, 5000
+_NOT_NORMAL = 0.005  # significance at which a distribution is taken for not normal
+_TAIL = 0.00135  # share beyond three standard deviations of a normal distribution
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """A control chart.
+
+    Attributes
+    ----------
+    values, lower, upper : (N,) arrays
+        What is charted, and its limits.
+    centre : float
+    """
+
+    values: Floats
+    lower: Floats
+    upper: Floats
+    centre: float
+
+    @property
+    def signals(self) -> tuple[int, ...]:
+        """Points outside the limits."""
+        return tuple(np.flatnonzero((self.values < self.lower) | (self.values > self.upper)).tolist())
+
+
+def individuals(values: Floats) -> tuple[Chart, Chart]:
+    """Individuals and moving ranges of two [NIST 6.3.2.2]."""
+    ranges = np.abs(np.diff(values))
+    mean, spread = float(np.mean(values)), float(np.mean(ranges)) if ranges.size else 0.0
+    ones = np.ones(values.size)
+    first = Chart(values, (mean - 3 * spread / _D2) * ones, (mean + 3 * spread / _D2) * ones, mean)
+    return first, Chart(ranges, 0 * ranges, _D4 * spread * np.ones(ranges.size), spread)
+
+
+def ewma(values: Floats, target: float, deviation: float, weight: float = 0.2, width: float = 3.0) -> Chart:
+    """Exponentially weighted moving average, limits for each point's own age [NIST 6.3.2.4].
+
+    Parameters
+    ----------
+    values : (N,) array
+    target, deviation : float
+        Mean and standard deviation of the process in control.
+    weight : float
+        λ of the newest value.
+    width : float
+        Of the limits, in standard deviations of the average.
+    """
+    averages, last = np.empty(values.size), target
+    for i, value in enumerate(values.tolist()):
+        averages[i] = last = weight * value + (1 - weight) * last
+    age = np.arange(1, values.size + 1)
+    half = width * deviation * np.sqrt(weight / (2 - weight) * (1 - (1 - weight) ** (2 * age)))
+    return Chart(averages, target - half, target + half, target)
+
+
+@dataclass(frozen=True)
+class Capability:
+    """How a distribution lies between its limits.
+
+    Attributes
+    ----------
+    ppk, low, high : float
+        Index, and its 95 % interval; NaN for percentiles, whose interval is not known.
+    way : "normal" or "percentiles"
+    count : int
+    outside : int
+        Values beyond a limit.
+    """
+
+    ppk: float
+    low: float
+    high: float
+    way: str
+    count: int
+    outside: int
+
+
+def is_normal(values: Floats) -> bool:
+    """Whether nothing speaks against a normal distribution (Shapiro and Wilk); of many, an even choice is tested."""
+    from scipy.stats import shapiro
+
+    if values.size < _FEWEST_NORMALITY or np.ptp(values) == 0:
+        return True
+    step = -(-values.size // _MOST_NORMALITY)
+    return float(shapiro(values[::step]).pvalue) >= _NOT_NORMAL
+
+
+def capability(values: Floats, lower: float | None, upper: float | None) -> Capability | None:
+    """Ppk from the overall mean and deviation, or from percentiles where the values are not normal.
+
+    None for under two values, or no spread. [NIST 6.1.6; interval: Bissell 1990; ISO 22514-2]
+    """
+    if values.size < 2 or np.ptp(values) == 0:
+        return None
+    below = values < (-np.inf if lower is None else lower)
+    above = values > (np.inf if upper is None else upper)
+    outside, normal = int(np.sum(below | above)), is_normal(values)
+    if normal:
+        middle, deviation = float(np.mean(values)), float(np.std(values, ddof=1))
+        reach = 3 * deviation, 3 * deviation
+    else:
+        bottom, middle, top = np.quantile(values, [_TAIL, 0.5, 1 - _TAIL]).tolist()
+        reach = max(middle - bottom, 1e-300), max(top - middle, 1e-300)
+    sides = [(middle - lower) / reach[0]] if lower is not None else []
+    sides += [(upper - middle) / reach[1]] if upper is not None else []
+    ppk, count = float(min(sides)), values.size
+    if not normal:
+        return Capability(ppk, np.nan, np.nan, "percentiles", count, outside)
+    half = 1.959963985 * float(np.sqrt(1 / (9 * count) + ppk**2 / (2 * (count - 1))))
+    return Capability(ppk, ppk - half, ppk + half, "normal", count, outside)
+
+
+@dataclass(frozen=True)
+class Gauge:
+    """Where the variation of golden dampers comes from, as standard deviations.
+
+    Attributes
+    ----------
+    repeatability : float
+        What is left when dampers and sessions are accounted for.
+    reproducibility : float
+        From session to session.
+    parts : float
+        From damper to damper of the line.
+    """
+
+    repeatability: float
+    reproducibility: float
+    parts: float
+
+    @property
+    def gauge(self) -> float:
+        """Of the rig: both together."""
+        return float(np.hypot(self.repeatability, self.reproducibility))
+
+    @property
+    def share(self) -> float:
+        """Of the rig in everything that varies (%GRR as a fraction)."""
+        return self.gauge / float(np.hypot(self.gauge, self.parts)) if self.parts or self.gauge else np.nan
+
+
+def gauge_study(table: Floats, line: Floats) -> Gauge | None:
+    """Two-way analysis of variance without replication; None for under two sessions.
+
+    Parameters
+    ----------
+    table : (G, S) array
+        Golden dampers by sessions, complete.
+    line : (N,) array
+        Values of the line's dampers: their variation holds the rig's too, which is taken off.
+    """
+    dampers, sessions = table.shape
+    if sessions < 2 or dampers < 1:
+        return None
+    mean, by_damper, by_session = table.mean(), table.mean(axis=1), table.mean(axis=0)
+    between = dampers * float(np.sum((by_session - mean) ** 2)) / (sessions - 1)
+    if dampers == 1:  # sessions and repeats cannot be told apart: all of it is the rig's
+        repeat, session = 0.0, between
+    else:
+        left = table - by_damper[:, None] - by_session[None, :] + mean
+        repeat = float(np.sum(left**2)) / ((dampers - 1) * (sessions - 1))
+        session = max(0.0, (between - repeat) / dampers)
+    total = float(np.var(line, ddof=1)) if line.size > 1 else 0.0
+    return Gauge(np.sqrt(repeat), np.sqrt(session), np.sqrt(max(0.0, total - repeat - session)))

@@ -1,0 +1,187 @@
+"""The report of a line: one page from its table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from mrdamper.data import Floats
+from mrdamper.errors import ColumnError
+from mrdamper.files.atomic import write_file
+from mrdamper.fleet.charts import Gauge, capability, ewma, gauge_study, individuals
+from mrdamper.fleet.job import Plan
+from mrdamper.fleet.profile import Limit
+from mrdamper.fleet.verdicts import FEATURES, clock_findings, drift, suspects, with_features
+from mrdamper.report.page import render_page
+from mrdamper.report.plots.style import PALETTE, Picture, label, new_figure
+
+if TYPE_CHECKING:
+    import polars as pl
+
+_MOST_POINTS = 500  # of a chart; more dampers are charted by the medians of their sessions
+_WORST = 10
+_MOST_NAMED = 50  # refused or failed dampers, and suspects, that the page lists
+
+
+def write_page(table: Path, plan: Plan | None, limits: Mapping[str, Limit], path: Path) -> list[str]:
+    """Write the page of a line.
+
+    Parameters
+    ----------
+    table : path
+        `dampers.parquet`.
+    plan : Plan or None
+    limits : mapping of str to Limit
+        By column; without, nothing passes or fails.
+    path : path
+
+    Returns
+    -------
+    list of str
+        What a terminal should say: suspects, drift, limits.
+
+    Raises
+    ------
+    ColumnError
+        If a limit is for no column of numbers.
+    OutputError
+        If the page cannot be written.
+    """
+    import polars as pl
+
+    kept = [c for c in pl.read_parquet_schema(table) if c != "loops"]
+    whole = with_features(pl.read_parquet(table, columns=kept))
+    unknown = [name for name in limits if name not in whole.columns or not whole[name].dtype.is_numeric()]
+    if unknown:
+        numbers = sorted(c for c in whole.columns if whole[c].dtype.is_numeric())
+        raise ColumnError(f"no column {unknown[0]} to limit", where="limits", mend=f"known: {', '.join(numbers)}")
+    done = whole.filter(pl.col("status") == "done").sort("session", "serial", maintain_order=True)
+    line, golden = done.filter(~pl.col("golden")), done.filter("golden")
+    found = suspects(line)
+    features = {n: about for n, about in FEATURES.items() if line.height and line[n].null_count() < line.height}
+    drifts = {n: _drift(done, n) for n in features if n.startswith("force")}
+    verdicts = [_judged(line, name, limit) for name, limit in limits.items()]
+    facts = {
+        "counts": {s: whole.filter(pl.col("status") == s).height for s in ("done", "refused", "failed")},
+        "dampers": whole["serial"].n_unique(),
+        "plan": plan,
+        "suspects": found[:_MOST_NAMED],
+        "more_suspects": max(0, len(found) - _MOST_NAMED),
+        "drifts": {features[n][0]: d for n, d in drifts.items()},
+        "clock": clock_findings(done),
+        "limits": verdicts,
+        "gauge": {features[n]: g for n in features if (g := _gauge(golden, line, n)) is not None},
+        "golden": sorted(set(golden["serial"].to_list())),
+        "features": [_described(line, n, about) for n, about in features.items()],
+        "worst": _worst(table, line, plan),
+        "troubled": whole.filter(pl.col("status") != "done").head(_MOST_NAMED).rows(named=True),
+    }
+    with write_file(path) as target:
+        text = render_page(
+            "fleet.html.j2", "A line of dampers", f"mrdamper {version('mrdamper')}; {table.name}", **facts
+        )
+        target.write_text(text, encoding="utf-8")
+    said = [f"stands out: {s.serial} {s.session}: {s.cause} ({', '.join(s.findings)})" for s in found]
+    said += [f"{features[n][0]}: {d.text}" for n, d in drifts.items() if d.verdict != "none"]
+    return said + [f"limits of {v['name']}: {v['outside']} of {v['count']} outside" for v in verdicts] + facts["clock"]
+
+
+def _values(frame: pl.DataFrame, name: str) -> Floats:
+    return frame[name].drop_nulls().to_numpy().astype(float)
+
+
+def _drift(done: pl.DataFrame, name: str) -> Any:
+    known = done.drop_nulls(name)
+    columns = (known[c].to_list() for c in ("session", "serial", "golden"))
+    return drift(_values(known, name), *columns)
+
+
+def _gauge(golden: pl.DataFrame, line: pl.DataFrame, name: str) -> Gauge | None:
+    if not golden.height:
+        return None
+    wide = golden.pivot("session", index="serial", values=name, aggregate_function="mean").drop("serial")
+    return gauge_study(wide.drop_nulls().to_numpy().astype(float), _values(line, name)) if wide.height else None
+
+
+def _judged(line: pl.DataFrame, name: str, limit: Limit) -> dict[str, Any]:
+    values = _values(line, name)
+    outside = (values < (-np.inf if limit.lower is None else limit.lower)) | (
+        values > (np.inf if limit.upper is None else limit.upper)
+    )
+    serials = [s for s, out in zip(line.drop_nulls(name)["serial"].to_list(), outside, strict=True) if out]
+    return {
+        "name": name, "limit": limit, "capability": capability(values, limit.lower, limit.upper),
+        "outside": len(serials), "count": values.size, "serials": serials[:_MOST_NAMED],
+    }  # fmt: skip
+
+
+def _described(line: pl.DataFrame, name: str, about: tuple[str, str]) -> dict[str, Any]:
+    values = _values(line, name)
+    charted, what = values, "dampers in the order of sessions and serial numbers"
+    if values.size > _MOST_POINTS:
+        medians = line.drop_nulls(name).group_by("session", maintain_order=True).median()
+        charted, what = _values(medians, name), "medians of sessions"
+    quantiles = np.quantile(values, [0.00135, 0.05, 0.5, 0.95, 0.99865]).tolist()
+    first, ranges = individuals(charted)
+    sigma = max((first.upper[0] - first.centre) / 3, 1e-12)
+    average = ewma(charted, first.centre, sigma)
+    return {
+        "title": about[0], "unit": about[1], "quantiles": quantiles, "what": what,
+        "signals": (len(first.signals), len(ranges.signals), len(average.signals)),
+        "picture": Picture.of(_chart(values, first, ranges, average, about)).files["svg"],
+    }  # fmt: skip
+
+
+def _chart(values: Floats, first: Any, ranges: Any, average: Any, about: tuple[str, str]) -> Figure:
+    figure, axes = new_figure(2, 2, 4.6)
+    name = f"{about[0]} ({about[1]})"
+    axes[0].hist(values, bins=min(60, max(8, int(np.sqrt(values.size)))), color=PALETTE[1])
+    label(axes[0], name, "dampers", "Distribution")
+    for place, chart, title in (
+        (axes[1], first, "Individuals"),
+        (axes[2], ranges, "Moving range"),
+        (axes[3], average, "EWMA"),
+    ):
+        at = np.arange(1, chart.values.size + 1)
+        place.plot(at, chart.values, ".-", color=PALETTE[0], markersize=3, linewidth=0.6)
+        for limit in (chart.lower, chart.upper):
+            place.plot(at, limit, "--", color=PALETTE[2], linewidth=0.8)
+        place.axhline(chart.centre, color=PALETTE[1], linewidth=0.8)
+        out = list(chart.signals)
+        place.plot(at[out], chart.values[out], "o", color=PALETTE[2], markersize=5, fillstyle="none")
+        label(place, "number", name, title)
+    return figure
+
+
+def _worst(table: Path, line: pl.DataFrame, plan: Plan | None) -> dict[str, Any] | None:
+    """The loops farthest from the line's median, drawn over it."""
+    import polars as pl
+
+    if plan is None or not line.height:
+        return None
+    far = line.drop_nulls("loop_deviation").sort("loop_deviation", descending=True).head(_WORST)
+    keys = far.select("serial", "session")
+    loops = (
+        pl.scan_parquet(table)
+        .select("serial", "session", "loops")
+        .join(keys.lazy(), on=["serial", "session"])
+        .collect()
+    )
+    by_name = {(r[0], r[1]): r[2] for r in loops.iter_rows()}
+    figure, axes = new_figure(1, min(4, len(plan.matrix)), 2.6)
+    for number, place in enumerate(axes):
+        current, frequency, amplitude = plan.matrix[number]
+        phase = 2 * np.pi * (np.arange(len(plan.loops[number])) + 0.5) / len(plan.loops[number])
+        speed = 1e3 * 2 * np.pi * frequency * amplitude * np.cos(phase)
+        for key in keys.iter_rows():
+            loop = by_name[key][number]
+            if loop is not None:
+                place.plot(speed, loop, color=PALETTE[2], linewidth=0.6, alpha=0.8)
+        place.plot(speed, plan.loops[number], color=PALETTE[0], linewidth=1.4)
+        label(place, "velocity (mm/s)", "force (N)" if number == 0 else "", f"{current:g} A, {frequency:.3g} Hz")
+    return {"rows": far.rows(named=True), "picture": Picture.of(figure).files["svg"]}

@@ -1,0 +1,72 @@
+"""Charts, capability and gauge study against published numbers."""
+
+import numpy as np
+import pytest
+
+from mrdamper.fleet.charts import capability, ewma, gauge_study, individuals, is_normal
+
+
+def test_individuals_of_the_nist_handbook():
+    """NIST/SEMATECH e-Handbook 6.3.2.2, flow rates."""
+    flow = np.array([49.6, 47.6, 49.9, 51.3, 47.8, 51.2, 52.6, 52.4, 53.6, 52.1])
+    first, ranges = individuals(flow)
+    assert first.centre == pytest.approx(50.81, abs=1e-9)
+    assert ranges.centre == pytest.approx(1.8778, abs=5e-5)
+    assert first.upper[0] == pytest.approx(55.8041, abs=5e-5)
+    assert first.lower[0] == pytest.approx(45.8159, abs=5e-5)
+    assert first.signals == ()
+
+
+def test_ewma_of_the_nist_handbook():
+    """NIST/SEMATECH e-Handbook 6.3.2.4: averages to the printed digits, limits as they settle."""
+    values = np.array([52.0, 47.0, 53.0, 49.3, 50.1, 47.0, 51.0, 50.1, 51.2, 50.5, 49.6, 47.6, 49.9, 51.3, 47.8, 51.2,
+                       52.6, 52.4, 53.6, 52.1])  # fmt: skip
+    printed = [50.60, 49.52, 50.56, 50.18, 50.16, 49.21, 49.75, 49.85, 50.26, 50.33, 50.11, 49.36, 49.52, 50.05, 49.38,
+               49.92, 50.73, 51.23, 51.94, 51.99]  # fmt: skip
+    chart = ewma(values, 50.0, 2.0539, 0.3)
+    assert chart.values == pytest.approx(printed, abs=0.0051)
+    assert chart.upper[-1] == pytest.approx(52.5884, abs=1e-3)
+    assert chart.lower[-1] == pytest.approx(47.4115, abs=1e-3)
+    assert chart.signals == ()
+
+
+def test_capability_of_a_sample_with_known_moments():
+    """NIST 6.1.6: limits 8 and 20, mean 16, deviation 2 give 0.6667; its interval after Bissell."""
+    base = np.random.default_rng(1).standard_normal(50)
+    values = 16 + 2 * (base - base.mean()) / base.std(ddof=1)
+    found = capability(values, 8.0, 20.0)
+    assert found.way == "normal"
+    assert found.ppk == pytest.approx(2 / 3, abs=1e-12)
+    half = 1.96 * np.sqrt(1 / 450 + (2 / 3) ** 2 / 98)
+    assert (found.low, found.high) == pytest.approx((2 / 3 - half, 2 / 3 + half), abs=1e-4)
+    assert capability(values, None, 20.0).ppk == pytest.approx(2 / 3, abs=1e-12)
+
+
+def test_what_is_not_normal_goes_by_percentiles():
+    values = np.random.default_rng(0).exponential(1.0, 4000)
+    found = capability(values, None, 10.0)
+    assert not is_normal(values)
+    assert found.way == "percentiles"
+    top = -np.log(0.00135)  # the exact quantile
+    assert found.ppk == pytest.approx((10 - np.log(2)) / (top - np.log(2)), rel=0.15)
+
+
+def test_the_interval_holds_what_it_promises():
+    rng = np.random.default_rng(3)
+    truth = 4 / 3
+    held = 0
+    for _ in range(300):
+        found = capability(rng.standard_normal(60), -4.0, 4.0)
+        held += found.way == "percentiles" or found.low <= truth <= found.high + 0.05
+    assert held > 270
+
+
+def test_gauge_study_finds_the_parts_of_the_variation():
+    rng = np.random.default_rng(5)
+    table = 100 + rng.normal(0, 5, (30, 1)) + rng.normal(0, 2, (1, 300)) + rng.normal(0, 1, (30, 300))
+    line = 100 + np.sqrt(25 + 4 + 1) * rng.standard_normal(20000)
+    found = gauge_study(table, line)
+    assert found.repeatability == pytest.approx(1, rel=0.05)
+    assert found.reproducibility == pytest.approx(2, rel=0.1)
+    assert found.parts == pytest.approx(5, rel=0.05)
+    assert found.share == pytest.approx(np.sqrt(5 / 30), rel=0.1)

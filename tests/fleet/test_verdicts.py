@@ -1,0 +1,121 @@
+"""What stands out and what drifts, on lines whose truth is known; the page that says so."""
+
+import numpy as np
+import polars as pl
+import pytest
+from typer.testing import CliRunner
+
+from mrdamper.cli import application
+from mrdamper.errors import ColumnError
+from mrdamper.fleet.generator import FAULTS, Line, write_fleet
+from mrdamper.fleet.line import run_fleet
+from mrdamper.fleet.page import write_page
+from mrdamper.fleet.profile import FleetProfile, Limit, LimitsError, load_limits
+from mrdamper.fleet.verdicts import clock_findings, drift, suspects, with_features
+
+
+def line_of(seed, rig=0.0, made=0.0, golden=2, dampers=200, sessions=10):
+    """Forces of a line: 2 % from damper to damper, 0.2 % from session to session, 0.2 % of noise."""
+    rng = np.random.default_rng(seed)
+    share = np.linspace(0, 1, sessions)
+    gains = (1 + rig * share) * (1 + 0.002 * rng.standard_normal(sessions))
+    rows = []
+    own = 1 + 0.02 * rng.standard_normal(golden)
+    for s in range(sessions):
+        for g in range(golden):
+            rows.append((f"G{g}", f"S{s:02}", True, 1000 * own[g] * gains[s] * (1 + 0.002 * rng.standard_normal())))
+        for d in range(dampers // sessions):
+            spread = 1 + 0.02 * rng.standard_normal()
+            force = 1000 * spread * (1 + made * share[s]) * gains[s] * (1 + 0.002 * rng.standard_normal())
+            rows.append((f"D{s:02}{d:03}", f"S{s:02}", False, force))
+    serials, days, watched, values = zip(*rows, strict=True)
+    return np.array(values), days, serials, watched
+
+
+@pytest.mark.parametrize(("planted", "verdict"), [({"rig": 0.03}, "rig"), ({"made": 0.03}, "line"), ({}, "none")])
+def test_a_drift_of_the_rig_is_told_from_one_of_the_line(planted, verdict):
+    told = [drift(*line_of(seed, **planted)).verdict for seed in range(100)]
+    assert told.count(verdict) >= 95
+
+
+@pytest.mark.parametrize("planted", [{"rig": 0.03}, {"made": 0.03}])
+def test_without_golden_dampers_it_cannot_tell(planted):
+    told = [drift(*line_of(seed, golden=0, **planted)) for seed in range(30)]
+    assert {d.verdict for d in told} <= {"cannot tell", "none"}
+    assert sum(d.verdict == "cannot tell" for d in told) >= 20
+    assert all(np.isnan(d.rig) for d in told)
+    assert any("cannot tell" in d.text for d in told)
+
+
+def test_false_alarms_are_rare():
+    alarms = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        names = ("force_off_N", "force_rise_N", "gas_force_N", "friction_N")
+        frame = pl.DataFrame(
+            {
+                "serial": [f"D{i}" for i in range(200)],
+                "session": [f"S{i // 20}" for i in range(200)],
+                **{name: 100 * (1 + 0.02 * rng.standard_normal(200)) for name in names},
+                "shape_deviation": 0.01 * np.sqrt(rng.chisquare(4, 200) / 4),
+            }
+        )
+        alarms += len(suspects(frame))
+    assert alarms <= 0.01 * 20 * 200
+
+
+@pytest.mark.slow
+def test_planted_faults_are_found_and_named(tmp_path):
+    line = Line(dampers=80, sessions=4, golden=1, faults=dict.fromkeys(FAULTS, 3), seed=11)
+    write_fleet(line, tmp_path / "records")
+    found = run_fleet(tmp_path / "records", tmp_path / "out", workers=2)
+    table = with_features(pl.read_parquet(found.table)).filter(~pl.col("golden"))
+    named = {s.serial: s.cause for s in suspects(table)}
+    truth = {d.serial: d.fault for d in line if not d.golden}
+    faulty = {serial for serial, fault in truth.items() if fault}
+    assert len(faulty & set(named)) >= 0.95 * len(faulty)
+    assert len(set(named) - faulty) <= 0.01 * 80
+    words = {"low gas": "gas", "air in oil": "air", "worn seal": "seal", "wrong coil": "coil"}
+    assert sum(words[truth[s]] in named[s] for s in faulty & set(named)) >= 0.9 * len(faulty)
+
+
+def test_the_page_traces_everything_by_serial_number(identified, tmp_path):
+    said = write_page(identified.table, identified.plan, {"gas_force_N": Limit(lower=119.5)}, tmp_path / "fleet.html")
+    text = (tmp_path / "fleet.html").read_text(encoding="utf-8")
+    table = pl.read_parquet(identified.table)
+    below = table.filter(~pl.col("golden") & (pl.col("gas_force_N") < 119.5))["serial"].to_list()
+    assert f"limits of gas_force_N: {len(below)} of 6 outside" in said
+    assert all(serial in text for serial in (*below, *table["serial"]))
+    assert "Gauge study" in text
+    assert "<script" not in text
+
+
+def test_a_limit_for_no_column_is_refused(identified, tmp_path):
+    with pytest.raises(ColumnError, match="gas_force_N"):
+        write_page(identified.table, identified.plan, {"gas": Limit(lower=1)}, tmp_path / "fleet.html")
+    assert not (tmp_path / "fleet.html").exists()
+
+
+def test_a_lower_limit_above_the_upper_is_refused_before_any_work(line, tmp_path):
+    limits = tmp_path / "limits.toml"
+    limits.write_text("[limits.gas_force_N]\nlower = 3\nupper = 2\n")
+    with pytest.raises(LimitsError) as refused:
+        load_limits(limits)
+    assert refused.value.code == "E_LIMITS"
+    out = tmp_path / "out"
+    done = CliRunner().invoke(application(), ["fleet", str(line), "--out", str(out), "--limits", str(limits)])
+    assert isinstance(done.exception, LimitsError)
+    assert not out.exists()
+
+
+def test_a_clock_that_jumps_is_said():
+    frame = pl.DataFrame({"session": ["S1", "S2", "S3"], "date": ["2024-02-01", "2024-01-01", "soon"]})
+    jump = "the clock jumps back from 2024-02-01 in session S1 to 2024-01-01 in session S2"
+    assert clock_findings(frame)[0] == jump
+    assert "soon" in clock_findings(frame)[1]
+
+
+def test_golden_dampers_are_named_in_the_profile():
+    profile = FleetProfile(golden=("G1",))
+    assert profile.is_golden({"serial": "G1"})
+    assert not profile.is_golden({"serial": "D1"})
