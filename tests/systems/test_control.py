@@ -39,6 +39,7 @@ def test_nothing_beats_the_preview(name, preview):
     assert done.energy_gap < 1e-6
     assert done.current.min() >= 0
     assert done.current.max() <= 1.0 + 1e-12
+    assert ("damper" in done.unreachable) == (name in ("skyhook-continuous", "hybrid"))
     if name != "passive":
         assert np.ptp(done.current[:, 0]) > 0.3
 
@@ -148,3 +149,9 @@ def test_every_law_says_where_it_comes_from():
         assert kind.source or name == "passive"
         assert kind.__doc__
     assert Passive(0.3).current_A == 0.3
+
+
+def test_a_demand_that_is_never_in_reach_is_counted():
+    kind = controller_type("skyhook-continuous")
+    done = Loop(CAR, ROAD, {"damper": joint_damper()}, kind(c_sky=1e9)).run(1e-3, machine=False)
+    assert done.unreachable["damper"] > 0.9

@@ -12,12 +12,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.errors import ParameterError
 
 _MOST_TRIES = 60  # evaluations of one element in one search
 _MOST_SWEEPS = 50  # over all elements in one step
@@ -39,6 +40,8 @@ class Stage:
         Gives `step` as machine code.
     lines : int
         Of the program: what a step costs in the interpreter.
+    prepare : callable, optional
+        From other parameters to (status, derived).
     """
 
     step: Step
@@ -47,6 +50,20 @@ class Stage:
     start: tuple[float, ...]
     compiled: Callable[[], Step]
     lines: int = 3
+    prepare: Callable[..., Any] | None = None
+
+    def at(self, given: tuple[float, ...]) -> Stage:
+        """The stage with other parameters.
+
+        Raises
+        ------
+        ParameterError
+            If they need another program: another branch, or other bounds.
+        """
+        status, derived = self.prepare(given) if self.prepare else (1, ())
+        if status or len(given) != len(self.given):
+            raise ParameterError("parameters that need another program", mend="trace that damper by itself")
+        return replace(self, given=given, derived=tuple(derived))
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,7 +25,7 @@ def stage_of(program: Program) -> Stage:
         return compiled_step(program)
 
     lines = python_source(program).count("\n")
-    return Stage(step, given, tuple(derived), tuple(program.tape.starts.values()), compiled, lines)
+    return Stage(step, given, tuple(derived), tuple(program.tape.starts.values()), compiled, lines, prepare)
 
 
 def damper_stage(damper: Damper) -> Stage:

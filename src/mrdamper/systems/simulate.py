@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.util import find_spec
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,9 +57,13 @@ class Simulation:
         Height of the road by channel [m], [m/s]; zero on the ground.
     energy : mapping of str to (N,) array
         Put in, stored, dissipated by the structure, taken by each link since the start [J].
+    limits : mapping of str to float
+        Largest current [A] of dampers that are asked for a force.
     halving : float
         Largest relative change of a peak against steps twice as long; NaN where not asked.
     """
+
+    PEAKS: ClassVar = ("displacement_m", "drift_m", "acceleration_m_s2", "force_N")
 
     system: System
     time: Floats
@@ -76,6 +80,7 @@ class Simulation:
     road_rate: Floats
     energy: Mapping[str, Floats]
     controller: Controller
+    limits: Mapping[str, float]
     halving: float = math.nan
 
     @property
@@ -103,12 +108,13 @@ class Simulation:
     def peaks(self) -> dict[str, Floats]:
         """Largest magnitudes: displacement, drift, acceleration, force, by coordinate, span, damper."""
         dampers = [i for i, link in enumerate(self.links) if link.role == "damper"]
-        return {
-            "displacement_m": np.abs(self.x).max(axis=0),
-            "drift_m": np.array([np.abs(self.span(name)).max() for name in self.system.spans]),
-            "acceleration_m_s2": np.abs(self.a).max(axis=0),
-            "force_N": np.abs(self.force[:, dampers]).max(axis=0),
-        }
+        found = (
+            np.abs(self.x).max(axis=0),
+            np.array([np.abs(self.span(name)).max() for name in self.system.spans]),
+            np.abs(self.a).max(axis=0),
+            np.abs(self.force[:, dampers]).max(axis=0),
+        )
+        return dict(zip(self.PEAKS, found, strict=True))
 
     def span(self, name: str) -> Floats:
         """(N,) relative displacement [m] of a span of the system."""
@@ -118,6 +124,16 @@ class Simulation:
     def acceleration_of(self, point: str) -> Floats:
         """(N,) absolute acceleration [m/s²] of a point that moves with the coordinates."""
         return self.a @ self.system.point(point)[0]
+
+    @property
+    def unreachable(self) -> dict[str, float]:
+        """Share of the time the force asked of a damper was out of its reach: its current at an end."""
+        found = {}
+        for i, link in enumerate(self.links):
+            if link.name in self.limits:
+                most, current = self.limits[link.name], self.current[1:, i]
+                found[link.name] = float(np.mean((current <= 0.01 * most) | (current >= 0.99 * most)))
+        return found
 
     @property
     def timing(self) -> dict[str, float]:
@@ -228,6 +244,7 @@ class Loop:
         ]
         self.numbers = Numbers.of(self.stages)
         rows = [system.span(link.above, link.below) for link in self.links]
+        self.dampers = dict(dampers)
         self.B = np.array([row for row, _ in rows]).reshape(len(rows), len(system.coordinates))
         self.D = np.array([road for _, road in rows]).reshape(len(rows), len(system.channels))
         self.control = controller.prepare(system, self.links, dampers, period, highest)
@@ -240,6 +257,11 @@ class Loop:
         step = min(_COARSEST, self.source.step, 1 / (_STEPS_A_PERIOD * highest) if highest else _COARSEST)
         whole = self.period if self.control.program else self.source.step
         return whole / math.ceil(whole / step - 1e-9)
+
+    @property
+    def can_compile(self) -> bool:
+        """Whether numba is there."""
+        return find_spec("numba") is not None
 
     def run(self, dt: float, machine: bool | None = None, numbers: Numbers | None = None) -> Simulation:
         """The whole input at one step.
@@ -268,7 +290,7 @@ class Loop:
             )
         if machine is None:
             lines = _LINES_A_STEP + 3 * sum(stage.lines for stage in (*self.stages, *self._controllers))
-            machine = 3 * samples * lines > _LINES and find_spec("numba") is not None  # this run, and one at half
+            machine = 3 * samples * lines > _LINES and self.can_compile  # this run, and one at half
         time: Floats = dt * np.arange(samples, dtype=np.float64)
         ground, road, road_rate = self._driven(time)
         load = self._load(ground, road, road_rate)
@@ -305,7 +327,7 @@ class Loop:
         return Simulation(
             system, time, x, v, absolute, self.links, force, x @ self.B.T + road @ self.D.T,
             v @ self.B.T + road_rate @ self.D.T, current, flags.astype(np.int64), road, road_rate,
-            self._energy(dt, x, v, force, load, road), self.controller,
+            self._energy(dt, x, v, force, load, road), self.controller, self.control.limits,
         )  # fmt: skip
 
     def _previewed(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Optional
 
@@ -89,7 +91,7 @@ def register(app: typer.Typer) -> None:
             for path in write_simulation(done, out, table):
                 typer.echo(f"{path}", err=True)
         if as_json:
-            print(json.dumps(_figures(done), indent=1))
+            print(json.dumps(_figures(done, dampers), indent=1))
         else:
             _print(done)
 
@@ -132,8 +134,9 @@ def _amperes(current: float | None, volts: float | None, dampers: dict[str, Damp
     return min(driver.amperes_per_volt * volts, driver.limit_A)
 
 
-def _figures(done: Simulation) -> dict[str, Any]:
+def _figures(done: Simulation, dampers: Mapping[str, Damper]) -> dict[str, Any]:
     from mrdamper.systems.measures import measures
+    from mrdamper.systems.rise_time import rise_times
 
     peaks = {f"peak_{name}": values.tolist() for name, values in done.peaks.items()}
     forces = dict(zip((link.name for link in done.dampers), peaks.pop("peak_force_N"), strict=True))
@@ -149,7 +152,9 @@ def _figures(done: Simulation) -> dict[str, Any]:
         "step_halving_change": done.halving,
         "energy_gap": done.energy_gap,
         "outside_tests": done.outside,
+        "out_of_reach": done.unreachable,
         "timing": done.timing,
+        "rise_times_s": {name: asdict(rise_times(d)) for name, d in dampers.items() if d.coil},
         "measures": measures(done),
     }
 
@@ -175,6 +180,8 @@ def _print(done: Simulation) -> None:
         for quantity, share in shares.items():
             what = f"{quantity} outside its tests" if quantity in FLAGS else quantity
             typer.echo(f"warning: {name}: {what} {100 * share:.3g} % of the time", err=True)
+    for name, share in done.unreachable.items():
+        typer.echo(f"{name}: the force asked for was out of reach {100 * share:.3g} % of the time")
     if type(done.controller).calms:
         for name, timing in done.timing.items():
             if timing < 0:

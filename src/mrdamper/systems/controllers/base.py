@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Container, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from mrdamper.dampers.base import Damper
@@ -87,6 +87,7 @@ class Sight:
             "acceleration": (rate - self.tape.previous(rate, f"{place}rate")) / self.dt,
             "dt": self.dt,
         }
+        self.shared.setdefault("limits", {})[self.link.name] = self.high
         width = check_monotone(self.damper, self.high)
         return invert_on(self.tape, self.damper, place, motion, force, width, self.high).current
 
@@ -117,11 +118,14 @@ class Control:
         Its inputs but dt.
     start : tuple of float
         Current of each link before the first sample [A].
+    limits : mapping of str to float
+        Largest current [A] by damper that is asked for a force: at either end, the force is out of reach.
     """
 
     program: Program | None
     signals: tuple[str, ...]
     start: tuple[float, ...]
+    limits: Mapping[str, float] = field(default_factory=dict)
 
 
 class Controller(ABC):
@@ -172,7 +176,7 @@ class Controller(ABC):
         dt = signals.pop("dt", None)
         tape.inputs.pop("dt", None)
         tape.inputs["dt"] = tape.input("dt") if dt is None else dt  # comes last
-        return Control(program(tape, outputs), tuple(signals), tuple(start))
+        return Control(program(tape, outputs), tuple(signals), tuple(start), shared.get("limits", {}))
 
 
 def current_range(damper: Damper, highest: float | None) -> tuple[float, float]:

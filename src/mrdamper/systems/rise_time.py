@@ -1,0 +1,76 @@
+"""How fast a damper answers a step of current, as test laboratories state it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrdamper.dampers.base import Damper
+from mrdamper.errors import ParameterError
+from mrdamper.streaming import stepper
+
+_SAMPLES = 4000
+_SETTLE = 12.0  # lags of the coil after which nothing changes any more
+
+
+@dataclass(frozen=True)
+class RiseTimes:
+    """Times from the step of current to shares of the change of force [s].
+
+    Attributes
+    ----------
+    rise_63, rise_90 : float
+        With the current switched on.
+    fall_63, fall_90 : float
+        Switched off.
+    """
+
+    rise_63: float
+    rise_90: float
+    fall_63: float
+    fall_90: float
+
+
+def rise_times(damper: Damper, current: float | None = None, velocity: float | None = None) -> RiseTimes:
+    """Force at constant velocity after steps of current, up and down.
+
+    Parameters
+    ----------
+    damper : Damper
+        With a coil; without one the answer is the model's own.
+    current : float, optional
+        Switched on and off [A]. Default: the highest tested.
+    velocity : float, optional
+        [m/s]. Default: half the highest tested.
+
+    Raises
+    ------
+    ParameterError
+        If the force does not change with the current.
+    """
+    current = damper.envelope.current_A[1] if current is None else current
+    velocity = 0.5 * damper.envelope.peak_velocity_m_s[1] if velocity is None else velocity
+    lag = max(damper.coil.rise_s, damper.coil.fall_s, 1e-3) if damper.coil else 1e-3
+    dt = 2 * _SETTLE * lag / _SAMPLES
+    half = _SAMPLES // 2
+    steps = stepper(damper)
+    travel = 3.0  # settled in the knee and at constant speed, before anything is switched
+    begin = np.linspace(-travel * _SETTLE * lag, 0.0, 2000)
+    still = [steps.step_motion(velocity * t, velocity, 0.0, 0.0, begin[1] - begin[0]) for t in begin.tolist()][-1]
+    forces = np.empty(2 * half)
+    for i in range(2 * half):
+        on = current if i < half else 0.0
+        forces[i] = steps.step_motion(velocity * (i + 1) * dt, velocity, 0.0, on, dt)
+    # What the stroke itself changes, a gas spring for one, is taken out along a straight line.
+    end = forces[-1]
+    forces -= still + (end - still) * (np.arange(2 * half) + 1) / (2 * half)
+    top = forces[half - 1]
+    if not abs(top) > 0:
+        raise ParameterError("the force does not change with the current", where=damper.title, mend="another damper")
+
+    def when(part: np.ndarray, share: float) -> float:
+        return float((np.argmax(part >= share) + 0.5) * dt)  # the step itself takes a sample
+
+    up, down = forces[:half] / top, 1 - forces[half:] / top
+    return RiseTimes(when(up, 1 - np.exp(-1)), when(up, 0.9), when(down, 1 - np.exp(-1)), when(down, 0.9))
