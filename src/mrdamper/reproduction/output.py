@@ -73,7 +73,7 @@ def write_reproduction(
         pictures = {}
         for number, (name, (figure, caption)) in enumerate(drawn.items()):
             progress(f"figure {name}", 0.2 + 0.8 * number / len(drawn))
-            pictures[name] = caption, save_figure(figure, work / "figures" / name, png)
+            pictures[name] = caption, save_figure(figure, work / "figures" / name, ("png",) if png else ())
         for name, rows in tables.items():
             (work / "tables" / f"{name}.csv").write_text(csv_text(rows), encoding="utf-8")
         page = _page(study, claims, tables, pictures, (*study.notes, *notes))

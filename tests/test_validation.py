@@ -1,0 +1,126 @@
+"""Scores on what was not seen: an oracle that remembers shows any leak, and scores are those worked out by hand."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from mrdamper.data import Condition, Run
+from mrdamper.motion import sine
+from mrdamper.validation import RunScore, Validation, leave_one_condition_out, score_run, session_drift, validate
+
+
+@dataclass(frozen=True)
+class Said:
+    """What a damper says of a run."""
+
+    force: np.ndarray
+    motion: object
+    condition: Condition
+    extrapolation: tuple = ()
+
+
+class Memory:
+    """Knows the force of every run it was made of, and of every run at their conditions; says zero of all others."""
+
+    title = "memory"
+
+    def __init__(self, runs):
+        self.known = {(run.nominal.current_A, run.nominal.frequency_Hz) for run in runs}
+
+    def predict_run(self, run):
+        motion = sine(run.nominal, 3, 100)
+        knows = (run.nominal.current_A, run.nominal.frequency_Hz) in self.known
+        return Said(run.force if knows else np.zeros(run.time.size), motion, run.nominal)
+
+
+def made(current, frequency, name, gain=1.0, offset=0.0):
+    condition = Condition(current, frequency, 0.01)
+    motion = sine(condition, 3, 100)
+    force = offset + gain * (100 + 50 * current) * motion.velocity
+    window = (float(motion.time[100]), float(motion.time[-1]))
+    return Run(name, motion.time, motion.displacement, force, current, nominal=condition, window=window)
+
+
+# Every condition twice, one of them three times: a fold that keeps any twin knows the answer.
+RUNS = [made(I, f, f"{I}A-{f}Hz-{k}") for I in (0.0, 1.0) for f in (1.0, 2.0) for k in range(2)] + [made(0, 1, "third")]
+
+
+def test_no_fold_knows_the_condition_it_is_scored_on():
+    asked = []
+
+    def fit(rows):
+        asked.append(tuple(rows))
+        return Memory([RUNS[i] for i in rows])
+
+    found = leave_one_condition_out(RUNS, [run.nominal for run in RUNS], fit, "memory")
+    assert [score.run_id for score in found.runs] == [run.id for run in RUNS]
+    for score in found.runs:
+        # Zero was predicted: every absolute error is the force itself. A leak makes it none.
+        assert score.scores.wape == pytest.approx(1.0)
+    # Four conditions, four folds; each run is left out once and kept in all the others.
+    assert len(asked) == 4
+    left = [i for rows in asked for i in set(range(len(RUNS))) - set(rows)]
+    assert sorted(left) == list(range(len(RUNS)))
+    assert min(map(len, asked)) == len(RUNS) - 3
+    knowing = validate(Memory(RUNS), RUNS)
+    assert all(score.scores.wape == 0.0 for score in knowing.runs)
+
+
+def test_runs_at_one_condition_leave_nothing_to_score():
+    alone = [run for run in RUNS if run.nominal == RUNS[0].nominal]
+    found = leave_one_condition_out(alone, [run.nominal for run in alone], Memory, "memory")
+    assert found.runs == ()
+    assert np.isnan(found.median())
+
+
+class Exact:
+    title = "exact"
+
+    def predict_run(self, run):
+        motion = sine(run.nominal, 3, 100)
+        return Said((100 + 50 * run.nominal.current_A) * motion.velocity, motion, run.nominal, ("current",))
+
+
+def test_scores_are_taken_inside_the_window_only():
+    run = made(1.0, 1.0, "one")
+    spoiled = run.force.copy()
+    spoiled[:100] += 1e4  # before the window
+    score = score_run(Exact(), replace(run, force=spoiled))
+    assert score.scores.nrmse_pp == pytest.approx(0.0, abs=1e-12)
+    assert score.extrapolation == ("current",)
+    spoiled = run.force.copy()
+    spoiled[100:] += 3.0
+    score = score_run(Exact(), replace(run, force=spoiled))
+    assert score.scores.nrmse_pp == pytest.approx(3.0 / np.ptp(run.force[100:]))
+    assert score.scores.peak_error == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_force_too_large_has_positive_errors():
+    score = score_run(Exact(), made(1.0, 1.0, "one", gain=0.8))
+    assert score.scores.peak_error == pytest.approx(0.25)
+    assert score.scores.energy_error == pytest.approx(0.25)
+
+
+def test_median_and_worst_count_magnitudes_and_refused_runs_stay_apart():
+    runs = [made(1.0, 1.0, f"{gain}", gain=gain) for gain in (0.5, 0.9, 1.25)]
+    still = replace(runs[0], id="still", force=np.ones(runs[0].time.size))
+    found = validate(Exact(), [*runs, still])
+    assert [run.run_id for run in found.runs] == ["0.5", "0.9", "1.25"]
+    assert "does not change" in found.refused["still"]
+    errors = [1.0, 1 / 0.9 - 1, -0.2]
+    assert [run.scores.energy_error for run in found.runs] == pytest.approx(errors)
+    assert found.median("energy_error") == pytest.approx(0.2)
+    assert found.worst("energy_error").run_id == "0.5"
+    assert found.only({"1.25"}).runs[0].run_id == "1.25"
+    assert Validation("none", ()).only({"x"}).runs == ()
+    assert isinstance(found.runs[0], RunScore)
+
+
+def test_drift_between_sessions_is_the_gains_and_offsets_put_in():
+    gains, offsets = np.array([0.9, 1.0, 1.2]), np.array([-10.0, 0.0, 20.0])
+    runs = [made(1.0, 1.0, f"{g}", gain=g, offset=o) for g, o in zip(gains, offsets, strict=True)]
+    drift = session_drift(Exact(), runs)
+    assert drift.gain == pytest.approx(np.std(gains))
+    assert drift.offset == pytest.approx(np.std(offsets))
+    assert drift.floor == pytest.approx(0.0, abs=1e-9)
