@@ -72,12 +72,16 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
     """
     headers = [split_name(name, unit) for name, unit in zip(table.names, table.units, strict=True)]
     found: dict[str, int] = {}
+    problems: list[InputError] = []
     for role in ROLES:
         channel = profile.channels.get(role)
         if channel is not None and channel.column is not None:
-            found[role] = _named(table, headers, channel.column, role)
+            try:
+                found[role] = _named(table, headers, channel.column, role)
+            except ColumnError as error:
+                if role in REQUIRED:
+                    problems.append(error)
     taken = set(found.values())
-    problems: list[InputError] = []
     for role in ROLES:
         if role in found or (role == "time" and profile.file.sample_rate_Hz):
             continue
@@ -122,7 +126,13 @@ def left_out(table: RawTable, profile: Profile, found: Mapping[str, Assigned]) -
     for role in OPTIONAL:
         if role in found or (role == "current" and profile.current_is_given):
             continue
-        column = _choose(table, headers, role, taken)
+        channel = profile.channels.get(role)
+        try:
+            stated = None if channel is None or channel.column is None else channel.column
+            column = _choose(table, headers, role, taken) if stated is None else _named(table, headers, stated, role)
+        except ColumnError as error:
+            reasons[role] = error.found
+            continue
         unit = "" if column is None else headers[column][1]
         if column is not None and (unit or role == "current"):
             problem = _unit_problem(table, role, column, unit, parse_unit(unit) if unit else None)
@@ -235,10 +245,10 @@ def _convert(
 ) -> Assigned | None:
     name, stated = headers[column]
     unit = channel.unit if channel is not None and channel.unit else stated
-    required = role in REQUIRED or (channel is not None and channel.column is not None)
+    required = role in REQUIRED
     calibrated = channel is not None and channel.scale is not None
-    contradicts = stated and not calibrated and parse_unit(stated) is not None
-    for text in (unit, stated if contradicts else unit):
+    uncalibrated = stated and not calibrated and _dimension(stated) == "voltage"  # no unit makes newtons of volts
+    for text in (unit, stated if uncalibrated else unit):
         problem = _unit_problem(table, role, column, text, parse_unit(text) if text else None)
         if problem is not None:
             if required:
@@ -275,7 +285,8 @@ def _unit_problem(table: RawTable, role: str, column: int, unit: str, parsed: Un
     if parsed.dimension != DIMENSION[role]:
         mend = f'say [channels.{role}] unit = "..." in a profile, or name another column'
         if parsed.dimension == "mass" and role == "force":
-            mend = f'if kilogram-force is meant, say [channels.force] unit = "{unit}f" in a profile'
+            force = "kgf" if parsed.factor == 1 else "lbf"
+            mend = f'if the force of that weight is meant, say [channels.force] unit = "{force}" in a profile'
         if parsed.dimension == "voltage":
             mend = f"give the calibration: [channels.{role}] unit and scale (unit per {unit}) in a profile"
         return _refusal(

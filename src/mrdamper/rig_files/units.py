@@ -35,17 +35,20 @@ class Unit:
 
 _EXACT = {
     "time": {"s": 1, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60, "h": 3600},
-    "length": {"m": 1, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": INCH, "ft": 0.3048},
+    "length": {"m": 1, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": INCH, "ft": 0.3048,
+        "mil": 1e-3 * INCH, "thou": 1e-3 * INCH, "pouce": INCH,
+    },
     "force": {
         "N": 1, "mN": 1e-3, "daN": 10, "kN": 1e3, "KN": 1e3, "MN": 1e6,
-        "lbf": LBF, "kip": 1e3 * LBF, "klbf": 1e3 * LBF, "kgf": G, "kp": G, "gf": 1e-3 * G, "tf": 1e3 * G,
+        "lbf": LBF, "lb": LBF, "lbs": LBF, "kip": 1e3 * LBF, "klbf": 1e3 * LBF, "kgf": G, "kp": G,
+        "gf": 1e-3 * G, "tf": 1e3 * G,
     },
     "velocity": {"m/s": 1, "cm/s": 1e-2, "mm/s": 1e-3, "um/s": 1e-6, "in/s": INCH, "ft/s": 0.3048, "km/h": 1 / 3.6},
     "acceleration": {"m/s2": 1, "cm/s2": 1e-2, "mm/s2": 1e-3, "in/s2": INCH, "ft/s2": 0.3048, "g": G, "gn": G},
     "current": {"A": 1, "mA": 1e-3, "uA": 1e-6, "kA": 1e3},
     "voltage": {"V": 1, "mV": 1e-3, "uV": 1e-6, "kV": 1e3},
     "temperature": {"°C": 1, "degC": 1, "C": 1},
-    "mass": {"kg": 1, "lb": 0.45359237, "lbs": 0.45359237, "lbm": 0.45359237},
+    "mass": {"kg": 1, "lbm": 0.45359237},
     "pressure": {"Pa": 1, "kPa": 1e3, "MPa": 1e6, "bar": 1e5, "psi": 6894.757293168},
     "frequency": {"Hz": 1, "kHz": 1e3, "rpm": 1 / 60},
     "angle": {"rad": 1, "deg": 0.017453292519943295, "°": 0.017453292519943295},
@@ -57,7 +60,8 @@ _WORDS = {
     "minutes": "min", "minute": "min", "hour": "h", "hours": "h", "hr": "h", "sek": "s",
     "meter": "m", "meters": "m", "metre": "m", "metres": "m", "millimeter": "mm", "millimeters": "mm",
     "millimetre": "mm", "millimetres": "mm", "micron": "um", "microns": "um", "micrometer": "um",
-    "inch": "in", "inches": "in", "feet": "ft", "foot": "ft",
+    "inch": "in", "inches": "in", '"': "in", "''": "in", "mils": "mil", "pounds": "lbf", "pound": "lbf", "lbs.": "lbf",
+    "zoll": "in", "pulgada": "in", "pulgadas": "in", "kilopond": "kp", "feet": "ft", "foot": "ft",
     "newton": "N", "newtons": "N", "kilonewton": "kN", "kilonewtons": "kN", "lbsf": "lbf", "lb-f": "lbf",
     "lb_f": "lbf", "pound-force": "lbf", "kips": "kip", "ips": "in/s", "m/sec": "m/s", "mm/sec": "mm/s",
     "in/sec": "in/s", "kph": "km/h", "gs": "g",
@@ -81,6 +85,7 @@ DIMENSION = MappingProxyType(
         "current": "current",
         "voltage": "voltage",
         "temperature": "temperature",
+        "pressure": "pressure",
     }
 )
 _PINT = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
@@ -73,10 +74,18 @@ def raw_tables(path: str | Path, form: FileForm | None = None) -> Iterator[list[
     with opened(Path(path)) as source:
         reader = reader_of(source)
         if not reader.library:
-            yield reader.tables(source, form or FileForm())
+            yield _renamed(reader.tables(source, form or FileForm()), form)
             return
         with guarded_tables(source, reader, form or FileForm()) as tables:
-            yield tables
+            yield _renamed(tables, form)
+
+
+def _renamed(tables: list[RawTable], form: FileForm | None) -> list[RawTable]:
+    """Tables with the names a profile gives their columns, whatever the format."""
+    if form is None or not form.names:
+        return tables
+    width = len(form.names)
+    return [replace(t, names=form.names) if len(t.names) == width and t.names != form.names else t for t in tables]
 
 
 def reader_of(source: Source) -> Reader:
