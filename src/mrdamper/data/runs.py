@@ -153,6 +153,9 @@ class Run(Shown):
         Cycle-to-cycle scatter of the force over its peak-to-peak value: no model can beat it.
     segments : tuple of (int, int), optional
         Half-open sample ranges without a gap in time. Default: one range.
+    further : mapping of str to (N,) array
+        Further channels by name and unit, as "temperature_C" or "pressure_Pa"; NaN where a sample
+        is missing. No model is identified from them.
     notes : mapping
         Licence, provenance and remarks, by name.
 
@@ -184,6 +187,7 @@ class Run(Shown):
     window: tuple[float, float] | None = None
     repeatability: float | None = None
     segments: tuple[tuple[int, int], ...] = ()
+    further: Mapping[str, Floats] = field(default_factory=dict)
     notes: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -208,6 +212,13 @@ class Run(Shown):
             channels["velocity"] = self._channel("velocity", self.velocity, size)
         for name, value in {"time": time, **channels}.items():
             object.__setattr__(self, name, value)
+        for name, values in self.further.items():
+            if np.shape(values) != (size,):
+                raise RunError(
+                    f"{name} has {np.size(values)} samples, time has {size}", where=self._where,
+                    mend="trim or resample the run",
+                )  # fmt: skip
+        object.__setattr__(self, "further", {name: np.asarray(v, dtype=float) for name, v in self.further.items()})
         if self.split not in ("train", "validate"):
             raise RunError(f"split is {self.split!r}", where=self._where, mend="use train or validate")
         object.__setattr__(self, "segments", tuple(self.segments) or ((0, size),))
@@ -297,6 +308,7 @@ class Run(Shown):
             force=self.force[start:stop],
             current=self.current[start:stop],
             velocity=None if self.velocity is None else self.velocity[start:stop],
+            further={name: values[start:stop] for name, values in self.further.items()},
             segments=tuple((a, b) for a, b in inner if b > a),
         )
 

@@ -187,6 +187,7 @@ def _samples_table(folder: Path) -> dict[str, pl.DataFrame]:
         if column not in table.columns:
             raise _missing_column(column, table.columns, path)
     wanted = [c for c in (*_REQUIRED, *_OPTIONAL) if c in table.columns]
+    further = [c for c in table.columns if c not in ("run_id", *wanted) and table.schema[c].is_numeric()]
     for column in wanted:
         if not table.schema[column].is_numeric():
             raise ColumnError(
@@ -194,7 +195,7 @@ def _samples_table(folder: Path) -> dict[str, pl.DataFrame]:
                 where=str(path),
                 mend="write plain numbers with a decimal point",
             )
-    table = table.select(pl.col("run_id").cast(pl.String), *(pl.col(c).cast(pl.Float64) for c in wanted))
+    table = table.select(pl.col("run_id").cast(pl.String), *(pl.col(c).cast(pl.Float64) for c in (*wanted, *further)))
     groups = table.partition_by("run_id", as_dict=True, maintain_order=True)
     return {str(key[0]): group for key, group in groups.items()}
 
@@ -240,6 +241,7 @@ def _run(row: dict[str, Any], samples: pl.DataFrame, folder: Path) -> Run:
         nominal=nominal,
         window=None if start is None or end is None else (start, end),
         repeatability=number("repeatability_nrmse_pp"),
+        further={name: values for name, values in channels.items() if name not in (*_REQUIRED, *_OPTIONAL)},
         notes={k: v for k, v in row.items() if k not in _KNOWN_RUN_COLUMNS and v},
     )
 
@@ -257,8 +259,14 @@ def _row(run: Run) -> dict[str, Any]:
         "steady_t1_s": window[1],
         "split": run.split,
         "repeatability_nrmse_pp": run.repeatability,
+        **{name: f"{np.nanmean(v[run.in_window]):.6g}" for name, v in run.further.items() if _summarised(name, v, run)},
         **run.notes,
     }
+
+
+def _summarised(name: str, values: np.ndarray, run: Run) -> bool:
+    """Whether a mean of a further channel says something: of a state of the damper, not of a motion or a force."""
+    return name.endswith(("_C", "_Pa")) and bool(np.isfinite(values[run.in_window]).any())
 
 
 def _samples(dataset: Dataset) -> Iterable[pl.DataFrame]:
@@ -277,7 +285,7 @@ def _samples(dataset: Dataset) -> Iterable[pl.DataFrame]:
             columns["current_A"] = run.current
         if with_velocity and run.velocity is not None:
             columns["velocity_m_s"] = run.velocity
-        yield pl.DataFrame(columns)
+        yield pl.DataFrame({**columns, **run.further})
 
 
 def _missing_column(column: str, present: list[str], path: Path) -> ColumnError | UnitError:

@@ -30,6 +30,7 @@ WORDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "current": ("current", "curr", "strom", "stromstärke", "courant", "corriente", "corrente", "amperage", "ток",
                     "电流", "電流"),
         "voltage": ("voltage", "spannung", "tension électrique", "voltaje", "tensione", "напряжение", "电压", "電圧"),
+        "pressure": ("pressure", "druck", "pression", "presión", "pressione", "gasdruck", "давление", "压力"),
         "temperature": ("temperature", "temp", "temperatur", "température", "temperatura", "температура", "温度"),
     }
 )  # fmt: skip

@@ -96,6 +96,22 @@ class CurrentSource(Table):
         return self
 
 
+class Correction(Table):
+    """[correction]: what the load cell measures beside the damper's force; the raw force is kept beside the corrected.
+
+    Attributes
+    ----------
+    moving_mass_kg : float
+        Mass between load cell and damper, whose inertia is taken off: by the accelerometer
+        where there is one, else by the displacement's curvature.
+    gas_force_N : float
+        Force with which gas or a spring pushes the rod out, added so that it no longer counts.
+    """
+
+    moving_mass_kg: float = Field(default=0.0, ge=0, le=1e4, allow_inf_nan=False)
+    gas_force_N: float = Field(default=0.0, ge=-1e6, le=1e6, allow_inf_nan=False)
+
+
 class Profile(Table):
     """What a rig's files do not say.
 
@@ -106,8 +122,9 @@ class Profile(Table):
     file : FileForm
     channels : mapping of str to Channel
         By "time", "displacement", "force", "velocity", "acceleration", "current", "voltage",
-        "temperature".
+        "temperature", "pressure".
     current : CurrentSource, optional
+    correction : Correction, optional
     """
 
     rig: str = Field(default="", max_length=200)
@@ -116,6 +133,7 @@ class Profile(Table):
     file: FileForm = FileForm()
     channels: dict[str, Channel] = Field(default_factory=dict)
     current: CurrentSource | None = None
+    correction: Correction | None = None
 
     @field_validator("channels")
     @classmethod
@@ -189,6 +207,8 @@ def profile_text(profile: Profile) -> str:
         sections[f"channels.{name}"] = {k: v for k, v in channel.items() if v != plain.get(k) or k == "sign"}
     if "current" in values:
         sections["current"] = values["current"]
+    if "correction" in values:
+        sections["correction"] = values["correction"]
     for name, section in sections.items():
         if section or name.startswith("channels."):
             lines += ["", f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in section.items())]

@@ -15,7 +15,8 @@ import numpy as np
 from mrdamper.data import Floats
 
 REQUIRED = ("time", "displacement", "force")
-OPTIONAL = ("velocity", "acceleration", "current", "voltage", "temperature")
+OPTIONAL = ("velocity", "acceleration", "current", "voltage", "temperature", "pressure")
+FURTHER = {"acceleration": "m_s2", "voltage": "V", "temperature": "C", "pressure": "Pa"}  # and their SI unit
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,8 +94,10 @@ class Record:
         Name of the run to be.
     time, displacement, force : (N,) arrays
         [s], [m], [N], NaN where a sample is missing; positive in extension.
-    velocity, acceleration, current, voltage, temperature : (N,) arrays or None
-        [m/s], [m/s²], [A], [V], [°C], where the file or the profile has them.
+    velocity, acceleration, current, voltage, temperature, pressure : (N,) arrays or None
+        [m/s], [m/s²], [A], [V], [°C], [Pa], where the file or the profile has them.
+    further : mapping of str to (N,) array
+        Other columns in a known unit, by name and SI unit: second sensors of a kind, the raw force.
     findings : tuple of Finding
         In the order they were noticed.
     provenance : mapping of str to str
@@ -118,6 +121,8 @@ class Record:
     current: Floats | None = None
     voltage: Floats | None = None
     temperature: Floats | None = None
+    pressure: Floats | None = None
+    further: Mapping[str, Floats] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
     rig: str = ""

@@ -10,19 +10,22 @@ from pathlib import Path
 import numpy as np
 
 from mrdamper.data import Floats, held_current
-from mrdamper.errors import ColumnError, printable
+from mrdamper.errors import ColumnError, InputError, printable
+from mrdamper.motion.measured import smooth
 from mrdamper.rig_files.column_names import role_of, split_name
 from mrdamper.rig_files.columns import Assigned, assign, left_out
 from mrdamper.rig_files.conditions import Statement, agreed, contradicts, currents_in, stated_by_lines
 from mrdamper.rig_files.parts import stretches_of_time
-from mrdamper.rig_files.profile import Profile, current_in_name
+from mrdamper.rig_files.profile import Correction, Profile, current_in_name
 from mrdamper.rig_files.readers import RawTable, RigFileError, suffixes
 from mrdamper.rig_files.record import OPTIONAL, Finding, Record
 from mrdamper.rig_files.text.spool import rescale
 from mrdamper.rig_files.units import parse_unit
 
+_KEPT = {"temperature": "C", "pressure": "Pa", "voltage": "V", "acceleration": "m_s2", "length": "m", "force": "N"}
+_MOST_FURTHER = 12  # channels
 _LEFT_OUT = "the current channel is left out"
-_LENIENT = ("acceleration", "voltage", "temperature")  # a damaged cell there costs the channel, not the run
+_LENIENT = ("acceleration", "voltage", "temperature", "pressure")  # a damaged cell there costs the channel, not the run
 
 
 def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
@@ -40,6 +43,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
     size = next(iter(raw.values())).size
     if "time" not in channels:
         channels["time"] = np.arange(size) / (profile.file.sample_rate_Hz or 1.0)
+    further = _further(table, found, size)
     stretches = [slice(0, size)] if profile.file.blocks == "join" else stretches_of_time(channels["time"])
     remarks = _remarks(table, found)
     for name, why in left_out(table, profile, found).items():
@@ -47,7 +51,13 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
     records = []
     for number, stretch in enumerate(stretches, 1):
         part = {name: values[stretch] for name, values in channels.items()}
+        others = {name: values[stretch] for name, values in further.items()}
         part, its_lines = _aligned(part, found, None if lines is None else lines.part(stretch.start, stretch.stop))
+        if its_lines is not None and len(its_lines) != stretch.stop - stretch.start:
+            others = {}  # delays were taken off: the samples are no longer those of the file
+        if profile.correction is not None:
+            others["force_raw_N"] = part["force"]
+            part["force"], remarks["force_correction"] = corrected_force(part, profile.correction)
         current, whence = current_of(table, profile, path, part.get("current"))
         noticed = findings
         if current is not None:
@@ -57,7 +67,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
             Record(
                 id=_run_id(table, path) + (f"_{number}" if len(stretches) > 1 else ""),
                 findings=tuple(_unique(noticed)), provenance={**remarks, **whence}, rig=profile.rig,
-                excitation=profile.excitation, split=profile.split, lines=its_lines, **part,  # type: ignore[arg-type]
+                excitation=profile.excitation, split=profile.split, lines=its_lines, further=others, **part,  # type: ignore[arg-type]
             )
         )  # fmt: skip
     return records
@@ -84,6 +94,46 @@ def _read(table: RawTable, found: dict[str, Assigned]):
             findings.append(Finding(code, f"the {name} channel is left out: {error.found}"))
             del found[name]
     return raw, findings, content.lines
+
+
+def corrected_force(channels: dict[str, Floats], correction: Correction) -> tuple[Floats, str]:
+    """Force without the inertia of what moves with the load cell and without gas force [N], and how it was made."""
+    measured = channels.get("acceleration")
+    acceleration = measured if measured is not None else _curvature(channels["time"], channels["displacement"])
+    force = channels["force"] - correction.moving_mass_kg * acceleration + correction.gas_force_N
+    whence = "the accelerometer" if measured is not None else "the displacement"
+    said = [f"{correction.moving_mass_kg:g} kg times acceleration by {whence} taken off"] * bool(
+        correction.moving_mass_kg
+    )
+    said += [f"{correction.gas_force_N:g} N of gas force added"] * bool(correction.gas_force_N)
+    return force, ", ".join(said) or "none"
+
+
+def _curvature(time: Floats, displacement: Floats) -> Floats:
+    """Acceleration [m/s²] by local quadratics, NaN where a sample is missing."""
+    there = np.isfinite(time) & np.isfinite(displacement)
+    found = np.full(time.shape, np.nan)
+    found[there] = smooth(time[there], displacement[there])[2]
+    return found
+
+
+def _further(table: RawTable, found: dict[str, Assigned], size: int) -> dict[str, Floats]:
+    """Second sensors of a kind, in SI, by their name and unit: kept, never identified from."""
+    used = {entry.column for entry in found.values()}
+    kept: dict[str, Floats] = {}
+    for column, (name, unit) in enumerate(zip(table.names, table.units, strict=True)):
+        bare, stated = split_name(name, unit)
+        known = parse_unit(stated) if stated else None
+        if column in used or known is None or known.dimension not in _KEPT or len(kept) >= _MOST_FURTHER:
+            continue
+        try:
+            values = table.read([column]).values[column]
+        except InputError:
+            continue
+        key = f"{re.sub(r'[^A-Za-z0-9]+', '_', bare).strip('_')[:40].lower() or 'column'}_{_KEPT[known.dimension]}"
+        if values.size == size and key not in kept:
+            kept[key] = rescale(values, known.factor, known.offset)
+    return kept
 
 
 def thousands_in(values: Floats) -> bool:
@@ -200,9 +250,17 @@ def held_current_of(table: RawTable) -> float | None:
     return held.pop() if len(held) == 1 else None
 
 
+def _is_kept(name: str, unit: str) -> bool:
+    stated = split_name(name, unit)[1]
+    known = parse_unit(stated) if stated else None
+    return known is not None and known.dimension in _KEPT
+
+
 def _remarks(table: RawTable, found: dict[str, Assigned]) -> dict[str, str]:
     used = {entry.column for entry in found.values()}
-    ignored = [name for i, name in enumerate(table.names) if i not in used and name]
+    ignored = [
+        name for i, name in enumerate(table.names) if i not in used and name and not _is_kept(name, table.units[i])
+    ]
     taken = [f"{role} = {table.names[e.column] or f'column {e.column + 1}'} in {e.unit}" for role, e in found.items()]
     remarks = {"columns": ", ".join(taken)}
     if ignored:

@@ -12,7 +12,7 @@ from mrdamper.rig_files.quality import judge
 from mrdamper.rig_files.quality.loop import repeatability
 from mrdamper.rig_files.quality.motion import steady_window
 from mrdamper.rig_files.quality.view import SHORTEST, View
-from mrdamper.rig_files.record import Record
+from mrdamper.rig_files.record import FURTHER, Record
 
 
 def to_run(record: Record) -> Run:
@@ -43,9 +43,11 @@ def to_run(record: Record) -> Run:
         raise ColumnError("no current", where=f"run {record.id}", mend="name its column or value in the rig profile")
     keep = _kept(record)
     count = np.count_nonzero(keep)
+    segments = _segments(record, keep)
+    if count == keep.size:
+        keep = slice(None)  # nothing is copied: a long record lies in a file
     if count < 3:
         raise RunError(f"{count} samples", where=f"run {record.id}", mend="a run needs at least 3")
-    segments = _segments(record, keep)
     view = View(record)
     scatter = repeatability(view)
     return Run(
@@ -55,6 +57,7 @@ def to_run(record: Record) -> Run:
         force=record.force[keep],
         current=record.current[keep],
         velocity=None if record.velocity is None else record.velocity[keep],
+        further=_further(record, keep),
         rig=record.rig,
         excitation=record.excitation,
         split=record.split,  # type: ignore[arg-type]
@@ -63,6 +66,11 @@ def to_run(record: Record) -> Run:
         segments=segments,
         notes=_notes(record),
     )
+
+
+def _further(record: Record, keep: np.ndarray | slice) -> dict[str, np.ndarray]:
+    own = {f"{name}_{unit}": getattr(record, name) for name, unit in FURTHER.items()}
+    return {name: values[keep] for name, values in {**own, **record.further}.items() if values is not None}
 
 
 def _kept(record: Record) -> np.ndarray:

@@ -101,6 +101,8 @@ def record_of(run: Run) -> Record:
         displacement=run.displacement,
         force=run.force,
         velocity=run.velocity,
+        temperature=run.further.get("temperature_C"),
+        pressure=run.further.get("pressure_Pa"),
         current=run.current,
         provenance=run.notes,
         rig=run.rig,

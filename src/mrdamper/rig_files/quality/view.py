@@ -155,7 +155,7 @@ class View:
 
 UNITS = {
     "time": "s", "displacement": "m", "force": "N", "velocity": "m/s", "acceleration": "m/s²", "current": "A",
-    "voltage": "V", "temperature": "°C",
+    "voltage": "V", "temperature": "°C", "pressure": "Pa",
 }  # fmt: skip
 
 

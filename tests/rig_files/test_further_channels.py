@@ -1,0 +1,60 @@
+"""Temperature, pressure and second sensors stay with the run; a corrected force keeps the raw one beside it."""
+
+import numpy as np
+import pytest
+from support.rig_files import AMPLITUDE, FREQUENCY, channels, rows, text, write
+
+from mrdamper.data import Run
+from mrdamper.errors import RunError
+from mrdamper.files.dataset import load_dataset, save_dataset
+from mrdamper.rig_files.profile import parse_profile, profile_text
+from mrdamper.rig_files.rig_import import read_run, to_dataset
+
+HEADER = "time [s],disp [mm],force [N],oil temperature [°C],gas pressure [bar],LVDT 2 [in],body temp [°F]"
+
+
+@pytest.fixture
+def path(tmp_path):
+    plain = rows()
+    more = [20 + 0.01 * np.arange(len(plain)), np.full(len(plain), 12.5), plain[:, 1] / 25.4, np.full(len(plain), 68.0)]
+    return write(tmp_path, "a_1A.csv", text(np.column_stack([plain, *more]), (HEADER,)))
+
+
+def test_further_channels_are_kept_in_si_and_summarised(path, tmp_path):
+    dataset = to_dataset([read_run(path)])
+    save_dataset(dataset, tmp_path / "ds")
+    run = load_dataset(tmp_path / "ds").runs[0]
+    np.testing.assert_allclose(run.further["oil_temperature_C"], 20 + 0.01 * np.arange(run.time.size), atol=1e-6)
+    np.testing.assert_allclose(run.further["pressure_Pa"], 12.5e5)
+    np.testing.assert_allclose(run.further["lvdt_2_m"], run.displacement, atol=1e-7)
+    np.testing.assert_allclose(run.further["body_temp_C"], 20.0, atol=1e-9)
+    assert float(run.notes["body_temp_C"]) == pytest.approx(20.0)
+    assert "ignored_columns" not in run.notes
+    save_dataset(load_dataset(tmp_path / "ds"), tmp_path / "again")
+    assert load_dataset(tmp_path / "again").runs[0].notes == run.notes
+    part = run.part(10, 50)
+    assert all(values.size == 40 for values in part.further.values())
+
+
+def test_a_further_channel_of_another_length_is_refused():
+    time = np.arange(5.0)
+    with pytest.raises(RunError, match="temperature_C has 4 samples"):
+        Run("a", time, time, time, 0.0, further={"temperature_C": np.zeros(4)})
+
+
+def test_inertia_and_gas_force_are_taken_off_as_stated(path, tmp_path):
+    """A mass that moves with the load cell adds m a; gas pushes the rod out, against the force's sign."""
+    mass, gas = 8.0, 150.0
+    true = channels()
+    omega = 2 * np.pi * FREQUENCY
+    inertia = -mass * omega**2 * AMPLITUDE * np.sin(omega * true["time"])
+    table = rows()
+    table[:, 2] += inertia - gas
+    heavy = write(tmp_path, "b_1A.csv", text(table))
+    profile = parse_profile(f"[correction]\nmoving_mass_kg = {mass}\ngas_force_N = {gas}\n")
+    assert parse_profile(profile_text(profile)) == profile
+    record = read_run(heavy, profile)
+    inside = slice(20, -20)  # a parabola at the ends of the record sees one side only
+    np.testing.assert_allclose(record.force[inside], true["force"][inside], atol=0.3)
+    np.testing.assert_allclose(record.further["force_raw_N"], table[:, 2], atol=1e-5)
+    assert "8 kg" in record.provenance["force_correction"]
