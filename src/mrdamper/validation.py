@@ -143,6 +143,7 @@ def leave_one_condition_out(
     conditions: Sequence[Condition],
     fit: Callable[[Sequence[int]], Damper],
     title: str,
+    alone: Sequence[int] = (),
 ) -> Validation:
     """Score every run with a damper identified without any run at its condition.
 
@@ -154,9 +155,13 @@ def leave_one_condition_out(
     fit : callable
         Makes a damper from the runs at the given indices.
     title : str
+    alone : sequence of int
+        Runs that are a condition each, whatever sine they amount to: records that are no sine.
     """
     scored: dict[int, RunScore] = {}
-    for group in same_condition(conditions):
+    sines = [i for i in range(len(runs)) if i not in set(alone)]
+    groups = [[sines[k] for k in group] for group in same_condition([conditions[i] for i in sines])]
+    for group in [*groups, *([i] for i in alone)]:
         rest = [i for i in range(len(runs)) if i not in group]
         if not rest:
             continue

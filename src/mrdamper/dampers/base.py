@@ -59,6 +59,20 @@ class Envelope:
             span([c.peak_velocity for c in conditions]),
         )
 
+    def with_motion(self, current: Floats, displacement: Floats, velocity: Floats) -> Envelope:
+        """The envelope widened by the samples of a record that is no sine at one current."""
+
+        def wider(span: tuple[float, float], values: Floats) -> tuple[float, float]:
+            return min(span[0], float(np.min(values))), max(span[1], float(np.max(values)))
+
+        moved = np.array([np.ptp(displacement) / 2])
+        return replace(
+            self,
+            current_A=wider(self.current_A, np.abs(current)),
+            amplitude_m=wider(self.amplitude_m, moved),
+            peak_velocity_m_s=wider(self.peak_velocity_m_s, np.array([np.max(np.abs(velocity))])),
+        )
+
     @property
     def tested(self) -> bool:
         """Whether the ranges are known; those of a bare model are not."""
@@ -314,9 +328,10 @@ class Damper(Shown):
         """
         found = equivalent_sine(run)
         motion = measured_motion(run).about(found.centre)
-        flags = self.envelope.flags(found.condition)
-        if not found.is_sine:
-            flags = (*self.envelope.motion_flags(motion), NOT_A_SINE)
+        if found.is_sine and not run.current_changes:
+            flags = self.envelope.flags(found.condition)
+        else:
+            flags = (*self.envelope.motion_flags(motion), *((NOT_A_SINE,) if self.conditional else ()))
         if self.knee is not None and samples_in_knee(motion, self.knee) < _SAMPLES_IN_KNEE:
             flags = (*flags, COARSE)
         if self.conditional and not (found.is_sine and np.ptp(motion.current) <= _SAME_CURRENT):

@@ -26,12 +26,13 @@ from mrdamper.hysteresis.batch import follow_alike
 from mrdamper.identification import Problem
 from mrdamper.models import Model, Scale
 from mrdamper.optimizers.levenberg_marquardt import least_squares
-from mrdamper.optimizers.linear import on_one_blas_thread, solve_linear
+from mrdamper.optimizers.linear import on_one_blas_thread, robust_weights, solve_linear
 
 _RUNG = 1500 ** (1 / 40)  # from one yield displacement to the next; between them Gram matrices are interpolated
 _LATTICE = 2e-6  # m, one of the rungs, whatever the data
 _SHORTEST = 5e-4  # yield displacement looked for, in the smallest amplitude; the longest is the largest amplitude
 _AT_ONCE = 2**17  # states held at a time
+_BEST = 1e-4  # nrmse_pp below which a run gains no more weight
 _RIDGE = 1e-7  # interpolated Gram matrices of nearly parallel columns may lose positivity by less
 
 
@@ -235,7 +236,7 @@ def fit_jointly(
         found = least_squares(residual, centre, centre - reach, centre + reach, most_steps=most_steps)
         centre = found.point
         solution = design.solve(data.at(shape_values(centre)), weights)
-        weights = 1.0 / np.sqrt(np.maximum(solution.nrmse_pp, 1e-4))
+        weights = robust_weights(solution.nrmse_pp, _BEST)
     function = ParameterFunction(start.form, tuple((centre / scale).tolist()), start.rates, log=True)
     made = _finish(design, solution, {data.shape: function})
     reached, ends = shape_values(centre), data.ladder[[0, -1]]
@@ -258,7 +259,7 @@ def leave_out_errors(
         else np.full(data.scale.size, data.ladder[0])
     )
     gram = data.at(shapes)
-    weights = 1.0 / np.sqrt(np.maximum(fit.nrmse_pp, 1e-4))
+    weights = robust_weights(fit.nrmse_pp, _BEST)
     errors = np.zeros(data.scale.size)
     for group in groups:
         kept = weights.copy()
@@ -317,7 +318,7 @@ def _reweighted(design: _Design, gram: Floats, reweightings: int) -> _Solution:
     weights = np.ones(gram.shape[0])
     solution = design.solve(gram, weights)
     for _ in range(reweightings):
-        weights = 1.0 / np.sqrt(np.maximum(solution.nrmse_pp, 1e-4))
+        weights = robust_weights(solution.nrmse_pp, _BEST)
         solution = design.solve(gram, weights)
     return solution
 

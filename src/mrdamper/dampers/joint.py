@@ -12,7 +12,9 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Self
+from functools import cached_property
+from itertools import product
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,13 +28,20 @@ from mrdamper.models import Model, Scale, SearchAxis, model_type
 from mrdamper.motion import Excitation, equivalent_sine, measured_motion
 from mrdamper.optimizers.ending import Ending
 from mrdamper.optimizers.levenberg_marquardt import least_squares
-from mrdamper.optimizers.linear import on_one_blas_thread, solve_bounded, solve_linear
+from mrdamper.optimizers.linear import on_one_blas_thread, robust_weights, solve_bounded
 
-_ROWS = 400  # samples of a run that enter the least squares; its motion is followed in full
+RISE, FALL = "coil.rise_s", "coil.fall_s"  # names of the coil's lags on the search axes
+_ROWS = 400  # samples of a steady run that enter the least squares; its motion is followed in full
+_TRANSIENT = 0.1  # weight of what lies outside a steady window, ramps and rests, against what lies inside
 _CYCLES = 4  # of a sine that enter: more repeat the same
 _WARM_UP = 1.5  # cycles before the scored samples in which the model forgets its start
 _SETTLED = 1e-6  # relative gain of a step at which the search ends
 _BEST = 1e-3  # nrmse_pp below which a run gains no more weight
+_STILL = 0.01  # share of the peak velocity below which a damper rests
+_LAGS, _LAG = (1e-4, 0.2), 8e-3  # of a coil's field [s]
+_FEW, _FEW_STEPS = 6, 5  # runs on which starts are tried, and steps from each
+_STIFF = 2e-4  # damping of the step that stands for a fit without some runs
+_CLEARLY = 0.85  # share of the first start's cost that another one must come below
 
 
 @dataclass(frozen=True)
@@ -138,6 +147,8 @@ class JointFit:
     ending : Ending
     evaluations : int
     seconds : float
+    searched : tuple of str
+        Names of the search axes.
     """
 
     damper: JointDamper
@@ -147,6 +158,7 @@ class JointFit:
     ending: Ending
     evaluations: int
     seconds: float
+    searched: tuple[str, ...] = ()
 
 
 class JointProblem:
@@ -159,10 +171,14 @@ class JointProblem:
     Parameters
     ----------
     runs : sequence of Run
-        Of one rig; any motion, any current.
+        Of one rig; any motion, any current. Whole records enter: ramps and rests too.
     model : str or type of Model
     fixed : mapping, optional
         Parameters held at a value.
+    free : sequence of str
+        Presets to determine as well.
+    coil : Coil or None, optional
+        Known lags of the field, or none. By default they are determined where a current changes.
 
     Raises
     ------
@@ -170,25 +186,77 @@ class JointProblem:
         If there are no runs, or runs of several rigs.
     """
 
-    def __init__(self, runs: Sequence[Run], model: str | type[Model], fixed: Mapping[str, float] | None = None):
+    def __init__(
+        self,
+        runs: Sequence[Run],
+        model: str | type[Model],
+        fixed: Mapping[str, float] | None = None,
+        *,
+        free: Sequence[str] = (),
+        coil: Coil | Literal["determined"] | None = "determined",
+        parts: Sequence[_Part] = (),
+    ):
         if not runs:
             raise IdentificationError("no runs", mend="give at least one")
         rigs = {run.rig for run in runs}
         if len(rigs) > 1:
             raise IdentificationError(f"runs of {len(rigs)} rigs", mend="identify one rig at a time")
-        self.rig = rigs.pop()
+        self.rig, self.runs = rigs.pop(), tuple(runs)
         self.model_type = model_type(model) if isinstance(model, str) else model
         self.fixed = dict(fixed or {})
         infos = self.model_type.parameters()
-        self.free = tuple(info.name for info in infos if info.name not in self.fixed)
+        self.free = tuple(i.name for i in infos if i.name not in self.fixed and (not i.preset or i.name in free))
         self.linear = [info for info in infos if info.linear and info.name in self.free]
-        self.axes: tuple[SearchAxis, ...] = self.model_type.search_axes(Scale(1e-2, 0.1), self.free)
-        self.parts = [_Part.of(run) for run in runs]
+        self.parts = list(parts) or [_Part.of(run) for run in runs]
+        self.axes: tuple[SearchAxis, ...] = self.model_type.search_axes(_scale(self.parts), self.free)
+        self.given_coil, self.coil = coil, None if coil == "determined" else coil
+        if coil == "determined" and any(part.changes for part in self.parts):
+            self.axes += tuple(SearchAxis(name, *_LAGS, (_LAG,), log=True) for name in (RISE, FALL))
+
+    def with_free(self, free: Sequence[str], fixed: Mapping[str, float] | None = None) -> JointProblem:
+        """The same runs with other presets free, or more parameters held."""
+        held = {**self.fixed, **(fixed or {})}
+        return JointProblem(self.runs, self.model_type, held, free=free, coil=self.given_coil, parts=self.parts)
+
+    def with_parts(self, parts: Sequence[_Part]) -> JointProblem:
+        """The same problem on other stretches of the runs."""
+        return JointProblem(self.runs, self.model_type, self.fixed, free=self.free, coil=self.given_coil, parts=parts)
+
+    def from_point(self, fit: JointFit) -> Floats:
+        """(D,) the end of another problem's fit on these axes; what it did not have begins at its own start."""
+        lags = fit.damper.coil
+        known = {RISE: lags.rise_s, FALL: lags.fall_s} if lags else {}
+        known |= {name: getattr(fit.damper.model, name) for name in fit.searched if name not in known}
+        values = [known.get(a.name, a.grid[0]) for a in self.axes]
+        return np.array([a.coordinate(min(max(v, a.lower), a.upper)) for a, v in zip(self.axes, values, strict=True)])
+
+    def errors(self, fit: JointFit, rows: Sequence[int]) -> Floats:
+        """(len(rows),) nrmse_pp of some runs predicted by a fit to others."""
+        table = _Table(self, [self.parts[i] for i in rows])
+        return np.sqrt(np.bincount(table.owner, table.residual(fit.point, fit.damper.model) ** 2))
 
     @property
+    def rests(self) -> bool:
+        """Whether the motion ever stops for longer than a fraction of a cycle, as ramps and holds do."""
+        return any(part.rests for part in self.parts)
+
+    @cached_property
     def start(self) -> Floats:
-        """(D,) the model's start on the search axes."""
-        return np.array([axis.coordinate(axis.grid[0]) for axis in self.axes])
+        """(D,) the best of the model's starts on the search axes."""
+        grid = [np.array(u) for u in product(*([axis.coordinate(g) for g in axis.grid] for axis in self.axes))]
+        if len(grid) == 1:
+            return grid[0]
+        few = self.parts[:: max(1, len(self.parts) // _FEW)]
+        table = _Table(self, [part.steady_end() for part in few])
+        costs = np.array([float(np.sum(table.solve(u).nrmse_pp)) for u in grid])
+        # Each length of lost motion has a valley of its own: the best start in each, some steps on.
+        lengths = np.array([u[[len(axis.grid) > 1 for axis in self.axes]][0] for u in grid])
+        kinds = [np.flatnonzero(lengths == d) for d in dict.fromkeys(lengths.tolist())]
+        best = [grid[min(kind, key=costs.__getitem__)] for kind in kinds]
+        lower, upper = self._box()
+        found = [least_squares(lambda u: table.solve(u).residual, u, lower, upper, _FEW_STEPS, 1e-3) for u in best]
+        better = min(found, key=lambda minimum: minimum.cost)
+        return (better if better.cost < _CLEARLY * found[0].cost else found[0]).point
 
     @on_one_blas_thread
     def fit(
@@ -196,7 +264,7 @@ class JointProblem:
         rows: Sequence[int] | None = None,
         start: Floats | None = None,
         rounds: int = 3,
-        most_steps: int = 15,
+        most_steps: int = 25,
         settled: float = _SETTLED,
     ) -> JointFit:
         """Identify from all runs, or from those at some indices.
@@ -229,17 +297,18 @@ class JointProblem:
                 )
                 point, ending = found.point, found.ending
                 evaluations += found.evaluations
-            table.weights = 1.0 / np.sqrt(np.maximum(table.solve(point).nrmse_pp, _BEST))
+            table.weigh(table.solve(point).nrmse_pp)
         solved = table.solve(point)
         at_bounds = [axis.name for axis, u in zip(self.axes, point, strict=True) if axis.at_bound(float(u))]
         return JointFit(
-            self._damper(solved.model, table.parts),
+            self._damper(solved.model, point, table.parts),
             solved.nrmse_pp,
             (*at_bounds, *solved.held),
             point,
             ending,
             evaluations,
             time.perf_counter() - begin,
+            tuple(axis.name for axis in self.axes),
         )
 
     @on_one_blas_thread
@@ -258,26 +327,54 @@ class JointProblem:
         """
         residual, jacobian, owner = self.linearised(fit)
         kept = np.isin(owner, list(rows))
-        step = solve_linear(jacobian[kept], -residual[kept], rank_limit=1e-12)
+        normal = jacobian[kept].T @ jacobian[kept]
+        # Damped: what hardly shows in the rest must not run away, for a long step is no straight one.
+        step = np.linalg.solve(normal + _STIFF * np.diag(np.diag(normal)), -jacobian[kept].T @ residual[kept])
         lower, upper = self._box()
         table = _Table(self, [self.parts[i] for i in rows])
-        table.weights = 1.0 / np.sqrt(np.maximum(fit.nrmse_pp[list(rows)], _BEST))
-        solved = table.solve(np.clip(fit.point + step[: len(self.axes)], lower, upper))
-        return self._damper(solved.model, table.parts)
+        table.weigh(fit.nrmse_pp[list(rows)])
+        point = np.clip(fit.point + step[: len(self.axes)], lower, upper)
+        return self._damper(table.solve(point).model, point, table.parts)
 
     def linearised(self, fit: JointFit) -> tuple[Floats, Floats, NDArray[np.intp]]:
-        """Residual at a fit, its derivatives by all free parameters, and the run of each row."""
+        """Residual at a fit, its derivatives, and whose rows they are.
+
+        Returns
+        -------
+        residual : (N,) array
+            Weighted: its squares sum to the fit's cost.
+        jacobian : (N, D + L) array
+            By the search axes, then the linear parameters.
+        owner : (N,) int array
+            Index of the run of each row.
+        """
         if self._linearisation is None or self._linearisation[0] is not fit:
-            table = _Table(self, self.parts)
-            table.weights = 1.0 / np.sqrt(np.maximum(fit.nrmse_pp, _BEST))
-            self._linearisation = (fit, *table.linearise(fit.point, fit.damper.model))
+            self._linearisation = (fit, *self.table(fit.nrmse_pp).linearise(fit.point, fit.damper.model))
         return self._linearisation[1:]
+
+    def table(self, errors: Floats) -> _Table:
+        """All runs, weighted as after a fit that left these errors."""
+        table = _Table(self, self.parts)
+        table.weigh(errors)
+        return table
 
     _linearisation: tuple[JointFit, Floats, Floats, NDArray[np.intp]] | None = None
 
-    def _damper(self, model: Model, parts: Sequence[_Part]) -> JointDamper:
+    def _damper(self, model: Model, point: Floats, parts: Sequence[_Part]) -> JointDamper:
         about = {"runs": str(len(parts)), "fit": "joint, all runs at once"}
-        return JointDamper(self.rig, model, self.free, Envelope.of([p.condition for p in parts]), about)
+        return JointDamper(
+            self.rig,
+            model,
+            self.free,
+            _envelope(parts),
+            about,
+            self.coil_at(point),
+        )
+
+    def coil_at(self, point: Floats) -> Coil | None:
+        """The coil at a point of the search axes."""
+        lags = {axis.name: axis.value(float(u)) for axis, u in zip(self.axes, point, strict=True)}
+        return Coil(lags[RISE], lags[FALL]) if RISE in lags else self.coil
 
     def _box(self) -> tuple[Floats, Floats]:
         return (
@@ -288,33 +385,116 @@ class JointProblem:
     def bare(self, point: Floats) -> Model:
         """The model at a point of the search axes, its linear parameters zero."""
         values = {axis.name: axis.value(float(u)) for axis, u in zip(self.axes, point, strict=True)}
+        values = {name: value for name, value in values.items() if name not in (RISE, FALL)}
         return self.model_type.build({**self.fixed, **values, **{info.name: 0.0 for info in self.linear}})
+
+
+def _envelope(parts: Sequence[_Part]) -> Envelope:
+    """Ranges of the sines at one current, and every sample of the others."""
+    found = Envelope.of([part.condition for part in parts])
+    others = [part for part in parts if part.changes or not part.is_sine]
+    extent = np.array([[part.lowest, part.highest] for part in others])
+    for part in others:
+        found = found.with_motion(part.motion.current, extent, part.motion.velocity)
+    return found
+
+
+def _scale(parts: Sequence[_Part]) -> Scale:
+    """Sizes of all runs: the middle motion, the largest force and current."""
+    return Scale(
+        amplitude=float(np.median([part.condition.amplitude_m for part in parts])),
+        speed=float(np.median([part.condition.peak_velocity for part in parts])),
+        force=max(part.scale for part in parts) / 2,
+        current=max(float(np.max(np.abs(part.motion.current))) for part in parts),
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A run's motion from shortly before its steady window on, and the samples that are scored."""
+    """What of a run is followed, which samples enter, and how much each counts.
+
+    Of a steady sine the middle cycles are left out: they repeat the last ones.
+    """
 
     motion: Excitation
     picked: NDArray[np.intp]
     target: Floats
+    share: Floats
     condition: Condition
     scale: float
+    information: float
+    changes: bool
+    is_sine: bool
+    lowest: float
+    highest: float
+    steady: tuple[int, int]
 
     @classmethod
     def of(cls, run: Run) -> _Part:
         found = equivalent_sine(run)
         motion = measured_motion(run).about(found.centre)
-        first, last = (int(i) for i in np.flatnonzero(run.in_window)[[0, -1]])
-        period = 1 / found.condition.frequency_Hz
-        if found.is_sine:
-            first = max(first, int(np.searchsorted(run.time, run.time[last] - _CYCLES * period)))
-        begin = int(np.searchsorted(run.time, run.time[first] - _WARM_UP * period))
-        picked = np.arange(first, last + 1, max(1, (last + 1 - first) // _ROWS))
+        window = np.flatnonzero(run.in_window)
+        first, last = int(window[0]), int(window[-1])
         scale = float(np.ptp(run.force[first : last + 1]))
         if scale == 0:
             raise RunError("the force does not change", where=f"run {run.id}", mend="leave the run out")
-        return cls(motion.part(slice(begin, last + 1)), picked - begin, run.force[picked], found.condition, scale)
+        period, time = 1 / found.condition.frequency_Hz, run.time
+        information = 1.0
+        followed = np.ones(len(motion), dtype=bool)
+        steady = first
+        if found.is_sine:
+            steady = max(first, int(np.searchsorted(time, time[last] - _CYCLES * period)))
+            followed = (time <= time[first] + period) | (time >= time[steady] - _WARM_UP * period)
+        else:
+            information = max(1.0, np.sqrt((time[last] - time[first]) / period))
+        rows = int(_ROWS * information)
+        inside = np.arange(steady, last + 1, max(1, (last + 1 - steady) // rows))
+        outside = np.concatenate([np.arange(first), np.arange(last + 1, len(motion))])
+        outside = outside[:: max(1, outside.size // _ROWS)]
+        picked = np.concatenate([outside[outside < first], inside, outside[outside > last]])
+        transient = _TRANSIENT if outside.size else 0.0
+        share = np.where((picked >= first) & (picked <= last), 1 / inside.size, transient / max(outside.size, 1)) / (
+            1 + transient
+        )
+        place = np.cumsum(followed) - 1
+        return cls(
+            motion.part(followed),
+            place[picked],
+            run.force[picked],
+            share,
+            found.condition,
+            scale,
+            information,
+            run.current_changes,
+            found.is_sine,
+            float(np.min(run.displacement)),
+            float(np.max(run.displacement)),
+            (int(place[steady]), int(place[last])),
+        )
+
+    @property
+    def rests(self) -> bool:
+        """Whether the motion stands still for a fifth of a cycle or more."""
+        speed = np.abs(self.motion.velocity)
+        moving = np.concatenate([[-1], np.flatnonzero(speed > _STILL * self.condition.peak_velocity), [speed.size]])
+        longest = int(np.argmax(np.diff(moving)))
+        begin, end = max(int(moving[longest]), 0), min(int(moving[longest + 1]), speed.size - 1)
+        return float(self.motion.time[end] - self.motion.time[begin]) > 0.2 / self.condition.frequency_Hz
+
+    def steady_end(self) -> _Part:
+        """The last cycles of the steady part, of other records the last third: enough to compare starts and forms."""
+        kept = np.flatnonzero((self.picked >= self.steady[0]) & (self.picked <= self.steady[1]))
+        kept = kept[-_ROWS if self.is_sine else -max(_ROWS, kept.size // 3) :]
+        begin, end = int(self.picked[kept[0]]), int(self.picked[kept[-1]]) + 1
+        begin = max(0, int(begin - 0.4 * (end - begin)))  # to forget the start in
+        return replace(
+            self,
+            motion=self.motion.part(slice(begin, end)),
+            picked=self.picked[kept] - begin,
+            target=self.target[kept],
+            share=self.share[kept] / self.share[kept].sum(),
+            steady=(int(self.picked[kept[0]]) - begin, end - 1 - begin),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -331,21 +511,46 @@ class _Table:
     def __init__(self, problem: JointProblem, parts: Sequence[_Part]):
         self.problem, self.parts = problem, parts
         self.motion = string(part.motion for part in parts)
-        offsets = np.cumsum([0, *(len(part.motion) for part in parts)])
-        self.picked = np.concatenate([part.picked + at for part, at in zip(parts, offsets[:-1], strict=True)])
-        self.seen = self.motion.part(self.picked)
+        self.offsets = np.cumsum([0, *(len(part.motion) for part in parts)])
+        self.picked = np.concatenate([part.picked + at for part, at in zip(parts, self.offsets[:-1], strict=True)])
         self.target = np.concatenate([part.target for part in parts])
         self.owner = np.repeat(np.arange(len(parts)), [part.target.size for part in parts])
-        # Divides residuals so that their squares sum to each run's nrmse_pp².
-        self.size = np.array([part.scale * np.sqrt(part.target.size) for part in parts])
-        self.weights = np.ones(len(parts))
+        # Multiplies residuals so that their squares sum to each run's nrmse_pp².
+        self.share = np.concatenate([part.share for part in parts])
+        self.unit = np.sqrt(self.share) / np.repeat([part.scale for part in parts], [p.target.size for p in parts])
+        self.information = np.sqrt([part.information for part in parts])
+        self.weights = self.information
+        self.felt(problem.coil)
+
+    def weigh(self, errors: Floats) -> None:
+        """Robust weights: the sum of the errors counts, not of their squares; long records by their information."""
+        self.weights = self.information * robust_weights(errors, _BEST)
+
+    def felt(self, coil: Coil | None) -> None:
+        """Lay the current that the field feels along the motion, and remember it."""
+        if getattr(self, "seen", None) is not None and coil == self.coil:
+            return
+        self.coil = coil
+        current = np.abs(self.motion_current)
+        if coil is not None:
+            for part, begin, end in zip(self.parts, self.offsets[:-1], self.offsets[1:], strict=True):
+                if part.changes:
+                    current[begin:end] = coil.along(part.motion.time, part.motion.current)
+        self.motion = self.motion.with_current(current)
+        self.seen = self.motion.part(self.picked)
+
+    @cached_property
+    def motion_current(self) -> Floats:
+        """The measured current along the strung motion [A]."""
+        return np.concatenate([part.motion.current for part in self.parts])
 
     def solve(self, point: Floats) -> _Solved:
         """Linear parameters of least weighted squares at a point of the search axes."""
         linear = self.problem.linear
         bare = self.problem.bare(point)
+        self.felt(self.problem.coil_at(point))
         base, columns = linear_table(bare, linear, self.seen, bare.state(self.motion)[self.picked])
-        factor = (self.weights / self.size)[self.owner]
+        factor = self.weights[self.owner] * self.unit
         columns, right = columns * factor[:, None], (self.target - base) * factor
         solution, held = solve_bounded(columns, right, *bounds_of(linear))
         residual = columns @ solution - right
@@ -353,20 +558,25 @@ class _Table:
         model = replace(bare, **{i.name: float(s) for i, s in zip(linear, solution, strict=True)})
         return _Solved(model, residual, errors, tuple(i.name for i, h in zip(linear, held, strict=True) if h))
 
+    def residual(self, point: Floats, model: Model) -> Floats:
+        """(N,) of the linear parameters of a model at a point; its squares sum to each run's nrmse_pp²."""
+        moved = replace(self.problem.bare(point), **{i.name: getattr(model, i.name) for i in self.problem.linear})
+        self.felt(self.problem.coil_at(point))
+        return (moved.force(self.seen, moved.state(self.motion)[self.picked]) - self.target) * self.unit
+
     def linearise(self, point: Floats, model: Model) -> tuple[Floats, Floats, NDArray[np.intp]]:
         """Weighted residual of a model, derivatives by search axes and linear parameters, owners."""
-        factor = (self.weights / self.size)[self.owner]
-        linear = {info.name: getattr(model, info.name) for info in self.problem.linear}
+        factor = self.weights[self.owner] * self.unit
 
         def residual(u: Floats) -> Floats:
-            moved = replace(self.problem.bare(u), **linear)
-            return (moved.force(self.seen, moved.state(self.motion)[self.picked]) - self.target) * factor
+            return self.residual(u, model) * self.weights[self.owner]
 
         r = residual(point)
         lower, upper = self.problem._box()
-        steps = 1e-6 * (upper - lower)
+        steps = np.where(point + 1e-6 * (upper - lower) > upper, -1e-6, 1e-6) * (upper - lower)
         slopes = [(residual(point + s) - r) / d for s, d in zip(np.diag(steps), steps, strict=True)]
         bare = self.problem.bare(point)
+        self.felt(self.problem.coil_at(point))
         state = bare.state(self.motion)[self.picked]
         columns = linear_table(bare, self.problem.linear, self.seen, state)[1] * factor[:, None]
         return r, np.column_stack([*slopes, columns]), self.owner

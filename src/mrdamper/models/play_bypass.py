@@ -8,33 +8,38 @@ enters: what looks like dependence on them comes out of play, rate and lag.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.models.base import Model, Scale, SearchAxis
 from mrdamper.motion import Excitation, Path
-from mrdamper.motion.lag import first_order_lag
+from mrdamper.motion.lag import first_order_lag, leaking_load
 from mrdamper.parameters import param
 from mrdamper.tracing import Tape, streamed
 
-RISE_CURRENT = 0.12  # A; the yield force starts with zero slope in the current and is straight beyond
+RISE_CURRENT = 0.12  # A; where nothing else is known, the yield force starts with zero slope over this current
 
 
 @dataclass(frozen=True)
 class PlayBypass(Model):
-    """F = f0 + k x (1 − S) + (c0 + c1 I) v + fy(I) (S + q |S|) + m a, S the lagged share of the yield force.
+    """F = f0 + k x (1 − S) + (c0 + c1 I) v + cq |v| + fy(I) (S + q |S|) + m a, S the lagged share of the yield force.
 
     With δ the play's position (stop operator, |δ| ≤ d), φ = sgn δ · max(0, |δ| − (d − e))/e is
     how far the seat is loaded and η its loading along the motion; b = r/√(1 + r²) with
     r = cb |v|/fy is the bypass, capped by the yield force. Then
 
-    s = (1 − h) φ + sgn v [h |v|/(|v| + vh) η + (1 − η) b],  T dS/dt + S = s,
+    s = (1 − h) φ G + sgn v [h |v|/(|v| + vh) η + (1 − η) b],  T dS/dt + S = s,
+    dG/dt = (|v|/e)(1 − G) − l G,
 
-    fy(I) = fy0 + fy1 I (1 − exp(−I/0.12 A)), h = h0 + h1 I within 0 and 1, q the asymmetry.
+    G the load of the seat that has not leaked away (l = 0: held for ever),
+
+    fy(I) = fy0 + fy1 I (1 − exp(−I/Ic))/(1 + si I), h = h0 + h1 I within 0 and 1, q, cq and qb the
+    surplus of yield, viscosity and bypass (cb (1 + qb sgn v)) in extension. Of the level law and
+    the asymmetries only what the tests show is freed (`dampers.choice`).
 
     References
     ----------
@@ -44,14 +49,15 @@ class PlayBypass(Model):
     name: ClassVar[str] = "play-bypass"
     title: ClassVar[str] = "play and bypass"
     equation: ClassVar[str] = (
-        r"F = f_0 + k x (1 - S) + (c_0 + c_1 I) v + f_y (S + q |S|) + m a,\quad "
-        r"f_y = f_{y0} + f_{y1} I \left(1 - e^{-I/(0.12\,\mathrm{A})}\right),\quad "
-        r"T \dot S + S = (1 - h) \varphi + \mathrm{sgn}\,v \left[h \frac{|v|}{|v| + v_h} \eta + (1 - \eta) b\right],"
-        r"\quad "
+        r"F = f_0 + k x (1 - S) + (c_0 + c_1 I) v + c_q |v| + f_y (S + q |S|) + m a,\quad "
+        r"f_y = f_{y0} + f_{y1} I \frac{1 - e^{-I/I_c}}{1 + s_i I},\quad "
+        r"T \dot S + S = (1 - h) \varphi G + \mathrm{sgn}\,v \left[h \frac{|v|}{|v| + v_h} \eta + (1 - \eta) b\right],"
+        r"\quad \dot G = \frac{|v|}{e} (1 - G) - l G,\quad "
         r"h = \min(1, \max(0, h_0 + h_1 I)),\quad "
         r"\dot\delta = v \;\mathrm{where}\; |\delta| < d \;\mathrm{or}\; \delta v < 0,\;\mathrm{else}\; 0,\quad "
         r"\varphi = \mathrm{sgn}\,\delta\, \max(0, |\delta| - (d - e))/e,\quad "
-        r"\eta = \max(0, \varphi\,\mathrm{sgn}\,v),\quad b = \frac{r}{\sqrt{1 + r^2}},\quad r = \frac{c_b |v|}{f_y}"
+        r"\eta = \max(0, \varphi\,\mathrm{sgn}\,v),\quad b = \frac{r}{\sqrt{1 + r^2}},\quad "
+        r"r = \frac{c_b (1 + q_b\,\mathrm{sgn}\,v) |v|}{f_y}"
     )
     source: ClassVar[str] = "derived from the bundled tests"
 
@@ -59,14 +65,14 @@ class PlayBypass(Model):
     k: float = param("N/m", "stiffness while the seat is not loaded", linear=True)
     c0: float = param("N s/m", "post-yield viscous damping without current", bounds=(0, np.inf), linear=True)
     c1: float = param("N s/m/A", "rise of the viscous damping with current", bounds=(0, np.inf), linear=True)
-    fy0: float = param("N", "yield force without current", bounds=(0.1, 1e6), scale="log")
-    fy1: float = param("N/A", "rise of the yield force with current", bounds=(0, 1e6), scale="log")
+    fy0: float = param("N", "yield force without current", bounds=(1e-6, 1e7), scale="log")
+    fy1: float = param("N/A", "rise of the yield force with current", bounds=(0, 1e8), scale="log")
     d: float = param("m", "half the play and seat: lost motion is 2 (d − e)", bounds=(1e-6, 1e-2), scale="log")
-    e: float = param("m", "elastic displacement of the seat", bounds=(1e-7, 1e-2), scale="log")
-    cb: float = param("N s/m", "viscous damping of the bypass in the play", bounds=(1, 1e7), scale="log")
+    e: float = param("m", "elastic displacement of the seat", bounds=(1e-9, 1e-2), scale="log")
+    cb: float = param("N s/m", "viscous damping of the bypass in the play", bounds=(1e-2, 1e10), scale="log")
     h0: float = param("-", "share of the seated force that fades with velocity", bounds=(-1, 2))
-    h1: float = param("1/A", "rise of that share with current", bounds=(-5, 5))
-    vh: float = param("m/s", "velocity at which that share has faded by half", bounds=(1e-5, 1), scale="log")
+    h1: float = param("1/A", "rise of that share with current", bounds=(-1e3, 1e3))
+    vh: float = param("m/s", "velocity at which that share has faded by half", bounds=(1e-7, 10), scale="log")
     T: float = param("s", "lag of the yield force", bounds=(0, 0.2), scale="log")
     asymmetry: float = param(
         "-",
@@ -77,15 +83,48 @@ class PlayBypass(Model):
         symbol="q",
     )
     m: float = param("kg", "inertia", bounds=(0, np.inf), linear=True, default=0.0)
+    cq: float = param("N s/m", "surplus of the viscous damping in extension", linear=True, preset=True, default=0.0)
+    qb: float = param("-", "surplus of the bypass in extension", bounds=(-0.95, 0.95), preset=True, default=0.0)
+    Ic: float = param(
+        "A",
+        "current over which the yield force begins to rise",
+        bounds=(1e-4, 20),
+        scale="log",
+        preset=True,
+        default=RISE_CURRENT,
+    )
+    leak: float = param(
+        "1/s",
+        "share of the seat's load lost in a second at rest",
+        bounds=(0, 1e5),
+        scale="log",
+        preset=True,
+        default=0.0,
+        symbol="l",
+    )
+    si: float = param("1/A", "saturation of the yield force with current", bounds=(0, 1e3), preset=True, default=0.0)
 
     @property
     def knee(self) -> float:
         """Lost motion and seat, 2 d [m]."""
         return 2 * self.d
 
+    @property
+    def seat_share(self) -> float:
+        """e/d, what the seat takes of the way; from 1 on there is no lost motion [-]."""
+        return self.e / self.d
+
+    @classmethod
+    def build(cls, values: Mapping[str, float]) -> Self:
+        """Make the model from its parameters, or from `seat_share` [-] in place of e."""
+        given = dict(values)
+        if (share := given.pop("seat_share", None)) is not None:
+            given["e"] = share * given["d"]
+        return cls(**given)
+
     def yield_force(self, current: Floats) -> Floats:
         """fy(I) [N]."""
-        return self.fy0 + self.fy1 * current * -np.expm1(-np.abs(current) / RISE_CURRENT)
+        return self.fy0 + self.fy1 * current * -np.expm1(-np.abs(current) / self.Ic) / (1 + self.si * np.abs(current))
 
     def state(self, motion: Excitation) -> Floats:
         """S (N,), the lagged share of the yield force."""
@@ -94,38 +133,49 @@ class PlayBypass(Model):
         seat = np.minimum(self.e, self.d)
         loaded = np.sign(play) * np.maximum(0.0, np.abs(play) - (self.d - seat)) / seat
         along = np.maximum(0.0, loaded * np.sign(v))
-        ratio = self.cb * speed / self.yield_force(motion.current)
+        ratio = (self.cb * (1 + self.qb * np.sign(v))) * speed / self.yield_force(motion.current)
         bypass = ratio / np.sqrt(1 + ratio**2)
         fading = np.clip(self.h0 + self.h1 * motion.current, 0.0, 1.0)
         seated = fading * speed / (speed + self.vh) * along
-        share = (1 - fading) * loaded + np.sign(v) * (seated + (1 - along) * bypass)
+        held = (1 - fading) * loaded * leaking_load(motion.time, motion.path, seat, self.leak)
+        share = held + np.sign(v) * (seated + (1 - along) * bypass)
         return first_order_lag(motion.time, share, self.T)
 
     def force(self, motion: Excitation, state: Floats) -> Floats:
         x, v, a, current = motion.displacement, motion.velocity, motion.acceleration, motion.current
         viscous = (self.c0 + self.c1 * current) * v
         yielded = self.yield_force(current) * (state + self.asymmetry * np.abs(state))
-        return self.f0 + self.k * x * (1 - state) + viscous + yielded + self.m * a
+        return self.f0 + self.k * x * (1 - state) + viscous + self.cq * np.abs(v) + yielded + self.m * a
 
     @classmethod
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-        """Each nonlinear parameter on its own scale, from one start that both bundled rigs share."""
-        starts = {
-            "fy0": (1.0, 1e4, 100.0),
-            "fy1": (1.0, 1e5, 1000.0),
-            "d": (2e-5, 2e-3, 2e-4),
-            "e": (1e-6, 2e-4, 2e-5),
-            "cb": (1e3, 1e6, 3.5e4),
-            "h0": (0.0, 1.0, 0.4),
-            "h1": (-1.0, 3.0, 0.3),
-            "vh": (2e-4, 5e-2, 3e-3),
-            "T": (2e-4, 5e-2, 5e-3),
+        """Each nonlinear parameter on its own scale: forces, speeds, currents by the data, lengths of any damper.
+
+        Lost motion of all sizes is tried, for no search finds its way from 0.4 mm to 8.
+        """
+        X, V, F, I = scale.amplitude, scale.speed, scale.force, scale.current or 1.0
+        longest = min(1e-2, 0.7 * X)
+        lengths = tuple(length for length in (2e-4, 5e-5, 8e-4, 3e-3) if length < longest) or (0.2 * longest,)
+        boxes = {
+            "fy0": (1e-3 * F, 3 * F, (0.08 * F,)),
+            "fy1": (1e-3 * F / I, 30 * F / I, (0.7 * F / I,)),
+            "d": (1e-6, longest, lengths),
+            "seat_share": (5e-3, 0.5, (0.1,)),
+            "cb": (0.02 * F / V, 1e3 * F / V, (1.0 * F / V, 5.0 * F / V)),
+            "h0": (0.0, 1.0, (0.4,)),
+            "h1": (-2.0 / I, 3.0 / I, (0.3 / I,)),
+            "vh": (1e-3 * V, 0.5 * V, (0.02 * V,)),
+            "T": (2e-4, 5e-2, (5e-3,)),
+            "qb": (-0.9, 0.9, (0.0,)),
+            "Ic": (0.01 * I, 2.0 * I, (RISE_CURRENT,) if 0.01 * I < RISE_CURRENT < 2 * I else (0.12 * I,)),
+            "leak": (0.2, 2e3, (18.0,)),
+            "si": (0.0, 10.0 / I, (0.1 / I,)),
         }
         infos = {info.name: info for info in cls.parameters()}
         return tuple(
-            SearchAxis(name, low, high, (start,), log=infos[name].scale == "log")
-            for name, (low, high, start) in starts.items()
-            if name in free
+            SearchAxis(name, low, high, starts, log=name == "seat_share" or infos[name].scale == "log")
+            for name, (low, high, starts) in boxes.items()
+            if ("e" if name == "seat_share" else name) in free
         )
 
 
@@ -144,9 +194,24 @@ def play_position(path: Path, limit: float, start: float = 0.0) -> Floats:
     [Brokate and Sprekels 1996; recalled] Within a stroke δ rises with the distance until it
     stops, so samples are independent; only the reversals follow one another.
     """
-    at_start, w = [], path.first_direction * start
-    for length in path.lengths:
-        at_start.append(w)
-        w = -min(w + length, limit)
-    at_start.append(w)
-    return path.direction * np.minimum(np.array(at_start)[path.stroke] + path.distance, limit)
+    turned = path.first_direction * np.where(np.arange(len(path.lengths)) % 2, -1.0, 1.0) * path.lengths
+    at_start = np.concatenate([[start], _clipped_sums(turned, limit, start)])
+    return path.direction * np.minimum((path.direction * at_start[path.stroke]) + path.distance, limit)
+
+
+def _clipped_sums(moves: Floats, limit: float, start: float) -> Floats:
+    """δ after each of some moves, δ → clip(δ + move, ±limit).
+
+    Two such maps one after the other are a third, clip(δ + a, low, high): spans of 1, 2, 4, ... are
+    joined until every one forgets where it began.
+    """
+    a, low, high = moves.copy(), np.full(moves.size, -limit), np.full(moves.size, limit)
+    span = 1
+    while span < moves.size and (low < high).any():
+        later = slice(span, None)
+        low[later], high[later] = (
+            np.clip(end[:-span] + a[later], low[later], high[later]) for end in (low.copy(), high.copy())
+        )
+        a[later] = a[:-span] + a[later]
+        span *= 2
+    return np.clip(start + a, low, high)

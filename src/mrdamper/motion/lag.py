@@ -1,4 +1,4 @@
-"""A first-order lag along a sampled signal, exact for signals straight between samples."""
+"""First-order memories along a sampled motion: a lag, and a load that builds up with distance and leaks with time."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.motion.path import Path
 from mrdamper.tracing import Tape, choose, streamed
 
 _SHORT = 1e-4  # step over time constant below which a series loses fewer digits
@@ -33,8 +34,7 @@ def lag_step(tape: Tape, time: Any, signal: Any, time_constant: Any) -> Any:
 def first_order_lag(time: Floats, signal: Floats, time_constant: float) -> Floats:
     """Y with T dy/dt + y = signal, from y = 0 at the first sample.
 
-    y_i = p_i y_(i−1) + g_i with p = exp(−Δt/T). Instead of a loop over samples, spans of 1, 2,
-    4, ... samples are joined until the past is forgotten: a few passes over the whole array.
+    y_i = p_i y_(i−1) + g_i with p = exp(−Δt/T). No loop over samples: a few passes over the array.
 
     Parameters
     ----------
@@ -50,9 +50,49 @@ def first_order_lag(time: Floats, signal: Floats, time_constant: float) -> Float
     # Weights of the two ends of a straight piece; the series where their difference would cancel.
     gain = np.where(step > _SHORT, -np.expm1(-step) / np.where(step > 0, step, 1.0), 1 - step / 2 + step**2 / 6)
     value = np.concatenate([[0.0], (gain - keep[1:]) * signal[:-1] + (1 - gain) * signal[1:]])
+    return _summed(keep, value)
+
+
+def _summed(keep: Floats, value: Floats) -> Floats:
+    """Y with y_i = keep_i y_(i−1) + value_i: spans of 1, 2, 4, ... samples are joined until the past is forgotten."""
     span = 1
     while span < value.size and keep.max() > _FORGOTTEN:
-        value[span:] = value[span:] + keep[span:] * value[:-span]
-        keep = np.concatenate([np.zeros(span), keep[span:] * keep[:-span]])
+        value[span:] += keep[span:] * value[:-span]
+        keep[span:] = keep[span:] * keep[:-span]
+        keep[:span] = 0.0
         span *= 2
     return value
+
+
+def load_step(tape: Tape, time: Any, path: Any, length: Any, leak: Any) -> Any:
+    """`leaking_load` for one sample."""
+    held = tape.remember("load", 1.0)
+    built, leaked = abs(path.step) / length, time.step * leak
+    both = built + leaked
+    settled = choose(both > 0, lambda: built / both, lambda: 1.0)
+    moved = tape.select(tape.first, 1.0, settled + (held - settled) * np.exp(-both))
+    tape.update(held, moved)
+    return choose(leak > 0, lambda: moved, lambda: 1.0)
+
+
+@streamed(load_step)
+def leaking_load(time: Floats, path: Path, length: float, leak: float) -> Floats:
+    """G with dG/dt = (|v|/length)(1 − G) − leak G, from G = 1: a load built up by motion that leaks away at rest.
+
+    Parameters
+    ----------
+    time : (N,) array
+        [s]
+    path : Path
+        N samples; the speed counts as constant between two.
+    length : float
+        Motion in which the load builds up [m].
+    leak : float
+        Share of the load lost in a second [1/s]; 0 keeps it for ever.
+    """
+    if leak <= 0:
+        return np.ones(time.size)
+    built, leaked = np.diff(path.travel) / length, leak * np.diff(time)
+    both = np.maximum(built + leaked, np.finfo(float).tiny)
+    keep = np.concatenate([[0.0], np.exp(-both)])
+    return _summed(keep, np.concatenate([[1.0], -np.expm1(-both) * built / both]))

@@ -86,6 +86,11 @@ class Path:
     def __len__(self) -> int:
         return self.distance.size
 
+    @property
+    def travel(self) -> Floats:
+        """(N,) distance travelled since the first sample, round the reversals [m]."""
+        return np.cumsum([0.0, *self.lengths])[self.stroke] + self.distance
+
 
 def _checked_motion(displacement: ArrayLike, time: ArrayLike | None) -> tuple[Floats, Floats | None]:
     x = np.asarray(displacement, dtype=float)

@@ -77,6 +77,19 @@ def solve_bounded(columns: Floats, right: Floats, lower: Floats, upper: Floats) 
     return solution, held
 
 
+def robust_weights(errors: Floats, best: float) -> Floats:
+    """Weights under which squares sum up to the errors themselves: one bad run cannot bend what all share.
+
+    Parameters
+    ----------
+    errors : (R,) array
+        Root mean square residual of each group of rows, at the last fit.
+    best : float
+        Error below which a group gains no more weight.
+    """
+    return 1.0 / np.sqrt(np.maximum(errors, best))
+
+
 def _pivots(normal: Floats) -> Floats:
     try:
         return np.diag(np.linalg.cholesky(normal))

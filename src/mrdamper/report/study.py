@@ -154,20 +154,28 @@ def _figures(rig: RigStudy) -> dict[str, Figure]:
     measured = _measured(rig)
     return {
         **(figures_of_tests(rig.dataset, measured) if measured else {}),
-        "matrix": test_matrix(rig.loops),
-        "loops": measured_loops(rig.dataset, rig.loops),
-        "analysis": test_analysis(rig.loops, rig.ranges),
+        **(_figures_of_loops(rig) if rig.loops else {}),
         "scores": score_strip(scores),
-        "parameters": parameter_curves(_mapped(rig)[1]),
+        **({"parameters": parameter_curves(mapped[1])} if (mapped := _mapped(rig)) else {}),
         "predicted": predicted_loops(chosen.damper, _shown(rig)),
         "residuals": residual_map(chosen.damper, train),
         "reversal": force_since_reversal(train, chosen.damper),
     }
 
 
+def _figures_of_loops(rig: RigStudy) -> dict[str, Figure]:
+    return {
+        "matrix": test_matrix(rig.loops),
+        "loops": measured_loops(rig.dataset, rig.loops),
+        "analysis": test_analysis(rig.loops, rig.ranges),
+    }
+
+
 def _shown(rig: RigStudy) -> list[Any]:
     """Held-out sine runs where there are any, spread over the currents; else train runs."""
     sines = {loop.run_id: loop.condition for loop in rig.loops}
+    if not sines:
+        return list(rig.dataset.split("validate") or rig.dataset.runs)[:_LOOPS_SHOWN]
     runs = [run for run in rig.dataset.split("validate") if run.id in sines]
     if not runs:
         runs = [run for run in rig.dataset if run.id in sines]
@@ -185,7 +193,7 @@ def _measured(rig: RigStudy) -> dict[str, Characteristics]:
 
 
 def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limit]) -> dict[str, Any]:
-    chosen, (mapped, _) = rig.chosen, _mapped(rig)
+    chosen, mapped = rig.chosen, (_mapped(rig) or (None, None))[0]
     floors = [run.repeatability for run in rig.dataset if run.repeatability is not None]
     held = any(run.id in {loop.run_id for loop in rig.loops} for run in rig.dataset.split("validate"))
     return {
@@ -203,8 +211,8 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
         ],
         "loops": rig.loops,
         "not_identified": rig.not_identified,
-        "identifications": mapped.identifications,
-        "parameter_names": [n for n in mapped.identifications[0].model.values() if n in mapped.identifications[0].free],
+        "identifications": mapped.identifications if mapped else (),
+        "parameter_names": _free_names(mapped.identifications[0]) if mapped else (),
         "mapped": mapped,
         "joint": _joint_table(chosen.fit) if isinstance(chosen.fit, JointFit) else (),
         "predicted_caption": (
@@ -216,9 +224,13 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
     }
 
 
-def _mapped(rig: RigStudy) -> tuple[Scored, ModifiedFit]:
-    """The best candidate whose parameters are functions of the condition: its curves are shown."""
-    return next((c, c.fit) for c in rig.candidates if isinstance(c.fit, ModifiedFit))
+def _free_names(found: Identification) -> list[str]:
+    return [name for name in found.model.values() if name in found.free]
+
+
+def _mapped(rig: RigStudy) -> tuple[Scored, ModifiedFit] | None:
+    """The best candidate whose parameters are functions of the condition, if any: its curves are shown."""
+    return next(((c, c.fit) for c in rig.candidates if isinstance(c.fit, ModifiedFit)), None)
 
 
 def _joint_table(fit: JointFit) -> list[dict[str, Any]]:
@@ -272,6 +284,10 @@ def _choice(rig: RigStudy) -> str:
 
 
 def _tests(rig: RigStudy) -> str:
+    others = len(rig.dataset) - len(rig.loops)
+    more = f"{others} records of other motion or of a current that changes" if others else ""
+    if not rig.loops:
+        return f"{more}; no steady sine at one current among them."
     conditions = [loop.condition for loop in rig.loops]
     currents = sorted({round(c.current_A, 3) for c in conditions})
     frequencies = [c.frequency_Hz for c in conditions]
@@ -281,4 +297,4 @@ def _tests(rig: RigStudy) -> str:
         f"{len(rig.loops)} sine runs, {held} of them held out: "
         f"{', '.join(f'{c:g}' for c in currents)} A, {min(frequencies):.3g}–{max(frequencies):.3g} Hz, "
         f"{min(amplitudes):.3g}–{max(amplitudes):.3g} mm, all from the measured motion."
-    )
+    ) + (f" Besides {more}." if more else "")

@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.joint import JointFit, JointProblem
+from mrdamper.dampers.choice import identify_jointly
+from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit, fit_modified, fit_modified_jointly
 from mrdamper.dampers.paper import paper_functions
 from mrdamper.dampers.published import Published, all_published
@@ -29,12 +31,14 @@ from mrdamper.identification.methods.paper import Paper
 from mrdamper.models import Scale, all_models, model_type
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.motion import analyse_motion, equivalent_sine
-from mrdamper.validation import Validation, leave_one_condition_out, validate
+from mrdamper.validation import RunScore, Validation, leave_one_condition_out, validate
 
 Progress = Callable[[str, float], None]
 
 JOINTLY = "play-bypass"  # the model whose parameters hold for a whole damper
 GENETIC = ("bouc-wen:paper", "bouc-wen:direct-genetic")
+_STRETCH, _STRETCHES = 12, 8  # cycles of a long record that are left out together, at least; stretches at most
+_RECORD = "stretch of"  # note of a stretch: the record it was cut from
 _MANY = 20  # runs from which on leaving one out is followed by a single step
 
 
@@ -211,12 +215,15 @@ def follow(
         If the damper cannot be determined from these runs.
     """
     begin = time.perf_counter()
-    made = recipe.make(train, identifications)
+    pieces = [piece for run in train for piece in stretches(run)] if recipe.basis is None else list(train)
+    made = recipe.make(pieces, identifications)
     seconds = spent + time.perf_counter() - begin
     title, left_out = made.damper.title, None
     if leave_out:
-        conditions = [equivalent_sine(run).condition for run in train]
-        left_out = leave_one_condition_out(train, conditions, made.refit, title=title)
+        motions = [equivalent_sine(run) for run in pieces]
+        others = [i for i, run in enumerate(pieces) if not motions[i].is_sine or run.current_changes]
+        left_out = leave_one_condition_out(pieces, [m.condition for m in motions], made.refit, title, others)
+        left_out = _whole_again(left_out, pieces)
     errors = [i.scores.nrmse_pp for i in identifications]
     return Scored(
         recipe=recipe,
@@ -229,6 +236,47 @@ def follow(
         held_out=validate(made.damper, held_out),
         seconds=seconds,
     )
+
+
+def stretches(run: Run) -> list[Run]:
+    """A record that is no sine, cut into stretches of a dozen cycles or more, eight at most; a sine as it is."""
+    motion = equivalent_sine(run)
+    period = 1 / motion.condition.frequency_Hz
+    begin, end = run.window or (float(run.time[0]), float(run.time[-1]))
+    count = min(_STRETCHES, int((end - begin) / period / _STRETCH))
+    if (motion.is_sine and not run.current_changes) or count < 2:
+        return [run]
+    cuts = np.searchsorted(run.time, np.linspace(begin, end, count + 1))
+    parts = []
+    for number, (first, last) in enumerate(pairwise(cuts.tolist()), 1):
+        lead = max(0, int(np.searchsorted(run.time, run.time[first] - 1.5 * period)))
+        window = (float(run.time[first]), float(run.time[min(last, run.time.size) - 1]))
+        notes = {**run.notes, _RECORD: run.id}
+        parts.append(replace(run.part(lead, last), id=f"{run.id} {number}/{count}", window=window, notes=notes))
+    return parts
+
+
+def _whole_again(validation: Validation, pieces: Sequence[Run]) -> Validation:
+    """One score a record where its stretches were scored one by one."""
+    record = {piece.id: piece.notes.get(_RECORD, piece.id) for piece in pieces}
+    scored: dict[str, list[RunScore]] = {}
+    for score in validation.runs:
+        scored.setdefault(record[score.run_id], []).append(score)
+    return replace(validation, runs=tuple(_joined(name, scores) for name, scores in scored.items()))
+
+
+def _joined(name: str, scores: Sequence[RunScore]) -> RunScore:
+    """Errors of stretches of about one length as those of the whole: squares add up."""
+    if len(scores) == 1 and scores[0].run_id == name:
+        return scores[0]
+
+    def joined(field_name: str) -> float:
+        values = np.array([getattr(score.scores, field_name) for score in scores])
+        return float(np.sqrt(np.mean(values**2)) if field_name.startswith("nrmse") else np.mean(values))
+
+    whole = replace(scores[0].scores, **{f.name: joined(f.name) for f in fields(scores[0].scores)})
+    flags = tuple(dict.fromkeys(flag for score in scores for flag in score.extrapolation))
+    return replace(scores[0], run_id=name, scores=whole, extrapolation=flags)
 
 
 def follow_all(
@@ -314,8 +362,8 @@ def at_once(runs: Sequence[Run], identifications: Sequence[Identification]) -> M
 
 def one_set(runs: Sequence[Run], identifications: Sequence[Identification]) -> Made:
     """One set of parameters for every condition, of the model that takes the current as an input."""
-    problem = JointProblem(runs, JOINTLY)
-    fit = problem.fit()
+    choice = identify_jointly(runs)
+    problem, fit = choice.problem, choice.fit
 
     def refit(rows: Sequence[int]) -> Damper:
         # With many runs, one missing hardly moves the fit, and a single step finds where to.

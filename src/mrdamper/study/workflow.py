@@ -7,8 +7,8 @@ object that plots, reports and files take from there.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from hashlib import sha256
 from typing import Any
@@ -35,6 +35,7 @@ from mrdamper.study.recipe import (
     modified,
     play_and_bypass,
 )
+from mrdamper.validation import Validation, validate
 
 _SAMPLES_A_CYCLE = 8  # below, neither the velocity nor a loop can be told
 _DISTORTED = 0.35  # harmonics over the fundamental: a triangle has 0.12, a square wave 0.48
@@ -198,17 +199,22 @@ def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None, *
     sines, refused = usable_sines(dataset)
     loops = at_levels([analyse_loop(run) for run in sines])
     train = [run for run in sines if run.split == "train"]
-    if len(train) < 2:
+    trusted, distrusted = believed(dataset)
+    everything, unusable = usable(run for run in trusted if run.split == "train")
+    unusable |= distrusted
+    refused = {name: unusable.get(name, f"{why}; the joint model takes it whole") for name, why in refused.items()}
+    if not everything:
         raise IdentificationError(
-            f"{len(train)} train runs with a steady sine",
+            "no train runs that can be used",
             where=f"rig {rig or dataset.name}",
-            mend="a model over conditions needs at least two; check the split column of runs.csv",
+            mend="check the split column of runs.csv" if not unusable else next(iter(unusable.values())),
         )
     candidates, impossible = follow_all(
-        _steps(train),
-        [run for run in believed(dataset)[0] if run.split == "validate"],
+        _steps(train, everything),
+        [run for run in trusted if run.split == "validate"],
         lambda what, share: progress(f"{rig or 'rig'}: {what}", share),
     )
+    candidates = [_judged_on_all(c, everything) for c in candidates]
     eligible = [c for c in candidates if model in (None, c.recipe.model)]
     if not eligible:
         name, reason = next(iter(impossible.items()))
@@ -217,8 +223,10 @@ def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None, *
             where=f"rig {rig or dataset.name}",
             mend="test more conditions, or leave this rig out of the dataset",
         )
-    candidates.sort(key=_left_out)
-    near = [c for c in eligible if _left_out(c) <= _WORTH * min(map(_left_out, eligible))]
+    errors = {id(c): _left_out(c, {run.id for run in train}) for c in candidates}
+    candidates.sort(key=lambda c: errors[id(c)])
+    least = min(errors[id(c)] for c in eligible)
+    near = [c for c in eligible if errors[id(c)] <= _WORTH * least]
     chosen = min(near, key=lambda c: c.damper.parameter_count)
     candidates.sort(key=lambda c: c is not chosen)
     return RigStudy(
@@ -226,9 +234,37 @@ def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None, *
     )
 
 
-def _left_out(candidate: Scored) -> float:
-    """Median error on left-out conditions; of runs at one condition nothing can be left out."""
-    return candidate.left_out.median() if candidate.left_out.runs else float("inf")
+def _judged_on_all(candidate: Scored, everything: Sequence[Run]) -> Scored:
+    """The same with the train runs that its recipe could not take among the left-out ones: it never saw them."""
+    known = {score.run_id for score in (*candidate.train.runs, *candidate.left_out.runs)}
+    others = validate(candidate.damper, [run for run in everything if run.id not in known])
+    if not others.runs:
+        return candidate
+    left_out = candidate.left_out
+    return replace(candidate, left_out=Validation(left_out.title, (*left_out.runs, *others.runs), others.refused))
+
+
+def _left_out(candidate: Scored, sines: Collection[str]) -> float:
+    """Median error on left-out conditions, sines and other records alike; infinite where nothing was left out."""
+    runs = candidate.left_out.runs
+    kinds = [[abs(run.scores.nrmse_pp) for run in runs if (run.run_id in sines) == kind] for kind in (True, False)]
+    medians = [float(np.median(errors)) for errors in kinds if errors]
+    return float(np.mean(medians)) if medians else float("inf")
+
+
+def usable(runs: Iterable[Run], clipped: bool = False) -> tuple[list[Run], dict[str, str]]:
+    """The runs of any motion and any current that a joint model takes, and why the others are not used."""
+    found, refused = [], {}
+    for run in runs:
+        try:
+            refuse_clipped(run, clipped)
+            if np.ptp(run.force[run.in_window]) == 0:
+                raise IdentificationError("the force does not change", where=f"run {run.id}", mend="check the channel")
+            equivalent_sine(run)  # refuses a run that does not move
+            found.append(run)
+        except InputError as error:
+            refused[run.id] = str(error)
+    return found, refused
 
 
 def believed(dataset: Dataset) -> tuple[list[Run], dict[str, str]]:
@@ -273,16 +309,16 @@ def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], di
         if found.is_sine and analyse_motion(run).distortion < _DISTORTED:
             sines.append(run)
         else:
-            refused[run.id] = "the motion is no sine: it is predicted, but not identified from"
+            refused[run.id] = "the motion is no sine, which identification run by run needs"
     return sines, refused
 
 
-def _steps(train: Sequence[Run]) -> list[tuple[Recipe, Sequence[Run]]]:
-    """The recipes of a study, and the runs each is followed on."""
-    steps: list[tuple[Recipe, Sequence[Run]]] = [
-        (make(name), train) for name in STUDIED for make in (modified, jointly)
-    ]
+def _steps(train: Sequence[Run], everything: Sequence[Run]) -> list[tuple[Recipe, Sequence[Run]]]:
+    """The recipes of a study, and the runs each is followed on: sines run by run, everything at once."""
+    steps: list[tuple[Recipe, Sequence[Run]]] = []
+    if len(train) > 1:
+        steps += [(make(name), train) for name in STUDIED for make in (modified, jointly)]
     pure = [run for run in train if analyse_motion(run).is_sine]  # the paper's recipe takes no other
     if len(pure) > 2:
         steps.append((literal(Settled.of(pure, None)), train))
-    return [*steps, (play_and_bypass(), train)]
+    return [*steps, (play_and_bypass(), everything)]

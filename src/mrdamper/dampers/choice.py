@@ -1,0 +1,351 @@
+"""Which terms of a joint model the tests show: chosen by what is predicted when it was left out.
+
+Terms are tried on the linearisation of one fit: leaving out a condition, a current or a
+session, with a term or without it, is then linear algebra on a few thousand rows, and only the
+terms that win are fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mrdamper.dampers.joint import JointFit, JointProblem
+from mrdamper.data import Floats, Run, same_condition
+from mrdamper.optimizers.linear import on_one_blas_thread, solve_linear
+
+_WORTH = 0.985  # a term must lower the left-out error to this share of it
+_HARM = 1.01  # and raise it by no more in any way of leaving out
+_NO_PLAY = 1e-2  # seat longer than any play: none is left [m]
+_BLOCK = 12.0  # cycles of a record that is no sine that are left out together
+_LEVEL = 5e-3  # currents closer than this share of the largest are one level
+MODEL = "play-bypass"
+
+
+@dataclass(frozen=True)
+class Term:
+    """Something a model may have or not.
+
+    Attributes
+    ----------
+    title : str
+    names : tuple of str
+        Parameters it takes.
+    neutral : tuple of float
+        Their values where the model does without.
+    """
+
+    title: str
+    names: tuple[str, ...]
+    neutral: tuple[float, ...]
+
+
+LEVEL_LAWS = (
+    Term("yield force rises over a current of its own", ("Ic",), (0.0,)),
+    Term("yield force saturates with current", ("Ic", "si"), (0.0, 0.0)),
+)
+TERMS = (
+    Term("viscosity differs by direction", ("cq",), (0.0,)),
+    Term("bypass differs by direction", ("qb",), (0.0,)),
+)
+ALWAYS = (
+    Term("yield force differs by direction", ("asymmetry",), (0.0,)),
+    Term("viscosity rises with current", ("c1",), (0.0,)),
+    Term("seated share depends on current", ("h1",), (0.0,)),
+    Term("inertia", ("m",), (0.0,)),
+)
+
+
+@dataclass(frozen=True)
+class Tried:
+    """What the evidence said of a term.
+
+    Attributes
+    ----------
+    term : str
+    kept : bool
+    left_out : mapping of str to float
+        Mean nrmse_pp with it (where it was not kept) or without it (where it was), by what is left out.
+    before : mapping of str to float
+        The same of the model it was tried on.
+    """
+
+    term: str
+    kept: bool
+    left_out: Mapping[str, float]
+    before: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class JointChoice:
+    """A joint model whose terms were chosen by evidence.
+
+    Attributes
+    ----------
+    problem : JointProblem
+    fit : JointFit
+    tried : tuple of Tried
+    left_out : mapping of str to float
+        Mean nrmse_pp by what is left out: "condition", "current", "session".
+    """
+
+    problem: JointProblem
+    fit: JointFit
+    tried: tuple[Tried, ...]
+    left_out: Mapping[str, float]
+
+
+@on_one_blas_thread
+def identify_jointly(
+    runs: Sequence[Run], progress: Callable[[str, float], None] = lambda what, share: None
+) -> JointChoice:
+    """Identify one damper from all runs, with the terms that predict what is left out.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Of one rig; any motion, any current.
+    progress : callable
+
+    Raises
+    ------
+    IdentificationError, RunError
+        As `JointProblem`.
+    """
+    fixed = _undetermined(runs)
+    problem = JointProblem(runs, MODEL, fixed)
+    leak = ("leak",) if problem.rests else ()
+    progress("one model, steady ends first", 0.0)
+    short = JointProblem(runs, MODEL, fixed, parts=[part.steady_end() for part in problem.parts])
+    fit = short.fit(rounds=2)
+    short, fit, tried = _lost_motion(short, fit)
+    progress("how the force rises with current", 0.3)
+    law, more = _level_law(short, fit) if not fixed else ((), ())
+    tried = (*tried, *more)
+    progress("whole records", 0.5)
+    problem = problem.with_free((*leak, *law), short.fixed)
+    fit = problem.fit(start=problem.from_point(fit), rounds=2, most_steps=10)
+    progress("which terms the tests show", 0.8)
+    extra = [name for term in TERMS for name in term.names]
+    if not law and not fixed and any(run.current_changes for run in runs):
+        extra += LEVEL_LAWS[-1].names
+    evidence = Evidence.of(problem.with_free((*leak, *law, *extra)), problem, fit)
+    chosen, more = evidence.choose(law, [t for t in ALWAYS if not problem.fixed.keys() & set(t.names)])
+    final, found = problem, fit
+    off = {name: 0.0 for term in ALWAYS for name in term.names if name in problem.free and name not in chosen}
+    new = [name for name in extra if name in chosen]
+    if off or new:
+        final = problem.with_free((*leak, *law, *new), off)
+        found = final.fit(start=evidence.start(final), rounds=2, most_steps=10)
+    progress("one model for all runs", 1.0)
+    left_out, before = (Evidence.of(p, p, f).everything() for p, f in ((final, found), (problem, fit)))
+    if _total(left_out, before) > 1.0:  # what one step promised, the search did not keep
+        final, found, left_out = problem, fit, before
+    tried = (*tried, *more)
+    kept = "; ".join(t.term for t in tried if t.kept)
+    about = {**found.damper.provenance, "terms": kept or "none beyond the plain form"}
+    about |= {f"left out, {what}": f"{100 * error:.2f} %" for what, error in left_out.items()}
+    found = replace(found, damper=replace(found.damper, provenance=about))
+    return JointChoice(final, found, tried, left_out)
+
+
+def _lost_motion(problem: JointProblem, fit: JointFit) -> tuple[JointProblem, JointFit, tuple[Tried, ...]]:
+    """Whether the damper loses motion after a reversal: the model without it, where that predicts as well."""
+    without = problem.with_free((), {"e": _NO_PLAY})
+    found = without.fit(start=without.from_point(fit), rounds=2)
+    now, scores = (Evidence.of(p, p, f).everything() for p, f in ((problem, fit), (without, found)))
+    kept = _better(now, scores)
+    said = Tried("lost motion after a reversal", kept, scores if kept else now, now if kept else scores)
+    return (problem, fit, (said,)) if kept else (without, found, (said,))
+
+
+def _level_law(short: JointProblem, fit: JointFit) -> tuple[tuple[str, ...], tuple[Tried, ...]]:
+    """Form of the yield force over current that predicts currents left out, the shortest first.
+
+    One step does not carry a form from current to current, so these are refitted.
+    """
+    levels = levels_of(short)
+    if len(levels) < 3:
+        return (), ()
+    names: tuple[str, ...] = ()
+    now = {"current": _left_out_current(short, fit, levels)}
+    tried = []
+    for term in LEVEL_LAWS:
+        longer = short.with_free(term.names)
+        found = longer.fit(start=longer.from_point(fit), rounds=1, most_steps=12)
+        scores = {"current": _left_out_current(longer, found, levels)}
+        kept = _better(scores, now)
+        tried.append(Tried(term.title, kept, now if kept else scores, scores if kept else now))
+        if kept:
+            names, now = term.names, scores
+    return names, tuple(tried)
+
+
+def _left_out_current(problem: JointProblem, fit: JointFit, levels: Sequence[Sequence[int]]) -> float:
+    """Mean nrmse_pp of the runs at inner currents, each level predicted by a fit without it."""
+    errors = []
+    for level in levels[1:-1]:
+        rest = [i for i in range(len(problem.parts)) if i not in level]
+        without = problem.fit(rest, fit.point, rounds=1, most_steps=8)
+        errors += problem.errors(without, level).tolist()
+    return float(np.mean(errors))
+
+
+def levels_of(problem: JointProblem) -> list[list[int]]:
+    """Runs of constant current, by level from the lowest."""
+    constant = [i for i, part in enumerate(problem.parts) if not part.changes]
+    highest = max((abs(problem.parts[i].condition.current_A) for i in constant), default=0.0)
+    levels: list[list[int]] = []
+    for i in sorted(constant, key=lambda i: problem.parts[i].condition.current_A):
+        now = problem.parts[i].condition.current_A
+        if levels and now - problem.parts[levels[-1][0]].condition.current_A <= max(_LEVEL * highest, 1e-3):
+            levels[-1].append(i)
+        else:
+            levels.append([i])
+    return levels
+
+
+def _undetermined(runs: Sequence[Run]) -> dict[str, float]:
+    """Parameters that the currents of the tests cannot tell from others: of one level, the rises with current."""
+    lowest = min(float(np.min(np.abs(run.coil_current))) for run in runs)
+    highest = max(float(np.max(np.abs(run.coil_current))) for run in runs)
+    one_level = highest - lowest <= _LEVEL * highest
+    return {"fy1": 0.0, "c1": 0.0, "h1": 0.0} if one_level else {}
+
+
+class Evidence:
+    """The linearisation of a fit by all parameters, and what to leave out of it."""
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        values: Floats,
+        neutral: Floats,
+        residual: Floats,
+        jacobian: Floats,
+        groups: Mapping[str, Sequence[np.ndarray]],
+        error: Callable[[Floats, np.ndarray], float],
+    ):
+        self.names, self.values, self.neutral = tuple(names), values, neutral
+        self.residual, self.jacobian = residual, jacobian
+        self.groups, self.error = groups, error
+        self.step = np.zeros(len(self.names))
+
+    @classmethod
+    def of(cls, wide: JointProblem, problem: JointProblem, fit: JointFit) -> Evidence:
+        """Linearise the wider problem where the narrower one ended."""
+        point = wide.from_point(fit)
+        lower = np.array([a.coordinate(a.lower) for a in wide.axes])
+        upper = np.array([a.coordinate(a.upper) for a in wide.axes])
+        table = wide.table(fit.nrmse_pp)
+        residual, jacobian, owner = table.linearise(np.clip(point, lower, upper), fit.damper.model)
+        names = [*(a.name for a in wide.axes), *(i.name for i in wide.linear)]
+        values = np.array([*point, *(getattr(fit.damper.model, i.name) for i in wide.linear)])
+        neutral = values.copy()
+        for k, name in enumerate(names):
+            if name in ("asymmetry", "c1", "h1", "m", "cq", "qb", "si"):
+                neutral[k] = 0.0
+        rows = _rows_of(wide, owner, table)
+
+        def error(weighted: Floats, group: np.ndarray) -> float:
+            runs = float(np.sum(table.share[group]))  # one for each whole run
+            return float(np.sqrt(np.sum((weighted[group] / table.weights[owner[group]]) ** 2) / runs))
+
+        return cls(names, values, neutral, residual, jacobian, rows, error)
+
+    def everything(self) -> dict[str, float]:
+        """Mean left-out errors with all parameters."""
+        return self.scores(frozenset(self.names))
+
+    def scores(self, active: frozenset[str]) -> dict[str, float]:
+        """Mean left-out error by what is left out, with the other parameters neutral."""
+        on = np.array([n in active or n.startswith("coil.") for n in self.names])
+        shift = np.where(on, 0.0, self.neutral - self.values)
+        base = self.residual + self.jacobian @ shift
+        found = {}
+        normal, right = self.jacobian[:, on].T @ self.jacobian[:, on], self.jacobian[:, on].T @ base
+        for what, groups in self.groups.items():
+            errors = []
+            for group in groups:
+                J = self.jacobian[np.ix_(group, on)]
+                step = _damped(normal - J.T @ J, -(right - J.T @ base[group]))
+                errors.append(self.error_of(base[group] + J @ step, group))
+            found[what] = float(np.mean(errors))
+        return found
+
+    def error_of(self, weighted: Floats, group: np.ndarray) -> float:
+        """Unweighted error of some rows."""
+        whole = np.zeros(self.residual.size)
+        whole[group] = weighted
+        return self.error(whole, group)
+
+    def choose(self, law: Sequence[str], removable: Sequence[Term]) -> tuple[frozenset[str], tuple[Tried, ...]]:
+        """Terms that lower what is left out; and of those always there, the ones that can go."""
+        extra = {n for t in (*TERMS, *LEVEL_LAWS) for n in t.names} - set(law)
+        active = frozenset(n for n in self.names if n not in extra and not n.startswith("coil."))
+        now, tried = self.scores(active), []
+        waiting = [t for t in (*TERMS, *LEVEL_LAWS) if set(t.names) <= set(self.names) - set(law)]
+        while waiting:
+            trials = [(t, self.scores(active | set(t.names))) for t in waiting]
+            term, best = min(trials, key=lambda pair: _total(pair[1], now))
+            if not _better(best, now):
+                tried += [Tried(t.title, False, scores, now) for t, scores in trials]
+                break
+            tried.append(Tried(term.title, True, now, best))
+            active, now = active | set(term.names), best
+            waiting = [t for t in waiting if not set(t.names) & set(term.names)]
+        for term in removable:
+            if set(term.names) <= active:
+                without = self.scores(active - set(term.names))
+                keep = _better(now, without)
+                tried.append(Tried(term.title, keep, without if keep else now, now if keep else without))
+                if not keep:
+                    active, now = active - set(term.names), without
+        self.active = active
+        return active, tuple(tried)
+
+    def start(self, problem: JointProblem) -> Floats:
+        """Where the chosen problem starts: one step of the linearisation from the fit."""
+        on = np.array([n in self.active or n.startswith("coil.") for n in self.names])
+        shift = np.where(on, 0.0, self.neutral - self.values)
+        J, base = self.jacobian[:, on], self.residual + self.jacobian @ shift
+        moved = self.values + shift
+        moved[on] += solve_linear(J, -base, rank_limit=1e-10)
+        known = dict(zip(self.names, moved.tolist(), strict=True))
+        lower = np.array([a.coordinate(a.lower) for a in problem.axes])
+        upper = np.array([a.coordinate(a.upper) for a in problem.axes])
+        return np.clip(
+            [known[a.name] for a in problem.axes], lower + 0.02 * (upper - lower), upper - 0.02 * (upper - lower)
+        )
+
+
+def _damped(normal: Floats, right: Floats) -> Floats:
+    scale = np.sqrt(np.maximum(np.diag(normal), np.finfo(float).tiny))
+    stiff = normal / scale / scale[:, None] + 1e-9 * np.eye(scale.size)
+    return np.linalg.solve(stiff, right / scale) / scale
+
+
+def _total(scores: Mapping[str, float], before: Mapping[str, float]) -> float:
+    return float(np.mean([scores[what] / before[what] for what in scores])) if scores else 1.0
+
+
+def _better(scores: Mapping[str, float], before: Mapping[str, float]) -> bool:
+    return _total(scores, before) < _WORTH and all(scores[w] < _HARM * before[w] for w in scores)
+
+
+def _rows_of(problem: JointProblem, owner: np.ndarray, table: object) -> dict[str, list[np.ndarray]]:
+    """Rows left out together: of a condition, or a stretch of another record."""
+    found = {}
+    sines = [i for i, part in enumerate(problem.parts) if part.is_sine and not part.changes]
+    conditions = [problem.parts[i].condition for i in sines]
+    groups = [np.flatnonzero(np.isin(owner, [sines[k] for k in group])) for group in same_condition(conditions)]
+    for i, part in enumerate(problem.parts):
+        if i not in sines:
+            rows = np.flatnonzero(owner == i)
+            cycles = (part.motion.time[-1] - part.motion.time[0]) * part.condition.frequency_Hz
+            groups += np.array_split(rows, max(4, int(cycles / _BLOCK)))
+    if len(groups) > 2:
+        found["condition"] = groups
+    return found
