@@ -38,12 +38,15 @@ class Envelope:
     ----------
     current_A, frequency_Hz, amplitude_m, peak_velocity_m_s : (float, float)
         Lowest and highest tested.
+    any_motion : bool
+        Motions that are no sine, or currents that change, were among the tests.
     """
 
     current_A: tuple[float, float]
     frequency_Hz: tuple[float, float]
     amplitude_m: tuple[float, float]
     peak_velocity_m_s: tuple[float, float]
+    any_motion: bool = False
 
     @classmethod
     def of(cls, conditions: Sequence[Condition]) -> Envelope:
@@ -68,6 +71,7 @@ class Envelope:
         moved = np.array([np.ptp(displacement) / 2])
         return replace(
             self,
+            any_motion=True,
             current_A=wider(self.current_A, np.abs(current)),
             amplitude_m=wider(self.amplitude_m, moved),
             peak_velocity_m_s=wider(self.peak_velocity_m_s, np.array([np.max(np.abs(velocity))])),
@@ -331,7 +335,7 @@ class Damper(Shown):
         if found.is_sine and not run.current_changes:
             flags = self.envelope.flags(found.condition)
         else:
-            flags = (*self.envelope.motion_flags(motion), *((NOT_A_SINE,) if self.conditional else ()))
+            flags = (*self.envelope.motion_flags(motion), *(() if self.envelope.any_motion else (NOT_A_SINE,)))
         if self.knee is not None and samples_in_knee(motion, self.knee) < _SAMPLES_IN_KNEE:
             flags = (*flags, COARSE)
         if self.conditional and not (found.is_sine and np.ptp(motion.current) <= _SAME_CURRENT):

@@ -61,6 +61,7 @@ class _Envelope(_Strict):
     frequency_Hz: Range
     amplitude_m: Range
     peak_velocity_m_s: Range
+    any_motion: bool | None = None  # since 1.2; written where it holds
 
 
 class _Driver(_Strict):
@@ -124,7 +125,7 @@ def dump_model(damper: Damper) -> str:
         version=f"{MAJOR}.{MINOR}",
         rig=damper.rig,
         units=UNITS,
-        envelope=_Envelope(**{name: getattr(damper.envelope, name) for name in _Envelope.model_fields}),
+        envelope=_Envelope(**{name: getattr(damper.envelope, name) or None for name in _Envelope.model_fields}),
         provenance=dict(damper.provenance),
         coil=_describe_coil(damper.coil),
         damper={"kind": damper.kind, **asdict(damper.to_saved())},
@@ -191,7 +192,7 @@ def parse_model(text: str, where: str = "model") -> Damper:
     try:
         require_name("rig", document.rig)
         coil = _restore_coil(document.coil) if document.coil else None
-        envelope = Envelope(**document.envelope.model_dump())
+        envelope = Envelope(**document.envelope.model_dump(exclude_none=True))
         return kind.from_saved(saved, document.rig, envelope, document.provenance, coil)
     except InputError as error:
         raise ModelFileError(error.found, where=where, mend=error.mend) from error

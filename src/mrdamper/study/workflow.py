@@ -209,6 +209,12 @@ def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None, *
             where=f"rig {rig or dataset.name}",
             mend="check the split column of runs.csv" if not unusable else next(iter(unusable.values())),
         )
+    if len(everything) == len(train) < 2:
+        raise IdentificationError(
+            f"{len(train)} train runs with a steady sine",
+            where=f"rig {rig or dataset.name}",
+            mend="a model over conditions needs at least two, or a record of other motion; check the split column",
+        )
     candidates, impossible = follow_all(
         _steps(train, everything),
         [run for run in trusted if run.split == "validate"],
