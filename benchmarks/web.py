@@ -143,9 +143,11 @@ def sessions(address: str, document: str) -> str:
 
 
 def _asking(address: str, document: str, taken: list[float], errors: list[str]) -> None:
+    base, _, token = address.partition("?token=")
+
     def post(path: str, body: object) -> bytes:
-        headers = {"Origin": address.rstrip("/"), "Content-Type": "application/json"}
-        request = urllib.request.Request(f"{address}api/sessions{path}", json.dumps(body).encode(), headers)
+        headers = {"Origin": base.rstrip("/"), "Content-Type": "application/json", "X-Bench-Token": token}
+        request = urllib.request.Request(f"{base}api/sessions{path}", json.dumps(body).encode(), headers)
         with urllib.request.urlopen(request, timeout=30) as answer:
             return answer.read()
 

@@ -59,12 +59,14 @@ def address():
 def served():
     import uvicorn
 
-    from mrdamper.web.server import _listen
+    from mrdamper.web.server import Connection, _listen
 
     listener = _listen(0)
     port = listener.getsockname()[1]
     app = create_app([f"127.0.0.1:{port}"], lambda: server.should_exit)
-    server = uvicorn.Server(uvicorn.Config(app, log_level="error", access_log=False, timeout_graceful_shutdown=1))
+    server = uvicorn.Server(
+        uvicorn.Config(app, http=Connection, log_level="error", access_log=False, timeout_graceful_shutdown=1)
+    )
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]}, daemon=True)
     thread.start()
     while not server.started:

@@ -7,16 +7,18 @@ import socket
 import subprocess
 import sys
 import time
+import urllib.error
 import urllib.request
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
+from web.conftest import served
 from web.processes import alive
 
 from mrdamper.cli import application
 from mrdamper.errors import InputError, MissingExtraError
-from mrdamper.web import server
+from mrdamper.web import security, server
 from mrdamper.web.app import plotly_script
 
 
@@ -31,12 +33,15 @@ def test_it_starts_answers_and_stops_cleanly(tmp_path, name):
         text=True,
         env={**os.environ, "TMPDIR": str(tmp_path)},
     )
-    address = process.stdout.readline().split()[2]
+    address, token = process.stdout.readline().split()[2].split("?token=")
+    assert len(token) > 30
     assert address.startswith("http://127.0.0.1:")
     with urllib.request.urlopen(address, timeout=10) as answer:
         assert b"live bench" in answer.read()
     # SIGHUP ends the server as SIGINT does; one of them with work under way is enough.
-    workers = workers_of_a_study(process.pid, address) if name != "SIGHUP" else []
+    with pytest.raises(urllib.error.HTTPError, match="403"):
+        post(address, "", "a guess")
+    workers = workers_of_a_study(process.pid, address, token) if name != "SIGHUP" else []
     assert list(tmp_path.glob("mrdamper-bench-*"))
     process.send_signal(stop)
     out, err = process.communicate(timeout=20)
@@ -50,17 +55,18 @@ def test_it_starts_answers_and_stops_cleanly(tmp_path, name):
     assert not [pid for pid in workers if alive(pid)]
 
 
-def workers_of_a_study(server, address):
+def post(address, path, token):
+    headers = {"Origin": address.rstrip("/"), "X-Bench-Token": token}
+    request = urllib.request.Request(f"{address}api/sessions{path}", b"", headers)
+    with urllib.request.urlopen(request, timeout=20) as answer:
+        return json.load(answer)
+
+
+def workers_of_a_study(server, address, token):
     """Begin long work; gives the process ids of the server's children."""
-
-    def post(path):
-        request = urllib.request.Request(f"{address}api/sessions{path}", b"", {"Origin": address.rstrip("/")})
-        with urllib.request.urlopen(request, timeout=20) as answer:
-            return json.load(answer)
-
-    session = post("")["session"]
-    post(f"/{session}/bundled")
-    post(f"/{session}/study")
+    session = post(address, "", token)["session"]
+    post(address, f"/{session}/bundled", token)
+    post(address, f"/{session}/study", token)
     deadline = time.monotonic() + 20
     while not (found := children(server)) and time.monotonic() < deadline:
         time.sleep(0.02)
@@ -115,3 +121,32 @@ def test_the_help_shows_an_example():
     result = CliRunner().invoke(application(), ["serve", "--help"])
     assert result.exit_code == 0
     assert "Example: mrdamper serve" in result.output
+
+
+@pytest.mark.parametrize(
+    ("sent", "answer"),
+    [
+        (b"GET / HT", b""),
+        (b"", b""),
+        (b"GET / HTTP/1.1\r\nHost: {host}\r\n\r\nGET / HT", b"HTTP/1.1 200 OK"),
+        (b"POST /api/sessions HTTP/1.1\r\nHost: {host}\r\nContent-Le", b""),
+        (
+            b"POST /api/sessions/x/dampers HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\n"
+            b"Content-Type: application/json\r\nContent-Length: 900\r\n\r\n{",
+            b"HTTP/1.1 408",
+        ),
+    ],
+    ids=["head", "nothing", "second head", "header", "body"],
+)
+def test_half_sent_requests_are_given_up(monkeypatch, sent, answer):
+    monkeypatch.setattr(server, "HALF_SENT_S", 0.3)
+    monkeypatch.setattr(security, "HALF_SENT_S", 0.3)
+    with served() as address, socket.create_connection(("127.0.0.1", int(address.rsplit(":", 1)[1])), 10) as line:
+        line.sendall(sent.replace(b"{host}", address.removeprefix("http://").encode()))
+        received = b""
+        while part := line.recv(65536):
+            received += part
+            if answer.endswith(b"408") and answer in received:
+                break
+    assert received.startswith(answer)
+    assert bool(received) == bool(answer)

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import ctypes
+import gc
 import importlib.util
 import sys
 import traceback
@@ -15,6 +18,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import HTMLResponse, JSONResponse, Response
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mrdamper.errors import InputError, MissingExtraError
@@ -30,7 +34,12 @@ _SWEEP_SECONDS = 60.0
 _STATUS = {"E_SESSION": 410, "E_DROP_SIZE": 413}
 
 
-def create_app(hosts: Iterable[str], stopping: Callable[[], bool] = lambda: False, read_ahead: bool = False) -> FastAPI:
+def create_app(
+    hosts: Iterable[str],
+    stopping: Callable[[], bool] = lambda: False,
+    read_ahead: bool = False,
+    token: str | None = None,
+) -> FastAPI:
     """Make the application.
 
     Parameters
@@ -41,6 +50,9 @@ def create_app(hosts: Iterable[str], stopping: Callable[[], bool] = lambda: Fals
         Says whether the server is about to stop, so that open streams end.
     read_ahead : bool
         Whether the first session brings the bundled tests before they are asked for.
+    token : str, optional
+        What a page has to show to open a session: it stands in the printed address, so that other
+        users of this machine cannot. Without one, anybody who reaches the bench can.
 
     Raises
     ------
@@ -59,7 +71,7 @@ def create_app(hosts: Iterable[str], stopping: Callable[[], bool] = lambda: Fals
 
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None, redirect_slashes=False, lifespan=life)
     app.state.sessions, app.state.stopping = sessions, stopping
-    app.state.read_ahead = ReadAhead() if read_ahead else None
+    app.state.read_ahead, app.state.token = ReadAhead() if read_ahead else None, token
     app.add_exception_handler(InputError, _refuse)
     app.add_exception_handler(RequestValidationError, _misunderstand)
     app.add_exception_handler(HTTPException, _decline)
@@ -102,6 +114,15 @@ async def _sweep(sessions: Sessions) -> None:
     while True:
         await asyncio.sleep(_SWEEP_SECONDS)
         await asyncio.to_thread(sessions.sweep)
+        await asyncio.to_thread(_give_memory_back)
+
+
+def _give_memory_back() -> None:
+    """What ended sessions held goes back to the system: the allocator would keep it."""
+    gc.collect()
+    if sys.platform == "linux":
+        with contextlib.suppress(OSError, AttributeError):  # a C library that knows no trim
+            ctypes.CDLL(None).malloc_trim(0)
 
 
 def _refuse(request: Request, error: Exception) -> JSONResponse:
@@ -143,6 +164,8 @@ class _Faults:
 
         try:
             await self.app(scope, receive, watched)
+        except ClientDisconnect:
+            return  # an upload that broke off: nobody is left to answer
         except Exception:
             traceback.print_exc(file=sys.stderr)
             if scope["type"] != "http" or begun:

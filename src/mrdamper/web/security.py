@@ -8,6 +8,7 @@ elsewhere and run no inline script or style.
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterable
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -38,6 +39,7 @@ HEADERS = {
     "Permissions-Policy": "camera=(), microphone=(), geolocation=()",
 }
 FORM_LIMIT = 5_000_000  # bytes of a question; files come by PUT and stream under a limit of their own
+HALF_SENT_S = 30.0  # between two pieces of a body
 _HARMLESS = frozenset({"GET", "HEAD"})
 _OWN_SITES = frozenset({"same-origin", "none"})  # what a browser says of our page, and of a typed address
 
@@ -65,11 +67,15 @@ class Guard:
             return
         headers = Headers(scope=scope)
         refusal = self.refusal(scope["method"], headers)
-        received = 0
+        received, whole = 0, False
 
         async def receive_some() -> Message:
-            nonlocal received
-            message = await receive()
+            nonlocal received, whole
+            try:  # once the body is there, the next message is the end of the connection: any time
+                message = await asyncio.wait_for(receive(), None if whole else HALF_SENT_S)
+            except TimeoutError:
+                raise HTTPException(408, "the request did not go on") from None
+            whole = whole or not message.get("more_body", False)
             received += len(message.get("body", b""))
             if received > FORM_LIMIT and scope["method"] != "PUT":
                 raise HTTPException(413, "the question is too long")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
+import secrets
 import signal
 import socket
 import threading
@@ -12,10 +14,12 @@ from contextlib import contextmanager
 from types import FrameType
 
 import uvicorn
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from mrdamper.errors import InputError
 from mrdamper.web.app import create_app
 
+HALF_SENT_S = 15.0  # that the head of a request may take
 LOOPBACK = "127.0.0.1"
 _ENDS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
@@ -44,12 +48,20 @@ def serve(port: int, open_browser: bool = True) -> int:
     listener = _listen(port)
     port = listener.getsockname()[1]
     server: uvicorn.Server
-    app = create_app([f"{LOOPBACK}:{port}", f"localhost:{port}"], lambda: server.should_exit, read_ahead=True)
+    token = secrets.token_urlsafe(24)
+    hosts = [f"{LOOPBACK}:{port}", f"localhost:{port}"]
+    app = create_app(hosts, lambda: server.should_exit, read_ahead=True, token=token)
     server = _Server(
         uvicorn.Config(
-            app, log_level="error", ws="none", access_log=False, timeout_graceful_shutdown=3, server_header=False
+            app,
+            http=Connection,
+            log_level="error",
+            ws="none",
+            access_log=False,
+            timeout_graceful_shutdown=3,
+            server_header=False,
         ),
-        f"http://{LOOPBACK}:{port}/",
+        f"http://{LOOPBACK}:{port}/?token={token}",
         open_browser,
     )
     try:
@@ -58,6 +70,39 @@ def serve(port: int, open_browser: bool = True) -> int:
         listener.close()
     print("stopped", flush=True)
     return server.ended_by
+
+
+class Connection(H11Protocol):
+    """One that is closed when a request's head is begun and not finished; `Guard` looks after bodies."""
+
+    _deadline: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(transport)
+        self._watch()
+
+    def data_received(self, data: bytes) -> None:
+        super().data_received(data)
+        self._watch()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        if self._deadline is not None:
+            self._deadline.cancel()
+        super().connection_lost(exc)
+
+    def _watch(self) -> None:
+        if self.cycle is not None and not self.cycle.response_complete:
+            if self._deadline is not None:
+                self._deadline.cancel()
+            self._deadline = None
+        elif self._deadline is None:
+            self._deadline = self.loop.call_later(HALF_SENT_S, self._give_up)
+
+    def _give_up(self) -> None:
+        self._deadline = None
+        busy = self.cycle is not None and not self.cycle.response_complete
+        if not busy and not self.transport.is_closing():
+            self.transport.close()
 
 
 class _Server(uvicorn.Server):

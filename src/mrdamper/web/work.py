@@ -57,6 +57,7 @@ class Job:
     _process: Any = None
     _thread: threading.Thread | None = None
     _stop: threading.Event = field(default_factory=threading.Event)
+    _starting: threading.Lock = field(default_factory=threading.Lock)
 
     def start(self) -> Job:
         """Begin; returns at once."""
@@ -77,7 +78,8 @@ class Job:
     def cancel(self) -> None:
         """Stop the process; harmless where it has ended."""
         self._stop.set()
-        process = self._process
+        with self._starting:  # one that is half started cannot be ended, and would complain when left alone
+            process = self._process
         if process is not None and process.is_alive():
             _end_group(process)
 
@@ -112,8 +114,9 @@ class Job:
         self.state, self.what = "running", "starting"
         context = get_context("spawn")  # a fork of a process that runs threads can hang
         here, there = context.Pipe(duplex=False)
-        self._process = context.Process(target=_work, args=(there, self.task, self.arguments))
-        self._process.start()
+        with self._starting:
+            self._process = context.Process(target=_work, args=(there, self.task, self.arguments))
+            self._process.start()
         there.close()
         if self._stop.is_set():  # cancelled while it was being started
             _end_group(self._process)

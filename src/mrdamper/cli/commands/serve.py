@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 import signal
+import sys
 
 import typer
 
@@ -27,5 +29,6 @@ def register(app: typer.Typer) -> None:
         from mrdamper.web import serve as run
 
         ended_by = run(port, browser)
-        if ended_by != signal.SIGINT:  # Ctrl-C is the way to stop it
-            raise typer.Exit(128 + ended_by)
+        sys.stdout.flush()
+        # All is cleaned up; threads that still compute for a session are not waited for.
+        os._exit(0 if ended_by == signal.SIGINT else 128 + ended_by)  # Ctrl-C is the way to stop it

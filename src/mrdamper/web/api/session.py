@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import secrets
 from importlib.metadata import version
 from typing import Any
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter, HTTPException, Request
 
 from mrdamper.web.drops import FILE_COUNT_LIMIT, FILE_LIMIT
 from mrdamper.web.sessions import Current
@@ -16,6 +17,9 @@ router = APIRouter(prefix="/sessions")
 @router.post("")
 def open_session(request: Request) -> dict[str, Any]:
     """A new session and what the page must know of the bench."""
+    token, shown = request.app.state.token, request.headers.get("x-bench-token", "")
+    if token is not None and not secrets.compare_digest(shown.encode(), token.encode()):
+        raise HTTPException(403, "Open the address that the terminal shows: its token is missing or of an older bench.")
     session = request.app.state.sessions.open()
     if request.app.state.read_ahead:
         request.app.state.read_ahead.begin()

@@ -8,6 +8,18 @@ export class BenchError extends Error {
   }
 }
 
+const TOKEN = "mrdamper.token";
+
+/** What the printed address holds: kept for loading the page again, and taken out of the address. */
+function token() {
+  const given = new URLSearchParams(location.search).get("token");
+  if (given) {
+    sessionStorage.setItem(TOKEN, given);
+    history.replaceState(history.state, "", location.pathname + location.hash);
+  }
+  return sessionStorage.getItem(TOKEN) ?? "";
+}
+
 const RETRIES = 4; // of a progress stream that broke off
 
 export class Api {
@@ -17,7 +29,8 @@ export class Api {
 
   /** Open a session. */
   static async open() {
-    return (await answer(await send("/api/sessions", { method: "POST" }))).json();
+    const headers = { "X-Bench-Token": token() };
+    return (await answer(await send("/api/sessions", { method: "POST", headers }))).json();
   }
 
   url(path) {
