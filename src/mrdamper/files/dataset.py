@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 BUNDLED = "two_rigs"
 SAMPLE_FILES = ("samples.parquet", "samples.csv.gz", "samples.csv")
+_PIECE = 2**20  # samples written at once
 _REQUIRED = ("time_s", "displacement_m", "force_N")
 _OPTIONAL = ("current_A", "velocity_m_s")
 _UNIT = re.compile(r"^(time|displacement|force|current|velocity)[ _\[(]", re.IGNORECASE)
@@ -92,13 +93,9 @@ def save_dataset(
     >>> len(load_dataset(folder))
     34
     """
-    import polars as pl
-
     with write_folder(folder, replace=replace) as target:
         (target / "runs.csv").write_text(csv_text([_row(run) for run in dataset]), encoding="utf-8")
-        pl.concat(_samples(dataset), how="diagonal").write_parquet(
-            target / "samples.parquet", compression="zstd", statistics=False
-        )
+        _write_samples(dataset, target)
         for name, text in (extra_files or {}).items():
             (target / name).write_text(text, encoding="utf-8")
 
@@ -269,23 +266,52 @@ def _summarised(name: str, values: np.ndarray, run: Run) -> bool:
     return name.endswith(("_C", "_Pa")) and bool(np.isfinite(values[run.in_window]).any())
 
 
-def _samples(dataset: Dataset) -> Iterable[pl.DataFrame]:
+def _write_samples(dataset: Dataset, folder: Path) -> None:
+    """All samples in one table; those of long records pass piece by piece, so that memory stays small."""
     import polars as pl
 
-    varying = any(float(np.ptp(run.current)) > 0 for run in dataset)
-    with_velocity = any(run.velocity is not None for run in dataset)
+    path = folder / "samples.parquet"
+    if sum(run.time.size for run in dataset) <= 2 * _PIECE:
+        pl.concat(_samples(dataset), how="diagonal").write_parquet(path, compression="zstd", statistics=False)
+        return
+    parts = []
+    for number, table in enumerate(_samples(dataset)):
+        parts.append(folder / f".part{number}.parquet")
+        table.write_parquet(parts[-1], compression="zstd", compression_level=1, statistics=False)
+    schemas = [pl.read_parquet_schema(part) for part in parts]
+    names = list(dict.fromkeys(name for schema in schemas for name in schema))
+    tables = [
+        pl.scan_parquet(part).with_columns(pl.lit(None, pl.Float64).alias(n) for n in names if n not in schema)
+        for part, schema in zip(parts, schemas, strict=True)
+    ]
+    pl.concat([table.select(names) for table in tables]).sink_parquet(
+        path, compression="zstd", statistics=False, row_group_size=_PIECE // 4
+    )
+    for part in parts:
+        part.unlink()
+
+
+def _samples(dataset: Dataset) -> Iterable[pl.DataFrame]:
+    """Tables of at most a million samples, in order."""
+    import polars as pl
+
+    varying = any(_varies(run.current) for run in dataset)
     for run in dataset:
-        columns: dict[str, Any] = {
-            "run_id": [run.id] * run.time.size,
-            "time_s": run.time,
-            "displacement_m": run.displacement,
-            "force_N": run.force,
-        }
+        channels = {"time_s": run.time, "displacement_m": run.displacement, "force_N": run.force}
         if varying:
-            columns["current_A"] = run.current
-        if with_velocity and run.velocity is not None:
-            columns["velocity_m_s"] = run.velocity
-        yield pl.DataFrame({**columns, **run.further})
+            channels["current_A"] = run.current
+        if run.velocity is not None:
+            channels["velocity_m_s"] = run.velocity
+        channels |= run.further
+        for start in range(0, run.time.size, _PIECE):
+            inside = slice(start, min(start + _PIECE, run.time.size))
+            size = inside.stop - inside.start
+            columns = {name: np.array(values[inside]) for name, values in channels.items()}
+            yield pl.DataFrame({"run_id": pl.repeat(run.id, size, eager=True), **columns})
+
+
+def _varies(current: np.ndarray) -> bool:
+    return float(np.min(current)) != float(np.max(current))
 
 
 def _missing_column(column: str, present: list[str], path: Path) -> ColumnError | UnitError:

@@ -13,6 +13,7 @@ from mrdamper.rig_files.quality.loop import repeatability
 from mrdamper.rig_files.quality.motion import steady_window
 from mrdamper.rig_files.quality.view import SHORTEST, View
 from mrdamper.rig_files.record import FURTHER, Record
+from mrdamper.rig_files.text.spool import release
 
 
 def to_run(record: Record) -> Run:
@@ -50,7 +51,7 @@ def to_run(record: Record) -> Run:
         raise RunError(f"{count} samples", where=f"run {record.id}", mend="a run needs at least 3")
     view = View(record)
     scatter = repeatability(view)
-    return Run(
+    run = Run(
         id=record.id,
         time=record.time[keep],
         displacement=record.displacement[keep],
@@ -66,6 +67,10 @@ def to_run(record: Record) -> Run:
         segments=segments,
         notes=_notes(record),
     )
+    for values in (record.time, record.displacement, record.force, record.current):
+        if values is not None:
+            release(values)
+    return run
 
 
 def _further(record: Record, keep: np.ndarray | slice) -> dict[str, np.ndarray]:
