@@ -79,7 +79,7 @@ def fit_harmonics(time: Floats, signal: Floats, orders: int, *, frequency: float
         Fit a linear drift of the mean.
     """
     origin = float(time[0])
-    nyquist = 0.5 / float(np.median(np.diff(time)))
+    nyquist = 0.5 * (time.size - 1) / float(time[-1] - time[0])
     orders = int(np.clip(nyquist / frequency, 1, orders))
     coefficients = solve_linear(_rows(time - origin, frequency, orders, drift).T, signal)
     lead = 2 if drift else 1
