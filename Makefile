@@ -4,7 +4,7 @@ VENV   ?= .venv
 BIN    := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help study serve test test-all bench fuzz attack lint format release-check clean
+.PHONY: help study serve test test-all bench fuzz attack lint format docs release-check clean
 
 help:  ## show this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -38,11 +38,15 @@ lint: $(VENV)/.dev  ## format check, lint, types, import order of the layers
 format: $(VENV)/.dev  ## format and mend what ruff can mend
 	$(BIN)/ruff format . && $(BIN)/ruff check --fix .
 
+docs: $(VENV)/.docs  ## build the documentation site, offline, and check links and accessibility
+	MPLBACKEND=agg $(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
+	$(BIN)/python docs/check.py docs/_build/html
+
 release-check:  ## build twice, compare, install bare and locked, lowest versions, SBOM
 	bash release/check.sh
 
 clean:  ## remove environments and results
-	rm -rf $(VENV) .venv-* result dist
+	rm -rf $(VENV) .venv-* result dist docs/_build docs/_live docs/gallery docs/reference/generated
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
@@ -58,3 +62,7 @@ $(VENV)/.web: pyproject.toml constraints.txt | $(VENV)/bin/python
 $(VENV)/.dev: pyproject.toml constraints.txt | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
 	@touch $@ $(VENV)/.core $(VENV)/.web
+
+$(VENV)/.docs: pyproject.toml constraints.txt | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
+	@touch $@ $(VENV)/.core

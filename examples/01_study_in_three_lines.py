@@ -1,4 +1,8 @@
-"""The whole method on the bundled tests of two dampers."""
+"""
+The whole method in three lines
+===============================
+
+The whole method on the bundled tests of two dampers."""
 
 from mrdamper import load_dataset, run_study
 

@@ -1,6 +1,11 @@
-"""A Bouc–Wen model from one test, and how much of it to believe."""
+"""
+One test, and how much of it to believe
+=======================================
 
-from mrdamper import identify, load_dataset
+A Bouc–Wen model from one test, and how much of it to believe."""
+
+from mrdamper import identify, load_dataset, plot_loop
+from mrdamper.motion import measured_motion
 
 run = load_dataset()["utf_5mm4Hz_1A"]
 found = identify(run, "bouc-wen")
@@ -10,3 +15,8 @@ print(f"c = {found.model.c:.0f} ± {found.standard_errors['c']:.0f} N s/m")
 print(found.ending)
 for note in found.notes:
     print(f"note: {note}")
+
+axes = plot_loop(run, over="velocity", color="black", label="measured")
+steady = run.steady()
+axes.plot(1e3 * measured_motion(steady).velocity, 1e-3 * (steady.force + found.residual), label="Bouc–Wen")
+axes.legend()

@@ -1,13 +1,20 @@
-"""The loop of a condition nobody tested, with its extrapolation flags."""
+"""
+A condition nobody tested
+=========================
+
+The loop of a condition nobody tested, with its extrapolation flags."""
 
 import numpy as np
 
-from mrdamper import Condition, load_dataset, run_study
+from mrdamper import Condition, load_dataset, plot_loop, run_study
 
 damper = run_study(load_dataset().rig("utfsm")).model
+axes = None
 for condition in (Condition(0.75, 1.5, 0.012), Condition(0.75, 6.0, 0.012)):
     prediction = damper.predict(condition)
     x, force = prediction.motion.displacement, prediction.force
     energy = float(np.sum((force[1:] + force[:-1]) / 2 * np.diff(x)))
     flags = ", ".join(prediction.extrapolation) or "inside the tests"
     print(f"{condition}: peak force {np.ptp(force) / 2:.0f} N, {energy:.1f} J per cycle ({flags})")
+    axes = plot_loop(prediction, axes, linestyle="--" if prediction.extrapolation else "-", label=str(condition))
+axes.legend()

@@ -1,4 +1,8 @@
-"""From a folder of a rig's own files to a model: decimal commas, units in a row, currents in file names, one bad file.
+"""
+A rig's own files
+=================
+
+From a folder of a rig's own files to a model: decimal commas, units in a row, currents in file names, one bad file.
 
 With `--keep FOLDER` the files are only written, for the commands of docs/how-to/your-own-rig.md.
 """

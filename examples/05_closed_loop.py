@@ -1,4 +1,8 @@
-"""A damper in a closed loop: a body on a spring, passive, at full current, and under skyhook control.
+"""
+A damper in a closed loop
+=========================
+
+A damper in a closed loop: a body on a spring, passive, at full current, and under skyhook control.
 
 The damper is identified from the bundled tests and asked sample by sample, as a real-time
 target would ask the exported C.

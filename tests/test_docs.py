@@ -1,0 +1,72 @@
+"""Pages of the documentation: code blocks run in order, links lead somewhere."""
+
+import re
+import runpy
+import shlex
+from pathlib import Path
+
+import pytest
+from support.fmu_files import fmu_bytes
+from typer.testing import CliRunner
+
+from mrdamper.cli import application
+
+DOCS = Path(__file__).parent.parent / "docs"
+FENCE = re.compile(r"(?P<slow><!-- slow -->\n)?^```(?P<kind>python|sh)\n(?P<body>.*?)^```", re.MULTILINE | re.DOTALL)
+PAGES = sorted(p for p in DOCS.rglob("*.md") if FENCE.search(p.read_text(encoding="utf-8")))
+LINK = re.compile(r"\]\(([^)#\s]+)")
+
+
+def blocks(page, *, slow):
+    found = FENCE.finditer(page.read_text(encoding="utf-8"))
+    return [(m["kind"], m["body"]) for m in found if slow or not m["slow"]]
+
+
+def _machine():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sys.argv", ["04_your_own_rig.py", "--keep", "machine"])
+        runpy.run_path(str(DOCS.parent / "examples" / "04_your_own_rig.py"), run_name="__main__")
+
+
+def _fmu():
+    pytest.importorskip("fmpy", reason="the fmu extra is not installed")
+    Path("damper.fmu").write_bytes(fmu_bytes("joint", 2))
+
+
+GIVEN = {"your-own-rig": _machine, "fmpy": _fmu}  # files that a page has from its own commands
+
+
+def run_page(page, monkeypatch, folder, *, slow):
+    """Python blocks share their names, commands their folder, as a reader's would."""
+    monkeypatch.chdir(folder)
+    GIVEN.get(page.stem, lambda: None)()
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    names = {"__name__": "__main__"}
+    for kind, body in blocks(page, slow=slow):
+        if kind == "python":
+            exec(compile(body, str(page), "exec"), names)
+            continue
+        for line in body.splitlines():
+            program, *words = shlex.split(line, comments=True)
+            assert program == "mrdamper"
+            done = CliRunner().invoke(application(), words)
+            assert done.exit_code == 0, f"{line}: {done.output} {done.exception}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.stem)
+def test_the_blocks_of_a_page_run(page, monkeypatch, tmp_path):
+    run_page(page, monkeypatch, tmp_path, slow=False)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", [p for p in PAGES if "<!-- slow -->" in p.read_text(encoding="utf-8")])
+def test_the_slow_blocks_of_a_page_run(page, monkeypatch, tmp_path):
+    run_page(page, monkeypatch, tmp_path, slow=True)
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.rglob("*.md")), ids=lambda p: str(p.relative_to(DOCS)))
+def test_links_lead_to_files(page):
+    made = ("gallery/", "commands", "model-classes", "generated/")  # by the build
+    for target in LINK.findall(page.read_text(encoding="utf-8")):
+        if not target.startswith(("http:", "https:", "mailto:", *made)):
+            assert (page.parent / target).exists(), target
