@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.joint import damper_of
 from mrdamper.data import Floats
-from mrdamper.export.base import Exporter, Written, identifier
+from mrdamper.export.base import Exporter, Written, identifier, write_export
 from mrdamper.export.c_writer import CWriter
 from mrdamper.export.templates import render
 from mrdamper.files.encoding import c_comment
@@ -51,6 +52,47 @@ def c_sources(made: Stream, name: str, rig: str) -> dict[str, str]:
     """
     facts = c_facts(made, identifier(name), rig)
     return {f"{name}.h": render("model.h.j2", **facts), f"{name}.c": render("model.c.j2", **facts)}
+
+
+def program_sources(made: Program, name: str, title: str) -> dict[str, str]:
+    """Header and source of any program of one sample, by file name: a control law, an inverse.
+
+    Parameters
+    ----------
+    made : Program
+        With dt among its inputs and no parameters.
+    name : str
+        Prefix of files and symbols.
+    title : str
+        For the comment at the top.
+    """
+    word = identifier(name)
+    writer = CWriter(made)
+    setup = writer.setup()
+    derived = [("int" if e.logical else f"{word}_real", writer.name(e).removeprefix("d->")) for e in made.derived]
+    arguments = [(f"const {word}_derived *d", "d")] if derived else []
+    described = _program("model", writer, made, [*arguments, (f"{word}_state *s", "s")])
+    text = setup + described["body"] + described["results"]
+    facts = {
+        "name": word,
+        "upper": word.upper(),
+        "title": c_comment(title),
+        "version": _version(),
+        "derived": derived,
+        "members": list(made.tape.starts),
+        "starts": [(member, repr(start)) for member, start in made.tape.starts.items()],
+        "main": described,
+        "setup": setup,
+        "helpers": {call: f"{call}(" in text for call in ("signum", "lesser", "greater")},
+        **_tables(made.tape.tables, writer.number),
+    }
+    return {f"{word}.h": render("program.h.j2", **facts), f"{word}.c": render("program.c.j2", **facts)}
+
+
+def write_program(made: Program, name: str, title: str, folder: str | Path) -> list[Path]:
+    """Write what `program_sources` gives into a folder, whole or not at all; raises `OutputError`."""
+    files = {file: text.encode() for file, text in program_sources(made, name, title).items()}
+    return write_export(Written(files), folder, "")
 
 
 def self_test(made: Stream, name: str) -> str:

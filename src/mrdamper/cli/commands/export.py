@@ -16,6 +16,7 @@ def register(app: typer.Typer) -> None:
         to: str = typer.Option(..., "--to", help="c, fmu, page, latex, markdown, table, adams."),
         out: Path = typer.Option(..., "--out", help="Folder to write into; for fmu, page, latex, markdown a file."),
         name: str | None = typer.Option(None, "--name", help="Of files and symbols; default: the rig."),
+        inverse: bool = typer.Option(False, "--inverse", help="For c: the current for a wanted force instead."),
         fmi: int | None = typer.Option(None, "--fmi", help="For fmu: version of the standard, 2 (default) or 3."),
     ) -> None:
         """Export a saved model: C99 source, FMU, web page, LaTeX or Markdown equations, force–velocity tables."""
@@ -32,7 +33,18 @@ def register(app: typer.Typer) -> None:
         made = kind(**options)
         require_writable(out)
         damper = load_model(model)
-        written = made.export(damper, identifier(name or damper.rig or "damper"))
+        called = identifier(name or damper.rig or "damper")
+        if inverse and to != "c":
+            raise InputError(f"--inverse with --to {to}", mend="export --to c", code="E_OPTION")
+        if inverse:
+            from mrdamper.export.c import write_program
+            from mrdamper.systems.inverse import invert
+
+            turned = invert(damper)
+            for path in write_program(turned.program, f"{called}_inverse", turned.title, out):
+                typer.echo(path)
+            return
+        written = made.export(damper, called)
         for path in write_export(written, out, kind.suffix):
             typer.echo(path)
         for note in written.notes:

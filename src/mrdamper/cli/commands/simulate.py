@@ -43,6 +43,7 @@ def register(app: typer.Typer) -> None:
         out: Optional[Path] = typer.Option(  # noqa: UP045
             None, "--out", help="Folder for simulation.html, time histories and measures."
         ),
+        law_out: Optional[Path] = typer.Option(None, "--c", help="Folder for the control law as C99."),  # noqa: UP045
         as_json: bool = typer.Option(False, "--json", help="Print JSON, SI units."),
     ) -> None:
         """Simulate a building or a vehicle with its dampers, and print what they let through."""
@@ -82,6 +83,15 @@ def register(app: typer.Typer) -> None:
         others = [_controller(text) for text in _all_of(beside or [])]
         if others and not dampers:
             raise InputError("controllers without a damper", mend="leave out --without-damper or --beside")
+        if law_out is not None:
+            from mrdamper.export.c import write_program
+            from mrdamper.systems.simulate import Loop
+
+            law = Loop(found.system, shaken_by, dampers, controller, highest).control.program
+            if law is None:
+                raise InputError(f"{type(controller).name} has no law to export", mend="give --control a law")
+            for path in write_program(law, type(controller).name, controller.title, law_out):
+                typer.echo(f"{path}", err=True)
         done = simulate_system(found.system, shaken_by, dampers, controller, step, highest)
         if out is not None:
             from mrdamper.report.simulation import write_simulation
