@@ -299,9 +299,10 @@ def _walk(evaluate: Any, command: Any, search: Any) -> Any:
                     if status != 0:
                         return i
                     scale[j] = max(scale[j], abs(force))
-                    moved = max(moved, abs(force - f[i, j]) / scale[j])
+                    if j > 0:  # those before it counted on the force that it had
+                        moved = max(moved, abs(force - f[i, j]) / scale[j])
                     f[i, j], flags[i, j] = force, flag
-                if count == 1 or moved <= 10 * _TOLERANCE:
+                if moved <= 10 * _TOLERANCE:
                     break
             memory[:] = later
             for r in range(n):
