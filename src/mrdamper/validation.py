@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Prediction
+from mrdamper.dampers.certainty import band
 from mrdamper.data import Condition, Run, Shown, same_condition
 from mrdamper.errors import InputError, RunError
-from mrdamper.metrics import Scores, score
+from mrdamper.metrics import Scores, peak_force, score
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +137,19 @@ def score_run(damper: Damper, run: Run) -> RunScore:
     return RunScore(
         run.id, run.rig, prediction.condition, _scores(run, prediction), run.repeatability, prediction.extrapolation
     )
+
+
+def peak_band(damper: Damper, run: Run, level: float = 0.9) -> dict[str, float]:
+    """Half the peak-to-peak force of a run's steady window [N], measured, and the ends of its predicted band.
+
+    The ends are missing where the damper does not know how sure it is.
+    """
+    measured = {"peak_force_measured_N": peak_force(run.force[run.in_window])}
+    prediction = damper.predict_run(run)
+    known = band(damper, prediction, level, shown=run.in_window)
+    if known is None:
+        return measured
+    return {**measured, "peak_force_low_N": known.peak[0], "peak_force_high_N": known.peak[1]}
 
 
 def leave_one_condition_out(

@@ -1,13 +1,65 @@
-"""Standard errors against textbook formulas and against the scatter of repeated identifications."""
+"""Intervals hold what they say, whatever the residual is made of; a seeded tenth of `benchmarks/coverage.py`."""
+
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from support.synthetic import synthetic_run
 
 from mrdamper.data import Condition
 from mrdamper.identification import identify
-from mrdamper.identification.covariance import autocorrelation_time, standard_errors
+from mrdamper.identification.covariance import spread, standard_errors
 from mrdamper.models.bingham import Bingham
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+from benchmarks.coverage import CASES, covered
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_intervals_cover_what_they_say(case):
+    ours, textbook = covered(CASES[case], repeats=50, seed=2)
+    # 50 repeats of 95 %: three standard errors of the share are 9 points.
+    assert np.all(ours >= 0.86), (case, ours)
+    if case != "white":
+        assert textbook.min() < 0.7
+
+
+def test_more_cycles_do_not_average_model_error_away():
+    def error(cycles):
+        phase = 2 * np.pi * np.arange(200 * cycles) / 200
+        residual = 30 * np.cos(3 * phase) + 12 * np.cos(5 * phase + 1) + 5 * np.cos(7 * phase) + 2 * np.cos(9 * phase)
+        residual += np.random.default_rng(1).standard_normal(phase.size)
+        jacobian = np.column_stack([np.cos(phase), np.sin(phase), np.tanh(8 * np.cos(phase))])
+        residual = residual - jacobian @ np.linalg.lstsq(jacobian, residual, rcond=None)[0]
+        return spread(jacobian, residual, phase / (2 * np.pi), 1.0).errors
+
+    assert np.all(error(64) > 0.5 * error(2))
+
+
+def test_what_nothing_says_is_infinite():
+    phase = np.linspace(0, 20, 500)
+    column = np.cos(phase)
+    noise = np.random.default_rng(0).standard_normal(500)
+    found = spread(np.column_stack([column, 2 * column, np.sin(phase), 0 * phase]), noise)
+    assert np.isinf(found.errors[[0, 1, 3]]).all()
+    assert np.isfinite(found.errors[2])
+
+
+def test_a_record_shorter_than_its_memory_shows_it():
+    rng = np.random.default_rng(4)
+    walk = np.cumsum(rng.standard_normal(1000))
+    phase = 2 * np.pi * np.arange(1000) / 200
+    jacobian = np.column_stack([np.cos(phase), np.sin(phase), np.ones(1000)])
+    residual = walk - jacobian @ np.linalg.lstsq(jacobian, walk, rcond=None)[0]
+    assert spread(jacobian, residual, phase / (2 * np.pi), 1.0).memory < 10
+
+
+def test_an_exact_fit_has_no_spread():
+    phase = np.linspace(0, 20, 300)
+    found = spread(np.column_stack([np.cos(phase), np.sin(phase)]), np.zeros(300), phase, 1 / (2 * np.pi))
+    assert np.array_equal(found.errors, [0.0, 0.0])
 
 
 def test_white_noise_gives_the_textbook_errors():
@@ -21,13 +73,10 @@ def test_white_noise_gives_the_textbook_errors():
 
 
 @pytest.mark.parametrize(("rho", "time"), [(0.0, 1.0), (0.5, 3.0), (0.8, 9.0)])
-def test_the_autocorrelation_time_is_that_of_an_autoregressive_process(rho, time):
-    noise = np.random.default_rng(5).standard_normal(60_000)
-    series = np.empty_like(noise)
-    series[0] = noise[0]
-    for i in range(1, noise.size):
-        series[i] = rho * series[i - 1] + noise[i]
-    assert autocorrelation_time(series) == pytest.approx(time, rel=0.12)  # (1 + rho)/(1 - rho)
+def test_the_memory_is_that_of_an_autoregressive_process(rho, time):
+    series = lfilter([1], [1, -rho], np.random.default_rng(5).standard_normal(60_000))
+    found = spread(np.ones((60_000, 1)), series)
+    assert 60_000 / found.memory == pytest.approx(time, rel=0.12)  # (1 + rho)/(1 - rho)
 
 
 def test_standard_errors_are_the_scatter_of_repeated_identifications():

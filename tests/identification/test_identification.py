@@ -8,7 +8,7 @@ from mrdamper.data import Condition, Dataset, Run
 from mrdamper.errors import IdentificationError, RunError, UnknownNameError
 from mrdamper.gas_spring import GasSpring
 from mrdamper.identification import identify
-from mrdamper.identification.covariance import autocorrelation_time, standard_errors
+from mrdamper.identification.covariance import spread, standard_errors
 from mrdamper.identification.methods import all_methods
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.optimizers.levenberg_marquardt import least_squares
@@ -125,9 +125,10 @@ def test_standard_errors_widen_with_autocorrelation():
     slow = np.zeros(40_000)
     for i in range(1, 40_000):
         slow[i] = 0.9 * slow[i - 1] + white[i]
-    assert autocorrelation_time(white) == pytest.approx(1, abs=0.3)
-    assert autocorrelation_time(slow) == pytest.approx(19, rel=0.3)  # (1 + 0.9)/(1 − 0.9)
     column = np.ones((40_000, 1))
+    assert 40_000 / spread(column, white).memory == pytest.approx(1, abs=0.3)
+    assert 40_000 / spread(column, slow).memory == pytest.approx(19, rel=0.3)  # (1 + 0.9)/(1 − 0.9)
+    assert spread(column, slow).effective[0] == pytest.approx(40_000 / 19, rel=0.3)
     assert standard_errors(column, slow)[0] > 3 * standard_errors(column, slow[rng.permutation(40_000)])[0]
     assert standard_errors(np.zeros((10, 1)), np.ones(10))[0] == np.inf
 

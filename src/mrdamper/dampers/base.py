@@ -16,6 +16,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from mrdamper.dampers.causal import SLACK, causal_force
+from mrdamper.dampers.certainty import Certainty, OwnNumber
 from mrdamper.dampers.coil import Coil
 from mrdamper.data import Condition, Floats, Run, Shown
 from mrdamper.errors import InputError
@@ -139,12 +140,20 @@ class Prediction(Shown):
         That the prediction was made for, or that the motion amounts to.
     extrapolation : tuple of str
         Quantities outside the tested envelope; empty inside.
+    steady : bool
+        One closed loop of the steady response, not a motion from rest.
     """
 
     motion: Excitation
     force: Floats
     condition: Condition
     extrapolation: tuple[str, ...]
+    steady: bool = False
+
+    @property
+    def is_sine(self) -> bool:
+        """Whether the motion is the sine of the condition."""
+        return NOT_A_SINE not in self.extrapolation
 
     @property
     def headline(self) -> str:
@@ -198,6 +207,8 @@ class Damper(Shown):
         Ranges of the tests it was identified from.
     provenance : mapping of str to str
     coil : Coil or None
+    certainty : Certainty or None
+        How sure its numbers and predictions are, where that is known.
     """
 
     kind: ClassVar[str]
@@ -209,6 +220,7 @@ class Damper(Shown):
     envelope: Envelope
     provenance: Mapping[str, str]
     coil: Coil | None
+    certainty: Certainty | None
 
     @property
     @abstractmethod
@@ -263,6 +275,15 @@ class Damper(Shown):
     def functions(self) -> Mapping[str, ParameterFunction]:
         """Parameter functions by what they give; none where the parameters are no such functions."""
         return {}
+
+    @property
+    def own_numbers(self) -> Mapping[str, OwnNumber]:
+        """The numbers determined from the data; none where nobody could name them."""
+        return {}
+
+    def with_numbers(self, values: Mapping[str, float]) -> Self:
+        """The damper with some of its own numbers changed; only for derivatives and draws."""
+        raise not_held(self, values)
 
     @property
     def knee(self) -> float | None:
@@ -321,7 +342,7 @@ class Damper(Shown):
     def predict(self, condition: Condition) -> Prediction:
         """Steady loop at a condition, with its flags."""
         response = self.loop(condition)
-        return Prediction(response.excitation, response.force, condition, self.envelope.flags(condition))
+        return Prediction(response.excitation, response.force, condition, self.envelope.flags(condition), steady=True)
 
     def predict_run(self, run: Run) -> Prediction:
         """Force along the measured motion of a run, with its flags. The measured force is not looked at.
@@ -338,11 +359,17 @@ class Damper(Shown):
             flags = (*self.envelope.motion_flags(motion), *(() if self.envelope.any_motion else (NOT_A_SINE,)))
         if self.knee is not None and samples_in_knee(motion, self.knee) < _SAMPLES_IN_KNEE:
             flags = (*flags, COARSE)
-        if self.conditional and not (found.is_sine and np.ptp(motion.current) <= _SAME_CURRENT):
-            force = causal_force(self, motion)
-        else:
-            force = self.force_along(motion, found.condition)
-        return Prediction(motion, force, found.condition, flags)
+        made = Prediction(motion, np.zeros(len(motion)), found.condition, flags)
+        return replace(made, force=self.again(made))
+
+    def again(self, prediction: Prediction) -> Floats:
+        """The force of this damper for what another one's prediction was made for."""
+        motion, condition = prediction.motion, prediction.condition
+        if prediction.steady:
+            return self.loop(condition).force
+        if self.conditional and not (prediction.is_sine and np.ptp(motion.current) <= _SAME_CURRENT):
+            return causal_force(self, motion)
+        return self.force_along(motion, condition)
 
 
 def not_held(damper: Damper, names: Iterable[str]) -> InputError:

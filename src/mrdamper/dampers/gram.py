@@ -311,7 +311,7 @@ def _factor(gram: Floats) -> Floats:
         return np.linalg.cholesky(gram).transpose(0, 2, 1)
     except np.linalg.LinAlgError:  # a model that fits to rounding: interpolation took more than the ridge gave
         values, vectors = np.linalg.eigh(gram)
-        return np.sqrt(np.maximum(values, _RIDGE))[:, :, None] * vectors.transpose(0, 2, 1)
+        return np.asarray(np.sqrt(np.maximum(values, _RIDGE))[:, :, None] * vectors.transpose(0, 2, 1), dtype=float)
 
 
 def _reweighted(design: _Design, gram: Floats, reweightings: int) -> _Solution:

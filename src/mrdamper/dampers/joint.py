@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.dampers.base import UNTESTED, Damper, Envelope, Saved
+from mrdamper.dampers.certainty import Certainty, OwnNumber
 from mrdamper.dampers.coil import Coil
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, ParameterError, RunError
@@ -68,6 +69,7 @@ class JointDamper(Damper):
     envelope : Envelope
     provenance : mapping
     coil : Coil, optional
+    certainty : Certainty, optional
     """
 
     kind: ClassVar[str] = "joint"
@@ -79,6 +81,7 @@ class JointDamper(Damper):
     envelope: Envelope
     provenance: Mapping[str, str] = field(default_factory=dict)
     coil: Coil | None = None
+    certainty: Certainty | None = field(default=None, kw_only=True)
 
     @property
     def title(self) -> str:
@@ -108,6 +111,17 @@ class JointDamper(Damper):
         return self.model
 
     def holding(self, values: Mapping[str, float]) -> JointDamper:
+        return replace(self.with_numbers(values), certainty=None)
+
+    @property
+    def own_numbers(self) -> Mapping[str, OwnNumber]:
+        return {
+            info.name: OwnNumber(getattr(self.model, info.name), info.bounds, info.scale == "log")
+            for info in self.model.parameters()
+            if info.name in self.free
+        }
+
+    def with_numbers(self, values: Mapping[str, float]) -> Self:
         return replace(self, model=replace(self.model, **values))
 
     def to_saved(self) -> SavedJoint:

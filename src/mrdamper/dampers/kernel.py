@@ -9,6 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Envelope, Saved
+from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.piece import Piece
 from mrdamper.data import Condition, Floats, Run
@@ -101,6 +102,7 @@ class KernelDamper(Damper):
     envelope: Envelope
     provenance: Mapping[str, str] = field(default_factory=dict)
     coil: Coil | None = None
+    certainty: Certainty | None = field(default=None, kw_only=True)
 
     @property
     def title(self) -> str:

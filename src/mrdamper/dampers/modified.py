@@ -14,6 +14,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Envelope, Saved, not_held
+from mrdamper.dampers.certainty import Certainty, OwnNumber
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.gram import Condensed, choose_forms, condense, fit_jointly
 from mrdamper.dampers.parameter_map import ParameterMap
@@ -56,6 +57,7 @@ class ModifiedModel(Damper):
     provenance : mapping
         What it was made from.
     coil : Coil, optional
+    certainty : Certainty, optional
     """
 
     kind: ClassVar[str] = "modified"
@@ -67,6 +69,7 @@ class ModifiedModel(Damper):
     envelope: Envelope
     provenance: Mapping[str, str] = field(default_factory=dict)
     coil: Coil | None = None
+    certainty: Certainty | None = field(default=None, kw_only=True)
 
     @property
     def title(self) -> str:
@@ -102,6 +105,22 @@ class ModifiedModel(Damper):
         for name, value in values.items():
             log = functions[name].log
             functions[name] = ParameterFunction("constant", (math.log(value) if log else value,), log=log)
+        return replace(self, parameters=ParameterMap(self.parameters.model_type, functions), certainty=None)
+
+    @property
+    def own_numbers(self) -> Mapping[str, OwnNumber]:
+        return {
+            f"{name}.{i}": OwnNumber(value)
+            for name, function in self.functions.items()
+            for i, value in enumerate((*function.coefficients, *function.rates))
+        }
+
+    def with_numbers(self, values: Mapping[str, float]) -> Self:
+        functions = {}
+        for name, f in self.functions.items():
+            numbers = [values.get(f"{name}.{i}", v) for i, v in enumerate((*f.coefficients, *f.rates))]
+            cut = len(f.coefficients)
+            functions[name] = replace(f, coefficients=tuple(numbers[:cut]), rates=tuple(numbers[cut:]))
         return replace(self, parameters=ParameterMap(self.parameters.model_type, functions))
 
     def to_saved(self) -> SavedModified:

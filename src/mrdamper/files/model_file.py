@@ -8,14 +8,16 @@ from __future__ import annotations
 import json
 import math
 import re
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from mrdamper.dampers import all_kinds
 from mrdamper.dampers.base import Damper, Envelope
+from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.coil import Coil, Driver
 from mrdamper.data import require_name
 from mrdamper.errors import InputError, ModelFileError
@@ -23,7 +25,7 @@ from mrdamper.files.atomic import path_of, write_file
 from mrdamper.files.strict_json import parse_json
 
 FORMAT = "mrdamper-model"
-MAJOR, MINOR = 1, 2
+MAJOR, MINOR = 1, 3
 _LARGEST = 64_000_000  # bytes of a file
 UNITS = {
     "time": "s",
@@ -77,6 +79,30 @@ class _Coil(_Strict):
     driver: _Driver | None = None
 
 
+class _Session(_Strict):
+    gain: float
+    offset_N: float
+    degrees_of_freedom: float
+
+
+class _ModelError(_Strict):
+    force: float
+    peak: float
+    energy: float
+    left_out: int
+
+
+class _Covariance(_Strict):
+    parameters: tuple[str, ...]
+    logarithmic: tuple[bool, ...]
+    matrix: tuple[tuple[float, ...], ...]
+    degrees_of_freedom: tuple[float, ...]
+    one_sided: tuple[str, ...] = ()
+    unknown: tuple[str, ...] = ()
+    session: _Session
+    model_error: _ModelError
+
+
 class _Document(_Strict):
     format: Literal["mrdamper-model"]
     version: str
@@ -85,6 +111,7 @@ class _Document(_Strict):
     envelope: _Envelope
     provenance: dict[str, str]
     coil: _Coil | None = None  # since 1.2
+    covariance: _Covariance | None = None  # since 1.3
     damper: dict[str, Any]  # its kind, and what that kind says
 
 
@@ -128,6 +155,7 @@ def dump_model(damper: Damper) -> str:
         envelope=_Envelope(**{name: getattr(damper.envelope, name) or None for name in _Envelope.model_fields}),
         provenance=dict(damper.provenance),
         coil=_describe_coil(damper.coil),
+        covariance=_describe_certainty(damper.certainty),
         damper={"kind": damper.kind, **asdict(damper.to_saved())},
     )
     return json.dumps(document.model_dump(exclude_none=True), indent=1, ensure_ascii=False) + "\n"
@@ -193,7 +221,8 @@ def parse_model(text: str, where: str = "model") -> Damper:
         require_name("rig", document.rig)
         coil = _restore_coil(document.coil) if document.coil else None
         envelope = Envelope(**document.envelope.model_dump(exclude_none=True))
-        return kind.from_saved(saved, document.rig, envelope, document.provenance, coil)
+        damper = kind.from_saved(saved, document.rig, envelope, document.provenance, coil)
+        return _with_certainty(damper, document.covariance, where) if document.covariance else damper
     except InputError as error:
         raise ModelFileError(error.found, where=where, mend=error.mend) from error
 
@@ -227,6 +256,42 @@ def _upgraded(raw: dict[str, Any]) -> dict[str, Any]:
             whole = {"mean": numbers.get("mean"), "size": numbers.get("size"), "spread": spread}
             return {**raw, "damper": {"kind": "kernel", **tables, **whole}}
     return raw
+
+
+def _describe_certainty(known: Certainty | None) -> _Covariance | None:
+    if known is None:
+        return None
+    return _Covariance(
+        parameters=known.names,
+        logarithmic=known.logs,
+        matrix=tuple(tuple(row) for row in known.covariance.tolist()),
+        degrees_of_freedom=tuple(known.dof.tolist()),
+        one_sided=known.one_sided,
+        unknown=known.unknown,
+        session=_Session(gain=known.gain, offset_N=known.offset, degrees_of_freedom=known.session_dof),
+        model_error=_ModelError(force=known.force, peak=known.peak, energy=known.energy, left_out=known.left_out),
+    )
+
+
+def _with_certainty(damper: Damper, saved: _Covariance, where: str) -> Damper:
+    """The damper with the covariance of its file, once it fits the damper."""
+    size, session, model = len(saved.parameters), saved.session, saved.model_error
+    square = len(saved.matrix) == size and all(len(row) == size for row in saved.matrix)
+    matrix = np.array(saved.matrix, dtype=float).reshape(size, size) if square else np.zeros((0, 0))
+    lengths = len(saved.logarithmic) == len(saved.degrees_of_freedom) == size
+    named = all(name in damper.own_numbers for name in (*saved.parameters, *saved.one_sided, *saved.unknown))
+    if (
+        not (square and lengths and named)
+        or not np.allclose(matrix, matrix.T, rtol=1e-6)
+        or np.any(np.diag(matrix) < 0)
+    ):
+        raise ModelFileError("covariance: it does not fit the damper", where=where, mend="write the model again")
+    known = Certainty(
+        saved.parameters, saved.logarithmic, matrix, np.array(saved.degrees_of_freedom), saved.one_sided, saved.unknown,
+        session.gain, session.offset_N, session.degrees_of_freedom,
+        model.force, model.peak, model.energy, model.left_out,
+    )  # fmt: skip
+    return replace(damper, certainty=known)  # type: ignore[type-var]
 
 
 def _describe_coil(coil: Coil | None) -> _Coil | None:

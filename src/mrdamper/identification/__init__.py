@@ -163,7 +163,15 @@ def _standard_errors(
         columns.append((moved.force(seen, there) - base) / step)
     if not columns:
         return {}
-    return dict(zip(names, standard_errors(np.column_stack(columns), residual).tolist(), strict=True))
+    return dict(
+        zip(
+            names,
+            standard_errors(
+                np.column_stack(columns), residual, seen.time, problem.analysis.condition.frequency_Hz
+            ).tolist(),
+            strict=True,
+        )
+    )
 
 
 def _notes(problem: Problem) -> tuple[str, ...]:

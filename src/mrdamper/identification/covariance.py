@@ -1,59 +1,262 @@
-"""How certain parameters are when residuals are not independent.
+"""How certain least-squares parameters are when residuals are not independent.
 
-What a damper model leaves over is mostly model error, repeated every cycle, not noise. The
-usual standard errors, which count every sample as new evidence, are then far too small.
+Two things make a damper's residuals depend on each other. Noise remembers: its spectrum decides
+what a parameter sees of it, an offset force the noise at 0 Hz, a viscous damping that at the
+frequency of the motion. And model error repeats with every cycle: more cycles do not average it
+away, so it counts as one unknown function of the phase, not as noise.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from mrdamper.data import Floats
 
+_HIGHEST_ORDER = 12  # of the autoregression
+_HARMONICS = 40  # of the motion in which model error is looked for
+_REPEATS = 0.95  # cycles from which harmonics of the motion can be told apart
+_TELLING = 1.9  # cycles from which repeats are seen as such
+_LONGEST = 0.9995  # correlation of neighbours
+_NO_MORE = 1e-12  # of the largest: eigenvalue of the scaled normal matrix below which nothing is known
 
-def standard_errors(jacobian: Floats, residual: Floats) -> Floats:
-    """Standard errors of least-squares parameters, widened for autocorrelated residuals.
+
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """Covariance of parameters.
+
+    Attributes
+    ----------
+    covariance : (P, P) array
+        Infinite on the diagonal where the data does not determine a parameter.
+    dof : (P,) array
+        Degrees of freedom behind each variance, for Student's t.
+    effective : (P,) array
+        Independent samples that would give each parameter's error, were the residual white.
+    memory : float
+        Length of the record in lags of its residual; a record shorter than some ten says little.
+    """
+
+    covariance: Floats
+    dof: Floats
+    effective: Floats
+    memory: float
+
+    @property
+    def errors(self) -> Floats:
+        """(P,) standard errors."""
+        return np.sqrt(np.diag(self.covariance))
+
+
+def spread(jacobian: Floats, residual: Floats, time: Floats | None = None, frequency: float | None = None) -> Spread:
+    """Covariance of the parameters of a least-squares fit to one record.
+
+    (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹ with Σ from the residual: an autoregression whose order an
+    information criterion chooses, and beside it, where the motion repeats, what the residual
+    repeats with it, each harmonic corrected for what the fit took out of it.
 
     Parameters
     ----------
     jacobian : (N, P) array
         Derivatives of the residual with respect to the parameters.
     residual : (N,) array
-
-    Returns
-    -------
-    (P,) array
-        √diag(σ² (JᵀJ)⁻¹ τ) with τ the integrated autocorrelation time in samples; infinite
-        where the data does not determine a parameter.
+    time : (N,) array, optional
+        [s]; evenly spaced, or nearly.
+    frequency : float, optional
+        Of the motion, where it repeats [Hz].
     """
     scale = np.sqrt(np.sum(jacobian**2, axis=0))
-    determined = scale > 0
-    errors = np.full(scale.size, np.inf)
-    if not determined.any():
-        return errors
-    scaled = jacobian[:, determined] / scale[determined]
-    values, vectors = np.linalg.eigh(scaled.T @ scaled)
-    safe = np.maximum(values, np.finfo(float).eps * values[-1] * scaled.shape[0])
-    spread = np.sum(vectors**2 / safe, axis=1)
-    variance = float(residual @ residual) / max(residual.size - scale.size, 1)
-    errors[determined] = np.sqrt(variance * autocorrelation_time(residual) * spread) / scale[determined]
-    return errors
+    known = scale > 0
+    size, count = residual.size, scale.size
+    covariance = np.diag(np.full(count, np.inf))
+    if not known.any():
+        return Spread(covariance, np.ones(count), np.zeros(count), np.inf)
+    unit = jacobian[:, known] / scale[known]
+    values, vectors = np.linalg.eigh(unit.T @ unit)
+    safe = np.maximum(values, np.finfo(float).eps * values[-1] * known.sum())
+    inverse = (vectors / safe) @ vectors.T
+    score, dof, memory = score_covariance(unit, residual, time, frequency, inverse)
+    middle = inverse @ score @ inverse
+    weak = values <= _NO_MORE * values[-1]
+    lost = np.sum(vectors[:, weak] ** 2, axis=1) > 1e-6
+    rows = np.flatnonzero(known)
+    covariance[np.ix_(rows, rows)] = middle / scale[known][:, None] / scale[known]
+    for row in rows[lost]:
+        covariance[row, :] = covariance[:, row] = 0.0
+        covariance[row, row] = np.inf
+    textbook = np.full(count, np.inf)
+    variance = float(residual @ residual) / max(size - known.sum(), 1)
+    textbook[rows] = variance * np.diag(inverse) / scale[known] ** 2
+    with np.errstate(invalid="ignore", divide="ignore"):
+        effective = np.nan_to_num(size * textbook / np.diag(covariance), nan=0.0, posinf=float(size))
+    free = np.ones(count)
+    free[rows] = np.clip(dof, 1.0, max(size - known.sum(), 1))
+    return Spread(covariance, free, np.minimum(effective, size), memory)
 
 
-def autocorrelation_time(residual: Floats) -> float:
-    """Samples per independent one: 1 + 2 Σ ρ_k up to the first pair of non-positive sum.
+def score_covariance(
+    jacobian: Floats, residual: Floats, time: Floats | None, frequency: float | None, inverse: Floats
+) -> tuple[Floats, Floats, float]:
+    """Jᵀ Σ J, (P,) degrees of freedom behind each parameter's variance, the record's length in lags of its residual.
 
-    Initial positive sequence estimate [Geyer 1992, Statistical Science 7, 473].
+    `inverse` is (JᵀJ)⁻¹, for what the fit took out of the residual.
     """
-    centred = residual - residual.mean()
-    size = centred.size
-    padded = 1 << (2 * size - 1).bit_length()  # a power of two transforms several times faster
-    spectrum = np.fft.rfft(centred, padded)
-    correlation = np.fft.irfft(spectrum * spectrum.conj(), padded)[:size]
-    if correlation[0] <= 0:
-        return 1.0
-    rho = correlation / correlation[0]
-    pairs = rho[: size // 2 * 2].reshape(-1, 2).sum(axis=1)
-    ends = np.flatnonzero(pairs <= 0)
-    kept = pairs[: ends[0]] if ends.size else pairs
-    return float(max(2 * kept.sum() - 1, 1.0))
+    repeats = time is not None and frequency is not None and np.ptp(time) * frequency >= _REPEATS
+    rest, parts = residual, []
+    if repeats:
+        rest, parts = _repeated(jacobian, residual, time, frequency, inverse)  # type: ignore[arg-type]
+    noise, memory = _noise(jacobian, rest, inverse)
+    parts = [*parts, noise]
+    total = np.sum([score for score, _ in parts], axis=0)
+    # Relative variances of the parts, each by its share of a parameter's variance [Satterthwaite 1946].
+    shares = [np.diag(inverse @ score @ inverse) for score, _ in parts]
+    whole = np.maximum(np.sum(shares, axis=0), np.finfo(float).tiny)
+    doubt = np.sum(
+        [(share / whole) ** 2 * relative for share, (_, relative) in zip(shares, parts, strict=True)], axis=0
+    )
+    return total, 2 / np.maximum(doubt, 1e-9), residual.size / max(memory, 1e-9)
+
+
+Part = tuple[Floats, Floats]  # Jᵀ Σ J of one cause, and the relative variance of each parameter's share of it
+
+
+def _repeated(
+    jacobian: Floats, residual: Floats, time: Floats, frequency: float, inverse: Floats
+) -> tuple[Floats, list[Part]]:
+    """What of a residual does not repeat, and the score's covariance by what does."""
+    size, count = jacobian.shape
+    step = float(np.median(np.diff(time)))
+    most = int(min(_HARMONICS, 0.4 / (step * frequency), size // 8))
+    if most < 4:
+        return residual, []
+    orders: Floats = np.arange(1.0, most + 1)
+    phase = 2 * np.pi * frequency * np.outer(time - time[0], orders)
+    waves = np.stack([np.cos(phase), np.sin(phase)], axis=2).reshape(size, 2 * most)
+    amplitudes = np.linalg.solve(waves.T @ waves, waves.T @ (residual - residual.mean()))
+    rest = residual - waves @ amplitudes
+    seen = jacobian.T @ waves  # (P, 2K)
+    # Share of every wave that the parameters can take up, and so have taken out of the residual.
+    taken = np.clip(np.einsum("pk,pq,qk->k", seen, inverse, seen) / np.sum(waves**2, axis=0), 0.0, 1.0)
+    left = (1 - taken).reshape(most, 2).mean(axis=1)
+    power = (amplitudes**2).reshape(most, 2).mean(axis=1)
+    omega: Floats = 2 * np.pi * frequency * step * orders
+    expected = 2 * _spectrum(_autoregression(rest), omega) / max(size - 2 * most, 1)
+    # Noise alone has power at these frequencies too; only a surplus that chance does not explain repeats.
+    if np.sum(power) < (1 + 3 / np.sqrt(left.sum())) * np.sum(expected * left):
+        return residual, []
+    level, relative = _power_law(orders, power, expected, left)
+    lines = (seen * np.repeat(level, 2)) @ seen.T
+    pull = inverse @ seen
+    shares = (pull**2 * np.repeat(level, 2)).reshape(count, most, 2).sum(axis=2)
+    weights = shares / np.maximum(shares.sum(axis=1, keepdims=True), np.finfo(float).tiny)
+    if np.ptp(time) * frequency < _TELLING:
+        rest = residual  # what does not repeat cannot be told from what would
+    return rest, [(lines, np.einsum("pk,kl,pl->p", weights, relative, weights))]
+
+
+def _power_law(orders: Floats, power: Floats, expected: Floats, left: Floats) -> tuple[Floats, Floats]:
+    """Mean power of repeated lines at every order, and the covariance of its logarithm.
+
+    A symmetric damper's model error has odd lines far above even ones; each kind falls with a
+    power of the order. The lines the fit took away are read off those it left [Whittle 1953].
+    """
+    odd = orders % 2 == 1
+    groups = [group for group in (odd, ~odd) if left[group].sum() > 1]
+    logs = np.log(orders)
+    best, least = np.zeros(orders.size), np.inf
+    for fall in np.linspace(0.0, 6.0, 61):
+        shape, cost = np.exp(-fall * logs), 0.0
+        level = np.zeros(orders.size)
+        for group in groups:
+            ratio = power[group] / shape[group]
+            amount = float(ratio.sum() / left[group].sum())
+            level[group] = amount * shape[group]
+            cost += float(np.sum(left[group] * np.log(np.maximum(level[group], 1e-300))))
+        if cost < least:
+            best, least = level, cost
+    columns = np.column_stack([*[group.astype(float) for group in groups], -logs])
+    information = (columns * left[:, None]).T @ columns
+    relative: Floats = columns @ np.linalg.pinv(information) @ columns.T
+    return np.maximum(best - expected, 0.0), relative
+
+
+def _noise(jacobian: Floats, residual: Floats, inverse: Floats) -> tuple[Part, float]:
+    """The score's covariance by the residual's own spectrum, and its memory in samples."""
+    size = residual.size
+    model = _autoregression(residual)
+    points = 1 << (2 * size - 1).bit_length()
+    omega = 2 * np.pi * np.arange(points // 2 + 1) / points
+    spectrum = _spectrum(model, omega)
+    transformed = np.fft.rfft(jacobian, points, axis=0)
+    weights = np.full(spectrum.size, 2.0) / points
+    weights[[0, -1]] = 1.0 / points
+    score = np.real((transformed.conj().T * (weights * spectrum)) @ transformed)
+    whole = float(np.sum(weights * spectrum))
+    if whole <= 0:
+        return (score, np.zeros(len(inverse))), 1.0
+    # The fit took a share of the noise with it.
+    taken = float(np.trace(inverse @ score)) / (size * whole)
+    influence = np.abs(transformed @ inverse) ** 2 * weights[:, None]
+    relative = _doubt_of_spectrum(model, omega, spectrum, weights, influence, size)
+    return (score / max(1 - taken, 0.2), relative), float(spectrum[0] / whole)
+
+
+def _doubt_of_spectrum(
+    model: Floats, omega: Floats, spectrum: Floats, weights: Floats, influence: Floats, size: int
+) -> Floats:
+    """Relative variance of each parameter's variance, as the coefficients of the autoregression are uncertain."""
+    order, base = model.size - 1, spectrum @ influence
+    relative = np.full(influence.shape[1], 2.0 / size)
+    if not order:
+        return relative
+    lags = np.array([np.sum(weights * spectrum * np.cos(omega * k)) for k in range(order)])
+    covariance = model[0] / size * np.linalg.pinv(lags[np.abs(np.subtract.outer(range(order), range(order)))])
+    slopes = np.empty((order, influence.shape[1]))
+    for k in range(order):
+        step = 1e-4 * np.sqrt(covariance[k, k])
+        moved = model.copy()
+        moved[k + 1] += step
+        slopes[k] = (_spectrum(moved, omega) @ influence / np.maximum(base, 1e-300) - 1) / step
+    return relative + np.einsum("kp,kl,lp->p", slopes, covariance, slopes)
+
+
+def _autoregression(residual: Floats) -> Floats:
+    """Variance of the innovation, then coefficients: Burg's recursion, order by the corrected criterion of Akaike."""
+    forward = backward = residual - residual.mean()
+    size = residual.size
+    variance = float(forward @ forward) / size
+    if variance == 0:
+        return np.zeros(1)
+    coefficients = np.zeros(0)
+    best, least = np.array([variance]), size * np.log(variance) + 2
+    for order in range(1, min(_HIGHEST_ORDER, size // 10) + 1):
+        ahead, behind = forward[1:], backward[:-1]
+        power = float(ahead @ ahead + behind @ behind)
+        if power <= 0:
+            break
+        reflection = -2 * float(ahead @ behind) / power
+        if order == 1:  # what a mean taken out hides of a long memory [Kendall 1954, Marriott and Pope 1954]
+            reflection = max(reflection - max(1 - 3 * reflection, 0.0) / size, -_LONGEST)
+        forward, backward = ahead + reflection * behind, behind + reflection * ahead
+        coefficients = np.concatenate([coefficients + reflection * coefficients[::-1], [reflection]])
+        variance *= 1 - reflection**2
+        if variance <= 0:
+            break
+        criterion = size * np.log(variance) + 2 * (order + 1) * size / max(size - order - 2, 1)
+        if criterion < least:
+            best, least = np.concatenate([[variance], coefficients]), criterion
+    return best
+
+
+def _spectrum(model: Floats, omega: Floats) -> Floats:
+    """Power spectrum of an autoregression at frequencies [rad a sample]; its mean over the circle is the variance."""
+    lags = np.exp(-1j * np.outer(omega, np.arange(1, model.size)))
+    return model[0] / np.abs(1 + lags @ model[1:]) ** 2
+
+
+def standard_errors(
+    jacobian: Floats, residual: Floats, time: Floats | None = None, frequency: float | None = None
+) -> Floats:
+    """(P,) standard errors; arguments as `spread`."""
+    return spread(jacobian, residual, time, frequency).errors

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mrdamper.dampers.base import Damper
+from mrdamper.dampers.certainty import unsure
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.identification import Identification
@@ -21,6 +22,7 @@ def doubts(found: Scored, loops: Sequence[LoopAnalysis]) -> list[str]:
     """Sentences on where the model and its data deserve distrust, most consequential first."""
     return [
         *_outside(found.damper),
+        *(unsure(found.damper) if found.damper.certainty else ()),
         *_runs(found.left_out, found.held_out),
         *(_functions(found.fit) if isinstance(found.fit, ModifiedFit) else ()),
         *(_joint(found.fit) if isinstance(found.fit, JointFit) else ()),

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from mrdamper.dampers.base import Prediction
+from mrdamper.dampers.certainty import Band
 from mrdamper.identification import Identification
 from mrdamper.validation import RunScore
 
@@ -40,8 +41,8 @@ def identification_rows(identifications: Sequence[Identification]) -> list[dict[
     return rows
 
 
-def prediction_rows(prediction: Prediction) -> list[dict[str, Any]]:
-    """One row a sample, in the columns of the command-line contract, and the extrapolation flag."""
+def prediction_rows(prediction: Prediction, band: Band | None = None) -> list[dict[str, Any]]:
+    """One row a sample, in the columns of the command-line contract; the band where there is one; the flags."""
     motion = prediction.motion
     columns = {
         "time_s": motion.time,
@@ -50,6 +51,8 @@ def prediction_rows(prediction: Prediction) -> list[dict[str, Any]]:
         "current_A": motion.current,
         "force_N": prediction.force,
     }
+    if band is not None:
+        columns |= {"force_low_N": band.low, "force_high_N": band.high}
     flag = " ".join(prediction.extrapolation)
     names = list(columns)
     return [

@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Envelope
+from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.modified import ModifiedFit, fit_modified
 from mrdamper.dampers.published import all_published
@@ -111,6 +112,7 @@ class OnePerCurrent(Damper):
     envelope : Envelope
     provenance : mapping
     coil : Coil, optional
+    certainty : Certainty, optional
     """
 
     kind: ClassVar[str] = "one-per-current"
@@ -120,6 +122,7 @@ class OnePerCurrent(Damper):
     envelope: Envelope
     provenance: Mapping[str, str] = field(default_factory=dict)
     coil: Coil | None = None
+    certainty: Certainty | None = None
 
     @classmethod
     def of(cls, found: Sequence[Identification]) -> OnePerCurrent:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.dampers.base import Damper
+from mrdamper.dampers.certainty import certain
 from mrdamper.data import Dataset, Run, Shown
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError
 from mrdamper.identification import refuse_clipped
@@ -235,6 +236,7 @@ def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None, *
     near = [c for c in eligible if errors[id(c)] <= _WORTH * least]
     chosen = min(near, key=lambda c: c.damper.parameter_count)
     candidates.sort(key=lambda c: c is not chosen)
+    candidates[0] = replace(chosen, damper=certain(chosen.damper, train, [r.scores for r in chosen.left_out.runs]))
     return RigStudy(
         rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), refused, impossible, model is not None
     )

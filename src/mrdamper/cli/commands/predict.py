@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
+
+if TYPE_CHECKING:
+    from mrdamper.dampers.base import Prediction
+    from mrdamper.dampers.certainty import Band
 
 WARNINGS = {
     "not a sine": "the motion is no sine; a model over frequency and amplitude uses running estimates of them",
@@ -30,6 +35,7 @@ def register(app: typer.Typer) -> None:
         coil_lag: float | None = typer.Option(
             None, "--coil-lag", help="Time constant of the coil [ms], in place of the model's own."
         ),
+        level: float = typer.Option(0.9, "--level", help="Share of sessions whose force the band holds."),
         out: Path | None = typer.Option(None, "--out", help="CSV to write; default: standard output."),
         as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
     ) -> None:
@@ -37,6 +43,7 @@ def register(app: typer.Typer) -> None:
         from dataclasses import replace
 
         from mrdamper.cli.output import put
+        from mrdamper.dampers.certainty import band
         from mrdamper.dampers.coil import Coil
         from mrdamper.data import Condition
         from mrdamper.errors import ConditionError, InputError
@@ -70,4 +77,24 @@ def register(app: typer.Typer) -> None:
                 f"warning: {WARNINGS.get(flag, f'{flag} lies outside the tests this model was identified from')}",
                 err=True,
             )
-        put(prediction_rows(prediction), out, as_json, csv_text)
+        known = band(damper, prediction, level)
+        typer.echo(_said(prediction, known, level), err=True)
+        put(prediction_rows(prediction, known), out, as_json, csv_text)
+
+
+def _said(prediction: Prediction, known: Band | None, level: float) -> str:
+    """The peak force, its band, and where the band comes from."""
+    from mrdamper.metrics import peak_force
+
+    if known is None:
+        return "note: no band: the model was saved without its covariance"
+    parts = ", ".join(
+        f"{name} {float((part**2).mean() ** 0.5):.3g} N"
+        for name, part in (("parameters", known.parameter), ("session", known.session), ("model", known.model))
+    )
+    return (
+        f"peak force {peak_force(prediction.force):.4g} N; {100 * level:g} % band {known.peak[0]:.4g} to "
+        f"{known.peak[1]:.4g} N in an unknown session, {known.known_session[0]:.4g} to {known.known_session[1]:.4g} N "
+        f"once its gain is known; dissipated energy {100 * known.energy[0]:+.2g} to {100 * known.energy[1]:+.2g} %; "
+        f"standard deviations: {parts}"
+    )

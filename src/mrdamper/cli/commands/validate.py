@@ -16,6 +16,7 @@ def register(app: typer.Typer) -> None:
         data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests."),
         rig: str | None = typer.Option(None, "--rig", help="Score the runs of this rig instead."),
         split: str | None = typer.Option(None, "--split", help="Only train or only validate runs."),
+        level: float = typer.Option(0.9, "--level", help="Share of runs whose peak force the band holds."),
         out: Path | None = typer.Option(None, "--out", help="CSV to write; default: standard output."),
         as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
     ) -> None:
@@ -27,6 +28,7 @@ def register(app: typer.Typer) -> None:
         from mrdamper.files.encoding import csv_text
         from mrdamper.files.model_file import load_model
         from mrdamper.report.tables import score_row
+        from mrdamper.validation import peak_band
         from mrdamper.validation import validate as score
 
         if split not in (None, "train", "validate"):
@@ -47,7 +49,19 @@ def register(app: typer.Typer) -> None:
             typer.echo(f"not scored: {name}: {why}", err=True)
         if not validation.runs:
             raise InputError("no run could be scored", where=f"rig {wanted}", mend="see the lines above")
-        put([score_row(run) for run in validation.runs], out, as_json, csv_text)
+        by_id = {run.id: run for run in runs}
+        peaks = {name: peak_band(damper, run, level) for name, run in by_id.items() if name not in validation.refused}
+        put([{**score_row(run), **peaks[run.run_id]} for run in validation.runs], out, as_json, csv_text)
+        inside = [
+            p["peak_force_low_N"] <= p["peak_force_measured_N"] <= p["peak_force_high_N"]
+            for p in peaks.values()
+            if len(p) > 1
+        ]
+        if inside:
+            few = " (too few runs to tell a share)" if len(inside) < 20 else ""
+            typer.echo(
+                f"peak force inside its {100 * level:g} % band in {sum(inside)} of {len(inside)} runs{few}", err=True
+            )
         floors = [run.floor for run in validation.runs if run.floor is not None]
         outside = sum(bool(run.extrapolation) for run in validation.runs)
         typer.echo(

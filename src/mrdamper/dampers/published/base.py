@@ -10,6 +10,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Envelope, Saved
+from mrdamper.dampers.certainty import Certainty, OwnNumber
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.piece import Piece
 from mrdamper.data import Condition, Floats, Run
@@ -47,6 +48,7 @@ class ConditionedDamper(Damper):
     envelope : Envelope
     provenance : mapping
     coil : Coil, optional
+    certainty : Certainty, optional
     """
 
     kind: ClassVar[str] = "conditioned"
@@ -66,6 +68,7 @@ class ConditionedDamper(Damper):
     envelope: Envelope
     provenance: Mapping[str, str] = field(default_factory=dict)
     coil: Coil | None = field(default=None, kw_only=True)
+    certainty: Certainty | None = field(default=None, kw_only=True)
 
     @property
     def title(self) -> str:
@@ -141,6 +144,13 @@ class ConditionedDamper(Damper):
         found = least_squares(residual, centre, centre - _REACH, centre + _REACH, most_steps=_STEPS)
         return replace(self, coefficients=dict(zip(names, (found.point * size).tolist(), strict=True)))
 
+    @property
+    def own_numbers(self) -> Mapping[str, OwnNumber]:
+        return {name: OwnNumber(value) for name, value in self.coefficients.items()}
+
+    def with_numbers(self, values: Mapping[str, float]) -> Self:
+        return replace(self, coefficients={**self.coefficients, **values})
+
     def to_saved(self) -> SavedConditioned:
         own = {f.name: getattr(self, f.name) for f in fields(self)}
         tables = {name: value.tolist() for name, value in own.items() if isinstance(value, np.ndarray)}
@@ -156,7 +166,7 @@ class ConditionedDamper(Damper):
         reference = Condition(*saved.reference)
         tables = {name: np.array(table) for name, table in saved.tables.items()}
         try:
-            made = known(rig, saved.coefficients, reference, envelope, provenance, coil=coil, **tables)
+            made = known(rig, saved.coefficients, reference, envelope, provenance, coil=coil, **tables)  # type: ignore[arg-type]
             made.force_along(sine(reference, 1, 8), reference)
             for condition in envelope.corners:
                 made.force_along(sine(condition, 1, 8), condition)

@@ -1,0 +1,129 @@
+"""How sure a damper is: saved, in bands, in words, and wide where nothing is known."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.dampers import joint_damper, modified_damper
+from support.sessions import session_runs
+from typer.testing import CliRunner
+
+from mrdamper.cli import application
+from mrdamper.dampers.certainty import Certainty, band, certain, session_of, unsure
+from mrdamper.data import Condition
+from mrdamper.errors import InputError, ModelFileError
+from mrdamper.files.model_file import dump_model, parse_model, save_model
+from mrdamper.metrics import score
+
+
+@pytest.fixture(scope="module")
+def damper():
+    truth = joint_damper()
+    return certain(truth, session_runs(truth))
+
+
+def test_gains_of_sessions_are_found():
+    truth = joint_damper()
+    found = [certain(truth, session_runs(truth, seed=s, repeats=2)).certainty for s in range(4)]
+    # 18 sessions know their spread to a sixth, four repeats to a twelfth.
+    assert np.sqrt(np.mean([c.gain**2 for c in found])) == pytest.approx(0.045, rel=0.35)
+    still = certain(truth, session_runs(truth, gain=0.0)).certainty
+    assert still.gain < 0.01
+    assert np.all(np.diag(still.covariance) < np.diag(found[0].covariance))
+
+
+def test_a_certainty_is_saved_bit_by_bit(damper):
+    back = parse_model(dump_model(damper)).certainty
+    assert np.array_equal(back.covariance, damper.certainty.covariance)
+    assert np.array_equal(back.dof, damper.certainty.dof)
+    assert (back.names, back.gain, back.offset) == (
+        damper.certainty.names, damper.certainty.gain, damper.certainty.offset
+    )  # fmt: skip
+    assert "covariance" not in json.loads(dump_model(joint_damper()))
+
+
+@pytest.mark.parametrize("damage", [{"parameters": ["x"]}, {"matrix": [[1.0]]}, {"degrees_of_freedom": []}])
+def test_a_covariance_that_does_not_fit_is_refused(damper, damage):
+    document = json.loads(dump_model(damper))
+    document["covariance"] |= damage
+    with pytest.raises(ModelFileError, match="covariance"):
+        parse_model(json.dumps(document))
+
+
+def test_a_higher_level_is_wider_and_an_unknown_session_wider_than_a_known(damper):
+    prediction = damper.predict(Condition(0.5, 1.0, 0.01))
+    narrow, wide = (band(damper, prediction, level) for level in (0.5, 0.95))
+    assert np.all(wide.high - wide.low > narrow.high - narrow.low)
+    assert np.all((wide.low < prediction.force) & (prediction.force < wide.high))
+    assert wide.peak[0] < wide.known_session[0] < wide.known_session[1] < wide.peak[1]
+    for bad in (0.0, 1.0, 90.0, float("nan")):
+        with pytest.raises(InputError, match="E_LEVEL"):
+            band(damper, prediction, bad)
+
+
+def test_the_band_of_the_peak_holds_new_sessions():
+    truth = joint_damper()
+    made = certain(truth, session_runs(truth, seed=5, repeats=2))
+    inside = []
+    for run in session_runs(truth, seed=6, repeats=3):
+        prediction = made.predict_run(run)
+        low, high = band(made, prediction, 0.9).peak
+        inside.append(low <= np.ptp(run.force) / 2 <= high)
+    assert np.mean(inside) >= 0.75  # 27 of 90 %: three standard errors are 17 points
+
+
+def test_what_left_out_conditions_were_wrong_by_widens_the_band():
+    truth = joint_damper()
+    runs = session_runs(truth)
+    wrong = [score(r.force, 1.2 * r.force, np.gradient(r.displacement, r.time), r.time) for r in runs]
+    sure, unsure = certain(truth, runs), certain(truth, runs, wrong)
+    prediction = truth.predict(Condition(0.5, 1.0, 0.01))
+    assert unsure.certainty.peak > 0.1
+    assert np.ptp(band(unsure, prediction).peak) > np.ptp(band(sure, prediction).peak)
+
+
+def test_what_a_bound_holds_and_what_nothing_tells_apart_has_no_interval():
+    truth = joint_damper()
+    held = replace(truth, model=replace(truth.model, c1=0.0))
+    runs = [
+        run for run in session_runs(held, gain=0.0) if run.current_A == 0.0
+    ]  # without current nothing shows fy1 and h1
+    made = certain(held, runs)
+    assert "c1" in made.certainty.one_sided
+    assert {"fy1", "h1"} <= set(made.certainty.unknown)
+    said = " ".join(unsure(made))
+    assert "c1 ended at a limit" in said
+    assert "cannot be known" in said
+    for name in ("c1", "fy1"):
+        with pytest.raises(InputError, match="E_CERTAINTY"):
+            made.certainty.interval(made, name)
+
+
+def test_functions_have_a_spread_too():
+    truth = modified_damper()
+    made = certain(truth, session_runs(truth))
+    low, high = made.certainty.interval(made, "f0.0")
+    assert low < 30.0 < high
+    assert isinstance(parse_model(dump_model(made)).certainty, Certainty)
+
+
+def test_a_session_is_a_day_and_hour_or_the_run():
+    run = session_runs(joint_damper())[0]
+    assert session_of(run) == "run r0"
+    assert session_of(replace(run, notes={"recorded_at": "2020-06-10T10:05:11"})) == "2020-06-10T10"
+    assert session_of(replace(run, notes={"recorded_at": "2020-06-10T10:05:11", "session": "a"})) == "a"
+
+
+def test_the_command_writes_the_band(damper, tmp_path):
+    path = tmp_path / "m.json"
+    runner, ask = CliRunner(), ["--current", "0.5", "--frequency", "1", "--amplitude", "10"]
+    save_model(damper, path)
+    got = runner.invoke(application(), ["predict", str(path), *ask, "--level", "0.8", "--out", str(tmp_path / "a.csv")])
+    assert got.exit_code == 0
+    head = (tmp_path / "a.csv").read_text().splitlines()[0].split(",")
+    assert {"force_N", "force_low_N", "force_high_N"} <= set(head)
+    save_model(joint_damper(), path)
+    got = runner.invoke(application(), ["predict", str(path), *ask, "--out", str(tmp_path / "b.csv")])
+    assert "force_low_N" not in (tmp_path / "b.csv").read_text()
+    assert "no band" in got.stderr
