@@ -108,3 +108,16 @@ def test_bad_folders_are_refused_with_place_and_remedy(tmp_path, runs, samples, 
 def test_a_missing_folder_is_named(tmp_path):
     with pytest.raises(DatasetError, match="no such folder"):
         load_dataset(tmp_path / "nowhere")
+
+
+@pytest.mark.parametrize("cell", ["1_0", "٣", "nan", "1,5", "0x10"])
+def test_a_number_is_what_a_laboratory_writes(tmp_path, bundled, cell):
+    save_dataset(bundled.only([bundled["utf_5mm4Hz_1A"]]), tmp_path / "set")
+    table = tmp_path / "set" / "runs.csv"
+    head, row = table.read_text().splitlines()
+    at = head.split(",").index("current_A")
+    cells = row.split(",")
+    cells[at] = f'"{cell}"'
+    table.write_text(f"{head}\n{','.join(cells)}\n", encoding="utf-8")
+    with pytest.raises(ColumnError, match="current_A is"):
+        load_dataset(tmp_path / "set")

@@ -205,7 +205,7 @@ def _run(row: dict[str, Any], samples: pl.DataFrame, folder: Path) -> Run:
         if not text:
             return None
         try:
-            value = float(text)
+            value = float(text) if text.isascii() and "_" not in text else math.nan  # Python reads 1_0 as ten
         except ValueError:
             value = math.nan
         if not math.isfinite(value):

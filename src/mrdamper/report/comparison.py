@@ -59,17 +59,18 @@ def write_comparison(
             chapters.append(_chapter(rig, work / "figures", suffix, png))
             for entry in rig.entries:
                 save_model(entry.damper, work / "models" / f"{entry.recipe.name.replace(':', '-')}{suffix}.json")
-        took = f"compared in {comparison.seconds:.0f} s on {comparison.jobs} processes."
-        footer = f"{made_from(comparison.dataset)}; {took}"
+        footer = f"{made_from(comparison.dataset)}."
         title = f"MR damper models compared: {', '.join(r.rig for r in comparison.rigs) or comparison.dataset.name}"
         page = render_page("comparison.html.j2", title, footer, chapters=chapters)
         (work / "comparison.html").write_text(page, encoding="utf-8")
-        rows = summary_rows(comparison)
+        rows = [{k: v for k, v in row.items() if k != "seconds"} for row in summary_rows(comparison)]
         (work / "comparison.csv").write_text(csv_text(rows), encoding="utf-8")
         (work / "runs.csv").write_text(csv_text(run_rows(comparison)), encoding="utf-8")
         (work / "comparison.json").write_text(json.dumps(rows, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
-    written = publish(folder, "comparison.html", fill)
+    took = {rig.rig: {entry.recipe.name: entry.seconds for entry in rig.entries} for rig in comparison.rigs}
+    facts = {"seconds": {"in all": comparison.seconds, **took}, "processes": comparison.jobs}
+    written = publish(folder, "comparison.html", fill, facts)
     progress("written", 1.0)
     return written
 

@@ -87,7 +87,7 @@ def write_study(
             vectors |= {f"{key}-{name}": p.files["pdf"] for name, p in pictures.items() if "pdf" in p.files}
             chapters.append({**_chapter(rig, saved, limits), "key": key})
             forces += force_rows(chapters[-1]["measured"] or {})
-        footer = f"{made_from(study.dataset)}; identified and validated in {study.seconds:.1f} s."
+        footer = f"{made_from(study.dataset)}."
         title = f"MR damper study: {', '.join(r.rig for r in study.rigs) or study.dataset.name}"
         head = about or About()
         origin = provenance({rig.rig or rig.dataset.name: rig.dataset for rig in study.rigs})
@@ -106,7 +106,8 @@ def write_study(
         )
         (work / "validation.csv").write_text(_validation_table(study), encoding="utf-8")
 
-    written = publish(folder, "report.html", fill)
+    took = {rig.rig: {c.recipe.name: c.seconds for c in rig.candidates} for rig in study.rigs}
+    written = publish(folder, "report.html", fill, {"seconds": {"in all": study.seconds, **took}})
     progress("written", 1.0)
     return written
 
