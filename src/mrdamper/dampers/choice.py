@@ -16,6 +16,7 @@ from mrdamper.dampers.joint import JointFit, JointProblem
 from mrdamper.data import Floats, Run, same_condition
 from mrdamper.optimizers.linear import on_one_blas_thread, solve_linear
 
+_ROUGHLY = 1e-4  # relative gain of a step that is enough to tell forms apart
 _WORTH = 0.985  # a term must lower the left-out error to this share of it
 _HARM = 1.01  # and raise it by no more in any way of leaving out
 _NO_PLAY = 1e-2  # seat longer than any play: none is left [m]
@@ -119,14 +120,14 @@ def identify_jointly(
     leak = ("leak",) if problem.rests else ()
     progress("one model, steady ends first", 0.0)
     short = JointProblem(runs, MODEL, fixed, parts=[part.steady_end() for part in problem.parts])
-    fit = short.fit(rounds=2)
+    fit = short.fit(rounds=2, most_steps=15, settled=_ROUGHLY)
     short, fit, tried = _lost_motion(short, fit)
     progress("how the force rises with current", 0.3)
     law, more = _level_law(short, fit) if not fixed else ((), ())
     tried = (*tried, *more)
     progress("whole records", 0.5)
     problem = problem.with_free((*leak, *law), short.fixed)
-    fit = problem.fit(start=problem.from_point(fit), rounds=2, most_steps=10)
+    fit = problem.fit(start=problem.from_point(fit), rounds=2, most_steps=8, settled=_ROUGHLY / 10)
     progress("which terms the tests show", 0.8)
     extra = [name for term in TERMS for name in term.names]
     if not law and not fixed and any(run.current_changes for run in runs):
@@ -138,7 +139,7 @@ def identify_jointly(
     new = [name for name in extra if name in chosen]
     if off or new:
         final = problem.with_free((*leak, *law, *new), off)
-        found = final.fit(start=evidence.start(final), rounds=2, most_steps=10)
+        found = final.fit(start=evidence.start(final), rounds=1, most_steps=8, settled=_ROUGHLY / 10)
     progress("one model for all runs", 1.0)
     left_out, before = (Evidence.of(p, p, f).everything() for p, f in ((final, found), (problem, fit)))
     if _total(left_out, before) > 1.0:  # what one step promised, the search did not keep
@@ -154,7 +155,7 @@ def identify_jointly(
 def _lost_motion(problem: JointProblem, fit: JointFit) -> tuple[JointProblem, JointFit, tuple[Tried, ...]]:
     """Whether the damper loses motion after a reversal: the model without it, where that predicts as well."""
     without = problem.with_free((), {"e": _NO_PLAY})
-    found = without.fit(start=without.from_point(fit), rounds=2)
+    found = without.fit(start=without.from_point(fit), rounds=1, most_steps=10, settled=_ROUGHLY)
     now, scores = (Evidence.of(p, p, f).everything() for p, f in ((problem, fit), (without, found)))
     kept = _better(now, scores)
     said = Tried("lost motion after a reversal", kept, scores if kept else now, now if kept else scores)
@@ -174,7 +175,7 @@ def _level_law(short: JointProblem, fit: JointFit) -> tuple[tuple[str, ...], tup
     tried = []
     for term in LEVEL_LAWS:
         longer = short.with_free(term.names)
-        found = longer.fit(start=longer.from_point(fit), rounds=1, most_steps=12)
+        found = longer.fit(start=longer.from_point(fit), rounds=1, most_steps=10, settled=_ROUGHLY)
         scores = {"current": _left_out_current(longer, found, levels)}
         kept = _better(scores, now)
         tried.append(Tried(term.title, kept, now if kept else scores, scores if kept else now))
@@ -188,7 +189,7 @@ def _left_out_current(problem: JointProblem, fit: JointFit, levels: Sequence[Seq
     errors = []
     for level in levels[1:-1]:
         rest = [i for i in range(len(problem.parts)) if i not in level]
-        without = problem.fit(rest, fit.point, rounds=1, most_steps=8)
+        without = problem.fit(rest, fit.point, rounds=1, most_steps=5, settled=_ROUGHLY)
         errors += problem.errors(without, level).tolist()
     return float(np.mean(errors))
 
