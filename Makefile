@@ -32,6 +32,9 @@ SHARE ?= 1
 attack: $(VENV)/.dev  ## hostile names, models, tables, calls; killed and starved commands: counts a kind (SHARE=0.1)
 	$(BIN)/python -m fuzz.attack --share $(SHARE)
 
+mutants: $(VENV)/.dev  ## plant faults where results are judged: the tests notice at least 95 % of them
+	$(BIN)/python -m mutants
+
 lint: $(VENV)/.dev  ## format check, lint, types, import order of the layers
 	$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/pyright --pythonpath $(BIN)/python && $(BIN)/lint-imports
 

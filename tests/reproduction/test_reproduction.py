@@ -19,20 +19,17 @@ from mrdamper.gas_spring import GasSpring
 from mrdamper.identification import identify
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.identification.methods.direct_genetic import DirectGenetic
-from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.optimizers.generation import GeneticSettings
 from mrdamper.reproduction import reproduce
 from mrdamper.reproduction import study as study_module
 from mrdamper.reproduction.claims import friction_along, judge_all, lost_length
 from mrdamper.reproduction.output import parameter_rows, verdicts, write_reproduction
-from mrdamper.reproduction.sensitivity import one_at_a_time, sobol
 from mrdamper.reproduction.switches import Switches
 from mrdamper.reproduction.verdicts import LIMITS
 from mrdamper.reproduction.virtual_rig import VirtualRig, friction_test, virtual_dataset
 from mrdamper.reproduction.ways import CONSISTENT, HALF, LITERAL, SAME_FORMS
 
 CURRENTS = (0.0, 0.5, 1.0, 2.0)
-MODEL = BoucWen(c=1440, alpha=9e5, beta=2e5, gamma=2e5, f0=120, k1=1382, k3=8243, m=15.0)
 
 
 @pytest.fixture(scope="module")
@@ -222,39 +219,6 @@ def test_relative_errors_are_those_of_the_vector(vectors):
         "r2": metrics.r_squared,
     }.items():
         assert function(measured, predicted) == pytest.approx(found[name], rel=1e-12), name
-
-
-def test_a_preset_that_others_make_up_for_costs_nothing():
-    found = {s.name: s for s in one_at_a_time(MODEL, Condition(1.0, 1.0, 0.05))}
-    assert found["A"].effect > 0.01
-    assert found["A"].left < 1e-9  # A is redundant: α, β, γ absorb it exactly
-    assert found["n"].left < 0.01
-    assert np.isnan(found["c"].left)
-
-
-def test_sensitivity_does_not_depend_on_the_unit_of_length():
-    """The same damper and motion, written in millimetres: every coordinate as sensitive."""
-    short = BoucWen.build(
-        {"c": 1.44, "yield_force": MODEL.yield_force, "yield_displacement": 1e3 * MODEL.yield_displacement, "f0": 120.0,
-         "k1": 1.382, "k3": 8243e-9, "m": 0.015, "n": 2.0}
-    )  # fmt: skip
-    metres = one_at_a_time(MODEL, Condition(1.0, 1.0, 0.05))
-    millimetres = one_at_a_time(short, Condition(1.0, 1.0, 50.0), refit=())
-    for a, b in zip(metres, millimetres, strict=True):
-        assert a.name == b.name
-        assert b.effect == pytest.approx(a.effect, rel=1e-6), a.name
-
-
-def test_sobol_indices_have_intervals_and_rank_like_single_changes():
-    pytest.importorskip("SALib")
-    names = ("c", "yield_force", "m")
-    found = sobol(MODEL, Condition(1.0, 1.0, 0.05), names, samples=128)
-    single = {s.name: s.effect for s in one_at_a_time(MODEL, Condition(1.0, 1.0, 0.05), names, refit=())}
-    assert [names[i] for i in np.argsort(found.total)] == sorted(names, key=single.get)
-    assert np.all(found.total > -0.05)
-    assert np.all((found.total_confidence > 0) & (found.total_confidence < 0.5))
-    with pytest.raises(ParameterError, match="spread is 2"):
-        sobol(MODEL, Condition(1.0, 1.0, 0.05), spread=2.0)
 
 
 def test_the_direct_search_comes_near_on_an_easy_run():

@@ -43,6 +43,8 @@ def _page(model) -> str:
     if not hasattr(model, "parameters"):
         notes = (model.__doc__ or "").strip().replace("\n    ", "\n")
         facts = [f"limits: {model.limits}", f"source: {model.source}"]
+        if unverified := getattr(model, "unverified", ""):
+            facts.append(f"not verified against the publication: {unverified}")
         equation = model.__dict__.get("equation", "")
         lines = [f"{model.name}: {model.heading}", "", notes, "", *facts]
         return "\n".join([*lines, "", f"LaTeX: {equation}"] if equation else lines)
@@ -74,6 +76,7 @@ def _entry(model) -> dict:
             "equation": model.__dict__.get("equation", ""),
             "source": model.source,
             "limits": model.limits,
+            "unverified": getattr(model, "unverified", "") or None,
             "basis": model.basis or None,
             "parameters": [],
         }

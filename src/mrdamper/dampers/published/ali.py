@@ -31,6 +31,9 @@ class AliType(ConditionedDamper):
     name: ClassVar[str] = "ali-type"
     heading: ClassVar[str] = "Ali-type (Spencer-based)"
     source: ClassVar[str] = "after Ali and Ramaswamy 2009; equations not seen"
+    unverified: ClassVar[str] = (
+        "that three of the ten numbers vary, their powers of amplitude and frequency, and the quadratic of the current"
+    )
     equation: ClassVar[str] = (
         r"F = c_1 \dot y + k_1 x + f_0,\quad \dot y = \frac{F_z \zeta + k_0 r + c_0 v}{c_0 + c_1},\quad "
         r"r = x - y,\quad "

@@ -58,6 +58,7 @@ class ConditionedDamper(Damper):
     heading: ClassVar[str]
     source: ClassVar[str]  # type: ignore[assignment]
     equation: ClassVar[str]  # type: ignore[assignment]
+    unverified: ClassVar[str] = ""  # what of the form could not be checked against the publication
     basis: ClassVar[str]  # model identified run by run, from which the coefficients start
     basis_free: ClassVar[tuple[str, ...]] = ()
     limits: ClassVar[str]  # what it cannot do, for tables

@@ -37,6 +37,10 @@ class BoadaType(ConditionedDamper):
     name: ClassVar[str] = "boada-type"
     heading: ClassVar[str] = "Boada-type (arctangent, neural network)"
     source: ClassVar[str] = "after Boada et al.; equations not seen"
+    unverified: ClassVar[str] = (
+        "the trigonometric form of the loop, the size of the network and its inputs; the publication is "
+        "said to have few parameters, this network has tens"
+    )
     equation: ClassVar[str] = (
         r"F = \frac{2}{\pi} f_y \arctan[\kappa (v + v_0\,\mathrm{sgn}\,x)] + c\,v + k\,x + f_0,\quad "
         r"(\ln f_y, \ln \kappa, \ln v_0, c, k, f_0)_j = \mathrm{middle}_j + \mathrm{width}_j\, o_j,\quad "

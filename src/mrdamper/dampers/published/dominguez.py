@@ -34,6 +34,10 @@ class DominguezType(ConditionedDamper):
     name: ClassVar[str] = "dominguez-type"
     heading: ClassVar[str] = "Dominguez-type"
     source: ClassVar[str] = "after Dominguez, Sedaghati and Stiharu 2008; equations not seen"
+    unverified: ClassVar[str] = (
+        "which coefficients carry the current and by which law, and that one power law of frequency and "
+        "amplitude multiplies the whole force; of the 16 numbers two only scale others"
+    )
     equation: ClassVar[str] = (
         r"F = s \left[c\,v + (k_1 + k_2 I)\,x + \alpha z\right] + f_0,\quad "
         r"s = (f/f_r)^{d_2} (A/A_r)^{d_4},\quad "

@@ -25,6 +25,9 @@ class LeiType(ConditionedDamper):
     name: ClassVar[str] = "lei-type"
     heading: ClassVar[str] = "Lei-type (piecewise, quadratic in current)"
     source: ClassVar[str] = "after Lei et al.; equations not seen"
+    unverified: ClassVar[str] = (
+        "the piecewise loop (taken from Wereley et al. 1998) and which of its numbers are quadratics of the current"
+    )
     equation: ClassVar[str] = (
         r"F = c_{po} v + f_y \max\left(-1, \min\left(1, \frac{v - v_h\,\mathrm{sgn}\,a}{v_y}\right)\right) + f_0,\quad "
         r"v_y = \frac{f_y}{c_{pr} - c_{po}},\quad v_h = v_0 \frac{c_{pr} v_y}{f_y},\quad "

@@ -28,6 +28,7 @@ class LvType(ConditionedDamper):
     name: ClassVar[str] = "lv-type"
     heading: ClassVar[str] = "Lv-type (rheological)"
     source: ClassVar[str] = "after Lv et al.; equations not seen"
+    unverified: ClassVar[str] = "the fluid law and what of it depends on the current"
     equation: ClassVar[str] = (
         r"F = \frac{f_y}{T}\,\mathrm{sgn}\,v + f_0,\quad \frac{|v|}{v_c} = \frac{m}{2m+1} T^{-1/m}"
         r" (1-T)^{1+1/m} \left(1 + \frac{m}{m+1} T\right),\quad "

@@ -1,0 +1,1 @@
+"""Planted faults: does a test notice when a judgement is turned over?"""
