@@ -34,3 +34,12 @@ def test_dissipated_power_of_a_dashpot():
     t = np.linspace(0, 2, 4001)
     velocity = 0.3 * np.cos(2 * np.pi * t)
     assert metrics.dissipated_power(1000 * velocity, velocity, t) == pytest.approx(1000 * 0.3**2 / 2, rel=1e-6)
+
+
+def test_peak_force_and_power_are_those_of_the_formula():
+    from mrdamper.metrics import dissipated_power, peak_force
+
+    time = 7.0 + np.linspace(0.0, 2.0, 2001)  # a clock that does not begin at zero
+    velocity = np.sin(2 * np.pi * time)
+    assert peak_force(np.array([-10.0, 3.0, 30.0])) == 20.0
+    assert dissipated_power(5.0 * velocity, velocity, time) == pytest.approx(2.5, rel=1e-6)

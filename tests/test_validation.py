@@ -124,3 +124,17 @@ def test_drift_between_sessions_is_the_gains_and_offsets_put_in():
     assert drift.gain == pytest.approx(np.std(gains))
     assert drift.offset == pytest.approx(np.std(offsets))
     assert drift.floor == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_floor_is_the_error_left_by_a_gain_and_an_offset():
+    run = made(1.0, 1.0, "one", gain=1.1, offset=5.0)
+    inside = run.in_window
+    wave = 2.0 * np.sin(2 * np.pi * 5 * run.time)  # five times the frequency: no gain and no offset takes it up
+    drift = session_drift(Exact(), [replace(run, force=run.force + wave)])
+    spread = np.ptp((run.force + wave)[inside])
+    assert drift.floor == pytest.approx(np.sqrt(2.0) / spread, rel=0.02)
+
+
+def test_a_validation_is_called_after_its_damper_unless_named():
+    assert validate(Exact(), []).title == "exact"
+    assert validate(Exact(), [], "other").title == "other"

@@ -46,3 +46,9 @@ def test_the_dynamic_range_counts_from_the_lowest_current_of_the_same_motion():
     assert found.currents_A == (0.0, 0.5, 1.0)
     assert found.ratios == pytest.approx((1.0, 2.0, 3.5))
     assert (found.frequency_Hz, found.amplitude_m) == pytest.approx((1.0, 0.02), rel=1e-3)
+
+
+def test_the_peak_force_is_the_median_over_cycles():
+    condition = Condition(0.5, 1.0, 0.02)
+    grown = run_of(lambda m: 100.0 * m.displacement / 0.02 * (1 + 9 * ((m.time > 1) & (m.time < 2))), condition)
+    assert analyse_loop(grown).peak_force == pytest.approx(100.0, rel=0.01)
