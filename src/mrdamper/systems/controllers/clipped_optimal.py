@@ -16,7 +16,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.parameters import param
 from mrdamper.systems.controllers.base import Controller, Sight
-from mrdamper.systems.linear import linear_system
+from mrdamper.systems.linear import aims, linear_system
 from mrdamper.systems.structure import Link, System
 
 
@@ -62,6 +62,7 @@ class ClippedOptimal(Controller):
     effort: float = param(
         "-", "weight of the forces, in accelerations of the whole mass", bounds=(1e-12, math.inf), default=1e-3
     )
+    span_weight: float = param("-", "of drifts beside accelerations", bounds=(0, math.inf), default=1.0)
     noise_ratio: float = param("-", "input over sensor noise, as densities", bounds=(1e-9, math.inf), default=50.0)
     design: Design | None = None
 
@@ -74,7 +75,8 @@ class ClippedOptimal(Controller):
         still = np.zeros((coupled.shape[1] - n, coupled.shape[1]))
         sampled: Any = expm(period * np.vstack([coupled, still]))
         A, B, E = sampled[:n, :n], sampled[:n, n : n + count], sampled[:n, n + count :]
-        z, f = linear.aim
+        weights = [self.span_weight if aim.kind == "span" else 1.0 for aim in aims(system)]
+        z, f = (part * np.array(weights)[:, None] for part in linear.aim)
         R = f.T @ f + self.effort * np.eye(count) / linear.mass**2
         P = solve_discrete_are(A, B, z.T @ z, R, s=z.T @ f)
         G = np.linalg.solve(R + B.T @ P @ B, B.T @ P @ A + f.T @ z)
