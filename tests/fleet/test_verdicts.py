@@ -119,3 +119,14 @@ def test_golden_dampers_are_named_in_the_profile():
     profile = FleetProfile(golden=("G1",))
     assert profile.is_golden({"serial": "G1"})
     assert not profile.is_golden({"serial": "D1"})
+
+
+def test_a_damper_of_another_rig_is_named(identified, tmp_path):
+    table = pl.read_parquet(identified.table)
+    assert set(table["findings"]) == {""}
+    other = table.with_columns(
+        findings=pl.when(pl.col("serial") == "D000002").then(pl.lit("W_OTHER_RIG")).otherwise(pl.lit(""))
+    )
+    other.write_parquet(tmp_path / "dampers.parquet")
+    said = write_page(tmp_path / "dampers.parquet", identified.plan, {}, tmp_path / "fleet.html")
+    assert "1 dampers were not tested on rig 'virtual' like most of the line: D000002" in said

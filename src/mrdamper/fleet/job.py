@@ -30,6 +30,7 @@ from mrdamper.fleet.loops import (
 from mrdamper.models import SearchAxis
 from mrdamper.motion import equivalent_sine
 
+OTHER_RIG = "W_OTHER_RIG"  # tested on another rig than most of the line: compared with them all the same
 _ROUNDS, _STEPS, _SETTLED = 1, 40, 1e-8  # one least squares without reweighting, searched to its end: the optimum
 # is then the same to 1e-6 whatever near start it was found from
 _SPEED_STEPS = (0.25, 0.5, 0.75, 1.0)  # of the velocity ladder, over the line's highest test speed
@@ -80,6 +81,8 @@ class Plan:
         Median measured loop of each [N].
     speeds : tuple of float
         Velocity ladder [m/s].
+    rig : str
+        That most reference dampers were tested on; empty if there is none.
     references : tuple of str
         Names of the dampers it was made from.
     draft : bool
@@ -95,6 +98,7 @@ class Plan:
     matrix: tuple[Test, ...]
     loops: tuple[tuple[float, ...], ...]
     speeds: tuple[float, ...]
+    rig: str = ""
     references: tuple[str, ...] = ()
     draft: bool = False
 
@@ -132,6 +136,8 @@ def measure(job: dict[str, Any]) -> dict[str, Any]:
             mend="run the same command again", code="E_FLEET_CHANGED",
         )  # fmt: skip
     dataset, findings = read(item, settings)
+    if plan is not None and plan.rig and dataset.rigs[0] != plan.rig:
+        findings = (*findings, OTHER_RIG)
     row = {**_identify(dataset, settings, plan), "findings": " ".join(findings)}
     row["host_name"] = socket.gethostname()
     row["wall_time_s"] = time.perf_counter() - begin[0]
@@ -325,6 +331,8 @@ def drafts(rows: dict[str, dict[str, Any]]) -> list[Plan]:
         for number, like in enumerate(by_test(some, matrix)):
             found[number] += [np.array(row["loops"][i]) for i in like]
     top = max(Condition(*test).peak_velocity for test in matrix)
+    rigs = [row["rig"] for row in rows.values()]
+    rig = max(sorted(set(rigs)), key=rigs.count)
     best = sorted(rows.values(), key=lambda row: row["cost"])[:_CANDIDATES]
     return [
         Plan(
@@ -337,6 +345,7 @@ def drafts(rows: dict[str, dict[str, Any]]) -> list[Plan]:
             matrix=matrix,
             loops=tuple(tuple(np.round(np.median(some, axis=0), 3).tolist()) for some in found),
             speeds=tuple(float(f"{step * top:.2g}") for step in _SPEED_STEPS),
+            rig=rig if 2 * rigs.count(rig) > len(rigs) else "",
             references=tuple(rows),
             draft=True,
         )

@@ -216,7 +216,8 @@ class _Line:
         """Run the jobs whose rows are not in the journal; what is finished together is kept together."""
         waiting = [n for n in numbers if n not in self._failed and not self._is_kept(n, plan)]
         if count:
-            self._already = len(numbers) - len(waiting)
+            kept = (self._journal.result(self._key(n, plan)) for n in numbers)
+            self._already = sum(row is not None and row["status"] == "done" for row in kept)
         running: dict[Future[dict[str, Any]], int] = {}
         todo, done, begin = iter(waiting), 0, time.monotonic()
         while True:

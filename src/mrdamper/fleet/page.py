@@ -14,7 +14,7 @@ from mrdamper.data import Floats
 from mrdamper.errors import ColumnError
 from mrdamper.files.atomic import write_file
 from mrdamper.fleet.charts import Gauge, capability, ewma, gauge_study, individuals
-from mrdamper.fleet.job import Plan
+from mrdamper.fleet.job import OTHER_RIG, Plan
 from mrdamper.fleet.profile import Limit
 from mrdamper.fleet.verdicts import FEATURES, clock_findings, drift, suspects, with_features
 from mrdamper.report.page import render_page
@@ -73,7 +73,7 @@ def write_page(table: Path, plan: Plan | None, limits: Mapping[str, Limit], path
         "suspects": found[:_MOST_NAMED],
         "more_suspects": max(0, len(found) - _MOST_NAMED),
         "drifts": {features[n][0]: d for n, d in drifts.items()},
-        "clock": clock_findings(done),
+        "notes": [*clock_findings(done), *_other_rigs(done, plan)],
         "limits": verdicts,
         "gauge": {features[n]: g for n in features if (g := _gauge(golden, line, n)) is not None},
         "golden": sorted(set(golden["serial"].to_list())),
@@ -88,7 +88,17 @@ def write_page(table: Path, plan: Plan | None, limits: Mapping[str, Limit], path
         target.write_text(text, encoding="utf-8")
     said = [f"stands out: {s.serial} {s.session}: {s.cause} ({', '.join(s.findings)})" for s in found]
     said += [f"{features[n][0]}: {d.text}" for n, d in drifts.items() if d.verdict != "none"]
-    return said + [f"limits of {v['name']}: {v['outside']} of {v['count']} outside" for v in verdicts] + facts["clock"]
+    return said + [f"limits of {v['name']}: {v['outside']} of {v['count']} outside" for v in verdicts] + facts["notes"]
+
+
+def _other_rigs(done: pl.DataFrame, plan: Plan | None) -> list[str]:
+    import polars as pl
+
+    other = done.filter(pl.col("findings").str.contains(OTHER_RIG))
+    if plan is None or not other.height:
+        return []
+    named = ", ".join(other["serial"].unique(maintain_order=True).to_list()[:_WORST])
+    return [f"{other.height} dampers were not tested on rig {plan.rig!r} like most of the line: {named}"]
 
 
 def _values(frame: pl.DataFrame, name: str) -> Floats:
