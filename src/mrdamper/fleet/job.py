@@ -362,16 +362,19 @@ def holding(plan: Plan, rows: Sequence[dict[str, Any]]) -> Plan:
     What is left has one minimum, the same from any start near the line, and can be compared.
     """
     curvature = np.array([row["curvature"] for row in rows])
-    free = list(range(curvature.shape[1]))
+    names = rows[0]["axes"]
+    free = list(range(len(names)))
     while free:
         some = [c[np.ix_(free, free)] for c in curvature]
         inverse = [np.linalg.inv(c + _RIDGE * (1 + np.trace(c)) * np.eye(len(free))) for c in some]
         rises = np.median([1 / np.diag(i) for i in inverse], axis=0)
         rises = rises * np.array([rows[0]["changes"][i] for i in free]) ** 2
+        rises[[names[i] not in rows[0]["parameters"] for i in free]] = (
+            np.inf
+        )  # an axis of several parameters stays free
         if rises.min() > _WORTH:
             break
         del free[int(np.argmin(rises))]
-    names = rows[0]["axes"]
     held = {
         name: float(np.median([row["parameters"][name] for row in rows]))
         for i, name in enumerate(names)

@@ -63,7 +63,11 @@ class SearchAxis:
 
     def value(self, coordinate: float) -> float:
         """The value at a place on the axis."""
-        return math.exp(coordinate) if self.log else coordinate
+        if not self.log:
+            return coordinate
+        value = math.exp(coordinate)
+        # A parameter may end where the axis does, and rounding must not carry it beyond.
+        return next((end for end in (self.lower, self.upper) if math.isclose(value, end, rel_tol=1e-12)), value)
 
     def below(self, limit: float) -> SearchAxis:
         """The part of a logarithmic axis below a value."""
