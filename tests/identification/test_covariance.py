@@ -74,9 +74,9 @@ def test_white_noise_gives_the_textbook_errors():
 
 @pytest.mark.parametrize(("rho", "time"), [(0.0, 1.0), (0.5, 3.0), (0.8, 9.0)])
 def test_the_memory_is_that_of_an_autoregressive_process(rho, time):
-    series = lfilter([1], [1, -rho], np.random.default_rng(5).standard_normal(60_000))
-    found = spread(np.ones((60_000, 1)), series)
-    assert 60_000 / found.memory == pytest.approx(time, rel=0.12)  # (1 + rho)/(1 - rho)
+    series = lfilter([1], [1, -rho], np.random.default_rng(5).standard_normal(4_000))
+    found = spread(np.ones((4_000, 1)), series)
+    assert 4_000 / found.memory == pytest.approx(time, rel=0.25)  # (1 + rho)/(1 - rho)
 
 
 def test_standard_errors_are_the_scatter_of_repeated_identifications():

@@ -15,9 +15,10 @@ import numpy as np
 from mrdamper.data import Floats
 
 _HIGHEST_ORDER = 12  # of the autoregression
-_HARMONICS = 40  # of the motion in which model error is looked for
+_HARMONICS = 24  # of the motion in which model error is looked for
 _REPEATS = 0.95  # cycles from which harmonics of the motion can be told apart
 _TELLING = 1.9  # cycles from which repeats are seen as such
+_MOST = 2001  # samples that are looked at
 _LONGEST = 0.9995  # correlation of neighbours
 _NO_MORE = 1e-12  # of the largest: eigenvalue of the scaled normal matrix below which nothing is known
 
@@ -66,6 +67,11 @@ def spread(jacobian: Floats, residual: Floats, time: Floats | None = None, frequ
     frequency : float, optional
         Of the motion, where it repeats [Hz].
     """
+    whole = residual.size
+    if (block := whole // _MOST) > 1:  # means over a few samples keep all that is slower than them
+        kept = whole // block * block
+        jacobian, residual = (a[:kept].reshape(-1, block, *a.shape[1:]).mean(axis=1) for a in (jacobian, residual))
+        time = None if time is None else time[:kept].reshape(-1, block).mean(axis=1)
     scale = np.sqrt(np.sum(jacobian**2, axis=0))
     known = scale > 0
     size, count = residual.size, scale.size
