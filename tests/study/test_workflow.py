@@ -91,6 +91,7 @@ def test_every_file_of_the_contract_is_there(folder):
         "validation.csv",
         "figures",
         "forces.csv",
+        "made.json",
     }
     assert {p.suffix for p in (folder / "figures").iterdir()} == {".svg", ".csv"}
 
