@@ -39,13 +39,12 @@ def named(kind: str, name: str, known: Mapping[str, N]) -> N:
 MOVED = MappingProxyType(
     {
         "comparison": "study.comparison",
-        "comparison.publication": "report.comparison",
         "condensed": "dampers.gram",
         "conditioned": "dampers.published",
         "damper": "dampers.base",
         "datasets": "files.bundled",
         "excitation": "motion",
-        "formulas": "export.formulas",
+        "formulas": "export.equations",
         "function_fitting": "functions.fitting",
         "harmonic_balance": "identification.harmonic_balance",
         "harmonics": "motion.harmonics",

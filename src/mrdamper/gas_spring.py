@@ -110,5 +110,5 @@ class GasSpring:
 
 
 def _require_positive(name: str, value: object) -> None:
-    if not (isinstance(value, numbers.Real) and not isinstance(value, bool) and 0 < value < math.inf):
+    if not (isinstance(value, numbers.Real) and not isinstance(value, bool) and 0 < float(value) < math.inf):
         raise ParameterError(f"gas {name} is {value!r:.60}", mend="give a positive SI value")

@@ -1,3 +1,5 @@
+import gzip
+
 import numpy as np
 import polars as pl
 import pytest
@@ -121,3 +123,19 @@ def test_a_number_is_what_a_laboratory_writes(tmp_path, bundled, cell):
     table.write_text(f"{head}\n{','.join(cells)}\n", encoding="utf-8")
     with pytest.raises(ColumnError, match="current_A is"):
         load_dataset(tmp_path / "set")
+
+
+@pytest.mark.parametrize("name", ["samples.parquet", "samples.csv.gz"])
+def test_samples_that_unpack_without_end_are_refused_before(tmp_path, name):
+    (tmp_path / "runs.csv").write_text("run_id,current_A\na,0\n")
+    if name.endswith("parquet"):
+        count = 2**24
+        table = {"run_id": pl.repeat("a", count, eager=True)}
+        table |= {c: pl.repeat(0.0, count, eager=True) for c in ("time_s", "displacement_m", "force_N")}
+        pl.DataFrame(table).write_parquet(tmp_path / name, compression="zstd")
+    else:
+        with gzip.open(tmp_path / name, "wb") as file:
+            file.write(b"run_id,time_s,displacement_m,force_N\n" + b"a,0,0,0\n" * 2**25)
+    with pytest.raises(DatasetError, match="unpack") as error:
+        load_dataset(tmp_path)
+    assert error.value.code == "E_ARCHIVE_RATIO"

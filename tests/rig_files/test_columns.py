@@ -47,7 +47,7 @@ def test_a_row_of_units_leaves_the_names_alone():
         ("load displacement", "displacement"), ("v", "velocity"), ("I", "current"), ("Strom", "current"),
         ("U", "voltage"), ("T", "temperature"),
         ("Force command", None), ("displacement_setpoint", None), ("Axial Count", None), ("Sollwert Weg", None),
-        ("pressure", None), ("", None), ("X", None),
+        ("pressure", "pressure"), ("", None), ("X", None),
     ],
 )  # fmt: skip
 def test_what_a_name_stands_for(name, role):

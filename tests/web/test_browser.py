@@ -277,7 +277,8 @@ def test_a_bad_file_says_what_where_and_how_to_mend_it(page, shoot):
 
 def test_hostile_names_are_text(page, small_rig, tmp_path, shoot):
     one = next(iter(small_rig))
-    dataset = small_rig.only([replace(one, id=name, rig=HOSTILE[0]) for name in HOSTILE], name="hostile")
+    runs = [replace(one, id=name, rig=HOSTILE[0], force=one.force + i) for i, name in enumerate(HOSTILE)]
+    dataset = small_rig.only(runs, name="hostile")  # the same samples twice would be left out
     drop_dataset(page, dataset, tmp_path / "hostile")
     page.locator(".cell").first.wait_for()
     assert page.locator(".cell").count() == len(HOSTILE)

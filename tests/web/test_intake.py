@@ -110,7 +110,7 @@ def test_runs_that_do_not_move_are_shown_and_not_used(client, app, session, smal
     table = client.get(f"{session}/data/rigs/0").json()
     shown = next(run for run in table["runs"] if run["id"] == "still")
     assert shown["condition"] is None
-    assert "does not move" in shown["refused"]
+    assert "E_NO_EXCITATION" in shown["refused"]
     assert client.get(f"{session}/data/rigs/0/runs/{shown['key']}/cycle").status_code == 200
     verdict = client.get(f"{session}/data/rigs/0/quality").json()[shown["key"]]
     assert verdict["verdict"] == "refused"

@@ -175,7 +175,8 @@ class Prediction(Shown):
         }
 
 
-UNTESTED = Envelope(*[(-np.inf, np.inf)] * 4)
+_ANY = (-np.inf, np.inf)
+UNTESTED = Envelope(_ANY, _ANY, _ANY, _ANY)
 
 
 @dataclass(frozen=True)
@@ -235,7 +236,7 @@ class Damper(Shown):
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:
         """A row a quantity: the ranges it was tested in."""
-        ranges = vars(self.envelope)
+        ranges = {name: span for name, span in vars(self.envelope).items() if isinstance(span, tuple)}
         return {
             "tested": list(ranges),
             "lowest": [low for low, _ in ranges.values()],

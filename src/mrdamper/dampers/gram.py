@@ -308,7 +308,7 @@ class _Design:
 def _factor(gram: Floats) -> Floats:
     """(R, K, K) matrices T with Tᵀ T the given ones, or the nearest that have such."""
     try:
-        return np.linalg.cholesky(gram).transpose(0, 2, 1)
+        return np.asarray(np.linalg.cholesky(gram).transpose(0, 2, 1), dtype=float)
     except np.linalg.LinAlgError:  # a model that fits to rounding: interpolation took more than the ridge gave
         values, vectors = np.linalg.eigh(gram)
         return np.asarray(np.sqrt(np.maximum(values, _RIDGE))[:, :, None] * vectors.transpose(0, 2, 1), dtype=float)

@@ -223,7 +223,8 @@ class JointProblem:
         self.linear = [info for info in infos if info.linear and info.name in self.free]
         self.parts = list(parts) or [_Part.of(run) for run in runs]
         self.axes: tuple[SearchAxis, ...] = self.model_type.search_axes(_scale(self.parts), self.free)
-        self.given_coil, self.coil = coil, None if coil == "determined" else coil
+        self.given_coil: Coil | Literal["determined"] | None = coil
+        self.coil = None if coil == "determined" else coil
         if coil == "determined" and any(part.changes for part in self.parts):
             self.axes += tuple(SearchAxis(name, *_LAGS, (_LAG,), log=True) for name in (RISE, FALL))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from html import escape
 from typing import Any
 
@@ -23,7 +23,7 @@ class Shown(ABC):
 
     @property
     @abstractmethod
-    def table(self) -> Mapping[str, Sequence[Any]]:
+    def table(self) -> Mapping[str, Any]:
         """Columns by name, all of one length; units are part of the names."""
 
     def __repr__(self) -> str:

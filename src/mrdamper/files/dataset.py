@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+import zlib
 from collections.abc import Collection, Iterable
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 BUNDLED = "two_rigs"
+_RATIO, _UNPACKED = 100, 2**28  # samples may grow so many times, or to so many bytes, when unpacked
 SAMPLE_FILES = ("samples.parquet", "samples.csv.gz", "samples.csv")
 _PIECE = 2**20  # samples written at once
 _REQUIRED = ("time_s", "displacement_m", "force_N")
@@ -172,13 +174,14 @@ def _samples_table(folder: Path) -> dict[str, pl.DataFrame]:
     else:
         raise DatasetError(f"none of {', '.join(SAMPLE_FILES)} is there", where=str(folder), mend="add the samples")
     try:
+        _refuse_bomb(path)
         if path.suffix == ".parquet":
             table = pl.read_parquet(path)
         else:
             header = pl.read_csv(path, n_rows=0, infer_schema_length=0).columns
             numbers = {c: pl.Float64 for c in (*_REQUIRED, *_OPTIONAL) if c in header}
             table = pl.read_csv(path, schema_overrides={"run_id": pl.String, **numbers})
-    except (pl.exceptions.PolarsError, OSError) as error:
+    except (pl.exceptions.PolarsError, OSError, EOFError, zlib.error) as error:
         raise DatasetError(_first_line(error), where=str(path), mend="write the file again") from error
     for column in ("run_id", *_REQUIRED):
         if column not in table.columns:
@@ -195,6 +198,30 @@ def _samples_table(folder: Path) -> dict[str, pl.DataFrame]:
     table = table.select(pl.col("run_id").cast(pl.String), *(pl.col(c).cast(pl.Float64) for c in (*wanted, *further)))
     groups = table.partition_by("run_id", as_dict=True, maintain_order=True)
     return {str(key[0]): group for key, group in groups.items()}
+
+
+def _refuse_bomb(path: Path) -> None:
+    """Refuse samples that grow a hundredfold and beyond what a test could hold, before they are unpacked."""
+    import gzip
+
+    import polars as pl
+
+    packed, unpacked = path.stat().st_size, 0
+    most = max(_UNPACKED, _RATIO * packed)
+    if path.suffix == ".parquet":
+        lazy = pl.scan_parquet(path)
+        unpacked = 8 * lazy.select(pl.len()).collect().item() * len(lazy.collect_schema())
+    elif path.suffix == ".gz":
+        with gzip.open(path) as file:
+            while unpacked <= most and (piece := file.read(2**22)):
+                unpacked += len(piece)
+    if unpacked > most:
+        raise DatasetError(
+            f"{packed:,} bytes unpack to over {most:,}",
+            where=str(path),
+            mend="a test does not compress like that; write the samples again",
+            code="E_ARCHIVE_RATIO",
+        )
 
 
 def _run(row: dict[str, Any], samples: pl.DataFrame, folder: Path) -> Run:

@@ -152,7 +152,7 @@ def dump_model(damper: Damper) -> str:
         version=f"{MAJOR}.{MINOR}",
         rig=damper.rig,
         units=UNITS,
-        envelope=_Envelope(**{name: getattr(damper.envelope, name) or None for name in _Envelope.model_fields}),
+        envelope=_Envelope(**{name: getattr(damper.envelope, name) or None for name in _Envelope.model_fields}),  # type: ignore[arg-type]
         provenance=dict(damper.provenance),
         coil=_describe_coil(damper.coil),
         covariance=_describe_certainty(damper.certainty),

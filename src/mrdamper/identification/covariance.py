@@ -14,6 +14,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 
+_NOTHING = 1e-200  # a variance of nothing, that shares of it can still be divided by
 _HIGHEST_ORDER = 12  # of the autoregression
 _HARMONICS = 24  # of the motion in which model error is looked for
 _REPEATS = 0.95  # cycles from which harmonics of the motion can be told apart
@@ -117,9 +118,10 @@ def score_covariance(
     total = np.sum([score for score, _ in parts], axis=0)
     # Relative variances of the parts, each by its share of a parameter's variance [Satterthwaite 1946].
     shares = [np.diag(inverse @ score @ inverse) for score, _ in parts]
-    whole = np.maximum(np.sum(shares, axis=0), np.finfo(float).tiny)
+    whole = np.maximum(np.sum(shares, axis=0), _NOTHING)
     doubt = np.sum(
-        [(share / whole) ** 2 * relative for share, (_, relative) in zip(shares, parts, strict=True)], axis=0
+        [np.clip(share / whole, -1e3, 1e3) ** 2 * relative for share, (_, relative) in zip(shares, parts, strict=True)],
+        axis=0,
     )
     return total, 2 / np.maximum(doubt, 1e-9), residual.size / max(memory, 1e-9)
 
@@ -183,7 +185,7 @@ def _power_law(orders: Floats, power: Floats, expected: Floats, left: Floats) ->
             best, least = level, cost
     columns = np.column_stack([*[group.astype(float) for group in groups], -logs])
     information = (columns * left[:, None]).T @ columns
-    relative: Floats = columns @ np.linalg.pinv(information) @ columns.T
+    relative: Floats = np.asarray(columns @ np.linalg.pinv(information) @ columns.T, dtype=float)
     return np.maximum(best - expected, 0.0), relative
 
 

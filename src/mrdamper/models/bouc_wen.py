@@ -59,7 +59,7 @@ class BoucWen(Model):
     m: float = param("kg", "equivalent mass", linear=True, preset=True, default=0.0)
 
     @cached_property
-    def shape(self) -> Shape:
+    def shape(self) -> Shape:  # type: ignore[override]  # a model is frozen: computed once
         """Shape of the hysteresis without its force scale."""
         return Shape.from_bouc_wen(self.beta, self.gamma, self.n)
 

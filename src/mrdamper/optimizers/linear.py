@@ -92,7 +92,7 @@ def robust_weights(errors: Floats, best: float) -> Floats:
 
 def _pivots(normal: Floats) -> Floats:
     try:
-        return np.diag(np.linalg.cholesky(normal))
+        return np.asarray(np.diag(np.linalg.cholesky(normal)), dtype=float)
     except np.linalg.LinAlgError:
         return np.zeros(1)
 

@@ -350,7 +350,7 @@ def _second_clock(table: RawTable, headers: Sequence[tuple[str, str]], time: Ass
         one, two = one[there] - one[there][0], two[there] - two[there][0]
         coarse = float(np.max(np.abs(np.diff(two)), initial=0.0))  # a clock that shows whole seconds
         if np.ptp(two) > 0 and np.max(np.abs(one - two)) > 1.5 * coarse + 1e-3 * float(np.ptp(one)):
-            return [_ambiguous(table, "time", [table.names[time.column], table.names[other]])]
+            return [_ambiguous(table, "time", [table.names[time.column], table.names[other]])]  # type: ignore[list-item]
     return []
 
 

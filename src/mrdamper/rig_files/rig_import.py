@@ -174,10 +174,10 @@ def import_files(
         If the profile or the table of tests cannot be read, or a folder holds no rig's file.
     """
     profile = _profile(profile)
-    paths = list(map(Path, paths))
-    beside = [path / TESTS for path in paths if (path / TESTS).is_file()]
+    given = list(map(Path, paths))
+    beside = [path / TESTS for path in given if (path / TESTS).is_file()]
     table = load_tests(tests) if tests is not None else load_tests(beside[0]) if beside else None
-    files = [path for path in _files(paths) if path.name != TESTS]
+    files = [path for path in _files(given) if path.name != TESTS]
     records: list[Record] = []
     refusals: list[Refusal] = []
     met: list[tuple[Path, str]] = []

@@ -200,7 +200,9 @@ def plan_tests(damper: Damper, limits: Limits, hours: float) -> list[Planned]:
     conditions = limits.candidates()
     _refuse_short(limits, hours, conditions)
     doubts = [_doubts(damper, known, condition) for condition in conditions]
-    prior = np.linalg.inv(known.covariance + 1e-12 * np.diag(np.diag(known.covariance)))
+    prior: Floats = np.asarray(
+        np.linalg.inv(known.covariance + 1e-12 * np.diag(np.diag(known.covariance))), dtype=float
+    )
     goal = np.mean(
         [np.mean([d.slopes.T @ d.slopes / len(d.slopes) for d in drawn], axis=0) for drawn in doubts], axis=0
     )

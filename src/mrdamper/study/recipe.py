@@ -369,7 +369,7 @@ def one_set(runs: Sequence[Run], identifications: Sequence[Identification]) -> M
         # With many runs, one missing hardly moves the fit, and a single step finds where to.
         if len(runs) > _MANY:
             return problem.without(fit, rows)
-        return problem.fit(rows, fit.point, rounds=1, most_steps=4).damper
+        return problem.fit(rows, fit.point, rounds=1, most_steps=2).damper
 
     return Made(fit.damper, refit, fit)
 

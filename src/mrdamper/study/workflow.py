@@ -179,8 +179,8 @@ def run_study(
     >>> from mrdamper import Condition, load_dataset, run_study
     >>> tests = load_dataset().rig("utfsm")
     >>> study = run_study(tests.only([run for run in tests if run.excitation == "sine"][:4]))
-    >>> study.model
-    <play and bypass of rig utfsm: 15 numbers from tests>
+    >>> study.model.title
+    'play and bypass'
     >>> prediction = study.model.predict(Condition(current_A=0.5, frequency_Hz=2.0, amplitude_m=0.01))
     >>> bool(prediction.force.max() > 500)  # [N]
     True

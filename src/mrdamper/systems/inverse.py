@@ -224,6 +224,15 @@ def invert(damper: Damper, highest: float | None = None) -> Inverse:
     ------
     ParameterError
         E_NOT_MONOTONE if more current somewhere gives less force, or as `stream`.
+
+    Examples
+    --------
+    >>> from mrdamper import invert, load_system
+    >>> damper = load_system("dyke1996").dampers["mr"]
+    >>> inverse = invert(damper)
+    >>> asked = [inverse.step(1e-5 * i, 0.01, 0.0, 200.0, 1e-3) for i in range(200)]  # 200 N at 10 mm/s
+    >>> 0.0 < asked[-1].current < 0.75  # [A]
+    True
     """
     width = check_monotone(damper, highest)
     tape = Tape()

@@ -195,6 +195,15 @@ def simulate_system(
         If the step is too coarse, naming the step needed, or a step has no solution.
     ExcitationError
         If the input does not fit the system.
+
+    Examples
+    --------
+    >>> from mrdamper import load_input, load_system, simulate_system
+    >>> frame = load_system("dyke1996")
+    >>> bare = simulate_system(frame.system, load_input("elcentro", time_scale=5), {}, step=1e-3)
+    >>> damped = simulate_system(frame.system, load_input("elcentro", time_scale=5), frame.dampers, step=5e-4)
+    >>> bool(abs(damped.x[:, 2]).max() < 0.5 * abs(bare.x[:, 2]).max())  # [m], the top floor
+    True
     """
     loop = Loop(system, source, dampers, controller or Passive(), highest)
     dt = loop.first_step if step is None else step

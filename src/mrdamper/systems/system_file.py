@@ -135,6 +135,13 @@ def load_system(name: str | Path) -> SystemFile:
         If there is no such file and no such system.
     StructureError, ModelFileError
         If the file, its structure or a damper it names cannot be used.
+
+    Examples
+    --------
+    >>> from mrdamper import load_system
+    >>> found = load_system("dyke1996")
+    >>> sorted(found.dampers)
+    ['mr']
     """
     known = bundled_systems()
     path = known.get(str(name), Path(name))

@@ -160,7 +160,9 @@ def figure_data(figure: Figure) -> list[dict[str, object]]:
     for number, axes in enumerate(figure.axes, 1):
         about = {"panel": number, "x_is": axes.get_xlabel(), "y_is": axes.get_ylabel()}
         series = [(line.get_label(), np.column_stack(line.get_data(orig=True))) for line in axes.get_lines()]
-        series += [(c.get_label(), np.asarray(c.get_offsets())) for c in axes.collections if len(c.get_offsets()) > 1]
+        series += [
+            (c.get_label(), np.asarray(c.get_offsets())) for c in axes.collections if np.size(c.get_offsets()) > 2
+        ]
         for name, points in series:
             label_ = "" if str(name).startswith("_") else str(name)
             rows += [{**about, "series": label_, "x": x, "y": y} for x, y in points.tolist()]

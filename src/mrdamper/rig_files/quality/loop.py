@@ -54,7 +54,7 @@ def keeps_its_sign(view: View) -> None:
         return  # a force that stands still opposes its own other half cycle
     period = 1 / motion.condition.frequency_Hz
     time = view.run.time
-    starts = float(view.steady.time[0]) + period * np.arange(int(motion.cycles + 0.05))
+    starts = np.asarray(view.steady.time[0] + period * np.arange(int(motion.cycles + 0.05)), dtype=np.float64)
     starts = starts[view.without_leap(starts, starts + period)]
     cycles = [tuple(map(int, np.searchsorted(time, (start, start + period)))) for start in starts]
     if len(cycles) < 2 or min(b - a for a, b in cycles) < _FEWEST:

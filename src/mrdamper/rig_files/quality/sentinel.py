@@ -83,7 +83,7 @@ def _repeated_leaps(values: Floats, leap: float) -> list[tuple[float, int]]:
         leaps.append(piece[1:-1][steps[1:] & steps[:-1]][: _CHUNK // 100])
     found, counts = np.unique(np.concatenate(leaps), return_counts=True)
     most = np.argsort(counts)[::-1][:200]
-    return [(float(found[i]), int(counts[i])) for i in most if counts[i] > 1 or _known(found[i])]
+    return [(float(found[i]), int(counts[i])) for i in most if counts[i] > 1 or _known(float(found[i]))]
 
 
 def _known(value: float) -> bool:

@@ -54,6 +54,12 @@ def load_input(name: str | Path, values: Mapping[str, float] | None = None, time
     ------
     UnknownNameError, ParameterError, DatasetError, ColumnError, UnitError, RecordError
         If there is none of that name, or it cannot be used.
+
+    Examples
+    --------
+    >>> from mrdamper import load_input
+    >>> round(load_input("elcentro", time_scale=5).duration, 2)  # [s]
+    10.75
     """
     from mrdamper.systems.inputs.record import load_record
 
