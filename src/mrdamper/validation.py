@@ -197,8 +197,8 @@ class SessionDrift:
     offset : float
         Standard deviation of the offsets [N].
     floor : float
-        Median nrmse_pp that would be left: what no model of the damper can go below while
-        sessions differ like this.
+        Median nrmse_pp that would be left. No floor of every model: gains and offsets also take in
+        this model's own misfit.
     """
 
     gain: float
