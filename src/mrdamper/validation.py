@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from mrdamper.dampers.bands import band
 from mrdamper.dampers.base import Damper, Prediction
-from mrdamper.dampers.certainty import band
 from mrdamper.data import Condition, Run, Shown, same_condition
 from mrdamper.errors import InputError, RunError
 from mrdamper.metrics import Scores, peak_force, score

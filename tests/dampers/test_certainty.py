@@ -10,7 +10,9 @@ from support.sessions import session_runs
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
-from mrdamper.dampers.certainty import Certainty, band, certain, session_of, unsure
+from mrdamper.dampers.bands import band
+from mrdamper.dampers.certainty import Certainty, unsure
+from mrdamper.dampers.covariance import certain, session_of
 from mrdamper.data import Condition
 from mrdamper.errors import InputError, ModelFileError
 from mrdamper.files.model_file import dump_model, parse_model, save_model

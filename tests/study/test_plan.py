@@ -9,7 +9,7 @@ from support.sessions import session_runs
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
-from mrdamper.dampers.certainty import certain
+from mrdamper.dampers.covariance import certain
 from mrdamper.errors import InputError
 from mrdamper.files.model_file import save_model
 from mrdamper.files.motion import load_motion

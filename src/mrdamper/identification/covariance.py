@@ -172,17 +172,14 @@ def _power_law(orders: Floats, power: Floats, expected: Floats, left: Floats) ->
     odd = orders % 2 == 1
     groups = [group for group in (odd, ~odd) if left[group].sum() > 1]
     logs = np.log(orders)
-    best, least = np.zeros(orders.size), np.inf
-    for fall in np.linspace(0.0, 6.0, 61):
-        shape, cost = np.exp(-fall * logs), 0.0
-        level = np.zeros(orders.size)
-        for group in groups:
-            ratio = power[group] / shape[group]
-            amount = float(ratio.sum() / left[group].sum())
-            level[group] = amount * shape[group]
-            cost += float(np.sum(left[group] * np.log(np.maximum(level[group], 1e-300))))
-        if cost < least:
-            best, least = level, cost
+    shapes = np.exp(-np.outer(np.linspace(0.0, 6.0, 61), logs))  # a row a fall
+    level = np.zeros_like(shapes)
+    for group in groups:
+        amount = np.sum(power[group] / shapes[:, group], axis=1) / left[group].sum()
+        level[:, group] = amount[:, None] * shapes[:, group]
+    seen = np.logical_or.reduce(groups) if groups else np.zeros(orders.size, dtype=bool)
+    costs = np.log(np.maximum(level[:, seen], _NOTHING)) @ left[seen]
+    best = level[int(np.argmin(costs))]
     columns = np.column_stack([*[group.astype(float) for group in groups], -logs])
     information = (columns * left[:, None]).T @ columns
     relative: Floats = np.asarray(columns @ np.linalg.pinv(information) @ columns.T, dtype=float)
@@ -218,14 +215,11 @@ def _doubt_of_spectrum(
     relative = np.full(influence.shape[1], 2.0 / size)
     if not order:
         return relative
-    lags = np.array([np.sum(weights * spectrum * np.cos(omega * k)) for k in range(order)])
-    covariance = model[0] / size * np.linalg.pinv(lags[np.abs(np.subtract.outer(range(order), range(order)))])
-    slopes = np.empty((order, influence.shape[1]))
-    for k in range(order):
-        step = 1e-4 * np.sqrt(covariance[k, k])
-        moved = model.copy()
-        moved[k + 1] += step
-        slopes[k] = (_spectrum(moved, omega) @ influence / np.maximum(base, 1e-300) - 1) / step
+    known = np.cos(np.outer(range(order), omega)) @ (weights * spectrum)
+    covariance = model[0] / size * np.linalg.pinv(known[np.abs(np.subtract.outer(range(order), range(order)))])
+    lags = np.exp(-1j * np.outer(omega, np.arange(1, order + 1)))
+    bent = -2 * np.real(lags / (1 + lags @ model[1:])[:, None]) * spectrum[:, None]  # d spectrum / d coefficient
+    slopes = bent.T @ influence / np.maximum(base, 1e-300)
     return relative + np.einsum("kp,kl,lp->p", slopes, covariance, slopes)
 
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from mrdamper.dampers.bands import Band
 from mrdamper.dampers.base import Prediction
-from mrdamper.dampers.certainty import Band
 from mrdamper.identification import Identification
 from mrdamper.validation import RunScore
 

@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Prediction
-from mrdamper.dampers.certainty import Certainty, force_slope
+from mrdamper.dampers.certainty import Certainty
+from mrdamper.dampers.slopes import force_slopes
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import InputError
 from mrdamper.motion import Excitation, sine
@@ -251,7 +252,7 @@ def _doubts(damper: Damper, known: Certainty, condition: Condition) -> list[_Dou
         base = Prediction(motion, drawn.force_along(motion, condition), condition, ())
         last = slice(-4 * _SAMPLES, None, 4)
         half = float(np.ptp(base.force[last]) / 2) or 1.0
-        slopes = np.column_stack([force_slope(drawn, base, name)[last] for name in known.names])
+        slopes = force_slopes(drawn, base, known.names)[last]
         made.append(_Doubt(slopes / half, base.force[last] / half))
     return made
 

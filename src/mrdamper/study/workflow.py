@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.certainty import certain
+from mrdamper.dampers.covariance import certain
 from mrdamper.data import Dataset, Run, Shown
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError
 from mrdamper.identification import refuse_clipped

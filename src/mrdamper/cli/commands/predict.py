@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import typer
 
 if TYPE_CHECKING:
+    from mrdamper.dampers.bands import Band
     from mrdamper.dampers.base import Prediction
-    from mrdamper.dampers.certainty import Band
 
 WARNINGS = {
     "not a sine": "the motion is no sine; a model over frequency and amplitude uses running estimates of them",
@@ -43,7 +43,7 @@ def register(app: typer.Typer) -> None:
         from dataclasses import replace
 
         from mrdamper.cli.output import put
-        from mrdamper.dampers.certainty import band
+        from mrdamper.dampers.bands import band
         from mrdamper.dampers.coil import Coil
         from mrdamper.data import Condition
         from mrdamper.errors import ConditionError, InputError

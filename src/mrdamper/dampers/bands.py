@@ -1,0 +1,100 @@
+"""Bands: where the force of a damper lies in a session nobody has seen, and once its gain is known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mrdamper.dampers.base import Damper, Prediction
+from mrdamper.dampers.certainty import Certainty, student
+from mrdamper.dampers.slopes import force_slopes
+from mrdamper.data import Floats
+from mrdamper.metrics import dissipated_power, peak_force
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """Where the force of an unknown session lies.
+
+    Attributes
+    ----------
+    low, high : (N,) arrays
+        [N]
+    parameter, session, model : (N,) arrays
+        Standard deviations of the parts [N].
+    peak : (float, float)
+        Of half the peak-to-peak force [N].
+    energy : (float, float)
+        Relative, around the predicted dissipated energy.
+    known_session : (float, float)
+        Peak force once the session's gain is known [N].
+    """
+
+    low: Floats
+    high: Floats
+    parameter: Floats
+    session: Floats
+    model: Floats
+    peak: tuple[float, float]
+    energy: tuple[float, float]
+    known_session: tuple[float, float]
+
+
+def band(
+    damper: Damper, prediction: Prediction, level: float = 0.9, shown: NDArray[np.bool_] | None = None
+) -> Band | None:
+    """Where the force lies at a level, in a session nobody has seen; None where nothing is known of it.
+
+    Parameters
+    ----------
+    damper : Damper
+    prediction : Prediction
+        Of this damper.
+    level : float
+    shown : (N,) array of bool, optional
+        Samples the band is of, its peak and its energy among them; default all.
+
+    Raises
+    ------
+    InputError
+        E_LEVEL if the level is not between 0 and 1.
+    """
+    student(level, 1.0)
+    known: Certainty | None = damper.certainty
+    if known is None:
+        return None
+    seen_at = slice(None) if shown is None else shown
+    force, motion = prediction.force[seen_at], prediction.motion.part(seen_at)
+    slopes = force_slopes(damper, prediction, known.names)[seen_at]
+    half = peak_force(force)
+    parameter = np.einsum("np,pq,nq->n", slopes, known.covariance, slopes)
+    session = (known.gain * force) ** 2 + known.offset**2
+    model = np.full(force.size, (known.force * half) ** 2)
+    top, bottom = int(np.argmax(force)), int(np.argmin(force))
+    swing = (slopes[top] - slopes[bottom]) / 2
+    own = float(swing @ known.covariance @ swing)
+    worst = float(np.min(known.dof)) if known.names else 1.0
+    dofs = (worst, max(known.session_dof, 1.0), max(known.left_out - 1.0, 1.0))
+
+    def reach(parts: Sequence[float]) -> float:
+        whole = sum(parts)
+        if whole <= 0:
+            return 0.0
+        dof = whole**2 / sum(part**2 / d for part, d in zip(parts, dofs, strict=True))
+        return student(level, dof) * float(np.sqrt(whole))
+
+    t = reach([float(np.mean(v)) for v in (parameter, session, model)])
+    mean = float(np.mean(parameter + session + model))
+    width = (t / np.sqrt(mean) if mean > 0 else 0.0) * np.sqrt(parameter + session + model)
+    unseen = reach([own, (known.gain * half) ** 2, (known.peak * half) ** 2])
+    seen = reach([own, 0.0, (known.peak * half) ** 2])
+    power = dissipated_power(force, motion.velocity, motion.time) or 1.0
+    turned = np.array([dissipated_power(column, motion.velocity, motion.time) for column in slopes.T]) / power
+    loss = reach([float(turned @ known.covariance @ turned), known.gain**2, known.energy**2])
+    return Band(
+        force - width, force + width, np.sqrt(parameter), np.sqrt(session), np.sqrt(model),
+        (max(half - unseen, 0.0), half + unseen), (-loss, loss), (max(half - seen, 0.0), half + seen),
+    )  # fmt: skip

@@ -1,0 +1,62 @@
+"""Derivatives of a damper's force by its own numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mrdamper.dampers.base import Damper, Prediction
+from mrdamper.data import Floats
+from mrdamper.identification.columns import linear_table
+
+_STEP = 1e-4  # of a number
+
+
+def force_slopes(damper: Damper, prediction: Prediction, names: Sequence[str]) -> Floats:
+    """Derivatives of a predicted force by some of the damper's own numbers, or by their logarithm.
+
+    Of the linear parameters of one model they are columns that share one state; by the others the
+    force is predicted again.
+
+    Parameters
+    ----------
+    damper : Damper
+    prediction : Prediction
+        Of this damper, N samples.
+    names : sequence of str, length P
+
+    Returns
+    -------
+    (N, P) array
+        [N per unit of the number]
+    """
+    prediction.motion.path  # noqa: B018  cut into strokes once, for every number that is moved
+    columns = _linear(damper, prediction, names)
+    table = [columns[n] if n in columns else _moved(damper, prediction, n) for n in names]
+    return np.column_stack(table) if table else np.zeros((prediction.force.size, 0))
+
+
+def _linear(damper: Damper, prediction: Prediction, names: Sequence[str]) -> dict[str, Floats]:
+    model = damper.one_model
+    if model is None:
+        return {}
+    linear = [info for info in model.parameters() if info.linear and info.name in names]
+    if prediction.steady:
+        loop = damper.loop(prediction.condition)
+        motion, state = loop.excitation, loop.state
+    else:
+        motion = damper.felt(prediction.motion)
+        state = model.state(motion)
+    bare = replace(model, **{info.name: 0.0 for info in linear})
+    return dict(zip([info.name for info in linear], linear_table(bare, linear, motion, state)[1].T, strict=True))
+
+
+def _moved(damper: Damper, prediction: Prediction, name: str) -> Floats:
+    own = damper.own_numbers[name]
+    step = _STEP if own.log else _STEP * (abs(own.value) or 1.0)
+    there = own.value * np.exp(step) if own.log else own.value + step
+    if there > own.bounds[1]:
+        step, there = -step, own.value * np.exp(-step) if own.log else own.value - step
+    return (damper.with_numbers({name: there}).again(prediction) - prediction.force) / step
