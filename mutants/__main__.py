@@ -1,91 +1,32 @@
-"""`python -m mutants`: plant every fault, run the tests that answer for its module, say what survives.
+"""`python -m mutants`: plant faults, run the tests that run through them, say what survives.
 
-Libraries are loaded once; a fault is tried in a fork of this process, in which its module is
-loaded from the changed source. Ends with 0 where at most 5 % of the faults survive.
+Room by room: the room's tests are collected once and run once without a fault, which shows the
+functions each of them runs through. A fault is then tried in a fork of that process, in which the
+changed code replaces that of the living functions, by those tests alone, the quickest first, up to
+the first that fails. Ends with 0 where at most 5 % of the faults survive.
 """
 
 from __future__ import annotations
 
 import argparse
-import importlib.abc
-import importlib.util
+import importlib
 import os
+import pickle
 import signal
 import sys
 import time
 from collections import Counter
 from pathlib import Path
 
-from mutants.faults import SOURCE, Fault, all_faults, path_of, planted
+from mutants.explained import EXPLAINED
+from mutants.faults import SOURCE, Fault, faults_of
+from mutants.rooms import ROOMS, Room
 
 ROOT = Path(__file__).parent.parent
-LIMIT = 240  # seconds for the tests of a fault
 MOST = 0.05  # of the faults may survive
-for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[name] = "1"
-
-
-class Changed(importlib.abc.MetaPathFinder, importlib.abc.SourceLoader):
-    """Loads one module from changed source; all others as they stand."""
-
-    def __init__(self, module: str, source: str):
-        self.module, self.source = module, source
-
-    def find_spec(self, fullname, path=None, target=None):
-        if fullname != self.module:
-            return None
-        return importlib.util.spec_from_file_location(fullname, self.get_filename(fullname), loader=self)
-
-    def get_filename(self, fullname):
-        return str(path_of(fullname))
-
-    def get_data(self, path):
-        return self.source.encode()
-
-    def path_stats(self, path):
-        raise OSError("never taken from a cache")
-
-
-def try_one(fault: Fault | None, tests: tuple[str, ...]) -> int:
-    """Exit code of the tests with a fault planted; in a process of its own."""
-    import pytest
-
-    silent = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(silent, 1)
-    os.dup2(silent, 2)
-    if fault is not None:
-        sys.meta_path.insert(0, Changed(fault.module, planted(fault)))
-    signal.alarm(LIMIT)
-    return int(pytest.main(["-x", "-q", "-m", "not slow", "-p", "no:cacheprovider", "--no-header", *tests]))
-
-
-def run(tasks: list[tuple[Fault | None, tuple[str, ...]]], jobs: int) -> list[int]:
-    """Exit codes of all tasks, several at once, each in a fork."""
-    waiting, codes = dict(enumerate(tasks)), [0] * len(tasks)
-    running: dict[int, int] = {}
-    begin = time.perf_counter()
-    while waiting or running:
-        while waiting and len(running) < jobs:
-            number = min(waiting)
-            fault, tests = waiting.pop(number)
-            child = os.fork()
-            if child == 0:
-                code = 9
-                try:
-                    code = try_one(fault, tests)
-                finally:
-                    os._exit(code)
-            running[child] = number
-        child, status = os.wait()
-        number = running.pop(child)
-        codes[number] = os.waitstatus_to_exitcode(status)
-        fault = tasks[number][0]
-        if fault is not None and codes[number] == 0:
-            print(f"\nsurvives: {fault.module}:{fault.line}: {fault.change}", file=sys.stderr)
-        done = len(tasks) - len(waiting) - len(running)
-        print(f"\r{done} of {len(tasks)}, {time.perf_counter() - begin:.0f} s ", end="", file=sys.stderr, flush=True)
-    print(file=sys.stderr)
-    return codes
+PATIENCE = 10.0  # a fault may make tests this much slower [s], beyond five times
+LIBRARIES = ("numpy", "scipy.optimize", "scipy.special", "scipy.signal", "scipy.stats", "polars", "matplotlib.figure",
+             "pydantic", "typer.testing", "jinja2", "pytest")  # fmt: skip
 
 
 def main() -> int:
@@ -93,40 +34,89 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m mutants", description=__doc__)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--only", default="", help="Modules whose name holds this.")
+    parser.add_argument(
+        "--share", type=float, default=0.2, help="Of every module's faults, at equal distances; 1: all."
+    )
     given = parser.parse_args()
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = "1"
     os.chdir(ROOT)
     sys.path.insert(0, str(SOURCE))
     sys.dont_write_bytecode = True
-    for library in (
-        "numpy",
-        "scipy.optimize",
-        "scipy.special",
-        "scipy.signal",
-        "polars",
-        "matplotlib.figure",
-        "pytest",
-        "pydantic",
-        "typer.testing",
-        "jinja2",
-    ):
+    for library in LIBRARIES:
         importlib.import_module(library)
-    faults = [fault for fault in all_faults() if given.only in fault.module]
-    sets = sorted({fault.tests for fault in faults})
-    healthy = run([(None, tests) for tests in sets], given.jobs)
-    for tests, code in zip(sets, healthy, strict=True):
-        if code:
-            print(f"{' '.join(tests)} fail without any fault (exit {code}): mend them first")
+    survivors: list[Fault] = []
+    counts: Counter[str] = Counter()
+    begin = time.perf_counter()
+    for room in ROOMS:
+        faults = [fault for module in room.modules if given.only in module for fault in _share(module, given.share)]
+        if not faults:
+            continue
+        alive, why = _try_room(room, faults, given.jobs)
+        if why:
+            print(f"{' '.join(room.tests)}: {why}")
             return 1
-    codes = run([(fault, fault.tests) for fault in faults], given.jobs)
-    survivors = [fault for fault, code in zip(faults, codes, strict=True) if code == 0]
-    planted_in, alive = Counter(f.module for f in faults), Counter(f.module for f in survivors)
-    for module, count in planted_in.items():
-        print(f"{module:45} {count:4} planted {alive[module]:4} survive")
+        counts.update(fault.module for fault in faults)
+        survivors += alive
+    died = counts - Counter(fault.module for fault in survivors)
+    for module, count in counts.items():
+        print(f"{module:45} {count:4} planted {count - died[module]:4} survive")
     for fault in survivors:
-        print(f"survives: {path_of(fault.module).relative_to(ROOT)}:{fault.line}: {fault.change}")
-    print(f"{len(survivors)} of {len(faults)} survive")
-    return 0 if len(survivors) <= MOST * len(faults) else 1
+        why = EXPLAINED.get((fault.module.removeprefix("mrdamper."), fault.text, fault.change), "")
+        print(f"survives: {fault.module}:{fault.line}: {fault.change}: {fault.text}{why and f'  [{why}]'}")
+    total = sum(counts.values())
+    print(f"{time.perf_counter() - begin:.0f} s")
+    print(f"{len(survivors)} of {total} survive")
+    return 0 if len(survivors) <= MOST * total else 1
+
+
+def _share(module: str, share: float) -> list[Fault]:
+    faults = faults_of(module)
+    count = max(min(len(faults), 4), round(share * len(faults)))
+    return [faults[int(k * len(faults) / count)] for k in range(count)]
+
+
+def _try_room(room: Room, faults: list[Fault], jobs: int) -> tuple[list[Fault], str]:
+    """Survivors among the faults of a room, or why they could not be tried; in a process of its own."""
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(reader)
+        answer: tuple[list[Fault], str] = [], "the tests could not be collected"
+        try:
+            from mutants.trial import Trial
+
+            trial = Trial(faults, jobs, PATIENCE, os.dup(2))
+            silent = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(silent, 1)
+            os.dup2(silent, 2)
+            import pytest
+
+            arguments = [
+                "-q",
+                "-m",
+                "not slow",
+                "-p",
+                "no:cacheprovider",
+                "-p",
+                "no:xdist",
+                "-p",
+                "no:benchmark",
+                "--tb=no",
+            ]
+            pytest.main([*arguments, *room.tests], plugins=[trial])
+            answer = trial.survivors, trial.why
+        finally:
+            with os.fdopen(writer, "wb") as pipe:
+                pickle.dump(answer, pipe)
+            os._exit(0)
+    os.close(writer)
+    with os.fdopen(reader, "rb") as pipe:
+        answer = pickle.load(pipe)
+    os.waitpid(child, 0)
+    return answer
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     sys.exit(main())

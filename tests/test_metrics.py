@@ -37,9 +37,19 @@ def test_dissipated_power_of_a_dashpot():
 
 
 def test_peak_force_and_power_are_those_of_the_formula():
-    from mrdamper.metrics import dissipated_power, peak_force
-
     time = 7.0 + np.linspace(0.0, 2.0, 2001)  # a clock that does not begin at zero
     velocity = np.sin(2 * np.pi * time)
-    assert peak_force(np.array([-10.0, 3.0, 30.0])) == 20.0
-    assert dissipated_power(5.0 * velocity, velocity, time) == pytest.approx(2.5, rel=1e-6)
+    assert metrics.peak_force(np.array([-10.0, 3.0, 30.0])) == 20.0
+    assert metrics.dissipated_power(5.0 * velocity, velocity, time) == pytest.approx(2.5, rel=1e-6)
+
+
+def test_samples_without_force_have_no_relative_error():
+    measured, predicted = np.array([0.0, 1.0, 2.0]), np.array([5.0, 1.5, 2.0])
+    assert metrics.mean_relative_error(measured, predicted) == pytest.approx(0.25)
+
+
+def test_a_force_that_takes_no_energy_has_no_energy_error():
+    t = np.linspace(0, 1, 101)
+    still = metrics.score(np.sin(t), np.cos(t), np.zeros(101), t)
+    assert np.isnan(still.energy_error)
+    assert np.isfinite(still.peak_error)

@@ -1,13 +1,23 @@
 """Scores on what was not seen: an oracle that remembers shows any leak, and scores are those worked out by hand."""
 
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from mrdamper import validation
 from mrdamper.data import Condition, Run
 from mrdamper.motion import sine
-from mrdamper.validation import RunScore, Validation, leave_one_condition_out, score_run, session_drift, validate
+from mrdamper.validation import (
+    RunScore,
+    Validation,
+    leave_one_condition_out,
+    peak_band,
+    score_run,
+    session_drift,
+    validate,
+)
 
 
 @dataclass(frozen=True)
@@ -138,3 +148,54 @@ def test_the_floor_is_the_error_left_by_a_gain_and_an_offset():
 def test_a_validation_is_called_after_its_damper_unless_named():
     assert validate(Exact(), []).title == "exact"
     assert validate(Exact(), [], "other").title == "other"
+
+
+def test_a_table_holds_every_score_under_its_own_name():
+    runs = [replace(made(1.0, 1.0, f"{gain}", gain=gain), rig="bench 2") for gain in (0.5, 0.8)]
+    found = validate(Exact(), [*runs, replace(runs[0], id="still", force=np.ones(runs[0].time.size))])
+    assert [run.rig for run in found.runs] == ["bench 2"] * 2
+    assert found.headline.startswith("exact: 2 runs, 1 refused, median nrmse_pp ")
+    assert "refused" not in validate(Exact(), runs).headline
+    scores = [run.scores for run in found.runs]
+    assert found.table == {
+        "run_id": ["0.5", "0.8"],
+        "nrmse_pp": [s.nrmse_pp for s in scores],
+        "nrmse_std": [s.nrmse_std for s in scores],
+        "wape": [s.wape for s in scores],
+        "energy_error": [s.energy_error for s in scores],
+        "peak_error": [s.peak_error for s in scores],
+        "extrapolation": ["current", "current"],
+    }
+    # A dashpot's force spans √8 standard deviations; every number by hand, none a per cent.
+    assert found.table["nrmse_pp"] == pytest.approx([1 / np.sqrt(8), 0.25 / np.sqrt(8)], rel=5e-3)
+    assert found.table["nrmse_std"] == pytest.approx([1.0, 0.25], rel=5e-3)
+
+
+def test_the_band_of_the_peak_is_told_beside_the_measured_peak_of_the_window(monkeypatch):
+    run = made(1.0, 1.0, "one")
+    spoiled = run.force.copy()
+    spoiled[50] = 1e4  # before the window
+    run, asked = replace(run, force=spoiled), {}
+
+    def said(damper, prediction, level, shown):
+        asked.update(level=level, shown=shown)
+        return SimpleNamespace(peak=(8.0, 13.0)) if level > 0.5 else None
+
+    monkeypatch.setattr(validation, "band", said)
+    half = np.ptp(run.force[100:]) / 2
+    expected = {"peak_force_measured_N": half, "peak_force_low_N": 8.0, "peak_force_high_N": 13.0}
+    assert peak_band(Exact(), run) == pytest.approx(expected)
+    assert asked["level"] == 0.9
+    assert np.array_equal(asked["shown"], run.in_window)
+    assert peak_band(Exact(), run, 0.3) == pytest.approx({"peak_force_measured_N": half})
+
+
+def test_the_floor_of_several_runs_is_their_median():
+    waves = [1.0, 2.0, 9.0]
+    runs = []
+    for size in waves:
+        run = made(1.0, 1.0, f"{size}")
+        runs.append(replace(run, force=run.force + size * np.sin(2 * np.pi * 5 * run.time)))
+    each = [session_drift(Exact(), [run]).floor for run in runs]
+    assert each == sorted(each)
+    assert session_drift(Exact(), runs).floor == pytest.approx(each[1])

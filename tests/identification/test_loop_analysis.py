@@ -1,10 +1,12 @@
 """Figures of a loop against those worked out by hand: viscous, Coulomb, spring, offset."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mrdamper.data import Condition, Run
-from mrdamper.identification.loop_analysis import analyse_loop, dynamic_ranges
+from mrdamper.identification.loop_analysis import analyse_loop, at_levels, dynamic_ranges, whole_cycles
 from mrdamper.motion import sine
 
 
@@ -52,3 +54,42 @@ def test_the_peak_force_is_the_median_over_cycles():
     condition = Condition(0.5, 1.0, 0.02)
     grown = run_of(lambda m: 100.0 * m.displacement / 0.02 * (1 + 9 * ((m.time > 1) & (m.time < 2))), condition)
     assert analyse_loop(grown).peak_force == pytest.approx(100.0, rel=0.01)
+
+
+def test_whole_cycles_are_counted_from_the_first_sample_and_what_is_left_is_not_used():
+    time = 3.0 + np.arange(0, 3501) / 1000
+    assert whole_cycles(time, 1.0) == slice(0, 3001)
+    assert whole_cycles(time[:1851], 1.0) == slice(0, 1001)
+    assert whole_cycles(time[:1991], 1.0) == slice(0, 1991)  # a sample short of two cycles is two cycles
+    assert whole_cycles(time[:1301], 2.0) == slice(0, 1001)
+
+
+def test_part_of_a_cycle_at_the_end_changes_no_figure():
+    condition = Condition(0.5, 1.0, 0.02)
+    whole = run_of(lambda m: 5e3 * m.displacement + 70.0, condition)
+    loop = analyse_loop(replace(whole, window=(1.0, 2.6)))
+    assert loop.mean_force == pytest.approx(70.0, abs=0.5)
+    assert loop.peak_force == pytest.approx(100.0, rel=0.01)
+
+
+def test_loops_take_the_level_of_their_current_and_keep_the_rest():
+    loops = [
+        analyse_loop(run_of(lambda m: 9.0 * m.velocity, Condition(I, f, 0.02), f"{I}"))
+        for I, f in ((0.99, 1.0), (1.01, 2.0), (0.0, 1.0))
+    ]
+    levelled = at_levels(loops)
+    assert [loop.run_id for loop in levelled] == ["0.99", "1.01", "0.0"]
+    currents = [loop.condition.current_A for loop in levelled]
+    assert currents[0] == currents[1] == pytest.approx(1.0, abs=0.011)
+    assert currents[2] == 0.0
+    assert [loop.condition.frequency_Hz for loop in levelled] == [loop.condition.frequency_Hz for loop in loops]
+
+
+def test_two_currents_make_a_dynamic_range_named_by_the_lowest():
+    runs = [
+        run_of(lambda m, size=size: size * np.sign(m.velocity), Condition(I, f, X), f"{I}")
+        for I, f, X, size in ((2.0, 1.0, 0.0201, 300.0), (0.0, 1.002, 0.02, 100.0))
+    ]
+    (found,) = dynamic_ranges([analyse_loop(run) for run in runs])
+    assert found.currents_A == (0.0, 2.0)
+    assert (found.amplitude_m, found.frequency_Hz) == pytest.approx((0.02, 1.002), rel=1e-4)

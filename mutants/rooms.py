@@ -1,0 +1,45 @@
+"""Where faults are planted, and the tests that answer for them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Room:
+    """Modules, and the tests that must notice faults in them.
+
+    Attributes
+    ----------
+    modules, tests : tuple of str
+    """
+
+    modules: tuple[str, ...]
+    tests: tuple[str, ...]
+
+
+def _room(modules: str, tests: str) -> Room:
+    return Room(tuple(f"mrdamper.{name}" for name in modules.split()), tuple(f"tests/{name}" for name in tests.split()))
+
+
+ROOMS = (
+    _room("validation metrics", "test_validation.py test_metrics.py"),
+    _room("identification.loop_analysis", "identification/test_loop_analysis.py"),
+    _room("identification.covariance", "identification/test_covariance.py"),
+    _room("functions.forms functions.fitting", "functions"),
+    _room("reproduction.verdicts reproduction.claims", "reproduction/test_verdicts.py reproduction/test_claims.py"),
+    _room("reproduction.sensitivity", "reproduction/test_sensitivity.py"),
+    _room("reproduction.virtual_rig", "reproduction/test_virtual_rig.py"),
+    _room("reproduction.output reproduction.ways reproduction.switches reproduction.study", "reproduction"),
+    _room("dampers.paper dampers.modified", "dampers/test_paper.py"),
+    _room("dampers.joint", "dampers/test_joint.py"),
+    _room(
+        "dampers.published.ali dampers.published.boada dampers.published.dominguez dampers.published.lei"
+        " dampers.published.lv dampers.published.base",
+        "dampers/test_published_laws.py",
+    ),
+    _room("models.play_bypass", "models/test_play_bypass.py"),
+    _room("identification.methods.paper identification.harmonic_balance", "identification/test_harmonic_balance.py"),
+    _room("report.tables", "report/test_tables.py"),
+    _room("rig_files.quality.loop", "rig_files/test_quality.py"),
+)

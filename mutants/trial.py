@@ -1,0 +1,193 @@
+"""One room: its tests are collected once, then every fault is tried in a fork."""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from types import CodeType, FrameType, FunctionType
+from typing import Any
+
+import pytest
+
+from mutants.faults import Fault, path_of, planted
+
+
+class Trial:
+    """A pytest plugin that runs the collected tests once healthy and then once a fault.
+
+    Parameters
+    ----------
+    faults : list of Fault
+    jobs : int
+        Forks at a time.
+    patience : float
+        Seconds a fault may add.
+    console : int
+        File descriptor for progress.
+    """
+
+    def __init__(self, faults: list[Fault], jobs: int, patience: float, console: int):
+        self.faults, self.jobs, self.patience, self.console = faults, jobs, patience, console
+        self.survivors: list[Fault] = []
+        self.why = ""
+        self.seconds: dict[str, float] = {}
+        self.through: dict[tuple[str, str, int], set[str]] = {}  # function → tests and fixtures that run through it
+        self.running: list[str] = []
+        self.functions: list[FunctionType] = []
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        """Instead of running the tests once."""
+        if session.testsfailed or not session.items:
+            self.why = "no test could be collected"
+            return True
+        files = {str(path_of(fault.module)) for fault in self.faults}
+        answer = _in_fork(lambda: self._healthy(session, files), 600)
+        if not isinstance(answer, tuple):
+            self.why = f"fail without any fault ({answer}): mend them first"
+            return True
+        self.seconds, self.through = answer
+        self.functions = [f for f in gc.get_objects() if isinstance(f, FunctionType)]
+        gc.freeze()  # forks then share the pages of what is there
+        self._try_all(session)
+        return True
+
+    @pytest.hookimpl(hookwrapper=True)
+    def pytest_fixture_setup(self, fixturedef: Any) -> Iterator[None]:
+        """A shared fixture's calls and time count for every test that uses it."""
+        begin = time.perf_counter()
+        self.running.append(f"fixture {fixturedef.baseid}::{fixturedef.argname}")
+        yield
+        name = self.running.pop()
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begin
+
+    def _healthy(self, session: pytest.Session, files: set[str]) -> Any:
+        def trace(frame: FrameType, event: str, argument: object) -> None:
+            code = frame.f_code
+            if code.co_filename in files:
+                self.through.setdefault(_key(code), set()).update(self.running)
+
+        sys.settrace(trace)
+        for item in session.items:
+            self.running, begin = [item.nodeid], time.perf_counter()
+            item.config.hook.pytest_runtest_protocol(item=item, nextitem=None)
+            self.seconds[item.nodeid] = time.perf_counter() - begin
+            if session.testsfailed:
+                return item.nodeid
+        return self.seconds, self.through
+
+    def _try_all(self, session: pytest.Session) -> None:
+        begin, running = time.perf_counter(), {}
+        for number, fault in enumerate(self.faults, 1):
+            changed = _changed_code(fault)
+            tests = self._answering(session, changed)
+            if not tests:
+                self._survives(fault, "no test runs through it")
+                continue
+            limit = self.patience + 5 * sum(self._cost(item) for item in tests)
+            child = os.fork()
+            if child == 0:
+                signal.alarm(int(limit) + 1)
+                os._exit(_noticed(session, self.functions, changed, tests))
+            running[child] = fault
+            while len(running) >= self.jobs:
+                self._reap(running)
+            os.write(self.console, f"\r{number} of {len(self.faults)}, {time.perf_counter() - begin:.0f} s ".encode())
+        while running:
+            self._reap(running)
+        os.write(self.console, b"\n")
+
+    def _reap(self, running: dict[int, Fault]) -> None:
+        child, status = os.wait()
+        fault = running.pop(child)
+        if os.waitstatus_to_exitcode(status) == 0:
+            self._survives(fault, "")
+
+    def _survives(self, fault: Fault, why: str) -> None:
+        self.survivors.append(fault)
+        text = f"\nsurvives: {fault.module}:{fault.line}: {fault.change}: {fault.text} {why}\n"
+        os.write(self.console, text.encode())
+
+    def _answering(self, session: pytest.Session, changed: list[tuple[CodeType, CodeType]]) -> list[pytest.Item]:
+        """Tests that run through a function the fault changes, the quickest first."""
+        names = set().union(*(self.through.get(_key(old), set()) for old, _ in changed))
+        found = [i for i in session.items if i.nodeid in names or not names.isdisjoint(_fixtures(i))]
+        return sorted(found, key=self._cost)
+
+    def _cost(self, item: pytest.Item) -> float:
+        return self.seconds[item.nodeid] + sum(self.seconds.get(name, 0.0) for name in _fixtures(item))
+
+
+def _noticed(
+    session: pytest.Session,
+    functions: list[FunctionType],
+    changed: list[tuple[CodeType, CodeType]],
+    tests: list[pytest.Item],
+) -> int:
+    """1 where a test fails with the fault planted, 0 where none does."""
+    try:
+        file = changed[0][0].co_filename
+        new = dict(changed)
+        for function in functions:
+            if function.__code__.co_filename == file and function.__code__ in new:
+                function.__code__ = new[function.__code__]
+        for item in tests:
+            item.config.hook.pytest_runtest_protocol(item=item, nextitem=None)
+            if session.testsfailed:
+                return 1
+    except BaseException:
+        return 1
+    return 0
+
+
+def _changed_code(fault: Fault) -> list[tuple[CodeType, CodeType]]:
+    """Code objects before and after, where they differ."""
+    path = path_of(fault.module)
+    old = compile(path.read_text(encoding="utf-8"), str(path), "exec", dont_inherit=True)
+    new = compile(planted(fault), str(path), "exec", dont_inherit=True)
+    return list(_differing(old, new))
+
+
+def _differing(old: CodeType, new: CodeType) -> Iterator[tuple[CodeType, CodeType]]:
+    inner = ([c for c in code.co_consts if isinstance(c, CodeType)] for code in (old, new))
+    # Arguments that change places take their lambdas along: then only the function around them counts.
+    pairs = zip(*inner, strict=False)
+    for a, b in pairs:
+        yield from _differing(a, b)
+    if old != new:
+        yield old, new
+
+
+def _key(code: CodeType) -> tuple[str, str, int]:
+    return code.co_filename, code.co_qualname, code.co_firstlineno
+
+
+def _fixtures(item: pytest.Item) -> set[str]:
+    found = item._fixtureinfo.name2fixturedefs
+    return {f"fixture {d.baseid}::{name}" for name, definitions in found.items() for d in definitions}
+
+
+def _in_fork(work: Any, limit: int) -> Any:
+    """What the work returns, from a fork; None where it broke off."""
+    import pickle
+
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        signal.alarm(limit)
+        answer = None
+        try:
+            answer = work()
+        finally:
+            with os.fdopen(writer, "wb") as pipe:
+                pickle.dump(answer, pipe)
+            os._exit(0)
+    os.close(writer)
+    with os.fdopen(reader, "rb") as pipe:
+        answer = pickle.load(pipe)
+    os.waitpid(child, 0)
+    return answer
