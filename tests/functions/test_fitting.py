@@ -1,0 +1,214 @@
+"""Fits beside NumPy's least squares, errors at left-out conditions beside refits, forms beside their formulas."""
+
+from math import exp
+
+import numpy as np
+import pytest
+
+from mrdamper.data import Condition
+from mrdamper.errors import IdentificationError
+from mrdamper.functions import fitting
+from mrdamper.functions.fitting import FunctionFit, assess, choose_function, fit_function, require_determined
+from mrdamper.functions.forms import FORMS, ParameterFunction
+
+I, f, A, r, s = 1.3, 0.7, 0.06, 0.9, 2.1  # no two products of their powers are alike
+# Every form once more, term by term.
+FORMULAS = {
+    "constant": [1],
+    "linear-current": [I, 1],
+    "quadratic-current": [I * I, I, 1],
+    "saturating-current": [I, I * exp(-r * I), 1],
+    "decaying-current": [exp(-r * I), 1],
+    "linear-current-speed": [I, f * A, 1],
+    "quadratic-current-linear-speed": [I * I, I, f * A, 1],
+    "quadratic-current-speed": [I * I, I, f * f * A * A, f * A, 1],
+    "viscous-paper": [I * I / (f * A), I / (f * A), f * A, 1, 1 / (f * A)],
+    "mass-exponential": [I * I, I, exp(-r * f), 1],
+    "mass-power": [I * I, I, f**-r, 1],
+    "mass-inverse-square": [I * I, I, 1 / f**2, 1],
+    "plane": [I * I, I, f, A, 1],
+    "current-decay-frequency": [exp(-r * I) * exp(-s * f), exp(-r * I), 1],
+}
+RNG = np.random.default_rng(8)
+CONDITIONS = [Condition(i, f, a) for i in (0.0, 0.4, 1.1, 2.0) for f, a in ((0.5, 0.05), (1.0, 0.02), (2.1, 0.02))]
+CURRENT = np.array([c.current_A for c in CONDITIONS])
+VALUES = 300 + 900 * CURRENT - 120 * CURRENT**2 + RNG.normal(0, 40, CURRENT.size)
+
+
+def test_every_form_is_the_formula_it_names():
+    assert set(FORMULAS) == set(FORMS)
+    for name, terms in FORMULAS.items():
+        rates = (r, s)[: len(FORMS[name].rate_bounds)]
+        for k, term in enumerate(terms):
+            unit = tuple(float(j == k) for j in range(len(terms)))
+            assert ParameterFunction(name, unit, rates)(I, f, A) == pytest.approx(term, rel=1e-12), (name, k)
+        whole = ParameterFunction(name, (2.0,) * len(terms), rates, log=True)(I, f, A)
+        assert whole == pytest.approx(exp(2 * sum(terms)))
+
+
+@pytest.mark.parametrize(
+    ("form", "coefficients", "rates", "text"),
+    [
+        ("quadratic-current-speed", (1.0, -2.5, 3.0, 4.0, -5.0), (), "1 I^2 -2.5 I +3 f^2 A^2 +4 f A -5"),
+        ("mass-power", (1.0, 2.0, 3.0, 4.0), (0.5,), "1 I^2 +2 I +3 f^-0.5 +4"),
+        ("current-decay-frequency", (1.0, 2.0, 3.0), (0.25, 7.0), "1 exp(-0.25 I) exp(-7 f) +2 exp(-0.25 I) +3"),
+    ],
+)
+def test_a_function_reads_as_it_is_computed(form, coefficients, rates, text):
+    assert ParameterFunction(form, coefficients, rates).formula == text
+    assert ParameterFunction(form, coefficients, rates, log=True).formula == f"exp({text})"
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+@pytest.mark.parametrize("log", [False, True])
+def test_a_fit_is_that_of_weighted_least_squares_and_its_errors_those_of_refits(weighted, log):
+    errors = np.where(np.arange(CURRENT.size) % 3 == 0, 60.0, 20.0) if weighted else None
+    fit = fit_function("quadratic-current", CONDITIONS, np.exp(VALUES / 1e3) if log else VALUES, log=log,
+                       uncertainty=errors)  # fmt: skip
+    y = VALUES / 1e3 if log else VALUES
+    # The most certain quarter counts 1; what is three times as uncertain counts a third.
+    w = np.ones(y.size) if errors is None else 20.0 / errors
+    assert fit.function.coefficients == pytest.approx(np.polyfit(CURRENT, y, 2, w=w).tolist())
+    found = np.polyval(fit.function.coefficients, CURRENT)
+    assert fit.r2 == pytest.approx(1 - np.sum((y - found) ** 2) / np.sum((y - np.mean(y)) ** 2))
+    missed = []
+    for i in range(y.size):
+        rest = np.arange(y.size) != i
+        missed.append(y[i] - np.polyval(np.polyfit(CURRENT[rest], y[rest], 2, w=w[rest]), CURRENT[i]))
+    rms = np.sqrt(np.average(np.square(missed), weights=w**2))
+    assert fit.left_out == pytest.approx(rms / np.std(y), rel=1e-6)
+
+
+def test_searched_rates_are_charged_to_the_error_at_left_out_conditions():
+    rate = 1.7
+    y = 5 + 40 * np.exp(-rate * CURRENT) + 0.1 * RNG.standard_normal(CURRENT.size)
+    fit = fit_function("decaying-current", CONDITIONS, y)
+    (found,) = fit.function.rates
+    columns = np.column_stack([np.exp(-found * CURRENT), np.ones(CURRENT.size)])
+    assert found == pytest.approx(rate, rel=0.05)
+    for other in (0.99 * found, 1.01 * found):  # no other rate is better
+        moved = np.column_stack([np.exp(-other * CURRENT), np.ones(CURRENT.size)])
+        costs = [np.sum((m @ np.linalg.lstsq(m, y)[0] - y) ** 2) for m in (columns, moved)]
+        assert costs[0] < costs[1]
+    hat = columns @ np.linalg.pinv(columns)
+    missed = (y - hat @ y) / (1 - np.diag(hat))
+    N = y.size
+    assert fit.left_out == pytest.approx(np.sqrt(np.mean(missed**2)) / np.std(y) * N / (N - 1), rel=1e-6)
+
+
+def test_weights_count_in_the_search_of_rates_too():
+    y = 5 + 40 * np.exp(-1.7 * CURRENT)
+    spoiled, errors = y.copy(), np.full(y.size, 0.1)
+    spoiled[4], errors[4] = y[4] + 30.0, 1e4
+    fit = fit_function("decaying-current", CONDITIONS, spoiled, uncertainty=errors)
+    assert fit.function.rates[0] == pytest.approx(1.7, rel=1e-3)
+    assert fit_function("decaying-current", CONDITIONS, spoiled).function.rates[0] != pytest.approx(1.7, rel=1e-2)
+
+
+def test_uncertainties_that_are_not_known_count_as_the_largest_known():
+    errors = np.full(CURRENT.size, 10.0)
+    errors[2], errors[5] = 40.0, np.nan
+    known = np.where(np.isnan(errors), 40.0, errors)
+    w = 10.0 / known
+    fit = fit_function("linear-current", CONDITIONS, VALUES, uncertainty=errors)
+    assert fit.function.coefficients == pytest.approx(np.polyfit(CURRENT, VALUES, 1, w=w).tolist())
+    plain = np.polyfit(CURRENT, VALUES, 1).tolist()
+    for nothing in (np.full(CURRENT.size, np.nan), np.zeros(CURRENT.size), np.full(CURRENT.size, 3.0)):
+        alike = fit_function("linear-current", CONDITIONS, VALUES, uncertainty=nothing)
+        assert alike.function.coefficients == pytest.approx(plain)
+
+
+def test_no_value_counts_more_than_those_of_the_most_certain_quarter():
+    errors = np.array([1e-9, *np.linspace(1, 4, CURRENT.size - 1)])
+    w = np.quantile(errors, 0.25) / np.maximum(errors, np.quantile(errors, 0.25))
+    fit = fit_function("linear-current", CONDITIONS, VALUES, uncertainty=errors)
+    assert fit.function.coefficients == pytest.approx(np.polyfit(CURRENT, VALUES, 1, w=w).tolist())
+
+
+def test_values_that_do_not_vary_are_explained_whole():
+    fit = fit_function("constant", CONDITIONS, np.full(CURRENT.size, 7.0))
+    assert (fit.r2, fit.left_out) == (1.0, pytest.approx(0.0, abs=1e-12))
+    assert assess(fit.function, CONDITIONS, np.full(CURRENT.size, 7.0)).r2 == 1.0
+
+
+def test_a_constant_knows_less_than_the_mean_of_all_and_explains_nothing():
+    fit = fit_function("constant", CONDITIONS, VALUES)
+    N = VALUES.size
+    assert fit.r2 == pytest.approx(0.0, abs=1e-12)
+    assert fit.left_out == pytest.approx(N / (N - 1))
+
+
+def test_a_function_found_otherwise_is_assessed_by_the_values_beside_it():
+    line = ParameterFunction("linear-current", (800.0, 310.0))
+    missed = np.sum((VALUES - 310 - 800 * CURRENT) ** 2)
+    assert assess(line, CONDITIONS, VALUES).r2 == pytest.approx(1 - missed / np.sum((VALUES - VALUES.mean()) ** 2))
+    assert np.isnan(assess(line, CONDITIONS, VALUES).left_out)
+    grown, target = ParameterFunction("linear-current", (0.8, 0.3), log=True), VALUES / 1e3
+    missed = np.sum((target - 0.3 - 0.8 * CURRENT) ** 2)
+    expected = 1 - missed / np.sum((target - target.mean()) ** 2)
+    assert assess(grown, CONDITIONS, np.exp(target)).r2 == pytest.approx(expected)
+
+
+def fits(monkeypatch, errors):
+    """Forms whose errors at left-out conditions are given; None is refused."""
+
+    def fit(form, *args, **more):
+        if errors[form.name] is None:
+            raise IdentificationError(f"no {form.name}")
+        return FunctionFit(form.name, 0.0, errors[form.name])
+
+    monkeypatch.setattr(fitting, "fit_function", fit)
+    return choose_function(errors, CONDITIONS, VALUES).function
+
+
+def test_a_longer_form_must_win_by_a_tenth(monkeypatch):
+    assert fits(monkeypatch, {"quadratic-current": 0.95, "constant": 1.0}) == "constant"
+    assert fits(monkeypatch, {"quadratic-current": 0.89, "constant": 1.0}) == "quadratic-current"
+    assert fits(monkeypatch, {"plane": 0.5, "quadratic-current": 0.55, "constant": 1.0}) == "quadratic-current"
+    # A searched rate counts as a coefficient: three against two.
+    assert fits(monkeypatch, {"decaying-current": 0.95, "linear-current": 1.0}) == "linear-current"
+    assert fits(monkeypatch, {"constant": None, "plane": 2.0}) == "plane"
+    with pytest.raises(IdentificationError, match="no plane"):
+        fits(monkeypatch, {"plane": None})
+    with pytest.raises(IdentificationError, match="no form to choose from"):
+        fits(monkeypatch, {})
+
+
+def test_forms_the_conditions_cannot_tell_apart_are_refused_with_what_was_tested():
+    one_speed = [Condition(i, 2.0, 0.01) for i in (0.0, 0.5, 1.0, 1.5, 2.0)]
+    counts = "5 coefficients and they do not tell its terms apart: 5 currents, 1 frequencies, 1 amplitudes"
+    with pytest.raises(IdentificationError, match=counts):
+        fit_function("plane", one_speed, np.arange(5.0))
+    with pytest.raises(IdentificationError, match="current-decay-frequency has 5 coefficients and 4 conditions: 4 cur"):
+        fit_function("current-decay-frequency", one_speed[:4], np.arange(4.0))
+
+
+@pytest.mark.parametrize(("count", "enough"), [(2, False), (3, True)])
+def test_as_many_conditions_as_coefficients_are_enough(count, enough):
+    few = [Condition(i, 1.0, 0.02) for i in (0.0, 1.0, 2.0)][:count]
+    if enough:
+        require_determined("quadratic-current", few)
+        assert fit_function("quadratic-current", few, [1.0, 2.0, 5.0]).function.coefficients == pytest.approx((1, 0, 1))
+        return
+    with pytest.raises(IdentificationError, match="2 conditions"):
+        require_determined("quadratic-current", few)
+    with pytest.raises(IdentificationError, match=r"quadratic-current has 3 coefficients and 2 conditions: 2 currents"):
+        fit_function("quadratic-current", few, [1.0, 2.0])
+
+
+def test_terms_that_rest_on_the_scatter_of_a_rig_are_not_determined():
+    scattered = [Condition(i, 1.0, 0.02 * (1 + 1e-6 * k)) for k, i in enumerate((0.0, 0.5, 1.0, 1.5, 2.0, 0.2))]
+    with pytest.raises(IdentificationError, match="tell its terms apart"):
+        require_determined("linear-current-speed", scattered)
+    require_determined("linear-current-speed", [*scattered, Condition(1.0, 1.0, 0.021)])
+    dark = [Condition(0.0, 1.0, 0.02)] * 5
+    with pytest.raises(IdentificationError, match="tell its terms apart"):
+        require_determined("linear-current", dark)
+    with pytest.raises(IdentificationError, match="rates to search"):
+        require_determined("decaying-current", CONDITIONS)
+
+
+@pytest.mark.parametrize(("top", "turn"), [(2.0, 1.5), (1.1, 1.5), (0.9, None)])
+def test_a_parabola_turns_where_its_slope_is_zero_within_half_more_than_was_tested(top, turn):
+    found = ParameterFunction("quadratic-current", (-1.0, 3.0, 0.0)).turning_point(top, 1.0, 0.02)
+    assert found is None if turn is None else found == pytest.approx(turn, abs=1.5 * top / 600)
