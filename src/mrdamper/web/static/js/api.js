@@ -157,14 +157,19 @@ export class Latest {
     const question = this.waiting;
     this.waiting = null;
     this.asking = true;
-    let found = null;
+    let [found, trouble] = [null, null];
     try {
       found = await this.ask(question);
     } catch (error) {
-      this.fail(error);
+      trouble = error;
     }
     this.asking = false;
     if (this.waiting !== null) this.next();
-    if (found) await Promise.resolve(this.show(found, question)).catch(this.fail);
+    try {
+      if (trouble) throw trouble;
+      await this.show(found, question);
+    } catch (error) {
+      this.fail(error);
+    }
   }
 }

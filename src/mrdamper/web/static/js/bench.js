@@ -15,6 +15,7 @@ export class Bench {
     this.busy = ""; // what is being done to bring others
     this.dampers = [];
     this.tables = new Map(); // rig number to its runs and matrix
+    this.undocumented = null; // the damper last seen that no file holds
     this.loops = new Map(); // measured loops and verdicts, fetched once
   }
 
@@ -91,14 +92,15 @@ export class Bench {
     this.store.commit({ ...state, source: this.overview?.source ?? null, dataName: this.overview?.name ?? "", damper });
   }
 
-  /** The model's document goes into the state, so that a link or file carries it. */
+  /** The model's document goes into the state, so that a link or file carries it; asked for once a damper. */
   async keepDocument() {
     const { damper, document } = this.state;
-    if (!damper || document) return;
+    if (!damper || document || this.undocumented === damper) return;
     try {
       const { text } = await this.api.post(`/dampers/${damper}/document`, { held: {} });
       if (this.state.damper === damper) this.store.settle({ document: JSON.stringify(JSON.parse(text)) });
     } catch (error) {
+      this.undocumented = damper;
       if (error.status !== 422) return this.fail(error);
       this.say(note("warn", "This kind of damper has no file format yet: a link brings back the data, not the model."), 6000);
     }

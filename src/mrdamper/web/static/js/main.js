@@ -1,11 +1,11 @@
 // The page: opens or finds its session, builds the views, keeps link, undo and theme.
 
+import { Address } from "./address.js";
 import { BenchError } from "./api.js";
 import { Bench } from "./bench.js";
 import { library } from "./chart.js";
 import { h, note, problem, put } from "./dom.js";
 import { openSession } from "./session.js";
-import { fromFragment, toFragment } from "./state.js";
 import { theme } from "./theme.js";
 import * as data from "./views/data.js";
 import * as identify from "./views/identify.js";
@@ -14,7 +14,6 @@ import * as compare from "./views/compare.js";
 import * as takeaway from "./views/takeaway.js";
 
 const VIEWS = [data, identify, model, compare, takeaway];
-const LAST = "mrdamper.last"; // link and damper of this page, for loading it again
 const BEAT = 60_000;
 
 async function start() {
@@ -23,13 +22,13 @@ async function start() {
   const bench = new Bench(api, limits);
   const views = VIEWS.map((v) => Object.assign(v.create(bench), { id: v.id, label: v.label }));
   const tabs = makeTabs(bench, views);
-  const tools = makeTools(bench);
+  const address = new Address(bench);
+  const tools = makeTools(bench, address);
   bench.store.onChange((state, before) => {
     if (state.view !== before.view) show(views, tabs, state.view);
-    if (state.damper !== before.damper || (before.document && !state.document)) bench.keepDocument();
     tools.update();
     for (const view of views) view.update?.(state, before);
-    remember(bench);
+    address.follow();
   });
   if (there.data) {
     bench.overview = await api.get("/data");
@@ -39,9 +38,7 @@ async function start() {
   }
   show(views, tabs, bench.state.view);
   try {
-    const linked = await fromFragment(location.hash);
-    const last = JSON.parse(sessionStorage.getItem(LAST) ?? "null");
-    if (linked && last?.hash === location.hash) linked.damper = last.damper; // the same page again: its dampers are there
+    const linked = await address.found();
     if (linked) await bench.restore(linked);
     bench.store.forget(); // there is nothing before it to go back to
     const jobs = there.data ? await api.get("/jobs") : []; // of a page that is loaded again
@@ -84,10 +81,10 @@ function show(views, tabs, id) {
   views[at].shown?.();
 }
 
-function makeTools(bench) {
+function makeTools(bench, address) {
   const undo = h("button", { class: "quiet", title: "Undo (Ctrl+Z)", "aria-label": "Undo", onclick: () => bench.store.undo() }, "↶", h("span", { class: "word" }, "Undo"));
   const redo = h("button", { class: "quiet", title: "Redo (Ctrl+Y)", "aria-label": "Redo", onclick: () => bench.store.redo() }, "↷", h("span", { class: "word" }, "Redo"));
-  const link = h("button", { class: "quiet", title: "Copy a link that brings this state back", onclick: () => copyLink(bench) }, "Copy link");
+  const link = h("button", { class: "quiet", title: "Copy a link that brings this state back", onclick: () => copyLink(bench, address) }, "Copy link");
   const name = h("span", { class: "data-name" });
   put(document.getElementById("tools"), name, undo, redo, link, theme.button());
   document.addEventListener("keydown", (event) => {
@@ -108,8 +105,8 @@ function makeTools(bench) {
   };
 }
 
-async function copyLink(bench) {
-  const address = `${location.origin}/#${await toFragment(bench.state)}`;
+async function copyLink(bench, kept) {
+  const address = `${location.origin}/#${await kept.fragment()}`;
   try {
     await navigator.clipboard.writeText(address);
     bench.say(note("", "Link copied. It brings back data, model and sliders on a bench at the same address."), 5000);
@@ -117,16 +114,6 @@ async function copyLink(bench) {
     history.replaceState(null, "", address);
     bench.say(note("", "The link is in the address bar now."), 5000);
   }
-}
-
-let remembering = 0;
-function remember(bench) {
-  clearTimeout(remembering);
-  remembering = setTimeout(async () => {
-    const hash = `#${await toFragment(bench.state)}`;
-    history.replaceState(null, "", hash);
-    sessionStorage.setItem(LAST, JSON.stringify({ hash, damper: bench.state.damper }));
-  }, 400);
 }
 
 start().catch((error) => put(document.getElementById("view"), h("div", { class: "empty" }, problem(error))));

@@ -7,6 +7,7 @@ import { condition, figures } from "./format.js";
 export class ModelCharts {
   constructor(bench) {
     this.bench = bench;
+    this.turn = 0; // of the answers drawn
     this.x = new Chart({ title: "Force over displacement", x: "Displacement (mm)", y: "Force (N)", name: "model-force-displacement", keys: true });
     this.v = new Chart({ title: "Force over velocity", x: "Velocity (m/s)", y: "Force (N)", name: "model-force-velocity" });
     this.t = new Chart({ title: "Force over time", x: "Time (s)", y: "Force (N)", name: "model-force-time" });
@@ -29,9 +30,14 @@ export class ModelCharts {
     for (const chart of this.all) chart.reset();
   }
 
-  /** Draw an answer of the bench: its head and arrays, the curve over current, the current asked for, and the damper's rig. */
+  /**
+   * Draw an answer of the bench: its head and arrays, the curve over current, the current asked for,
+   * and the damper's rig. False where a newer answer came meanwhile.
+   */
   async draw(head, arrays, curve, current_A, rig) {
+    const turn = (this.turn += 1);
     const near = await this.measured(head, rig);
+    if (turn !== this.turn) return false;
     const family = head.loops.filter((loop) => loop.name !== "now");
     const ends = [family[0], family.at(-1)]; // the scale of the others follows from these
     const predicted = head.loops.slice().reverse().map((loop) => predictedLoop(loop, head, arrays, ends.includes(loop))); // the loop asked for on top
@@ -44,6 +50,7 @@ export class ModelCharts {
       this.t.draw([...near.map((n) => n.curve("t", "F")), predicted.at(-1)("t", "F")], said),
       this.drawCurve(head, curve, current_A, said),
     ]);
+    return turn === this.turn;
   }
 
   /** Draw the figures over current; `curve` holds as many points as there are. */

@@ -39,7 +39,10 @@ class ModelView {
     this.latest = new Latest(
       (question) => this.timed(question),
       (found, question) => this.draw(found, question),
-      (error) => bench.fail(error),
+      (error) => {
+        bench.fail(error);
+        this.rest();
+      },
     );
     document.addEventListener("bench:dampers", () => {
       if (bench.dampers.some((d) => d.key === this.damper?.key)) return this.panel.list(); // what is moved stays
@@ -49,7 +52,22 @@ class ModelView {
   }
 
   shown() {
-    if (this.bench.state.view === id) this.refresh().catch((error) => this.bench.fail(error));
+    if (this.bench.state.view !== id) return;
+    this.busy(true);
+    this.refresh().catch((error) => {
+      this.bench.fail(error);
+      this.busy(false);
+    });
+  }
+
+  /** Whether the picture is still to follow what the panel says. */
+  busy(on) {
+    this.stage.setAttribute("aria-busy", String(on));
+  }
+
+  /** The picture is that of the panel, unless something is asked or moved still. */
+  rest() {
+    if (!this.latest.busy && !this.charts.held) this.busy(false);
   }
 
   update(state, before) {
@@ -64,6 +82,7 @@ class ModelView {
       this.damper = null;
       this.panel.empty();
       put(this.stage, nothing(this.bench));
+      this.busy(false);
       return;
     }
     if (key !== state.damper) {
@@ -111,7 +130,6 @@ class ModelView {
 
   late(on) {
     this.stage.classList.toggle("late", on);
-    this.stage.setAttribute("aria-busy", String(on));
     if (on) put(this.verdict, note("", h("b", {}, "Calculating …"), h("div", {}, "The picture is that of before.")));
   }
 
@@ -120,9 +138,11 @@ class ModelView {
     this.panel.set(head.parameters);
     this.judge(head, ask);
     const curve = ask.currents ? { current: arrays["over.current"], peak: arrays["over.peak"], energy: arrays["over.energy"] } : NO_CURVE;
-    await this.charts.draw(head, arrays, curve, ask.current_A, this.damper.rig);
+    const newest = await this.charts.draw(head, arrays, curve, ask.current_A, this.damper.rig);
+    if (!newest) return;
     if (moved !== null) measure(moved);
     if (!ask.currents && !this.charts.held) await this.complete(head, key, ask);
+    this.rest();
   }
 
   /** The curves over current after the loop: at once, or point by point until something newer is asked. */
@@ -156,6 +176,7 @@ class ModelView {
 
   settled(change) {
     this.bench.store.commit(change);
+    if (!this.charts.held) return; // a number that was typed
     clearTimeout(this.settling); // keys move a slider step by step: the axes wait for the last
     this.settling = setTimeout(() => {
       this.charts.held = false;

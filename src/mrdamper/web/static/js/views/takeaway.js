@@ -127,13 +127,14 @@ class TakeAwayView {
   }
 
   stateBody() {
-    const keep = () => {
+    const keep = async () => {
+      await this.bench.keepDocument();
       const state = { ...portable(this.bench.state), view: this.bench.state.document ? "model" : "data" };
       save(new Blob([JSON.stringify(state, null, 1)], { type: "application/json" }), "bench-state.json");
     };
     return h("div", { class: "body" },
       h("p", {}, "A state file brings back what you see: data where they are bundled, the model, and every slider. Drop it on the Data page."),
-      h("div", {}, h("button", { onclick: keep }, "Save the state")),
+      h("div", {}, h("button", { onclick: () => this.safely(keep()) }, "Save the state")),
       h("p", { class: "small faint" }, "“Copy link” in the header does the same in a link. Everything stays on this machine: the bench sends nothing anywhere, and its files go when it stops."));
   }
 }
