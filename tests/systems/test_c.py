@@ -86,7 +86,7 @@ def test_a_loop_closed_with_the_c_is_pythons_loop(law, tmp_path):
 def test_both_leave_by_the_command_line(tmp_path):
     save_model(joint_damper(), tmp_path / "model.json")
     model = ["--damper", str(tmp_path / "model.json")]
-    chosen = ["simulate", "quarter-car", "--input", "bump:length_s=0.3", *model, "--json"]
+    chosen = ["simulate", "quarter-car", "--input", "bump:length_s=0.1", *model, "--json"]
     done = CliRunner().invoke(application(), [*chosen, "--control", "sh-add", "--c", str(tmp_path / "law")])
     assert done.exit_code == 0, done.output
     assert {path.name for path in (tmp_path / "law").iterdir()} == {"sh_add.h", "sh_add.c"}

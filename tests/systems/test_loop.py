@@ -117,3 +117,12 @@ def test_a_step_that_is_too_coarse_is_refused_with_the_one_that_is_needed():
     assert simulate_system(frame, pulse(), {}, step=needed).halving < 5e-3
     with pytest.raises(StepError):
         simulate_system(frame, pulse(), {}, step=-1.0)
+
+
+def test_peaks_that_no_step_settles_are_called_so():
+    hops = quarter_car("car", 300, 40, 20e3, 200e3, stop=(0.03, 2e6))  # nothing takes energy out
+    rough = load_input("iso8608-e", {"length_s": 4.0})
+    done = simulate_system(hops, rough, {})
+    assert not done.settled
+    assert done.step > 5e-5  # it was not halved in vain
+    assert simulate_system(hops, load_input("bump", {"length_s": 0.5, "height_m": 1e-3}), {}).settled

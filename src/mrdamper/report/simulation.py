@@ -15,7 +15,7 @@ from mrdamper.report.plots.simulation import histories, spectra
 from mrdamper.report.plots.style import save_figure
 from mrdamper.systems.contest import Contest
 from mrdamper.systems.measures import benchmark_ratios, measures
-from mrdamper.systems.simulate import Simulation
+from mrdamper.systems.result import Simulation
 
 _ROWS = 20_000  # of histories.csv
 

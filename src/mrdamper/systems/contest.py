@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from mrdamper.dampers.base import Damper
 from mrdamper.systems.controllers import Controller
@@ -11,7 +11,8 @@ from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.controllers.preview import Preview
 from mrdamper.systems.inputs import Input
 from mrdamper.systems.measures import cost
-from mrdamper.systems.simulate import Loop, Simulation, simulate_system
+from mrdamper.systems.result import Simulation
+from mrdamper.systems.simulate import Loop, simulate_system
 from mrdamper.systems.structure import System
 
 
@@ -57,7 +58,7 @@ def contest(
     runs = {"no current": first}
     between = {f"{highest:.3g} A": Passive(highest), **{_title(c): c for c in controllers}}
     for title, controller in {**between, Preview.title: Preview()}.items():
-        runs[title] = replace(Loop(system, source, dampers, controller, highest).run(first.step), halving=first.halving)
+        runs[title] = Loop(system, source, dampers, controller, highest).run(first.step)
     return Contest(runs)
 
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,7 @@ class Stage:
         Of the program: what a step costs in the interpreter.
     prepare : callable, optional
         From other parameters to (status, derived).
+    inputs : int
     """
 
     step: Step
@@ -51,6 +53,12 @@ class Stage:
     compiled: Callable[[], Step]
     lines: int = 3
     prepare: Callable[..., Any] | None = None
+    inputs: int = 5
+
+    @property
+    def sizes(self) -> tuple[int, int, int]:
+        """Numbers of parameters, of what follows from them, and of what is remembered."""
+        return len(self.given), len(self.derived), len(self.start)
 
     def at(self, given: tuple[float, ...]) -> Stage:
         """The stage with other parameters.
@@ -82,8 +90,8 @@ class Numbers:
         return cls(strung("given"), strung("derived"), strung("start"))
 
 
-def make_walk(elements: Sequence[Stage], control: Stage | None, signals: int, machine: bool) -> Callable[..., int]:
-    """The loop for these stages, interpreted or as machine code.
+def make_walk(elements: Sequence[Stage], control: Stage | None, machine: bool) -> Callable[..., int]:
+    """The loop for these stages, interpreted or as machine code: `walk` without its first two arguments.
 
     Parameters
     ----------
@@ -91,56 +99,34 @@ def make_walk(elements: Sequence[Stage], control: Stage | None, signals: int, ma
         Inputs displacement [m], velocity [m/s], acceleration [m/s²], command [A], dt [s];
         outputs force [N] and flags.
     control : Stage, optional
-        From `signals` inputs and dt to one command [A] an element.
+        From signals and dt to one command [A] an element.
     machine : bool
-        Compile; takes seconds, and gains a hundredfold.
+        Compile what is new in these stages; takes seconds, and gains a hundredfold.
     """
-    compile_ = _compiler(machine)
+    compiled: Any = None
+    if machine:
+        from mrdamper.systems import machine as compiled
+    compile_ = compiled.compile_ if machine else lambda function: function
+    cut = compiled.cut if machine else _cut
     evaluate = compile_(_nothing)
     ends = np.cumsum([[0, 0, 0], *([len(e.given), len(e.derived), len(e.start)] for e in elements)], axis=0)
     for index in reversed(range(len(elements))):
-        stage = elements[index]
-        given, derived, held = _cuts(ends[index], stage, machine)
-        keep = compile_(_keeper(int(ends[index][2]), len(stage.start)))
-        first = compile_(_one(_step(stage, machine), given, derived, held, keep))
+        stage, begin = elements[index], ends[index].tolist()
+        step = stage.compiled() if machine else stage.step
+        keep = compile_(_keeper(begin[2], len(stage.start)))
+        first = compile_(_one(step, *(cut(b, size) for b, size in zip(begin, stage.sizes, strict=True)), keep))
         evaluate = compile_(_either(index, first, evaluate))
     command = compile_(_no_command)
     if control is not None:
-        given, derived, held = _cuts((0, 0, 0), control, machine)
-        seen = _cut(0, signals + 1, machine)
-        keep = compile_(_keeper(0, len(control.start)))
-        command = compile_(_command(_step(control, machine), given, derived, held, seen, keep))
-    search = compile_(_search(evaluate))
-    return compile_(_walk(evaluate, command, search))
+        step = control.compiled() if machine else control.step
+        cuts = [cut(0, size) for size in (*control.sizes, control.inputs)]
+        command = compile_(_command(step, *cuts, compile_(_keeper(0, len(control.start)))))
+    return compiled.walk_of(evaluate, command) if machine else partial(walk, evaluate, command)
 
 
-def _compiler(machine: bool) -> Callable[[Any], Any]:
-    if not machine:
-        return lambda function: function
-    from numba import njit
-
-    return njit(error_model="numpy")
-
-
-def _step(stage: Stage, machine: bool) -> Step:
-    return stage.compiled() if machine else stage.step
-
-
-def _cuts(begin: Sequence[int], stage: Stage, machine: bool) -> list[Any]:
-    sizes = (len(stage.given), len(stage.derived), len(stage.start))
-    return [_cut(int(b), size, machine) for b, size in zip(begin, sizes, strict=True)]
-
-
-def _cut(begin: int, size: int, machine: bool) -> Any:
+def _cut(begin: int, size: int) -> Any:
     """A function from an array to a tuple of `size` of its numbers."""
-    if not machine:
-        return lambda values: tuple(values[begin : begin + size].tolist())
-    from numba import njit
-    from numba.np.unsafe.ndarray import to_fixed_tuple
-
-    if size == 0:
-        return njit(lambda values: ())
-    return njit(lambda values: to_fixed_tuple(values[begin : begin + size], size))  # type: ignore[call-arg]
+    return lambda values: tuple(values[begin : begin + size].tolist())
 
 
 def _nothing(j, p, d, memory, later, x, v, a, current, dt):
@@ -192,125 +178,120 @@ def _command(step: Step, given: Any, derived: Any, held: Any, inputs: Any, keep:
     return command
 
 
-def _search(evaluate: Any) -> Any:
-    def search(j, p, d, memory, later, state, free, compliance, current, dt, slope, scale):
-        """End velocity and force of one element: where its force meets the structure's line.
+def search(evaluate, j, p, d, memory, later, state, free, compliance, current, dt, slope, scale):
+    """End velocity and force of one element: where its force meets the structure's line.
 
-        The structure moves by `u = free − compliance f`; the element answers D(u). Their gap
-        grows with u, so that a secant inside a bracket ends, at a jump of D too.
-        """
-        x0, u0, f0, drift = state
-        low, high = -math.inf, math.inf
-        gap_low, gap_high = 0.0, 0.0
-        stiff = 1.0 / compliance
-        u = (free * stiff + slope * u0 - f0) / (slope + stiff)  # as if the force went on along its slope
-        last_u, last_gap = u, 0.0
-        f, flags = f0, 0.0
-        for k in range(_MOST_TRIES):
-            status, f, flags = evaluate(
-                j, p, d, memory, later, x0 + 0.5 * dt * (u + u0) + drift, u, (u - u0) / dt, current, dt
-            )
-            if status != 0 or not math.isfinite(f):
-                return 1, u, f, flags, slope
-            line = (free - u) * stiff
-            gap = f - line
-            if abs(gap) <= _TOLERANCE * scale or abs(gap) * compliance <= 1e-14 * (abs(u) + abs(free)):
-                return 0, u, line, flags, slope
-            if k > 0 and u != last_u:
-                slope = max((gap - last_gap) / (u - last_u) - stiff, -0.5 * stiff)
-            if gap > 0:
-                high, gap_high = u, gap
+    The structure moves by `u = free − compliance f`; the element answers D(u). Their gap
+    grows with u, so that a secant inside a bracket ends, at a jump of D too.
+    """
+    x0, u0, f0, drift = state
+    low, high = -math.inf, math.inf
+    gap_low, gap_high = 0.0, 0.0
+    stiff = 1.0 / compliance
+    u = (free * stiff + slope * u0 - f0) / (slope + stiff)  # as if the force went on along its slope
+    last_u, last_gap = u, 0.0
+    f, flags = f0, 0.0
+    for k in range(_MOST_TRIES):
+        status, f, flags = evaluate(
+            j, p, d, memory, later, x0 + 0.5 * dt * (u + u0) + drift, u, (u - u0) / dt, current, dt
+        )
+        if status != 0 or not math.isfinite(f):
+            return 1, u, f, flags, slope
+        line = (free - u) * stiff
+        gap = f - line
+        if abs(gap) <= _TOLERANCE * scale or abs(gap) * compliance <= 1e-14 * (abs(u) + abs(free)):
+            return 0, u, line, flags, slope
+        if k > 0 and u != last_u:
+            slope = max((gap - last_gap) / (u - last_u) - stiff, -0.5 * stiff)
+        if gap > 0:
+            high, gap_high = u, gap
+        else:
+            low, gap_low = u, gap
+        last_u, last_gap = u, gap
+        u = u - gap / (slope + stiff)
+        if (k >= 3 and not (low < u < high)) or k > 8:
+            if math.isinf(low):
+                u = high - 2.0 * gap_high * compliance
+            elif math.isinf(high):
+                u = low - 2.0 * gap_low * compliance
             else:
-                low, gap_low = u, gap
-            last_u, last_gap = u, gap
-            u = u - gap / (slope + stiff)
-            if (k >= 3 and not (low < u < high)) or k > 8:
-                if math.isinf(low):
-                    u = high - 2.0 * gap_high * compliance
-                elif math.isinf(high):
-                    u = low - 2.0 * gap_low * compliance
-                else:
-                    u = 0.5 * (low + high)
-        if not (math.isinf(low) or math.isinf(high)):  # a jump: the structure decides on the force
-            return 0, u, (free - u) * stiff, flags, slope
-        return 1, u, f, flags, slope
-
-    return search
+                u = 0.5 * (low + high)
+    if not (math.isinf(low) or math.isinf(high)):  # a jump: the structure decides on the force
+        return 0, u, (free - u) * stiff, flags, slope
+    return 1, u, f, flags, slope
 
 
-def _walk(evaluate: Any, command: Any, search: Any) -> Any:
-    def walk(
-        dt, every, P, Q, R, G, B, loads, road, road_rate, H, seen, p, d, memory, cp, cd, cm, currents, x, v, f, flags
-    ):
-        """Fill x, v (N, n), f, currents, flags (N, E) from their first rows on; the step that failed, or −1.
+def walk(
+    evaluate, command, dt, every, P, Q, R, G, B, loads, road, road_rate, H, seen, p, d, memory, cp, cd, cm, currents,
+    x, v, f, flags,
+    ):  # fmt: skip
+    """Fill x, v (N, n), f, currents, flags (N, E) from their first rows on; the step that failed, or −1.
 
-        End velocity of the points is 2 (P v + Q x + load − R f_mean) − v. `loads` (N, n) is the
-        response to the mean load of the step that ends there, `road` and `road_rate` (N, E) what
-        the input adds to an element's stroke and its rate, `seen` (N, S) to a signal.
-        """
-        samples, n = x.shape
-        count = f.shape[1]
-        later = memory.copy()
-        slope, scale = np.zeros(count), np.full(count, 1e-6)
-        mean, free = np.zeros(n), np.zeros(count)
-        signals, held = np.zeros(H.shape[0] + 1), currents[0].copy()
-        state = np.zeros(2 * n + count)
-        for i in range(1, samples):
-            if H.shape[0] > 0 and (i - 1) % every == 0:
-                state[:n], state[n : 2 * n], state[2 * n :] = x[i - 1], v[i - 1], f[i - 1]
-                for s in range(H.shape[0]):
-                    total = seen[i - 1, s]
-                    for k in range(state.size):
-                        total += H[s, k] * state[k]
-                    signals[s] = total
-                signals[H.shape[0]] = every * dt
-                if command(cp, cd, cm, signals, held) != 0:
-                    return i
-            currents[i] = held
-            for r in range(n):
-                total = loads[i, r]
-                for k in range(n):
-                    total += P[r, k] * v[i - 1, k] + Q[r, k] * x[i - 1, k]
-                for k in range(count):
-                    total -= 0.5 * R[r, k] * f[i - 1, k]
-                mean[r] = total
+    End velocity of the points is 2 (P v + Q x + load − R f_mean) − v. `loads` (N, n) is the
+    response to the mean load of the step that ends there, `road` and `road_rate` (N, E) what
+    the input adds to an element's stroke and its rate, `seen` (N, S) to a signal.
+    """
+    samples, n = x.shape
+    count = f.shape[1]
+    later = memory.copy()
+    slope, scale = np.zeros(count), np.full(count, 1e-6)
+    mean, free = np.zeros(n), np.zeros(count)
+    signals, held = np.zeros(H.shape[0] + 1), currents[0].copy()
+    state = np.zeros(2 * n + count)
+    for i in range(1, samples):
+        if H.shape[0] > 0 and (i - 1) % every == 0:
+            state[:n], state[n : 2 * n], state[2 * n :] = x[i - 1], v[i - 1], f[i - 1]
+            for s in range(H.shape[0]):
+                total = seen[i - 1, s]
+                for k in range(state.size):
+                    total += H[s, k] * state[k]
+                signals[s] = total
+            signals[H.shape[0]] = every * dt
+            if command(cp, cd, cm, signals, held) != 0:
+                return i
+        currents[i] = held
+        for r in range(n):
+            total = loads[i, r]
+            for k in range(n):
+                total += P[r, k] * v[i - 1, k] + Q[r, k] * x[i - 1, k]
+            for k in range(count):
+                total -= 0.5 * R[r, k] * f[i - 1, k]
+            mean[r] = total
+        for j in range(count):
+            total = road_rate[i, j]
+            for k in range(n):
+                total += B[j, k] * (2.0 * mean[k] - v[i - 1, k])
+            free[j] = total
+            f[i, j] = f[i - 1, j]
+        for _sweep in range(_MOST_SWEEPS):
+            moved = 0.0
             for j in range(count):
-                total = road_rate[i, j]
+                x0, u0 = road[i - 1, j], road_rate[i - 1, j]
                 for k in range(n):
-                    total += B[j, k] * (2.0 * mean[k] - v[i - 1, k])
-                free[j] = total
-                f[i, j] = f[i - 1, j]
-            for _sweep in range(_MOST_SWEEPS):
-                moved = 0.0
-                for j in range(count):
-                    x0, u0 = road[i - 1, j], road_rate[i - 1, j]
-                    for k in range(n):
-                        x0 += B[j, k] * x[i - 1, k]
-                        u0 += B[j, k] * v[i - 1, k]
-                    drift = road[i, j] - road[i - 1, j] - 0.5 * dt * (road_rate[i, j] + road_rate[i - 1, j])
-                    line = free[j]
-                    for k in range(count):
-                        if k != j:
-                            line -= G[j, k] * f[i, k]
-                    began = (x0, u0, f[i - 1, j], drift)
-                    status, _, force, flag, slope[j] = search(
-                        j, p, d, memory, later, began, line, G[j, j], currents[i, j], dt, slope[j], scale[j]
-                    )
-                    if status != 0:
-                        return i
-                    scale[j] = max(scale[j], abs(force))
-                    if j > 0:  # those before it counted on the force that it had
-                        moved = max(moved, abs(force - f[i, j]) / scale[j])
-                    f[i, j], flags[i, j] = force, flag
-                if moved <= 10 * _TOLERANCE:
-                    break
-            memory[:] = later
-            for r in range(n):
-                total = mean[r]
+                    x0 += B[j, k] * x[i - 1, k]
+                    u0 += B[j, k] * v[i - 1, k]
+                drift = road[i, j] - road[i - 1, j] - 0.5 * dt * (road_rate[i, j] + road_rate[i - 1, j])
+                line = free[j]
                 for k in range(count):
-                    total -= 0.5 * R[r, k] * f[i, k]
-                v[i, r] = 2.0 * total - v[i - 1, r]
-                x[i, r] = x[i - 1, r] + dt * total
-        return -1
-
-    return walk
+                    if k != j:
+                        line -= G[j, k] * f[i, k]
+                began = (x0, u0, f[i - 1, j], drift)
+                status, _, force, flag, slope[j] = search(
+                    evaluate, j, p, d, memory, later, began, line, G[j, j], currents[i, j], dt, slope[j], scale[j]
+                )
+                if status != 0:
+                    return i
+                scale[j] = max(scale[j], abs(force))
+                if j > 0:  # those before it counted on the force that it had
+                    moved = max(moved, abs(force - f[i, j]) / scale[j])
+                f[i, j], flags[i, j] = force, flag
+            if moved <= 10 * _TOLERANCE:
+                break
+        memory[:] = later
+        for r in range(n):
+            total = mean[r]
+            for k in range(count):
+                total -= 0.5 * R[r, k] * f[i, k]
+            v[i, r] = 2.0 * total - v[i - 1, r]
+            x[i, r] = x[i - 1, r] + dt * total
+    return -1

@@ -24,8 +24,8 @@ def stage_of(program: Program) -> Stage:
 
         return compiled_step(program)
 
-    lines = python_source(program).count("\n")
-    return Stage(step, given, tuple(derived), tuple(program.tape.starts.values()), compiled, lines, prepare)
+    lines, tape = python_source(program).count("\n"), program.tape
+    return Stage(step, given, tuple(derived), tuple(tape.starts.values()), compiled, lines, prepare, len(tape.inputs))
 
 
 def damper_stage(damper: Damper) -> Stage:

@@ -8,7 +8,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.systems.linear import aims
-from mrdamper.systems.simulate import Simulation
+from mrdamper.systems.result import Simulation
 from mrdamper.systems.weighting import frequency_weighted
 
 _WINDOW = 1.0  # s, of the running mean square behind MTVV

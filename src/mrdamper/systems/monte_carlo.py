@@ -12,7 +12,8 @@ from mrdamper.dampers.joint import JointDamper
 from mrdamper.data import Floats
 from mrdamper.errors import ParameterError
 from mrdamper.systems.kernel import Numbers
-from mrdamper.systems.simulate import Loop, Simulation
+from mrdamper.systems.result import Simulation
+from mrdamper.systems.simulate import Loop
 
 LEVELS = (0.05, 0.5, 0.95)
 

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from importlib.util import find_spec
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, StepError, StructureError
-from mrdamper.streaming import FLAGS
 from mrdamper.systems.controllers import Controller
 from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.controllers.preview import Preview
@@ -23,142 +21,17 @@ from mrdamper.systems.inputs import Input
 from mrdamper.systems.kernel import Numbers, Stage, make_walk
 from mrdamper.systems.linear import aims, linear_system
 from mrdamper.systems.links import contact_stage, damper_stage, stage_of
-from mrdamper.systems.structure import Link, System
+from mrdamper.systems.result import HALVING, Simulation
+from mrdamper.systems.structure import System
 
 PERIOD = 1e-3  # s between two looks of a control law, as usual on a real-time target
-HALVING = 5e-3  # change of a peak when the step is halved that is still called settled
 _COARSEST, _FINEST = 1e-3, 1e-5  # s
+_LOST = 0.1  # change of a peak by the third halving, beyond which halving on is in vain
+_MOST_HALVED = 1_000_000  # samples, beyond which a step is not halved again
 _STEPS_A_PERIOD = 40  # of the highest natural frequency, to begin with
 _LINES = 10_000_000  # that the interpreter may walk; more is worth the seconds of compilation
 _LINES_A_STEP = 60  # of the loop itself
 _MOST_STEPS = 20_000_000
-
-
-@dataclass(frozen=True, eq=False)
-class Simulation:
-    """What a system did.
-
-    Attributes
-    ----------
-    system : System
-    time : (N,) array
-        [s]
-    x, v, a : (N, n) arrays
-        Coordinates [m], their rates [m/s], absolute accelerations [m/s²].
-    links : tuple of Link
-        That were there: without dampers where they were taken out.
-    force, stroke, stroke_rate : (N, E) arrays
-        Of each link [N], [m], [m/s].
-    current : (N, E) array
-        Commanded to each link [A]; zero for stops and tyres.
-    flags : (N, E) array of int
-        Of dampers: bits of `streaming.FLAGS`. Of stops and tyres: touching; in the air.
-    road, road_rate : (N, q) arrays
-        Height of the road by channel [m], [m/s]; zero on the ground.
-    energy : mapping of str to (N,) array
-        Put in, stored, dissipated by the structure, taken by each link since the start [J].
-    limits : mapping of str to float
-        Largest current [A] of dampers that are asked for a force.
-    halving : float
-        Largest relative change of a peak against steps twice as long; NaN where not asked.
-    """
-
-    PEAKS: ClassVar = ("displacement_m", "drift_m", "acceleration_m_s2", "force_N")
-
-    system: System
-    time: Floats
-    x: Floats
-    v: Floats
-    a: Floats
-    links: tuple[Link, ...]
-    force: Floats
-    stroke: Floats
-    stroke_rate: Floats
-    current: Floats
-    flags: NDArray[np.int64]
-    road: Floats
-    road_rate: Floats
-    energy: Mapping[str, Floats]
-    controller: Controller
-    limits: Mapping[str, float]
-    halving: float = math.nan
-
-    @property
-    def step(self) -> float:
-        """Time step [s]."""
-        return float(self.time[1])
-
-    @property
-    def dampers(self) -> tuple[Link, ...]:
-        """The dampers that were there."""
-        return tuple(link for link in self.links if link.role == "damper")
-
-    @property
-    def outside(self) -> dict[str, dict[str, float]]:
-        """Share of the time each damper spent outside its tests, by quantity; stops and tyres: in touch, in the air."""
-        found: dict[str, dict[str, float]] = {}
-        for i, link in enumerate(self.links):
-            words = FLAGS if link.role == "damper" else ({"stop": "touching", "tyre": "in the air"}[link.role],)
-            shares = {word: float(np.mean(self.flags[:, i] >> bit & 1)) for bit, word in enumerate(words)}
-            if kept := {word: share for word, share in shares.items() if share > 0}:
-                found[link.name] = kept
-        return found
-
-    @cached_property
-    def peaks(self) -> dict[str, Floats]:
-        """Largest magnitudes: displacement, drift, acceleration, force, by coordinate, span, damper."""
-        dampers = [i for i, link in enumerate(self.links) if link.role == "damper"]
-        found = (
-            np.abs(self.x).max(axis=0),
-            np.array([np.abs(self.span(name)).max() for name in self.system.spans]),
-            np.abs(self.a).max(axis=0),
-            np.abs(self.force[:, dampers]).max(axis=0),
-        )
-        return dict(zip(self.PEAKS, found, strict=True))
-
-    def span(self, name: str) -> Floats:
-        """(N,) relative displacement [m] of a span of the system."""
-        row, road = self.system.span(*self.system.spans[name])
-        return self.x @ row + self.road @ road
-
-    def acceleration_of(self, point: str) -> Floats:
-        """(N,) absolute acceleration [m/s²] of a point that moves with the coordinates."""
-        return self.a @ self.system.point(point)[0]
-
-    @property
-    def unreachable(self) -> dict[str, float]:
-        """Share of the time the force asked of a damper was out of its reach: its current at an end."""
-        found = {}
-        for i, link in enumerate(self.links):
-            if link.name in self.limits:
-                most, current = self.limits[link.name], self.current[1:, i]
-                found[link.name] = float(np.mean((current <= 0.01 * most) | (current >= 0.99 * most)))
-        return found
-
-    @property
-    def timing(self) -> dict[str, float]:
-        """Correlation of each damper's current with the power it takes from the mass that is to be calmed.
-
-        Negative: firm just when it shakes that mass, as with a sign exchanged. Left out where the
-        current does not change.
-        """
-        found = {}
-        for i, link in enumerate(self.links):
-            current = self.current[:, i]
-            if link.role == "damper" and np.ptp(current) > 0:
-                end, sign = (link.below, -1.0) if self.controller.calms == "below" else (link.above, 1.0)
-                row, road = self.system.point(end)
-                power = sign * self.force[:, i] * (self.v @ row + self.road_rate @ road)
-                if np.ptp(power) > 0:
-                    found[link.name] = float(np.corrcoef(current, power)[0, 1])
-        return found
-
-    @property
-    def energy_gap(self) -> float:
-        """Largest imbalance of energy over the most that was put in."""
-        spent = sum(series for name, series in self.energy.items() if name != "input")
-        most = max(float(np.abs(self.energy["input"]).max()), np.finfo(float).tiny)
-        return float(np.abs(self.energy["input"] - spent).max()) / most
 
 
 def simulate_system(
@@ -187,7 +60,7 @@ def simulate_system(
     Returns
     -------
     Simulation
-        At the finer of the two steps compared.
+        At the finer of the two steps compared; `settled` says whether they agree.
 
     Raises
     ------
@@ -207,19 +80,20 @@ def simulate_system(
     """
     loop = Loop(system, source, dampers, controller or Passive(), highest)
     dt = loop.first_step if step is None else step
-    coarse, first = loop.run(dt), None
+    coarse, first, first_step = loop.run(dt), None, dt
     while True:
         fine = loop.run(dt / 2)
         change = _change(coarse, fine)
         first = change if first is None else first
-        if change <= HALVING or dt / 2 <= _FINEST:
+        lost = change > _LOST and dt <= first_step / 4  # sensitive to the smallest change: no step will do
+        if change <= HALVING or dt / 2 <= _FINEST or fine.time.size > _MOST_HALVED or lost:
             break
         coarse, dt = fine, dt / 2
     if step is not None and dt < step:
         raise StepError(
             f"halving the step of {step:g} s changes a peak by {100 * first:.2g} %",
             where=system.name,
-            mend=f"give --step {dt:.3g} or less, or none",
+            mend=f"give --step {dt:.3g} or less, or none" if change <= HALVING else "leave --step out",
             code="E_STEP_COARSE",
         )
     return replace(fine, halving=change)
@@ -318,12 +192,11 @@ class Loop:
             numbers = numbers or self.numbers
             control = Numbers.of(self._controllers)
             every = max(1, round(self.period / dt))
-            failed = self._walk(machine)(
-                dt, every, S @ (2 / dt * system.M), -S @ system.K, R, self.B @ R, self.B, mean_load,
-                np.ascontiguousarray(road @ self.D.T), np.ascontiguousarray(road_rate @ self.D.T), H, seen,
-                numbers.given, numbers.derived, numbers.start.copy(), control.given, control.derived, control.start,
-                current, x, v, force, flags,
-            )  # fmt: skip
+            rows = (S @ (2 / dt * system.M), -S @ system.K, R, self.B @ R, self.B, mean_load)
+            rows = (*rows, road @ self.D.T, road_rate @ self.D.T, H, seen)
+            held = (numbers.given, numbers.derived, numbers.start.copy(), control.given, control.derived, control.start)
+            written = (current, x, v, force, flags)
+            failed = self._walk(machine)(float(dt), every, *map(np.ascontiguousarray, rows), *held, *written)
         if failed >= 0 or not np.isfinite(x).all():
             raise StepError(
                 f"no solution at {time[max(failed, 0)]:.6g} s",
@@ -416,9 +289,7 @@ class Loop:
 
     def _walk(self, machine: bool) -> Any:
         if machine not in self._walks:
-            self._walks[machine] = make_walk(
-                self.stages, next(iter(self._controllers), None), len(self.control.signals), machine
-            )
+            self._walks[machine] = make_walk(self.stages, next(iter(self._controllers), None), machine)
         return self._walks[machine]
 
     def _energy(self, dt: float, x: Floats, v: Floats, force: Floats, load: Floats, road: Floats) -> dict[str, Floats]:

@@ -12,7 +12,7 @@ import typer
 if TYPE_CHECKING:
     from mrdamper.dampers.base import Damper
     from mrdamper.systems.controllers import Controller
-    from mrdamper.systems.simulate import Simulation
+    from mrdamper.systems.result import Simulation
 
 
 def register(app: typer.Typer) -> None:
@@ -160,6 +160,7 @@ def _figures(done: Simulation, dampers: Mapping[str, Damper]) -> dict[str, Any]:
         "peak_force_by_damper_N": forces,
         "step_s": done.step,
         "step_halving_change": done.halving,
+        "settled": done.settled,
         "energy_gap": done.energy_gap,
         "outside_tests": done.outside,
         "out_of_reach": done.unreachable,
@@ -186,6 +187,12 @@ def _print(done: Simulation) -> None:
         f"step {1e3 * done.step:.3g} ms; halving it last changed a peak by {100 * done.halving:.2g} %; "
         f"energy balances to {done.energy_gap:.1g}"
     )
+    if not done.settled:
+        typer.echo(
+            "warning: the peaks have not settled: this motion answers to the smallest change, as wheels in the air, "
+            "hard stops or too little damping make it; read them as one of many",
+            err=True,
+        )
     for name, shares in done.outside.items():
         for quantity, share in shares.items():
             what = f"{quantity} outside its tests" if quantity in FLAGS else quantity

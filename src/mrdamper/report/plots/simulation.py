@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mrdamper.report.plots.style import MM, PALETTE, house_style, label, new_figure
-from mrdamper.systems.simulate import Simulation
+from mrdamper.systems.result import Simulation
 
 _POINTS = 4000  # of a history that are drawn
 

@@ -1,0 +1,151 @@
+"""What a system did: histories, peaks, energies, and how far a damper was taken beyond its tests."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mrdamper.data import Floats
+from mrdamper.streaming import FLAGS
+from mrdamper.systems.controllers import Controller
+from mrdamper.systems.structure import Link, System
+
+HALVING = 5e-3  # change of a peak when the step is halved that is still called settled
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """What a system did.
+
+    Attributes
+    ----------
+    system : System
+    time : (N,) array
+        [s]
+    x, v, a : (N, n) arrays
+        Coordinates [m], their rates [m/s], absolute accelerations [m/s²].
+    links : tuple of Link
+        That were there: without dampers where they were taken out.
+    force, stroke, stroke_rate : (N, E) arrays
+        Of each link [N], [m], [m/s].
+    current : (N, E) array
+        Commanded to each link [A]; zero for stops and tyres.
+    flags : (N, E) array of int
+        Of dampers: bits of `streaming.FLAGS`. Of stops and tyres: touching; in the air.
+    road, road_rate : (N, q) arrays
+        Height of the road by channel [m], [m/s]; zero on the ground.
+    energy : mapping of str to (N,) array
+        Put in, stored, dissipated by the structure, taken by each link since the start [J].
+    limits : mapping of str to float
+        Largest current [A] of dampers that are asked for a force.
+    halving : float
+        Largest relative change of a peak against steps twice as long; NaN where not asked.
+    """
+
+    PEAKS: ClassVar = ("displacement_m", "drift_m", "acceleration_m_s2", "force_N")
+
+    system: System
+    time: Floats
+    x: Floats
+    v: Floats
+    a: Floats
+    links: tuple[Link, ...]
+    force: Floats
+    stroke: Floats
+    stroke_rate: Floats
+    current: Floats
+    flags: NDArray[np.int64]
+    road: Floats
+    road_rate: Floats
+    energy: Mapping[str, Floats]
+    controller: Controller
+    limits: Mapping[str, float]
+    halving: float = math.nan
+
+    @property
+    def step(self) -> float:
+        """Time step [s]."""
+        return float(self.time[1])
+
+    @property
+    def settled(self) -> bool:
+        """Whether halving the step changed no peak by more than 0.5 %; False too where nobody asked."""
+        return self.halving <= HALVING
+
+    @property
+    def dampers(self) -> tuple[Link, ...]:
+        """The dampers that were there."""
+        return tuple(link for link in self.links if link.role == "damper")
+
+    @property
+    def outside(self) -> dict[str, dict[str, float]]:
+        """Share of the time each damper spent outside its tests, by quantity; stops and tyres: in touch, in the air."""
+        found: dict[str, dict[str, float]] = {}
+        for i, link in enumerate(self.links):
+            words = FLAGS if link.role == "damper" else ({"stop": "touching", "tyre": "in the air"}[link.role],)
+            shares = {word: float(np.mean(self.flags[:, i] >> bit & 1)) for bit, word in enumerate(words)}
+            if kept := {word: share for word, share in shares.items() if share > 0}:
+                found[link.name] = kept
+        return found
+
+    @cached_property
+    def peaks(self) -> dict[str, Floats]:
+        """Largest magnitudes: displacement, drift, acceleration, force, by coordinate, span, damper."""
+        dampers = [i for i, link in enumerate(self.links) if link.role == "damper"]
+        found = (
+            np.abs(self.x).max(axis=0),
+            np.array([np.abs(self.span(name)).max() for name in self.system.spans]),
+            np.abs(self.a).max(axis=0),
+            np.abs(self.force[:, dampers]).max(axis=0),
+        )
+        return dict(zip(self.PEAKS, found, strict=True))
+
+    def span(self, name: str) -> Floats:
+        """(N,) relative displacement [m] of a span of the system."""
+        row, road = self.system.span(*self.system.spans[name])
+        return self.x @ row + self.road @ road
+
+    def acceleration_of(self, point: str) -> Floats:
+        """(N,) absolute acceleration [m/s²] of a point that moves with the coordinates."""
+        return self.a @ self.system.point(point)[0]
+
+    @property
+    def unreachable(self) -> dict[str, float]:
+        """Share of the time the force asked of a damper was out of its reach: its current at an end."""
+        found = {}
+        for i, link in enumerate(self.links):
+            if link.name in self.limits:
+                most, current = self.limits[link.name], self.current[1:, i]
+                found[link.name] = float(np.mean((current <= 0.01 * most) | (current >= 0.99 * most)))
+        return found
+
+    @property
+    def timing(self) -> dict[str, float]:
+        """Correlation of each damper's current with the power it takes from the mass that is to be calmed.
+
+        Negative: firm just when it shakes that mass, as with a sign exchanged. Left out where the
+        current does not change.
+        """
+        found = {}
+        for i, link in enumerate(self.links):
+            current = self.current[:, i]
+            if link.role == "damper" and np.ptp(current) > 0:
+                end, sign = (link.below, -1.0) if self.controller.calms == "below" else (link.above, 1.0)
+                row, road = self.system.point(end)
+                power = sign * self.force[:, i] * (self.v @ row + self.road_rate @ road)
+                if np.ptp(power) > 0:
+                    found[link.name] = float(np.corrcoef(current, power)[0, 1])
+        return found
+
+    @property
+    def energy_gap(self) -> float:
+        """Largest imbalance of energy over the most that was put in."""
+        spent = sum(series for name, series in self.energy.items() if name != "input")
+        most = max(float(np.abs(self.energy["input"]).max()), np.finfo(float).tiny)
+        return float(np.abs(self.energy["input"] - spent).max()) / most
