@@ -32,7 +32,12 @@ from mrdamper.optimizers.levenberg_marquardt import least_squares
 from mrdamper.optimizers.linear import on_one_blas_thread, robust_weights, solve_bounded
 
 RISE, FALL = "coil.rise_s", "coil.fall_s"  # names of the coil's lags on the search axes
-_ROWS = 400  # samples of a steady run that enter the least squares; its motion is followed in full
+_ROWS = 400  # samples of a steady run that enter the least squares, about
+_TURNING, _RUNNING = 400, 60  # samples of a cycle that are followed: where the motion turns, and elsewhere
+_SLOW = 0.4  # of the peak velocity, below which a motion turns
+_AT_REST = 0.05  # cycles of rest around a sample at which nothing turns any more
+_STARTING = 0.05  # cycles at the begin of a record that do not enter: the state it began in is not known
+_CURRENT_MOVES = 1e-3  # of the largest current; where it changes by more, every sample is followed
 _TRANSIENT = 0.1  # weight of what lies outside a steady window, ramps and rests, against what lies inside
 _CYCLES = 4  # of a sine that enter: more repeat the same
 _WARM_UP = 1.5  # cycles before the scored samples in which the model forgets its start
@@ -426,7 +431,7 @@ def _scale(parts: Sequence[_Part]) -> Scale:
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """What of a run is followed, which samples enter, and how much each counts.
+    """What of a run is followed, which samples enter, and how much each counts: by the time it stands for.
 
     Of a steady sine the middle cycles are left out: they repeat the last ones.
     """
@@ -455,26 +460,28 @@ class _Part:
             raise RunError("the force does not change", where=f"run {run.id}", mend="leave the run out")
         period, time = 1 / found.condition.frequency_Hz, run.time
         information = 1.0
-        followed = np.ones(len(motion), dtype=bool)
+        followed = _carrying(motion, found.condition)
         steady = first
         if found.is_sine:
             steady = max(first, int(np.searchsorted(time, time[last] - _CYCLES * period)))
-            followed = (time <= time[first] + period) | (time >= time[steady] - _WARM_UP * period)
+            followed &= (time <= time[first] + period) | (time >= time[steady] - _WARM_UP * period)
         else:
             information = max(1.0, np.sqrt((time[last] - time[first]) / period))
-        rows = int(_ROWS * information)
-        inside = np.arange(steady, last + 1, max(1, (last + 1 - steady) // rows))
-        outside = np.concatenate([np.arange(first), np.arange(last + 1, len(motion))])
-        outside = outside[:: max(1, outside.size // _ROWS)]
-        picked = np.concatenate([outside[outside < first], inside, outside[outside > last]])
-        transient = _TRANSIENT if outside.size else 0.0
-        share = np.where((picked >= first) & (picked <= last), 1 / inside.size, transient / max(outside.size, 1)) / (
-            1 + transient
-        )
-        place = np.cumsum(followed) - 1
+        at = np.flatnonzero(followed)
+        rows = at[time[at] >= time[0] + _STARTING * period]
+        before, inside, after = rows[rows < first], rows[(rows >= steady) & (rows <= last)], rows[rows > last]
+        inside = inside[:: max(1, int(inside.size / (_ROWS * information)))]
+        every = max(1, (before.size + after.size) // _ROWS)
+        before, after = before[::every], after[::every]
+        picked = np.concatenate([before, inside, after])
+        transient = _TRANSIENT if before.size + after.size else 0.0
+        lasting = [_lasting(time[part]) for part in (before, inside, after)]
+        outside = float(lasting[0].sum() + lasting[2].sum())
+        sizes = (transient / max(outside, 1e-300), 1 / lasting[1].sum(), transient / max(outside, 1e-300))
+        share = np.concatenate([size * part for size, part in zip(sizes, lasting, strict=True)]) / (1 + transient)
         return cls(
-            motion.part(followed),
-            place[picked],
+            motion.part(at),
+            np.searchsorted(at, picked),
             run.force[picked],
             share,
             found.condition,
@@ -484,7 +491,7 @@ class _Part:
             found.is_sine,
             float(np.min(run.displacement)),
             float(np.max(run.displacement)),
-            (int(place[steady]), int(place[last])),
+            (int(np.searchsorted(at, inside[0])), int(np.searchsorted(at, inside[-1]))),
         )
 
     @property
@@ -510,6 +517,36 @@ class _Part:
             share=self.share[kept] / self.share[kept].sum(),
             steady=(int(self.picked[kept[0]]) - begin, end - 1 - begin),
         )
+
+
+def _carrying(motion: Excitation, condition: Condition) -> NDArray[np.bool_]:
+    """Samples without which the motion would be another: dense where it turns, few where it runs on or rests.
+
+    A damper's force changes within a short way after a reversal; between two it changes slowly,
+    however fast the record was sampled.
+    """
+    size, duration = len(motion), float(motion.time[-1] - motion.time[0])
+    cycle = (size - 1) / (duration * condition.frequency_Hz)  # samples
+    dense = max(1, int(cycle / _TURNING))
+    sparse = dense * max(1, round(cycle / _RUNNING / dense))
+    speed = np.abs(motion.velocity) / condition.peak_velocity
+    reach = max(1, int(_AT_REST * cycle))
+    moving = np.cumsum(np.concatenate([np.zeros(reach + 1), speed > _STILL, np.zeros(reach)]))
+    turning = (speed < _SLOW) & (moving[2 * reach + 1 :] > moving[: -2 * reach - 1])
+    place = np.arange(size)
+    kept = (place % dense == 0) & (turning | (place % sparse == 0))
+    current = np.abs(np.diff(motion.current)) > _CURRENT_MOVES * float(np.max(np.abs(motion.current)))
+    kept[:-1] |= current
+    kept[1:] |= current
+    return kept
+
+
+def _lasting(time: Floats) -> Floats:
+    """(N,) time each of some samples stands for: half of the way to its neighbours on either side [s]."""
+    if time.size < 2:
+        return np.ones(time.size)
+    steps = np.diff(time)
+    return (np.concatenate([steps[:1], steps]) + np.concatenate([steps, steps[-1:]])) / 2
 
 
 @dataclass(frozen=True, eq=False)
