@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import importlib
 import os
 import signal
 import sys
@@ -45,6 +46,8 @@ class Trial:
         if session.testsfailed or not session.items:
             self.why = "no test could be collected"
             return True
+        for module in {fault.module for fault in self.faults}:
+            importlib.import_module(module)  # what is found and loaded later would be loaded whole again
         files = {str(path_of(fault.module)) for fault in self.faults}
         answer = _in_fork(lambda: self._healthy(session, files), 600)
         if not isinstance(answer, tuple):

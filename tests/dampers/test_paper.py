@@ -80,7 +80,6 @@ def test_the_recipe_makes_frequency_dependence_out_of_a_constant_damper():
 
 
 def test_the_genetic_search_comes_to_the_optimum_it_is_after():
-    pytest.importorskip("pymoo")
     run = steady_run(Condition(1.0, 1.0, 0.05), samples=400)
     optimum = identify(run, "bouc-wen", Paper(search="optimum"), gas=GAS)
     # A tenth of the paper's generations, to be quick; eight boxes make up for it.

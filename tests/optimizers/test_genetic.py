@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mrdamper.errors import MissingExtraError, ParameterError
+from mrdamper.errors import ParameterError
 from mrdamper.optimizers.generation import (
     GeneticSettings,
     next_generation,
@@ -61,7 +61,6 @@ def test_crossover_takes_numbers_from_the_parents_and_mutation_stays_in_the_box(
 
 
 def test_the_search_is_seeded_narrows_and_records_its_history():
-    pytest.importorskip("pymoo")
     settings = GeneticSettings(generations=40, narrowings=4)
     first, again = (genetic(bowl, [0, 0], [1e8, 1e8], settings) for _ in range(2))
     other = genetic(bowl, [0, 0], [1e8, 1e8], GeneticSettings(generations=40, narrowings=4, seed=1))
@@ -81,16 +80,3 @@ def test_reversed_bounds_and_impossible_settings_are_refused():
         GeneticSettings(mutation=1.5)
     with pytest.raises(ParameterError, match="population of 4"):
         GeneticSettings(population=2)
-
-
-def test_a_missing_pymoo_is_named_with_the_way_to_install_it(monkeypatch):
-    real = builtins.__import__
-
-    def without_pymoo(name, *args, **kwargs):
-        if name == "mrdamper.optimizers.pymoo_scheme":
-            raise ModuleNotFoundError("No module named 'pymoo'", name="pymoo")
-        return real(name, *args, **kwargs)
-
-    monkeypatch.setattr(builtins, "__import__", without_pymoo)
-    with pytest.raises(MissingExtraError, match=r"pip install 'mrdamper\[ga\]'"):
-        genetic(bowl, [0, 0], [1, 1])

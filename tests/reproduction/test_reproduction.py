@@ -222,7 +222,6 @@ def test_relative_errors_are_those_of_the_vector(vectors):
 
 
 def test_the_direct_search_comes_near_on_an_easy_run():
-    pytest.importorskip("pymoo")
     run = virtual_dataset(currents=(1.0,))["50mm-1Hz-1A"]
     method = DirectGenetic(genetic=GeneticSettings(population=60, generations=25, narrowings=3, narrow_to=0.4))
     found = identify(run, "bouc-wen", method)

@@ -2,9 +2,8 @@
 
 [Qian et al. 2024, section 4.3] states population, crossover fraction, mutation probability,
 selection, generations and bounds. What it leaves open follows the program whose default
-selection it names: rank scaling, five per cent elite, scattered crossover. pymoo keeps the
-population and runs the generations; the operators are ours, in `generation`, so that they can
-be read and tested.
+selection it names: rank scaling, five per cent elite, scattered crossover. The operators stand
+in `generation`.
 """
 
 from __future__ import annotations
@@ -15,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mrdamper.errors import MissingExtraError, ParameterError
+from mrdamper.errors import ParameterError
 from mrdamper.optimizers.ending import Ending
-from mrdamper.optimizers.generation import GeneticSettings
+from mrdamper.optimizers.generation import GeneticSettings, next_generation
 from mrdamper.optimizers.linear import Floats
 
 Cost = Callable[[Floats], Floats]
@@ -71,8 +70,6 @@ def genetic(
     ------
     ParameterError
         If a lower bound is not below its upper bound.
-    MissingExtraError
-        If pymoo is not installed.
     """
     chosen = settings or GeneticSettings()
     low, high = np.array(lower, dtype=float), np.array(upper, dtype=float)
@@ -82,7 +79,6 @@ def genetic(
         raise ParameterError(
             f"bounds of coordinate {i} run from {low[i]:g} to {high[i]:g}", mend="give the lower bound first"
         )
-    generations = _generations()
     outer, boxes, history = (low, high), [], []
     best, best_cost = (low + high) / 2, np.inf
     rng = np.random.default_rng(chosen.seed)
@@ -91,7 +87,7 @@ def genetic(
         progress(
             f"genetic search, box {round_number + 1} of {chosen.narrowings + 1}", round_number / (chosen.narrowings + 1)
         )
-        point, found, costs = generations(cost, low, high, chosen, int(rng.integers(2**31)))
+        point, found, costs = _generations(cost, low, high, chosen, int(rng.integers(2**31)))
         history.append(np.minimum(costs, best_cost))
         if found < best_cost:
             best, best_cost = point, found
@@ -105,11 +101,18 @@ def genetic(
     )
 
 
-def _generations() -> Callable[[Cost, Floats, Floats, GeneticSettings, int], tuple[Floats, float, Floats]]:
-    try:
-        from mrdamper.optimizers.pymoo_scheme import run_generations
-    except ModuleNotFoundError as error:
-        raise MissingExtraError(
-            "the genetic algorithm needs pymoo, which is not installed", mend="pip install 'mrdamper[ga]'"
-        ) from error
-    return run_generations
+def _generations(
+    cost: Cost, lower: Floats, upper: Floats, settings: GeneticSettings, seed: int
+) -> tuple[Floats, float, Floats]:
+    """Search one box; the best point, its cost, and the lowest cost after every generation."""
+    rng = np.random.default_rng(seed)
+    points = rng.uniform(lower, upper, (settings.population, lower.size))
+    costs = cost(points)
+    lowest = [np.min(costs)]
+    for _ in range(settings.generations - 1):
+        elite, children = next_generation(points, costs, lower, upper, settings, rng)
+        kept = np.sort(costs, kind="stable")[: len(elite)]
+        points, costs = np.concatenate([elite, children]), np.concatenate([kept, cost(children)])
+        lowest.append(np.min(costs))
+    best = int(np.argmin(costs))
+    return points[best], float(costs[best]), np.array(lowest)

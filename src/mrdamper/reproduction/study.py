@@ -17,7 +17,7 @@ import numpy as np
 
 from mrdamper.dampers.paper import paper_functions
 from mrdamper.data import Condition, Dataset, Floats, Run
-from mrdamper.errors import IdentificationError, InputError, MissingExtraError
+from mrdamper.errors import IdentificationError, InputError
 from mrdamper.gas_spring import GasSpring
 from mrdamper.identification import Identification, Method, identify
 from mrdamper.identification.harmonic_balance import ForceReading, SineRecord, read_force
@@ -304,10 +304,7 @@ def _genetic_checks(
         progress(f"genetic search, {run.id}", number / len(picks))
         method = Paper(genetic=GeneticSettings(seed=number), bounds=switches.bounds, explain=False)
         problem, begin = settled.basis(method).problem(run), time.perf_counter()
-        try:
-            found = method.genetic_search(problem)
-        except MissingExtraError as error:
-            return (), (f"the genetic search was left out: {error}",)
+        found = method.genetic_search(problem)
         seconds = time.perf_counter() - begin
         best = settled.basis(replace(method, search="optimum")).identify(run)
         ends = np.array([found.point, [getattr(best.model, name) for name in ("alpha", "beta")]])
