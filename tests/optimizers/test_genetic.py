@@ -1,6 +1,5 @@
 """The paper's genetic algorithm: its operators one by one, then the whole."""
 
-import builtins
 import json
 from pathlib import Path
 
