@@ -20,7 +20,15 @@ extensions = [
     "sphinx_gallery.gen_gallery",
     "sphinx_llms_txt",
 ]
-exclude_patterns = ["_build", "gallery/*.ipynb", "gallery/*.py", "gallery/*.zip", "gallery/*.json", "_live"]
+exclude_patterns = [
+    "_build",
+    "gallery/*.ipynb",
+    "gallery/*.py",
+    "gallery/*.zip",
+    "gallery/*.json",
+    "_live",
+    "sg_execution_times.rst",
+]
 suppress_warnings = ["config.cache"]
 myst_heading_anchors = 3
 autosummary_generate = True
@@ -43,6 +51,7 @@ html_theme = "pydata_sphinx_theme"
 html_title = "mrdamper"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_js_files = ["site.js"]
 html_extra_path = ["_live"]
 html_show_sourcelink = False
 html_theme_options = {
@@ -105,6 +114,7 @@ def _plain_bars(app, what, name, thing, options, lines: list[str]) -> None:
 def setup(app) -> None:
     """Write what is made from the program itself, before the pages are read."""
     app.connect("autodoc-process-docstring", _plain_bars)
+    (HERE / "_live").mkdir(exist_ok=True)  # Sphinx looks for it before the first page is read
     _commands()
     _models()
     app.connect("builder-inited", lambda _: _live_dampers())

@@ -1,4 +1,8 @@
-"""A damper at work: a frame in an earthquake, and the current for a wanted force."""
+"""
+A building and a car
+====================
+
+A damper at work: a frame in an earthquake, and the current for a wanted force."""
 
 import math
 

@@ -1,4 +1,8 @@
-"""A line of dampers that was never made, tested, identified and watched: who stands out, what drifts."""
+"""
+A line of dampers
+=================
+
+A line of dampers that was never made, tested, identified and watched: who stands out, what drifts."""
 
 import tempfile
 from pathlib import Path
