@@ -125,17 +125,81 @@ def test_a_number_is_what_a_laboratory_writes(tmp_path, bundled, cell):
         load_dataset(tmp_path / "set")
 
 
+def constant(count, **columns):
+    table = {"run_id": pl.repeat("a", count, eager=True)}
+    return pl.DataFrame(table | {c: pl.repeat(0.0, count, eager=True) for c in (*CHANNELS, *columns)})
+
+
+CHANNELS = ("time_s", "displacement_m", "force_N")
+
+
 @pytest.mark.parametrize("name", ["samples.parquet", "samples.csv.gz"])
 def test_samples_that_unpack_without_end_are_refused_before(tmp_path, name):
     (tmp_path / "runs.csv").write_text("run_id,current_A\na,0\n")
     if name.endswith("parquet"):
-        count = 2**24
-        table = {"run_id": pl.repeat("a", count, eager=True)}
-        table |= {c: pl.repeat(0.0, count, eager=True) for c in ("time_s", "displacement_m", "force_N")}
-        pl.DataFrame(table).write_parquet(tmp_path / name, compression="zstd")
+        constant(2**24).write_parquet(tmp_path / name, compression="zstd")
     else:
         with gzip.open(tmp_path / name, "wb") as file:
             file.write(b"run_id,time_s,displacement_m,force_N\n" + b"a,0,0,0\n" * 2**25)
-    with pytest.raises(DatasetError, match="unpack") as error:
+    with pytest.raises(DatasetError) as error:
         load_dataset(tmp_path)
     assert error.value.code == "E_ARCHIVE_RATIO"
+
+
+def test_many_columns_together_are_no_way_around_the_bound(tmp_path):
+    (tmp_path / "runs.csv").write_text("run_id,current_A\na,0\n")
+    constant(2**21, **{f"c{i}": 0 for i in range(20)}).write_parquet(tmp_path / "samples.parquet", compression="zstd")
+    with pytest.raises(DatasetError) as error:
+        load_dataset(tmp_path)
+    assert error.value.code == "E_ARCHIVE_RATIO"
+
+
+def test_lists_and_text_in_further_columns_are_not_unpacked(tmp_path):
+    (tmp_path / "runs.csv").write_text("run_id,current_A\na,0\n")
+    t = np.arange(4.0)
+    lists = [np.zeros(2**21)] * 4
+    table = {"run_id": ["a"] * 4, "time_s": t, "displacement_m": t, "force_N": t, "list": lists, "text": ["x"] * 4}
+    pl.DataFrame(table).write_parquet(tmp_path / "samples.parquet", compression="zstd")
+    assert load_dataset(tmp_path)["a"].further == {}
+    pl.DataFrame({**table, "force_N": lists}).write_parquet(tmp_path / "samples.parquet", compression="zstd")
+    with pytest.raises(ColumnError, match="force_N holds text"):
+        load_dataset(tmp_path)
+
+
+def test_damaged_samples_are_refused_or_read(tmp_path):
+    save_dataset(dataset(), tmp_path / "d")
+    path = tmp_path / "d" / "samples.parquet"
+    whole = path.read_bytes()
+    rng = np.random.default_rng(1)
+    refused = 0
+    for _ in range(25):
+        content = bytearray(whole)
+        for at in rng.integers(len(whole) - 400, len(whole), 3):
+            content[at] = rng.integers(256)
+        path.write_bytes(content)
+        try:
+            load_dataset(tmp_path / "d")
+        except InputError:
+            refused += 1
+    assert refused > 5
+
+
+@pytest.mark.parametrize(
+    ("table", "found"),
+    [
+        ("run_id,current_A," + ",".join(f"c{i}" for i in range(1000)), "1002 columns"),
+        ("run_id,current_A,current_A\na,1,2", "2 of different names"),
+        ("run_id,current_A\na,1,2", "3 cells under 2 columns in the row of run a"),
+        ("run_id,current_A\n" + "a,1\n" * 100_001, "over 100,000 runs"),
+    ],
+)
+def test_a_table_of_runs_has_bounds(tmp_path, table, found):
+    (tmp_path / "runs.csv").write_text(table)
+    with pytest.raises(DatasetError, match=found):
+        load_dataset(tmp_path)
+
+
+def test_rows_of_a_run_need_not_stand_together(tmp_path):
+    (tmp_path / "runs.csv").write_text("run_id,current_A\na,0\nb,1\n")
+    (tmp_path / "samples.csv").write_text(rows(*(f"{r},{t},{t % 2},{t}" for t in range(4) for r in "ba")))
+    assert [run.force.tolist() for run in load_dataset(tmp_path)] == [[0, 1, 2, 3]] * 2

@@ -5,9 +5,8 @@
 
 from __future__ import annotations
 
+import csv
 import math
-import re
-import zlib
 from collections.abc import Collection, Iterable
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -16,20 +15,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mrdamper.data import Condition, Dataset, Run
-from mrdamper.errors import ColumnError, DatasetError, UnitError
+from mrdamper.errors import ColumnError, DatasetError
 from mrdamper.files.atomic import path_of, write_file, write_folder
 from mrdamper.files.encoding import csv_text, csv_value
+from mrdamper.files.samples import OPTIONAL, REQUIRED, SAMPLE_FILES, Channels, missing_column, read_samples
+from mrdamper.rig_files.readers.base import MOST_COLUMNS
 
 if TYPE_CHECKING:
     import polars as pl
 
 BUNDLED = "two_rigs"
-_RATIO, _UNPACKED = 100, 2**28  # samples may grow so many times, or to so many bytes, when unpacked
-SAMPLE_FILES = ("samples.parquet", "samples.csv.gz", "samples.csv")
 _PIECE = 2**20  # samples written at once
-_REQUIRED = ("time_s", "displacement_m", "force_N")
-_OPTIONAL = ("current_A", "velocity_m_s")
-_UNIT = re.compile(r"^(time|displacement|force|current|velocity)[ _\[(]", re.IGNORECASE)
+_MOST_RUNS, _RUNS_BYTES = 100_000, 2**26  # of a table of runs
 _KNOWN_RUN_COLUMNS = (
     "run_id", "rig", "excitation", "current_A", "nominal_frequency_Hz", "nominal_amplitude_m",
     "steady_t0_s", "steady_t1_s", "split", "repeatability_nrmse_pp",
@@ -61,7 +58,7 @@ def load_dataset(folder: str | Path | None = None) -> Dataset:
     """
     if folder is None:
         with as_file(files("mrdamper.files.bundled") / BUNDLED) as bundled:
-            return _load(Path(bundled), "bundled tests of two dampers")
+            return _load(Path(bundled), "bundled tests of two dampers", trusted=True)
     folder = path_of(folder)
     return _load(folder, folder.name or str(folder))
 
@@ -118,9 +115,9 @@ def store_split(folder: str | Path, held_out: Collection[str]) -> None:
         path.write_text(csv_text(rows), encoding="utf-8")
 
 
-def _load(folder: Path, name: str) -> Dataset:
+def _load(folder: Path, name: str, *, trusted: bool = False) -> Dataset:
     table = _runs_table(folder)
-    samples = _samples_table(folder)
+    samples = read_samples(folder, trusted=trusted)
     missing = [row["run_id"] for row in table if row["run_id"] not in samples]
     if missing:
         raise DatasetError(
@@ -131,7 +128,7 @@ def _load(folder: Path, name: str) -> Dataset:
     strangers = set(samples) - {row["run_id"] for row in table}
     if strangers:
         raise DatasetError(
-            f"samples name run {min(strangers)!r}, which runs.csv does not",
+            f"samples name run {min(strangers)[:80]!r}, which runs.csv does not",
             where=str(folder),
             mend="add a row to runs.csv, or correct the run_id",
         )
@@ -139,8 +136,6 @@ def _load(folder: Path, name: str) -> Dataset:
 
 
 def _runs_table(folder: Path) -> list[dict[str, Any]]:
-    import polars as pl
-
     if not folder.is_dir():
         raise DatasetError("no such folder", where=str(folder), mend="give a folder that holds runs.csv")
     path = folder / "runs.csv"
@@ -150,81 +145,52 @@ def _runs_table(folder: Path) -> list[dict[str, Any]]:
             hint = f"are these files of a rig? mrdamper import {folder.name or folder} --out DATASET makes a dataset"
         raise DatasetError("runs.csv is missing", where=str(folder), mend=hint)
     try:
-        table = pl.read_csv(path, infer_schema_length=0)
-    except (pl.exceptions.PolarsError, OSError) as error:
-        raise DatasetError(_first_line(error), where=str(path), mend="write it as comma-separated UTF-8") from error
-    if "run_id" not in table.columns:
-        raise _missing_column("run_id", table.columns, path)
-    if not table.height:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = _rows_of(csv.reader(file), path)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        found = str(error).splitlines()[0]
+        raise DatasetError(found, where=str(path), mend="write it as comma-separated UTF-8") from error
+    if not rows:
         raise DatasetError("no rows", where=str(path), mend="add one row a run")
-    return [{k: v and csv_value(v) for k, v in row.items()} for row in table.to_dicts()]
+    return rows
+
+
+def _rows_of(lines: Iterable[list[str]], path: Path) -> list[dict[str, Any]]:
+    """Rows by column; empty cells are None."""
+
+    def refuse(found: str) -> DatasetError:
+        return DatasetError(found, where=str(path), mend="write one row a run and one column a fact")
+
+    if path.stat().st_size > _RUNS_BYTES:
+        raise refuse(f"over {_RUNS_BYTES // 2**20} MB")
+    heads: list[str] | None = None
+    rows = []
+    for line in lines:
+        if not line:
+            continue
+        if heads is None:
+            heads = line
+            if "run_id" not in heads:
+                raise missing_column("run_id", heads, path)
+            if len(set(heads)) < len(heads) or len(heads) > MOST_COLUMNS:
+                raise refuse(f"{len(heads)} columns, {len(set(heads))} of different names")
+        elif len(line) > len(heads):
+            raise refuse(
+                f"{len(line)} cells under {len(heads)} columns in the row of run {line[heads.index('run_id')][:80]}"
+            )
+        elif len(rows) == _MOST_RUNS:
+            raise refuse(f"over {_MOST_RUNS:,} runs")
+        else:
+            cells = [csv_value(cell) or None for cell in line] + [None] * (len(heads) - len(line))
+            rows.append(dict(zip(heads, cells, strict=True)))
+    return rows
 
 
 def _holds_rig_files(folder: Path) -> bool:
     return any(p.is_file() and p.name not in SAMPLE_FILES for p in folder.iterdir())
 
 
-def _samples_table(folder: Path) -> dict[str, pl.DataFrame]:
-    import polars as pl
-
-    for name in SAMPLE_FILES:
-        path = folder / name
-        if path.is_file():
-            break
-    else:
-        raise DatasetError(f"none of {', '.join(SAMPLE_FILES)} is there", where=str(folder), mend="add the samples")
-    try:
-        _refuse_bomb(path)
-        if path.suffix == ".parquet":
-            table = pl.read_parquet(path)
-        else:
-            header = pl.read_csv(path, n_rows=0, infer_schema_length=0).columns
-            numbers = {c: pl.Float64 for c in (*_REQUIRED, *_OPTIONAL) if c in header}
-            table = pl.read_csv(path, schema_overrides={"run_id": pl.String, **numbers})
-    except (pl.exceptions.PolarsError, OSError, EOFError, zlib.error) as error:
-        raise DatasetError(_first_line(error), where=str(path), mend="write the file again") from error
-    for column in ("run_id", *_REQUIRED):
-        if column not in table.columns:
-            raise _missing_column(column, table.columns, path)
-    wanted = [c for c in (*_REQUIRED, *_OPTIONAL) if c in table.columns]
-    further = [c for c in table.columns if c not in ("run_id", *wanted) and table.schema[c].is_numeric()]
-    for column in wanted:
-        if not table.schema[column].is_numeric():
-            raise ColumnError(
-                f"column {column} holds text",
-                where=str(path),
-                mend="write plain numbers with a decimal point",
-            )
-    table = table.select(pl.col("run_id").cast(pl.String), *(pl.col(c).cast(pl.Float64) for c in (*wanted, *further)))
-    groups = table.partition_by("run_id", as_dict=True, maintain_order=True)
-    return {str(key[0]): group for key, group in groups.items()}
-
-
-def _refuse_bomb(path: Path) -> None:
-    """Refuse samples that grow a hundredfold and beyond what a test could hold, before they are unpacked."""
-    import gzip
-
-    import polars as pl
-
-    packed, unpacked = path.stat().st_size, 0
-    most = max(_UNPACKED, _RATIO * packed)
-    if path.suffix == ".parquet":
-        lazy = pl.scan_parquet(path)
-        unpacked = 8 * lazy.select(pl.len()).collect().item() * len(lazy.collect_schema())
-    elif path.suffix == ".gz":
-        with gzip.open(path) as file:
-            while unpacked <= most and (piece := file.read(2**22)):
-                unpacked += len(piece)
-    if unpacked > most:
-        raise DatasetError(
-            f"{packed:,} bytes unpack to over {most:,}",
-            where=str(path),
-            mend="a test does not compress like that; write the samples again",
-            code="E_ARCHIVE_RATIO",
-        )
-
-
-def _run(row: dict[str, Any], samples: pl.DataFrame, folder: Path) -> Run:
+def _run(row: dict[str, Any], samples: Channels, folder: Path) -> Run:
     where = f"{folder / 'runs.csv'}, run {row['run_id']}"
 
     def number(column: str) -> float | None:
@@ -239,11 +205,7 @@ def _run(row: dict[str, Any], samples: pl.DataFrame, folder: Path) -> Run:
             raise ColumnError(f"{column} is {text!r}", where=where, mend="give a number or leave the cell empty")
         return value
 
-    channels = {
-        name: samples[name].to_numpy()
-        for name in samples.columns
-        if name != "run_id" and (name in _REQUIRED or samples[name].null_count() < samples.height)
-    }
+    channels = {n: values for n, values in samples.items() if n in REQUIRED or not np.isnan(values).all()}
     current = channels.get("current_A", number("current_A"))
     if current is None:
         raise ColumnError("no current_A", where=where, mend="add the column current_A to runs.csv or to the samples")
@@ -265,7 +227,7 @@ def _run(row: dict[str, Any], samples: pl.DataFrame, folder: Path) -> Run:
         nominal=nominal,
         window=None if start is None or end is None else (start, end),
         repeatability=number("repeatability_nrmse_pp"),
-        further={name: values for name, values in channels.items() if name not in (*_REQUIRED, *_OPTIONAL)},
+        further={name: values for name, values in channels.items() if name not in (*REQUIRED, *OPTIONAL)},
         notes={k: v for k, v in row.items() if k not in _KNOWN_RUN_COLUMNS and v},
     )
 
@@ -339,19 +301,3 @@ def _samples(dataset: Dataset) -> Iterable[pl.DataFrame]:
 
 def _varies(current: np.ndarray) -> bool:
     return float(np.min(current)) != float(np.max(current))
-
-
-def _missing_column(column: str, present: list[str], path: Path) -> ColumnError | UnitError:
-    quantity = column.split("_")[0]
-    for other in present:
-        if other.lower().startswith(quantity) and _UNIT.match(other):
-            return UnitError(
-                f"column {other!r} where {column!r} is expected",
-                where=str(path),
-                mend="convert it to SI and rename it",
-            )
-    return ColumnError(f"column {column} is missing (found {', '.join(present)})", where=str(path), mend="add it")
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).strip().splitlines()[0]

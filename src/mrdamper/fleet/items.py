@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from mrdamper.errors import InputError
-from mrdamper.files.dataset import SAMPLE_FILES
+from mrdamper.files.samples import SAMPLE_FILES
 from mrdamper.fleet.profile import FleetProfile
 
 Kind = Literal["dataset", "rig files", "lake"]

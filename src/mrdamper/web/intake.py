@@ -13,7 +13,8 @@ from pathlib import Path, PurePosixPath
 
 from mrdamper.data import Dataset
 from mrdamper.errors import InputError
-from mrdamper.files.dataset import SAMPLE_FILES, load_dataset
+from mrdamper.files.dataset import load_dataset
+from mrdamper.files.samples import SAMPLE_FILES
 from mrdamper.web.drops import Drop, DropError, Intake, NothingTakenError
 from mrdamper.web.rig_drop import read_rig_files
 

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import io
-from typing import ClassVar
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.arrays import array_table, check_unpacked, damaged, refusing_damage
-from mrdamper.rig_files.readers.base import RawTable, Reader, Source
+from mrdamper.rig_files.readers.base import RawTable, Reader, Source, Words
+
+if TYPE_CHECKING:
+    import polars as pl
 
 _MAGIC = b"PAR1"
 
@@ -55,25 +59,47 @@ class Parquet(Reader):
         names = list(schema)
         check_unpacked(source, 8 * rows)
 
+        def loaded(column: int) -> pl.Series:
+            return pl.read_parquet(content, columns=[names[column]], use_statistics=False).to_series()
+
         def column_of(column: int) -> np.ndarray:
-            return _plain(pl.read_parquet(content, columns=[names[column]], use_statistics=False).to_series())
+            kind = schema[names[column]]
+            plain = kind.is_numeric() or isinstance(kind, (pl.Datetime, pl.Duration, pl.Null))
+            return _plain(loaded(column)) if plain else _no_numbers(kind)
+
+        def words(column: int) -> Words:
+            if schema[names[column]].is_nested():  # a list may hold anything any number of times
+                raise source.refuse("E_NUMBER", f"column {names[column]!r} holds lists", column=column + 1)
+            with refusing_damage(source, self.title):
+                return words_in(loaded(column))
 
         units = ["s" if isinstance(kind, (pl.Datetime, pl.Duration)) else "" for kind in schema.values()]
-        return [array_table(source, names, units, column_of, title=self.title)]
+        return [replace(array_table(source, names, units, column_of, title=self.title), words=words)]
 
 
-def _plain(values) -> np.ndarray:
+def words_in(values: pl.Series) -> Words:
+    """The words of a column; a missing one is empty."""
+    import polars as pl
+
+    if values.dtype.is_float():
+        cells = [f"{cell:g}" if cell is not None else "" for cell in values.unique(maintain_order=True)]
+        values = values.replace_strict(values.unique(maintain_order=True), cells, return_dtype=pl.String)
+    values = values.cast(pl.String).fill_null("")
+    labels = values.unique(maintain_order=True)
+    codes = values.replace_strict(labels, pl.int_range(labels.len(), eager=True), return_dtype=pl.Int32)
+    return Words(codes.to_numpy(), tuple(labels.to_list()))
+
+
+def _no_numbers(kind: pl.DataType) -> np.ndarray:
+    import polars as pl
+
+    return np.empty(1, dtype=object if kind == pl.Object else bool if kind == pl.Boolean else "U1")
+
+
+def _plain(values: pl.Series) -> np.ndarray:
     import polars as pl
 
     kind = values.dtype
-    if kind.is_float():
+    if kind.is_numeric() or kind == pl.Null:
         return values.cast(pl.Float64).fill_null(float("nan")).to_numpy()
-    if kind.is_integer() or kind.is_decimal():
-        return values.cast(pl.Float64).fill_null(float("nan")).to_numpy()
-    if isinstance(kind, (pl.Datetime, pl.Duration)):
-        return values.to_numpy()
-    if kind == pl.Object:
-        return np.empty(values.len(), dtype=object)
-    if kind == pl.Null:
-        return np.full(values.len(), np.nan)
-    return np.empty(values.len(), dtype=bool if kind == pl.Boolean else "U1")  # no numbers: never asked for by name
+    return values.to_numpy()

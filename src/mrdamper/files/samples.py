@@ -1,0 +1,173 @@
+"""The samples of a dataset: one table of all runs, read under bounds of size, ratio and memory.
+
+A Parquet file may crash its library, or hold far more than it weighs. It is read by the process
+that reads rig files of that kind, and only the columns a dataset knows ever leave it.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+
+import numpy as np
+
+from mrdamper.data import Floats
+from mrdamper.errors import ColumnError, DatasetError, UnitError
+from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.readers.archive import opened
+from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, RigFileError, Source
+from mrdamper.rig_files.readers.parquet import Parquet, words_in
+from mrdamper.rig_files.sandbox import guarded_tables
+
+SAMPLE_FILES = ("samples.parquet", "samples.csv.gz", "samples.csv")
+REQUIRED = ("time_s", "displacement_m", "force_N")
+OPTIONAL = ("current_A", "velocity_m_s")
+_RATIO, _UNPACKED = 20, 2**28  # all columns together: so many times their file, or so many bytes
+_HEADER = 2**20  # bytes a line of names may have
+_UNIT = re.compile(r"^(time|displacement|force|current|velocity)[ _\[(]", re.IGNORECASE)
+Channels = dict[str, Floats]
+
+
+def read_samples(folder: Path, *, trusted: bool = False) -> dict[str, Channels]:
+    """Samples of every run by its name: (N,) arrays by channel, NaN where a cell is empty.
+
+    Parameters
+    ----------
+    folder : path
+    trusted : bool
+        The file is our own: no process guards its reading.
+
+    Raises
+    ------
+    DatasetError, ColumnError, UnitError
+        If the file is missing, damaged or larger than a test can be, or lacks a column.
+    """
+    path = next((folder / name for name in SAMPLE_FILES if (folder / name).is_file()), None)
+    if path is None:
+        raise DatasetError(f"none of {', '.join(SAMPLE_FILES)} is there", where=str(folder), mend="add the samples")
+    try:
+        with opened(path) as source:
+            if path.suffix == ".parquet":
+                reader: AbstractContextManager[list[RawTable]] = (
+                    nullcontext(Parquet().tables(source, FileForm()))
+                    if trusted
+                    else guarded_tables(source, Parquet(), FileForm())
+                )
+                with reader as tables:
+                    return _of_parquet(tables[0], path)
+            return _of_text(source, path)
+    except RigFileError as error:
+        raise DatasetError(error.found, where=str(path), mend=error.mend, code=error.code) from error
+
+
+def _of_parquet(table: RawTable, path: Path) -> dict[str, Channels]:
+    names = list(table.names)
+    _require(names, path)
+    assert table.words is not None
+    ids = table.words(names.index("run_id"))
+    channels: Channels = {}
+    for name in _in_order(names):
+        at = names.index(name)
+        if name not in (*REQUIRED, *OPTIONAL) and table.units[at]:
+            continue  # dates
+        try:
+            channels[name] = table.read([at]).values[at]
+        except RigFileError as error:
+            if error.code not in ("E_NUMBER", "E_UNSAFE"):
+                raise
+            _refuse_text(name, path)
+        _refuse_bomb(8 * ids.codes.size * (len(channels) + 1), path)
+    return _by_run(ids.codes, ids.labels, channels)
+
+
+def _of_text(source: Source, path: Path) -> dict[str, Channels]:
+    import polars as pl
+
+    try:
+        names = next(csv.reader(io.StringIO(_first_line_of(source).decode("utf-8-sig"))), [])
+        if len(names) > MOST_COLUMNS:
+            raise source.refuse("E_TOO_MANY_COLUMNS", f"{len(names)} columns", mend="keep only the channels needed")
+        _require(names, path)
+        kinds = {c: pl.Float64 for c in (*REQUIRED, *OPTIONAL) if c in names}
+        table = pl.read_csv(source.file, schema_overrides={"run_id": pl.String, **kinds})
+    except (pl.exceptions.PolarsError, OSError, UnicodeDecodeError, csv.Error) as error:
+        raise DatasetError(first_line(error), where=str(path), mend="write the file again") from error
+    ids = words_in(table["run_id"])
+    channels = {
+        name: table[name].cast(pl.Float64).fill_null(float("nan")).to_numpy()
+        for name in _in_order(table.columns)
+        if table.schema[name].is_numeric() or _refuse_text(name, path)
+    }
+    return _by_run(ids.codes, ids.labels, channels)
+
+
+def _first_line_of(source: Source) -> bytes:
+    head = source.head(_HEADER)
+    if len(head) == _HEADER and b"\n" not in head:
+        raise source.refuse("E_TOO_MANY_COLUMNS", "no end of the first line", mend="begin with a line of names")
+    return head.split(b"\n", 1)[0]
+
+
+def _require(names: list[str], path: Path) -> None:
+    for column in ("run_id", *REQUIRED):
+        if column not in names:
+            raise missing_column(column, names, path)
+
+
+def _in_order(names: Iterable[str]) -> list[str]:
+    known = [name for name in (*REQUIRED, *OPTIONAL) if name in names]
+    return known + [name for name in names if name not in (*known, "run_id")]
+
+
+def _refuse_text(name: str, path: Path) -> bool:
+    """Further columns may hold text, and are left out."""
+    if name in (*REQUIRED, *OPTIONAL):
+        raise ColumnError(f"column {name} holds text", where=str(path), mend="write plain numbers with a decimal point")
+    return False
+
+
+def _refuse_bomb(size: int, path: Path) -> None:
+    packed = path.stat().st_size
+    most = max(_UNPACKED, _RATIO * packed)
+    if size > most:
+        raise DatasetError(
+            f"{packed:,} bytes unpack to over {most:,}",
+            where=str(path), mend="a test does not compress like that; write the samples again", code="E_ARCHIVE_RATIO",
+        )  # fmt: skip
+
+
+def _by_run(codes: np.ndarray, labels: tuple[str, ...], channels: Channels) -> dict[str, Channels]:
+    """Rows of a run need not stand together; their order stays."""
+    order = np.argsort(codes, kind="stable")
+    ends = np.cumsum(np.bincount(codes, minlength=len(labels)))
+    together = bool(np.all(np.diff(order) == 1))
+    take: Callable[[Floats], Floats] = (lambda values: values) if together else (lambda values: values[order])
+    sorted_channels = {name: take(values) for name, values in channels.items()}
+    parts = [slice(end - count, end) for end, count in zip(ends, np.diff(ends, prepend=0), strict=True)]
+    return {
+        label: {name: values[part] for name, values in sorted_channels.items()}
+        for label, part in zip(labels, parts, strict=True)
+    }
+
+
+def missing_column(column: str, present: list[str], path: Path) -> ColumnError | UnitError:
+    """The refusal of a table without a column; it names the one that holds it in another unit."""
+    quantity = column.split("_")[0]
+    for other in present:
+        if other.lower().startswith(quantity) and _UNIT.match(other):
+            return UnitError(
+                f"column {other!r} where {column!r} is expected",
+                where=str(path),
+                mend="convert it to SI and rename it",
+            )
+    shown = ", ".join(name[:40] for name in present[:20])
+    return ColumnError(f"column {column} is missing (found {shown})", where=str(path), mend="add it")
+
+
+def first_line(error: Exception) -> str:
+    """What a library says, in a line."""
+    return (str(error).strip().splitlines() or [type(error).__name__])[0]
