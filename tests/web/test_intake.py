@@ -79,7 +79,7 @@ def test_a_wrong_profile_is_told(drop, small_rig):
         ({}, "E_DROP"),
         ({"runs.csv": b"run_id,rig\n"}, "E_DATASET"),
         ({"runs.csv": b"run_id,rig\na,b\n", "samples.csv": b"run_id,time_s\na,0\n"}, "E_COLUMN"),
-        ({"runs.csv": b"\xff\xfe\x00"}, "E_COLUMN"),
+        ({"runs.csv": b"\xff\xfe\x00"}, "E_DATASET"),
         ({"photo.png": b"\x89PNG\r\n\x1a\n\x00"}, "E_DROP_REFUSED"),
     ],
 )
