@@ -94,7 +94,7 @@ def test_a_damper_that_cannot_be_used_is_named_and_the_others_go_on(tmp_path):
     found = run_fleet(source, tmp_path / "out", workers=1)
     rows = {(r["serial"], r["code"]): r["status"] for r in pl.read_parquet(found.table).to_dicts()}
     assert rows == {
-        ("D000001", "E_FORMAT"): "refused",
+        ("D000001", "E_TRUNCATED"): "refused",
         ("D000002", "E_FLEET_SERIAL"): "refused",
         ("D000003", "E_FLEET_RIGS"): "refused",
         ("D000004", "E_UNITS"): "refused",
