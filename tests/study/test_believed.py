@@ -10,7 +10,7 @@ from mrdamper.study.workflow import believed, usable_sines
 
 @pytest.fixture(scope="module")
 def runs(bundled):
-    return [run for run in bundled.rig("utfsm") if run.excitation == "sine"][:4]
+    return [run for run in bundled.rig("utfsm") if run.excitation == "sine"][:5]
 
 
 def sampled(run, time, displacement, force):
@@ -32,17 +32,32 @@ def noise(run):
     return replace(run, force=500 * np.random.default_rng(1).normal(size=run.time.size))
 
 
+def random_walk(run):
+    return replace(run, force=np.cumsum(np.random.default_rng(3).normal(0, 1, run.time.size)))
+
+
 @pytest.mark.parametrize(
     ("harm", "code"),
     [
         (lambda run: replace(run, force=-run.force), "E_DISSIPATION_SIGN"),
+        (lambda run: replace(run, force=run.force[::-1], displacement=run.displacement[::-1]), "E_DISSIPATION_SIGN"),
         (noise, "E_NOISE"),
-        (lambda run: replace(run, force=np.zeros(run.time.size)), ""),
-        (square, ""),
+        (lambda run: replace(run, displacement=1e-5 * noise(run).force), "E_NOISE"),
+        (lambda run: replace(run, force=np.zeros(run.time.size)), "E_RANGE"),
+        (lambda run: replace(run, force=1e5 * run.displacement), "E_NO_ENERGY"),
+        (lambda run: replace(run, force=300 * np.sin(5 * run.time)), ""),
+        (random_walk, ""),
+        (lambda run: replace(run, force=run.force.clip(max=0.8 * run.force.max())), "W_CLIPPED"),
+        (lambda run: replace(run, force=1000 * run.force), "E_OTHER_SIZE"),
+        (lambda run: replace(run, current=np.full(run.time.size, 26.0)), "E_OTHER_SIZE"),
+        (square, "E_UNRESOLVED"),
         (coarse, ""),
     ],
-    ids=["force reversed", "noise", "no force", "square wave", "three samples a cycle"],
-)
+    ids=[
+        "force reversed", "time reversed", "noise", "a motion of noise", "no force", "a spring", "another test",
+        "random walk", "clipped", "kilonewtons", "temperature as current", "square wave", "three samples a cycle",
+    ],
+)  # fmt: skip
 def test_a_run_that_cannot_be_believed_is_left_out_by_name(bundled, runs, harm, code):
     harmed = replace(harm(runs[0]), id="harmed")
     sines, refused = usable_sines(bundled.only([harmed, *runs[1:]]))
@@ -53,9 +68,10 @@ def test_a_run_that_cannot_be_believed_is_left_out_by_name(bundled, runs, harm, 
 
 def test_the_same_samples_count_once_and_leak_into_nothing(bundled, runs):
     again = replace(runs[0], id="again", split="validate")
-    kept, refused = believed(bundled.only([*runs, again]))
+    rounded = replace(runs[0], id="rounded", force=np.round(runs[0].force, 3), time=runs[0].time + 5)
+    kept, refused = believed(bundled.only([*runs, again, rounded]))
     assert [run.id for run in kept] == [run.id for run in runs]
-    assert "the same samples as run " + runs[0].id in refused["again"]
+    assert all("the same samples as run " + runs[0].id in refused[name] for name in ("again", "rounded"))
 
 
 def test_all_bundled_runs_are_believed(bundled):

@@ -10,7 +10,6 @@ import time
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from hashlib import sha256
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ from mrdamper.errors import IdentificationError, InputError, UnknownNameError
 from mrdamper.identification import refuse_clipped
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, at_levels, dynamic_ranges
 from mrdamper.motion import analyse_motion, equivalent_sine
-from mrdamper.rig_files.quality.table import refusal
+from mrdamper.rig_files.quality.table import judged
 from mrdamper.study.parallel import HERE, Processes
 from mrdamper.study.recipe import (
     JOINTLY,
@@ -40,6 +39,13 @@ from mrdamper.validation import Validation, validate
 
 _SAMPLES_A_CYCLE = 8  # below, neither the velocity nor a loop can be told
 _DISTORTED = 0.35  # harmonics over the fundamental: a triangle has 0.12, a square wave 0.48
+_SAME = 1e-4  # of the range: two tests never agree so well, a file written twice does
+_FEWEST = 4  # runs that say what is usual
+_SIZES = (
+    ("peak-to-peak force", "N", 100, lambda run: float(np.ptp(run.force))),
+    ("stroke", "m", 300, lambda run: float(np.ptp(run.displacement))),
+    ("current", "A", 12, lambda run: float(np.median(np.abs(run.current)))),
+)
 _WORTH = 1.1  # more numbers must lower the left-out error by a tenth
 STUDIED = ("bouc-wen", "bingham")  # the model of the method, and the one everybody compares with
 
@@ -265,7 +271,7 @@ def usable(runs: Iterable[Run], clipped: bool = False) -> tuple[list[Run], dict[
     found, refused = [], {}
     for run in runs:
         try:
-            refuse_clipped(run, clipped)
+            _refuse_clipped(run, clipped)
             if np.ptp(run.force[run.in_window]) == 0:
                 raise IdentificationError("the force does not change", where=f"run {run.id}", mend="check the channel")
             equivalent_sine(run)  # refuses a run that does not move
@@ -275,24 +281,56 @@ def usable(runs: Iterable[Run], clipped: bool = False) -> tuple[list[Run], dict[
     return found, refused
 
 
+def _refuse_clipped(run: Run, clipped: bool) -> None:
+    """As the identification, but seen today: a dataset written elsewhere says nothing."""
+    seen = " ".join(finding.code for finding in judged(run)[1])
+    refuse_clipped(replace(run, notes={**run.notes, "findings": f"{run.notes.get('findings', '')} {seen}"}), clipped)
+
+
 def believed(dataset: Dataset) -> tuple[list[Run], dict[str, str]]:
     """The runs that physics allows to believe, each once, and why the others are left out of everything."""
     kept: list[Run] = []
     refused: dict[str, str] = {}
-    seen: dict[bytes, str] = {}
     for run in dataset:
-        samples = sha256()
-        for channel in (run.time, run.displacement, run.force):
-            samples.update(np.ascontiguousarray(channel).tobytes())
-        first = seen.setdefault(samples.digest(), run.id)
-        error = refusal(run)
-        if first != run.id:
-            refused[run.id] = f"the same samples as run {first}: a test counts once [E_TWICE]"
+        twin = next((other.id for other in kept if _are_one_test(run, other)), None)
+        error, _ = judged(run)
+        if twin is not None:
+            refused[run.id] = f"the same samples as run {twin}: a test counts once [E_TWICE]"
         elif error is not None:
             refused[run.id] = str(error)
         else:
             kept.append(run)
-    return kept, refused
+    refused |= _of_another_size(kept)
+    return [run for run in kept if run.id not in refused], refused
+
+
+def _are_one_test(run: Run, other: Run) -> bool:
+    """Whether two runs hold the same samples, be it rounded otherwise, cut shorter or at another time."""
+    size = min(run.time.size, other.time.size)
+    for channel in ("displacement", "force"):
+        one, two = getattr(run, channel)[:size], getattr(other, channel)[:size]
+        near = _SAME * float(np.ptp(one))
+        if np.abs(one[::97] - two[::97]).max() > near or np.abs(one - two).max() > near:
+            return False
+    return True
+
+
+def _of_another_size(runs: Sequence[Run]) -> dict[str, str]:
+    """Runs whose force, stroke or current is so far from all others' that its unit must be another."""
+    found: dict[str, str] = {}
+    for what, unit, most, size_of in _SIZES:
+        sizes = {run.id: size_of(run) for run in runs}
+        counted = [size for size in sizes.values() if size > 0]
+        if len(counted) < _FEWEST:
+            continue
+        usual = float(np.median(counted))
+        for name, size in sizes.items():
+            if size > most * usual or (what != "current" and size < usual / most):
+                found[name] = (
+                    f"run {name}: {what} of {size:.3g} {unit}, {usual:.3g} {unit} in the other runs; "
+                    "state its unit when it is imported, or take it out of the dataset [E_OTHER_SIZE]"
+                )
+    return found
 
 
 def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], dict[str, str]]:
@@ -301,7 +339,7 @@ def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], di
     kept, refused = believed(dataset)
     for run in kept:
         try:
-            refuse_clipped(run, clipped)
+            _refuse_clipped(run, clipped)
             run.current_A  # noqa: B018
             found = equivalent_sine(run)
             rate = (run.time.size - 1) / float(run.time[-1] - run.time[0])

@@ -18,6 +18,7 @@ from mrdamper.rig_files.quality import (
     clock,
     current,
     flat,
+    follow,
     force_lag,
     leaps,
     loop,
@@ -46,10 +47,12 @@ CHECKS: tuple[Check, ...] = (
     leaps.spikes,
     leaps.wraps,
     loop.dissipates,
+    follow.motion_is_told,
     velocity_lag.velocity_channel,
     flat.clipped,
     flat.frozen,
     loop.keeps_its_sign,
+    follow.force_follows,
     motion.enough_cycles,
     motion.is_a_sine,
     motion.drifts,
@@ -84,7 +87,8 @@ def judge(record: Record) -> Record:
     QualityError
         If the record cannot be used; the code says why: E_NO_DATA, E_NONFINITE, E_SENTINEL,
         E_MISSING, E_TIME_ORDER, E_TIME_DUPLICATE, E_RANGE, E_NO_EXCITATION,
-        E_SPIKE, E_LEAP, E_DISSIPATION_SIGN, E_CHANNEL_LAG.
+        E_SPIKE, E_LEAP, E_NOISE, E_UNRESOLVED, E_DISSIPATION_SIGN, E_NO_ENERGY, E_UNRELATED,
+        E_CHANNEL_LAG.
     """
     view = View(record)
     for check in (*CHECKS, *_dropped_in()):

@@ -10,15 +10,14 @@ import numpy as np
 
 from mrdamper.data import Condition, Run, held_current, once_per_run
 from mrdamper.errors import QualityError
-from mrdamper.rig_files.quality import CHECKS, judge
+from mrdamper.rig_files.quality import judge
 from mrdamper.rig_files.quality.current import current_in
-from mrdamper.rig_files.quality.loop import dissipates, repeatability
+from mrdamper.rig_files.quality.follow import force_follows
+from mrdamper.rig_files.quality.loop import repeatability
 from mrdamper.rig_files.quality.motion import cycles_of, drift_of, steady_window
-from mrdamper.rig_files.quality.noise import sample_noise
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding, Record
 
-_NOISE = 0.7  # of the force's standard deviation: white noise has 1, a noisy load cell 0.1
 NOT_IDENTIFIED = ("W_CLIPPED", "W_SHORT", "W_CURRENT_VARIES")  # what identification refuses by default
 
 
@@ -113,26 +112,14 @@ def record_of(run: Run) -> Record:
 
 
 @once_per_run
-def refusal(run: Run) -> QualityError | None:
-    """Why a stored run cannot be believed: the checks that refuse, in their order; None if it can.
-
-    Those that only note something, and the search for a lag between the channels, are left to `judge`.
-    """
-    view = View(record_of(run))
+def judged(run: Run) -> tuple[QualityError | None, tuple[Finding, ...]]:
+    """Why a stored run cannot be believed, None if it can, and what else was noticed: as if it were imported now."""
     try:
-        for check in CHECKS[: CHECKS.index(dissipates) + 1]:
-            view.found.extend(check(view) or ())
-        force = view.channels["force"]
-        if sample_noise(force) > _NOISE * float(np.std(force)):
-            raise QualityError(
-                "the force is noise: it does not go on from sample to sample",
-                where=view.where,
-                mend="check the load cell's cable and amplifier",
-                code="E_NOISE",
-            )
+        record = judge(record_of(run))
+        force_follows(View(record))  # of a channel that died there is little left to identify from
+        return None, record.findings
     except QualityError as error:
-        return error
-    return None
+        return error, ()
 
 
 def row(quality: Quality) -> dict[str, Any]:

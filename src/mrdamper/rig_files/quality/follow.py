@@ -1,0 +1,68 @@
+"""Whether samples can tell the motion, and whether the force follows it: without either nothing can be identified."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mrdamper.data import held_current
+from mrdamper.errors import QualityError
+from mrdamper.rig_files.quality.current import current_in
+from mrdamper.rig_files.quality.loop import damping_share, repeatability
+from mrdamper.rig_files.quality.motion import LEAST_CYCLES, cycles_of, steady_window
+from mrdamper.rig_files.quality.noise import sample_noise
+from mrdamper.rig_files.quality.view import View
+
+_NOISE = 0.7  # of a channel's standard deviation: white noise has 1, a noisy load cell 0.1
+_LEAP, _LEAPS = 0.4, 0.4  # a step of such a share of the range, and the part of the path in such steps
+_NO_ENERGY = 0.002  # share of the force that opposes the velocity: a spring's
+_UNLIKE = 0.25  # scatter from cycle to cycle over the peak-to-peak force; beyond, it is no answer to the motion
+
+
+def motion_is_told(view: View) -> None:
+    """Refuse channels without memory from sample to sample, and a motion of fewer samples than its strokes need."""
+    for name in ("displacement", "force"):
+        values = view.channels[name]
+        if sample_noise(values) > _NOISE * float(np.nanstd(values)):
+            raise QualityError(
+                f"the {name} is noise: it does not go on from sample to sample",
+                where=view.where,
+                mend="check the sensor's cable and amplifier, and that the record has enough samples a cycle",
+                code="E_NOISE",
+            )
+    x = view.channels["displacement"]
+    steps = np.abs(np.diff(x[np.isfinite(x)]))
+    leaps = float(np.sum(steps[steps > _LEAP * float(np.nanmax(x) - np.nanmin(x))]))
+    if leaps > _LEAPS * float(np.sum(steps)):
+        raise QualityError(
+            "the displacement leaps from sample to sample: no speed can be told",
+            where=view.where,
+            mend="record at least eight samples a cycle, and a motion that the drive can follow",
+            code="E_UNRESOLVED",
+        )
+
+
+def force_follows(view: View) -> None:
+    """Refuse a force that takes no energy, or that differs from cycle to cycle of the same motion and current."""
+    if cycles_of(view) >= LEAST_CYCLES and abs(damping_share(view)) < _NO_ENERGY:
+        raise QualityError(
+            "the force takes no energy out of the motion: that of a spring, or of no damper",
+            where=view.where,
+            mend="check the load cell, and that the damper is mounted",
+            code="E_NO_ENERGY",
+        )
+    found = repeatability(view)
+    if found is None or found[0] < _UNLIKE or view.noticed("W_FROZEN") or _current_changes(view):
+        return
+    raise QualityError(
+        f"the force differs from cycle to cycle by {100 * found[0]:.0f} % of its peak-to-peak value: it does not "
+        "follow the motion",
+        where=view.where,
+        mend="check that force and displacement are of the same test, and that the load cell does not drift",
+        code="E_UNRELATED",
+    )
+
+
+def _current_changes(view: View) -> bool:
+    if view.record.current is None:
+        return False
+    return bool(held_current(current_in(view.record, steady_window(view)))[1])
