@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support.lab_exports import KINDS, LOCALES, UNITS, Lab, campaign, faults
+from support.machine_exports import MACHINES
 
 from mrdamper.rig_files.parts import stretches_of_time
 from mrdamper.rig_files.rig_import import import_files, to_dataset
@@ -12,7 +13,7 @@ WRITINGS = [(locale, units) for locale in LOCALES for units in UNITS]
 
 @pytest.fixture(scope="module")
 def tests():
-    return campaign(1, currents=(0.0, 0.8), points=60, cycles=3)
+    return campaign(1, currents=(0.0, 0.8), points=40, cycles=3)[::2]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -28,6 +29,14 @@ def test_an_export_holds_every_test_it_was_made_of(kind, tests, tmp_path):
         imported = import_files([folder])
         assert not imported.refusals, str(imported.refusals[0].error)
         assert faults(lab, to_dataset(imported.records)) == []
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+def test_a_machines_export_holds_every_test_it_was_made_of(machine, tests, tmp_path):
+    MACHINES[machine](tests, tmp_path)
+    imported = import_files([tmp_path])
+    assert not imported.refusals, str(imported.refusals[0].error)
+    assert faults(Lab(tests), to_dataset(imported.records)) == []
 
 
 @pytest.mark.parametrize(

@@ -13,25 +13,31 @@ from mrdamper.rig_files.units import is_unit, parse_unit
 # Words of channel names in the languages rigs are operated in; the last that fits wins.
 WORDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
-        "time": ("time", "zeit", "temps", "tiempo", "tempo", "czas", "tijd", "tid", "timestamp", "zeitstempel",
-                 "elapsed", "время", "时间", "時間"),
+        "time": ("time", "zeit", "temps", "tiempo", "tempo", "czas", "tijd", "tid", "timestamp", "timestamps",
+                 "zeitstempel", "elapsed", "время", "时间", "時間", "시간", "čas", "aika", "zaman"),
         "displacement": ("displacement", "disp", "displ", "position", "pos", "stroke", "travel", "weg", "hub",
                          "verschiebung", "auslenkung", "läge", "förskjutning", "déplacement", "deplacement", "course",
                          "desplazamiento", "posicion", "posición", "spostamento", "corsa", "deslocamento", "lvdt",
                          "extension",
                          "compression", "jounce", "einfederung", "einfederweg",
-                         "przemieszczenie", "перемещение", "位移", "変位"),
+                         "przemieszczenie", "перемещение", "位移", "変位", "변위", "ストローク", "dráha", "droga",
+                         "verplaatsing", "siirtymä", "deplasman"),
         "force": ("force", "load", "kraft", "fuerza", "forza", "força", "forca", "charge", "carga", "carico", "siła",
-                  "loadcell", "last", "kracht", "effort", "сила", "力", "荷重"),
+                  "loadcell", "last", "kracht", "effort", "сила", "усилие", "力", "荷重", "载荷", "하중", "síla",
+                  "voima", "kuvvet"),
         "velocity": ("velocity", "vel", "speed", "geschwindigkeit", "vitesse", "velocidad", "velocità",
-                     "velocidade", "скорость", "速度"),
+                     "velocidade", "скорость", "速度", "속도"),
         "acceleration": ("acceleration", "accel", "acc", "beschleunigung", "accélération", "aceleracion",
-                         "aceleración", "accelerazione", "加速度"),
+                         "aceleración", "accelerazione", "加速度", "가속도"),
         "current": ("current", "curr", "strom", "stromstärke", "courant", "corriente", "corrente", "amperage", "ток",
-                    "电流", "電流"),
-        "voltage": ("voltage", "spannung", "tension électrique", "voltaje", "tensione", "напряжение", "电压", "電圧"),
-        "pressure": ("pressure", "druck", "pression", "presión", "pressione", "gasdruck", "давление", "压力"),
-        "temperature": ("temperature", "temp", "temperatur", "température", "temperatura", "температура", "温度"),
+                    "电流", "電流", "電流値", "전류", "intensité", "intensidad", "intensità", "intensidade", "stroom",
+                    "ström", "proud", "prąd", "virta", "akım"),
+        "voltage": ("voltage", "spannung", "tension électrique", "voltaje", "tensione", "напряжение", "电压", "電圧",
+                    "전압"),
+        "pressure": ("pressure", "druck", "pression", "presión", "pressione", "gasdruck", "давление", "压力", "圧力",
+                     "압력"),
+        "temperature": ("temperature", "temp", "temperatur", "température", "temperatura", "температура", "温度",
+                        "온도", "teplota"),
     }
 )  # fmt: skip
 _SYMBOLS = MappingProxyType(
@@ -68,6 +74,7 @@ _NOT_MEASURED = frozenset(
 _COMPRESSION = ("compress", "jounce", "bump", "druckkraft", "druckweg", "einfeder", "compresi", "druckstufe")
 _BRACKETED = re.compile(r"^(?P<name>.*?)\s*[\[({<](?P<unit>[^\[\](){}<>]{1,40})[\])}>]\s*$", re.DOTALL)
 _SLASHED = re.compile(r"^(?P<name>.*\S)\s*(?:\s/\s*|,\s*|\s+in\s+|\s*;\s*)(?P<unit>\S{1,20})$", re.DOTALL)
+_EAST_ASIAN = re.compile("[\u3040-\u30ff\u4e00-\u9fff\uac00-\ud7af]")
 _LONGEST_NAME = 200  # beyond, it is no name, and matching it could take long
 _FUSED = re.compile(r"[ _.:-]+")
 
@@ -114,8 +121,13 @@ def role_of(name: str) -> str | None:
 
 def _role_of_word(word: str) -> str | None:
     exact = next((role for role, known in WORDS.items() if word in known), None)
-    if exact is not None or len(word) < 5:
+    if exact is not None:
         return exact
+    if _EAST_ASIAN.search(word):  # written without spaces: 线圈电流, 阻尼力; the longest ending, as 压力 is no 力
+        ends = [(len(w), role) for role, known in WORDS.items() for w in known if not w.isascii() and word.endswith(w)]
+        return max(ends)[1] if ends else None
+    if len(word) < 5:
+        return None
     return next((role for end, role in _COMPOUNDS.items() if word.endswith(end) and word != end), None)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import ColumnError, CombinedError, InputError, UnitError, printable
 from mrdamper.rig_files.column_names import WORDS, names_compression, role_of, says_nothing, split_name, unknown_unit
+from mrdamper.rig_files.conditions import stated_rate
 from mrdamper.rig_files.readers.base import RawTable, RigFileError
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED
 from mrdamper.rig_files.units import DIMENSION, Unit, parse_unit
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from mrdamper.rig_files.profile import Channel, Profile
 
 ROLES = (*REQUIRED, *OPTIONAL)
+_INDEX = frozenset(("sample", "samples", "sample no", "sample number", "index", "scan", "point", "n", "no", "nr"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +117,31 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
     return assigned
 
 
+def rate_of(table: RawTable, profile: Profile) -> float | None:
+    """Sampling rate [Hz] of a table without time stamps, by the profile or by what stands beside the columns.
+
+    Raises
+    ------
+    RigFileError
+        E_AMBIGUOUS if the file states two.
+    """
+    if profile.file.sample_rate_Hz:
+        return profile.file.sample_rate_Hz
+    decimal = table.form.get("decimal")
+    try:
+        return stated_rate(table.remarks, table.constants, decimal if isinstance(decimal, str) else None)
+    except ValueError as error:
+        raise table.source.refuse(
+            "E_AMBIGUOUS", f"two sampling rates: {error}", mend="say [file] sample_rate_Hz = ... in a profile"
+        ) from error
+
+
+def index_of_samples(table: RawTable) -> int | None:
+    """The column that counts samples, None if there is none or several may."""
+    found = [i for i, name in enumerate(table.names) if name.strip(" .#").casefold() in _INDEX]
+    return found[0] if len(found) == 1 else None
+
+
 def left_out(table: RawTable, profile: Profile, found: Mapping[str, Assigned]) -> dict[str, str]:
     """Optional channels that a column is named after but that its unit forbids to use, and why.
 
@@ -175,6 +202,8 @@ def _choose(table: RawTable, headers: Sequence[tuple[str, str]], role: str, take
         exact = [i for i in candidates if headers[i][0].casefold() in WORDS[role]]
         if len({headers[i][0].casefold() for i in exact}) == 1 or (exact and role == "time"):
             return exact[0]
+        if role == "time" and fitting:
+            return fitting[0]  # total and running time: refused if they run otherwise
         if role not in REQUIRED:
             return None
         raise _ambiguous(table, role, [table.names[i] for i in candidates])
@@ -212,7 +241,7 @@ def _missing(
     table: RawTable, headers: Sequence[tuple[str, str]], found: Mapping[str, int], profile: Profile
 ) -> list[InputError]:
     """A refusal for every channel that no column is known to be."""
-    missing = [r for r in REQUIRED if r not in found and not (r == "time" and profile.file.sample_rate_Hz)]
+    missing = [r for r in REQUIRED if r not in found and not (r == "time" and rate_of(table, profile))]
     if missing and not any(table.names):
         return [
             _refusal(

@@ -7,21 +7,33 @@ other are refused, not chosen from.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from mrdamper.rig_files.column_names import names_condition, split_name
-from mrdamper.rig_files.units import parse_unit
+from mrdamper.rig_files.units import Unit, parse_unit
 
 LARGEST_STATED = 15.0  # [A]: more is no coil current of a damper but another number
 _AGREE_A, _AGREE = 0.05, 0.15  # a nominal and a measured current may differ by so much: [A], and of it
 _IN_NAME = re.compile(r"(?<![0-9A-Za-z.,])([0-9]{1,4}(?:[.,xp][0-9]{1,4})?)[ _]?(mA|A)(?:mp(?:ere)?s?)?(?![A-Za-z0-9])")
 _LINE = re.compile(
-    r"^[\s#%/\"]*(?P<key>[^:=;\t]{1,60}?)[\s\"]*[:=;,\t][\s:=;,\t\"]*(?P<number>[+-]?[0-9]+(?:[.,][0-9]+)?)"
-    r"[\s;,\t\"]*[\[(]?(?P<unit>[A-Za-z]{0,8})[\])]?[\s;,\t\"]*$"
+    r"^[\s#%/\"]*(?P<key>[^:=;\t]{1,60}?)[\s\"]*[:=;,\t][\s:=;,\t\"]*(?P<number>[+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]{1,2})?)"
+    r"[\s;,\t\"]*[\[(]?(?P<unit>[A-Za-zµ/]{0,9})[\])]?[\s;,\t\"]*$"
+)
+_LONGEST_LINE, _MOST_PARTS = 300, 20
+_RATING = re.compile(
+    r"max|min|limit|range|rated|suppl|amplif|sensor|full|scale|fuse|bereich|grenz|messverst|nenn|speis|probe|clamp|zange",
+    re.IGNORECASE,
+)
+_RATE = re.compile(
+    r"sampl|abtast|messrate|^rate$|scan|acquisition|échantillon|muestreo|campion|^fs$|^f_s$", re.IGNORECASE
+)
+_STEP = re.compile(
+    r"^dt$|^d_t$|^delta[ _]?t|^[dΔ] ?t$|sampl|abtast|time ?step|step ?time|zeitschritt|increment|échantillon|muestreo",
+    re.IGNORECASE,
 )
 _SPACED = re.compile(
-    r"^[\s#%/\"]*(?P<key>[^\d:=;,\t]{1,60}?)\s+(?P<number>[+-]?[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>[A-Za-z]{1,8})\s*$"
+    r"^[\s#%/\"]*(?P<key>[^\d:=;,\t]{1,60}?)\s+(?P<number>[+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]{1,2})?)\s*(?P<unit>[A-Za-zµ/]{1,9})\s*$"
 )
 
 
@@ -62,17 +74,62 @@ def stated_by_lines(lines: Iterable[str], decimal: str | None = None) -> list[St
     """
     found = []
     for line in lines:
-        match = _LINE.match(line[:300]) or _SPACED.match(line[:300])
+        for key, value, known in _quantities(line, decimal):
+            if known.dimension == "current" and names_condition(key, "current"):
+                found.append(Statement(value, f"the line {line.strip()[:60]!r}"))
+    return found
+
+
+def stated_in_titles(lines: Iterable[str]) -> list[Statement]:
+    """Currents in the free text of lines that name no limit or range: "Test 3: 0.4 A, 2 Hz"."""
+    found = []
+    for line in lines:
+        stated = () if _RATING.search(line) else currents_in(line)
+        if len(stated) == 1:
+            found.append(Statement(stated[0], f"the line {line.strip()[:60]!r}"))
+    return found
+
+
+def stated_rate(lines: Iterable[str], numbers: Mapping[str, float], decimal: str | None = None) -> float | None:
+    """Sampling rate [Hz] that lines or numbers beside the columns state, as a rate or as a step; None if none does.
+
+    Raises
+    ------
+    ValueError
+        If two of them contradict each other.
+    """
+    stated = [(key, value, known) for line in lines for key, value, known in _quantities(line, decimal)]
+    for name, number in numbers.items():
+        key, unit = split_name(name)
+        known = parse_unit(unit) if unit else None
+        if known is not None:
+            stated.append((key, known.factor * number, known))
+    rates = []
+    for key, value, known in stated:
+        if value > 0 and known.dimension == "frequency" and _RATE.search(key):
+            rates.append(value)
+        elif value > 0 and known.dimension == "time" and _STEP.search(key):
+            rates.append(1 / value)
+    if rates and max(rates) > 1.001 * min(rates):
+        raise ValueError(f"{min(rates):g} Hz and {max(rates):g} Hz")
+    return rates[0] if rates else None
+
+
+def _quantities(line: str, decimal: str | None) -> Iterator[tuple[str, float, Unit]]:
+    """Name, value in SI and unit of what a line states: one quantity, or several behind each other."""
+    line = line[:_LONGEST_LINE]
+    match = _LINE.match(line) or _SPACED.match(line)
+    parts = [line] if match else re.split(r"[,;|]\s+|[{}\t]|\s{2,}", line)
+    for part in parts[:_MOST_PARTS]:
+        match = _LINE.match(part) or _SPACED.match(part)
         if match is None:
             continue
         key, unit = split_name(match["key"].strip().strip('"'))
         unit = match["unit"] or unit
         known = parse_unit(unit) if unit else None
         value = _value(match["number"], decimal)
-        if known is None or known.dimension != "current" or value is None or not names_condition(key, "current"):
-            continue
-        found.append(Statement(known.factor * value, f"the line {line.strip()[:60]!r}"))
-    return found
+        if known is not None and value is not None:
+            yield key, known.factor * value, known
 
 
 def _value(number: str, decimal: str | None) -> float | None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,14 +13,16 @@ import numpy as np
 
 from mrdamper.data import Dataset
 from mrdamper.errors import ColumnError, InputError
+from mrdamper.rig_files.coil_current import as_data, held_current_of
 from mrdamper.rig_files.column_names import names_compression
-from mrdamper.rig_files.columns import assign, propose
+from mrdamper.rig_files.columns import assign, propose, rate_of
 from mrdamper.rig_files.long_records import judge_long
+from mrdamper.rig_files.packed_folder import is_packed_folder, unpacked
 from mrdamper.rig_files.parts import tests_of
 from mrdamper.rig_files.profile import Channel, Profile, current_pattern, load_profile, profile_hash
-from mrdamper.rig_files.readers import RawTable, RigFileError, raw_tables, suffixes
+from mrdamper.rig_files.readers import NoTableError, RawTable, RigFileError, raw_tables, suffixes
 from mrdamper.rig_files.record import Record
-from mrdamper.rig_files.rig_record import as_data, held_current_of, joined, records_of
+from mrdamper.rig_files.rig_record import joined, records_of
 from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests
 
@@ -47,10 +50,13 @@ class ImportResult:
     records : tuple of Record
         Accepted, with their findings, in the order of the files.
     refusals : tuple of Refusal
+    left_out : tuple of str
+        Files of the folders that are no rig's files: of other kinds, or texts without a table.
     """
 
     records: tuple[Record, ...]
     refusals: tuple[Refusal, ...] = ()
+    left_out: tuple[str, ...] = ()
 
 
 def read_run(path: str | Path, profile: Profile | str | Path | None = None) -> Record:
@@ -116,6 +122,10 @@ def guess_profile(path: str | Path, profile: Profile | str | Path | None = None)
     if not any(table.names):
         form["names"] = tuple(f"column {i + 1}" for i in range(len(table.names)))
     stated = "current" in channels or held_current_of(table) is not None
+    rate = rate_of(table, profile) if "time" not in channels or channels["time"].column is None else None
+    if rate:
+        form["sample_rate_Hz"] = rate
+        channels.pop("time", None)
     pattern = None if stated else current_pattern(Path(path).name)
     update = {
         "file": type(profile.file)(**form),  # type: ignore[arg-type]
@@ -143,9 +153,11 @@ def _guess_channels(tables: list[RawTable], profile: Profile) -> tuple[RawTable,
     return table, channels
 
 
-def first_file(paths: Sequence[str | Path]) -> Path:
-    """The first file among files and folders."""
-    return _files(paths)[0]
+@contextlib.contextmanager
+def first_file(paths: Sequence[str | Path]) -> Iterator[Path]:
+    """The first file among files, folders and archives, for as long as the block goes."""
+    with unpacked(paths) as given:
+        yield _files(given)[0][0]
 
 
 def import_files(
@@ -174,22 +186,30 @@ def import_files(
         If the profile or the table of tests cannot be read, or a folder holds no rig's file.
     """
     profile = _profile(profile)
-    given = list(map(Path, paths))
-    beside = [path / TESTS for path in given if (path / TESTS).is_file()]
-    table = load_tests(tests) if tests is not None else load_tests(beside[0]) if beside else None
-    files = [path for path in _files(given) if path.name != TESTS]
-    records: list[Record] = []
-    refusals: list[Refusal] = []
-    met: list[tuple[Path, str]] = []
-    for number, path in enumerate(files):
-        progress(path.name, number / len(files))
-        good, refused, names = _read_judged(path, profile, table)
-        records += good
-        refusals += refused
-        met += [(path, name) for name in names or [""]]
-    if table is not None:
-        table.require_found(met)
-    return ImportResult(_with_unique_ids(records), tuple(refusals))
+    with unpacked(paths) as given:
+        beside = [path / TESTS for path in given if (path / TESTS).is_file()]
+        table = load_tests(tests) if tests is not None else load_tests(beside[0]) if beside else None
+        files, left_out = _files(given)
+        records: list[Record] = []
+        refusals: list[Refusal] = []
+        notes: list[Refusal] = []
+        met: list[tuple[Path, str]] = []
+        for number, path in enumerate(files):
+            progress(path.name, number / len(files))
+            good, refused, names = _read_judged(path, profile, table)
+            if path not in given and [type(refusal.error) for refusal in refused] == [NoTableError]:
+                notes += refused
+                continue
+            records += good
+            refusals += refused
+            met += [(path, name) for name in names or [""]]
+        if table is not None:
+            table.require_found(met)
+        if records or refusals:
+            left_out += [Path(note.file) for note in notes]
+        else:
+            refusals = notes
+        return ImportResult(_with_unique_ids(records), tuple(refusals), tuple(path.name for path in left_out))
 
 
 def found_tests(
@@ -198,13 +218,14 @@ def found_tests(
     """Every test that files hold, not judged, and the files that cannot be read: for a table of tests."""
     records: list[Record] = []
     refusals: list[Refusal] = []
-    for path in _files(paths):
-        if path.name == TESTS:
-            continue
-        try:
-            records += _unjudged(path, _profile(profile))
-        except InputError as error:
-            refusals.append(Refusal(str(path), error))
+    with unpacked(paths) as given:
+        for path in _files(given)[0]:
+            try:
+                records += _unjudged(path, _profile(profile))
+            except NoTableError as error:
+                refusals += [Refusal(str(path), error)] if path in given else []
+            except InputError as error:
+                refusals.append(Refusal(str(path), error))
     return tuple(records), tuple(refusals)
 
 
@@ -315,23 +336,37 @@ def _digest(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _files(paths: Iterable[str | Path]) -> list[Path]:
+def _files(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:
+    """The files to be read, and those of the folders that are of other kinds."""
     files: list[Path] = []
-    for path in map(Path, paths):
+    others: list[Path] = []
+    for path in paths:
         if not path.is_dir():
             files.append(path)
             continue
-        known = suffixes()
         inside = sorted(
             Path(folder) / name
             for folder, _, names in os.walk(path)
             for name in names
-            if Path(name).suffix.lower() in known and not name.startswith(".")
+            if not name.startswith((".", "~$")) and name != TESTS
         )
-        if not inside:
-            raise RigFileError("E_NO_DATA", "no rig's file in this folder", file=str(path), mend="give another folder")
-        files.extend(inside)
-    return files
+        inside = [file for file in inside if not is_packed_folder(file)]
+        known = [file for file in inside if file.suffix.lower() in suffixes()]
+        known = known or [file for file in inside if _is_table(file)]  # suffixes of a laboratory's own: run.001
+        files += known
+        others += [file for file in inside if file not in set(known)]
+    if not files:
+        where = ", ".join(path.name for path in paths)
+        raise RigFileError("E_NO_DATA", "no rig's file in this folder", file=where, mend="give another folder")
+    return files, others
+
+
+def _is_table(path: Path) -> bool:
+    try:
+        with raw_tables(path) as tables:
+            return any(table.names for table in tables)
+    except InputError:
+        return False
 
 
 def _require_current(records: Sequence[Record], path: Path) -> None:

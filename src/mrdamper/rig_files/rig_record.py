@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from mrdamper.data import Floats, held_current
-from mrdamper.errors import ColumnError, InputError, printable
+from mrdamper.data import Floats
+from mrdamper.errors import ColumnError, InputError
 from mrdamper.motion.measured import smooth
-from mrdamper.rig_files.column_names import role_of, split_name
-from mrdamper.rig_files.columns import Assigned, assign, left_out
-from mrdamper.rig_files.conditions import Statement, agreed, contradicts, currents_in, stated_by_lines
+from mrdamper.rig_files.coil_current import as_data, constant, current_of, without_gaps
+from mrdamper.rig_files.column_names import split_name
+from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, left_out, rate_of
 from mrdamper.rig_files.parts import stretches_of_time
-from mrdamper.rig_files.profile import Correction, Profile, current_in_name
+from mrdamper.rig_files.profile import Correction, Profile
 from mrdamper.rig_files.readers import RawTable, RigFileError, suffixes
 from mrdamper.rig_files.record import OPTIONAL, Finding, Record
 from mrdamper.rig_files.text.spool import rescale
@@ -40,12 +40,12 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
     found = assign(table, profile)
     raw, findings, lines = _read(table, found)
     channels = {name: _si(raw[entry.column], entry) for name, entry in found.items()}
-    size = next(iter(raw.values())).size
+    size, rate = next(iter(raw.values())).size, ""
     if "time" not in channels:
-        channels["time"] = np.arange(size) / (profile.file.sample_rate_Hz or 1.0)
+        channels["time"], rate = _counted_time(table, profile, size)
     further = _further(table, found, size)
     stretches = [slice(0, size)] if profile.file.blocks == "join" else stretches_of_time(channels["time"])
-    remarks = _remarks(table, found)
+    remarks = {**_remarks(table, found), **({"time_from": rate} if rate else {})}
     for name, why in left_out(table, profile, found).items():
         findings.append(Finding("W_COLUMN", f"the {name} channel is left out: {why}"))
     records = []
@@ -60,8 +60,11 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
             part["force"], remarks["force_correction"] = corrected_force(part, profile.correction)
         current, whence = current_of(table, profile, path, part.get("current"))
         noticed = findings
+        if "current" in part:
+            part["current"], slow = without_gaps(part["current"])
+            noticed = [*findings, *slow]
         if current is not None:
-            part["current"] = _constant(current, part["time"])
+            part["current"] = constant(current, part["time"])
             noticed = [f for f in findings if not f.text.startswith(_LEFT_OUT)]
         records.append(
             Record(
@@ -94,6 +97,17 @@ def _read(table: RawTable, found: dict[str, Assigned]):
             findings.append(Finding(code, f"the {name} channel is left out: {error.found}"))
             del found[name]
     return raw, findings, content.lines
+
+
+def _counted_time(table: RawTable, profile: Profile, size: int) -> tuple[Floats, str]:
+    """Time by the sampling rate, of a column that counts samples or of the rows, and how it was made."""
+    rate = rate_of(table, profile) or 1.0
+    column = index_of_samples(table)
+    if column is not None:
+        counted = table.read([column]).values[column]
+        if counted.size == size and np.array_equal(counted, np.round(counted)):
+            return (counted - counted[0]) / rate, f"{table.names[column]} at {rate:g} Hz"
+    return np.arange(size) / rate, f"rows at {rate:g} Hz"
 
 
 def corrected_force(channels: dict[str, Floats], correction: Correction) -> tuple[Floats, str]:
@@ -182,74 +196,6 @@ def _aligned(channels: dict[str, Floats], found: dict[str, Assigned], lines):
     return cut, None if lines is None else lines.part(inside.start, inside.stop)
 
 
-def _constant(value: float, like: Floats) -> Floats:
-    """One number as a channel that takes no memory."""
-    return np.broadcast_to(np.float64(value), like.shape)
-
-
-def current_of(
-    table: RawTable, profile: Profile, path: Path, channel: Floats | None
-) -> tuple[float | None, dict[str, str]]:
-    """The current [A] that a test states beside its columns, and where; None where the channel has it, or nothing does.
-
-    Raises
-    ------
-    InputError
-        E_AMBIGUOUS if two statements contradict each other, E_CURRENT_CONTRADICTS if one
-        contradicts the channel, E_RANGE if one is no coil current.
-    """
-    if profile.current is not None and profile.current.value is not None:
-        return profile.current.value, {"current_from": "profile"}
-    if profile.current is not None:
-        found = current_in_name(path.name, profile)
-        statements = [] if found is None else [Statement(found, "file name")]
-    else:
-        statements = _statements(table, path)
-    where = printable(table.source.name)
-    mend = "correct the name or the line, or say [current] value = ... in a profile"
-    try:
-        stated = agreed(statements)
-    except ValueError as error:
-        code = "E_RANGE" if "no coil current" in str(error) else "E_AMBIGUOUS"
-        raise ColumnError(printable(str(error)), where=where, mend=mend, code=code) from None
-    if channel is not None and stated is not None:
-        known = channel[np.isfinite(channel)]
-        mean, change = held_current(known) if known.size >= 3 else (stated.amperes, "")
-        if not change and contradicts(mean, stated.amperes):
-            raise ColumnError(
-                printable(f"{stated.whence} gives {stated.amperes:g} A, the current channel {mean:g} A"), where=where,
-                mend=f"if the channel is right, rename; else say [current] value = {stated.amperes:g} in a profile",
-                code="E_CURRENT_CONTRADICTS",
-            )  # fmt: skip
-    if channel is not None or stated is None:
-        return None, {}
-    return stated.amperes, {"current_from": as_data(stated.whence)}
-
-
-def _statements(table: RawTable, path: Path) -> list[Statement]:
-    """Every current that stands beside the columns, the surest place first."""
-    held = held_current_of(table)
-    found = [] if held is None else [Statement(held, "a number in the file")]
-    found += stated_by_lines(table.remarks, table.form.get("decimal"))  # type: ignore[arg-type]
-    member = table.source.name.removeprefix(f"{path.name}:").removeprefix(f"{path.name}, sheet ")
-    for text, whence in ((table.label, "the title"), (path.name, "file name"), (member, "file name")):
-        stated = currents_in(text)
-        if len(stated) == 1:
-            found.append(Statement(stated[0], whence if whence == "file name" else f"{whence} {text!r}"))
-    return found
-
-
-def held_current_of(table: RawTable) -> float | None:
-    """Coil current [A] that a file holds as one number beside its columns, `current_A = 0.5`; None if it does not."""
-    held = set()
-    for name, value in table.constants.items():
-        name, unit = split_name(name)
-        known = parse_unit(unit) if unit else None
-        if known is not None and known.dimension == "current" and role_of(name) == "current" and np.isfinite(value):
-            held.add(known.factor * value)
-    return held.pop() if len(held) == 1 else None
-
-
 def _is_kept(name: str, unit: str) -> bool:
     stated = split_name(name, unit)[1]
     known = parse_unit(stated) if stated else None
@@ -268,17 +214,12 @@ def _remarks(table: RawTable, found: dict[str, Assigned]) -> dict[str, str]:
     return {key: as_data(text) for key, text in remarks.items()}
 
 
-def as_data(text: str) -> str:
-    """Text of a file as a cell that no spreadsheet takes for a formula."""
-    text = printable(text)[:1000]
-    return f"'{text}" if text.startswith(("=", "+", "-", "@")) else text
-
-
 def joined(records: list[Record], profile: Profile, tables: list[RawTable]) -> list[Record]:
     """Blocks whose time goes on are one test, unless the profile says otherwise."""
     if len(records) < 2 or profile.file.blocks == "split" or not all(t.label.startswith("block") for t in tables):
         return records
     names = [n for n in ("time", "displacement", "force", *OPTIONAL) if all(getattr(r, n) is not None for r in records)]
+    partly: dict[str, Floats | None] = {name: None for name in OPTIONAL if name not in names}
     time = np.concatenate([record.time for record in records])
     if profile.file.blocks != "join" and not np.all(np.diff(time[np.isfinite(time)]) > 0):
         return records
@@ -286,8 +227,13 @@ def joined(records: list[Record], profile: Profile, tables: list[RawTable]) -> l
         np.concatenate([np.asarray(r.lines) for r in records]) if all(r.lines is not None for r in records) else None
     )
     channels = {name: np.concatenate([getattr(record, name) for record in records]) for name in names}
+    if "current" in partly and "current_from" in records[0].provenance:  # a page's heading states it once
+        stated = {float(r.current[0]) for r in records if r.current is not None}
+        partly["current"] = constant(stated.pop(), time) if len(stated) == 1 else None
+    alike = set.intersection(*(set(record.further) for record in records))
+    further = {name: np.concatenate([record.further[name] for record in records]) for name in alike}
     findings = _unique(finding for record in records for finding in record.findings)
-    return [replace(records[0], findings=tuple(findings), lines=lines, **channels)]
+    return [replace(records[0], findings=tuple(findings), lines=lines, further=further, **channels, **partly)]
 
 
 def _unique(findings: Iterable[Finding]) -> list[Finding]:

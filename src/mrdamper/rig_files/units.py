@@ -50,7 +50,7 @@ _EXACT = {
     "temperature": {"°C": 1, "degC": 1, "C": 1},
     "mass": {"kg": 1, "lbm": 0.45359237},
     "pressure": {"Pa": 1, "kPa": 1e3, "MPa": 1e6, "bar": 1e5, "psi": 6894.757293168},
-    "frequency": {"Hz": 1, "kHz": 1e3, "rpm": 1 / 60},
+    "frequency": {"Hz": 1, "kHz": 1e3, "rpm": 1 / 60, "S/s": 1, "kS/s": 1e3, "1/s": 1, "samples/s": 1},
     "angle": {"rad": 1, "deg": 0.017453292519943295, "°": 0.017453292519943295},
     "count": {"%": 0.01, "segments": 1, "cycles": 1, "counts": 1, "samples": 1},
 }  # fmt: skip
@@ -67,7 +67,10 @@ _WORDS = {
     "in/sec": "in/s", "kph": "km/h", "gs": "g",
     "amp": "A", "amps": "A", "ampere": "A", "amperes": "A", "milliamps": "mA",
     "volt": "V", "volts": "V", "millivolts": "mV", "celsius": "°C", "deg c": "°C", "grad c": "°C",
-    "mm": "mm", "ms": "ms", "s": "s",  # some programs write all of a header in capitals
+    "с": "s", "сек": "s", "мс": "ms", "м": "m", "см": "cm", "мм": "mm", "мкм": "um", "н": "N", "кн": "kN",
+    "кгс": "kgf", "а": "A", "ма": "mA", "в": "V", "°с": "°C",
+    "秒": "s", "毫秒": "ms", "米": "m", "毫米": "mm", "厘米": "cm", "微米": "um", "牛": "N", "牛顿": "N", "千牛": "kN",
+    "安": "A", "安培": "A", "毫安": "mA", "伏": "V", "초": "s", "ミリ秒": "ms", "アンペア": "A",
     "segment": "segments", "cycle": "cycles", "count": "counts", "degree": "deg", "degrees": "deg",
 }  # fmt: skip
 _OTHER = {
@@ -120,6 +123,9 @@ def _from_table(text: str) -> Unit | None:
     for dimension, units in _EXACT.items():
         if text in units:
             return Unit(dimension, units[text])
+    if text.isupper() and text.isascii():  # some programs write all of a header in capitals
+        same = [Unit(d, factor) for d, units in _EXACT.items() for u, factor in units.items() if u.upper() == text]
+        return same[0] if same and all(unit == same[0] for unit in same) else None
     return None
 
 

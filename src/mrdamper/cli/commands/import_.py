@@ -113,12 +113,13 @@ def _write_profile(files: list[Path], known: Profile, target: Path) -> None:
     from mrdamper.rig_files.profile import profile_text
     from mrdamper.rig_files.rig_import import first_file, guess_profile, read_runs
 
-    guess = guess_profile(first_file(files), known)
-    text = profile_text(guess)
-    try:
-        read_runs(first_file(files), guess)
-    except InputError as error:
-        typer.echo(f"the profile does not suffice yet: {error}", err=True)
+    with first_file(files) as first:
+        guess = guess_profile(first, known)
+        text = profile_text(guess)
+        try:
+            read_runs(first, guess)
+        except InputError as error:
+            typer.echo(f"the profile does not suffice yet: {error}", err=True)
     if str(target) == "-":
         print(text, end="")
         return
@@ -177,6 +178,11 @@ def _print(result: ImportResult, out: Path | None, total: int) -> None:
             print(f"  {finding}")
     for line in _refused_lines(result):
         print(line)
+    if result.left_out:
+        shown = ", ".join(result.left_out[:5]) + (
+            f" and {len(result.left_out) - 5} more" if result.left_out[5:] else ""
+        )
+        print(f"left out, no tables of tests: {shown}")
     if any("profile" in refusal.error.mend for refusal in result.refusals):
         print(
             "a profile answers once for all files: mrdamper import FILE --write-profile rig.toml, "
@@ -230,6 +236,7 @@ def _summary(result: ImportResult, out: Path | None) -> dict:
             }
             for record in result.records
         ],
+        "left_out": list(result.left_out),
         "refused": [
             {"file": refusal.file, "code": refusal.error.code, "text": str(refusal.error)}
             for refusal in result.refusals

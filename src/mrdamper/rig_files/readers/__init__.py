@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from mrdamper.discovery import subclasses_in
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.archive import opened
-from mrdamper.rig_files.readers.base import RawTable, Reader, RigFileError, Source
+from mrdamper.rig_files.readers.base import NoTableError, RawTable, Reader, RigFileError, Source
 from mrdamper.rig_files.sandbox import guarded_tables
 
 if TYPE_CHECKING:
@@ -132,6 +132,7 @@ def suffixes() -> tuple[str, ...]:
 
 __all__ = [
     "FileForm",
+    "NoTableError",
     "RawTable",
     "Reader",
     "RigFileError",

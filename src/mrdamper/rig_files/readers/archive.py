@@ -23,8 +23,8 @@ UNREADABLE_ZIP = (zipfile.BadZipFile, OSError, ValueError, NotImplementedError)
 
 
 @contextlib.contextmanager
-def opened(path: Path) -> Iterator[Source]:
-    """Open a file and unpack it if it is packed.
+def opened(path: Path, *, folder: bool = False) -> Iterator[Source]:
+    """Open a file and unpack it if it is packed; of an archive of a folder, to the archive of its files.
 
     Raises
     ------
@@ -45,6 +45,9 @@ def opened(path: Path) -> Iterator[Source]:
                 "E_TRUNCATED" if size < 4 else "E_FORMAT", f"the content is no {source.suffix[1:]} archive",
                 mend="copy the file again, or correct its name",
             )  # fmt: skip
+        if folder:
+            yield _gunzip(source) if head.startswith(_GZIP) else source
+            return
         if packed and source.suffix not in (".gz", ".zip", ".gzip", ""):
             raise source.refuse(
                 "E_FORMAT", f"the name says {source.suffix}, the content is a packed file", mend="rename it"
@@ -53,6 +56,15 @@ def opened(path: Path) -> Iterator[Source]:
             source = _unzip(source) if head.startswith(b"PK") else _gunzip(source)
             _refuse_nested(source)
         yield source
+
+
+@contextlib.contextmanager
+def opened_zip(path: Path) -> Iterator[Source]:
+    """A zip as it is."""
+    size, file = _at(path)
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(file)
+        yield Source(path, path.name, path.suffix.lower(), file, size, stack)
 
 
 def _at(path: Path) -> tuple[int, BinaryIO]:
@@ -143,20 +155,32 @@ def _unzip(source: Source) -> Source:
 
 def _one_member(source: Source, members: list[zipfile.ZipInfo]) -> zipfile.ZipInfo:
     for member in members:
-        name = member.filename
-        if not name:
-            raise source.refuse("E_ARCHIVE", "a member without a name", mend="pack it again")
-        parts = [*PurePosixPath(name).parts, *PureWindowsPath(name).parts]
-        if ".." in parts or name.startswith(("/", "\\")) or PureWindowsPath(name).drive or "\0" in name:
-            raise source.refuse("E_ARCHIVE_PATH", f"member {name!a} leads out of the archive", mend="pack it again")
-        if stat.S_ISLNK(member.external_attr >> 16):
-            raise source.refuse("E_ARCHIVE", f"member {name!a} is a link", mend="pack the file itself")
+        check_member(source, member.filename, link=stat.S_ISLNK(member.external_attr >> 16))
     files = [member for member in members if not member.is_dir()]
     if len(files) != 1:
-        raise source.refuse("E_ARCHIVE", f"{len(files)} members", mend="pack one file an archive, or unpack it first")
+        raise source.refuse(
+            "E_ARCHIVE", f"{len(files)} members", mend="read it as a folder: mrdamper import, or unpack it first"
+        )
     if files[0].flag_bits & 1:
         raise source.refuse("E_ARCHIVE", "the member is encrypted", mend="unpack it first")
     return files[0]
+
+
+def check_member(source: Source, name: str, *, link: bool) -> None:
+    """Refuse a member without a name, one whose name leads out of the archive, and a link.
+
+    Raises
+    ------
+    RigFileError
+        E_ARCHIVE, E_ARCHIVE_PATH.
+    """
+    if not name:
+        raise source.refuse("E_ARCHIVE", "a member without a name", mend="pack it again")
+    parts = [*PurePosixPath(name).parts, *PureWindowsPath(name).parts]
+    if ".." in parts or name.startswith(("/", "\\")) or PureWindowsPath(name).drive or "\0" in name:
+        raise source.refuse("E_ARCHIVE_PATH", f"member {name!a} leads out of the archive", mend="pack it again")
+    if link:
+        raise source.refuse("E_ARCHIVE", f"member {name!a} is a link", mend="pack the file itself")
 
 
 def _gunzip(source: Source) -> Source:

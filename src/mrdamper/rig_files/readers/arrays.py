@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import re
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import ModuleType
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import InputError, MissingExtraError
+from mrdamper.rig_files.column_names import role_of, split_name
 from mrdamper.rig_files.readers.base import (
     MOST_COLUMNS,
     MOST_RATIO,
@@ -24,7 +25,10 @@ from mrdamper.rig_files.readers.base import (
     Source,
     Words,
 )
+from mrdamper.rig_files.units import is_unit
 
+_MOST_ACROSS = 50  # channels of a matrix that has its samples in rows
+_TELLING = 2  # words that name channels make a list of names
 _NO_NUMBERS = {"b": "truth values", "c": "complex numbers", "V": "bytes"}
 _EARLY_END = (
     "truncat", "end of file", "eof", "unexpected end", "could not read", "not enough", "incomplete", "short",
@@ -121,8 +125,10 @@ def as_floats(source: Source, array: np.ndarray, name: str, column: int) -> Floa
 
 
 def expand(name: str, shape: tuple[int, ...]) -> list[tuple[str, int | None]]:
-    """Names of the columns of an array: one for a vector, numbered ones for a matrix."""
+    """Names of the columns of an array: one for a vector, numbered ones for a matrix, its samples the long way."""
     inner = [n for n in shape if n != 1]
+    if len(inner) == 2 and inner[0] < inner[1] and inner[0] <= _MOST_ACROSS:
+        return [(f"{name}[{i + 1}]", i - inner[0]) for i in range(inner[0])]
     if len(inner) == 2 and inner[1] <= MOST_COLUMNS:
         return [(f"{name}[{i + 1}]", i) for i in range(inner[1])]
     return [(name, None)] if len(inner) <= 1 else []
@@ -130,7 +136,19 @@ def expand(name: str, shape: tuple[int, ...]) -> list[tuple[str, int | None]]:
 
 def pick(array: np.ndarray, part: int | None) -> np.ndarray:
     """The column of an array that `expand` named."""
-    return array if part is None else np.squeeze(array)[:, part]
+    if part is None:
+        return array
+    return np.squeeze(array)[part] if part < 0 else np.squeeze(array)[:, part]
+
+
+def titles_of(width: int, texts: Iterable[Sequence[str]]) -> tuple[Sequence[str], Sequence[str]] | None:
+    """Names and units of a matrix's columns, where lists of words beside it hold one a column; else None."""
+    fitting = [words for words in texts if len(words) == width]
+    names = [words for words in fitting if sum(role_of(split_name(word)[0]) is not None for word in words) >= _TELLING]
+    units = [words for words in fitting if 2 * sum(map(is_unit, words)) >= width and words not in names]
+    if not names or any(other != names[0] for other in names):
+        return None
+    return names[0], units[0] if units else [""] * width
 
 
 def check_unpacked(source: Source, size: int) -> None:

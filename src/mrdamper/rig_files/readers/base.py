@@ -55,6 +55,10 @@ class RigFileError(InputError):
         super().__init__(found, where=", ".join(part for part in parts if part), mend=mend, code=code)
 
 
+class NoTableError(RigFileError):
+    """A text that holds no table at all: notes, a letter."""
+
+
 @dataclass(frozen=True, eq=False)
 class Source:
     """An opened file, unpacked where it was packed.

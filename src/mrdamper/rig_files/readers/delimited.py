@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mrdamper.errors import printable
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import Content, RawTable, Reader, Source, Words
 from mrdamper.rig_files.record import Finding, LineNumbers
@@ -16,13 +17,14 @@ from mrdamper.rig_files.text.blocks import Block, find_blocks
 from mrdamper.rig_files.text.bulk import read_bulk
 from mrdamper.rig_files.text.cells import Form, field_count, read_cells, split_rows
 from mrdamper.rig_files.text.labview import is_labview, named, stated_form
-from mrdamper.rig_files.text.layout import Layout, find_layout, is_comment, split
+from mrdamper.rig_files.text.layout import Layout, find_layout, is_comment, is_footer, split
 from mrdamper.rig_files.text.spool import Spool
 from mrdamper.rig_files.text.stream import LONGEST_LINE, TextStream, open_text, too_long
 from mrdamper.rig_files.text.tokens import looks_numeric
 
 _ODD = re.compile("[\udc80-\udcff\ufffd\x80-\x9fÿþðÞÐ¤¦¬¸¨÷×]")  # bytes of another encoding, as they come out
 _HEADER_LINES, _BREAKS = 200, 12  # lines in which a quoted name may be broken, and into how many
+_FOOTER = 8192  # bytes in which lines of words below the rows are looked for
 _HEAD_LINES = 4000  # in which the data must have begun
 BULK_FROM = 2**19  # bytes; below, reading cell by cell takes less time than loading the fast reader
 
@@ -32,7 +34,7 @@ class DelimitedText(Reader):
 
     name = "text"
     title = "delimited text"
-    suffixes = (".csv", ".txt", ".dat", ".tsv", ".asc", ".prn", ".log", ".tab", ".lvm")
+    suffixes = (".csv", ".txt", ".dat", ".tsv", ".asc", ".prn", ".log", ".tab", ".lvm", ".tra")
     binary = False
 
     def recognises(self, source: Source) -> bool:
@@ -107,7 +109,9 @@ def _form(stream: TextStream, layout: Layout) -> dict[str, str | int]:
 
 def _read(stream: TextStream, layout: Layout, block: Block, columns: tuple[int, ...]) -> Content:
     form = Form(stream, layout, columns)
-    block, findings = _without_cut_row(form, block)
+    block, findings = _without_footer(form, block)
+    block, cut = _without_cut_row(form, block)
+    findings += cut
     spool, odd, line, size = Spool(columns), False, block.line, 0
     starts: list[int] = []
     numbers: list[int] = []
@@ -137,7 +141,7 @@ def _read(stream: TextStream, layout: Layout, block: Block, columns: tuple[int, 
 
 def _words(stream: TextStream, layout: Layout, block: Block, column: int) -> Words:
     form = Form(stream, layout, (column,))
-    block, _ = _without_cut_row(form, block)
+    block, _ = _without_cut_row(form, _without_footer(form, block)[0])
     known: dict[str, int] = {}
     codes: list[np.ndarray] = []
     line, at = block.line, block.start
@@ -156,6 +160,25 @@ def _stretches(lines: np.ndarray, expected: int | None) -> np.ndarray:
         return np.empty(0, dtype=int)
     jumps = np.flatnonzero(np.diff(lines) != 1) + 1
     return jumps if expected == lines[0] else np.concatenate(([0], jumps))
+
+
+def _without_footer(form: Form, block: Block) -> tuple[Block, tuple[Finding, ...]]:
+    """Leave out lines of words below the last row: statistics, the end of a page."""
+    stream = form.stream
+    size = min(block.stop - block.start, _FOOTER)
+    stream.file.seek(block.stop - size)
+    lines = stream.file.read(size).splitlines(keepends=True)
+    stop, left = block.stop, []
+    for raw in reversed(lines[1:]):
+        text = stream.decode(raw).rstrip("\r\n")
+        if text.strip() and not is_footer(text, form.layout):
+            break
+        stop -= len(raw)
+        left += [text.strip()[:40]] if text.strip() else []
+    if not left:
+        return block, ()
+    shown = f"{len(left)} line{'s' * (len(left) > 1)} below the last row left out: {left[-1]!r}"
+    return replace(block, stop=stop), (Finding("W_FOOTER", printable(shown)),)
 
 
 def _without_cut_row(form: Form, block: Block) -> tuple[Block, tuple[Finding, ...]]:

@@ -8,13 +8,22 @@ from typing import Any
 import numpy as np
 
 from mrdamper.rig_files.file_form import FileForm
-from mrdamper.rig_files.readers.arrays import array_table, check_unpacked, expand, load, pick, refusing_damage
+from mrdamper.rig_files.readers.arrays import (
+    array_table,
+    check_unpacked,
+    expand,
+    load,
+    pick,
+    refusing_damage,
+    titles_of,
+)
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
 
 # pyright: reportMissingImports=false, reportAttributeAccessIssue=false
 
 HDF5_MARK = b"\x89HDF\r\n\x1a\n"
 _MOST_OBJECTS = 10_000
+MOST_STRUCTS = 2000  # of an array of structs
 _DEEPEST = 8  # groups within groups
 _PACKING = ("scale_factor", "add_offset", "_FillValue", "missing_value")
 _UNIT_NAMES = ("units", "unit", "Units", "Unit", "UNIT", "UNITS", "unit_string")
@@ -167,10 +176,45 @@ def _walk(group: Any, path: str, found: _Found) -> None:
         item = group.get(name)
         if isinstance(item, h5py.Group) and name != "#refs#" and name != "#subsystem#":
             _walk(item, f"{path}/{name}", found)
+        elif isinstance(item, h5py.Dataset) and h5py.check_ref_dtype(item.dtype) is h5py.Reference:
+            _follow(item, str(name), path, found)
         elif isinstance(item, h5py.Dataset):
             columns = _columns(item, str(name), path, found)
             if columns:
                 found.groups.setdefault(path, []).extend(columns)
+
+
+def _follow(references: Any, name: str, path: str, found: _Found) -> None:
+    """Arrays of structs and cells of MATLAB 7.3: what lies in #refs# is met where its reference stands."""
+    import h5py
+
+    cells = references.size if references.size <= MOST_STRUCTS else 0
+    if path.count("/") > _DEEPEST or not cells or "MATLAB_class" not in _file_marks(references):
+        found.objects.append(name)
+        found.groups.setdefault(path, []).append((name, "", None, None))
+        return
+    cell = _text(references.attrs.get("MATLAB_class")) == "cell"  # else a field of an array of structs
+    for number, reference in enumerate(np.reshape(references[()], -1), 1):
+        found.seen += 1
+        item = references.file[reference] if reference else None
+        if found.seen > _MOST_OBJECTS:
+            raise found.source.refuse("E_TOO_MANY_COLUMNS", f"over {_MOST_OBJECTS} objects", mend="export fewer")
+        inner = f"{path}_{number}" if cells > 1 and not cell else path
+        if isinstance(item, h5py.Group):
+            _walk(item, f"{inner}/{name}_{number}" if cell else f"{inner}/{name}", found)
+        elif isinstance(item, h5py.Dataset) and _text(item.attrs.get("MATLAB_class")) == "char":
+            text = "".join(map(chr, np.reshape(item[()], -1)[:200].tolist())) if item.dtype.kind in "iu" else ""
+            found.remarks.setdefault(inner, []).append(f"{name}: {text}")
+        elif isinstance(item, h5py.Dataset) and not cell:
+            columns = _columns(item, name, inner, found)
+            if columns:
+                found.groups.setdefault(inner, []).extend(columns)
+
+
+def _file_marks(item: Any) -> set[str]:
+    """Names of the attributes of a dataset and of the group it lies in, and whether its file is MATLAB's."""
+    marks = {*item.attrs, *item.parent.attrs}
+    return marks | {"MATLAB_class"} if item.file.userblock_size else marks
 
 
 def _attributes(item: Any) -> list[str]:
@@ -204,7 +248,29 @@ def _columns(dataset: Any, name: str, path: str, found: _Found) -> list[tuple]:
     stated = [dataset.attrs[name] for name in _UNIT_NAMES if name in dataset.attrs]
     unit = next((_text(value) for value in stated if np.asarray(value).dtype.kind in "SUO"), "")
     shape = dataset.shape[::-1] if "MATLAB_class" in dataset.attrs else dataset.shape
-    return [(column, unit, dataset, part) for column, part in expand(name, shape)]
+    across = expand(name, shape)
+    lists = [_words(dataset.attrs[key]) for key in list(dataset.attrs)[:MOST_COLUMNS]]
+    lists += [_words(item[()]) for item in dataset.parent.values() if _is_words(item)] if len(across) > 1 else []
+    titles = titles_of(len(across), lists) if len(across) > 1 else None
+    if titles:
+        return [(n, u or unit, dataset, part) for n, u, (_, part) in zip(*titles, across, strict=True)]
+    return [(column, unit, dataset, part) for column, part in across]
+
+
+def _is_words(item: Any) -> bool:
+    """Whether a dataset is a short list of texts."""
+    import h5py
+
+    if not isinstance(item, h5py.Dataset) or item.ndim != 1 or not 1 < len(item) <= MOST_COLUMNS:
+        return False
+    return item.dtype.kind == "S" or h5py.check_string_dtype(item.dtype) is not None
+
+
+def _words(values: Any) -> list[str]:
+    """The texts of an attribute or a dataset; empty if it holds anything else."""
+    array = np.asarray(values).reshape(-1)
+    texts = array.dtype.kind in "SU" or all(isinstance(item, str | bytes) for item in array[:MOST_COLUMNS])
+    return [_text(item).strip() for item in array[:MOST_COLUMNS].tolist()] if texts else []
 
 
 def _text(value: object) -> str:

@@ -8,15 +8,23 @@ from typing import Any
 
 import numpy as np
 
+from mrdamper.rig_files.column_names import role_of, split_name
 from mrdamper.rig_files.file_form import FileForm
-from mrdamper.rig_files.readers.arrays import array_table, check_unpacked, expand, pick, refusing_damage, twice
+from mrdamper.rig_files.readers.arrays import (
+    array_table,
+    check_unpacked,
+    expand,
+    pick,
+    refusing_damage,
+    titles_of,
+    twice,
+)
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
-from mrdamper.rig_files.readers.hdf5 import HDF5_MARK, hdf5_tables
+from mrdamper.rig_files.readers.hdf5 import HDF5_MARK, MOST_STRUCTS, hdf5_tables
 
 _NUMERIC = ("double", "single", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
 _OBJECTS = ("object", "opaque", "function", "unknown")
 _DEEPEST = 4
-MOST_STRUCTS = 2000  # of an array of structs
 
 
 class Matlab(Reader):
@@ -67,11 +75,12 @@ class Matlab(Reader):
 
 @dataclass
 class _Found:
-    """By the label of a table its columns, single numbers and texts."""
+    """By the label of a table its columns, single numbers, texts, and lists of words."""
 
     columns: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
     single: dict[str, dict[str, float]] = field(default_factory=dict)
     remarks: dict[str, list[str]] = field(default_factory=dict)
+    lists: dict[str, list[list[str]]] = field(default_factory=dict)
 
     def above(self, label: str) -> Iterator[str]:
         """Labels of the structs a table lies in, from the file down to its own."""
@@ -83,12 +92,19 @@ def _inside(label: str, outer: str) -> bool:
 
 
 def _table(source: Source, columns: dict[str, np.ndarray], label: str, title: str, found: _Found) -> RawTable:
-    parts = [(name, array, part) for key, array in columns.items() for name, part in expand(key, array.shape)]
+    parts: list[tuple[str, np.ndarray, int | None]] = []
+    units: list[str] = []
+    for key, array in columns.items():
+        across = expand(key, array.shape)
+        titles = titles_of(len(across), found.lists.get(label, ())) if len(across) > 1 else None
+        names, its_units = titles or ([name for name, _ in across], [""] * len(across))
+        parts += [(name, array, part) for name, (_, part) in zip(names, across, strict=True)]
+        units += its_units
     above = list(dict.fromkeys(found.above(label)))
     return array_table(
         source,
         [name for name, _, _ in parts],
-        [""] * len(parts),
+        units,
         lambda column: pick(parts[column][1], parts[column][2]),
         label=label,
         title=title,
@@ -111,12 +127,26 @@ def _gather(value: Any, name: str, label: str, found: _Found, depth: int = 0) ->
     elif kind == "O" and size and depth < _DEEPEST and all(np.asarray(item).dtype.names for item in array.flat):
         for number, item in enumerate(array.reshape(-1)[:MOST_STRUCTS], 1):
             _gather(item, f"{name}_{number}", label, found, depth + 1)
+    elif size > 1 and role_of(split_name(name)[0]) is None and (words := _words(array)):
+        found.lists.setdefault(label, []).append(words)
     elif kind in "iufcO" and size > 1:
         found.columns.setdefault(label, {})[name] = array  # objects and complex numbers are refused if asked for
     elif kind in "iuf" and size == 1 and len(found.single.setdefault(label, {})) < MOST_COLUMNS:
         found.single[label][name] = float(array.reshape(-1)[0])
     elif kind in "US" and size == 1:
         found.remarks.setdefault(label, []).append(f"{name}: {array.reshape(-1)[0]}"[:200])
+
+
+def _words(array: np.ndarray) -> list[str]:
+    """A cell array of texts, or the rows of a matrix of characters; empty if it is neither."""
+    if array.dtype.kind == "U" and array.size <= MOST_COLUMNS:
+        return [str(item).strip() for item in array.reshape(-1)]
+    if array.dtype.kind != "O" or array.size > MOST_COLUMNS:
+        return []
+    cells = [np.asarray(item) for item in array.reshape(-1)]
+    if any(cell.dtype.kind != "U" or cell.size > 1 for cell in cells):
+        return []
+    return [str(cell.reshape(-1)[0]).strip() if cell.size else "" for cell in cells]
 
 
 def _is_version_4(head: bytes) -> bool:

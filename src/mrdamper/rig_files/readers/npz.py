@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import zipfile
+from itertools import groupby
 
 import numpy as np
 
+from mrdamper.rig_files.column_names import role_of, split_name
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.archive import UNREADABLE_ZIP, check_sizes, is_arrays, zipped_names
-from mrdamper.rig_files.readers.arrays import array_table, damaged, expand, pick, refusing_damage, twice
+from mrdamper.rig_files.readers.arrays import array_table, damaged, expand, pick, refusing_damage, titles_of, twice
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
 
 _Column = tuple[str, str, tuple[str, int | str | None]]
@@ -33,8 +35,9 @@ class Npz(Reader):
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """The arrays as columns; a matrix gives numbered ones, a structured array its fields."""
         with refusing_damage(source, self.title):
-            columns, single = _columns(source)
+            columns, single, worded = _columns(source)
             constants = _numbers(source, single[:MOST_COLUMNS])
+            columns = _titled(source, columns, worded)
         names, units, places = [c[0] for c in columns], [c[1] for c in columns], [c[2] for c in columns]
 
         def load(column: int) -> np.ndarray:
@@ -53,8 +56,24 @@ def _numbers(source: Source, names: list[str]) -> dict[str, float]:
         return {name: float(archive[name].reshape(-1)[0]) for name in names}
 
 
-def _columns(source: Source) -> tuple[list[_Column], list[str]]:
-    """Name, unit and place of every column, and the arrays of one number, by the headers of the arrays alone."""
+def _titled(source: Source, columns: list[_Column], worded: list[str]) -> list[_Column]:
+    """The columns with the names and units that lists of words give those of a matrix."""
+    if not worded:
+        return columns
+    source.file.seek(0)
+    with np.load(source.file, allow_pickle=False) as archive:
+        lists = [[str(word).strip() for word in archive[name].reshape(-1)] for name in worded]
+    found = []
+    for member, group in groupby(columns, key=lambda column: column[2][0]):
+        across = list(group)
+        titles = titles_of(len(across), lists) if isinstance(across[0][2][1], int) else None
+        names, units = titles or ([c[0] for c in across], [c[1] for c in across])
+        found += [(n, u, (member, c[2][1])) for n, u, c in zip(names, units, across, strict=True)]
+    return found
+
+
+def _columns(source: Source) -> tuple[list[_Column], list[str], list[str]]:
+    """Name, unit and place of every column, the arrays of one number and those of words, by the arrays' headers."""
     try:
         archive = zipfile.ZipFile(source.file)
     except UNREADABLE_ZIP as error:
@@ -63,6 +82,7 @@ def _columns(source: Source) -> tuple[list[_Column], list[str]]:
         check_sizes(source, archive.infolist())
         found: list[_Column] = []
         single: list[str] = []
+        worded: list[str] = []
         names = [member.filename for member in archive.infolist()]
         if len(set(names)) < len(names):
             raise twice(source, next(name for name in names if names.count(name) > 1).removesuffix(".npy"))
@@ -79,7 +99,13 @@ def _columns(source: Source) -> tuple[list[_Column], list[str]]:
                 )  # fmt: skip
             if int(np.prod(shape, dtype=object)) * dtype.itemsize > member.file_size:
                 raise damaged(source, Npz.title, f"array {name!r} is incomplete")
-            if dtype.names:
+            if (
+                dtype.kind == "U"
+                and role_of(split_name(name)[0]) is None
+                and 1 < np.prod(shape, dtype=object) <= MOST_COLUMNS
+            ):
+                worded.append(name)
+            elif dtype.names:
                 found += [(field, "", (name, field)) for field in dtype.names]
             elif np.prod(shape, dtype=object) > 1:
                 unit = "s" if dtype.kind in "Mm" else ""
@@ -88,4 +114,4 @@ def _columns(source: Source) -> tuple[list[_Column], list[str]]:
                 single.append(name)
     if not found:
         raise source.refuse("E_NO_DATA", "no array of numbers", mend="save the channels as arrays")
-    return found, single
+    return found, single, worded

@@ -90,7 +90,7 @@ def _sheets(source: Source, form: FileForm) -> list[tuple[str, Source]]:
 
 
 def _as_text(source: Source, title: str, rows: Iterable[tuple]) -> Source:
-    file = Scratch(source.keep)
+    ragged = Scratch(source.keep)
     width, blank = 0, 0
     for number, row in enumerate(rows, 1):
         cells = [_shown(cell) for cell in row]
@@ -102,10 +102,14 @@ def _as_text(source: Source, title: str, rows: Iterable[tuple]) -> Source:
             blank += 1
             continue
         width = max(width, len(cells))
-        file.write(b"\n" * blank)
+        ragged.write(b"\n" * blank)
         blank = 0
-        # Trailing empty cells are not stored in a sheet: a row may be shorter than its header.
-        file.write(("\t".join(cells + [""] * (width - len(cells))) + "\n").encode("utf-8", "replace"))
+        ragged.write(("\t".join(cells) + "\n").encode("utf-8", "replace"))
+    file = Scratch(source.keep)
+    ragged.file.seek(0)
+    for line in ragged.file:  # trailing empty cells are not stored in a sheet: rows differ in width
+        cells = line.count(b"\t") + 1 if line.strip() else width
+        file.write(line[:-1] + b"\t" * (width - cells) + b"\n")
     return Source(source.path, f"{source.name}, sheet {title}", ".txt", file.file, file.size, source.keep)
 
 

@@ -6,7 +6,7 @@ import csv
 import re
 from dataclasses import dataclass
 
-from mrdamper.rig_files.text.layout import Layout, is_comment, split, units_in
+from mrdamper.rig_files.text.layout import Layout, is_comment, is_footer, split, units_in
 from mrdamper.rig_files.text.stream import TextStream
 from mrdamper.rig_files.text.tokens import looks_numeric
 
@@ -98,7 +98,7 @@ def _lines(text: bytes, stream: TextStream) -> tuple[str, ...]:
 
 def _is_data(text: str, layout: Layout) -> bool:
     """Whether a line is a row, even a damaged one: those must not pass for remarks."""
-    if not text.strip() or is_comment(text) or _SEGMENT.match(text):
+    if not text.strip() or is_comment(text) or _SEGMENT.match(text) or is_footer(text, layout):
         return False
     try:
         cells = split(text, layout.separator)

@@ -11,11 +11,13 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
+from mrdamper.rig_files.column_names import role_of, split_name
 from mrdamper.rig_files.file_form import FileForm
-from mrdamper.rig_files.readers.base import MOST_COLUMNS, RigFileError, Source
-from mrdamper.rig_files.text.tokens import looks_numeric, stamp
+from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RigFileError, Source
+from mrdamper.rig_files.text.tokens import FORTRAN, MISSING, looks_numeric, stamp
 from mrdamper.rig_files.units import is_unit
 
 Kind = Literal["number", "stamp", "text"]
@@ -25,6 +27,9 @@ _COMMENT = re.compile(r"^\s*(#(?!N/A|REF!|VALUE!|DIV/0|NAME\?|NULL!|NUM!)|%|//)+
 _MARKS = frozenset("#%/")
 _SAMPLE = 60  # rows looked at
 _STRAY = 0.1  # of the sampled numbers: fewer with the other decimal mark are single bad cells
+_TELLING = 2  # columns whose names tell what they are
+_WORD = re.compile(r"[^\W\d_]{3,}")
+_NAME_AND_UNIT = re.compile(r"[^\s\[(<{]+(?:\s*\[[^\[\]]*\]|\s*\([^()]*\))?")
 _GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 
 
@@ -52,6 +57,8 @@ class Layout:
         The lines above the names of columns.
     over : tuple of str
         One a column where the line above the names holds titles of groups of columns.
+    fortran : bool
+        Whether exponents are written with a D.
     """
 
     separator: str
@@ -67,6 +74,7 @@ class Layout:
     odd: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     over: tuple[str, ...] = ()
+    fortran: bool = False
 
     @property
     def width(self) -> int:
@@ -93,6 +101,11 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
     """
     separator = form.separator or _separator(lines, source)
     first, width, trailing = _first_row(lines, separator, source, form)
+    if form.header_line is None and form.data_line is None:
+        again = _below_preamble(lines, first, separator)
+        if again:
+            below = form.model_copy(update={"data_line": again + 1})
+            first, width, trailing = _first_row(lines, separator, source, below)
     if width > MOST_COLUMNS:
         raise source.refuse("E_TOO_MANY_COLUMNS", f"{width} columns", line=first + 1, mend="is one sample one line?")
     rows = _rows(lines[first:], separator, width, trailing)
@@ -118,9 +131,51 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         trailing,
         lines[header] if header is not None and not is_comment(lines[header]) else "",
         tuple(next(filter(None, c), "") if k == "text" else "" for c, k in zip(columns, kinds, strict=True)),
-        tuple(line for line in above if line.strip()),
+        (*(line for line in above if line.strip()), *_notes_beside(rows)),
         _titles(above, separator, width),
+        _is_fortran(rows),
     )
+
+
+def _is_fortran(rows: Sequence[Sequence[str]]) -> bool:
+    cells = [cell for row in rows for cell in row if cell]
+    return 2 * sum(FORTRAN.fullmatch(cell) is not None for cell in cells) > len(cells)
+
+
+def _below_preamble(lines: Sequence[str], first: int, separator: str) -> int:
+    """Index below the names of columns of the test, where a table of something else stands above it; else zero.
+
+    Testing machines put a table of results above the record. It is one if other names of
+    columns follow that hold displacement and force, and its own do not.
+    """
+    wanted = {"displacement", "force"}
+    if any(wanted <= _roles(_fields(line, separator, 0)) for line in lines[:first]):
+        return 0
+    for i, line in enumerate(lines[first : first + _SAMPLE], first):
+        if wanted <= _roles(_fields(line, separator, 0)):
+            return i + 1
+    return 0
+
+
+def _roles(cells: Sequence[str]) -> set[str | None]:
+    """The channels that cells name."""
+    return {role_of(split_name(cell.strip('"'))[0]) for cell in cells[:MOST_COLUMNS] if cell} - {None}
+
+
+def _notes_beside(rows: Sequence[Sequence[str]]) -> tuple[str, ...]:
+    """Names with a number behind them that stand beside the first rows, as lines."""
+    pairs = [(a, b) for row in rows[:_SAMPLE] for a, b in pairwise(row) if a and b]
+    return tuple(f"{a}: {b}" for a, b in pairs if not looks_numeric(a) and looks_numeric(b))[:_SAMPLE]
+
+
+def is_footer(line: str, layout: Layout) -> bool:
+    """Whether a line that stands where rows do begins with a word in a column of numbers: Maximum; 12.5; 3.4."""
+    cells = _try_split(line, layout.separator)
+    if not any(cells):
+        return False
+    at = next(i for i, cell in enumerate(cells) if cell)
+    worded = _WORD.match(cells[at]) is not None and cells[at].lower() not in MISSING
+    return worded and (at >= layout.width or layout.kinds[at] != "text")
 
 
 def _titles(above: Sequence[str], separator: str, width: int) -> tuple[str, ...]:
@@ -220,11 +275,9 @@ def _first_row(lines: Sequence[str], separator: str, source: Source, form: FileF
     rows = [cells for cells in sample if _is_row(cells)]
     named = any(_names_columns(line, mark) for _, line in content[-_SAMPLE:] for mark in _SEPARATORS[:-1])
     if not rows or (len(rows) == 1 and len(content) > 1 and named and not _is_row(sample[-1])):
-        raise source.refuse(
-            "E_NO_DATA",
-            "names of columns, but no row of numbers below them" if named else "no row of numbers",
-            mend="export the file again, with its data",
-        )
+        what = "names of columns, but no row of numbers below them" if named else "no row of numbers"
+        kind = RigFileError if named else NoTableError
+        raise kind("E_NO_DATA", what, file=source.name, mend="export the file again, with its data")
     width = Counter(len(cells) for cells in rows).most_common(1)[0][0]
     first, cells = next(
         (i, cells) for i, cells in _split_all(content, separator) if len(cells) == width and _is_row(cells)
@@ -294,8 +347,13 @@ def _header_lines(
         last = fitting[-1]
         if candidates is plain and last != plain[-1] and _names_columns(lines[plain[-1]], separator):
             break
-        if _is_units(_cells(lines[last], separator, width)):
-            return (fitting[-2] if len(fitting) > 1 else None), last
+        units = next((i for i in reversed(fitting) if _is_units(_cells(lines[i], separator, width))), None)
+        naming = [i for i in fitting if i != units and (units is None or i < units)]
+        if units is not None and (units == last or not _roles(_cells(lines[last], separator, width))):
+            return (naming[-1] if naming else None), units
+        telling = [i for i in fitting if len(_roles(_cells(lines[i], separator, width))) >= _TELLING]
+        if telling and not _roles(_cells(lines[last], separator, width)):  # names of sensors or types below the names
+            last = telling[-1]
         return last, (form.units_line - 1 if form.units_line else None)
     naming = [i for i in plain if _names_columns(lines[i], separator)]
     if naming and not form.names:
@@ -323,7 +381,9 @@ def _fields(line: str, separator: str, width: int) -> list[str]:
         line = _COMMENT.sub("", line, count=1)
     if separator == SPACES:
         wide = re.split(r"\s{2,}|\t", line.strip())
-        return wide if len(wide) == width else line.split()
+        narrow = line.split()
+        with_units = _NAME_AND_UNIT.findall(line.strip()) if len(narrow) != width else narrow
+        return next((cells for cells in (wide, with_units) if len(cells) == width), narrow)
     cells = _try_split(line, separator)
     return cells[:-1] if len(cells) == width + 1 and not cells[-1] else cells
 

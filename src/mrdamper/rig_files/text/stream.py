@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import codecs
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import BinaryIO
 
+from mrdamper.rig_files.column_names import role_of
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import RigFileError, Source
 from mrdamper.rig_files.readers.scratch import Scratch
@@ -21,6 +23,9 @@ _BOMS = (
     (codecs.BOM_UTF16_LE, "utf-16-le"),
     (codecs.BOM_UTF16_BE, "utf-16-be"),
 )
+_LOCAL = ("cp1250", "cp1251", "cp1254", "mac_roman")  # a byte a character, as cp1252
+_MULTIBYTE = ("cp932", "gb18030", "cp949", "big5", "shift_jis", "euc_jp", "gbk", "gb2312", "euc_kr")
+_NAMES = 16 * 1024  # bytes in which the names of columns stand
 _TEXT = bytes(b for b in range(256) if b >= 32 or b in b"\t\n\r\f\v")
 _CTRL_Z = b"\x1a"
 
@@ -130,7 +135,8 @@ def open_text(source: Source, form: FileForm) -> TextStream:
         raise source.refuse("E_EMPTY", "the file is empty", mend="export it again")
     encoding, mark = _encoding(source, head, form)
     file, size, start = source.file, source.size, mark
-    if encoding.startswith(("utf-16", "utf-32")) or (b"\n" not in head and b"\r" in head):
+    several = encoding.startswith(("utf-16", "utf-32")) or encoding in _MULTIBYTE
+    if several or (b"\n" not in head and b"\r" in head):
         file, size = _as_utf8(source, encoding, mark)
         start, inner = 0, "utf-8"
     else:
@@ -174,15 +180,29 @@ def _encoding(source: Source, head: bytes, form: FileForm) -> tuple[str, int]:
     try:
         codecs.getincrementaldecoder("utf-8")().decode(head, final=len(head) < _HEAD)
     except UnicodeDecodeError:
-        return _single_byte(head), 0
+        return _not_unicode(head), 0
     return "utf-8", 0
 
 
-def _single_byte(head: bytes) -> str:
-    """UTF-8 with a few damaged bytes stays UTF-8; text without any of its sequences is cp1252."""
+def _not_unicode(head: bytes) -> str:
+    """UTF-8 with a few damaged bytes stays UTF-8; else what makes most of the names words of channels, else cp1252."""
     damaged = sum(0xDC80 <= ord(c) <= 0xDCFF for c in head.decode("utf-8", "surrogateescape"))
     sound = sum(byte >= 0xC2 for byte in head) - damaged
-    return "utf-8" if sound > damaged else "cp1252"
+    if sound > damaged:
+        return "utf-8"
+    start = b"\n".join(line for line in head[:_NAMES].split(b"\n") if not line.isascii())
+    words = {name: _telling_words(start, name) for name in ("cp1252", *_LOCAL, *_MULTIBYTE)}
+    best = max(words, key=lambda name: words[name])
+    return best if words[best] > 0 else "cp1252"
+
+
+def _telling_words(text: bytes, encoding: str) -> int:
+    """Words beyond ASCII that name channels, were the text in this encoding."""
+    try:
+        words = re.findall(r"[^\W\d_]+", text.decode(encoding))
+    except UnicodeDecodeError:
+        return -1
+    return sum(not word.isascii() and role_of(word) is not None for word in words)
 
 
 def _as_utf8(source: Source, encoding: str, mark: int) -> tuple[BinaryIO, int]:

@@ -17,14 +17,17 @@ NUMBER = {
     mark: re.compile(rf"[+-]?(?:[0-9]+(?:{re.escape(mark)}[0-9]*)?|{re.escape(mark)}[0-9]+)(?:[eE][+-]?[0-9]+)?")
     for mark in ".,"
 }
-MISSING = frozenset(("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "-nan", "+nan", "nan(ind)"))
+MISSING = frozenset(("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "-nan", "+nan", "nan(ind)",
+                     "-nan(ind)", "#nv", "1.#qnan", "-1.#qnan", "1.#ind", "-1.#ind"))  # fmt: skip
 _INFINITE = re.compile(r"[+-]?(?:inf(?:inity)?|1\.#inf|∞)", re.IGNORECASE)
 _STAMP = re.compile(
-    r"(?:(?:([0-9]{4})([-/])([0-9]{2})\2([0-9]{2})|([0-9]{2})\.([0-9]{2})\.([0-9]{4}))[T ])?"
-    r"([0-9]{2}):([0-9]{2}):([0-9]{2})(?:[.,]([0-9]{1,9}))?"
-    r"(Z|[+-][0-9]{2}:?[0-9]{2})?",
+    r"(?:(?:([0-9]{4})([-/])([0-9]{2})\2([0-9]{2})|([0-9]{2})\.([0-9]{2})\.([0-9]{4})"
+    r"|[0-9]{1,2}/[0-9]{1,2}/[0-9]{4}(?=.*[AP]M))(?:T| +))?"
+    r"([0-9]{1,2}):([0-9]{2}):([0-9]{2})(?:[.,]([0-9]{1,9})|:([0-9]{3}))?"
+    r"(?: ?([AP]M))?(Z|[+-][0-9]{2}:?[0-9]{2})?",
     re.IGNORECASE,
 )
+FORTRAN = re.compile(r"[+-]?[0-9]*[.,]?[0-9]+[dD][+-]?[0-9]{1,3}")  # 1.25D-03; taken where a file writes so throughout
 _SPACE = " \t"
 
 
@@ -43,7 +46,7 @@ def number(token: str, mark: str) -> float | None:
 def looks_numeric(token: str) -> bool:
     """Whether a cell is meant as a value, in whatever writing: tells rows of data from headers."""
     token = token.strip(_SPACE)
-    if token.lower() in MISSING or stamp(token) is not None or _INFINITE.fullmatch(token):
+    if token.lower() in MISSING or stamp(token) is not None or _INFINITE.fullmatch(token) or FORTRAN.fullmatch(token):
         return True
     if len(token) > 40 or not any(unicodedata.decimal(c, None) is not None for c in token):
         return False
@@ -53,16 +56,21 @@ def looks_numeric(token: str) -> bool:
 def stamp(token: str) -> tuple[int, bool] | None:
     """Nanoseconds of an ISO-8601 time stamp or a clock time, and whether it states its zone.
 
-    Dates also as 2024/03/31 and 31.03.2024, which mean one thing everywhere; 03/04/2024 does not.
+    Dates also as 2024/03/31 and 31.03.2024, which mean one thing everywhere. 03/04/2024 does not;
+    before a clock of twelve hours it is not looked at, and a record that passes midnight runs backwards.
     Integers, as doubles would round the nanoseconds of a date. A zone's offset is taken
     off, so that the change to summer time does not bend a record.
     """
     match = _STAMP.fullmatch(token)
     if match is None:
         return None
-    year, _, month, day, *dotted, hour, minute, second, fraction, zone = match.groups()
+    year, _, month, day, *dotted, hour, minute, second, fraction, thousandths, half, zone = match.groups()
     if dotted[0]:
         day, month, year = dotted
+    if half is not None:
+        if not 1 <= int(hour) <= 12:
+            return None
+        hour = int(hour) % 12 + 12 * (half.upper() == "PM")
     if int(hour) > 23 or int(minute) > 59 or int(second) > 59:
         return None
     days = _day(year, month, day) if year else 0
@@ -75,7 +83,7 @@ def stamp(token: str) -> tuple[int, bool] | None:
             return None
         offset = 3600 * int(digits[:2]) + 60 * int(digits[2:])
         seconds -= offset if zone[0] == "+" else -offset
-    return seconds * 10**9 + int((fraction or "0").ljust(9, "0")), zone is not None
+    return seconds * 10**9 + int((fraction or thousandths or "0").ljust(9, "0")), zone is not None
 
 
 @lru_cache(maxsize=64)

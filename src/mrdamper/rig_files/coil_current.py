@@ -1,0 +1,140 @@
+"""The coil current of a test: of its channel, or of what stands beside the columns, the surest place first."""
+
+from __future__ import annotations
+
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+
+from mrdamper.data import Floats, held_current
+from mrdamper.errors import ColumnError, InputError, printable
+from mrdamper.rig_files.column_names import names_condition, role_of, split_name
+from mrdamper.rig_files.conditions import Statement, agreed, contradicts, currents_in, stated_by_lines, stated_in_titles
+from mrdamper.rig_files.profile import Profile, current_in_name
+from mrdamper.rig_files.readers import RawTable
+from mrdamper.rig_files.record import Finding
+from mrdamper.rig_files.units import parse_unit
+
+_FEWEST_SLOW = 5  # samples of a current that is recorded more rarely than the force
+_FOLDERS = 3  # above a file, whose names may state its current
+
+
+def current_of(
+    table: RawTable, profile: Profile, path: Path, channel: Floats | None
+) -> tuple[float | None, dict[str, str]]:
+    """The current [A] that a test states beside its columns, and where; None where the channel has it, or nothing does.
+
+    Raises
+    ------
+    InputError
+        E_AMBIGUOUS if two statements contradict each other, E_CURRENT_CONTRADICTS if one
+        contradicts the channel, E_RANGE if one is no coil current.
+    """
+    if profile.current is not None and profile.current.value is not None:
+        return profile.current.value, {"current_from": "profile"}
+    if profile.current is not None:
+        found = current_in_name(path.name, profile)
+        statements = [] if found is None else [Statement(found, "file name")]
+    else:
+        statements = _statements(table, path)
+    where = printable(table.source.name)
+    mend = "correct the name or the line, or say [current] value = ... in a profile"
+    try:
+        stated = agreed(statements)
+    except ValueError as error:
+        code = "E_RANGE" if "no coil current" in str(error) else "E_AMBIGUOUS"
+        raise ColumnError(printable(str(error)), where=where, mend=mend, code=code) from None
+    if channel is not None and stated is not None:
+        known = channel[np.isfinite(channel)]
+        mean, change = held_current(known) if known.size >= 3 else (stated.amperes, "")
+        if not change and contradicts(mean, stated.amperes):
+            raise ColumnError(
+                printable(f"{stated.whence} gives {stated.amperes:g} A, the current channel {mean:g} A"), where=where,
+                mend=f"if the channel is right, rename; else say [current] value = {stated.amperes:g} in a profile",
+                code="E_CURRENT_CONTRADICTS",
+            )  # fmt: skip
+    if channel is not None or stated is None:
+        return None, {}
+    return stated.amperes, {"current_from": as_data(stated.whence)}
+
+
+def _statements(table: RawTable, path: Path) -> list[Statement]:
+    """Every current that stands beside the columns, the surest place first."""
+    held = held_current_of(table)
+    found = [] if held is None else [Statement(held, "a number in the file")]
+    found += stated_by_lines(table.remarks, table.form.get("decimal"))  # type: ignore[arg-type]
+    member = table.source.name.removeprefix(f"{path.name}:").removeprefix(f"{path.name}, sheet ")
+    for text, whence in ((table.label, "the title"), (path.name, "file name"), (member, "file name")):
+        stated = currents_in(text)
+        if len(stated) == 1:
+            found.append(Statement(stated[0], whence if whence == "file name" else f"{whence} {text!r}"))
+    return found or _set_points(table) or _once(stated_in_titles(table.remarks)) or _folders(table, path)
+
+
+def _set_points(table: RawTable) -> list[Statement]:
+    """What a column of the current that was asked for states, where it is one number."""
+    for column, (name, unit) in enumerate(zip(table.names, table.units, strict=True)):
+        bare, stated = split_name(name, unit)
+        known = parse_unit(stated) if stated else None
+        if known is None or known.dimension != "current" or not names_condition(bare, "current"):
+            continue
+        try:
+            values = table.read([column]).values[column]
+        except InputError:
+            continue
+        low, high = np.nanmin(values), np.nanmax(values)
+        if low == high:
+            return [Statement(known.factor * float(low), f"the column {name!r}")]
+    return []
+
+
+def _once(found: list[Statement]) -> list[Statement]:
+    """Statements in free text, if all say one thing."""
+    return found if len({statement.amperes for statement in found}) == 1 else []
+
+
+def _folders(table: RawTable, path: Path) -> list[Statement]:
+    """The nearest folder, of a file or within an archive, whose name states a current."""
+    inner = PurePosixPath(table.source.name.removeprefix(f"{path.name}:")).parent.parts
+    for name in (*reversed(inner), *(folder.name for folder in list(path.parents)[:_FOLDERS])):
+        stated = currents_in(name)
+        if stated:
+            return [Statement(stated[0], f"the folder {name!r}")] if len(stated) == 1 else []
+    return []
+
+
+def held_current_of(table: RawTable) -> float | None:
+    """Coil current [A] that a file holds as one number beside its columns, `current_A = 0.5`; None if it does not."""
+    held = set()
+    for name, value in table.constants.items():
+        name, unit = split_name(name)
+        known = parse_unit(unit) if unit else None
+        if known is not None and known.dimension == "current" and role_of(name) == "current" and np.isfinite(value):
+            held.add(known.factor * value)
+    return held.pop() if len(held) == 1 else None
+
+
+def as_data(text: str) -> str:
+    """Text of a file as a cell that no spreadsheet takes for a formula."""
+    text = printable(text)[:1000]
+    return f"'{text}" if text.startswith(("=", "+", "-", "@")) else text
+
+
+def without_gaps(current: Floats) -> tuple[Floats, tuple[Finding, ...]]:
+    """A current that is recorded at every n-th sample only, by its mean, where it is constant."""
+    there = np.flatnonzero(np.isfinite(current))
+    if there.size < _FEWEST_SLOW or there.size > 0.6 * current.size:
+        return current, ()
+    steps = np.diff(there)
+    usual = int(np.median(steps))
+    whole = there[0] <= usual and current.size - there[-1] <= usual and steps.max() <= 2 * usual
+    mean, change = held_current(current[there])
+    if not whole or change:
+        return current, ()
+    text = f"the current is recorded at every {usual}th sample only: its mean {mean:g} A is taken"
+    return constant(mean, current), (Finding("W_DECIMATED", text),)
+
+
+def constant(value: float, like: Floats) -> Floats:
+    """One number as a channel that takes no memory."""
+    return np.broadcast_to(np.float64(value), like.shape)

@@ -1,0 +1,157 @@
+"""Archives of a folder (zip, tar, tgz): unpacked within bounds into a folder that is removed afterwards."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import stat
+import tarfile
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Iterable, Iterator
+from pathlib import Path, PurePosixPath
+from typing import IO
+
+from mrdamper.rig_files.readers.archive import (
+    UNREADABLE_ZIP,
+    bomb,
+    check_member,
+    check_sizes,
+    opened,
+    opened_zip,
+)
+from mrdamper.rig_files.readers.base import MOST_RATIO, MOST_UNPACKED, RigFileError, Source
+
+SUFFIXES = (".tar", ".tgz")
+_MOST_MEMBERS = 10_000
+_PIECE = 2**20
+_NESTED = (".zip", ".gz", ".tgz", ".tar", ".bz2", ".xz", ".7z", ".rar")
+
+
+@contextlib.contextmanager
+def unpacked(paths: Iterable[str | Path]) -> Iterator[list[Path]]:
+    """The same paths, with a folder in the place of every archive of several files.
+
+    Raises
+    ------
+    RigFileError
+        E_ARCHIVE, E_ARCHIVE_PATH, E_ARCHIVE_RATIO, E_TRUNCATED, E_FORMAT.
+    """
+    with contextlib.ExitStack() as stack:
+        found = []
+        for path in map(Path, paths):
+            found += [_folder_of(path, stack)] if is_packed_folder(path) else [path]
+            inside = sorted(path.rglob("*")) if path.is_dir() else ()
+            found += [_folder_of(archive, stack) for archive in inside if is_packed_folder(archive)]
+        yield found
+
+
+def is_packed_folder(path: Path) -> bool:
+    """Whether a file is a tar, or a zip of several files."""
+    name = path.name.lower()
+    if name.startswith(".") or not path.is_file():
+        return False
+    if name.endswith((*SUFFIXES, ".tar.gz")):
+        return True
+    if not name.endswith(".zip"):
+        return False
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return len(_members(archive.infolist())) > 1
+    except UNREADABLE_ZIP:
+        return False
+
+
+def _members(members: list[zipfile.ZipInfo]) -> list[zipfile.ZipInfo]:
+    return [member for member in members if not member.is_dir() and not _is_junk(member.filename)]
+
+
+def _is_junk(name: str) -> bool:
+    """Whether a file is one that systems leave in folders: .DS_Store, __MACOSX/._run1.csv, Thumbs.db."""
+    parts = PurePosixPath(name).parts
+    return not parts or "__MACOSX" in parts or parts[-1].startswith((".", "~$")) or parts[-1] == "Thumbs.db"
+
+
+def _folder_of(path: Path, stack: contextlib.ExitStack) -> Path:
+    top = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="mrdamper-"))) / path.name
+    top.mkdir()
+    if path.suffix.lower() == ".zip":
+        with opened_zip(path) as source:
+            _unzip(source, top)
+    else:
+        with opened(path, folder=True) as source:
+            _untar(source, top)
+    inside = list(top.iterdir())
+    return inside[0] if len(inside) == 1 and inside[0].is_dir() else top
+
+
+def _unzip(source: Source, top: Path) -> None:
+    try:
+        with zipfile.ZipFile(source.file) as archive:
+            everything = archive.infolist()
+            for member in everything:
+                check_member(source, member.filename, link=stat.S_ISLNK(member.external_attr >> 16))
+            members = _members(everything)
+            check_sizes(source, members)
+            if any(member.flag_bits & 1 for member in members):
+                raise source.refuse("E_ARCHIVE", "a member is encrypted", mend="unpack it first")
+            room = _Room(source, top)
+            for member in members:
+                with archive.open(member) as stream:
+                    room.write(member.filename, stream)
+    except RigFileError:
+        raise
+    except (*UNREADABLE_ZIP, RuntimeError, EOFError, zlib.error) as error:
+        raise source.refuse("E_ARCHIVE", f"damaged or unusual archive ({error})", mend="pack it again") from error
+
+
+def _untar(source: Source, top: Path) -> None:
+    try:
+        with tarfile.open(fileobj=source.file, mode="r:") as archive:
+            room = _Room(source, top)
+            for member in archive:
+                check_member(source, member.name, link=not (member.isfile() or member.isdir()))
+                stream = archive.extractfile(member) if member.isfile() and not _is_junk(member.name) else None
+                if stream is not None:
+                    room.write(member.name, stream)
+    except RigFileError:
+        raise
+    except (tarfile.TarError, OSError, ValueError, EOFError) as error:
+        code = "E_TRUNCATED" if "unexpected end" in str(error) else "E_ARCHIVE"
+        raise source.refuse(code, f"damaged archive ({error})", mend="copy or pack it again") from error
+
+
+class _Room:
+    """The folder that is filled, and how much may still come into it."""
+
+    def __init__(self, source: Source, top: Path):
+        self._source, self._top = source, top
+        packed = source.path.stat().st_size
+        self._left = min(MOST_UNPACKED, MOST_RATIO * packed)
+        self._count = 0
+
+    def write(self, name: str, stream: IO[bytes]) -> None:
+        """Store one member."""
+        self._count += 1
+        if self._count > _MOST_MEMBERS:
+            raise self._source.refuse("E_ARCHIVE", f"over {_MOST_MEMBERS} members", mend="unpack it first")
+        if name.lower().endswith(_NESTED):
+            raise self._source.refuse("E_ARCHIVE", f"an archive inside an archive ({name!a})", mend="unpack it first")
+        target = self._top.joinpath(*PurePosixPath(name).parts)
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            if target.exists():
+                raise self._source.refuse("E_ARCHIVE", f"two members are called {name!a}", mend="pack it again")
+            with target.open("xb") as file:
+                while piece := stream.read(_PIECE):
+                    self._left -= len(piece)
+                    if self._left < 0:
+                        raise bomb(self._source)
+                    file.write(piece)
+        except OSError as error:
+            if shutil.disk_usage(self._top).free < _PIECE:
+                raise
+            raise self._source.refuse(
+                "E_ARCHIVE", f"member {name!a}: {error.strerror}", mend="pack it again"
+            ) from error

@@ -1,0 +1,154 @@
+"""What stands around a record: archives of folders, files of other kinds, footers, free text, folders, rates."""
+
+import io
+import tarfile
+import zipfile
+
+import numpy as np
+import pytest
+from support import rig_files as rig
+
+from mrdamper.errors import InputError
+from mrdamper.rig_files.conditions import stated_in_titles, stated_rate
+from mrdamper.rig_files.rig_import import import_files, read_run
+
+HEAD = "time_s,displacement_mm,force_N,current_A"
+
+
+def rows(current=0.4, size=240):
+    table = rig.rows(size)[:, :3]
+    return "\n".join(",".join(f"{v:.5f}" for v in [*row, current]) for row in table)
+
+
+def text(current=0.4):
+    return f"{HEAD}\n{rows(current)}\n"
+
+
+def zipped(path, members):
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in members:
+            archive.writestr(name, content)
+    return path
+
+
+def tarred(path, *members):
+    with tarfile.open(path, "w") as archive:
+        for member, content in members:
+            member.size = len(content)
+            archive.addfile(member, io.BytesIO(content))
+    return path
+
+
+def member(name, kind=tarfile.REGTYPE, link=""):
+    found = tarfile.TarInfo(name)
+    found.type, found.linkname = kind, link
+    return found
+
+
+def test_a_refused_file_of_an_archive_does_not_cost_the_others(tmp_path):
+    path = zipped(tmp_path / "a.zip", [("a/one.csv", text()), ("a/two.csv", text(0.8)), ("a/bad.csv", "1,2\n")])
+    found = import_files([path])
+    assert sorted(record.id for record in found.records) == ["one", "two"]
+    assert len(found.refusals) == 1
+    assert not list(tmp_path.glob("*/*"))
+
+
+def test_a_table_of_tests_in_an_archive_is_used(tmp_path):
+    bare = text().replace(",current_A", "").replace(",0.40000\n", "\n")
+    path = zipped(
+        tmp_path / "a.zip", [("a/1.csv", bare), ("a/2.csv", bare), ("a/tests.csv", "file,current_A\n1,0.3\n2,1.2\n")]
+    )
+    assert [float(record.current[0]) for record in import_files([path]).records] == [0.3, 1.2]
+
+
+HOSTILE = {
+    "leads out": ("E_ARCHIVE_PATH", lambda p: zipped(p / "a.zip", [("a.csv", text()), ("../b.csv", text())])),
+    "absolute": ("E_ARCHIVE_PATH", lambda p: tarred(p / "a.tar", (member("/etc/a.csv"), b"1"))),
+    "a link": ("E_ARCHIVE", lambda p: tarred(p / "a.tar", (member("a.csv", tarfile.SYMTYPE, "/etc/passwd"), b""))),
+    "a device": ("E_ARCHIVE", lambda p: tarred(p / "a.tar", (member("a.csv", tarfile.FIFOTYPE), b""))),
+    "twice": ("E_ARCHIVE", lambda p: tarred(p / "a.tar", (member("a.csv"), b"1"), (member("a.csv"), b"2"))),
+    "nested": ("E_ARCHIVE", lambda p: tarred(p / "a.tar", (member("a.zip"), b"PK"), (member("b.csv"), b"2"))),
+    "a bomb": ("E_ARCHIVE_RATIO", lambda p: zipped(p / "a.zip", [("a.csv", bytes(10**7)), ("b.csv", bytes(10**7))])),
+    "no tar": ("E_ARCHIVE", lambda p: (p / "a.tar").write_bytes(b"no archive at all" * 100) and p / "a.tar"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", HOSTILE)
+def test_an_archive_is_read_within_bounds(tmp_path, case):
+    code, make = HOSTILE[case]
+    with pytest.raises(InputError) as caught:
+        import_files([make(tmp_path)])
+    assert caught.value.code == code, str(caught.value)
+
+
+def test_files_of_other_kinds_and_notes_are_named_and_left_out(tmp_path):
+    (tmp_path / "run.csv").write_text(text())
+    (tmp_path / "README.txt").write_text("Damper 7, tested in March.\nThe pump was off.\n")
+    (tmp_path / "photo.jpg").write_bytes(b"\xff\xd8\xff")
+    found = import_files([tmp_path])
+    assert (len(found.records), len(found.refusals)) == (1, 0)
+    assert sorted(found.left_out) == ["README.txt", "photo.jpg"]
+
+
+def test_a_text_without_a_table_is_refused_if_it_is_all_there_is(tmp_path):
+    (tmp_path / "README.txt").write_text("Damper 7, tested in March.\n")
+    assert [refusal.error.code for refusal in import_files([tmp_path]).refusals] == ["E_NO_DATA"]
+
+
+@pytest.mark.parametrize("foot", ["Maximum,20,1000,0.4", "\n\nEnd of test", "Mean;1;2\nStd,1,2,3"])
+def test_words_below_the_rows_are_left_out_and_said(tmp_path, foot):
+    (tmp_path / "a.csv").write_text(f"{text()}{foot}\n")
+    record = read_run(tmp_path / "a.csv")
+    assert record.time.size == 240
+    assert "W_FOOTER" in {finding.code for finding in record.findings}
+
+
+@pytest.mark.parametrize("row", ["1x2,1,2,0.4", "-,1,2,0.4,7", "0.5O,1,2,0.4", "x,1,2,0.4"])
+def test_a_damaged_last_row_is_no_footer(tmp_path, row):
+    (tmp_path / "a.csv").write_text(f"{text()}{row}\n")
+    with pytest.raises(InputError):
+        read_run(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize("line", ["Amplifier range 2 A", "max current 2 A", "Rated 1.5 A", "5 A supply, 0.4 A probe"])
+def test_a_rating_states_no_current(line):
+    assert stated_in_titles([line]) == []
+
+
+def test_free_text_that_says_two_currents_says_none(tmp_path):
+    bare = text().replace(",current_A", "").replace(",0.40000\n", "\n")
+    (tmp_path / "a.csv").write_text(f"Test 3 at 0.4 A\nafter the one at 0.8 A\n{bare}")
+    assert [r.error.code for r in import_files([tmp_path]).refusals] == ["E_CURRENT_MISSING"]
+
+
+def test_two_sampling_rates_are_refused(tmp_path):
+    bare = "\n".join(line.split(",", 1)[1] for line in text().splitlines())
+    (tmp_path / "a.csv").write_text(f"Sample rate: 100 Hz\nSampling interval: 2 ms\n{bare}\n")
+    with pytest.raises(InputError) as caught:
+        read_run(tmp_path / "a.csv")
+    assert caught.value.code == "E_AMBIGUOUS"
+    assert stated_rate(["Abtastrate: 2 kHz"], {}) == 2000
+    assert stated_rate(["Excitation: 2 Hz"], {"dt_ms": 4.0}) == 250
+    assert stated_rate(["Frequency = 2 Hz"], {}) is None
+
+
+def test_a_count_of_samples_with_a_hole_leaves_a_gap(tmp_path):
+    table = rig.rows(300)[:, 1:3]
+    counted = [f"{i + 20 * (i > 150)},{x:.5f},{f:.3f}" for i, (x, f) in enumerate(table)]
+    (tmp_path / "0.4A.csv").write_text(
+        "\n".join(["Sample rate: 100 Hz", "Sample,Position (mm),Force (N)", *counted, ""])
+    )
+    record = read_run(tmp_path / "0.4A.csv")
+    np.testing.assert_allclose(np.diff(record.time).max(), 0.21)
+    assert "W_TIME_GAP" in {finding.code for finding in record.findings}
+
+
+def test_a_slow_current_that_changes_is_not_taken_for_its_mean(tmp_path):
+    table = rig.rows(240)[:, :3]
+    said = [
+        f"{a:.5f},{b:.5f},{c:.3f}," + (f"{i / 240:.3f}" if i % 10 == 0 else "") for i, (a, b, c) in enumerate(table)
+    ]
+    (tmp_path / "a.csv").write_text("\n".join([HEAD, *said, ""]))
+    with pytest.raises(InputError) as caught:
+        read_run(tmp_path / "a.csv")
+    assert caught.value.code == "E_MISSING"

@@ -1,0 +1,389 @@
+"""Exports by the machine or program that wrote them: testing machines, loggers, hand-made sheets, many languages.
+
+As `lab_exports`, nothing here is shared with the readers. A text is told by its head, the form of
+its rows and its foot; what is no text of that kind is a function.
+"""
+
+from __future__ import annotations
+
+import datetime
+import io
+import tarfile
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from support.lab_exports import INCH, POUND, Truth, _motion
+
+G = 9.80665
+
+
+@dataclass(frozen=True)
+class Text:
+    """One file a test. Fields: n, i (current stated), I, mA, t, ms, x and um, inch, F, kN, daN, lbf, clock, k (row)."""
+
+    file: str
+    head: tuple[str, ...]
+    row: str
+    foot: tuple[str, ...] = ()
+    encoding: str = "utf-8"
+    comma: bool = False
+    end: str = "\r\n"
+
+    def __call__(self, tests: tuple[Truth, ...], folder: Path) -> None:
+        for n, test in enumerate(tests, 1):
+            said = {"n": n, "i": f"{test.current:.2f}", "motion": _motion(test), "rate": 1 / test.time[1]}
+            said |= {"step": test.time[1], "top": 1e-3 * test.force.max(), "mA": f"{1e3 * test.current:.0f}"}
+            mark = (lambda text: text.replace(".", ",")) if self.comma else str
+            stated = {key: mark(f"{v:.7g}" if isinstance(v, float) else str(v)) for key, v in said.items()}
+            rows = [mark(self.row.format(**sample)) for sample in samples(test)]
+            if self.file.startswith("log"):  # stamps keep their points
+                rows = [self.row.format(**sample) for sample in samples(test)]
+            lines = [*(h.format(**stated) for h in self.head), *rows, *(f.format(**stated) for f in self.foot), ""]
+            path = folder / self.file.format(**stated)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(self.end.join(lines).encode(self.encoding))
+
+
+def samples(test: Truth):
+    """Every sample in every unit."""
+    start = datetime.datetime(2024, 3, 1, 9, 59, 58)
+    v = np.gradient(test.x, test.time)
+    a = np.gradient(v, test.time) / G
+    for k, (t, x, f, i) in enumerate(test.table.tolist()):
+        now = start + datetime.timedelta(microseconds=round(1e6 * t))
+        yield {
+            "k": k, "t": t, "ms": 1e3 * t, "x": 1e3 * x, "um": 1e6 * x, "inch": x / INCH, "metre": x, "F": f,
+            "kN": 1e-3 * f, "daN": 0.1 * f, "lbf": f / POUND, "I": i, "mA": 1e3 * i, "now": now, "hour": now.hour,
+            "total": t + 120.5, "cycle": int(t * test.frequency + 1e-9), "v": v[k], "a": a[k],
+            "inside": t % (1 / test.frequency), "slow": f"{i:.4f}" if k % 10 == 0 else "", "set": test.current,
+            "nan": f"{i:.4f}" if k % 5 == 0 else "NaN", "warm": 25 + 0.01 * k,
+            "beside": (f"Coil current (A),{test.current:g}", "Operator,KH", "Damper,7")[k] if k < 3 else ",",
+            "tag": "trace_values" if k == 0 else "",
+        }  # fmt: skip
+
+
+_PLAIN = "{t:.5f},{x:.5f},{F:.3f},{I:.4f}"
+_GERMAN = "{t:.5f};{x:.5f};{F:.3f};{I:.4f}"
+TEXTS = {
+    "mts_testsuite": Text(
+        "TestRun{n}.csv",
+        ('"MTS TestSuite","TWE"', '"Test Run Name:","DMP-01 {i} A"', "", '"Time","Axial Displacement","Axial Force"',
+         '"sec","mm","kN"'),
+        '"{t:.5f}","{x:.5f}","{kN:.6f}"',
+    ),
+    "instron_bluehill": Text(
+        "Specimen_RawData_{n}.csv",
+        ('"Results Table 1"', '"Specimen label","Maximum Load (kN)","Extension at max (mm)"', '"S{n}","1.234","5.6"',
+         "", '"Coil current","{i}","A"', "", '"Time","Extension","Load"', '"(s)","(mm)","(kN)"'),
+        '"{t:.5f}","{x:.5f}","{kN:.6f}"',
+    ),
+    "instron_wavematrix": Text(
+        "damper {i}A {motion}.csv",
+        ("Total Time (s),Cycle Elapsed Time (s),Total Cycles,Step,Total Cycle Count(Linear Waveform),"
+         "Position(Linear:Digital Position) (mm),Load(Linear:Load) (kN)",),
+        "{t:.5f},{inside:.5f},{cycle},1,{cycle},{x:.5f},{kN:.6f}",
+    ),
+    "zwick": Text(
+        "Probe{n}.TRA",
+        ('"Prüfprotokoll"', '"Prüfer";"KH"', '"Spulenstrom";{i};"A"', '"Prüfzeit";"Standardweg";"Standardkraft"',
+         '"s";"mm";"N"'),
+        "{t:.5f};{x:.5f};{F:.3f}", encoding="cp1252", comma=True,
+    ),
+    "servotest": Text(
+        "run{n}.txt",
+        ("Servotest PULSAR data export", "File:\tRun{n}", "Sample Rate:\t{rate} Hz", "Current setpoint:\t{i} A", "",
+         "Time\tActuator Position\tLoad Cell", "s\tmm\tkN"),
+        "{t:.5f}\t{x:.5f}\t{kN:.6f}\t",
+    ),
+    "dspace": Text(
+        "rec{n}.csv",
+        ("type,measurement,,,", "path,,Model Root/Disp,Model Root/Force,Model Root/Current",
+         "description,time,Displacement,Force,Current", "unit,s,mm,N,A"),
+        "{tag}," + _PLAIN,
+    ),
+    "catman": Text(
+        "catman{n}.ASC",
+        ("HBM_CATMAN_DATAFILE", "T0 = 01.03.2024 10:11:12", "Number of channels: 4", "",
+         "Zeit  1 - Standardmessrate\tWeg\tKraft\tStrom", "s\tmm\tkN\tA", "Kanal 0\tKanal 1\tKanal 2\tKanal 3"),
+        "{t:.5f}\t{x:.5f}\t{kN:.6f}\t{I:.4f}", encoding="cp1252", comma=True,
+    ),
+    "diadem": Text(
+        "kanal{n}.csv", ("Name;Zeit;Weg;Kraft;Spulenstrom", "Einheit;s;mm;N;A", "Kommentar;;;;"), ";" + _GERMAN,
+        encoding="cp1252", comma=True,
+    ),
+    "statistics_below": Text(
+        "r{n}.csv", ("Time (s);Stroke (mm);Load (kN);Current (A)",), "{t:.5f};{x:.5f};{kN:.6f};{I:.4f}",
+        foot=("", "Maximum;20.0;{top};1.0", "Minimum;-20.0;-1.0;1.0", "End of data"),
+    ),
+    "french": Text(
+        "essai{n}.csv", ("Banc d'essai amortisseur", "Temps (s);Déplacement (mm);Effort (daN);Intensité (A)"),
+        "{t:.5f};{x:.5f};{daN:.4f};{I:.4f}", encoding="cp1252", comma=True,
+    ),
+    "japanese": Text(
+        "data{n}.csv", ("試験機データ", "時間[s],変位[mm],荷重[kN],電流[A]"), "{t:.5f},{x:.5f},{kN:.6f},{I:.4f}",
+        encoding="cp932",
+    ),
+    "chinese": Text("试验{n}.csv", ("时间(s),位移(mm),力(N),电流(A)",), _PLAIN, encoding="gb18030"),
+    "chinese_units": Text(
+        "试验{n}.csv", ("时间（秒）,位移（毫米）,阻尼力（牛）,线圈电流（安）",), _PLAIN, encoding="utf-8-sig",
+    ),
+    "korean": Text("r{n}.csv", ("시간(s),변위(mm),하중(N),전류(A)",), _PLAIN, encoding="cp949"),
+    "russian": Text(
+        "опыт{n}.csv", ("Время, с;Перемещение, мм;Сила, кН;Ток, А",), "{t:.5f};{x:.5f};{kN:.6f};{I:.4f}",
+        encoding="cp1251", comma=True,
+    ),
+    "czech": Text("r{n}.csv", ("Čas [s];Dráha [mm];Síla [N];Proud [A]",), _GERMAN, encoding="cp1250", comma=True),
+    "polish": Text("r{n}.csv", ("Czas [s];Droga [mm];Siła [N];Prąd [A]",), _GERMAN, encoding="cp1250", comma=True),
+    "spanish": Text(
+        "r{n}.csv", ("Tiempo (s);Posición (mm);Fuerza (N);Intensidad (A)",), _GERMAN, encoding="cp1252", comma=True,
+    ),
+    "italian": Text(
+        "r{n}.txt", ("Tempo [s];Spostamento [mm];Forza [N];Corrente [A]",), _GERMAN, encoding="mac_roman", comma=True,
+    ),
+    "clock": Text("log{n}.csv", ("Timestamp,Position [mm],Force [N],Current [A]",), "{now:%H:%M:%S.%f}," + _PLAIN[8:]),
+    "clock_beside_date": Text(
+        "log{n}.csv", ("Date;Time;Position [mm];Force [N];Current [A]",),
+        "01.03.2024;{hour}:{now:%M:%S.%f};{x:.5f};{F:.3f};{I:.4f}",
+    ),
+    "american_clock": Text(
+        "log{n}.csv", ("Time,Position (in),Load (lbs),Current (A)",),
+        "3/4/2024 {now:%I:%M:%S.%f %p},{inch:.6f},{lbf:.4f},{I:.4f}",
+    ),
+    "iso_clock": Text(
+        "log{n}.csv", ("time,displacement_mm,force_N,current_A",), "{now:%Y-%m-%dT%H:%M:%S.%f}+01:00," + _PLAIN[8:],
+    ),
+    "counted_samples": Text(
+        "r{n}.csv", ("Sample rate: {rate} Hz", "Coil current: {i} A", "Sample,Position (mm),Force (N)"),
+        "{k},{x:.5f},{F:.3f}",
+    ),
+    "stated_step": Text(
+        "r{n}.csv", ("# dt = {step} s", "Position (mm),Force (N),Current (A)"), "{x:.5f},{F:.3f},{I:.4f}",
+    ),
+    "fixed_width": Text(
+        "r{n}.txt",
+        ("      Time   Axial Displ   Axial Force       Current",
+         "       (s)          (mm)           (N)           (A)"),
+        "{t:10.5f}{x:14.5f}{F:14.3f}{I:14.4f}",
+    ),
+    "folders": Text("{i}A/{motion}.csv", ("time_s,disp_mm,force_N",), "{t:.5f},{x:.5f},{F:.3f}"),
+    "folders_alike": Text("I = {mA} mA/{motion}/data.csv", ("time_s,disp_mm,force_N",), "{t:.5f},{x:.5f},{F:.3f}"),
+    "trailing_marks": Text(
+        "r{n}.csv", ("Zeit [s];Weg [mm];Kraft [N];Strom [mA];",), "{t:.5f};{x:.5f};{F:.3f};{mA:.2f};",
+        encoding="utf-8-sig", comma=True,
+    ),
+    "sep_line": Text("r{n}.csv", ("sep=;", "Time [s];Position [mm];Force [N];Current [A]"), _GERMAN),
+    "imperial_words": Text(
+        "r{n}.csv", ("Time sec,Stroke in,Load lbs,Current amps",), "{t:.5f},{inch:.6f},{lbf:.5f},{I:.4f}",
+    ),
+    "slashed_units": Text("r{n}.csv", ("t / ms,s / µm,F / kN,I / mA",), "{ms:.3f},{um:.3f},{kN:.6f},{mA:.2f}"),
+    "further_channels": Text(
+        "r{n}.csv",
+        ("Force (N),Displacement (mm),Time (s),Velocity (m/s),Acceleration (g),Oil temperature (°C),Surface temp (°C),"
+         "Supply voltage (V),Current (A),Displacement Command (mm),Status",),
+        "{F:.3f},{x:.5f},{t:.5f},{v:.5f},{a:.5f},{warm:.2f},{warm:.1f},12.0,{I:.4f},{x:.5f},OK",
+    ),
+    "slow_channels": Text(
+        "r{n}.csv", ("Time (s),Displacement (mm),Force (N),Temperature (degC),Current (A)",),
+        "{t:.5f},{x:.5f},{F:.3f},{slow},{slow}",
+    ),
+    "slow_current": Text(
+        "r{n}.csv", ("Time (s),Displacement (mm),Force (N),Current (A)",), "{t:.5f},{x:.5f},{F:.3f},{nan}",
+    ),
+    "symbols": Text("r{n}.csv", ("t[s];x[mm];F[N];I[A];U[V]",), "{t:.5f};{x:.5f};{F:.3f};{I:.4f};{warm:.3f}"),
+    "sensors_above": Text(
+        "r{n}.csv", ("Channel 1,Channel 2,Channel 3,Channel 4", "Time,LVDT,Load cell,Coil current", "s,mm,N,A"), _PLAIN,
+    ),
+    "types_below": Text(
+        "r{n}.csv", ("Time,LVDT,Load cell,Coil current", "s,mm,N,A", "double,double,double,double", ""), _PLAIN,
+    ),
+    "pandas": Text(
+        "r{n}.csv", (",Time (s),Displacement (mm),Force (N),Current (A)",), "{k},{t!r},{x!r},{F!r},{I!r}", end="\n",
+    ),
+    "two_clocks": Text(
+        "r{n}.csv", ("Running Time (s),Total Time (s),Axial Displacement (mm),Axial Force (N),Coil Current (A)",),
+        "{t:.5f},{total:.5f},{x:.5f},{F:.3f},{I:.4f}",
+    ),
+    "set_point_beside": Text(
+        "r{n}.csv", ("Time (s),Displacement (mm),Force (N),Current setpoint (A),Current actual (A)",),
+        "{t:.5f},{x:.5f},{F:.3f},{set:.2f},{I:.4f}",
+    ),
+    "set_point_only": Text(
+        "r{n}.csv", ("Time (s),Displacement (mm),Force (N),Current setpoint (A)",), "{t:.5f},{x:.5f},{F:.3f},{set:.2f}",
+    ),
+    "json_line": Text(
+        "r{n}.dat",
+        ('# {{"operator": "KH", "coil_current_A": {i}, "rig": "B2"}}', "# time_s displacement_mm force_N"),
+        "{t:.5f} {x:.5f} {F:.3f}",
+    ),
+    "savetxt": Text("r{n}.txt", ("# t [s] x [m] F [N] I [A]",), "{t:.18e} {metre:.18e} {F:.18e} {I:.18e}", end="\n"),
+    "notes_beside": Text(
+        "r{n}.csv", ("Time (s),Disp (mm),Force (N),,Parameter,Value",), "{t:.5f},{x:.5f},{F:.3f},,{beside}",
+    ),
+    "key_values": Text(
+        "r{n}.csv", ("[Header]", "Version=2", "Strom_A={i}", "[Data]", "Zeit_s;Weg_mm;Kraft_N"),
+        "{t:.5f};{x:.5f};{F:.3f}", encoding="cp1252", comma=True,
+    ),
+    "devices": Text(
+        "r{n}.csv", ("timestamps,Force\\ETKC:1,Pos\\ETKC:1,Current\\ETKC:1", "s,N,mm,A"),
+        "{t:.5f},{F:.3f},{x:.5f},{I:.4f}",
+    ),
+    "own_suffix": Text("damper.{n}", ("Time (s)\tPosition (mm)\tForce (N)\tCurrent (A)",), _GERMAN.replace(";", "\t")),
+}  # fmt: skip
+
+
+def fortran(tests: tuple[Truth, ...], folder: Path) -> None:
+    """Exponents with a D."""
+    for n, test in enumerate(tests, 1):
+        rows = ["".join(f"{v:14.6E}".replace("E", "D") for v in row) for row in test.table * [1, 1e3, 1, 1]]
+        lines = ["  TIME (S)      DISP (MM)     FORCE (N)     CURRENT (A)", *rows, ""]
+        (folder / f"r{n}.dat").write_text("\n".join(lines), encoding="ascii")
+
+
+def pages(tests: tuple[Truth, ...], folder: Path) -> None:
+    """A heading a page."""
+    for n, test in enumerate(tests, 1):
+        lines = [f"TEST REPORT  coil current {test.current:.2f} A"]
+        rows = [f"{a:12.5f}{1e3 * b:12.5f}{c:12.3f}" for a, b, c, _ in test.table]
+        for at in range(0, len(rows), 50):
+            lines += [f"Page {at // 50 + 1}", "    Time [s]   Disp [mm]   Force [N]", *rows[at : at + 50], ""]
+        (folder / f"r{n}.txt").write_text("\n".join(lines), encoding="utf-8")
+
+
+def _book(rows: list[list], path: Path) -> None:
+    from openpyxl import Workbook
+
+    book = Workbook()
+    for row in rows:
+        book.active.append(row)
+    book.save(path)
+
+
+def _cells(test: Truth, columns: int = 3) -> list[list[float]]:
+    return [[round(float(v), 6) for v in row] for row in (test.table * [1, 1e3, 1, 1])[:, :columns]]
+
+
+def hand_made_sheets(tests: tuple[Truth, ...], folder: Path) -> None:
+    """A table that begins in the second column, a title, a condition, notes to the right."""
+    for n, test in enumerate(tests, 1):
+        rows = [[None, *row] for row in _cells(test)]
+        rows[0] += [None, None, "note: pump was off"]
+        rows[1] += [None, None, "looks good"]
+        head = [[None, "MR damper, my test"], [None, "Coil current", test.current, "A"], []]
+        _book([*head, [None, "Time (s)", "Disp. (mm)", "Force (N)"], *rows], folder / f"test{n}.xlsx")
+
+
+def sheets_with_statistics(tests: tuple[Truth, ...], folder: Path) -> None:
+    """Rows of statistics below."""
+    for n, test in enumerate(tests, 1):
+        foot = [[], ["Max", 20.0, 1000.0, 0.1], ["Mittelwert", 0.0, 1.0, 0.1]]
+        head = ["Zeit [s]", "Weg [mm]", "Kraft [N]", "Strom [A]"]
+        _book([head, *_cells(test, 4), *foot], folder / f"test{n}.xlsx")
+
+
+def tests_below_each_other(tests: tuple[Truth, ...], folder: Path) -> None:
+    """All tests in one sheet, a title and names of columns above each."""
+    rows: list[list] = []
+    for n, test in enumerate(tests, 1):
+        rows += [[f"Test {n}: {test.current:.1f} A"], ["Time [s]", "Disp [mm]", "Force [N]"], *_cells(test), []]
+    _book(rows, folder / "all.xlsx")
+
+
+def matlab_matrix(tests: tuple[Truth, ...], folder: Path) -> None:
+    """A matrix, its names and its units in cells, samples in rows and in columns."""
+    from scipy.io import savemat
+
+    for n, test in enumerate(tests, 1):
+        data = test.table * [1, 1e3, 1, 1]
+        words = {
+            "names": np.array(["Time", "Displacement", "Force", "Current"], dtype=object),
+            "units": np.array(["s", "mm", "N", "A"], dtype=object),
+        }
+        savemat(folder / f"r{n}.mat", {"data": data if n % 2 else data.T, **words})
+
+
+def matlab73_structs(tests: tuple[Truth, ...], folder: Path) -> None:
+    """An array of structs as MATLAB 7.3 stores it: references into a group of their own."""
+    import h5py
+
+    path = folder / "tests.mat"
+    with h5py.File(path, "w", userblock_size=512) as file:
+        store, group = file.create_group("#refs#"), file.create_group("tests")
+        fields: dict[str, list] = {"time_s": [], "disp_mm": [], "force_N": [], "current_A": []}
+        for i, test in enumerate(tests):
+            for name, values in zip(fields, (test.time, 1e3 * test.x, test.force, [test.current]), strict=True):
+                item = store.create_dataset(f"{name}{i}", data=np.reshape(values, (1, -1)))
+                item.attrs["MATLAB_class"] = np.bytes_("double")
+                fields[name].append(item.ref)
+        for name, references in fields.items():
+            kind = h5py.ref_dtype
+            group.create_dataset(name, data=np.array(references, dtype=kind).reshape(1, -1), dtype=kind)
+    head = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
+    path.write_bytes(head.ljust(512, b"\0") + path.read_bytes()[512:])
+
+
+def npz_matrix(tests: tuple[Truth, ...], folder: Path) -> None:
+    """A matrix and the names of its columns."""
+    for n, test in enumerate(tests, 1):
+        np.savez(folder / f"r{n}.npz", data=test.table, columns=np.array(["time_s", "x_m", "force_N", "current_A"]))
+
+
+def hdf5_matrix(tests: tuple[Truth, ...], folder: Path) -> None:
+    """A matrix with attributes."""
+    import h5py
+
+    for n, test in enumerate(tests, 1):
+        with h5py.File(folder / f"r{n}.h5", "w") as file:
+            item = file.create_dataset("data", data=test.table * [1, 1e3, 1, 1])
+            item.attrs["columns"] = ["Time", "Displacement", "Force", "Current"]
+            item.attrs["units"] = ["s", "mm", "N", "A"]
+
+
+def parquet_stamps(tests: tuple[Truth, ...], folder: Path) -> None:
+    """Stamps of a date, single precision."""
+    import polars as pl
+
+    for n, test in enumerate(tests, 1):
+        stamps = (np.round(1e9 * test.time).astype("int64") + 1_709_287_872 * 10**9).astype("datetime64[ns]")
+        rest = {"position_mm": 1e3 * test.x, "force_N": test.force, "current_A": test.amperes}
+        rest = {name: values.astype(np.float32) for name, values in rest.items()}
+        pl.DataFrame({"timestamp": stamps, **rest}).write_parquet(folder / f"r{n}.parquet")
+
+
+def _packed(tests: tuple[Truth, ...], *, current: bool):
+    for n, test in enumerate(tests, 1):
+        rows = [f"{a:.5f},{1e3 * b:.5f},{c:.3f}" + f",{i:.4f}" * current for a, b, c, i in test.table]
+        name = f"campaign/r{n}.csv" if current else f"campaign/{test.current:.1f}A/r{n}.csv"
+        yield name, "\n".join(["time_s,disp_mm,force_N" + ",current_A" * current, *rows, ""]).encode()
+
+
+def tar_of_a_folder(tests: tuple[Truth, ...], folder: Path) -> None:
+    """tgz."""
+    with tarfile.open(folder / "campaign.tgz", "w:gz") as archive:
+        for name, content in _packed(tests, current=True):
+            member = tarfile.TarInfo(name)
+            member.size = len(content)
+            archive.addfile(member, io.BytesIO(content))
+
+
+def zip_of_a_folder(tests: tuple[Truth, ...], folder: Path) -> None:
+    """The current in the names of folders within, and what a Mac adds."""
+    with zipfile.ZipFile(folder / "campaign.zip", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("__MACOSX/campaign/._r1.csv", b"\0\1\2")
+        for name, content in _packed(tests, current=False):
+            archive.writestr(name, content)
+
+
+MACHINES: dict[str, Callable[[tuple[Truth, ...], Path], None]] = {
+    **TEXTS,
+    **{
+        function.__name__: function
+        for function in (
+            fortran, pages, hand_made_sheets, sheets_with_statistics, tests_below_each_other, matlab_matrix,
+            matlab73_structs, npz_matrix, hdf5_matrix, parquet_stamps, tar_of_a_folder, zip_of_a_folder,
+        )
+    },
+}  # fmt: skip
