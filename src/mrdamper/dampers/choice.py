@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
-from mrdamper.dampers.joint import JointFit, JointProblem
+from mrdamper.dampers.coil import Coil
+from mrdamper.dampers.joint import FALL, RISE, JointFit, JointProblem
 from mrdamper.data import Floats, Run, same_condition
 from mrdamper.optimizers.linear import on_one_blas_thread, solve_linear
 
@@ -23,6 +25,7 @@ _NO_PLAY = 1e-2  # seat longer than any play: none is left [m]
 _BLOCK = 12.0  # cycles of a record that is no sine that are left out together
 _LEVEL = 5e-3  # currents closer than this share of the largest are one level
 MODEL = "play-bypass"
+_FREE = ("leak", "cq", "qb")  # presets free from the first fit on: without them others make up for what they do
 
 
 @dataclass(frozen=True)
@@ -45,13 +48,13 @@ class Term:
 
 LEVEL_LAWS = (
     Term("yield force rises over a current of its own", ("Ic",), (0.0,)),
-    Term("yield force saturates with current", ("Ic", "si"), (0.0, 0.0)),
+    Term("yield force saturates with current", ("si",), (0.0,)),
+    Term("yield force rises and saturates over currents of its own", ("Ic", "si"), (0.0, 0.0)),
 )
+_LAW = ("Ic", "si")
 TERMS = (
     Term("viscosity differs by direction", ("cq",), (0.0,)),
     Term("bypass differs by direction", ("qb",), (0.0,)),
-)
-ALWAYS = (
     Term("yield force differs by direction", ("asymmetry",), (0.0,)),
     Term("viscosity rises with current", ("c1",), (0.0,)),
     Term("seated share depends on current", ("h1",), (0.0,)),
@@ -117,31 +120,30 @@ def identify_jointly(
     """
     fixed = _undetermined(runs)
     problem = JointProblem(runs, MODEL, fixed)
-    leak = ("leak",) if problem.rests else ()
+    laws = () if fixed else _level_laws(problem)
     progress("one model, steady ends first", 0.0)
-    short = JointProblem(runs, MODEL, fixed, parts=[part.steady_end() for part in problem.parts])
+    ends = [part.steady_end() for part in problem.parts]
+    short = JointProblem(runs, MODEL, fixed, free=(*_FREE, *(_LAW if laws else ())), parts=ends)
     fit = short.fit(rounds=2, most_steps=15, settled=_ROUGHLY)
     short, fit, tried = _lost_motion(short, fit)
     progress("how the force rises with current", 0.3)
-    law, more = _level_law(short, fit) if not fixed else ((), ())
+    law, fit, more = _level_law(short, fit, laws)
     tried = (*tried, *more)
     progress("whole records", 0.5)
-    problem = problem.with_free((*leak, *law), short.fixed)
+    problem = problem.with_free((*_FREE, *law), short.fixed)
     fit = problem.fit(start=problem.from_point(fit), rounds=2, most_steps=8, settled=_ROUGHLY / 10)
     progress("which terms the tests show", 0.8)
-    extra = [name for term in TERMS for name in term.names]
-    if not law and not fixed and any(run.current_changes for run in runs):
-        extra += LEVEL_LAWS[-1].names
-    evidence = Evidence.of(problem.with_free((*leak, *law, *extra)), problem, fit)
-    chosen, more = evidence.choose(law, [t for t in ALWAYS if not problem.fixed.keys() & set(t.names)])
+    evidence = Evidence.of(problem, fit)
+    chosen, more = evidence.choose([t for t in TERMS if not problem.fixed.keys() & set(t.names)])
     final, found = problem, fit
-    off = {name: 0.0 for term in ALWAYS for name in term.names if name in problem.free and name not in chosen}
-    new = [name for name in extra if name in chosen]
-    if off or new:
-        final = problem.with_free((*leak, *law, *new), off)
+    off = {name: 0.0 for term in TERMS for name in term.names if name in problem.free and name not in chosen}
+    coil, gone = _absent(problem, fit)
+    off |= dict.fromkeys(gone, 0.0)
+    if off or coil != problem.given_coil:
+        final = JointProblem(runs, MODEL, {**problem.fixed, **off}, free=problem.free, coil=coil, parts=problem.parts)
         found = final.fit(start=evidence.start(final), rounds=1, most_steps=8, settled=_ROUGHLY / 10)
     progress("one model for all runs", 1.0)
-    left_out, before = (Evidence.of(p, p, f).everything() for p, f in ((final, found), (problem, fit)))
+    left_out, before = (Evidence.of(p, f).everything() for p, f in ((final, found), (problem, fit)))
     if _total(left_out, before) > 1.0:  # what one step promised, the search did not keep
         final, found, left_out = problem, fit, before
     tried = (*tried, *more)
@@ -154,34 +156,65 @@ def identify_jointly(
 
 def _lost_motion(problem: JointProblem, fit: JointFit) -> tuple[JointProblem, JointFit, tuple[Tried, ...]]:
     """Whether the damper loses motion after a reversal: the model without it, where that predicts as well."""
-    without = problem.with_free((), {"e": _NO_PLAY})
-    found = without.fit(start=without.from_point(fit), rounds=1, most_steps=10, settled=_ROUGHLY)
-    now, scores = (Evidence.of(p, p, f).everything() for p, f in ((problem, fit), (without, found)))
+    without = problem.with_free(problem.free, {"e": _NO_PLAY})
+    starts = (without.from_point(fit), without.start)  # the play found need not be the way of a seat without play
+    fits = [without.fit(start=start, rounds=1, most_steps=10, settled=_ROUGHLY) for start in starts]
+    found = min(fits, key=lambda each: float(np.sum(each.nrmse_pp)))
+    now, scores = (Evidence.of(p, f).everything() for p, f in ((problem, fit), (without, found)))
     kept = _better(now, scores)
     said = Tried("lost motion after a reversal", kept, scores if kept else now, now if kept else scores)
     return (problem, fit, (said,)) if kept else (without, found, (said,))
 
 
-def _level_law(short: JointProblem, fit: JointFit) -> tuple[tuple[str, ...], tuple[Tried, ...]]:
-    """Form of the yield force over current that predicts currents left out, the shortest first.
+def _absent(problem: JointProblem, fit: JointFit) -> tuple[Coil | Literal["determined"] | None, tuple[str, ...]]:
+    """The coil to look for, and presets, without those that ended where they do nothing."""
+    least = {
+        a.name
+        for a, u in zip(problem.axes, fit.point, strict=True)
+        if a.at_bound(float(u)) and a.value(float(u)) < np.sqrt(a.upper * max(a.lower, 1e-9 * a.upper))
+    }
+    coil = None if {RISE, FALL} <= least else problem.given_coil
+    return coil, tuple(name for name in ("leak", "si") if name in least)
 
-    One step does not carry a form from current to current, so these are refitted.
+
+def _level_laws(problem: JointProblem) -> tuple[Term, ...]:
+    """Forms of the level law that the currents of the tests can determine, the shortest first."""
+    if any(part.changes for part in problem.parts) or len(levels_of(problem)) > 3:
+        return LEVEL_LAWS[0], LEVEL_LAWS[-1]
+    return LEVEL_LAWS[:2] if len(levels_of(problem)) == 3 else ()
+
+
+def _level_law(
+    longest: JointProblem, fit: JointFit, forms: Sequence[Term]
+) -> tuple[tuple[str, ...], JointFit, tuple[Tried, ...]]:
+    """Form of the yield force over current that predicts what is left out, the shortest first.
+
+    Currents are left out where there are inner ones: one step does not carry a form from current
+    to current, so these are refitted. The search began with every parameter of the law, for the
+    others make up for a form that is too short.
     """
-    levels = levels_of(short)
-    if len(levels) < 3:
-        return (), ()
-    names: tuple[str, ...] = ()
-    now = {"current": _left_out_current(short, fit, levels)}
-    tried = []
-    for term in LEVEL_LAWS:
-        longer = short.with_free(term.names)
-        found = longer.fit(start=longer.from_point(fit), rounds=1, most_steps=10, settled=_ROUGHLY)
-        scores = {"current": _left_out_current(longer, found, levels)}
-        kept = _better(scores, now)
-        tried.append(Tried(term.title, kept, now if kept else scores, scores if kept else now))
+    levels = levels_of(longest)
+    tried: list[Tried] = []
+    best: tuple[tuple[str, ...], JointFit, Mapping[str, float]] | None = None
+    for term in (None, *forms):
+        form = term.names if term else ()
+        problem = longest.with_free([n for n in longest.free if n not in _LAW or n in form])
+        found = fit
+        if set(problem.free) != set(longest.free):
+            found = problem.fit(start=problem.from_point(fit), rounds=1, most_steps=10, settled=_ROUGHLY)
+        scores: Mapping[str, float] = Evidence.of(problem, found).everything()
+        if len(levels) > 2:
+            # Two levels that are left determine no form with a parameter more: conditions have a say.
+            scores = {**(scores if len(levels) == 3 else {}), "current": _left_out_current(problem, found, levels)}
+        if term is None or best is None:
+            best = form, found, scores
+            continue
+        kept = _better(scores, best[2])
+        tried.append(Tried(term.title, kept, best[2] if kept else scores, scores if kept else best[2]))
         if kept:
-            names, now = term.names, scores
-    return names, tuple(tried)
+            best = form, found, scores
+    assert best is not None
+    return best[0], best[1], tuple(tried)
 
 
 def _left_out_current(problem: JointProblem, fit: JointFit, levels: Sequence[Sequence[int]]) -> float:
@@ -235,20 +268,17 @@ class Evidence:
         self.step = np.zeros(len(self.names))
 
     @classmethod
-    def of(cls, wide: JointProblem, problem: JointProblem, fit: JointFit) -> Evidence:
-        """Linearise the wider problem where the narrower one ended."""
-        point = wide.from_point(fit)
-        lower = np.array([a.coordinate(a.lower) for a in wide.axes])
-        upper = np.array([a.coordinate(a.upper) for a in wide.axes])
-        table = wide.table(fit.nrmse_pp)
-        residual, jacobian, owner = table.linearise(np.clip(point, lower, upper), fit.damper.model)
-        names = [*(a.name for a in wide.axes), *(i.name for i in wide.linear)]
-        values = np.array([*point, *(getattr(fit.damper.model, i.name) for i in wide.linear)])
+    def of(cls, problem: JointProblem, fit: JointFit) -> Evidence:
+        """Linearise a problem where a fit of it ended."""
+        table = problem.table(fit.nrmse_pp)
+        residual, jacobian, owner = table.linearise(fit.point, fit.damper.model)
+        names = [*(a.name for a in problem.axes), *(i.name for i in problem.linear)]
+        values = np.array([*fit.point, *(getattr(fit.damper.model, i.name) for i in problem.linear)])
         neutral = values.copy()
         for k, name in enumerate(names):
-            if name in ("asymmetry", "c1", "h1", "m", "cq", "qb", "si"):
+            if any(name in term.names for term in TERMS):
                 neutral[k] = 0.0
-        rows = _rows_of(wide, owner, table)
+        rows = _rows_of(problem, owner)
 
         def error(weighted: Floats, group: np.ndarray) -> float:
             runs = float(np.sum(table.share[group]))  # one for each whole run
@@ -282,21 +312,10 @@ class Evidence:
         whole[group] = weighted
         return self.error(whole, group)
 
-    def choose(self, law: Sequence[str], removable: Sequence[Term]) -> tuple[frozenset[str], tuple[Tried, ...]]:
-        """Terms that lower what is left out; and of those always there, the ones that can go."""
-        extra = {n for t in (*TERMS, *LEVEL_LAWS) for n in t.names} - set(law)
-        active = frozenset(n for n in self.names if n not in extra and not n.startswith("coil."))
+    def choose(self, removable: Sequence[Term]) -> tuple[frozenset[str], tuple[Tried, ...]]:
+        """The parameters without which more is missed of what was left out, one term after the other."""
+        active = frozenset(n for n in self.names if not n.startswith("coil."))
         now, tried = self.scores(active), []
-        waiting = [t for t in (*TERMS, *LEVEL_LAWS) if set(t.names) <= set(self.names) - set(law)]
-        while waiting:
-            trials = [(t, self.scores(active | set(t.names))) for t in waiting]
-            term, best = min(trials, key=lambda pair: _total(pair[1], now))
-            if not _better(best, now):
-                tried += [Tried(t.title, False, scores, now) for t, scores in trials]
-                break
-            tried.append(Tried(term.title, True, now, best))
-            active, now = active | set(term.names), best
-            waiting = [t for t in waiting if not set(t.names) & set(term.names)]
         for term in removable:
             if set(term.names) <= active:
                 without = self.scores(active - set(term.names))
@@ -336,7 +355,7 @@ def _better(scores: Mapping[str, float], before: Mapping[str, float]) -> bool:
     return _total(scores, before) < _WORTH and all(scores[w] < _HARM * before[w] for w in scores)
 
 
-def _rows_of(problem: JointProblem, owner: np.ndarray, table: object) -> dict[str, list[np.ndarray]]:
+def _rows_of(problem: JointProblem, owner: np.ndarray) -> dict[str, list[np.ndarray]]:
     """Rows left out together: of a condition, or a stretch of another record."""
     found = {}
     sines = [i for i, part in enumerate(problem.parts) if part.is_sine and not part.changes]

@@ -36,7 +36,6 @@ _ROWS = 400  # samples of a steady run that enter the least squares, about
 _TURNING, _RUNNING = 400, 60  # samples of a cycle that are followed: where the motion turns, and elsewhere
 _SLOW = 0.4  # of the peak velocity, below which a motion turns
 _AT_REST = 0.05  # cycles of rest around a sample at which nothing turns any more
-_STARTING = 0.05  # cycles at the begin of a record that do not enter: the state it began in is not known
 _CURRENT_MOVES = 1e-3  # of the largest current; where it changes by more, every sample is followed
 _TRANSIENT = 0.1  # weight of what lies outside a steady window, ramps and rests, against what lies inside
 _CYCLES = 4  # of a sine that enter: more repeat the same
@@ -433,7 +432,8 @@ def _scale(parts: Sequence[_Part]) -> Scale:
 class _Part:
     """What of a run is followed, which samples enter, and how much each counts: by the time it stands for.
 
-    Of a steady sine the middle cycles are left out: they repeat the last ones.
+    Of a steady sine the middle cycles are left out: they repeat the last ones. What a record begins
+    with, before it has moved by its amplitude, tells of a state nobody knows.
     """
 
     motion: Excitation
@@ -468,7 +468,8 @@ class _Part:
         else:
             information = max(1.0, np.sqrt((time[last] - time[first]) / period))
         at = np.flatnonzero(followed)
-        rows = at[time[at] >= time[0] + _STARTING * period]
+        unknown = min(int(np.searchsorted(motion.path.travel, found.condition.amplitude_m)), len(motion) // 4)
+        rows = at[at >= unknown]
         before, inside, after = rows[rows < first], rows[(rows >= steady) & (rows <= last)], rows[rows > last]
         inside = inside[:: max(1, int(inside.size / (_ROWS * information)))]
         every = max(1, (before.size + after.size) // _ROWS)

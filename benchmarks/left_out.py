@@ -1,0 +1,71 @@
+"""Errors of the joint model on what was left out of train runs: `python -m benchmarks.left_out [RIG ...]`.
+
+A condition (every run of it), an interior current (every run at it) and a whole record, ramps and
+rests included, are each predicted by a fit to the other train runs; medians of nrmse_pp. Held-out
+runs are not looked at.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import numpy as np
+
+from mrdamper.dampers.base import Damper
+from mrdamper.dampers.choice import JointChoice, identify_jointly, levels_of
+from mrdamper.data import Dataset, Run, same_condition
+from mrdamper.files.dataset import load_dataset
+
+GOALS = {  # interior current, condition, whole record [-]
+    "utfsm": (0.026, 0.034, 0.032),
+    "labcontrol": (0.030, 0.025, 0.032),
+}
+
+
+def errors(rig: Dataset) -> tuple[JointChoice, dict[str, list[float]]]:
+    """The joint model of a rig's train runs, and its errors on what was left out."""
+    runs = rig.split("train")
+    choice = identify_jointly(runs)
+    problem, fit = choice.problem, choice.fit
+    found: dict[str, list[float]] = {"current": [], "condition": [], "whole record": []}
+    for level in levels_of(problem)[1:-1]:
+        damper = _without(choice, level)
+        found["current"] += [_error(damper, runs[i]) for i in level]
+    for group in same_condition([part.condition for part in problem.parts]):
+        damper = _without(choice, group)
+        found["condition"] += [_error(damper, runs[i]) for i in group]
+        found["whole record"] += [_error(damper, runs[i], whole=True) for i in group]
+    found["train"] = [_error(fit.damper, run) for run in runs]
+    return choice, found
+
+
+def _without(choice: JointChoice, group: list[int]) -> Damper:
+    rest = [i for i in range(len(choice.problem.parts)) if i not in group]
+    return choice.problem.fit(rest, choice.fit.point, rounds=2, most_steps=6, settled=1e-5).damper
+
+
+def _error(damper: Damper, run: Run, whole: bool = False) -> float:
+    inside = np.ones(run.time.size, dtype=bool) if whole else run.in_window
+    missed = (damper.predict_run(run).force - run.force)[inside]
+    return float(np.sqrt(np.mean(missed**2)) / np.ptp(run.force[inside]))
+
+
+def main(names: list[str]) -> None:
+    dataset = load_dataset()
+    print("| rig | left out | median | mean | goal | |\n|---|---|---|---|---|---|")
+    for name in names or dataset.rigs:
+        begin = time.process_time()
+        choice, found = errors(dataset.rig(name))
+        for (what, values), goal in zip(found.items(), (*GOALS[name], None), strict=True):
+            median = float(np.median(values))
+            verdict = "" if goal is None else "met" if median <= goal else "missed"
+            limit = "" if goal is None else f"{100 * goal:.1f} %"
+            print(f"| {name} | {what} | {100 * median:.2f} % | {100 * np.mean(values):.2f} % | {limit} | {verdict} |")
+        kept = "; ".join(t.term for t in choice.tried if t.kept)
+        print(f"{name}: {kept}; at a bound: {', '.join(choice.fit.at_bounds) or 'none'}; "
+              f"{time.process_time() - begin:.0f} s of processor time", flush=True)  # fmt: skip
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
