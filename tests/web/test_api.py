@@ -14,6 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from mrdamper.dampers.bands import band
+from mrdamper.dampers.covariance import certain
 from mrdamper.dampers.joint import JointProblem
 from mrdamper.dampers.kernel import KernelDamper
 from mrdamper.dampers.modified import fit_modified
@@ -130,7 +132,8 @@ def test_a_prediction_is_the_dampers(client, bench, request, kind):
     np.testing.assert_allclose(curves["now.F"], expected.force[picked], atol=SCREEN * scale)
     np.testing.assert_allclose(curves["now.x"], 1e3 * expected.motion.displacement[picked], atol=SCREEN * 12)
     assert head["extrapolation"] == list(expected.extrapolation)
-    assert len(head["loops"]) == 10
+    tested = [0.0, 0.25, 0.5, 1.0]  # the levels of that rig, not a spread over its range
+    assert [loop["current_A"] for loop in head["loops"][1:]] == tested
     at_zero = damper.predict(Condition(0.0, 1.1, 0.012))
     assert curves["over.peak"][0] == pytest.approx(np.ptp(at_zero.force) / 2, rel=SCREEN)
 
@@ -212,6 +215,118 @@ def test_exports_are_made_in_a_worker(client, bench, joint, form):
         assert {name: packed.read(name) for name in packed.namelist()} == dict(expected)
 
 
+def test_the_curve_over_current_has_points_where_the_tests_end_on_both_sides(client, bench, bundled):
+    runs = [run for run in bundled.rig("utfsm").split("train") if run.excitation == "sine" and run.current_A > 0.1]
+    damper = JointProblem(runs[:5], "play-bypass").fit(rounds=1, most_steps=2).damper
+    key = put_on(client, bench, damper)
+    ask = {"current_A": 0.1, "frequency_Hz": 1.1, "amplitude_m": 0.012, "currents": 11}
+    head, curves = opened(client.post(f"{bench}/dampers/{key}/predict", json=ask).content)
+    low, high = head["tested_A"]
+    assert low > 0.2
+    assert curves["over.current"][0] == 0.0
+    for end in (low, high):
+        assert np.min(np.abs(curves["over.current"] - end)) < 1e-6
+    assert "current" in head["extrapolation"]
+
+
+def test_a_band_is_the_dampers_own_and_not_of_a_held_one(client, bench, bundled, joint):
+    runs = list(bundled.rig("utfsm").split("train"))[:5]
+    damper = certain(joint, runs)
+    key = put_on(client, bench, damper)
+    ask = {"current_A": 0.4, "frequency_Hz": 1.1, "amplitude_m": 0.012, "currents": 0, "band": True}
+    head, curves = opened(client.post(f"{bench}/dampers/{key}/predict", json=ask).content)
+    prediction = damper.predict(Condition(0.4, 1.1, 0.012))
+    around = band(damper, prediction, 0.9)
+    picked = np.linspace(0, prediction.force.size - 1, curves["low.F"].size).round().astype(int)
+    np.testing.assert_allclose(curves["low.F"], around.low[picked], rtol=1e-5, atol=1e-3)
+    assert np.all(curves["low.F"] < curves["now.F"])
+    assert head["loops"][0]["peak_to_N"] == pytest.approx(around.peak[1])
+    held = {**ask, "held": {"f0": 10.0}}
+    _, curves = opened(client.post(f"{bench}/dampers/{key}/predict", json=held).content)
+    assert "low.F" not in curves
+
+
+def test_a_kept_bench_comes_back_with_data_dampers_and_state(client, app, session, small_rig, joint, modified):
+    from mrdamper.web.drops import Intake
+
+    next(iter(app.state.sessions)).put(Intake(small_rig, "drop"))
+    keys = [put_on(client, session, damper) for damper in (joint, modified)]
+    shown = {"state": json.dumps({"format": "mrdamper-bench-state"}), "damper": keys[1]}
+    kept = client.post(f"{session}/bench.zip", json=shown)
+    assert kept.status_code == 200, kept.text
+    assert kept.content[30:40] == b"bench.json"  # by which the page knows it
+
+    other = f"/api/sessions/{client.post('/api/sessions').json()['session']}"
+    answer = drop_kept(client, other, kept.content)
+    assert answer.status_code == 200, answer.text
+    found = answer.json()
+    assert found["state"] == shown["state"]
+    listed = client.get(f"{other}/dampers").json()
+    assert [d["key"] for d in listed].index(found["damper"]) == 1
+    texts = [client.post(f"{other}/dampers/{d['key']}/document", json={}).json()["text"] for d in listed]
+    assert texts == [dump_model(joint), dump_model(modified)]
+    back = list(app.state.sessions)[1].dataset
+    assert back.name == small_rig.name
+    for run in small_rig:
+        np.testing.assert_array_equal(back[run.id].force, run.force)
+
+
+def drop_kept(client, session, content):
+    key = client.post(f"{session}/drops").json()["drop"]
+    client.put(f"{session}/drops/{key}/files", params={"name": "kept.zip"}, content=content).raise_for_status()
+    return client.post(f"{session}/drops/{key}/open")
+
+
+LIST = {"format": "mrdamper-bench", "version": 1, "source": "", "name": "", "dampers": [], "current": None}
+
+
+@pytest.mark.parametrize(
+    ("parts", "said"),
+    [
+        ([("bench.json", LIST)], "holds no bench-state.json"),
+        ([("bench.json", LIST), ("bench-state.json", {}), ("../evil", {})], "holds 'evil'"),
+        ([("bench.json", {**LIST, "version": 2}), ("bench-state.json", {})], "none of this version"),
+        ([("bench.json", {**LIST, "more": 1}), ("bench-state.json", {})], "none of this version"),
+        ([("bench.json", {**LIST, "current": 0}), ("bench-state.json", {})], "names a damper"),
+        ([("bench.json", LIST), ("bench-state.json", "0" * 6_000_000)], "over 5 MB"),
+        ([("bench.json", {**LIST, "source": "drop"}), ("bench-state.json", {})], "runs.csv"),
+    ],
+)
+def test_what_is_no_kept_bench_is_refused(client, session, parts, said):
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as made:
+        for name, content in parts:
+            made.writestr(name, content if isinstance(content, str) else json.dumps(content))
+    answer = drop_kept(client, session, packed.getvalue())
+    assert answer.status_code == 422
+    assert said in answer.json()["text"]
+
+
+def test_a_damaged_kept_bench_is_refused_and_nothing_is_lost(client, bench):
+    kept = client.post(f"{bench}/bench.zip", json={"state": "{}"}).content
+    for damaged in (kept[:-30], kept[:60] + b"\0\0\0" + kept[63:], b"PK\3\4"):
+        answer = drop_kept(client, bench, damaged)
+        assert answer.status_code == 422
+        assert answer.json()["code"] == "E_KEPT"
+    assert client.get(bench).json()["data"] is not None
+
+
+@pytest.mark.parametrize(
+    ("head", "code"),
+    [
+        ({"about": {"custommer": "x"}}, "E_ABOUT"),
+        ({"about": {"notes": "x" * 6000}}, "E_ABOUT"),
+        ({"logo": "bm8gcGljdHVyZQ=="}, "E_ABOUT"),
+        ({"logo": "%%%"}, "E_ABOUT"),
+        ({"other": 1}, "E_REQUEST"),
+    ],
+)
+def test_a_head_that_cannot_be_printed_is_refused_before_the_study(client, bench, head, code):
+    answer = client.post(f"{bench}/study", json=head)
+    assert answer.status_code == 422
+    assert answer.json()["code"] == code
+
+
 def wait(client, session, job):
     deadline = time.monotonic() + 60
     while time.monotonic() < deadline:
@@ -226,15 +341,18 @@ def test_a_study_leaves_dampers_and_files(client, app, session, small_rig):
     from mrdamper.web.drops import Intake
 
     next(iter(app.state.sessions)).put(Intake(small_rig, "drop"))
-    report = wait(client, session, client.post(f"{session}/study").json())
+    head = {"about": {"customer": "<b>Customer & Sons</b>"}}
+    report = wait(client, session, client.post(f"{session}/study", json=head).json())
     assert report["state"] == "done", report
     (rig,) = report["answer"]["rigs"]
     listed = {d["key"] for d in client.get(f"{session}/dampers").json()}
     assert {c["damper"] for c in rig["candidates"]} <= listed
     names = [f["name"] for f in client.get(f"{session}/files").json()]
     assert names[0] == "report.html"
+    assert "report.pdf" in names
     report_file = client.get(f"{session}/files/0")
     assert "attachment" in report_file.headers["content-disposition"]
+    assert "&lt;b&gt;Customer &amp; Sons&lt;/b&gt;" in report_file.text
     packed = zipfile.ZipFile(io.BytesIO(client.get(f"{session}/files.zip").content))
     assert packed.testzip() is None
     assert len(packed.namelist()) == len(names)
@@ -249,6 +367,10 @@ def test_identified_values_are_those_of_identify(client, app, session, small_rig
     assert report["state"] == "done", report
     for shown in report["answer"]["runs"]:
         assert shown["values"] == pytest.approx(identify(small_rig[shown["id"]], "bingham").model.values(), rel=1e-12)
+        assert shown["errors"] == pytest.approx(identify(small_rig[shown["id"]], "bingham").standard_errors)
+    held = wait(client, session, client.post(f"{session}/identify", json={**choice, "fixed": {"f0": 12.0}}).json())
+    assert all(run["values"]["f0"] == 12.0 and "f0" not in run["errors"] for run in held["answer"]["runs"])
+    wait(client, session, client.post(f"{session}/identify", json=choice).json())
     head, curves = opened(client.get(f"{session}/identified/runs/0").content)
     assert head["id"] == report["answer"]["runs"][0]["id"]
     np.testing.assert_allclose(

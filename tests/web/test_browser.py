@@ -126,7 +126,16 @@ def test_from_drop_to_report(page, small_rig, tmp_path, shoot):
     assert page.locator("tbody tr").count() == 2
     shoot(page, "4-compared")
 
+    with page.expect_download() as waiting:
+        page.get_by_role("link", name="Ranking as CSV").click()
+    assert waiting.value.path().read_text(encoding="utf-8").startswith("rig,rank,model,title")
+    with page.expect_download() as waiting:
+        page.get_by_role("button", name="Page, tables and models as zip").click()
+    assert "mrdamper-comparison/comparison.html" in zipfile.ZipFile(waiting.value.path()).namelist()
+
     open_tab(page, "Take away")
+    page.get_by_text("Head of the report").click()
+    page.get_by_label("Customer").fill("Customer of the bench")
     page.get_by_role("button", name="Make the report").click()
     page.get_by_role("progressbar").wait_for()
     page.get_by_role("link", name="report.html").wait_for()
@@ -136,6 +145,7 @@ def test_from_drop_to_report(page, small_rig, tmp_path, shoot):
     report = tmp_path / "report.html"
     waiting.value.save_as(report)
     assert "MR damper study" in report.read_text(encoding="utf-8")
+    assert "Customer of the bench" in report.read_text(encoding="utf-8")
     with page.expect_download() as waiting:
         page.get_by_role("link", name="Everything as one zip").click()
     waiting.value.save_as(tmp_path / "all.zip")
@@ -189,8 +199,43 @@ def test_sliders_move_the_loops_and_undo_takes_it_back(on_model, shoot):
     comes_to(page, lambda: curve(page, "Force over displacement"), before)
 
     page.get_by_label("Loops at all tested currents").check()
-    page.locator("section[aria-label='Force over displacement'] .js-line").nth(9).wait_for(state="attached")
+    page.locator("section[aria-label='Force over displacement'] .js-line").nth(5).wait_for(state="attached")
+    at_rest(page)
+    keys = page.locator("section[aria-label='Force over displacement'] .keys").inner_text()
+    assert "0.25 A" in keys
+    assert "dotted: measured at this motion" in keys
     shoot(page, "7-family")
+
+
+def test_impossible_input_is_refused_in_words_and_the_tool_bar_is_beside_the_curve(on_model, shoot):
+    page = on_model
+    before = number(page, "current_A")
+    for name, typed, said in (
+        ("current_A", "-1", "−1 A is refused"),
+        ("current_A", "1e9", "lies between 0 A and"),
+        ("frequency_Hz", "0", "0 Hz is refused: a motion has a frequency above 0 Hz"),
+        ("amplitude_m", "-3", "−3 mm is refused"),
+        ("d", "-1", "is refused: "),
+        ("current_A", "", "type a number"),
+    ):
+        type_number(page, name, typed)
+        wrong = page.locator(f".slider[data-name={name}] .wrong")
+        wrong.wait_for()
+        assert said in wrong.inner_text()
+    shoot(page, "18-refused")
+    for name in ("current_A", "frequency_Hz", "amplitude_m"):
+        type_number(page, name, {"current_A": str(before), "frequency_Hz": "1", "amplitude_m": "10"}[name])
+        assert not page.locator(f".slider[data-name={name}] .wrong").is_visible()
+    chart = page.locator("section[aria-label='Force over velocity']")
+    chart.locator(".plot").hover()
+    bar, area = (chart.locator(part).bounding_box() for part in (".modebar", ".nsewdrag"))
+    assert bar["y"] + bar["height"] <= area["y"]
+    assert chart.get_by_text("Chart Studio").count() == 0
+    # Below the lowest tested current as above the highest the curve over current is dashed.
+    dashes = page.locator("section[aria-label='Peak force over current'] .js-line").evaluate_all(
+        "(lines) => lines.map((line) => line.style.strokeDasharray)"
+    )
+    assert any(dash not in ("", "none") for dash in dashes)
 
 
 def test_a_parameter_is_held_until_released(on_model):
@@ -234,11 +279,14 @@ def test_a_link_brings_the_state_back(on_model, browser, address):
     type_number(other, "current_A", "0.9")
     assert curve(at_rest(other), "Force over velocity") != shown
     open_tab(page, "Take away")
-    with page.expect_download() as waiting:
-        page.get_by_role("button", name="Save the state").click()
-    drop(other, {"bench-state.json": waiting.value.path().read_bytes()})
-    comes_to(other, lambda: number(other, "current_A"), pytest.approx(0.31))
-    assert curve(at_rest(other), "Force over velocity") == shown
+    for button, name in (("Save the state", "bench-state.json"), ("Keep this bench", "kept.zip")):
+        with page.expect_download() as waiting:
+            page.get_by_role("button", name=button).click()
+        drop(other, {name: waiting.value.path().read_bytes()})
+        comes_to(other, lambda: number(other, "current_A"), pytest.approx(0.31))
+        assert curve(at_rest(other), "Force over velocity") == shown
+        type_number(other, "current_A", "0.9")
+        at_rest(other)
     context.close()
 
 

@@ -18,6 +18,7 @@ from mrdamper.errors import InputError
 
 _LARGEST_LOGO = 500_000  # bytes; it stands in every page
 _LARGEST_FILE = 100_000  # bytes of a TOML file
+_LONGEST = 5_000  # letters of a field
 _PICTURES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg"}
 
 
@@ -89,19 +90,43 @@ def load_about(path: str | Path) -> About:
         a logo that is no PNG or JPEG or is too large.
     """
     path = Path(path)
-    table = _toml(path)
+    table = dict(_toml(path))
+    logo = table.get("logo")
+    if isinstance(logo, str) and logo.strip():
+        table["logo"] = _picture(*_logo_file(path.parent / logo.strip()))
+    return about_of(table, str(path))
+
+
+def about_of(table: Mapping[str, Any], where: str) -> About:
+    """The head of a report from its fields; the logo is a data address already.
+
+    Raises
+    ------
+    AboutError
+        If a field is unknown, or no text or number.
+    """
     known = [f.name for f in fields(About)]
     for name, value in table.items():
         if name not in known:
             near = get_close_matches(name, known, n=1)
             mend = f"did you mean {near[0]}?" if near else f"known: {', '.join(known)}"
-            raise AboutError(f"unknown field {name!r}", where=str(path), mend=mend)
+            raise AboutError(f"unknown field {name!r}", where=where, mend=mend)
         if isinstance(value, (dict, list, bool)):
-            raise AboutError(f"{name} is no text", where=str(path), mend=f'write {name} = "..."')
-    texts = {name: str(value).strip() for name, value in table.items()}
-    if texts.get("logo"):
-        texts["logo"] = _picture(path.parent / texts["logo"])
-    return About(**texts)
+            raise AboutError(f"{name} is no text", where=where, mend=f'write {name} = "..."')
+        if len(str(value)) > (_LONGEST if name != "logo" else 2 * _LARGEST_LOGO):
+            raise AboutError(f"{name} has {len(str(value)):,} letters", where=where, mend=f"at most {_LONGEST:,}")
+    return About(**{name: str(value).strip() for name, value in table.items()})
+
+
+def logo_of(data: bytes) -> str:
+    """A picture as the data address a page holds.
+
+    Raises
+    ------
+    AboutError
+        If it is no PNG or JPEG, or too large.
+    """
+    return _picture(data, "logo")
 
 
 def load_limits(path: str | Path) -> tuple[Limit, ...]:
@@ -151,19 +176,24 @@ def _toml(path: Path) -> Mapping[str, Any]:
         raise AboutError(f"is no TOML: {str(error).splitlines()[0]}", where=str(path), mend=mend) from error
 
 
-def _picture(path: Path) -> str:
+def _logo_file(path: Path) -> tuple[bytes, str]:
+    where = f"logo {path.name}"
     try:
-        size = path.stat().st_size
-        data = path.read_bytes() if size <= _LARGEST_LOGO else b""
-    except OSError as error:
-        raise AboutError(error.strerror or str(error), where=f"logo {path.name}", mend="correct its path") from error
-    if size > _LARGEST_LOGO:
-        raise AboutError(
-            f"{size / 1e6:.1f} MB", where=f"logo {path.name}", mend=f"give a picture under {_LARGEST_LOGO // 1000} kB"
-        )
+        with path.open("rb") as file:
+            data = file.read(_LARGEST_LOGO + 1)
+    except (OSError, ValueError) as error:
+        said = getattr(error, "strerror", None) or str(error)
+        raise AboutError(said, where=where, mend="correct its path") from error
+    return data, where
+
+
+def _picture(data: bytes, where: str) -> str:
+    if len(data) > _LARGEST_LOGO:
+        limit = _LARGEST_LOGO // 1000
+        raise AboutError(f"is over {limit} kB", where=where, mend=f"give a picture under {limit} kB")
     kind = next((kind for start, kind in _PICTURES.items() if data.startswith(start)), None)
     if kind is None:
-        raise AboutError("neither PNG nor JPEG", where=f"logo {path.name}", mend="save it as PNG")
+        raise AboutError("neither PNG nor JPEG", where=where, mend="save it as PNG")
     return f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"
 
 

@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from mrdamper.data import Condition, Dataset, Run, same_motion
+from mrdamper.data import Condition, Dataset, Run, current_levels, same_motion
 from mrdamper.errors import InputError
 from mrdamper.identification.loop_analysis import LoopAnalysis, analyse_loop
 from mrdamper.motion import equivalent_sine
@@ -78,6 +78,11 @@ class RigTable:
     @cached_property
     def _quality(self) -> tuple[Quality, ...]:
         return quality_table(record_of(row.run) for row in self.rows)
+
+    @property
+    def currents(self) -> list[float]:
+        """Levels of the steady sines [A], rising."""
+        return sorted(set(current_levels([row.condition.current_A for row in self.rows if row.loop and row.condition])))
 
     def row(self, key: str) -> Row:
         """The row of that key.

@@ -2,19 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 
 from mrdamper.dampers.base import Damper
+from mrdamper.dampers.covariance import certain
 from mrdamper.data import Dataset
 from mrdamper.errors import IdentificationError, InputError
 from mrdamper.export import exporter
 from mrdamper.export.base import identifier, write_export
 from mrdamper.identification import Identification
+from mrdamper.report.about import About
+from mrdamper.report.comparison import write_comparison
 from mrdamper.report.study import write_study
 from mrdamper.study.comparison import Comparison, compare
-from mrdamper.study.recipe import JOINTLY, Scored, at_once, follow, identified, modified, play_and_bypass, run_by_run
+from mrdamper.study.recipe import (
+    JOINTLY,
+    Basis,
+    Scored,
+    at_once,
+    follow,
+    identified,
+    modified,
+    play_and_bypass,
+    run_by_run,
+)
 from mrdamper.study.workflow import Study, run_study, usable_sines
 
 Tell = Callable[[str, float], None]
@@ -22,14 +36,22 @@ ALL_AT_ONCE = "joint"
 RUN_BY_RUN = "functions"
 
 
-def study(tell: Tell, dataset: Dataset, folder: Path) -> tuple[Study, list[Path]]:
+def study(tell: Tell, dataset: Dataset, folder: Path, about: About | None = None) -> tuple[Study, list[Path]]:
     """The whole method, and its report, models, tables and figures in a folder."""
     result = run_study(dataset, lambda what, share: tell(what, 0.6 * share))
-    return result, write_study(result, folder, lambda what, share: tell(what, 0.6 + 0.4 * share))
+    told = lambda what, share: tell(what, 0.6 + 0.4 * share)  # noqa: E731
+    return result, write_study(result, folder, told, about=about, also=("pdf",))
 
 
 def identify_rig(
-    tell: Tell, dataset: Dataset, run_ids: Sequence[str], model: str, method: str, over: str
+    tell: Tell,
+    dataset: Dataset,
+    run_ids: Sequence[str],
+    model: str,
+    method: str,
+    over: str,
+    free: Sequence[str] = (),
+    fixed: Mapping[str, float] = MappingProxyType({}),
 ) -> tuple[tuple[Identification, ...], Scored | str, dict[str, str]]:
     """Identify a model from runs of one rig, then over their conditions.
 
@@ -44,6 +66,10 @@ def identify_rig(
     over : str
         How one damper is made of them: "functions" through the identified values, or "joint",
         all forces at once.
+    free : sequence of str
+        Preset parameters to determine as well.
+    fixed : mapping of str to float
+        Parameters held at a value [SI].
 
     Returns
     -------
@@ -62,7 +88,8 @@ def identify_rig(
         recipe = play_and_bypass()
     else:
         recipe = modified(model, method)
-        recipe = replace(recipe, make=at_once if over == ALL_AT_ONCE else run_by_run)
+        basis = Basis(model, method, tuple(free), tuple(sorted(fixed.items())))
+        recipe = replace(recipe, basis=basis, make=at_once if over == ALL_AT_ONCE else run_by_run)
     found, spent = identified(recipe.basis, runs, {}, lambda what, share: tell(what, 0.8 * share))
     tell("over all conditions", 0.8)
     try:
@@ -71,12 +98,18 @@ def identify_rig(
         if not found:
             raise
         return tuple(found), str(error), refused
-    return tuple(found), scored, refused
+    tell("how sure it is", 0.95)
+    return tuple(found), replace(scored, damper=certain(scored.damper, runs)), refused
 
 
 def compare_models(tell: Tell, dataset: Dataset, names: Sequence[str], jobs: int) -> Comparison:
     """Models on the same runs."""
     return compare(dataset, names, jobs=jobs, progress=tell)
+
+
+def write_compared(tell: Tell, comparison: Comparison, folder: Path) -> list[Path]:
+    """A comparison as page, tables, figures and models in a folder."""
+    return write_comparison(comparison, folder, tell)
 
 
 @dataclass(frozen=True)

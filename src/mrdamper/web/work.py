@@ -107,6 +107,8 @@ class Job:
                 self._end("cancelled")
             else:
                 self._run()
+        except Exception:
+            self._fail(traceback.format_exc())  # a page waits for this: say how it ended
         finally:
             _FREE.release()
 

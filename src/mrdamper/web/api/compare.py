@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 from typing import Any
 
 from fastapi import APIRouter
@@ -11,15 +12,18 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mrdamper.data import Dataset
 from mrdamper.errors import InputError
+from mrdamper.files.encoding import csv_text
+from mrdamper.report.comparison import summary_rows
 from mrdamper.study.comparison import Comparison, RigComparison
 from mrdamper.study.recipe import JOINTLY, Scored, recipes
 from mrdamper.study.workflow import STUDIED
 from mrdamper.validation import RunScore, Validation
 from mrdamper.web.curves import measured_cycle, measured_window, predicted_on_run
+from mrdamper.web.downloads import archive, download
 from mrdamper.web.frames import frame, number
 from mrdamper.web.rig_table import condition_on_screen
 from mrdamper.web.sessions import Current, Session
-from mrdamper.web.tasks import compare_models
+from mrdamper.web.tasks import compare_models, write_compared
 
 router = APIRouter(prefix="/sessions/{session}/compare")
 
@@ -39,6 +43,7 @@ def choices(session: Current) -> list[dict[str, Any]]:
     return [
         {
             "name": c.name,
+            "title": c.title,
             "source": c.source,
             "slow": bool(c.basis and c.basis.costly),
             "studied": c.model in (*STUDIED, JOINTLY),
@@ -78,10 +83,45 @@ def overlaid(rig: int, key: str, session: Current) -> Response:
     return frame({"id": row.run.id, "condition": condition_on_screen(row.condition), "models": shown}, arrays)
 
 
+@router.get("/rigs/{rig}/comparison.csv")
+def table(rig: int, session: Current) -> Response:
+    """The ranking as CSV."""
+    return download(csv_text(summary_rows(_whole(session, rig))).encode(), "comparison.csv", "text/csv; charset=utf-8")
+
+
+@router.post("/rigs/{rig}/files")
+def start_files(rig: int, session: Current) -> dict[str, Any]:
+    """Begin to write the comparison as a page with tables, figures and models."""
+    folder = session.folder / session.key("comparison")
+
+    def conclude(written: list[Path]) -> dict[str, Any]:
+        session.results[f"compared.files.{rig}"] = written
+        return {"files": len(written)}
+
+    return session.start("comparison files", write_compared, (_whole(session, rig), folder), conclude)
+
+
+@router.get("/rigs/{rig}/files.zip")
+def files(rig: int, session: Current) -> Response:
+    """What was written, in one archive."""
+    written: list[Path] = session.results.get(f"compared.files.{rig}", [])
+    if not written:
+        raise InputError("the comparison is not written yet", mend="press “Page and tables” again", code="E_NO_RESULT")
+    return archive(written, "mrdamper-comparison")
+
+
+def _whole(session: Session, rig: int) -> Comparison:
+    found: Comparison | None = session.results.get(f"compared.whole.{rig}")
+    if found is None:
+        raise InputError("nothing is compared yet", mend="start a comparison", code="E_NO_RESULT")
+    return found
+
+
 def _conclude(session: Session, choice: Choice, found: Comparison) -> dict[str, Any]:
     rig = found.rigs[0]
     table = session.table(choice.rig)
     session.results[f"compared.{choice.rig}"] = rig
+    session.results[f"compared.whole.{choice.rig}"] = found
     keys = {row.run.id: row.key for row in table.rows}
     entries = []
     for entry in rig.entries:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from base64 import b64decode
+from dataclasses import replace
 from inspect import signature
 from typing import Any
 
@@ -10,10 +12,12 @@ from fastapi import APIRouter
 from fastapi.responses import Response
 from pydantic import BaseModel, ConfigDict, Field
 
+from mrdamper.dampers.certainty import table as intervals
 from mrdamper.dampers.joint import JointFit
 from mrdamper.errors import InputError
 from mrdamper.identification import Identification, all_methods, identify
 from mrdamper.models import all_models
+from mrdamper.report.about import About, AboutError, about_of, logo_of
 from mrdamper.study.recipe import JOINTLY, Scored
 from mrdamper.study.workflow import Study
 from mrdamper.validation import Validation
@@ -29,13 +33,34 @@ router = APIRouter(prefix="/sessions/{session}")
 class Choice(BaseModel):
     """What to identify."""
 
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     rig: int = Field(ge=0)
     model: str = Field(max_length=100)
     method: str = Field(max_length=100)
     over: str = Field(default=RUN_BY_RUN, pattern=f"^({RUN_BY_RUN}|{ALL_AT_ONCE})$")
     runs: list[str] = Field(default_factory=list, max_length=10_000)
+    free: list[str] = Field(default_factory=list, max_length=64)
+    fixed: dict[str, float] = Field(default_factory=dict, max_length=64)
+
+
+class Head(BaseModel):
+    """What the report says of the tests; the logo as base64."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    about: dict[str, str] = Field(default_factory=dict, max_length=20)
+    logo: str = Field(default="", max_length=1_000_000)
+
+    @property
+    def given(self) -> About:
+        """Checked, as the report takes it."""
+        about = about_of(self.about, "head of the report")
+        try:
+            logo = b64decode(self.logo, validate=True)
+        except ValueError as error:
+            raise AboutError("is no base64", where="logo", mend="choose the picture again") from error
+        return replace(about, logo=logo_of(logo)) if logo else about
 
 
 @router.get("/choices")
@@ -53,6 +78,10 @@ def choices(session: Current) -> dict[str, Any]:
                 "equation": cls.equation,
                 "integrated": cls.integrated,
                 "jointly": name == JOINTLY,
+                "parameters": [
+                    {"name": p.name, "unit": p.unit, "meaning": p.meaning, "preset": p.preset, "default": p.default}
+                    for p in cls.parameters()
+                ],
             }
             for name, cls in all_models().items()
         ],
@@ -61,10 +90,12 @@ def choices(session: Current) -> dict[str, Any]:
 
 
 @router.post("/study")
-def start_study(session: Current) -> dict[str, Any]:
+def start_study(head: Head, session: Current) -> dict[str, Any]:
     """Begin the whole method on all data."""
-    folder = session.folder / session.key("study")
-    return session.start("study", study, (session.dataset, folder), lambda found: _conclude_study(session, *found))
+    folder, about = session.folder / session.key("study"), head.given
+    return session.start(
+        "study", study, (session.dataset, folder, about), lambda found: _conclude_study(session, *found)
+    )
 
 
 @router.post("/identify")
@@ -75,7 +106,7 @@ def start_identification(choice: Choice, session: Current) -> dict[str, Any]:
     return session.start(
         "identify",
         identify_rig,
-        (table.dataset, names, choice.model, choice.method, choice.over),
+        (table.dataset, names, choice.model, choice.method, choice.over, choice.free, choice.fixed),
         lambda found: _conclude_identification(session, choice, *found),
     )
 
@@ -166,6 +197,7 @@ def _identified(one: Identification) -> dict[str, Any]:
         "values": {n: number(v) for n, v in one.model.values().items()},
         "errors": {n: number(v) for n, v in one.standard_errors.items()},
         "at_bounds": one.at_bounds,
+        "free": one.free,
         "message": str(one.ending),
         "notes": one.notes,
     }
@@ -183,6 +215,7 @@ def _joint(scored: Scored | str) -> dict[str, Any]:
     assert isinstance(scored, Scored)
     return {
         "values": {n: number(v) for n, v in fit.damper.model.values().items()},
+        "intervals": {str(r["name"]): (r["low"], r["high"]) for r in intervals(scored.damper) if r["low"] != ""},
         "at_bounds": fit.at_bounds,
         "runs": [
             {"id": run.run_id, "nrmse_pp": number(error)}

@@ -10,17 +10,19 @@ from fastapi import APIRouter
 from fastapi.responses import Response
 from pydantic import BaseModel, ConfigDict, Field
 
+from mrdamper.dampers.bands import band
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Condition
 from mrdamper.metrics import dissipated_power, peak_force
 from mrdamper.web.bench_model import follows_condition, held_model, predict_held, sliders
-from mrdamper.web.curves import predicted_cycle
+from mrdamper.web.curves import on_screen, predicted_cycle
 from mrdamper.web.frames import frame, number
-from mrdamper.web.rig_table import condition_on_screen
+from mrdamper.web.rig_table import RigTable, condition_on_screen
 from mrdamper.web.sessions import Bench, Current, Session
 
 router = APIRouter(prefix="/sessions/{session}/dampers")
-_FAMILY = 10  # loops of a family over current
+_FAMILY = 10  # loops of a family over current, at most
+_LEVEL = 0.9  # of the band around a loop
 _TURN = Lock()  # answers in turn: small NumPy calls of many threads at once take the interpreter from each other
 _BEYOND = 1.25  # sliders and curves reach past the tested conditions, where the answer is flagged
 
@@ -36,6 +38,7 @@ class Ask(BaseModel):
     held: dict[str, float] = Field(default_factory=dict, max_length=64)
     family: bool = False
     currents: int = Field(default=33, ge=0, le=100)
+    band: bool = False
 
     @property
     def condition(self) -> Condition:
@@ -90,20 +93,24 @@ def predict(key: str, ask: Ask, session: Current) -> Response:
 def _predicted(found: Damper, ask: Ask, session: Session) -> Response:
     arrays: dict[str, Any] = {}
     loops = []
-    for name, condition in _loops(found, ask):
+    table = session.table_of(found.rig)
+    for name, condition in _loops(found, ask, table):
         prediction = predict_held(found, condition, ask.held)
         cycle = predicted_cycle(prediction)
         arrays |= {f"{name}.{axis}": values for axis, values in cycle.items()}
         loops.append({"name": name, "current_A": condition.current_A, **_figures(prediction)})
+        if name == "now" and ask.band and not ask.held and (around := band(found, prediction, _LEVEL)):
+            for end, force in (("low", around.low), ("high", around.high)):
+                arrays |= {f"{end}.{axis}": v for axis, v in on_screen(prediction.motion, force).items()}
+            loops[-1] |= {"peak_from_N": around.peak[0], "peak_to_N": around.peak[1], "level": _LEVEL}
     if ask.currents:
         arrays |= _over_current(found, ask)
     model = held_model(found, ask.condition, ask.held)
-    table = session.table_of(found.rig)
     head = {
         "loops": loops,
         "peak_velocity_m_s": ask.condition.peak_velocity,
         "extrapolation": found.envelope.flags(ask.condition),
-        "tested_to_A": found.envelope.current_A[1],
+        "tested_A": found.envelope.current_A,
         "parameters": {n: number(v) for n, v in model.values().items()} if model else {},
         "nearest": [_measured(row) for row in table.nearest(ask.condition)] if table else [],
         "measured": [_measured(row) for row in table.at_motion(ask.condition)] if table else [],
@@ -111,18 +118,25 @@ def _predicted(found: Damper, ask: Ask, session: Session) -> Response:
     return frame(head, arrays)
 
 
-def _loops(found: Damper, ask: Ask) -> list[tuple[str, Condition]]:
-    """The loop asked for, and where wished those of the tested range of currents."""
+def _loops(found: Damper, ask: Ask, table: RigTable | None) -> list[tuple[str, Condition]]:
+    """The loop asked for, and where wished those at the currents of the tests."""
     loops = [("now", ask.condition)]
     if ask.family:
-        low, high = found.envelope.current_A
-        spread = np.linspace(low, high, _FAMILY - 1)
-        loops += [(f"family{i}", Condition(float(I), ask.frequency_Hz, ask.amplitude_m)) for i, I in enumerate(spread)]
+        currents = _tested_currents(found, table)
+        loops += [(f"family{i}", Condition(c, ask.frequency_Hz, ask.amplitude_m)) for i, c in enumerate(currents)]
     return loops
 
 
+def _tested_currents(found: Damper, table: RigTable | None) -> list[float]:
+    """Levels of the tests on the bench, or the ends of what the damper says was tested."""
+    levels = list(table.currents) if table else list(found.envelope.current_A)
+    picked = np.linspace(0, len(levels) - 1, min(len(levels), _FAMILY - 1)).round().astype(int)
+    return sorted({levels[i] for i in picked})
+
+
 def _over_current(found: Damper, ask: Ask) -> dict[str, Any]:
-    currents = np.linspace(0.0, _BEYOND * (found.envelope.current_A[1] or 1.0), ask.currents)
+    even = np.linspace(0.0, _BEYOND * (found.envelope.current_A[1] or 1.0), max(ask.currents - 2, 2))
+    currents = np.union1d(even, found.envelope.current_A)  # the line changes its dash where the tests end
     figures = [
         _figures(predict_held(found, Condition(float(I), ask.frequency_Hz, ask.amplitude_m), ask.held))
         for I in currents

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import zipfile
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +16,8 @@ from mrdamper.files.model_file import dump_model, parse_model
 from mrdamper.report.tables import prediction_rows
 from mrdamper.web.api.model import Ask
 from mrdamper.web.bench_model import as_damper, predict_held
+from mrdamper.web.downloads import archive, download, zipped
+from mrdamper.web.kept import Kept, keep, open_kept
 from mrdamper.web.sessions import Current, Session
 from mrdamper.web.tasks import Exported, export_damper
 
@@ -66,9 +65,7 @@ def everything(session: Current) -> Response:
     written = _written(session)
     if not written:
         raise InputError("no study yet", mend="run one on the Identify page", code="E_NO_RESULT")
-    top = written[0].parent
-    content = {f"mrdamper-study/{path.relative_to(top).as_posix()}": path.read_bytes() for path in written}
-    return _download(_packed(content), "mrdamper-study.zip", "application/zip")
+    return archive(written, "mrdamper-study")
 
 
 @router.post("/dampers")
@@ -89,7 +86,7 @@ def table(key: str, ask: Ask, session: Current) -> Response:
     """The loop at a condition as CSV."""
     prediction = predict_held(session.damper(key).damper, ask.condition, ask.held)
     text = csv_text(prediction_rows(prediction))
-    return _download(text.encode(), "prediction.csv", "text/csv; charset=utf-8")
+    return download(text.encode(), "prediction.csv", "text/csv; charset=utf-8")
 
 
 @router.get("/exports")
@@ -114,8 +111,39 @@ def exported(key: str, session: Current) -> Response:
         raise InputError("no such export", mend="make it again", code="E_NAME")
     if len(paths) == 1:
         return FileResponse(paths[0], filename=paths[0].name, media_type="application/octet-stream")
-    content = {path.name: path.read_bytes() for path in paths}
-    return _download(_packed(content), f"{paths[0].parent.name}.zip", "application/zip")
+    return zipped({path.name: path.read_bytes() for path in paths}, f"{paths[0].parent.name}.zip")
+
+
+class State(BaseModel):
+    """What the page shows, and the damper under its sliders."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    state: str = Field(max_length=2_000_000)
+    damper: str | None = Field(default=None, max_length=40)
+
+
+@router.post("/bench.zip")
+def keep_bench(shown: State, session: Current) -> Response:
+    """Data, dampers and state of this bench in one file."""
+    return download(keep(session, shown.state, shown.damper), "mrdamper-bench.zip", "application/zip")
+
+
+@router.post("/drops/{key}/open")
+def open_bench(key: str, session: Current) -> dict[str, Any]:
+    """Bring back what such a file holds."""
+    drop = session.drops.get(key)
+    if drop is None or len(drop.names) != 1:
+        raise InputError("no kept bench was dropped", mend="drop it again, alone", code="E_DROP")
+    kept: Kept = open_kept(next(iter(drop.names)), drop.folder)
+    if kept.intake is not None:
+        session.put(kept.intake)
+    keys = [session.add(damper, origin, note).key for damper, origin, note in kept.dampers]
+    return {
+        "data": kept.intake is not None,
+        "state": kept.state,
+        "damper": keys[kept.current] if kept.current is not None else None,
+    }
 
 
 def _conclude(session: Session, folder: Path, made: Exported) -> dict[str, Any]:
@@ -125,15 +153,3 @@ def _conclude(session: Session, folder: Path, made: Exported) -> dict[str, Any]:
 
 def _written(session: Session) -> list[Path]:
     return [path for path in session.results.get("study.files", []) if path.is_file()]
-
-
-def _packed(files: Mapping[str, bytes]) -> bytes:
-    packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in files.items():
-            archive.writestr(name, content)
-    return packed.getvalue()
-
-
-def _download(content: bytes, name: str, kind: str) -> Response:
-    return Response(content, media_type=kind, headers={"Content-Disposition": f'attachment; filename="{name}"'})

@@ -15,12 +15,18 @@ export class Bench {
     this.busy = ""; // what is being done to bring others
     this.dampers = [];
     this.tables = new Map(); // rig number to its runs and matrix
+    this.logo = ""; // of the report's head, as base64; too large for a link
     this.undocumented = null; // the damper last seen that no file holds
     this.loops = new Map(); // measured loops and verdicts, fetched once
   }
 
   get state() {
     return this.store.state;
+  }
+
+  /** What the reader wrote for the head of a report. */
+  get head() {
+    return { about: this.state.about, logo: this.logo };
   }
 
   /** New data: `bring` asks the bench for them; until they are there the Data view says `what` is being done. */
@@ -33,7 +39,7 @@ export class Bench {
       this.tables.clear();
       this.loops.clear();
       this.busy = "";
-      this.store.settle({ source: overview.source, dataName: overview.name, rig: 0, run: null, compareRun: null, ...change });
+      this.store.settle({ source: overview?.source ?? null, dataName: overview?.name ?? "", rig: 0, run: null, compareRun: null, ...change });
       this.store.forget();
       this.announce("data");
     } finally {
@@ -100,7 +106,8 @@ export class Bench {
       const { text } = await this.api.post(`/dampers/${damper}/document`, { held: {} });
       if (this.state.damper === damper) this.store.settle({ document: JSON.stringify(JSON.parse(text)) });
     } catch (error) {
-      this.undocumented = damper;
+      this.logo = ""; // of the report's head, as base64; too large for a link
+    this.undocumented = damper;
       if (error.status !== 422) return this.fail(error);
       this.say(note("warn", "This kind of damper has no file format yet: a link brings back the data, not the model."), 6000);
     }

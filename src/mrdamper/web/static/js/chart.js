@@ -4,7 +4,7 @@ import { paint } from "./colours.js";
 import { h, renew } from "./dom.js";
 import { legend } from "./legend.js";
 
-const LOOK = { margin: { l: 64, r: 16, t: 30, b: 50 }, pad: 0.04, growth: 0.25 };
+const LOOK = { margin: { l: 64, r: 16, t: 36, b: 50 }, pad: 0.04, growth: 0.25 };
 let loading = null;
 
 /** Load the library once. */

@@ -1,7 +1,7 @@
 // Taking files: dropped anywhere on the page or chosen, sent one by one, read, and answered for.
 
 import { h, note, problem, put } from "./dom.js";
-import { collect, isModel, isState } from "./files.js";
+import { collect, isKept, isModel, isState } from "./files.js";
 import { bytes } from "./format.js";
 import { imported } from "./state.js";
 
@@ -30,7 +30,7 @@ export class DropZone {
     const folder = input({ webkitdirectory: "", "aria-label": "Folder" }, (file) => file.webkitRelativePath || file.name);
     return h(
       "div", { class: "drop", id: "drop" },
-      h("strong", {}, "Drop rig files, a dataset folder or a model.json"),
+      h("strong", {}, "Drop rig files, a dataset folder, a model.json or a kept bench"),
       h("span", { class: "small" }, `up to ${bytes(this.bench.limits.file_bytes)} a file`),
       h("div", { class: "row" }, h("button", { onclick: () => files.click() }, "Files …"), h("button", { onclick: () => folder.click() }, "Folder …")),
       files, folder,
@@ -66,6 +66,7 @@ export class DropZone {
     put(this.said);
     try {
       if (files.length === 1 && files[0].name.toLowerCase().endsWith(".json") && (await this.bring(files[0].file))) return;
+      if (files.length === 1 && (await isKept(files[0].file))) return await this.open(files);
     } catch (error) {
       this.refuse(error);
       return;
@@ -111,6 +112,20 @@ export class DropZone {
   read(toml, refusedOnly = false) {
     put(this.said, h("p", { class: "small faint" }, "Judging each file …"));
     return this.bench.api.post(`/drops/${this.drop}/read`, { toml, refused_only: refusedOnly });
+  }
+
+  /** A bench that was kept: its data, its dampers, and what was shown. */
+  async open(files) {
+    const { bench } = this;
+    let found = null;
+    await bench.takeData(async () => {
+      await this.send(files);
+      found = await bench.api.post(`/drops/${this.drop}/open`);
+      return found.data ? bench.api.get("/data") : bench.overview;
+    }, "Opening the kept bench");
+    put(this.said);
+    await bench.refreshDampers();
+    await bench.restore({ ...imported(JSON.parse(found.state)), damper: found.damper });
   }
 
   /** A state or a model brought back; false where the file is something else. */

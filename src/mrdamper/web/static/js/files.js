@@ -17,6 +17,13 @@ export function isState(text) {
   return format(text) === "mrdamper-bench-state";
 }
 
+/** Whether a file is a bench that was kept: a zip whose first part has the name it is known by. */
+export async function isKept(file) {
+  const head = new Uint8Array(await file.slice(0, 40).arrayBuffer());
+  const [signature, name] = [head.slice(0, 4), head.slice(30)].map((bytes) => new TextDecoder("latin1").decode(bytes));
+  return signature === "PK\u0003\u0004" && name === "bench.json";
+}
+
 /** Save something as a file. */
 export function save(blob, name) {
   const link = document.createElement("a");

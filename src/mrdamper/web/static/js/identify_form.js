@@ -1,6 +1,6 @@
 // What to identify: the whole study, or one model by one method from some runs.
 
-import { h, put, renew } from "./dom.js";
+import { h, note, put, renew } from "./dom.js";
 import { condition } from "./format.js";
 import { rigChooser } from "./rig_chooser.js";
 
@@ -17,6 +17,7 @@ export class IdentifyForm {
     this.runs = h("select", { id: "which-runs" });
     this.over = h("select", { id: "over" },
       h("option", { value: "functions" }, "functions through the values"), h("option", { value: "joint" }, "functions fitted to all forces"));
+    this.parameters = new ParameterChoice();
     this.rig = h("div", {});
     this.source = h("p", { class: "small faint" });
     this.button = h("button", { class: "primary", onclick: () => this.go() }, "Start");
@@ -28,7 +29,7 @@ export class IdentifyForm {
     const field = (name, text, control, ...more) => h("div", { class: "field" }, h("label", { for: name }, text), control, more);
     return h("div", { class: "group", hidden: true },
       this.rig, field("model-name", "Model", this.model, this.source), field("method-name", "Method", this.method),
-      field("which-runs", "From", this.runs), field("over", "Over all conditions", this.over));
+      field("which-runs", "From", this.runs), field("over", "Over all conditions", this.over), this.parameters.element);
   }
 
   layout() {
@@ -77,6 +78,7 @@ export class IdentifyForm {
   about() {
     const chosen = this.choices.models.find((m) => m.name === this.model.value);
     this.source.textContent = `${chosen.source}${chosen.integrated ? ". Stepped in time: takes longer" : ""}`;
+    this.parameters.show(chosen.jointly ? [] : chosen.parameters);
     this.method.disabled = this.over.disabled = chosen.jointly;
   }
 
@@ -85,12 +87,51 @@ export class IdentifyForm {
   }
 
   go() {
+    const missing = this.whole.checked ? [] : this.parameters.missing;
+    if (missing.length) return this.bench.say(note("warn", `Tick ${missing.join(", ")}, or give the value to hold at: there is no preset.`));
     this.start({
       whole: this.whole.checked,
       body: {
         rig: this.bench.state.rig, model: this.model.value, method: this.method.value, over: this.over.value,
-        runs: this.runs.value ? [this.runs.value] : [],
+        runs: this.runs.value ? [this.runs.value] : [], ...this.parameters.chosen,
       },
     });
+  }
+}
+
+/** Which parameters are determined, and at what the others are held. */
+class ParameterChoice {
+  constructor() {
+    this.rows = [];
+    this.body = h("div", { class: "parameter-choice" });
+    this.element = h("details", {}, h("summary", {}, "Parameters: free or held"), this.body);
+  }
+
+  show(parameters) {
+    this.element.hidden = !parameters.length;
+    this.rows = parameters.map((p) => this.row(p));
+    put(this.body, h("p", { class: "small faint" }, "A ticked parameter is determined from the tests; another is held at the number beside it, in SI units, or at its preset where there is none."),
+      this.rows.map((row) => row.element));
+  }
+
+  row(parameter) {
+    const value = h("input", { type: "number", step: "any", "aria-label": `${parameter.name} held at, in ${parameter.unit}`, placeholder: parameter.default === null ? "number" : String(parameter.default) });
+    const free = h("input", { type: "checkbox", checked: !parameter.preset, onchange: () => (value.disabled = free.checked) });
+    value.disabled = free.checked;
+    const element = h("div", { class: "row" },
+      h("label", { class: "check grow", title: parameter.meaning }, free, h("span", {}, parameter.name, h("span", { class: "small faint" }, ` ${parameter.meaning}`))), value);
+    return { parameter, free, value, element };
+  }
+
+  get chosen() {
+    const free = this.rows.filter((r) => r.free.checked && r.parameter.preset).map((r) => r.parameter.name);
+    const held = this.rows.filter((r) => !r.free.checked && r.value.value.trim() !== "");
+    return { free, fixed: Object.fromEntries(held.map((r) => [r.parameter.name, Number(r.value.value)])) };
+  }
+
+  /** What hinders a start, in words. */
+  get missing() {
+    const rows = this.rows.filter((r) => !r.free.checked && !r.parameter.preset && r.value.value.trim() === "");
+    return rows.map((r) => r.parameter.name);
   }
 }

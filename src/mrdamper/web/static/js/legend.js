@@ -7,7 +7,7 @@ const DASHES = { dash: "5 3", dot: "2 2", dashdot: "5 2 2 2", longdash: "8 3" };
 
 /** One entry a name: curves with `legend: false` or without a name have none. */
 export function legend(traces) {
-  const named = new Map(traces.filter((t) => t.name && t.legend !== false).map((t) => [t.name, t]));
+  const named = new Map(traces.filter((t) => t.name && t.legend !== false && t.x.length).map((t) => [t.name, t]));
   return h("ul", { class: "keys" }, [...named.values()].reverse().map((t) => h("li", {}, swatch(t), t.name)));
 }
 

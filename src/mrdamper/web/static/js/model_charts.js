@@ -36,18 +36,18 @@ export class ModelCharts {
    */
   async draw(head, arrays, curve, current_A, rig) {
     const turn = (this.turn += 1);
-    const near = await this.measured(head, rig);
+    const { near, tested } = await this.measured(head, rig);
     if (turn !== this.turn) return false;
     const family = head.loops.filter((loop) => loop.name !== "now");
-    const ends = [family[0], family.at(-1)]; // the scale of the others follows from these
-    const predicted = head.loops.slice().reverse().map((loop) => predictedLoop(loop, head, arrays, ends.includes(loop))); // the loop asked for on top
-    const curves = (a, b) => [...near.map((n) => n.curve(a, b)), ...predicted.map((p) => p(a, b))];
+    const predicted = head.loops.slice().reverse().map((loop) => predictedLoop(loop, head, arrays)); // the loop asked for on top
+    const under = family.length ? tested : near;
+    const curves = (a, b) => [...band(head, arrays, a, b), ...under.map((n) => n.curve(a, b)), ...predicted.map((p) => p(a, b))];
     const [now] = head.loops;
     const said = `Predicted peak force ${figures(now.peak_N)} newtons, energy ${figures(now.energy_J)} joules a cycle${near.length ? `; measured nearest: ${near.map((n) => n.name).join("; ")}` : ""}.`;
     await Promise.all([
       this.x.draw(curves("x", "F"), said),
       this.v.draw(curves("v", "F"), said),
-      this.t.draw([...near.map((n) => n.curve("t", "F")), predicted.at(-1)("t", "F")], said),
+      this.t.draw([...band(head, arrays, "t", "F"), ...near.map((n) => n.curve("t", "F")), predicted.at(-1)("t", "F")], said),
       this.drawCurve(head, curve, current_A, said),
     ]);
     return turn === this.turn;
@@ -61,41 +61,67 @@ export class ModelCharts {
     ]);
   }
 
-  /** Loops measured nearest, on the page already or fetched now. */
+  /** Loops measured nearest, and those at this motion for a family: on the page already or fetched now. */
   async measured(head, rigName) {
     const rig = this.bench.overview?.rigs.findIndex((r) => r.name === rigName) ?? -1;
-    if (rig < 0) return [];
-    const found = await Promise.all(head.nearest.map((row) => this.bench.loop(row.key, "cycle", rig)));
-    return head.nearest.map((row, i) => {
-      const name = `${condition(row.condition)}${row.split === "validate" ? " (held out)" : ""}`;
+    if (rig < 0) return { near: [], tested: [] };
+    const fetched = (rows) => Promise.all(rows.map((row) => this.bench.loop(row.key, "cycle", rig)));
+    const rows = head.loops.length > 1 ? head.measured : [];
+    const [nearest, all] = await Promise.all([fetched(head.nearest), fetched(rows)]);
+    const near = head.nearest.map((row, i) => {
+      const name = `${condition(row.condition)}${heldOut(row)}`;
       const look = i
         ? { color: "line-strong", width: 1, name, legend: false, dash: i === 2 ? "dot" : "solid" }
         : { color: "measured", width: 1.6, name: `measured ${name}` };
-      return { name, curve: (a, b) => ({ ...look, x: found[i].arrays[a], y: found[i].arrays[b] }) };
+      return { name, curve: (a, b) => ({ ...look, x: nearest[i].arrays[a], y: nearest[i].arrays[b] }) };
     });
+    const tested = rows.map((row, i) => {
+      const look = { color: shade(row.condition.current_A, head), width: 1.4, dash: "dot", name: "dotted: measured at this motion", legend: i === 0 };
+      return { curve: (a, b) => ({ ...look, x: all[i].arrays[a], y: all[i].arrays[b] }) };
+    });
+    return { near, tested };
   }
 }
 
-function predictedLoop(loop, head, arrays, named) {
-  const share = head.tested_to_A ? loop.current_A / head.tested_to_A : 0;
-  const look = loop.name === "now"
-    ? { color: "predicted", width: 2.6, name: "predicted", dash: head.extrapolation.length ? "dash" : "solid" }
-    : { color: `shade ${share.toFixed(3)}`, width: 1.3, name: `${figures(loop.current_A, 3)} A`, legend: named };
+const heldOut = (row) => (row.split === "validate" ? " (held out)" : "");
+const shade = (current, head) => `shade ${Math.min(1, current / (head.tested_A[1] || 1)).toFixed(3)}`;
+
+/** Where the force of a session nobody has seen lies, as two lines around the loop. */
+function band(head, arrays, a, b) {
+  const [{ level }] = head.loops;
+  if (!level) return [];
+  return ["low", "high"].map((end) => ({
+    x: arrays[`${end}.${a}`], y: arrays[`${end}.${b}`], color: "predicted", width: 1, dash: "dot", opacity: 0.75, quiet: true,
+    name: `${Math.round(100 * level)} % of unseen sessions lie between`, legend: end === "low",
+  }));
+}
+
+function predictedLoop(loop, head, arrays) {
+  const now = loop.name === "now";
+  const untested = head.extrapolation.some((flag) => now || flag !== "current"); // those of a family lie at tested currents
+  const dash = untested ? "dash" : "solid";
+  const look = now
+    ? { color: "predicted", width: 2.6, name: "predicted", dash }
+    : { color: shade(loop.current_A, head), width: 1.3, name: `${figures(loop.current_A, 3)} A`, dash };
   return (a, b) => ({ ...look, x: arrays[`${loop.name}.${a}`], y: arrays[`${loop.name}.${b}`] });
 }
 
-/** Points measured at this motion, and the curve predicted: dashed beyond the currents tested. */
+/** Points measured at this motion, and the curve predicted: dashed where the current or the motion was not tested. */
 function overCurrent(head, currents, values, key, current_A) {
-  const beyond = currents.findIndex((current) => current > 1.001 * head.tested_to_A);
-  const end = beyond < 0 ? currents.length : beyond;
-  const from = Math.max(0, end - 1);
+  const [low, high] = head.tested_A;
+  const motion = head.extrapolation.some((flag) => flag !== "current");
+  const inside = [...currents.keys()].filter((i) => currents[i] >= low - 1e-9 && currents[i] <= high + 1e-9);
+  const [first, last] = inside.length ? [inside[0], inside.at(-1)] : [currents.length, currents.length];
+  const piece = (from, to, look) => ({ x: currents.slice(from, to), y: values.slice(from, to), color: "predicted", width: 2, ...look });
+  const beyond = { dash: "dash", name: "predicted, not tested", legend: motion || low > 0.02 * high };
   return [
     {
       x: head.measured.map((m) => m.condition.current_A), y: head.measured.map((m) => m[key]), mode: "markers",
       color: "measured", fill: "panel", name: "measured", text: head.measured.map((m) => m.id),
     },
-    { x: currents.slice(0, end), y: values.slice(0, end), color: "predicted", width: 2, name: "predicted" },
-    { x: currents.slice(from), y: values.slice(from), color: "predicted", width: 2, dash: "dash", name: "predicted, beyond the tests", legend: false },
+    piece(0, first + 1, beyond),
+    piece(first, last + 1, motion ? beyond : { name: "predicted" }),
+    piece(last, currents.length, { ...beyond, legend: true }),
     { x: [current_A], y: [head.loops[0][key]], mode: "markers", color: "predicted", size: 10, name: "now", legend: false },
   ];
 }

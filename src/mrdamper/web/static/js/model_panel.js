@@ -7,9 +7,9 @@ import { slider } from "./slider.js";
 const MM = 1000;
 const ORIGIN = { study: "from the study", identification: "identified here", comparison: "from the comparison", file: "from a file" };
 const CONDITION = [
-  { name: "current_A", symbol: "I", meaning: "current", unit: "A", bounds: ([, high]) => [0, 100 * high] },
-  { name: "frequency_Hz", symbol: "f", meaning: "frequency", unit: "Hz", scale: "log", bounds: ([low, high]) => [low / 100, high * 100] },
-  { name: "amplitude_m", symbol: "X", meaning: "amplitude", unit: "mm", factor: MM, bounds: ([low, high]) => [low / 100, high * 100] },
+  { name: "current_A", symbol: "I", meaning: "current", unit: "A", least: "a current counts by its magnitude, from 0 A on", bounds: ([, high]) => [0, 100 * high] },
+  { name: "frequency_Hz", symbol: "f", meaning: "frequency", unit: "Hz", scale: "log", least: "a motion has a frequency above 0 Hz", bounds: ([low, high]) => [low / 100, high * 100] },
+  { name: "amplitude_m", symbol: "X", meaning: "amplitude", unit: "mm", factor: MM, least: "a motion has an amplitude above 0 mm", bounds: ([low, high]) => [low / 100, high * 100] },
 ];
 
 export class ModelPanel {
@@ -17,6 +17,7 @@ export class ModelPanel {
   constructor(bench, { dragging, settled }) {
     Object.assign(this, { bench, dragging, settled, sliders: {}, damper: null });
     this.element = h("div", { class: "side" });
+    this.runs = h("select", { id: "tested-run", onchange: () => this.goTo(this.runs.value) });
     this.family = h("input", { type: "checkbox", id: "family", onchange: () => bench.store.commit({ family: this.family.checked }) });
   }
 
@@ -42,6 +43,8 @@ export class ModelPanel {
       if (value !== null) this.sliders[`p.${name}`].set(value, name in held);
     }
     this.family.checked = family;
+    const there = (c) => c.current_A === at.current_A && c.frequency_Hz === at.frequency_Hz && c.amplitude_mm / MM === at.amplitude_m;
+    this.runs.value = [...(this.tested ?? [])].find(([, c]) => there(c))?.[0] ?? "";
   }
 
   /** The dampers to choose from. */
@@ -60,7 +63,27 @@ export class ModelPanel {
 
   conditions() {
     return h("div", { class: "group" }, h("h2", {}, "Condition"), CONDITION.map((spec) => this.conditionSlider(spec)),
-      h("label", { class: "check" }, this.family, "Loops at all tested currents"));
+      this.testedRuns(),
+      h("label", { class: "check" }, this.family, "Loops at all tested currents, with those measured"));
+  }
+
+  /** Runs of the damper's rig, to lay one under the prediction. */
+  testedRuns() {
+    const rig = this.bench.overview?.rigs.findIndex((r) => r.name === this.damper.rig) ?? -1;
+    if (rig < 0) return null;
+    this.bench.rigTable(rig).then(({ runs }) => {
+      this.tested = new Map(runs.filter((r) => r.peak_N !== null).map((r) => [r.key, r.condition]));
+      put(this.runs, h("option", { value: "" }, "choose one"),
+        runs.filter((r) => this.tested.has(r.key)).map((r) => h("option", { value: r.key }, `${r.id}${r.split === "validate" ? " (held out)" : ""}`)));
+    }).catch((error) => this.bench.fail(error));
+    return h("div", { class: "field" }, h("label", { for: "tested-run" }, "At the condition of a tested run"), this.runs);
+  }
+
+  /** The sliders go to where a run was made: its measured loop is the nearest then. */
+  goTo(key) {
+    const at = this.tested.get(key);
+    if (!at) return;
+    this.bench.store.commit({ condition: { current_A: at.current_A, frequency_Hz: at.frequency_Hz, amplitude_m: at.amplitude_mm / MM } });
   }
 
   parameters() {

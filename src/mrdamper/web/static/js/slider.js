@@ -1,6 +1,6 @@
 // One quantity under a slider with a number beside it; both speak the unit of the screen.
 
-import { h, put, svg } from "./dom.js";
+import { capital, h, put, svg } from "./dom.js";
 import { figures, unit } from "./format.js";
 
 const STEPS = 1000;
@@ -27,6 +27,7 @@ export function slider(spec, { drag, settle, release }) {
   const range = h("input", { type: "range", id, min: "0", max: String(STEPS), step: "5" });
   const number = h("input", { type: "number", step: "any", "aria-label": `${spec.meaning} in ${spec.unit}` });
   const free = release ? h("button", { class: "quiet release", hidden: true, title: "Let it follow the model again", "aria-label": `Release ${spec.symbol}`, onclick: release }, "release") : null;
+  const wrong = h("p", { class: "wrong small", id: `${id}-wrong`, role: "alert", hidden: true });
   const element = h(
     "div", { class: "slider", "data-name": spec.name },
     h("label", { for: id, title: `${spec.symbol}: ${spec.meaning}` }, h("b", {}, spec.symbol), h("span", {}, spec.meaning), free),
@@ -34,12 +35,14 @@ export function slider(spec, { drag, settle, release }) {
     h("span", { class: "unit" }, unit(spec.unit)),
     range,
     spec.tested ? tested(spec, toPlace) : null,
+    wrong,
   );
 
   let last = null;
 
   function set(value, held = false) {
     if (last !== null && last.value === value && last.held === held) return; // most do not move while one is dragged
+    say("");
     last = { value, held };
     if (document.activeElement !== range) range.value = toPlace(value);
     if (document.activeElement !== number) number.value = typed(factor * value);
@@ -50,28 +53,40 @@ export function slider(spec, { drag, settle, release }) {
     element.classList.toggle("outside", Boolean(outside));
   }
 
-  /** What was typed is no number: show the value again. */
-  function reset() {
-    const { value, held } = last;
-    last = null;
-    number.blur();
-    set(value, held);
+  /** Say what is wrong with a number that was typed, or nothing. */
+  function say(text) {
+    wrong.textContent = text;
+    wrong.hidden = !text;
+    number.toggleAttribute("aria-invalid", Boolean(text));
+    if (text) number.setAttribute("aria-describedby", wrong.id);
+    else number.removeAttribute("aria-describedby");
   }
 
   range.addEventListener("input", (event) => {
     const value = toValue(Number(range.value));
+    say("");
     number.value = typed(factor * value);
     drag(value, event.timeStamp);
   });
   range.addEventListener("change", () => settle(toValue(Number(range.value))));
   number.addEventListener("change", () => {
-    const [low, high] = spec.bounds ?? [spec.low, spec.high];
-    const wished = Number(number.value) / factor;
-    if (number.value === "" || !Number.isFinite(wished)) return reset();
-    settle(Math.min(high ?? Infinity, Math.max(low ?? -Infinity, wished)));
+    const text = refusal(number.value, spec, factor);
+    say(text);
+    if (!text) settle(Number(number.value) / factor);
   });
   set(spec.value);
   return { element, set };
+}
+
+/** Why a typed number is not taken, in words; empty where it is. */
+function refusal(typed, spec, factor) {
+  if (typed.trim() === "" || !Number.isFinite(Number(typed))) return `${capital(spec.meaning)}: type a number.`;
+  const value = Number(typed) / factor;
+  const [low, high] = (spec.bounds ?? [spec.low, spec.high]).map((bound, i) => bound ?? [-Infinity, Infinity][i]);
+  const shown = (v) => `${figures(factor * v)} ${unit(spec.unit)}`.trim();
+  if (value >= low && value <= high) return "";
+  if (spec.least && value <= 0) return `${shown(value)} is refused: ${spec.least}.`;
+  return `${shown(value)} is refused: ${spec.meaning} lies ${low === -Infinity ? `at or below ${shown(high)}` : high === Infinity ? `at or above ${shown(low)}` : `between ${shown(low)} and ${shown(high)}`}.`;
 }
 
 /** A number as a field shows it: short enough to be read whole. */

@@ -4,7 +4,7 @@ const VERSION = 1;
 const MOST = 200; // steps that can be undone
 const BLANK = Object.freeze({
   view: "data", source: null, dataName: "", rig: 0, run: null,
-  damper: null, document: null, condition: null, held: {}, family: false, compareRun: null,
+  damper: null, document: null, condition: null, held: {}, family: false, compareRun: null, about: {},
 });
 const SESSION_ONLY = ["damper"]; // keys of this session mean nothing in another
 
@@ -94,6 +94,7 @@ export function imported(raw) {
   }
   state.held = Object.fromEntries(Object.entries(raw.held ?? {}).filter(([, value]) => Number.isFinite(value)));
   state.family = raw.family === true;
+  state.about = Object.fromEntries(Object.entries(raw.about ?? {}).filter(([, value]) => typeof value === "string").slice(0, 20));
   return state;
 }
 

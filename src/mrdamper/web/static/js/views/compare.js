@@ -24,6 +24,7 @@ class CompareView {
     this.answers = new Map(); // rig number to what came of its comparison
     this.drawn = new Set(); // dampers whose loops are drawn
     this.work = workBox(bench);
+    this.writing = workBox(bench);
     this.comparing = false;
     this.rig = h("div", {});
     this.list = h("fieldset", { class: "field" });
@@ -92,7 +93,7 @@ class CompareView {
     const link = (text, which) => h("button", { type: "button", class: "link small", onclick: check(which) }, text);
     put(this.list, h("legend", { class: "hidden-text" }, "Models"),
       h("div", { class: "row" }, link("Those of the study", (c) => c.studied), link("All but slow", (c) => !c.slow), link("None", () => false)),
-      found.map((c) => h("label", { class: "check", title: c.source }, box(c), c.name, c.slow ? h("span", { class: "badge" }, "slow") : null)));
+      found.map((c) => h("label", { class: "check", title: c.source }, box(c), c.title, c.slow ? h("span", { class: "badge" }, "slow") : null)));
   }
 
   start() {
@@ -150,12 +151,27 @@ class CompareView {
     put(this.runs, group("Held out", heldOut), group("Train", train));
     put(this.stage,
       card(["Rig ", h("span", {}, rig || this.bench.overview.name)], h("div", { class: "flush" }, table(columns, entries, { caption: "Models compared" }))),
+      this.takeAway(),
       why.length ? note("warn", h("b", {}, "Not determined from these data: "), why) : null,
       heldOut.length ? this.strip.element : note("", "These data hold no held-out runs; the ranking rests on conditions left out."),
       h("div", { class: "row" }, h("label", { for: "compare-run" }, "Run"), this.runs),
       this.legend, h("div", { class: "figures" }, this.loops.v.element, this.loops.x.element));
     if (heldOut.length) this.safely(this.drawStrip());
     this.safely(this.drawLoops());
+  }
+
+  /** The comparison as files. */
+  takeAway() {
+    const { api } = this.bench;
+    const path = `/compare/rigs/${this.bench.state.rig}`;
+    const write = async () => {
+      if (await this.writing.run(`${path}/files`)) h("a", { href: api.url(`${path}/files.zip`), download: "mrdamper-comparison.zip" }).click();
+    };
+    return h("div", { class: "group" },
+      h("div", { class: "row" },
+        h("a", { class: "button", href: api.url(`${path}/comparison.csv`), download: "comparison.csv" }, "Ranking as CSV"),
+        h("button", { onclick: () => this.safely(write()) }, "Page, tables and models as zip")),
+      this.writing.element);
   }
 
   /** The strip's vertical axis: one row a model. */

@@ -9,6 +9,8 @@ import { workBox } from "../work.js";
 export const id = "identify";
 export const label = "Identify";
 
+const INTERVAL = 1.96; // standard errors of a 95 % interval
+
 export function create(bench) {
   return new IdentifyView(bench);
 }
@@ -53,7 +55,7 @@ class IdentifyView {
   }
 
   start({ whole, body }) {
-    return this.attend(whole, whole ? this.work.run("/study", {}) : this.work.run("/identify", body));
+    return this.attend(whole, whole ? this.work.run("/study", this.bench.head) : this.work.run("/identify", body));
   }
 
   /** A page that was loaded again: go on watching, or show the result. */
@@ -148,7 +150,11 @@ class IdentifyView {
         const screen = onScreen(p.unit);
         const value = (run) => screen.factor * (run.values[p.name] ?? NaN);
         const { power, print } = column(runs.map(value));
-        return { title: heading(p.name, screen.unit, power), number: true, value: (run) => [print(value(run)), run.at_bounds.includes(p.name) ? h("span", { class: "badge warn" }, "at bound") : null] };
+        const sure = (run) => {
+          const half = INTERVAL * screen.factor * (run.errors[p.name] ?? NaN);
+          return Number.isFinite(half) ? h("span", { class: "faint" }, ` ± ${figures(half / 10 ** power, 2)}`) : null;
+        };
+        return { title: heading(p.name, screen.unit, power), number: true, value: (run) => [print(value(run)), sure(run), run.at_bounds.includes(p.name) ? h("span", { class: "badge warn" }, "at bound") : null] };
       }));
       columns.push({ title: "At bounds", value: (run) => run.at_bounds.join(", ") || "–" });
     }
@@ -157,7 +163,7 @@ class IdentifyView {
     this.lines = [...listed.tBodies[0].rows];
     return h("section", { class: "card" },
       h("div", { class: "head" }, h("h2", {}, `${count(runs.length, "run")} identified`),
-        h("span", { class: "small faint" }, `${answer.rig ? `Rig ${answer.rig}: ` : ""}median error ${percent(answer.median)} of the peak-to-peak force${held}`)),
+        h("span", { class: "small faint" }, `${answer.rig ? `Rig ${answer.rig}: ` : ""}${answer.joint ? "" : "± is the 95 % interval; "}median error ${percent(answer.median)} of the peak-to-peak force${held}`)),
       h("div", { class: "flush short" }, listed));
   }
 
@@ -184,10 +190,15 @@ class IdentifyView {
 }
 
 function jointCard(answer) {
-  const { values, at_bounds: bounds } = answer.joint;
+  const { values, intervals, at_bounds: bounds } = answer.joint;
+  const between = (p) => {
+    const ends = intervals[p.name]?.map((end) => figures(onScreen(p.unit).factor * end, 3));
+    return ends ? `${ends[0]} to ${ends[1]}` : "–";
+  };
   const columns = [
     { title: "Parameter", value: (p) => p.name },
     { title: "Value", number: true, value: (p) => `${figures(onScreen(p.unit).factor * values[p.name])} ${unit(onScreen(p.unit).unit)}` },
+    { title: "95 % interval", number: true, value: between },
     { title: "Meaning", value: (p) => p.meaning },
     { title: "", value: (p) => (bounds.includes(p.name) ? h("span", { class: "badge warn" }, "at bound") : "") },
   ];

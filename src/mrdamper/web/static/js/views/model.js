@@ -15,6 +15,7 @@ const LATE = 250; // milliseconds after which a picture that is not answered yet
 const SLOW = 60; // milliseconds a loop, from which on the curves over current come point by point
 const [COARSE, FINE] = [11, 31]; // points of the curves over current, while dragged and at rest; one lies where tests end
 
+const BAND = 20; // loops a band costs: about one a number
 const NO_CURVE = { current: [], peak: [], energy: [] };
 
 export function create(bench) {
@@ -110,7 +111,7 @@ class ModelView {
     const { damper, condition, held, family } = this.bench.state;
     if (this.damper?.key !== damper) return;
     const currents = this.pace > SLOW ? 0 : this.charts.held ? COARSE : FINE;
-    this.latest.want({ key: damper, moved: this.moved, ask: { ...(condition ?? this.damper.start), held, family, currents } });
+    this.latest.want({ key: damper, moved: this.moved, ask: { ...(condition ?? this.damper.start), held, family, currents, band: !this.charts.held && this.pace <= SLOW } });
     this.moved = null;
   }
 
@@ -120,7 +121,7 @@ class ModelView {
     const waiting = setTimeout(() => this.late(true), LATE);
     try {
       const found = await this.bench.api.frame(`/dampers/${key}/predict`, ask);
-      if (key === this.damper?.key) this.pace = (performance.now() - began) / (found.head.loops.length + ask.currents);
+      if (key === this.damper?.key) this.pace = (performance.now() - began) / (found.head.loops.length + ask.currents + (ask.band ? BAND : 0));
       return found;
     } finally {
       clearTimeout(waiting);
@@ -157,7 +158,7 @@ class ModelView {
     const [low, high] = this.damper.reach.current_A;
     for (let i = 0; i < COARSE; i += 1) {
       const at = low + (i / (COARSE - 1)) * (high - low);
-      const found = await this.bench.api.frame(`/dampers/${key}/predict`, { ...ask, current_A: at, family: false });
+      const found = await this.bench.api.frame(`/dampers/${key}/predict`, { ...ask, current_A: at, family: false, band: false });
       if (!current()) return;
       const [loop] = found.head.loops;
       curve.current.push(at);
@@ -198,7 +199,8 @@ class ModelView {
     const said = flags.length ? `Extrapolation in ${flags.map(([name]) => name).join(", ")}` : "Inside the tested conditions";
     if (this.spoken !== said) this.bench.speak(said); // when it changes, not at every move
     this.spoken = said;
-    const amounts = `Predicted: peak force ${figures(now.peak_N)} N, energy ${figures(now.energy_J)} J a cycle. ${nearest(head.nearest[0])}`;
+    const between = now.level ? ` (${Math.round(100 * now.level)} % of unseen sessions: ${figures(now.peak_from_N, 3)} to ${figures(now.peak_to_N, 3)} N)` : "";
+    const amounts = `Predicted: peak force ${figures(now.peak_N)} N${between}, energy ${figures(now.energy_J)} J a cycle. ${nearest(head.nearest[0])}`;
     put(this.verdict, flags.length
       ? note("warn", h("div", {}, h("b", {}, "Extrapolation: "), `${flags.map((f) => f.join(" ")).join("; ")}. The loop is dashed.`), h("div", {}, amounts))
       : note("", h("div", {}, h("b", {}, "Inside the tested conditions.")), h("div", {}, amounts)));

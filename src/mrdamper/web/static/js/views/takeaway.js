@@ -4,6 +4,7 @@ import { capital, card, h, note, problem, put, renew } from "../dom.js";
 import { save } from "../files.js";
 import { bytes, condition, figures } from "../format.js";
 import { portable } from "../state.js";
+import { AboutForm } from "../about_form.js";
 import { workBox } from "../work.js";
 
 export const id = "takeaway";
@@ -23,8 +24,9 @@ class TakeAwayView {
     this.report = h("div", { class: "body" });
     this.model = h("div", { class: "body" });
     this.said = h("div", { role: "status" });
+    this.about = new AboutForm(bench);
     this.element = h("div", { class: "stage" }, h("div", { class: "cards" },
-      card("Report and tables", this.report), card("Model", this.model), card("This bench", this.stateBody())));
+      card("Report and tables", this.about.element, this.report), card("Model", this.model), card("This bench", this.stateBody())));
     for (const what of ["dampers", "data"]) document.addEventListener(`bench:${what}`, () => this.shown());
   }
 
@@ -53,7 +55,7 @@ class TakeAwayView {
     const button = h("button", { id: "make-report", class: files.length ? "" : "primary", disabled: this.studying.busy, onclick: () => this.safely(this.study(button)) }, files.length ? "Make it again" : "Make the report");
     renew(this.report, files.length
       ? this.fileList(files)
-      : h("p", {}, "The whole study of the data on the bench: one report.html that needs nothing else, the models, and the tables as CSV."),
+      : h("p", {}, "The whole study of the data on the bench: one report.html that needs nothing else, the same as report.pdf, the models, and the tables as CSV."),
     h("div", {}, button), this.studying.element);
   }
 
@@ -71,7 +73,7 @@ class TakeAwayView {
   async study(button) {
     button.disabled = true;
     const running = (await this.bench.api.get("/jobs")).find((job) => job.kind === "study" && ["waiting", "running"].includes(job.state));
-    const answer = await (running ? this.studying.resume(running) : this.studying.run("/study", {}));
+    const answer = await (running ? this.studying.resume(running) : this.studying.run("/study", this.bench.head));
     button.disabled = false;
     if (answer) await this.bench.refreshDampers();
   }
@@ -127,14 +129,20 @@ class TakeAwayView {
   }
 
   stateBody() {
-    const keep = async () => {
+    const shown = async () => {
       await this.bench.keepDocument();
-      const state = { ...portable(this.bench.state), view: this.bench.state.document ? "model" : "data" };
-      save(new Blob([JSON.stringify(state, null, 1)], { type: "application/json" }), "bench-state.json");
+      return JSON.stringify({ ...portable(this.bench.state), view: this.bench.state.document ? "model" : "data" }, null, 1);
+    };
+    const keepState = async () => save(new Blob([await shown()], { type: "application/json" }), "bench-state.json");
+    const keepAll = async () => {
+      const { blob, name } = await this.bench.api.file("/bench.zip", { state: await shown(), damper: this.bench.state.damper });
+      save(blob, name);
     };
     return h("div", { class: "body" },
-      h("p", {}, "A state file brings back what you see: data where they are bundled, the model, and every slider. Drop it on the Data page."),
-      h("div", {}, h("button", { onclick: () => this.safely(keep()) }, "Save the state")),
-      h("p", { class: "small faint" }, "“Copy link” in the header does the same in a link. Everything stays on this machine: the bench sends nothing anywhere, and its files go when it stops."));
+      h("p", {}, "A kept bench holds the data, every damper and every slider in one file: drop it on any bench. A state file holds what you see without the data."),
+      h("div", { class: "row" },
+        h("button", { class: "primary", onclick: () => this.safely(keepAll()) }, "Keep this bench"),
+        h("button", { onclick: () => this.safely(keepState()) }, "Save the state")),
+      h("p", { class: "small faint" }, "“Copy link” in the header does the same as a state file. Everything stays on this machine: the bench sends nothing anywhere, and its files go when it stops."));
   }
 }

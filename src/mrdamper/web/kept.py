@@ -1,0 +1,188 @@
+"""A bench as one file: its data, its dampers and what its page shows, kept and brought back.
+
+The file is a zip of plain parts (CSV, Parquet, JSON). What comes back was written by anybody: only
+the names written here are read, each up to a size, and every part passes the checks its kind has anyway.
+"""
+
+from __future__ import annotations
+
+import io
+import shutil
+import tempfile
+import zipfile
+import zlib
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from mrdamper.dampers.base import Damper
+from mrdamper.data import Dataset
+from mrdamper.errors import InputError
+from mrdamper.files.dataset import SAMPLE_FILES, load_dataset, save_dataset
+from mrdamper.files.model_file import dump_model, parse_model
+from mrdamper.files.strict_json import parse_json
+from mrdamper.web.drops import FILE_LIMIT, Intake
+from mrdamper.web.intake import bundled
+from mrdamper.web.sessions import MOST_DAMPERS, Session
+
+LIST, STATE, DATA = "bench.json", "bench-state.json", "dataset"
+_PART_LIMIT = 100_000_000  # bytes of one part, unpacked
+_SMALL_LIMIT = 5_000_000  # of a part that is text
+
+
+class KeptError(InputError):
+    """A file that is no kept bench, or a damaged one."""
+
+    code = "E_KEPT"
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What such a file holds.
+
+    Attributes
+    ----------
+    intake : Intake or None
+        Data; None where there were none.
+    dampers : list of (Damper, str, str)
+        With how each came to the bench and its note.
+    current : int or None
+        The damper under the sliders.
+    state : str
+        What the page showed, which the page checks.
+    """
+
+    intake: Intake | None
+    dampers: list[tuple[Damper, str, str]]
+    current: int | None
+    state: str
+
+
+class _Damper(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    file: str = Field(pattern=r"^dampers/\d{1,3}\.json$")
+    origin: str = Field(max_length=40)
+    note: str = Field(max_length=500)
+
+
+class _List(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    format: str = Field(pattern="^mrdamper-bench$")
+    version: int = Field(ge=1, le=1)
+    source: str = Field(pattern="^(bundled|drop|)$")
+    name: str = Field(max_length=300)
+    dampers: list[_Damper] = Field(max_length=MOST_DAMPERS)
+    current: int | None = Field(default=None, ge=0)
+
+
+def keep(session: Session, state: str, shown: str | None) -> bytes:
+    """A session as such a file.
+
+    Raises
+    ------
+    KeptError
+        If it would be too large to be dropped on a bench again.
+    """
+    intake, dampers = session.intake, list(session.dampers.values())
+    files = [f"dampers/{i}.json" for i in range(len(dampers))]
+    about = _List(
+        format="mrdamper-bench",
+        version=1,
+        source=intake.source if intake else "",
+        name=intake.dataset.name if intake else "",
+        dampers=[
+            _Damper(file=f, origin=b.origin, note=b.note[:500]) for f, b in zip(files, dampers, strict=True)
+        ],
+        current=next((i for i, bench in enumerate(dampers) if bench.key == shown), None),
+    )  # fmt: skip
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as made:
+        made.writestr(LIST, about.model_dump_json(indent=1))  # first: the page knows the file by it
+        made.writestr(STATE, state)
+        for name, bench in zip(files, dampers, strict=True):
+            made.writestr(name, dump_model(bench.damper))
+        if intake and intake.source != "bundled":
+            _write_data(intake.dataset, made)
+    if packed.tell() > FILE_LIMIT:
+        raise KeptError(
+            f"the bench is {packed.tell() / 1e6:.0f} MB, over the {FILE_LIMIT / 1e6:.0f} MB a bench takes back",
+            mend="keep its dataset folder and save the state alone",
+        )
+    return packed.getvalue()
+
+
+def _write_data(dataset: Dataset, made: zipfile.ZipFile) -> None:
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place) / DATA
+        save_dataset(dataset, folder)
+        for path in sorted(folder.iterdir()):
+            made.write(path, f"{DATA}/{path.name}")
+
+
+def open_kept(path: Path, place: Path) -> Kept:
+    """Read such a file; `place` is a folder its data may be unpacked in.
+
+    Raises
+    ------
+    KeptError
+        If it is no such file, is damaged, or holds what does not belong in it.
+    InputError
+        What reading a dataset or a model says.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return _read(archive, place / "kept")
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError, zlib.error) as error:
+        raise KeptError(f"is damaged: {error}", where="the kept bench", mend="copy it again") from error
+
+
+def _read(archive: zipfile.ZipFile, place: Path) -> Kept:
+    names = archive.namelist()
+    try:
+        about = _List.model_validate(parse_json(_part(archive, LIST).decode("utf-8")))
+    except ValueError as error:
+        raise KeptError("is none of this version", where=LIST, mend="update mrdamper, or save it again") from error
+    data = [f"{DATA}/{name}" for name in ("runs.csv", *SAMPLE_FILES)]
+    known = {LIST, STATE, *(d.file for d in about.dampers), *data}
+    if len(set(names)) != len(names) or not set(names) <= known:
+        odd = next((n for n in names if n not in known), "one name twice")
+        raise KeptError(f"holds {PurePosixPath(odd).name!r:.60}", where="the kept bench", mend="save it again")
+    if about.current is not None and about.current >= len(about.dampers):
+        raise KeptError("names a damper it does not hold", where=LIST, mend="save it again")
+    dampers = [
+        (parse_model(_part(archive, d.file).decode("utf-8", "replace"), where=d.file), d.origin, d.note)
+        for d in about.dampers
+    ]
+    state = _part(archive, STATE).decode("utf-8", "replace")
+    try:
+        parse_json(state)
+    except ValueError as error:
+        raise KeptError(str(error), where=STATE, mend="save it again") from error
+    return Kept(_data(archive, about, [n for n in data if n in names], place), dampers, about.current, state)
+
+
+def _data(archive: zipfile.ZipFile, about: _List, parts: list[str], place: Path) -> Intake | None:
+    if about.source == "bundled":
+        return bundled()
+    if not about.source:
+        return None
+    shutil.rmtree(place, ignore_errors=True)
+    place.mkdir()
+    for name in parts:
+        (place / PurePosixPath(name).name).write_bytes(_part(archive, name, _PART_LIMIT))
+    return Intake(Dataset(load_dataset(place).runs, about.name), "drop")
+
+
+def _part(archive: zipfile.ZipFile, name: str, limit: int = _SMALL_LIMIT) -> bytes:
+    """One part, up to a size whatever it claims to be."""
+    try:
+        with archive.open(name) as part:
+            content = part.read(limit + 1)
+    except KeyError as error:
+        raise KeptError(f"holds no {name}", where="the kept bench", mend="save it again") from error
+    if len(content) > limit:
+        raise KeptError(f"{name} is over {limit / 1e6:.0f} MB", where="the kept bench", mend="save it again")
+    return content
