@@ -88,6 +88,7 @@ def test_every_file_of_the_contract_is_there(folder):
         "model-labcontrol.json",
         "model-utfsm.json",
         "identifications.csv",
+        "parameters.csv",
         "validation.csv",
         "figures",
         "forces.csv",
@@ -111,7 +112,12 @@ def test_tables_carry_units_and_numbers(folder):
     assert all(float(row["nrmse_pp"]) < 0.15 for row in rows if row["model"] == "play-bypass")
     with (folder / "identifications.csv").open() as file:
         names = next(csv.reader(file))
-    assert "alpha [N/m]" in names
+    assert {"alpha [N/m]", "alpha low 95 %", "alpha high 95 %"} <= set(names)
+    with (folder / "parameters.csv").open() as file:
+        numbers = list(csv.DictReader(file))
+    known = [row for row in numbers if row["state"] == "determined"]
+    assert len(known) > 20
+    assert all(float(row["low_95"]) < float(row["value"]) < float(row["high_95"]) for row in known)
 
 
 class _Links(HTMLParser):

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.dampers.base import Damper, Prediction
-from mrdamper.dampers.certainty import Certainty, student
+from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.slopes import force_slopes
 from mrdamper.data import Floats
+from mrdamper.identification.intervals import student
 from mrdamper.metrics import dissipated_power, peak_force
 
 

@@ -16,7 +16,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from mrdamper.dampers.causal import SLACK, causal_force
-from mrdamper.dampers.certainty import Certainty, OwnNumber
+from mrdamper.dampers.certainty import Certainty, OwnNumber, table
 from mrdamper.dampers.coil import Coil
 from mrdamper.data import Condition, Floats, Run, Shown
 from mrdamper.errors import InputError
@@ -232,6 +232,11 @@ class Damper(Shown):
     def headline(self) -> str:
         """What it is, whose, and how many numbers the tests determined."""
         return f"{self.title} of rig {self.rig}: {self.parameter_count} numbers from tests"
+
+    @property
+    def details(self) -> Sequence[str]:
+        """Its own numbers with their 95 % intervals and units."""
+        return [f"{row['name']} = {row['written']}" for row in table(self)]
 
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:

@@ -8,26 +8,29 @@ the damper (*model*): what conditions left out of the fit were wrong by, beyond 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import InputError
+from mrdamper.identification.intervals import interval_about, weaknesses, written
 
 if TYPE_CHECKING:
     from mrdamper.dampers.base import Damper
+_BADLY = 0.5  # standard error over the value from which a number is known to a factor only
 
 
 @dataclass(frozen=True)
 class OwnNumber:
-    """A number of a damper determined from data: its value, its bounds, and whether it is searched in the logarithm."""
+    """A number of a damper determined from data; `log` where it is searched in the logarithm."""
 
     value: float
     bounds: tuple[float, float] = (-np.inf, np.inf)
     log: bool = False
+    unit: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +49,8 @@ class Certainty:
     one_sided : tuple of str
         Numbers held by a bound: only the other side is open.
     unknown : tuple of str
-        Numbers these runs cannot tell apart from others.
+        Numbers these runs cannot tell apart from others; of those among `names` the spread is what is
+        left where the others are held.
     gain, offset : float
         Standard deviations between sessions, of the force as a share and as a shift [N].
     session_dof : float
@@ -56,6 +60,8 @@ class Certainty:
         of the peak force and of the dissipated energy, relative.
     left_out : int
         Runs left out that say so.
+    words : tuple of str
+        What only the runs could tell of it: numbers that do the same to the force, or rest on one run.
     """
 
     names: tuple[str, ...]
@@ -71,6 +77,12 @@ class Certainty:
     peak: float = 0.0
     energy: float = 0.0
     left_out: int = 0
+    words: tuple[str, ...] = ()
+
+    @property
+    def one_session(self) -> bool:
+        """Whether all runs are of one session, so that nobody can say how sessions differ."""
+        return self.session_dof < 0.5
 
     def interval(self, damper: Damper, name: str, level: float = 0.95) -> tuple[float, float]:
         """Ends of a number's interval.
@@ -80,32 +92,12 @@ class Certainty:
         InputError
             E_CERTAINTY if it is not among those whose spread is known.
         """
-        if name not in self.names:
+        if name not in self.names or name in self.unknown:
             why = "held by a bound" if name in self.one_sided else "not determined by these runs"
             raise InputError(f"{name} is {why}", mend="test where it matters", code="E_CERTAINTY")
         i = self.names.index(name)
-        value, half = (
-            damper.own_numbers[name].value,
-            student(level, self.dof[i]) * float(np.sqrt(self.covariance[i, i])),
-        )
-        if self.logs[i]:
-            return float(value * np.exp(-half)), float(value * np.exp(half))
-        return float(value - half), float(value + half)
-
-
-def student(level: float, dof: float) -> float:
-    """Two-sided quantile of Student's t.
-
-    Raises
-    ------
-    InputError
-        E_LEVEL if the level is not between 0 and 1.
-    """
-    from scipy.special import stdtrit
-
-    if not 0 < level < 1:
-        raise InputError(f"level {level:g}", mend="give a share between 0 and 1, as 0.9", code="E_LEVEL")
-    return float(stdtrit(max(dof, 1.0), (1 + level) / 2))
+        error = float(np.sqrt(self.covariance[i, i]))
+        return interval_about(damper.own_numbers[name].value, error, self.dof[i], level, self.logs[i])
 
 
 def unsure(damper: Damper) -> list[str]:
@@ -113,32 +105,66 @@ def unsure(damper: Damper) -> list[str]:
     known: Certainty | None = damper.certainty
     if known is None:
         return ["How sure the numbers are is not known: the model was saved without it."]
-    said = [f"{name} ended at a limit of its range: only one side of it is open." for name in known.one_sided]
-    if known.unknown:
-        said.append(f"{', '.join(known.unknown)} cannot be known from these runs: others do the same to the force.")
-    if known.session_dof < 2:
-        said.append("There are too few sessions to know how much they differ.")
     numbers = damper.own_numbers
-    for i, name in enumerate(known.names):
-        error = float(np.sqrt(known.covariance[i, i])) / (1.0 if known.logs[i] else abs(numbers[name].value) or 1.0)
-        if error > 0.5:
-            said.append(f"{name} is known to a factor only: its standard error is {100 * error:.0f} %.")
-    scale = np.sqrt(np.diag(known.covariance))
-    alike = known.covariance / np.outer(scale, scale) if known.names else np.zeros((0, 0))
-    for i, j in zip(*np.where(np.triu(np.abs(alike), 1) > 0.98), strict=True):
+    said = [f"{name} ended at {_limit(numbers[name])}: only one side of it is open." for name in known.one_sided]
+    said += [f"{text}." for text in known.words]
+    told = " ".join(known.words)
+    if silent := [name for name in known.unknown if name not in told]:
+        said.append(f"{', '.join(silent)} cannot be known from these runs: others do the same to the force.")
+    if known.one_session:
         said.append(
-            f"{known.names[i]} and {known.names[j]} are known together, not apart (correlation {alike[i, j]:.2f})."
+            "All runs are of one session: how sessions differ cannot be known, and intervals hold for it alone."
         )
-    return said
+    elif known.session_dof < 2:
+        said.append("There are too few sessions to know how much they differ.")
+    for i, name in enumerate(known.names):
+        error = float(np.sqrt(known.covariance[i, i]))
+        if name in known.unknown:
+            continue
+        if known.logs[i] and error > _BADLY:
+            said.append(f"{name} is known to a factor of {np.exp(error):.1f} only.")
+        elif not known.logs[i] and error > _BADLY * abs(numbers[name].value):
+            said.append(f"{name} cannot be told from zero: its standard error is {error:.2g} {numbers[name].unit}.")
+    apart = [i for i, name in enumerate(known.names) if name not in known.unknown]
+    names, block = [known.names[i] for i in apart], known.covariance[np.ix_(apart, apart)]
+    return [*said, *(f"{text}." for text in weaknesses(names, block))]
 
 
-def table(damper: Damper, level: float = 0.95) -> list[Mapping[str, float | str]]:
-    """Numbers with the ends of their intervals, one row each."""
+def _limit(own: OwnNumber) -> str:
+    for end, name in zip(own.bounds, ("lower", "upper"), strict=True):
+        if np.isclose(own.value, end, rtol=1e-6, atol=1e-12):
+            return f"its {name} limit {end:g}"
+    return "a limit of what was searched"
+
+
+def table(damper: Damper, level: float = 0.95) -> list[dict[str, Any]]:
+    """Own numbers with the ends of their intervals and what is known of each, a row a number.
+
+    Keys: name, value, unit, low, high (NaN where there are none), state, written (as on a screen).
+    """
     known: Certainty | None = damper.certainty
     rows = []
     for name, own in damper.own_numbers.items():
-        row: dict[str, float | str] = {"name": name, "value": own.value, "low": "", "high": ""}
-        if known is not None and name in known.names:
-            row["low"], row["high"] = known.interval(damper, name, level)
-        rows.append(row)
+        ends, state = None, "no covariance"
+        if known is not None:
+            state = "determined"
+            if name in known.one_sided:
+                state = f"one-sided: at {_limit(own)}"
+            elif name not in known.names or name in known.unknown:
+                state = "cannot be known"
+            else:
+                ends = known.interval(damper, name, level)
+        low, high = ends or (math.nan, math.nan)
+        text = written(own.value, ends, own.unit) + ("" if state == "determined" else f" ({state})")
+        rows.append(
+            {
+                "name": name,
+                "value": own.value,
+                "unit": own.unit,
+                "low": low,
+                "high": high,
+                "state": state,
+                "written": text,
+            }
+        )
     return rows

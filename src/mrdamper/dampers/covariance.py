@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,12 +12,15 @@ from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.slopes import force_slopes
 from mrdamper.data import Floats, Run
 from mrdamper.identification.covariance import score_covariance
+from mrdamper.identification.intervals import weaknesses
 from mrdamper.metrics import Scores, peak_force
 
 _ROWS = 400  # samples of a run that enter
 _CYCLES = 4  # of a sine that enter, as in the joint fit
 _WARM_UP = 1.5  # cycles before them in which the model forgets its start
 _BEST = 1e-3  # nrmse_pp below which a run gains no more weight, as in the joint fit
+_TAKES_PART = 0.1  # in a direction, of its unit vector
+_ONE_RUN = 0.6  # share of what is known of a number from which it rests on one run
 _UNKNOWN = 1e-10  # of the largest: eigenvalue of the scaled normal matrix below which a direction is unknown
 
 
@@ -27,7 +30,7 @@ def session_of(run: Run) -> str:
     return run.notes.get("session") or (clock[:13] if len(clock) >= 13 else f"run {run.id}")
 
 
-def certain(damper: Damper, runs: Sequence[Run], left_out: Sequence[Scores] = ()) -> Damper:
+def certain(damper: Damper, runs: Sequence[Run], left_out: Sequence[Scores] = (), held: Collection[str] = ()) -> Damper:
     """The damper with what is known of its uncertainty.
 
     Parameters
@@ -37,34 +40,38 @@ def certain(damper: Damper, runs: Sequence[Run], left_out: Sequence[Scores] = ()
         It was identified from.
     left_out : sequence of Scores
         Of runs predicted without their condition: what the form itself is wrong by.
+    held : collection of str
+        Parameters that ended at a limit of what was searched, inside their bounds.
     """
     if not damper.own_numbers or not runs:
         return damper
     parts = [_Part.of(damper, run) for run in runs]
     numbers = damper.own_numbers
-    at_bound = tuple(n for n, own in numbers.items() if np.isclose(own.value, own.bounds, rtol=1e-6, atol=1e-12).any())
+    at_bound = tuple(
+        name
+        for name, own in numbers.items()
+        if name.split(".")[0] in held or np.isclose(own.value, own.bounds, rtol=1e-6, atol=1e-12).any()
+    )
     free = [name for name in numbers if name not in at_bound]
     slopes = [force_slopes(damper, p.prediction, free)[p.picked] for p in parts]
-    known, unknown, inverse = _known(slopes, parts, free)
+    known, unseen, alike, inverse = _known(slopes, parts, len(free))
+    conditions = [part.prediction.condition for part in parts]
+    infinite = np.diag([np.inf if i in unseen else 1.0 for i in range(len(free))])
+    words = weaknesses(free, infinite, alike, conditions)
     slopes = [slope[:, known] for slope in slopes]
     names = tuple(free[i] for i in known)
     influence = [inverse @ (slope * part.weight**2).T for slope, part in zip(slopes, parts, strict=True)]
+    words += _rest_on_one_run(names, parts, slopes, inverse)
     within, doubt = _within(parts, slopes, inverse)
     gain, offset, session_dof, between = _sessions(parts, slopes, influence, within)
     covariance = within + between
     share = np.diag(between) / np.maximum(np.diag(covariance), np.finfo(float).tiny)
     dof = 1 / (share**2 / max(session_dof, 1.0) + (1 - share) ** 2 * doubt / 2)
     made = Certainty(
-        names,
-        tuple(numbers[n].log for n in names),
-        covariance,
-        np.maximum(dof, 1.0),
-        at_bound,
-        unknown,
-        gain,
-        offset,
-        session_dof,
-    )
+        names, tuple(numbers[n].log for n in names), covariance, np.maximum(dof, 1.0), at_bound,
+        tuple(free[i] for i in sorted({*unseen, *(i for group in alike for i in group)})),
+        gain, offset, session_dof, words=tuple(words),
+    )  # fmt: skip
     return replace(damper, certainty=_with_model_error(made, damper, parts, slopes, left_out))  # type: ignore[type-var]
 
 
@@ -107,20 +114,37 @@ class _Part:
 
 
 def _known(
-    slopes: Sequence[Floats], parts: Sequence[_Part], free: Sequence[str]
-) -> tuple[list[int], tuple[str, ...], Floats]:
-    """Columns that are determined, names of the others, and the inverse of the normal matrix of the former."""
+    slopes: Sequence[Floats], parts: Sequence[_Part], count: int
+) -> tuple[list[int], list[int], list[list[int]], Floats]:
+    """Columns to keep, those no run shows, groups that do the same, and the inverse of the kept ones' normal matrix."""
     normal = np.sum([(s.T @ s) * part.weight**2 for s, part in zip(slopes, parts, strict=True)], axis=0)
-    keep = list(np.flatnonzero(np.diag(normal) > 0))
+    keep = [i for i in range(count) if normal[i, i] > 0]
+    unseen, alike = [i for i in range(count) if i not in keep], []
     while keep:
         scale = np.sqrt(np.diag(normal)[keep])
         values, vectors = np.linalg.eigh(normal[np.ix_(keep, keep)] / np.outer(scale, scale))
         if values[0] > _UNKNOWN * values[-1]:
-            inverse = (vectors / values) @ vectors.T / np.outer(scale, scale)
-            lost = tuple(name for i, name in enumerate(free) if i not in keep)
-            return [int(i) for i in keep], lost, inverse
-        keep.pop(int(np.argmax(np.abs(vectors[:, 0]))))
-    return [], tuple(free), np.zeros((0, 0))
+            return keep, unseen, alike, (vectors / values) @ vectors.T / np.outer(scale, scale)
+        weight = np.abs(vectors[:, 0])
+        alike.append([keep[i] for i in np.flatnonzero(weight > _TAKES_PART)])
+        keep.pop(int(np.argmax(weight)))
+    return [], unseen, alike, np.zeros((0, 0))
+
+
+def _rest_on_one_run(
+    names: Sequence[str], parts: Sequence[_Part], slopes: Sequence[Floats], inverse: Floats
+) -> list[str]:
+    """Numbers of which one run of several tells most, in words."""
+    if len(parts) < 3 or not names:
+        return []
+    told = np.array([np.sum((s @ inverse * p.weight) ** 2, axis=0) for s, p in zip(slopes, parts, strict=True)])
+    share = told / np.maximum(told.sum(axis=0), np.finfo(float).tiny)
+    best = np.argmax(share, axis=0)
+    return [
+        f"{name} rests on one run: {parts[r].run.id} tells {100 * share[r, i]:.0f} % of it"
+        for i, (name, r) in enumerate(zip(names, best, strict=True))
+        if share[r, i] > _ONE_RUN
+    ]
 
 
 def _within(parts: Sequence[_Part], slopes: Sequence[Floats], inverse: Floats) -> tuple[Floats, Floats]:

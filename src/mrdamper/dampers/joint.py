@@ -120,7 +120,7 @@ class JointDamper(Damper):
     @property
     def own_numbers(self) -> Mapping[str, OwnNumber]:
         return {
-            info.name: OwnNumber(getattr(self.model, info.name), info.bounds, info.scale == "log")
+            info.name: OwnNumber(getattr(self.model, info.name), info.bounds, info.scale == "log", info.unit)
             for info in self.model.parameters()
             if info.name in self.free
         }
@@ -318,11 +318,10 @@ class JointProblem:
                 evaluations += found.evaluations
             table.weigh(table.solve(point).nrmse_pp)
         solved = table.solve(point)
-        at_bounds = [axis.name for axis, u in zip(self.axes, point, strict=True) if axis.at_bound(float(u))]
         return JointFit(
             self._damper(solved.model, point, table.parts),
             solved.nrmse_pp,
-            (*at_bounds, *solved.held),
+            (*self._at_bounds(point), *solved.held),
             point,
             ending,
             evaluations,
@@ -394,6 +393,20 @@ class JointProblem:
         """The coil at a point of the search axes."""
         lags = {axis.name: axis.value(float(u)) for axis, u in zip(self.axes, point, strict=True)}
         return Coil(lags[RISE], lags[FALL]) if RISE in lags else self.coil
+
+    def _at_bounds(self, point: Floats) -> list[str]:
+        """Parameters whose search axis ended at a limit, under their own names."""
+        own = {info.name for info in self.model_type.parameters()}
+        found = []
+        for i, axis in enumerate(self.axes):
+            if not axis.at_bound(float(point[i])):
+                continue
+            low, high = axis.coordinate(axis.lower), axis.coordinate(axis.upper)
+            inward = point + np.eye(len(point))[i] * 1e-3 * (low + high - 2 * point[i])
+            here, there = self.bare(point).values(), self.bare(inward).values()
+            stands_for = [n for n in here if here[n] != there[n]]
+            found += [axis.name] if axis.name in own or not stands_for else stands_for
+        return found
 
     def _box(self) -> tuple[Floats, Floats]:
         return (

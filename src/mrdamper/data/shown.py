@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -26,8 +26,13 @@ class Shown(ABC):
     def table(self) -> Mapping[str, Any]:
         """Columns by name, all of one length; units are part of the names."""
 
+    @property
+    def details(self) -> Sequence[str]:
+        """What stands under the headline where it is printed, a line each."""
+        return ()
+
     def __repr__(self) -> str:
-        return f"<{self.headline}>"
+        return f"<{chr(10).join((self.headline, *self.details))}>"
 
     def _repr_html_(self) -> str:
         """The headline and the first rows, for notebooks."""

@@ -101,6 +101,7 @@ class _Covariance(_Strict):
     unknown: tuple[str, ...] = ()
     session: _Session
     model_error: _ModelError
+    words: tuple[str, ...] = ()
 
 
 class _Document(_Strict):
@@ -270,6 +271,7 @@ def _describe_certainty(known: Certainty | None) -> _Covariance | None:
         unknown=known.unknown,
         session=_Session(gain=known.gain, offset_N=known.offset, degrees_of_freedom=known.session_dof),
         model_error=_ModelError(force=known.force, peak=known.peak, energy=known.energy, left_out=known.left_out),
+        words=known.words,
     )
 
 
@@ -289,7 +291,7 @@ def _with_certainty(damper: Damper, saved: _Covariance, where: str) -> Damper:
     known = Certainty(
         saved.parameters, saved.logarithmic, matrix, np.array(saved.degrees_of_freedom), saved.one_sided, saved.unknown,
         session.gain, session.offset_N, session.degrees_of_freedom,
-        model.force, model.peak, model.energy, model.left_out,
+        model.force, model.peak, model.energy, model.left_out, saved.words,
     )  # fmt: skip
     return replace(damper, certainty=known)  # type: ignore[type-var]
 

@@ -6,15 +6,14 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from mrdamper.data import Floats, Run
+from mrdamper.data import Run
 from mrdamper.errors import IdentificationError
 from mrdamper.gas_spring import GasSpring
-from mrdamper.identification.covariance import standard_errors
+from mrdamper.identification.certainty import certainty_of_run
 from mrdamper.identification.methods import all_methods, method_named
-from mrdamper.identification.problem import DELAY, Identification, Method, Problem, Solution
+from mrdamper.identification.problem import Identification, Method, Problem, Solution
 from mrdamper.metrics import score
 from mrdamper.models import Model, model_type
-from mrdamper.motion import Excitation
 from mrdamper.optimizers.linear import on_one_blas_thread
 
 __all__ = ["Identification", "Method", "Problem", "Solution", "all_methods", "identify"]
@@ -69,7 +68,10 @@ def identify(
     >>> from mrdamper import identify, load_dataset
     >>> run = load_dataset()["utf_5mm4Hz_1A"]
     >>> identify(run, "bingham")
-    <bingham from run utf_5mm4Hz_1A at 1 A, 4.07 Hz, 4.38 mm: 11.02 % of the peak-to-peak force>
+    <bingham from run utf_5mm4Hz_1A at 1 A, 4.07 Hz, 4.38 mm: 11.02 % of the peak-to-peak force
+    c = 10800 ± 7800 N s/m
+    fy = 480 ± 380 N
+    f0 = 41 ± 4.5 N>
     >>> found = identify(run)  # Bouc–Wen
     >>> found.free
     ('c', 'alpha', 'beta', 'f0', 'k1', 'k3')
@@ -123,6 +125,7 @@ def conclude(problem: Problem, method: Method, solution: Solution) -> Identifica
     state = solution.model.state(motion)[problem.scored]
     predicted = solution.model.force(seen, state)
     residual = predicted - problem.force
+    sure = certainty_of_run(problem, solution, motion, state, residual)
     return Identification(
         run_id=problem.run.id,
         rig=problem.run.rig,
@@ -134,43 +137,16 @@ def conclude(problem: Problem, method: Method, solution: Solution) -> Identifica
         delay=solution.delay,
         scores=score(problem.force, predicted, seen.velocity, seen.time),
         floor=problem.run.repeatability,
-        standard_errors=_standard_errors(problem, solution, motion, state, residual),
+        standard_errors=sure.errors,
+        dof=sure.dof,
         start=solution.start,
         end=solution.end,
         evaluations=solution.evaluations,
         ending=solution.ending,
         seed=solution.seed,
         notes=(*_notes(problem), *solution.notes),
+        doubts=sure.doubts,
         residual=residual,
-    )
-
-
-def _standard_errors(
-    problem: Problem, solution: Solution, motion: Excitation, state: Floats, residual: Floats
-) -> dict[str, float]:
-    """Differentiate the force by each free coordinate; those at a bound have no error to state."""
-    seen = motion.part(problem.scored)
-    linear = {i.name: getattr(solution.model, i.name) for i in solution.model.parameters() if i.linear}
-    searched = {name: value for name, value in solution.end.items() if name != DELAY}
-    point = {**problem.fixed, **searched, **linear}
-    names = [n for n in (*linear, *searched) if (n in problem.free or n in searched) and n not in solution.at_bounds]
-    base = residual + problem.force
-    columns = []
-    for name in names:
-        step = 1e-6 * abs(point[name]) or 1e-6
-        moved = problem.model_type.build({**point, name: point[name] + step})
-        there = state if name in linear else moved.state(motion)[problem.scored]  # linear ones do not change it
-        columns.append((moved.force(seen, there) - base) / step)
-    if not columns:
-        return {}
-    return dict(
-        zip(
-            names,
-            standard_errors(
-                np.column_stack(columns), residual, seen.time, problem.analysis.condition.frequency_Hz
-            ).tolist(),
-            strict=True,
-        )
     )
 
 

@@ -21,6 +21,7 @@ _REPEATS = 0.95  # cycles from which harmonics of the motion can be told apart
 _TELLING = 1.9  # cycles from which repeats are seen as such
 _MOST = 2001  # samples that are looked at
 _LONGEST = 0.9995  # correlation of neighbours
+_TAKES_PART = 0.1  # in a direction, of its unit vector
 _NO_MORE = 1e-12  # of the largest: eigenvalue of the scaled normal matrix below which nothing is known
 
 
@@ -38,12 +39,15 @@ class Spread:
         Independent samples that would give each parameter's error, were the residual white.
     memory : float
         Length of the record in lags of its residual; a record shorter than some ten says little.
+    alike : tuple of tuples of int
+        Parameters that do the same to the residual: of each group only some combinations are known.
     """
 
     covariance: Floats
     dof: Floats
     effective: Floats
     memory: float
+    alike: tuple[tuple[int, ...], ...] = ()
 
     @property
     def errors(self) -> Floats:
@@ -88,6 +92,7 @@ def spread(jacobian: Floats, residual: Floats, time: Floats | None = None, frequ
     weak = values <= _NO_MORE * values[-1]
     lost = np.sum(vectors[:, weak] ** 2, axis=1) > 1e-6
     rows = np.flatnonzero(known)
+    alike = tuple(tuple(int(rows[i]) for i in np.flatnonzero(np.abs(v) > _TAKES_PART)) for v in vectors[:, weak].T)
     covariance[np.ix_(rows, rows)] = middle / scale[known][:, None] / scale[known]
     for row in rows[lost]:
         covariance[row, :] = covariance[:, row] = 0.0
@@ -99,7 +104,7 @@ def spread(jacobian: Floats, residual: Floats, time: Floats | None = None, frequ
         effective = np.nan_to_num(size * textbook / np.diag(covariance), nan=0.0, posinf=float(size))
     free = np.ones(count)
     free[rows] = np.clip(dof, 1.0, max(size - known.sum(), 1))
-    return Spread(covariance, free, np.minimum(effective, size), memory)
+    return Spread(covariance, free, np.minimum(effective, size), memory, alike)
 
 
 def score_covariance(

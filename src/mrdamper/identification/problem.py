@@ -14,6 +14,7 @@ import numpy as np
 from mrdamper.data import Condition, Floats, Run, Shown
 from mrdamper.errors import IdentificationError, UnknownNameError
 from mrdamper.gas_spring import GasSpring
+from mrdamper.identification.intervals import interval_about, written
 from mrdamper.metrics import Scores
 from mrdamper.models import Model
 from mrdamper.motion import Excitation, MotionAnalysis, analyse_motion, measured_motion
@@ -191,8 +192,9 @@ class Identification(Shown):
         Inside the steady window.
     floor : float or None
         The run's cycle-to-cycle scatter as nrmse_pp: no model can do better.
-    standard_errors : mapping of str to float
-        Of the linear parameters and the search coordinates, widened for autocorrelated residuals.
+    standard_errors, dof : mapping of str to float
+        Of the free parameters and the search coordinates, as the residual depends on itself
+        (`identification.covariance`), and the degrees of freedom behind them.
     start, end : mapping of str to float
         Search coordinates the refinement began and ended at.
     evaluations : int
@@ -203,6 +205,8 @@ class Identification(Shown):
         Of the random search, where one was used.
     notes : tuple of str
         What the reader should know before trusting a parameter.
+    doubts : tuple of str
+        What the samples themselves cannot tell: parameters that do the same, a record too short.
     residual : (N,) array
         Predicted minus measured force in the steady window [N].
     """
@@ -218,12 +222,14 @@ class Identification(Shown):
     scores: Scores
     floor: float | None
     standard_errors: Mapping[str, float]
+    dof: Mapping[str, float]
     start: Mapping[str, float]
     end: Mapping[str, float]
     evaluations: int
     ending: Ending
     seed: int | None
     notes: tuple[str, ...]
+    doubts: tuple[str, ...]
     residual: Floats
 
     @property
@@ -233,17 +239,45 @@ class Identification(Shown):
         return f"{self.model.name} from run {self.run_id} at {self.condition}: {fault} of the peak-to-peak force"
 
     @property
+    def details(self) -> Sequence[str]:
+        """Free parameters with their 95 % intervals and units."""
+        return [
+            f"{info.name} = {written(getattr(self.model, info.name), self.interval(info.name), info.unit)}"
+            + ("" if info.name in self.standard_errors else " (at a bound: one-sided)")
+            for info in self.model.parameters()
+            if info.name in self.free
+        ]
+
+    def interval(self, name: str, level: float = 0.95) -> tuple[float, float] | None:
+        """Ends of a parameter's interval within the form of the model; None where none is known.
+
+        Raises
+        ------
+        InputError
+            E_LEVEL if the level is not between 0 and 1.
+        """
+        error = self.standard_errors.get(name)
+        if error is None or not np.isfinite(error):
+            return None
+        log = {info.name: info.scale == "log" for info in self.model.parameters()}.get(name, False)
+        value = float(getattr(self.model, name))
+        return interval_about(value, error / value if log else error, self.dof[name], level, log)
+
+    @property
     def table(self) -> Mapping[str, Sequence[Any]]:
         """A row a parameter."""
         infos = self.model.parameters()
+        intervals = [self.interval(info.name) for info in infos]
         return {
             "parameter": [info.name for info in infos],
             "value": [float(getattr(self.model, info.name)) for info in infos],
             "unit": [info.unit for info in infos],
             "standard_error": [self.standard_errors.get(info.name) for info in infos],
+            "low_95": [ends[0] if ends else None for ends in intervals],
+            "high_95": [ends[1] if ends else None for ends in intervals],
             "state": [
-                "at a bound" if info.name in self.at_bounds else "determined" if info.name in self.free else "held"
-                for info in infos
+                "held" if n not in self.free else "determined" if n in self.standard_errors else "at a bound: one-sided"
+                for n in (info.name for info in infos)
             ],
             "meaning": [info.meaning for info in infos],
         }

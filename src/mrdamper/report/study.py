@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from mrdamper.dampers.base import Damper
+from mrdamper.dampers.certainty import table
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.errors import IdentificationError
@@ -18,6 +20,7 @@ from mrdamper.files.encoding import csv_text, file_names
 from mrdamper.files.model_file import save_model
 from mrdamper.identification import Identification
 from mrdamper.identification.characteristics import Characteristics, characterise
+from mrdamper.models import Model
 from mrdamper.report.about import About, Limit
 from mrdamper.report.damper_tests import facts_of_tests, figures_of_tests, force_rows, provenance
 from mrdamper.report.distrust import doubts
@@ -45,7 +48,7 @@ def write_study(
     also: Sequence[str] = (),
     processes: Processes = HERE,
 ) -> list[Path]:
-    """Write report.html, model files, identifications.csv, validation.csv, forces.csv and figures/.
+    """Write report.html, model files, identifications.csv, parameters.csv, validation.csv, forces.csv and figures/.
 
     Parameters
     ----------
@@ -104,6 +107,7 @@ def write_study(
         (work / "identifications.csv").write_text(
             csv_text(identification_rows(_all_identifications(study))), encoding="utf-8"
         )
+        (work / "parameters.csv").write_text(_parameters_table(study), encoding="utf-8")
         (work / "validation.csv").write_text(_validation_table(study), encoding="utf-8")
 
     took = {rig.rig: {c.recipe.name: c.seconds for c in rig.candidates} for rig in study.rigs}
@@ -215,7 +219,7 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
         "identifications": mapped.identifications if mapped else (),
         "parameter_names": _free_names(mapped.identifications[0]) if mapped else (),
         "mapped": mapped,
-        "joint": _joint_table(chosen.fit) if isinstance(chosen.fit, JointFit) else (),
+        "joint": _joint_table(chosen.damper, chosen.fit.damper.model) if isinstance(chosen.fit, JointFit) else (),
         "predicted_caption": (
             "Held-out runs, last cycle of the steady window: the model has seen none of them."
             if held
@@ -234,18 +238,25 @@ def _mapped(rig: RigStudy) -> tuple[Scored, ModifiedFit] | None:
     return next(((c, c.fit) for c in rig.candidates if isinstance(c.fit, ModifiedFit)), None)
 
 
-def _joint_table(fit: JointFit) -> list[dict[str, Any]]:
-    model = fit.damper.model
+def _joint_table(damper: Damper, model: Model) -> list[dict[str, Any]]:
+    """Parameters with their intervals; those that were held have none."""
+    known = {row["name"]: row["written"] for row in table(damper)}
     return [
-        {
-            "name": info.name,
-            "value": getattr(model, info.name),
-            "unit": info.unit,
-            "meaning": info.meaning,
-            "at_bound": info.name in fit.at_bounds,
-        }
+        {"name": info.name, "written": known.get(info.name, f"{getattr(model, info.name):.4g} {info.unit}")}
+        | {"meaning": info.meaning}
         for info in model.parameters()
     ]
+
+
+def _parameters_table(study: Study) -> str:
+    """Numbers of the chosen dampers with the ends of their 95 % intervals, empty where there are none."""
+    names = {"low": "low_95", "high": "high_95"}
+    rows = [
+        {"rig": rig.rig} | {names.get(k, k): "" if v != v else v for k, v in row.items() if k != "written"}
+        for rig in study.rigs
+        for row in table(rig.damper)
+    ]
+    return csv_text(rows)
 
 
 def _drift(rig: RigStudy) -> str:

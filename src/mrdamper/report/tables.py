@@ -31,11 +31,12 @@ def identification_rows(identifications: Sequence[Identification]) -> list[dict[
             "wape": found.scores.wape,
             **{f"{name} [{unit}]": value for name, unit, value in _values(found)},
             **{f"standard error {name}": value for name, value in found.standard_errors.items()},
+            **_ends(found),
             "delay_s": found.delay,
             "at_bounds": " ".join(found.at_bounds),
             "evaluations": found.evaluations,
             "message": str(found.ending),
-            "notes": "; ".join(found.notes),
+            "notes": "; ".join((*found.notes, *found.doubts)),
         }
         rows.append(row)
     return rows
@@ -73,6 +74,14 @@ def score_row(run: RunScore) -> dict[str, Any]:
         "peak_error": s.peak_error,
         "extrapolation": " ".join(run.extrapolation),
     }
+
+
+def _ends(found: Identification) -> dict[str, float | None]:
+    """Ends of the 95 % intervals of the free parameters."""
+    columns: dict[str, float | None] = {}
+    for name in (info.name for info in found.model.parameters() if info.name in found.free):
+        columns[f"{name} low 95 %"], columns[f"{name} high 95 %"] = found.interval(name) or (None, None)
+    return columns
 
 
 def _values(found: Identification) -> list[tuple[str, str, float]]:

@@ -16,6 +16,8 @@ import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.joint import JointFit
+from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.data import Dataset, Run, Shown
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError
 from mrdamper.identification import refuse_clipped
@@ -242,7 +244,9 @@ def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None, *
     near = [c for c in eligible if errors[id(c)] <= _WORTH * least]
     chosen = min(near, key=lambda c: c.damper.parameter_count)
     candidates.sort(key=lambda c: c is not chosen)
-    candidates[0] = replace(chosen, damper=certain(chosen.damper, train, [r.scores for r in chosen.left_out.runs]))
+    held = chosen.fit.at_bounds if isinstance(chosen.fit, JointFit | ModifiedFit) else ()
+    errors_left_out = [r.scores for r in chosen.left_out.runs]
+    candidates[0] = replace(chosen, damper=certain(chosen.damper, train, errors_left_out, held))
     return RigStudy(
         rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), refused, impossible, model is not None
     )

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import typer
 
+_MOST_DOUBTS = 10  # lines on the screen
+
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
@@ -67,3 +69,8 @@ def register(app: typer.Typer) -> None:
         for name, why in refused.items():
             typer.echo(f"not identified: {name}: {why}", err=True)
         put(identification_rows(found), out, as_json, csv_text)
+        doubts = [f"warning: run {one.run_id}: {doubt}" for one in found for doubt in one.doubts]
+        for line in doubts[:_MOST_DOUBTS]:
+            typer.echo(line, err=True)
+        if len(doubts) > _MOST_DOUBTS:
+            typer.echo(f"warning: {len(doubts) - _MOST_DOUBTS} more of this kind in the column notes", err=True)

@@ -28,6 +28,7 @@ def register(app: typer.Typer) -> None:
         """Study a dataset: identify every run, map the parameters, validate; write report and models."""
         from mrdamper.cli.output import percent
         from mrdamper.cli.progress import progress_on_stderr
+        from mrdamper.dampers.certainty import table, unsure
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.dataset import load_dataset
         from mrdamper.report.about import load_about, load_limits
@@ -68,6 +69,10 @@ def register(app: typer.Typer) -> None:
                 held_out = percent(candidate.held_out.median() if candidate.held_out.runs else math.nan)
                 one_by_one = percent(candidate.per_run)
                 print(f"  {candidate.title:38}{percent(candidate.left_out.median()):>10}{held_out:>10}{one_by_one:>12}")
+            numbers = (f"{row['name']} {row['written']}" for row in table(rig.damper))
+            print(f"  numbers, 95 %: {'; '.join(numbers)}")
+            for doubt in unsure(rig.damper):
+                print(f"  {doubt}")
         print(f"report: {written[0]}")
 
 

@@ -199,7 +199,7 @@ def _identified(one: Identification) -> dict[str, Any]:
         "at_bounds": one.at_bounds,
         "free": one.free,
         "message": str(one.ending),
-        "notes": one.notes,
+        "notes": (*one.notes, *one.doubts),
     }
 
 

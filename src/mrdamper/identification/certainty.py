@@ -1,0 +1,137 @@
+"""How sure the parameters of one identified run are, and what its motion cannot tell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mrdamper.data import Floats
+from mrdamper.identification.covariance import Spread, spread
+from mrdamper.identification.intervals import weaknesses
+from mrdamper.identification.problem import DELAY, Problem, Solution
+from mrdamper.motion import Excitation
+
+_STEP = 1e-6  # of a coordinate, for derivatives
+_WORTH = 4.0  # times what noise gives away to the columns of a hysteresis that is not there
+_AT_LEAST = 20.0  # independent samples that any record of a cycle has for this question
+_SHORT = 3.0  # lags of its residual below which a record says little of its own noise
+
+
+@dataclass(frozen=True)
+class RunCertainty:
+    """Standard errors of a run's parameters and search coordinates, and what to know of them.
+
+    Attributes
+    ----------
+    errors, dof : mapping of str to float
+        Standard errors, and the degrees of freedom behind them.
+    doubts : tuple of str
+        What the samples cannot tell.
+    """
+
+    errors: Mapping[str, float] = field(default_factory=dict)
+    dof: Mapping[str, float] = field(default_factory=dict)
+    doubts: tuple[str, ...] = ()
+
+
+def certainty_of_run(
+    problem: Problem, solution: Solution, motion: Excitation, state: Floats, residual: Floats
+) -> RunCertainty:
+    """Differentiate the force by each free coordinate; those at a bound have no error to state.
+
+    Parameters
+    ----------
+    motion : Excitation
+        With the delay that was found.
+    state : (N,) array
+        Of the solution inside the scored samples.
+    residual : (N,) array
+        Predicted minus measured force there [N].
+    """
+    point, names, columns = _sensitivities(problem, solution, motion, state, residual)
+    if not columns:
+        return RunCertainty()
+    condition = problem.analysis.condition
+    found = spread(np.column_stack(columns), residual, motion.part(problem.scored).time, condition.frequency_Hz)
+    errors, dof = dict(zip(names, found.errors, strict=True)), dict(zip(names, found.dof, strict=True))
+    errors, dof = _of_parameters(problem, point, names, found.covariance, errors, dof)
+    hidden = [name for name in errors if name == DELAY]
+    shown = {name: float(error) for name, error in errors.items() if name not in hidden}
+    doubts = weaknesses(names, found.covariance, found.alike, [condition])
+    if unseen := _unseen(problem, names, np.column_stack(columns), residual, found):
+        doubts = [f"this motion never yields: {', '.join(unseen)} unseen", *doubts]
+        shown |= {name: float("inf") for name in shown if name in unseen or name not in problem.free}
+    if found.memory < _SHORT and np.any(residual):
+        doubts.append(
+            f"the record is only {found.memory:.1f} times as long as its noise remembers: "
+            "intervals are a guess, record longer"
+        )
+    return RunCertainty(shown, {name: float(dof[name]) for name in shown}, tuple(doubts))
+
+
+def _unseen(problem: Problem, names: Sequence[str], columns: Floats, residual: Floats, found: Spread) -> list[str]:
+    """Parameters of the hysteresis where the other columns alone explain the force as well [Davies 1987]."""
+    hysteretic = problem.model_type.state_column
+    searched = [i.name for i in problem.model_type.parameters() if i.name in problem.free and not i.linear]
+    if hysteretic is None or hysteretic not in names or not searched:
+        return []
+    linear = {info.name for info in problem.model_type.parameters() if info.linear}
+    others = columns[:, [i for i, name in enumerate(names) if name in linear and name != hysteretic]]
+    table = np.column_stack([others, np.ones(len(others))])
+    without = problem.force - table @ np.linalg.lstsq(table, problem.force, rcond=None)[0]
+    independent = max(float(found.effective[list(names).index(hysteretic)]), _AT_LEAST)
+    gain = float(without @ without) / max(float(residual @ residual), np.finfo(float).tiny) - 1
+    return searched if gain < _WORTH * (1 + len(searched)) / independent else []
+
+
+def _sensitivities(
+    problem: Problem, solution: Solution, motion: Excitation, state: Floats, residual: Floats
+) -> tuple[dict[str, float], list[str], list[Floats]]:
+    """The point, its free coordinates, and derivatives of the force by them."""
+    seen = motion.part(problem.scored)
+    linear = {i.name: getattr(solution.model, i.name) for i in solution.model.parameters() if i.linear}
+    searched = {name: value for name, value in solution.end.items() if name != DELAY}
+    point = {**problem.fixed, **searched, **linear}
+    names = [n for n in (*linear, *searched) if (n in problem.free or n in searched) and n not in solution.at_bounds]
+    base = residual + problem.force
+    columns = []
+    for name in names:
+        step = _STEP * abs(point[name]) or _STEP
+        moved = problem.model_type.build({**point, name: point[name] + step})
+        there = state if name in linear else moved.state(motion)[problem.scored]  # linear ones do not change it
+        columns.append((moved.force(seen, there) - base) / step)
+    if DELAY in solution.end and DELAY not in solution.at_bounds:
+        names.append(DELAY)
+        columns.append(-np.gradient(base, seen.time))
+    return point, names, columns
+
+
+def _of_parameters(
+    problem: Problem,
+    point: Mapping[str, float],
+    names: Sequence[str],
+    covariance: Floats,
+    errors: dict[str, float],
+    dof: dict[str, float],
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Also of the free parameters that were searched in other coordinates, as beta is in the yield displacement."""
+    missing = [name for name in problem.free if name not in errors]
+    searched = [i for i, name in enumerate(names) if name in point and name not in problem.free]
+    if not missing or not searched:
+        return errors, dof
+    at = problem.model_type.build(point)
+    slopes = np.zeros((len(missing), len(searched)))
+    for k, i in enumerate(searched):
+        step = _STEP * abs(point[names[i]]) or _STEP
+        moved = problem.model_type.build({**point, names[i]: point[names[i]] + step})
+        slopes[:, k] = [(getattr(moved, name) - getattr(at, name)) / step for name in missing]
+    block = covariance[np.ix_(searched, searched)]
+    for name, row in zip(missing, slopes, strict=True):
+        used = row != 0
+        if used.any():
+            variance = float(row[used] @ block[np.ix_(used, used)] @ row[used])
+            errors[name] = float(np.sqrt(variance)) if np.isfinite(variance) else float("inf")
+            dof[name] = min(dof[names[i]] for i, u in zip(searched, used, strict=True) if u)
+    return errors, dof

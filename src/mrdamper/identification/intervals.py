@@ -1,0 +1,120 @@
+"""Intervals of parameters as numbers and as text, and in words what cannot be known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from mrdamper.data import Condition, Floats
+from mrdamper.errors import InputError
+
+_ALIKE = 0.98  # correlation from which two parameters are known together only
+_SAME = 0.03  # frequencies and amplitudes this close are one
+_LOPSIDED = 0.1  # of an interval's half width: shifted by less, it is written with ±
+
+
+def student(level: float, dof: float) -> float:
+    """Two-sided quantile of Student's t.
+
+    Raises
+    ------
+    InputError
+        E_LEVEL if the level is not between 0 and 1.
+    """
+    from scipy.special import stdtrit
+
+    if not 0 < level < 1:
+        raise InputError(f"level {level:g}", mend="give a share between 0 and 1, as 0.9", code="E_LEVEL")
+    return float(stdtrit(max(dof, 1.0), (1 + level) / 2))
+
+
+def interval_about(value: float, error: float, dof: float, level: float, log: bool) -> tuple[float, float]:
+    """Ends of an interval; of a logarithm where `log`, then `error` is that of the logarithm."""
+    half = student(level, dof) * error
+    return (float(value * np.exp(-half)), float(value * np.exp(half))) if log else (value - half, value + half)
+
+
+def written(value: float, ends: tuple[float, float] | None, unit: str = "") -> str:
+    """A number with its interval and unit, to two digits of the half width: 730 ± 110 N s/m, 0.3 (0.1 to 0.9) m.
+
+    `ends` is None where nothing is known of it.
+    """
+    unit = "" if unit == "-" else unit
+    if ends is None or not all(map(math.isfinite, ends)):
+        return f"{_plain(value, 4)} {unit}".strip()
+    low, high = ends
+    half = (high - low) / 2
+    if half == 0:
+        return f"{_plain(value, 6)} ± 0 {unit}".strip()
+    digits = max(1, math.floor(math.log10(max(abs(value), half))) - math.floor(math.log10(half)) + 2)
+    if abs(high + low - 2 * value) > _LOPSIDED * half:
+        return f"{_plain(value, digits)} ({_plain(low, digits)} to {_plain(high, digits)}) {unit}".strip()
+    return f"{_plain(value, digits)} ± {_plain(half, 2)} {unit}".strip()
+
+
+def _plain(value: float, digits: int) -> str:
+    """A number to some digits, without an exponent below a million."""
+    return f"{float(f'{value:.{digits}g}'):.10g}" if abs(value) < 1e6 else f"{value:.{digits}g}"
+
+
+def weaknesses(
+    names: Sequence[str],
+    covariance: Floats,
+    alike: Sequence[Sequence[int]] = (),
+    conditions: Sequence[Condition] = (),
+) -> list[str]:
+    """What cannot be known, and what is known badly, in words.
+
+    Parameters
+    ----------
+    names : sequence of str, length P
+    covariance : (P, P) array
+        Infinite on the diagonal where nothing is known.
+    alike : sequence of sequences of int
+        Parameters that do the same to the force.
+    conditions : sequence of Condition
+        Of the tests: what they have one of only is the likely reason.
+    """
+    reason = _only_one(conditions)
+    said = [
+        f"{_listed([names[i] for i in group])} cannot {_both(group)} be known{reason}: they do the same to the force"
+        for group in alike
+    ]
+    grouped = {i for group in alike for i in group}
+    lost = [n for i, n in enumerate(names) if np.isinf(covariance[i, i]) and i not in grouped]
+    if lost:
+        said.append(f"{_listed(lost)} unseen{reason}: the force does not depend on it")
+    known = [i for i in range(len(names)) if np.isfinite(covariance[i, i]) and covariance[i, i] > 0]
+    for a, i in enumerate(known):
+        for j in known[a + 1 :]:
+            together = covariance[i, j] / np.sqrt(covariance[i, i] * covariance[j, j])
+            if abs(together) > _ALIKE:
+                said.append(f"{names[i]} and {names[j]} are known together, not apart (correlation {together:.3f})")
+    return said
+
+
+def _both(group: Sequence[int]) -> str:
+    return "both" if len(group) == 2 else "all"
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _only_one(conditions: Sequence[Condition]) -> str:
+    """Of what the tests had one value only, as a reason."""
+    if not conditions:
+        return ""
+    values = {
+        "frequency": [c.frequency_Hz for c in conditions],
+        "amplitude": [c.amplitude_m for c in conditions],
+        "current": [abs(c.current_A) for c in conditions],
+    }
+    single = [name for name, v in values.items() if max(v) - min(v) <= _SAME * max(v)]
+    if "current" in single and max(values["current"]) == 0:
+        return " without current" if len(single) == 1 else " from one motion without current"
+    if not single or len(single) == 3:
+        return " from one condition" if single else " from these runs"
+    return f" from one {' and one '.join(single)}"
