@@ -9,8 +9,8 @@ from mrdamper.data import Condition, Run
 from mrdamper.identification.harmonic_balance import ForceReading
 from mrdamper.motion import sine
 from mrdamper.reproduction import claims
+from mrdamper.reproduction.found import Ended
 from mrdamper.reproduction.sensitivity import OneAtATime
-from mrdamper.reproduction.study import Ended
 from mrdamper.reproduction.verdicts import judge
 from mrdamper.reproduction.ways import ALI, CONSISTENT, DIRECT, LITERAL
 

@@ -17,9 +17,9 @@ from mrdamper.errors import IdentificationError
 from mrdamper.functions.fitting import fit_function
 from mrdamper.identification.harmonic_balance import SineRecord
 from mrdamper.motion import equivalent_sine, measured_motion
+from mrdamper.reproduction.found import Reproduction
 from mrdamper.reproduction.sensitivity import OneAtATime
-from mrdamper.reproduction.study import Reproduction
-from mrdamper.reproduction.verdicts import RECOVERED, Verdict, judge, thresholds
+from mrdamper.reproduction.verdicts import RECOVERED, Verdict, judge, steadiness, thresholds
 from mrdamper.reproduction.ways import ALI, CONSISTENT, DIRECT, LITERAL
 
 _SAME = 0.08  # relative tolerance within which two runs have one motion
@@ -61,6 +61,8 @@ class Claim:
     threshold : str
     figure : str
         Name of the figure that shows it.
+    seeds : str
+        How many noise seeds say the same, and what the others say; empty where it was judged once.
     """
 
     key: str
@@ -71,6 +73,7 @@ class Claim:
     evidence: str
     threshold: str
     figure: str
+    seeds: str
 
 
 def judge_all(study: Reproduction) -> tuple[Claim, ...]:
@@ -82,7 +85,8 @@ def judge_all(study: Reproduction) -> tuple[Claim, ...]:
         numbers = "; ".join(f"{name} {value:.3g}" for name, value in found.numbers.items())
         said = RECOVERED.get(verdict, verdict) if built_in and study.rig is not None else verdict
         evidence = "; ".join(part for part in (numbers, found.evidence) if part)
-        claims.append(Claim(key, text, source, verdict, said, evidence, thresholds(key), figure))
+        seeds = steadiness(verdict, study.seed_verdicts.get(key, ()))
+        claims.append(Claim(key, text, source, verdict, said, evidence, thresholds(key), figure, seeds))
     return tuple(claims)
 
 

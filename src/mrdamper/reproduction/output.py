@@ -21,7 +21,7 @@ from mrdamper.report.plots.style import save_figure
 from mrdamper.report.tables import identification_rows
 from mrdamper.reproduction.claims import Claim, judge_all
 from mrdamper.reproduction.figures import figures
-from mrdamper.reproduction.study import Reproduction
+from mrdamper.reproduction.found import Reproduction
 from mrdamper.reproduction.ways import CONSISTENT, LITERAL
 from mrdamper.study.recipe import Progress
 
@@ -87,7 +87,14 @@ def write_reproduction(
 def summary(study: Reproduction) -> dict[str, Any]:
     """Verdicts and claims, for a program."""
     claims = [
-        {"claim": c.text, "verdict": c.verdict, "said": c.said, "evidence": c.evidence, "threshold": c.threshold}
+        {
+            "claim": c.text,
+            "verdict": c.verdict,
+            "said": c.said,
+            "evidence": c.evidence,
+            "threshold": c.threshold,
+            "seeds": c.seeds,
+        }
         for c in judge_all(study)
     ]
     return {
@@ -128,7 +135,7 @@ def verdicts(study: Reproduction) -> Rows:
 
 def _tables(study: Reproduction, claims: tuple[Claim, ...]) -> tuple[dict[str, Rows], dict[str, str]]:
     """The paper's tables by their numbers and those only this study has; and why others are not made."""
-    names = ("key", "text", "source", "verdict", "said", "evidence", "threshold", "figure")
+    names = ("key", "text", "source", "verdict", "said", "evidence", "threshold", "figure", "seeds")
     tables: dict[str, Rows] = {
         "table1_tests": [
             {"run_id": loop.run_id, "split": loop.split, **_condition(loop.condition), "peak_force_N": loop.peak_force,

@@ -9,7 +9,8 @@ property is recovered, in part, or not.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
@@ -156,3 +157,13 @@ def judge(key: str, numbers: Mapping[str, float]) -> Verdict:
 def thresholds(key: str) -> str:
     """Every threshold of a claim, in words."""
     return "; ".join(limit.text for limit in LIMITS[key])
+
+
+def steadiness(verdict: str, over_seeds: Sequence[str]) -> str:
+    """How often noise seeds give the same verdict, and what the others say; empty where it was not judged again."""
+    others = Counter(over_seeds)
+    if set(others) <= {"cannot be judged"}:
+        return ""
+    same = others.pop(verdict, 0)
+    text = f"{same} of {len(over_seeds)}"
+    return "; ".join([text, *(f"{count} {other}" for other, count in others.most_common())])

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.transforms import ScaledTranslation
 
 from mrdamper.data import Dataset, same_motion
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, whole_cycles
@@ -20,7 +21,8 @@ def test_matrix(loops: Sequence[LoopAnalysis]) -> Figure:
         colours = current_colours([loop.condition.current_A for loop in loops])
         entries = len({(loop.condition.current_A, loop.split) for loop in loops})
         figure, (axes,) = new_figure(1, 1, max(3.0, 0.8 + 0.16 * entries), right=1.7)
-        for current, colour in colours.items():
+        for number, (current, colour) in enumerate(colours.items()):
+            beside = ScaledTranslation(4 * (number - (len(colours) - 1) / 2) / 72, 0, figure.dpi_scale_trans)
             for split, face in (("train", colour), ("validate", "none")):
                 chosen = [
                     loop.condition for loop in loops if loop.condition.current_A == current and loop.split == split
@@ -28,15 +30,18 @@ def test_matrix(loops: Sequence[LoopAnalysis]) -> Figure:
                 if not chosen:
                     continue
                 name = f"{current:g} A" + ("" if split == "train" else ", held out")
+                motions = np.array([(c.frequency_Hz, MM * c.amplitude_m) for c in chosen])
+                axes.update_datalim(motions)
                 axes.scatter(
-                    [c.frequency_Hz for c in chosen],
-                    [MM * c.amplitude_m for c in chosen],
-                    s=34,
+                    *motions.T,
+                    s=18,
+                    transform=axes.transData + beside,  # currents tested at one motion stand side by side
                     facecolors=[face],
                     edgecolors=[colour],
                     linewidths=1.1,
                     label=name,
                 )
+        axes.autoscale_view()
         label(axes, "Frequency (Hz)", "Amplitude (mm)")
         axes.set_ylim(bottom=0)
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))

@@ -62,14 +62,22 @@ def house_style() -> Iterator[None]:
 
 
 def new_figure(
-    rows: int, columns: int, height: float, *, left: float = 0.78, right: float = 0.12, **options: object
+    rows: int,
+    columns: int,
+    height: float,
+    *,
+    left: float = 0.78,
+    right: float = 0.12,
+    top: float = 0.28,
+    gap: float = 0.78,
+    **options: object,
 ) -> tuple[Figure, list[Axes]]:
     """Make a figure of the house width; axes come as a flat list, row by row.
 
     Margins are fixed, in inches: an automatic layout would draw every figure twice, which is
     most of the time a study's report takes.
     """
-    top, bottom, gap = 0.28, 0.46, 0.78
+    bottom = 0.46
     figure = Figure(figsize=(WIDTH, height))
     wide = (WIDTH - left - right - (columns - 1) * gap) / columns
     tall = (height - top - bottom - (rows - 1) * (gap + 0.1)) / rows

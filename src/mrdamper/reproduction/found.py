@@ -1,0 +1,125 @@
+"""What the study of the paper found: results that claims judge, figures draw and tables list."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from mrdamper.data import Condition, Dataset, Floats, Run
+from mrdamper.gas_spring import GasSpring
+from mrdamper.identification.harmonic_balance import ForceReading
+from mrdamper.identification.loop_analysis import LoopAnalysis
+from mrdamper.optimizers.genetic import GeneticMinimum
+from mrdamper.reproduction.sensitivity import OneAtATime, Sobol
+from mrdamper.reproduction.switches import Switches
+from mrdamper.reproduction.virtual_rig import VirtualRig
+from mrdamper.study.recipe import Scored
+
+
+@dataclass(frozen=True)
+class GeneticCheck:
+    """The genetic search with the paper's settings on one run beside the optimum it is after.
+
+    Attributes
+    ----------
+    condition : Condition
+    minimum : GeneticMinimum
+    reached, optimum : float
+        RMSE where it ended and the lowest there is [N].
+    seconds : float
+    """
+
+    condition: Condition
+    minimum: GeneticMinimum
+    reached: float
+    optimum: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Ended:
+    """Where a genetic search of fewer generations ended on a run, over the optimum.
+
+    Attributes
+    ----------
+    run_id : str
+    seed : int
+    alpha, beta : float
+        Parameter reached over that of the optimum.
+    error : float
+        RMSE reached over the lowest there is.
+    seconds : float
+    """
+
+    run_id: str
+    seed: int
+    alpha: float
+    beta: float
+    error: float
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Reproduction:
+    """Everything the study found.
+
+    Attributes
+    ----------
+    dataset : Dataset
+    rig : VirtualRig or None
+        The truth, where the data are synthetic.
+    gas : GasSpring or None
+    train, held_out : tuple of Run
+    friction : Run or None
+    loops : tuple of LoopAnalysis
+    readings : tuple of ForceReading
+        F0, phi, f0 of the train runs.
+    contenders : tuple of Scored
+        Their `recipe.title` tells them apart.
+    switches : Switches
+    genetic : tuple of GeneticCheck
+    ended : tuple of Ended
+        Genetic searches over all train runs, one seed each.
+    seed_errors : mapping of str to (S,) array
+        Median nrmse_pp over the held-out runs, one a noise seed, by contender.
+    seed_verdicts : mapping of str to tuple of str
+        Verdicts on a claim by its key, one a noise seed.
+    sensitivity : tuple of OneAtATime
+        At the run in the middle of the consistent identifications.
+    sobol : Sobol or None
+    notes : tuple of str
+    seconds : float
+    """
+
+    dataset: Dataset
+    rig: VirtualRig | None
+    gas: GasSpring | None
+    train: tuple[Run, ...]
+    held_out: tuple[Run, ...]
+    friction: Run | None
+    loops: tuple[LoopAnalysis, ...]
+    readings: tuple[ForceReading, ...]
+    contenders: tuple[Scored, ...]
+    switches: Switches
+    genetic: tuple[GeneticCheck, ...] = ()
+    ended: tuple[Ended, ...] = ()
+    seed_errors: Mapping[str, Floats] = field(default_factory=dict)
+    seed_verdicts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    sensitivity: tuple[OneAtATime, ...] = ()
+    sobol: Sobol | None = None
+    notes: tuple[str, ...] = ()
+    seconds: float = 0.0
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """Measured conditions of the train runs."""
+        return tuple(loop.condition for loop in self.loops if loop.split == "train")
+
+    def contender(self, title: str) -> Scored | None:
+        """The contender of that title, where the data allowed it."""
+        return next((c for c in self.contenders if c.recipe.title == title), None)
+
+    @property
+    def best(self) -> Scored:
+        """The contender that predicts the held-out runs best."""
+        return min(self.contenders, key=lambda c: c.held_out.median())

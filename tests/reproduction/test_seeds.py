@@ -1,0 +1,55 @@
+"""Noise seeds: the same ways and claims once more, counted."""
+
+import numpy as np
+import pytest
+
+from mrdamper.reproduction import seeds
+from mrdamper.reproduction.seeds import Seed, one_seed, over_seeds
+from mrdamper.reproduction.switches import Switches
+from mrdamper.reproduction.verdicts import LIMITS, steadiness
+from mrdamper.reproduction.virtual_rig import VirtualRig
+from mrdamper.reproduction.ways import CONSISTENT, LITERAL
+from mrdamper.study.parallel import HERE
+
+
+@pytest.mark.parametrize(
+    ("verdict", "others", "said"),
+    [
+        ("holds", ["holds"] * 3, "3 of 3"),
+        ("holds", [*["does not hold"] * 2, "holds", "holds in part"], "1 of 4; 2 does not hold; 1 holds in part"),
+        ("holds in part", ["holds", "holds"], "0 of 2; 2 holds"),
+        ("holds", ["cannot be judged"] * 2, ""),
+        ("cannot be judged", ["cannot be judged"] * 2, ""),
+        ("holds", [], ""),
+    ],
+)  # fmt: skip
+def test_a_verdict_is_counted_beside_those_of_other_seeds(verdict, others, said):
+    assert steadiness(verdict, others) == said
+
+
+def test_every_seed_is_asked_once_and_its_numbers_stay_its_own(monkeypatch):
+    asked = []
+
+    def one(rig, switches, seed, progress):
+        asked.append(seed)
+        return Seed({"a": seed / 10, "b": seed / 100}, {"phase": f"said {seed}"})
+
+    monkeypatch.setattr(seeds, "one_seed", one)
+    errors, verdicts = over_seeds(VirtualRig(), Switches(), 3, HERE, lambda what, share: None)
+    assert asked == [1, 2, 3]
+    assert np.array_equal(errors["a"], [0.1, 0.2, 0.3])
+    assert np.array_equal(errors["b"], [0.01, 0.02, 0.03])
+    assert verdicts == {"phase": ("said 1", "said 2", "said 3")}
+    assert over_seeds(VirtualRig(), Switches(), 0, HERE, lambda what, share: None) == ({}, {})
+
+
+def test_a_seed_gives_the_errors_and_the_verdicts_of_its_own_noise(monkeypatch):
+    monkeypatch.setattr(seeds, "CURRENTS", (0.0, 1.0, 2.0))
+    loud = VirtualRig(force_noise=60.0)
+    found = [one_seed(loud, Switches(), seed, lambda what, share: None) for seed in (1, 2)]
+    assert set(found[0].verdicts) == set(LIMITS)
+    assert found[0].verdicts["viscosity"] == found[1].verdicts["viscosity"] == "does not hold"
+    assert found[0].verdicts["search"] == "cannot be judged"
+    for seed in found:
+        assert seed.errors[CONSISTENT] < 0.6 * seed.errors[LITERAL]
+    assert found[0].errors[CONSISTENT] != found[1].errors[CONSISTENT]
