@@ -10,7 +10,7 @@ so that one drifting session cannot bend the model (iteratively reweighted).
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
@@ -28,7 +28,7 @@ from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.models import Model, Scale, SearchAxis, model_type
 from mrdamper.motion import Excitation, equivalent_sine, measured_motion
 from mrdamper.optimizers.ending import Ending
-from mrdamper.optimizers.levenberg_marquardt import least_squares
+from mrdamper.optimizers.levenberg_marquardt import forward_differences, least_squares
 from mrdamper.optimizers.linear import on_one_blas_thread, robust_weights, solve_bounded
 
 RISE, FALL = "coil.rise_s", "coil.fall_s"  # names of the coil's lags on the search axes
@@ -45,7 +45,8 @@ _BEST = 1e-3  # nrmse_pp below which a run gains no more weight
 _STILL = 0.01  # share of the peak velocity below which a damper rests
 _LAGS, _LAG = (1e-4, 0.2), 8e-3  # of a coil's field [s]
 _FEW, _FEW_STEPS = 6, 5  # runs on which starts are tried, and steps from each
-_STIFF = 2e-4  # damping of the step that stands for a fit without some runs
+_AGAIN, _AGAIN_STEPS = 5e-4, 6  # relative gain of a step at which a fit without some runs ends, and its steps
+_NEARLY = 1e-11  # keeps columns apart that are nearly alike
 _CLEARLY = 0.85  # share of the first start's cost that another one must come below
 
 
@@ -273,7 +274,9 @@ class JointProblem:
         kinds = [np.flatnonzero(lengths == d) for d in dict.fromkeys(lengths.tolist())]
         best = [grid[min(kind, key=costs.__getitem__)] for kind in kinds]
         lower, upper = self._box()
-        found = [least_squares(lambda u: table.solve(u).residual, u, lower, upper, _FEW_STEPS, 1e-3) for u in best]
+        found = [
+            least_squares(table.solved_residual, u, lower, upper, _FEW_STEPS, 1e-3, slopes=table.slopes) for u in best
+        ]
         better = min(found, key=lambda minimum: minimum.cost)
         return (better if better.cost < _CLEARLY * found[0].cost else found[0]).point
 
@@ -300,19 +303,26 @@ class JointProblem:
         """
         begin = time.perf_counter()
         table = _Table(self, self.parts if rows is None else [self.parts[i] for i in rows])
-        lower, upper = self._box()
         point = self.start if start is None else start
+        return self._search(table, point, [table.slopes] * rounds, most_steps, settled, begin)
+
+    def _search(
+        self,
+        table: _Table,
+        point: Floats,
+        rounds: Sequence[Callable[[Floats], Floats]],
+        most_steps: int,
+        settled: float,
+        begin: float,
+    ) -> JointFit:
+        """Search with some derivatives in each round, weights by the errors found between them."""
         evaluations, ending = 0, Ending.SOLVED
-        for _ in range(rounds):
+        lower, upper = self._box()
+        for slopes in rounds:
             if self.axes:
+                curved = settled < _SETTLED
                 found = least_squares(
-                    lambda u: table.solve(u).residual,
-                    point,
-                    lower,
-                    upper,
-                    most_steps,
-                    settled,
-                    curved=settled < _SETTLED,
+                    table.solved_residual, point, lower, upper, most_steps, settled, slopes=slopes, curved=curved
                 )
                 point, ending = found.point, found.ending
                 evaluations += found.evaluations
@@ -330,11 +340,11 @@ class JointProblem:
         )
 
     @on_one_blas_thread
-    def without(self, fit: JointFit, rows: Sequence[int]) -> JointDamper:
-        """The damper had some runs been missing: one Gauss–Newton step from the fit to all.
+    def refit(self, fit: JointFit, rows: Sequence[int], settled: float = _AGAIN) -> JointFit:
+        """Fit some of the runs, from the fit to all: what leaving out the others asks for.
 
-        Leaving out one condition of many moves the parameters little, and one step from the
-        full fit then lands where a new search would, at no cost worth counting.
+        Along the derivatives known from the fit to all as far as they lead down, at a force a step;
+        then with its own, until nothing is gained.
 
         Parameters
         ----------
@@ -342,17 +352,22 @@ class JointProblem:
             To all runs of this problem.
         rows : sequence of int
             Runs to keep.
+        settled : float
+            Relative gain of a step at which the search ends.
         """
-        residual, jacobian, owner = self.linearised(fit)
-        kept = np.isin(owner, list(rows))
-        normal = jacobian[kept].T @ jacobian[kept]
-        # Damped: what hardly shows in the rest must not run away, for a long step is no straight one.
-        step = np.linalg.solve(normal + _STIFF * np.diag(np.diag(normal)), -jacobian[kept].T @ residual[kept])
-        lower, upper = self._box()
+        begin, rows = time.perf_counter(), sorted(rows)
+        _, jacobian, owner = self.linearised(fit)
+        jacobian = jacobian[np.isin(owner, rows)]
         table = _Table(self, [self.parts[i] for i in rows])
-        table.weigh(fit.nrmse_pp[list(rows)])
-        point = np.clip(fit.point + step[: len(self.axes)], lower, upper)
-        return self._damper(table.solve(point).model, point, table.parts)
+        table.weigh(fit.nrmse_pp[rows])
+        known = table.weights
+
+        def known_slopes(point: Floats) -> Floats:
+            weighted = jacobian * (table.weights / known)[table.owner][:, None]
+            own, linear = np.split(weighted, [len(self.axes)], axis=1)
+            return _beside(own, linear)
+
+        return self._search(table, fit.point, (known_slopes, known_slopes, table.slopes), _AGAIN_STEPS, settled, begin)
 
     def linearised(self, fit: JointFit) -> tuple[Floats, Floats, NDArray[np.intp]]:
         """Residual at a fit, its derivatives, and whose rows they are.
@@ -569,6 +584,7 @@ class _Solved:
     residual: Floats
     nrmse_pp: Floats
     held: tuple[str, ...]
+    columns: Floats
 
 
 class _Table:
@@ -586,11 +602,13 @@ class _Table:
         self.unit = np.sqrt(self.share) / np.repeat([part.scale for part in parts], [p.target.size for p in parts])
         self.information = np.sqrt([part.information for part in parts])
         self.weights = self.information
+        self.solved: tuple[Floats, _Solved | None] = np.zeros(0), None  # the last point
         self.felt(problem.coil)
 
     def weigh(self, errors: Floats) -> None:
         """Robust weights: the sum of the errors counts, not of their squares; long records by their information."""
         self.weights = self.information * robust_weights(errors, _BEST)
+        self.solved = np.zeros(0), None
 
     def felt(self, coil: Coil | None) -> None:
         """Lay the current that the field feels along the motion, and remember it."""
@@ -622,7 +640,28 @@ class _Table:
         residual = columns @ solution - right
         errors = np.sqrt(np.bincount(self.owner, residual**2)) / self.weights
         model = replace(bare, **{i.name: float(s) for i, s in zip(linear, solution, strict=True)})
-        return _Solved(model, residual, errors, tuple(i.name for i, h in zip(linear, held, strict=True) if h))
+        stopped = tuple(i.name for i, h in zip(linear, held, strict=True) if h)
+        self.solved = point, _Solved(model, residual, errors, stopped, columns[:, ~held])
+        return self.solved[1]
+
+    def solved_residual(self, point: Floats) -> Floats:
+        """(N,) weighted residual at a point of the search axes, the linear parameters solved for."""
+        return self.solve(point).residual
+
+    def slopes(self, point: Floats) -> Floats:
+        """(N, D) derivatives of the residual at a point, the linear parameters following.
+
+        They follow to first order: the gradient is exact, and an axis costs one force instead of a
+        least squares of its own [Kaufman 1975, BIT 15, 49].
+        """
+        known, solved = self.solved
+        if solved is None or not np.array_equal(known, point):
+            solved = self.solve(point)
+        factor, model = self.weights[self.owner], solved.model
+        moved = forward_differences(
+            lambda u: self.residual(u, model) * factor, point, solved.residual, *self.problem._box()
+        )
+        return _beside(moved, solved.columns)
 
     def residual(self, point: Floats, model: Model) -> Floats:
         """(N,) of the linear parameters of a model at a point; its squares sum to each run's nrmse_pp²."""
@@ -638,14 +677,19 @@ class _Table:
             return self.residual(u, model) * self.weights[self.owner]
 
         r = residual(point)
-        lower, upper = self.problem._box()
-        steps = np.where(point + 1e-6 * (upper - lower) > upper, -1e-6, 1e-6) * (upper - lower)
-        slopes = [(residual(point + s) - r) / d for s, d in zip(np.diag(steps), steps, strict=True)]
+        slopes = forward_differences(residual, point, r, *self.problem._box())
         bare = self.problem.bare(point)
         self.felt(self.problem.coil_at(point))
         state = bare.state(self.motion)[self.picked]
         columns = linear_table(bare, self.problem.linear, self.seen, state)[1] * factor[:, None]
-        return r, np.column_stack([*slopes, columns]), self.owner
+        return r, np.column_stack([slopes, columns]), self.owner
+
+
+def _beside(slopes: Floats, columns: Floats) -> Floats:
+    """(N, D) what of some slopes no combination of columns takes up."""
+    scale = np.sqrt(np.einsum("nl,nl->l", columns, columns))
+    scaled = columns / np.where(scale > 0, scale, 1.0)
+    return slopes - scaled @ np.linalg.solve(scaled.T @ scaled + _NEARLY * np.eye(scale.size), scaled.T @ slopes)
 
 
 def string(motions: Iterable[Excitation]) -> Excitation:

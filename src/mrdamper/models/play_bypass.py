@@ -18,6 +18,7 @@ from mrdamper.data import Floats
 from mrdamper.models.base import Model, Scale, SearchAxis
 from mrdamper.motion import Excitation, Path
 from mrdamper.motion.lag import first_order_lag, leaking_load
+from mrdamper.motion.path import last_along_a_path
 from mrdamper.parameters import param
 from mrdamper.tracing import Tape, streamed
 
@@ -124,7 +125,8 @@ class PlayBypass(Model):
 
     def yield_force(self, current: Floats) -> Floats:
         """fy(I) [N]."""
-        return self.fy0 + self.fy1 * current * -np.expm1(-np.abs(current) / self.Ic) / (1 + self.si * np.abs(current))
+        size = np.abs(current)
+        return self.fy0 + self.fy1 * current * (1 - np.exp(-size / self.Ic)) / (1 + self.si * size)
 
     def state(self, motion: Excitation) -> Floats:
         """S (N,), the lagged share of the yield force."""
@@ -194,6 +196,11 @@ def play_position(path: Path, limit: float, start: float = 0.0) -> Floats:
     [Brokate and Sprekels 1996; recalled] Within a stroke δ rises with the distance until it
     stops, so samples are independent; only the reversals follow one another.
     """
+    return _stopped(path, limit, start)
+
+
+@last_along_a_path
+def _stopped(path: Path, limit: float, start: float) -> Floats:
     turned = path.first_direction * np.where(np.arange(len(path.lengths)) % 2, -1.0, 1.0) * path.lengths
     at_start = np.concatenate([[start], _clipped_sums(turned, limit, start)])
     return path.direction * np.minimum((path.direction * at_start[path.stroke]) + path.distance, limit)

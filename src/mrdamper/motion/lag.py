@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.motion.path import Path
+from mrdamper.motion.path import Path, last_along_a_path
 from mrdamper.tracing import Tape, choose, streamed
 
 _SHORT = 1e-4  # step over time constant below which a series loses fewer digits
@@ -21,7 +21,7 @@ def lag_step(tape: Tape, time: Any, signal: Any, time_constant: Any) -> Any:
     def lagged() -> Any:
         step = time.step / time_constant
         keep = np.exp(-step)
-        gain = choose(step > _SHORT, lambda: -np.expm1(-step) / step, lambda: 1 - step / 2 + step**2 / 6)
+        gain = choose(step > _SHORT, lambda: (1 - keep) / step, lambda: 1 - step / 2 + step**2 / 6)
         moved = keep * held + ((gain - keep) * last + (1 - gain) * signal)
         return tape.select(tape.first, 0.0, moved)
 
@@ -48,7 +48,7 @@ def first_order_lag(time: Floats, signal: Floats, time_constant: float) -> Float
     step = np.diff(time) / time_constant
     keep = np.concatenate([[0.0], np.exp(-step)])
     # Weights of the two ends of a straight piece; the series where their difference would cancel.
-    gain = np.where(step > _SHORT, -np.expm1(-step) / np.where(step > 0, step, 1.0), 1 - step / 2 + step**2 / 6)
+    gain = np.where(step > _SHORT, (1 - keep[1:]) / np.where(step > 0, step, 1.0), 1 - step / 2 + step**2 / 6)
     value = np.concatenate([[0.0], (gain - keep[1:]) * signal[:-1] + (1 - gain) * signal[1:]])
     return _summed(keep, value)
 
@@ -90,9 +90,12 @@ def leaking_load(time: Floats, path: Path, length: float, leak: float) -> Floats
     leak : float
         Share of the load lost in a second [1/s]; 0 keeps it for ever.
     """
-    if leak <= 0:
-        return np.ones(time.size)
+    return np.ones(time.size) if leak <= 0 else _loaded(path, time, length, leak)
+
+
+@last_along_a_path
+def _loaded(path: Path, time: Floats, length: float, leak: float) -> Floats:
     built, leaked = np.diff(path.travel) / length, leak * np.diff(time)
     both = np.maximum(built + leaked, np.finfo(float).tiny)
     keep = np.concatenate([[0.0], np.exp(-both)])
-    return _summed(keep, np.concatenate([[1.0], -np.expm1(-both) * built / both]))
+    return _summed(keep, np.concatenate([[1.0], (1 - keep[1:]) * built / both]))

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, Self
+from functools import wraps
+from typing import Any, Literal, Self
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -90,6 +93,27 @@ class Path:
     def travel(self) -> Floats:
         """(N,) distance travelled since the first sample, round the reversals [m]."""
         return np.cumsum([0.0, *self.lengths])[self.stroke] + self.distance
+
+
+def last_along_a_path(function: Callable[..., Floats]) -> Callable[..., Floats]:
+    """Remember what a function of a path, its times and some numbers gave last, as long as the path lives.
+
+    A search moves one parameter at a time; what the others lead to stays.
+    """
+    known: WeakKeyDictionary[Path, tuple[tuple[Any, ...], Floats]] = WeakKeyDictionary()
+
+    @wraps(function)
+    def remembered(path: Path, *given: Any) -> Floats:
+        before = known.get(path)
+        if before is None or any(
+            a is not b and (isinstance(a, np.ndarray) or a != b) for a, b in zip(before[0], given, strict=True)
+        ):
+            made = function(path, *given)
+            made.flags.writeable = False
+            before = known[path] = (given, made)
+        return before[1]
+
+    return remembered
 
 
 def _checked_motion(displacement: ArrayLike, time: ArrayLike | None) -> tuple[Floats, Floats | None]:

@@ -49,6 +49,7 @@ def least_squares(
     most_steps: int = 40,
     tolerance: float = 1e-9,
     *,
+    slopes: Callable[[Floats], Floats] | None = None,
     curved: bool = False,
 ) -> Minimum:
     """Minimise |residual(point)|² inside a box, until a step gains less than `tolerance` of it.
@@ -62,6 +63,8 @@ def least_squares(
     start, lower, upper : (D,) arrays
     most_steps : int
     tolerance : float
+    slopes : callable, optional
+        (D,) point -> (N, D) derivatives of the residual; by forward differences without.
     curved : bool
         Learn from the change of the gradient what curvature the Jacobian alone leaves out. Where
         much residual remains, Gauss–Newton's steps shrink by the same factor again and again;
@@ -74,7 +77,7 @@ def least_squares(
     extra = before = None
     ending = Ending.STEPS_SPENT
     for _ in range(most_steps):
-        jacobian = _forward_differences(residual, point, r, upper, width)
+        jacobian = slopes(point) if slopes else forward_differences(residual, point, r, lower, upper)
         evaluations += point.size
         gradient = jacobian.T @ r
         if curved and before is not None:
@@ -109,9 +112,11 @@ def least_squares(
     return Minimum(point, r, cost, evaluations, ending)
 
 
-def _forward_differences(
-    residual: Callable[[Floats], Floats], point: Floats, r: Floats, upper: Floats, width: Floats
+def forward_differences(
+    residual: Callable[[Floats], Floats], point: Floats, r: Floats, lower: Floats, upper: Floats
 ) -> Floats:
+    """(N, D) derivatives of a residual, which is r at the point, by steps that stay inside the box."""
+    width = upper - lower
     steps = np.where(point + _STEP * width > upper, -_STEP, _STEP) * width
     return np.column_stack([(residual(point + s) - r) / d for s, d in zip(np.diag(steps), steps, strict=True)])
 

@@ -39,7 +39,6 @@ JOINTLY = "play-bypass"  # the model whose parameters hold for a whole damper
 GENETIC = ("bouc-wen:paper", "bouc-wen:direct-genetic")
 _STRETCH, _STRETCHES = 12, 8  # cycles of a long record that are left out together, at least; stretches at most
 _RECORD = "stretch of"  # note of a stretch: the record it was cut from
-_MANY = 20  # runs from which on leaving one out is followed by a single step
 
 
 @dataclass(frozen=True)
@@ -365,13 +364,7 @@ def one_set(runs: Sequence[Run], identifications: Sequence[Identification]) -> M
     choice = identify_jointly(runs)
     problem, fit = choice.problem, choice.fit
 
-    def refit(rows: Sequence[int]) -> Damper:
-        # With many runs, one missing hardly moves the fit, and a single step finds where to.
-        if len(runs) > _MANY:
-            return problem.without(fit, rows)
-        return problem.fit(rows, fit.point, rounds=1, most_steps=2).damper
-
-    return Made(fit.damper, refit, fit)
+    return Made(fit.damper, lambda rows: problem.refit(fit, rows).damper, fit)
 
 
 def by_the_paper(runs: Sequence[Run], identifications: Sequence[Identification], mass_law: str = "exponential") -> Made:
