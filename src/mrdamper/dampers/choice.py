@@ -222,7 +222,7 @@ def _left_out_current(problem: JointProblem, fit: JointFit, levels: Sequence[Seq
     errors = []
     for level in levels[1:-1]:
         rest = [i for i in range(len(problem.parts)) if i not in level]
-        without = problem.fit(rest, fit.point, rounds=1, most_steps=5, settled=_ROUGHLY)
+        without = problem.refit(fit, rest, _ROUGHLY)
         errors += problem.errors(without, level).tolist()
     return float(np.mean(errors))
 
