@@ -1,47 +1,103 @@
 """Many dampers in one loop; how fast one answers."""
 
+import json
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from support.dampers import ENVELOPE, joint_damper
+from support.dampers import ENVELOPE, joint_damper, modified_damper
+from typer.testing import CliRunner
 
+from mrdamper.cli import application
+from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.modified import ModifiedModel
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.errors import InputError
+from mrdamper.files.model_file import save_model
 from mrdamper.functions.forms import ParameterFunction
 from mrdamper.models import model_type
 from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.inputs import load_input
-from mrdamper.systems.monte_carlo import drawn, monte_carlo
+from mrdamper.systems.inputs.record import record
+from mrdamper.systems.monte_carlo import Draw, draw, monte_carlo
 from mrdamper.systems.rise_time import rise_times
 from mrdamper.systems.simulate import Loop
-from mrdamper.systems.structure import quarter_car
+from mrdamper.systems.structure import Link, quarter_car, shear_building
 
 CAR = quarter_car("car", 300, 40, 20e3, 200e3)
 ROAD = load_input("bump", {"length_s": 1.0})
 
 
-def test_other_numbers_in_one_loop_are_other_dampers():
-    damper = joint_damper()
-    loop = Loop(CAR, ROAD, {"damper": damper}, Passive(0.5))
-    others = drawn(damper, ("c0", "c1"), np.diag([60.0, 100.0]) ** 2, 3, seed=4)
-    bands = monte_carlo(loop, [{"damper": other} for other in others], 1e-3)
-    for row, other in zip(bands.peaks["acceleration_m_s2"], others, strict=True):
-        alone = Loop(CAR, ROAD, {"damper": other}, Passive(0.5)).run(1e-3, machine=False)
+def certain(damper, names, sizes, gain=0.0, offset=0.0):
+    logs = tuple(damper.own_numbers[name].log for name in names)
+    many = np.full(len(names), 1e6)
+    return replace(damper, certainty=Certainty(names, logs, np.diag(sizes) ** 2, many, (), (), gain, offset, 1e6))
+
+
+DAMPERS = {"joint": (joint_damper(), ("c0", "c1")), "modified": (modified_damper(), ("c.0", "yield_force.3"))}
+
+
+@pytest.mark.parametrize("kind", DAMPERS)
+def test_other_numbers_in_one_loop_are_other_dampers(kind):
+    damper, names = DAMPERS[kind]
+    damper = certain(damper, names, [0.05, 0.05] if damper.own_numbers[names[0]].log else [60.0, 40.0])
+    loop = Loop(CAR, ROAD, {"damper": damper}, Passive(0.5), free=True)
+    draws = draw({"damper": damper}, 3, seed=4)
+    bands = monte_carlo(loop, draws, loop.run(1e-3, machine=False))
+    for row, one in zip(bands.peaks["acceleration_m_s2"], draws, strict=True):
+        other = damper.with_numbers(one["damper"].numbers)
+        alone = Loop(CAR, ROAD, {"damper": other}, Passive(0.5)).run(bands.step, machine=False)
         assert row == pytest.approx(alone.peaks["acceleration_m_s2"], rel=1e-9)
     low, middle, high = bands.quantiles()["force_N"]
     assert low < middle < high
+    assert bands.measures["body.a_w_m_s2"].shape == (3,)
 
 
-def test_draws_scatter_as_they_are_told():
+def test_a_session_brings_a_gain_and_an_offset():
+    frame = shear_building("still", [1e9], [1e12], [0.0], [Link("d", "floor1", "ground")])  # moves as it would alone
     damper = joint_damper()
-    covariance = np.array([[400.0, 300.0], [300.0, 900.0]])
-    sets = np.array([[d.model.c0, d.model.c1] for d in drawn(damper, ("c0", "c1"), covariance, 4000)])
-    assert np.cov(sets.T) == pytest.approx(covariance, rel=0.1)
-    with pytest.raises(InputError):
-        drawn(damper, ("c0",), covariance, 3)
-    with pytest.raises(InputError):
-        drawn(damper, ("c0", "nothing"), covariance, 3)
+    quake = record(np.arange(0, 0.5, 0.01), np.sin(20 * np.arange(0, 0.5, 0.01)), "acceleration_m_s2")
+    loop = Loop(frame, quake, {"d": damper}, Passive(0.5))
+    bands = monte_carlo(loop, [{"d": Draw()}, {"d": Draw(gain=0.1)}, {"d": Draw(offset=50.0)}], loop.run(1e-3))
+    plain, more, pushed = bands.peaks["force_N"][:, 0]
+    assert more == pytest.approx(1.1 * plain, rel=1e-6)
+    assert abs(pushed - plain) == pytest.approx(50.0, rel=1e-6)
+
+
+def test_draws_scatter_as_the_damper_says():
+    damper = certain(
+        joint_damper(), ("c0", "fy0"), [0.02, 0.05] if joint_damper().own_numbers["c0"].log else [20.0, 5.0], 0.03, 7.0
+    )
+    draws = draw({"front": damper, "rear": damper}, 4000)
+    own = damper.own_numbers
+    for i, name in enumerate(damper.certainty.names):
+        values = np.array([row["front"].numbers[name] for row in draws])
+        moved = np.log(values / own[name].value) if own[name].log else values - own[name].value
+        assert np.std(moved) == pytest.approx(np.sqrt(damper.certainty.covariance[i, i]), rel=0.06)
+    gains = np.array([[row[end].gain for end in ("front", "rear")] for row in draws])
+    assert gains.std(axis=0) == pytest.approx([0.03, 0.03], rel=0.06)
+    assert abs(np.corrcoef(gains.T)[0, 1]) < 0.1
+    assert all(row["front"].numbers == row["rear"].numbers for row in draws)  # one model, two sessions
+    for count, one, code in ((1, damper, "E_DRAWS"), (5, joint_damper(), "E_CERTAINTY")):
+        with pytest.raises(InputError) as refused:
+            draw({"d": one}, count)
+        assert refused.value.code == code
+
+
+def test_bands_by_the_command_line(tmp_path):
+    save_model(certain(joint_damper(), ("c0",), [60.0], 0.05), tmp_path / "model.json")
+    command = ["simulate", "quarter-car", "--input", "bump:length_s=0.3", "--damper", str(tmp_path / "model.json")]
+    command += ["--draws", "5", "--out", str(tmp_path / "ride")]
+    done = CliRunner().invoke(application(), [*command, "--json"])
+    assert done.exit_code == 0, done.output
+    printed = json.loads(done.stdout[done.stdout.index("{\n") :])
+    low, middle, high = printed["bands"]["peak_force_N"]
+    assert low[0] < middle[0] < high[0]
+    assert 0.7 * printed["peak_force_N"] < middle[0] < 1.3 * printed["peak_force_N"]
+    assert set(printed["bands"]["measures"]) == set(printed["measures"])
+    assert "95 %" in (tmp_path / "ride/measures.csv").read_text()
+    assert "5 draws" in (tmp_path / "ride/simulation.html").read_text()
 
 
 def test_rise_times_are_those_of_the_coil():

@@ -51,7 +51,12 @@ class TracedMotion(Traced):
         return 1
 
 
-def trace(damper: Damper) -> Program:
+def free_name(number: str) -> str:
+    """What one of a damper's own numbers is called in a program that keeps it free."""
+    return number.replace(".", "_")
+
+
+def trace(damper: Damper, free: bool = False) -> Program:
     """The program of one sample.
 
     From displacement [m], velocity [m/s], acceleration [m/s²], current [A] and the step of time [s]
@@ -78,9 +83,12 @@ def trace(damper: Damper) -> Program:
     motion = TracedMotion(tape, x, v, a, tape.assume(felt, middle), TracedStep(tape, dt), TracedStep(tape, moved))
     outside: Any = 0.0
     if damper.one_model is not None:
-        free = damper.one_model
-        model = type(free)(**{i.name: tape.parameter(i.name, getattr(free, i.name)) for i in free.parameters()})
+        one = damper.one_model
+        model = type(one)(**{i.name: tape.parameter(i.name, getattr(one, i.name)) for i in one.parameters()})
     else:
+        if free:
+            own = {name: tape.parameter(free_name(name), n.value) for name, n in damper.own_numbers.items()}
+            damper = damper.with_numbers(own)
         running, outside = _running_condition(damper, motion)
         model = damper.model_at(running)
     force = model.force(motion, model.state(motion))  # type: ignore[arg-type]

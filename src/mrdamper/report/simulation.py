@@ -15,12 +15,15 @@ from mrdamper.report.plots.simulation import histories, spectra
 from mrdamper.report.plots.style import save_figure
 from mrdamper.systems.contest import Contest
 from mrdamper.systems.measures import benchmark_ratios, measures
+from mrdamper.systems.monte_carlo import LEVELS, Bands
 from mrdamper.systems.result import Simulation
 
 _ROWS = 20_000  # of histories.csv
 
 
-def write_simulation(done: Simulation, folder: str | Path, beside: Contest | None = None) -> list[Path]:
+def write_simulation(
+    done: Simulation, folder: str | Path, beside: Contest | None = None, bands: Bands | None = None
+) -> list[Path]:
     """Write a simulation, whole or not at all.
 
     Parameters
@@ -30,6 +33,8 @@ def write_simulation(done: Simulation, folder: str | Path, beside: Contest | Non
         Made if missing.
     beside : Contest, optional
         Controllers to show beside it.
+    bands : Bands, optional
+        Of draws of its dampers.
 
     Returns
     -------
@@ -44,6 +49,7 @@ def write_simulation(done: Simulation, folder: str | Path, beside: Contest | Non
     runs: dict[str, Simulation] = {type(done.controller).title: done}
     if beside is not None:
         runs |= beside.runs
+    spread = {name: bands.quantiles()[name] for name in bands.measures} if bands else {}
 
     def fill(work: Path) -> None:
         (work / "figures").mkdir()
@@ -62,11 +68,15 @@ def write_simulation(done: Simulation, folder: str | Path, beside: Contest | Non
             columns=columns,
             names=names,
             shares=shares,
+            bands=bands,
+            spread=spread,
             ratios=_ratios(runs, beside),
             figures=figures,
         )
         (work / "simulation.html").write_text(page, encoding="utf-8")
         rows = [{"measure": name, **{title: found.get(name) for title, found in columns.items()}} for name in names]
+        for row in rows if bands else []:
+            row |= dict(zip((f"{100 * level:g} %" for level in LEVELS), spread[row["measure"]], strict=True))
         (work / "measures.csv").write_text(csv_text(rows), encoding="utf-8")
         (work / "histories.csv").write_text(csv_text(history_rows(done)), encoding="utf-8")
 

@@ -44,6 +44,10 @@ class Stage:
     prepare : callable, optional
         From other parameters to (status, derived).
     inputs : int
+    names : tuple of str
+        Of its parameters.
+    scale : (float, float)
+        Gain and offset of what it gives first.
     """
 
     step: Step
@@ -54,6 +58,17 @@ class Stage:
     lines: int = 3
     prepare: Callable[..., Any] | None = None
     inputs: int = 5
+    names: tuple[str, ...] = ()
+    scale: tuple[float, float] = (1.0, 0.0)
+
+    @property
+    def scaled_given(self) -> tuple[float, ...]:
+        """Gain, offset, parameters: as they are strung together."""
+        return (*self.scale, *self.given)
+
+    def scaled(self, gain: float, offset: float) -> Stage:
+        """The stage with its first output times a gain, plus an offset."""
+        return replace(self, scale=(gain, offset))
 
     @property
     def sizes(self) -> tuple[int, int, int]:
@@ -87,7 +102,7 @@ class Numbers:
         def strung(name: str) -> Floats:
             return np.array([value for stage in stages for value in getattr(stage, name)], dtype=float)
 
-        return cls(strung("given"), strung("derived"), strung("start"))
+        return cls(strung("scaled_given"), strung("derived"), strung("start"))
 
 
 def make_walk(elements: Sequence[Stage], control: Stage | None, machine: bool) -> Callable[..., int]:
@@ -109,17 +124,18 @@ def make_walk(elements: Sequence[Stage], control: Stage | None, machine: bool) -
     compile_ = compiled.compile_ if machine else lambda function: function
     cut = compiled.cut if machine else _cut
     evaluate = compile_(_nothing)
-    ends = np.cumsum([[0, 0, 0], *([len(e.given), len(e.derived), len(e.start)] for e in elements)], axis=0)
+    ends = np.cumsum([[2, 0, 0], *([2 + p, d, m] for p, d, m in (e.sizes for e in elements))], axis=0)
     for index in reversed(range(len(elements))):
         stage, begin = elements[index], ends[index].tolist()
         step = stage.compiled() if machine else stage.step
         keep = compile_(_keeper(begin[2], len(stage.start)))
-        first = compile_(_one(step, *(cut(b, size) for b, size in zip(begin, stage.sizes, strict=True)), keep))
+        cuts = [cut(b, size) for b, size in zip(begin, stage.sizes, strict=True)]
+        first = compile_(_one(step, begin[0] - 2, *cuts, keep))
         evaluate = compile_(_either(index, first, evaluate))
     command = compile_(_no_command)
     if control is not None:
         step = control.compiled() if machine else control.step
-        cuts = [cut(0, size) for size in (*control.sizes, control.inputs)]
+        cuts = [cut(b, size) for b, size in zip((2, 0, 0, 0), (*control.sizes, control.inputs), strict=True)]
         command = compile_(_command(step, *cuts, compile_(_keeper(0, len(control.start)))))
     return compiled.walk_of(evaluate, command) if machine else partial(walk, evaluate, command)
 
@@ -149,11 +165,11 @@ def _keeper(begin: int, size: int) -> Any:
     return keep
 
 
-def _one(step: Step, given: Any, derived: Any, held: Any, keep: Any) -> Any:
+def _one(step: Step, scale: int, given: Any, derived: Any, held: Any, keep: Any) -> Any:
     def one(p, d, memory, later, x, v, a, current, dt):
         status, out, new = step(given(p), derived(d), held(memory), (x, v, a, current, dt))
         keep(later, new)
-        return status, out[0], out[1]
+        return status, p[scale] * out[0] + p[scale + 1], out[1]
 
     return one
 

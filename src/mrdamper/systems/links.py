@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from mrdamper.dampers.base import Damper
-from mrdamper.streaming import stream
+from mrdamper.dampers.causal import trace
 from mrdamper.systems.kernel import Stage
 from mrdamper.systems.structure import Link
 from mrdamper.tracing import Program
@@ -25,12 +25,13 @@ def stage_of(program: Program) -> Stage:
         return compiled_step(program)
 
     lines, tape = python_source(program).count("\n"), program.tape
-    return Stage(step, given, tuple(derived), tuple(tape.starts.values()), compiled, lines, prepare, len(tape.inputs))
+    memory, names = tuple(tape.starts.values()), tuple(tape.parameters)
+    return Stage(step, given, tuple(derived), memory, compiled, lines, prepare, len(tape.inputs), names)
 
 
-def damper_stage(damper: Damper) -> Stage:
-    """A damper as a stage; raises as `stream`."""
-    return stage_of(stream(damper).step)
+def damper_stage(damper: Damper, free: bool = False) -> Stage:
+    """A damper as a stage, its own numbers free to change if asked for; raises as `stream`."""
+    return stage_of(trace(damper, free))
 
 
 def contact_stage(link: Link) -> Stage:

@@ -3,111 +3,190 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.joint import JointDamper
+from mrdamper.dampers.causal import free_name
 from mrdamper.data import Floats
-from mrdamper.errors import ParameterError
+from mrdamper.errors import InputError, StepError
 from mrdamper.systems.kernel import Numbers
+from mrdamper.systems.measures import measures
 from mrdamper.systems.result import Simulation
-from mrdamper.systems.simulate import Loop
+from mrdamper.systems.simulate import Loop, changed
 
 LEVELS = (0.05, 0.5, 0.95)
+_MOST = 100_000
+_MOST_LOST = 0.1  # share of draws without a solution, from which bands say nothing
+_LEAST_DOF = 3.0  # below, a Student spread has no variance
+
+
+@dataclass(frozen=True)
+class Draw:
+    """One damper out of those the tests leave open.
+
+    Attributes
+    ----------
+    numbers : mapping of str to float
+        Its own numbers (`Damper.own_numbers`) that differ.
+    gain, offset : float
+        Of its session: the force becomes (1 + gain) F + offset [N].
+    """
+
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    gain: float = 0.0
+    offset: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class Bands:
-    """Peaks over many dampers.
+    """Peaks and measures over many draws.
 
     Attributes
     ----------
     peaks : mapping of str to (S, ·) array
-        As `Simulation.peaks`, one row a damper.
+        As `Simulation.peaks`, one row a draw.
+    measures : mapping of str to (S,) array
+        As `measures.measures`.
+    lost : int
+        Draws that had no solution, left out.
+    step : float
+        Of all draws [s].
+    step_change : float
+        Largest relative change of a peak between that step and the one the mean was run at.
     """
 
     peaks: Mapping[str, Floats]
+    measures: Mapping[str, Floats]
+    lost: int
+    step: float
+    step_change: float
+
+    @property
+    def count(self) -> int:
+        """Draws that were run to their end."""
+        return len(next(iter(self.peaks.values())))
 
     def quantiles(self, levels: Sequence[float] = LEVELS) -> dict[str, Floats]:
-        """(L, ·) quantiles of every peak."""
-        return {name: np.quantile(rows, levels, axis=0) for name, rows in self.peaks.items()}
+        """(L, ·) quantiles of every peak and (L,) of every measure."""
+        return {name: np.quantile(rows, levels, axis=0) for name, rows in {**self.peaks, **self.measures}.items()}
 
 
-def drawn(damper: JointDamper, names: Sequence[str], covariance: Floats, count: int, seed: int = 1) -> list[Damper]:
-    """Dampers whose parameters scatter as an identification, or the sessions behind it, say they do.
+def draw(dampers: Mapping[str, Damper], count: int, seed: int = 1) -> list[dict[str, Draw]]:
+    """Draws from what the dampers know of themselves: their numbers, and the session each is in.
+
+    Links that share a damper share its numbers; each has a session of its own. Spreads are
+    Student's, by the degrees of freedom behind them. What the form itself is wrong by
+    (`Certainty.force`) is no number and is not drawn.
 
     Parameters
     ----------
-    damper : JointDamper
-        The mean.
-    names : sequence of str
-        Parameters that scatter.
-    covariance : (P, P) array
-        Of them; those on a log scale in their logarithms.
+    dampers : mapping of str to Damper
+        By link, with `certainty`.
     count, seed : int
 
     Raises
     ------
-    ParameterError
-        If the covariance is none of these parameters.
+    InputError
+        E_CERTAINTY if a damper was saved without, E_DRAWS if the count is out of range.
     """
-    known = {info.name: info for info in type(damper.model).parameters()}
-    matrix = np.asarray(covariance, dtype=float)
-    if matrix.shape != (len(names), len(names)) or not np.allclose(matrix, matrix.T) or set(names) - set(known):
-        raise ParameterError(
-            f"a covariance of shape {matrix.shape} for {', '.join(names)}",
-            where=damper.title,
-            mend="give a symmetric one, a row a parameter of the model",
-        )
-    nudges = np.random.default_rng(seed).multivariate_normal(np.zeros(len(names)), matrix, count, check_valid="raise")
-    found: list[Damper] = []
-    for row in nudges:
-        values = {}
-        for name, nudge in zip(names, row.tolist(), strict=True):
-            mean, (low, high) = getattr(damper.model, name), known[name].bounds
-            moved = mean * np.exp(nudge) if known[name].scale == "log" else mean + nudge
-            values[name] = float(np.clip(moved, low, high))
-        found.append(replace(damper, model=replace(damper.model, **values)))
+    if not 2 <= count <= _MOST:
+        raise InputError(f"{count} draws", mend=f"give 2 to {_MOST:,}", code="E_DRAWS")
+    rng = np.random.default_rng(seed)
+    shared: dict[int, list[dict[str, float]]] = {}
+    found: list[dict[str, Draw]] = [{} for _ in range(count)]
+    for link, damper in dampers.items():
+        known = damper.certainty
+        if known is None:
+            raise InputError(
+                f"how sure {damper.title} is was not saved with it",
+                where=link,
+                mend="give a model that study wrote from tests, or leave out --draws",
+                code="E_CERTAINTY",
+            )
+        if id(damper) not in shared:
+            shared[id(damper)] = _numbers_drawn(damper, count, rng)
+        spread = np.array([known.gain, known.offset])
+        sessions = (_student(rng, known.session_dof, count) * rng.standard_normal((count, 2)) * spread).tolist()
+        for row, numbers, (gain, offset) in zip(found, shared[id(damper)], sessions, strict=True):
+            row[link] = Draw(numbers, gain, offset)
     return found
 
 
-def monte_carlo(loop: Loop, dampers: Sequence[Mapping[str, Damper]], step: float) -> Bands:
-    """Run the same loop with other dampers of the same models.
+def _numbers_drawn(damper: Damper, count: int, rng: np.random.Generator) -> list[dict[str, float]]:
+    known, own = damper.certainty, damper.own_numbers
+    assert known is not None
+    if not known.names:
+        return [{} for _ in range(count)]
+    nudges = rng.multivariate_normal(np.zeros(len(known.names)), known.covariance, count)
+    nudges *= _student(rng, float(np.min(known.dof)), count)
+    columns = []
+    for name, log, nudge in zip(known.names, known.logs, nudges.T, strict=True):
+        moved = own[name].value * np.exp(nudge) if log else own[name].value + nudge
+        columns.append(np.clip(moved, *own[name].bounds).tolist())
+    return [dict(zip(known.names, row, strict=True)) for row in zip(*columns, strict=True)]
 
-    The loop is traced and compiled once; only numbers differ from run to run.
+
+def _student(rng: np.random.Generator, dof: float, count: int) -> Floats:
+    """(S, 1) factors that make normal draws Student's."""
+    dof = max(dof, _LEAST_DOF)
+    return np.sqrt(dof / rng.chisquare(dof, (count, 1)))
+
+
+def monte_carlo(loop: Loop, draws: Sequence[Mapping[str, Draw]], mean: Simulation) -> Bands:
+    """Run a loop again with other numbers of its dampers; it is traced and compiled once.
 
     Parameters
     ----------
     loop : Loop
-    dampers : sequence of mapping of str to Damper
-        By link, as the loop's own.
-    step : float
-        [s], one at which the loop was found to have settled.
+        Made with `free`.
+    draws : sequence of mapping of str to Draw
+        By link, as `draw` gives them.
+    mean : Simulation
+        Of the dampers themselves. Draws take twice its step, or half the loop's first one if that is
+        longer: the last halvings for a peak after a switch are worth less than more draws.
 
     Raises
     ------
-    ParameterError
-        If a damper is not of the same model and branch as the loop's.
+    StepError
+        E_STEP_LOST if over a tenth of the draws have no solution.
     """
-    machine = len(dampers) > 5 or None
-    rows = [loop.run(step, machine=machine and loop.can_compile, numbers=_numbers(loop, one)).peaks for one in dampers]
-    return Bands({name: np.array([peaks[name] for peaks in rows]) for name in Simulation.PEAKS})
+    machine = (len(draws) > 5 or None) and loop.can_compile
+    step = max(2 * mean.step, loop.first_step / 2)
+    peaks, found, lost = [], [], 0
+    for one in draws:
+        try:
+            done = loop.run(step, machine=machine, numbers=_numbers(loop, one))
+        except (StepError, InputError):  # numbers that make no damper, or a motion nobody can follow
+            lost += 1
+            continue
+        peaks.append(done.peaks)
+        found.append(measures(done))
+    if lost > _MOST_LOST * len(draws):
+        raise StepError(
+            f"{lost} of {len(draws)} draws have no solution",
+            where=loop.system.name,
+            mend="the damper's numbers are too uncertain for bands: test more (mrdamper plan)",
+            code="E_STEP_LOST",
+        )
+    names = list(dict.fromkeys(name for row in found for name in row))
+    return Bands(
+        {name: np.array([row[name] for row in peaks]) for name in peaks[0]},
+        {name: np.array([row[name] for row in found]) for name in names},
+        lost,
+        step,
+        changed(loop.run(step, machine=machine), mean),
+    )
 
 
-def _numbers(loop: Loop, dampers: Mapping[str, Damper]) -> Numbers:
+def _numbers(loop: Loop, one: Mapping[str, Draw]) -> Numbers:
     stages = []
     for link, stage in zip(loop.links, loop.stages, strict=True):
-        if link.role == "damper":
-            model = dampers[link.name].one_model
-            own = loop.dampers[link.name].one_model
-            if model is None or own is None or type(model) is not type(own):
-                raise ParameterError(
-                    f"{dampers[link.name].title} for {loop.dampers[link.name].title}",
-                    where=link.name,
-                    mend="give dampers of one model, which keep their parameters free",
-                )
-            stage = stage.at(tuple(model.values().values()))
+        if link.name in one:
+            drawn = one[link.name]
+            moved = {free_name(name): value for name, value in drawn.numbers.items()}
+            given = tuple(moved.get(name, value) for name, value in zip(stage.names, stage.given, strict=True))
+            stage = stage.at(given).scaled(1.0 + drawn.gain, drawn.offset)
         stages.append(stage)
     return Numbers.of(stages)

@@ -83,7 +83,7 @@ def simulate_system(
     coarse, first, first_step = loop.run(dt), None, dt
     while True:
         fine = loop.run(dt / 2)
-        change = _change(coarse, fine)
+        change = changed(coarse, fine)
         first = change if first is None else first
         lost = change > _LOST and dt <= first_step / 4  # sensitive to the smallest change: no step will do
         if change <= HALVING or dt / 2 <= _FINEST or fine.time.size > _MOST_HALVED or lost:
@@ -108,6 +108,8 @@ class Loop:
         As `simulate_system`.
     period : float
         Time between two looks of the control law [s].
+    free : bool
+        Keep the dampers' own numbers free to change from run to run.
     """
 
     def __init__(
@@ -118,12 +120,14 @@ class Loop:
         controller: Controller,
         highest: float | None = None,
         period: float = PERIOD,
+        free: bool = False,
     ):
         _fit(system, source, dampers)
         self.system, self.source, self.controller, self.period = system, source, controller, period
         self.links = tuple(link for link in system.links if link.role != "damper" or link.name in dampers)
         self.stages = [
-            damper_stage(dampers[link.name]) if link.role == "damper" else contact_stage(link) for link in self.links
+            damper_stage(dampers[link.name], free) if link.role == "damper" else contact_stage(link)
+            for link in self.links
         ]
         self.numbers = Numbers.of(self.stages)
         rows = [system.span(link.above, link.below) for link in self.links]
@@ -330,7 +334,7 @@ def _fit(system: System, source: Input, dampers: Mapping[str, Damper]) -> None:
             )
 
 
-def _change(coarse: Simulation, fine: Simulation) -> float:
+def changed(coarse: Simulation, fine: Simulation) -> float:
     """Largest relative change of a peak, over the largest peak of its kind."""
     worst = 0.0
     for kind, values in fine.peaks.items():

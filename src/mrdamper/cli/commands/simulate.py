@@ -12,6 +12,7 @@ import typer
 if TYPE_CHECKING:
     from mrdamper.dampers.base import Damper
     from mrdamper.systems.controllers import Controller
+    from mrdamper.systems.monte_carlo import Bands
     from mrdamper.systems.result import Simulation
 
 
@@ -40,6 +41,10 @@ def register(app: typer.Typer) -> None:
         beside: Optional[list[str]] = typer.Option(  # noqa: UP045
             None, "--beside", help="More controllers for the report, or all: side by side, up to the preview bound."
         ),
+        draws: Optional[int] = typer.Option(  # noqa: UP045
+            None, "--draws", help="Runs with dampers drawn from what the tests leave open: bands of 5 to 95 %."
+        ),
+        seed: int = typer.Option(1, "--seed", help="Of --draws."),
         out: Optional[Path] = typer.Option(  # noqa: UP045
             None, "--out", help="Folder for simulation.html, time histories and measures."
         ),
@@ -56,7 +61,8 @@ def register(app: typer.Typer) -> None:
         from mrdamper.parameters import with_values
         from mrdamper.systems.controllers import controller_type
         from mrdamper.systems.inputs import load_input
-        from mrdamper.systems.simulate import simulate_system
+        from mrdamper.systems.monte_carlo import draw, monte_carlo
+        from mrdamper.systems.simulate import Loop, simulate_system
         from mrdamper.systems.system_file import load_system
 
         if out is not None:
@@ -85,25 +91,34 @@ def register(app: typer.Typer) -> None:
             raise InputError("controllers without a damper", mend="leave out --without-damper or --beside")
         if law_out is not None:
             from mrdamper.export.c import write_program
-            from mrdamper.systems.simulate import Loop
 
             law = Loop(found.system, shaken_by, dampers, controller, highest).control.program
             if law is None:
                 raise InputError(f"{type(controller).name} has no law to export", mend="give --control a law")
             for path in write_program(law, type(controller).name, controller.title, law_out):
                 typer.echo(f"{path}", err=True)
+        drawn = None
+        if draws is not None:
+            if not dampers:
+                raise InputError("draws without a damper", mend="leave out --without-damper or --draws")
+            drawn = draw(dampers, draws, seed)
         done = simulate_system(found.system, shaken_by, dampers, controller, step, highest)
+        bands = None
+        if drawn is not None:
+            loop = Loop(found.system, shaken_by, dampers, controller, highest, free=True)
+            bands = monte_carlo(loop, drawn, done)
         if out is not None:
             from mrdamper.report.simulation import write_simulation
             from mrdamper.systems.contest import contest
 
             table = contest(found.system, shaken_by, dampers, others, done.step, highest) if others else None
-            for path in write_simulation(done, out, table):
+            for path in write_simulation(done, out, table, bands):
                 typer.echo(f"{path}", err=True)
         if as_json:
-            print(json.dumps(_figures(done, dampers), indent=1))
+            print(json.dumps(_figures(done, dampers) | _banded(bands), indent=1))
         else:
             _print(done)
+            _print_bands(done, bands, dampers)
 
 
 def _all_of(names: list[str]) -> list[str]:
@@ -168,6 +183,44 @@ def _figures(done: Simulation, dampers: Mapping[str, Damper]) -> dict[str, Any]:
         "rise_times_s": {name: asdict(rise_times(d)) for name, d in dampers.items() if d.coil},
         "measures": measures(done),
     }
+
+
+def _banded(bands: Bands | None) -> dict[str, Any]:
+    """Quantiles of every peak and measure, for JSON."""
+    if bands is None:
+        return {}
+    from mrdamper.systems.monte_carlo import LEVELS
+
+    rows = {name: values.tolist() for name, values in bands.quantiles().items()}
+    return {"bands": {"levels": LEVELS, "draws": bands.count, "lost": bands.lost,
+                      "step_s": bands.step, "step_change": bands.step_change}
+            | {f"peak_{name}": rows.pop(name) for name in bands.peaks} | {"measures": rows}}  # fmt: skip
+
+
+def _print_bands(done: Simulation, bands: Bands | None, dampers: Mapping[str, Damper]) -> None:
+    if bands is None:
+        return
+    from mrdamper.systems.result import HALVING
+
+    found = bands.quantiles()
+    low, high = ({name: rows[end] for name, rows in found.items()} for end in (0, -1))
+    typer.echo(f"5 to 95 % of {bands.count} dampers and sessions that the tests leave open:")
+    for i, name in enumerate(done.system.coordinates):
+        x, a = "displacement_m", "acceleration_m_s2"
+        typer.echo(
+            f"  {name:12} x {1e3 * low[x][i]:9.3f} to {1e3 * high[x][i]:.3f} mm   "
+            f"a {low[a][i]:8.3f} to {high[a][i]:.3f} m/s²"
+        )
+    for i, link in enumerate(done.dampers):
+        typer.echo(f"  {link.name:12} F {low['force_N'][i]:9.1f} to {high['force_N'][i]:.1f} N")
+    if bands.step_change > HALVING:
+        typer.echo(f"their step of {1e3 * bands.step:.3g} ms moves a peak by {100 * bands.step_change:.2g} %", err=True)
+    if bands.lost:
+        typer.echo(f"warning: {bands.lost} draws had no solution and are left out", err=True)
+    for name, damper in dampers.items():
+        if damper.certainty and damper.certainty.left_out:
+            share = 100 * damper.certainty.force
+            typer.echo(f"not in them: what the form of {name} is wrong by, {share:.2g} % of half its force")
 
 
 def _print(done: Simulation) -> None:
