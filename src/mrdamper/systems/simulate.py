@@ -26,7 +26,7 @@ from mrdamper.systems.structure import System
 
 PERIOD = 1e-3  # s between two looks of a control law, as usual on a real-time target
 _COARSEST, _FINEST = 1e-3, 1e-5  # s
-_LOST = 0.1  # change of a peak by the third halving, beyond which halving on is in vain
+_FALLS = 0.7  # of the change before, to which a change has to fall from the third halving on
 _MOST_HALVED = 1_000_000  # samples, beyond which a step is not halved again
 _STEPS_A_PERIOD = 40  # of the highest natural frequency, to begin with
 _LINES = 10_000_000  # that the interpreter may walk; more is worth the seconds of compilation
@@ -80,15 +80,15 @@ def simulate_system(
     """
     loop = Loop(system, source, dampers, controller or Passive(), highest)
     dt = loop.first_step if step is None else step
-    coarse, first, first_step = loop.run(dt), None, dt
+    coarse, first, first_step, last = loop.run(dt), None, dt, math.inf
     while True:
         fine = loop.run(dt / 2)
         change = changed(coarse, fine)
         first = change if first is None else first
-        lost = change > _LOST and dt <= first_step / 4  # sensitive to the smallest change: no step will do
+        lost = dt <= first_step / 4 and change > _FALLS * last  # sensitive to the smallest change: no step will do
         if change <= HALVING or dt / 2 <= _FINEST or fine.time.size > _MOST_HALVED or lost:
             break
-        coarse, dt = fine, dt / 2
+        coarse, dt, last = fine, dt / 2, change
     if step is not None and dt < step:
         raise StepError(
             f"halving the step of {step:g} s changes a peak by {100 * first:.2g} %",

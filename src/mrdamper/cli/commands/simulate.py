@@ -242,8 +242,8 @@ def _print(done: Simulation) -> None:
     )
     if not done.settled:
         typer.echo(
-            "warning: the peaks have not settled: this motion answers to the smallest change, as wheels in the air, "
-            "hard stops or too little damping make it; read them as one of many",
+            "warning: the peaks have not settled: this motion answers to the smallest change, as a law that switches, "
+            "wheels in the air, hard stops or too little damping make it; read them as one of many",
             err=True,
         )
     for name, shares in done.outside.items():
