@@ -117,7 +117,7 @@ def test_a_rating_states_no_current(line):
 
 def test_free_text_that_says_two_currents_says_none(tmp_path):
     bare = text().replace(",current_A", "").replace(",0.40000\n", "\n")
-    (tmp_path / "a.csv").write_text(f"Test 3 at 0.4 A\nafter the one at 0.8 A\n{bare}")
+    (tmp_path / "a.csv").write_text(f"Test 3 at 0.4 A\ncompare 0.8 A\n{bare}")
     assert [r.error.code for r in import_files([tmp_path]).refusals] == ["E_CURRENT_MISSING"]
 
 
@@ -152,3 +152,55 @@ def test_a_slow_current_that_changes_is_not_taken_for_its_mean(tmp_path):
     with pytest.raises(InputError) as caught:
         read_run(tmp_path / "a.csv")
     assert caught.value.code == "E_MISSING"
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "Force_sim (N)",
+        "Force LP 10Hz (N)",
+        "Force x10 (N)",
+        "Lateral force (N)",
+        "Force uncertainty (N)",
+        "Force p-p (N)",
+    ],
+)
+def test_a_column_that_is_not_the_dampers_force_is_not_taken_for_it(tmp_path, name):
+    (tmp_path / "a.csv").write_text(text().replace("force_N", name))
+    with pytest.raises(InputError) as caught:
+        read_run(tmp_path / "a.csv")
+    assert caught.value.code in ("E_COLUMN", "E_UNITS_MISSING")
+
+
+def test_the_coils_current_is_taken_before_the_supplys_and_never_a_motors(tmp_path):
+    lines = [f"{line},2.5" for line in text().splitlines()]
+    both = "\n".join([HEAD.replace("current_A", "coil current [A],supply current [A]"), *lines[1:], ""])
+    (tmp_path / "a.csv").write_text(both)
+    assert float(np.mean(read_run(tmp_path / "a.csv").current)) == pytest.approx(0.4)
+    (tmp_path / "b.csv").write_text(text().replace("current_A", "motor current [A]"))
+    assert read_run(tmp_path / "b.csv").current is None
+
+
+@pytest.mark.parametrize(
+    ("name", "amperes"), [("run_04A", []), ("run_0400mA", [0.4]), ("run_0A", [0.0]), ("0p4A", [0.4])]
+)
+def test_a_padded_number_of_amperes_states_none(name, amperes):
+    from mrdamper.rig_files.conditions import currents_in
+
+    assert list(currents_in(name)) == amperes
+
+
+def test_an_absolute_force_is_refused(tmp_path):
+    table = rig.rows(600)[:, :3]
+    table[:, 2] = np.abs(table[:, 2] + 0.15 * np.max(table[:, 2]))
+    said = "\n".join(",".join(f"{v:.5f}" for v in [*row, 0.4]) for row in table)
+    (tmp_path / "a.csv").write_text(f"{HEAD}\n{said}\n")
+    refused = import_files([tmp_path]).refusals
+    assert {refusal.error.code for refusal in refused} <= {"E_RECTIFIED", "E_NO_ENERGY"}
+    assert refused
+
+
+def test_a_typographic_minus_throughout_is_a_minus(tmp_path):
+    (tmp_path / "a.csv").write_text(text().replace("-", "−"), encoding="utf-8")
+    (tmp_path / "b.csv").write_text(text(), encoding="utf-8")
+    np.testing.assert_array_equal(read_run(tmp_path / "a.csv").force, read_run(tmp_path / "b.csv").force)

@@ -60,7 +60,9 @@ _MADE = frozenset(
     ("rms", "peak", "pk", "filtered", "filter", "filt", "lowpass", "smoothed", "smooth", "average", "averaged", "avg",
      "mean", "std", "sd", "abs", "amplitude", "ampl", "envelope", "spitze", "spitzenwert", "effektiv", "gefiltert",
      "geglättet", "mittelwert", "mittel", "filtré", "filtrée", "moyenne", "filtrado", "filtrada", "filtrato", "delta",
-     "simulated", "model", "calc", "calculated", "theoretical", "ideal", "nominal")
+     "simulated", "sim", "model", "calc", "calculated", "theoretical", "ideal", "nominal", "lp", "hp", "uncertainty",
+     "sigma", "estimated", "est", "predicted", "pred", "normalized", "normalised", "difference", "diff", "berechnet",
+     "simuliert", "calculé", "calculée", "pp", "ptp")
 )  # fmt: skip
 _SET = frozenset(
     ("set", "setpoint", "command", "cmd", "commanded", "soll", "sollwert", "target", "demand", "desired", "nominal",
@@ -71,6 +73,13 @@ _NOT_MEASURED = frozenset(
      "error", "count", "counts", "cycle", "cycles", "segment", "segments", "index", "offset", "limit", "max", "min",
      "consigne", "consigna", "sollwert", "rate", "id", "status", "state", "flag")
 )  # fmt: skip
+# What says that a column is of another place than the damper's axis or coil.
+_ELSEWHERE = frozenset(
+    ("lateral", "side", "transverse", "transversal", "radial", "bending", "shear", "quer", "querkraft", "seitenkraft",
+     "motor", "pump", "pumpe", "heater", "drive", "servo", "servovalve", "leakage", "mains")
+)  # fmt: skip
+_COIL = frozenset(("coil", "spule", "spulenstrom", "bobine", "bobina", "solenoid", "magnet", "线圈电流", "damper"))
+_FACTOR = re.compile(r"[\s_][x×*·]\s?10+(?![0-9])|\bp-p\b")  # Force x10, Force p-p
 _COMPRESSION = ("compress", "jounce", "bump", "druckkraft", "druckweg", "einfeder", "compresi", "druckstufe")
 _BRACKETED = re.compile(r"^(?P<name>.*?)\s*[\[({<](?P<unit>[^\[\](){}<>]{1,40})[\])}>]\s*$", re.DOTALL)
 _SLASHED = re.compile(r"^(?P<name>.*\S)\s*(?:\s/\s*|,\s*|\s+in\s+|\s*;\s*)(?P<unit>\S{1,20})$", re.DOTALL)
@@ -110,7 +119,7 @@ def role_of(name: str) -> str | None:
         return None
     words = [w for w in re.split(r"[^\w]+|_|(?<=[a-zà-ÿ])(?=[A-Z])", name) if w]
     lower = [w.casefold().rstrip("0123456789") or w for w in words]
-    if any(word in _NOT_MEASURED or word in _MADE for word in lower):
+    if any(word in _NOT_MEASURED or word in _MADE or word in _ELSEWHERE for word in lower) or _FACTOR.search(name):
         return None
     if len(words) == 1 and words[0] in _SYMBOLS:
         return _SYMBOLS[words[0]]
@@ -129,6 +138,11 @@ def _role_of_word(word: str) -> str | None:
     if len(word) < 5:
         return None
     return next((role for end, role in _COMPOUNDS.items() if word.endswith(end) and word != end), None)
+
+
+def names_coil(name: str) -> bool:
+    """Whether a name says that a current is the coil's."""
+    return any(word.casefold() in _COIL for word in re.split(r"[^\w]+|_|(?<=[a-zà-ÿ])(?=[A-Z])", name[:_LONGEST_NAME]))
 
 
 def names_compression(name: str) -> bool:

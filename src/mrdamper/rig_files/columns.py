@@ -10,7 +10,15 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import ColumnError, CombinedError, InputError, UnitError, printable
-from mrdamper.rig_files.column_names import WORDS, names_compression, role_of, says_nothing, split_name, unknown_unit
+from mrdamper.rig_files.column_names import (
+    WORDS,
+    names_coil,
+    names_compression,
+    role_of,
+    says_nothing,
+    split_name,
+    unknown_unit,
+)
 from mrdamper.rig_files.conditions import stated_rate
 from mrdamper.rig_files.readers.base import RawTable, RigFileError
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED
@@ -202,6 +210,9 @@ def _choose(table: RawTable, headers: Sequence[tuple[str, str]], role: str, take
         exact = [i for i in candidates if headers[i][0].casefold() in WORDS[role]]
         if len({headers[i][0].casefold() for i in exact}) == 1 or (exact and role == "time"):
             return exact[0]
+        coils = [i for i in candidates if role == "current" and names_coil(headers[i][0])]
+        if len(coils) == 1:
+            return coils[0]
         if role == "time" and fitting:
             return fitting[0]  # total and running time: refused if they run otherwise
         if role not in REQUIRED:

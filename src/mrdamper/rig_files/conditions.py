@@ -22,7 +22,8 @@ _LINE = re.compile(
 )
 _LONGEST_LINE, _MOST_PARTS = 300, 20
 _RATING = re.compile(
-    r"max|min|limit|range|rated|suppl|amplif|sensor|full|scale|fuse|bereich|grenz|messverst|nenn|speis|probe|clamp|zange",
+    r"max|min|limit|range|rated|suppl|amplif|sensor|full|scale|fuse|bereich|grenz|messverst|nenn|speis|probe|clamp|zange|"
+    r"previous|vorher|\blast\b|\bnext\b|before|after|\bnach\b|instead|statt",
     re.IGNORECASE,
 )
 _RATE = re.compile(
@@ -53,7 +54,9 @@ def currents_in(text: str) -> tuple[float, ...]:
     text = text[:255]
     if re.search(r"(?<![0-9])[0-9]_[0-9]+ ?m?A(?![A-Za-z0-9])", text):
         return ()
-    found = [amperes(match[1], match[2]) for match in _IN_NAME.finditer(text)]
+    # 04A may be four or 0.4 amperes; 0400mA is padded.
+    stated = [match for match in _IN_NAME.finditer(text) if match[2] == "mA" or not re.fullmatch("0[1-9]+", match[1])]
+    found = [amperes(match[1], match[2]) for match in stated]
     return tuple(dict.fromkeys(found))
 
 

@@ -87,8 +87,8 @@ def judge(record: Record) -> Record:
     QualityError
         If the record cannot be used; the code says why: E_NO_DATA, E_NONFINITE, E_SENTINEL,
         E_MISSING, E_TIME_ORDER, E_TIME_DUPLICATE, E_RANGE, E_NO_EXCITATION,
-        E_SPIKE, E_LEAP, E_NOISE, E_UNRESOLVED, E_DISSIPATION_SIGN, E_NO_ENERGY, E_UNRELATED,
-        E_CHANNEL_LAG.
+        E_SPIKE, E_LEAP, E_NOISE, E_UNRESOLVED, E_DISSIPATION_SIGN, E_RECTIFIED, E_NO_ENERGY,
+        E_UNRELATED, E_CHANNEL_LAG.
     """
     view = View(record)
     for check in (*CHECKS, *_dropped_in()):

@@ -14,6 +14,8 @@ from mrdamper.rig_files.quality.presence import runs_of
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding
 
+_SLOW, _FAST = 0.1, 0.5  # of the largest velocity: samples near the reversals, and away from them
+_BELOW = 0.15  # of the range: so far below both strokes is a rectified force at the reversals
 GIVING = -0.05  # share of the force in phase with the velocity, below which the loop gives energy
 _CLEARLY = 0.3  # share of the force that opposes, or pushes, in a cycle that surely does
 _FEWEST = 20  # samples of a cycle
@@ -31,6 +33,11 @@ def dissipates(view: View) -> None:
     if cycles_of(view) < LEAST_CYCLES:
         return
     share = damping_share(view)
+    if _is_rectified(view):
+        raise QualityError(
+            "the force has the size of a damper's but one sign in both directions: an absolute value",
+            where=view.where, mend="export the channel with its sign", code="E_RECTIFIED",
+        )  # fmt: skip
     if share < GIVING:
         if _exchanged(view):
             what = "displacement and force look exchanged"
@@ -45,6 +52,23 @@ def dissipates(view: View) -> None:
             mend=mend,
             code="E_DISSIPATION_SIGN",
         )
+
+
+def _is_rectified(view: View) -> bool:
+    """Whether the force has one sign and is nearer to zero at the reversals than in either stroke.
+
+    A damper's force at a reversal lies between those of the strokes.
+    """
+    force, velocity = view.run.force, view.moving.velocity
+    span = float(np.ptp(force))
+    force = force * (np.sign(np.median(force)) or 1.0)
+    fastest = float(np.max(np.abs(velocity)))
+    parts = [force[np.abs(velocity) < _SLOW * fastest], force[velocity > _FAST * fastest]]
+    parts += [force[velocity < -_FAST * fastest]]
+    if np.quantile(force, 0.01) < -3 * sample_noise(force) - 0.02 * span or min(map(len, parts)) < _FEWEST:
+        return False
+    turning, *strokes = (float(np.median(part)) for part in parts)
+    return turning < min(strokes) - _BELOW * span
 
 
 def keeps_its_sign(view: View) -> None:

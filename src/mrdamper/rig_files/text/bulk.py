@@ -80,8 +80,8 @@ def _cleaned(block: bytes, form: Form) -> bytes:
         block = block.decode(form.stream.encoding, "replace").encode("utf-8")
     if form.layout.decimal == ",":
         block = block.translate(_COMMA_MARK)
-    if form.layout.fortran:
-        block = block.replace(b"D", b"E").replace(b"d", b"e")
+    for sign, meant in form.layout.writes:
+        block = block.replace(sign.encode(), meant.encode())
     return block.replace(b"\r\n", b"\n") if b"\r" in block else block
 
 

@@ -158,8 +158,8 @@ def split_rows(texts: Sequence[str], line: int, form: Form, final: bool) -> tupl
 def _numbers(cells: Sequence[str], column: int, lines: Sequence[int], form: Form) -> Floats:
     mark = form.layout.decimal
     matches, comma = NUMBER[mark].fullmatch, mark == ","
-    if form.layout.fortran:
-        cells = [cell.replace("D", "E").replace("d", "e") for cell in cells]
+    for sign, meant in form.layout.writes:
+        cells = [cell.replace(sign, meant) for cell in cells]
     values = np.empty(len(cells))
     for i, cell in enumerate(cells):
         value = float(cell.replace(",", ".") if comma else cell) if matches(cell) else number(cell, mark)

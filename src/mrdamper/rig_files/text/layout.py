@@ -57,8 +57,8 @@ class Layout:
         The lines above the names of columns.
     over : tuple of str
         One a column where the line above the names holds titles of groups of columns.
-    fortran : bool
-        Whether exponents are written with a D.
+    writes : tuple of (str, str)
+        Signs that the file uses throughout and what they stand for: D for the E of exponents, a typographic minus.
     """
 
     separator: str
@@ -74,7 +74,7 @@ class Layout:
     odd: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     over: tuple[str, ...] = ()
-    fortran: bool = False
+    writes: tuple[tuple[str, str], ...] = ()
 
     @property
     def width(self) -> int:
@@ -133,13 +133,17 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         tuple(next(filter(None, c), "") if k == "text" else "" for c, k in zip(columns, kinds, strict=True)),
         (*(line for line in above if line.strip()), *_notes_beside(rows)),
         _titles(above, separator, width),
-        _is_fortran(rows),
+        _writes(rows),
     )
 
 
-def _is_fortran(rows: Sequence[Sequence[str]]) -> bool:
+def _writes(rows: Sequence[Sequence[str]]) -> tuple[tuple[str, str], ...]:
     cells = [cell for row in rows for cell in row if cell]
-    return 2 * sum(FORTRAN.fullmatch(cell) is not None for cell in cells) > len(cells)
+    found: tuple[tuple[str, str], ...] = ()
+    if 2 * sum(FORTRAN.fullmatch(cell) is not None for cell in cells) > len(cells):
+        found = (("D", "E"), ("d", "e"))
+    negative = [cell[0] for cell in cells if cell[0] in "-−" and looks_numeric(cell) and len(cell) > 1]
+    return (*found, ("−", "-")) if len(negative) > 1 and set(negative) == {"−"} else found
 
 
 def _below_preamble(lines: Sequence[str], first: int, separator: str) -> int:
