@@ -1,6 +1,7 @@
 """Clean records pass; what is accepted and said: a test a code, and how often it is found."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -209,3 +210,23 @@ def test_a_long_record_is_judged_on_a_part_of_it():
     )
     assert codes_of(long) == []
     assert codes_of(replace(long, force=-long.force)) == ["E_DISSIPATION_SIGN"]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_reversals_are_the_peaks_that_stand_out_on_both_sides(seed):
+    from scipy.signal import find_peaks
+
+    from mrdamper.rig_files.quality.strokes import find_strokes
+
+    rng = np.random.default_rng(seed)
+    time = np.linspace(0, 1, int(rng.integers(200, 3000)))
+    motions = {
+        "sine": np.sin(2 * np.pi * rng.uniform(0.5, 20) * time + rng.uniform(0, 6)) + rng.normal(0, 0.01, time.size),
+        "walk": np.cumsum(rng.standard_normal(time.size)),
+        "dwells": np.round(5 * np.sin(2 * np.pi * rng.uniform(0.5, 9) * time)) / 5,
+    }
+    for name, x in motions.items():
+        least = 0.1 * np.ptp(x)
+        kinds = {int(at): sign for sign in (1, -1) for at in find_peaks(sign * x, prominence=least)[0]}
+        turns = [at for before, at in pairwise([-1, *sorted(kinds)]) if kinds.get(before) != kinds[at]]
+        np.testing.assert_array_equal(find_strokes(time, x).reversals, turns, err_msg=name)

@@ -54,19 +54,30 @@ def find_strokes(time: Floats, displacement: Floats) -> Strokes:
 
 
 def _reversals(x: Floats) -> np.ndarray:
-    from scipy.signal import find_peaks
-
+    """Turns that stand out on both sides: scipy.signal.find_peaks by prominence, which takes half a second to load."""
     least = _PROMINENCE * float(np.ptp(x))
-    if least <= 0:
+    if not least > 0:
         return np.empty(0, dtype=int)
-    tops, bottoms = find_peaks(x, prominence=least)[0], find_peaks(-x, prominence=least)[0]
-    both = np.concatenate([tops, bottoms])
-    kind = np.concatenate([np.ones(tops.size), np.zeros(bottoms.size)])
-    order = np.argsort(both, kind="stable")
-    both, kind = both[order], kind[order]
-    # Of two tops in a row (noise, a dwell) the first counts.
-    alternate = np.concatenate([[True], kind[1:] != kind[:-1]]) if kind.size else np.empty(0, dtype=bool)
-    return both[alternate]
+    moves = np.diff(x)
+    moving = np.flatnonzero(moves)
+    rising = moves[moving] > 0
+    turn = np.flatnonzero(rising[1:] != rising[:-1])
+    turns = (moving[turn] + 1 + moving[turn + 1]) // 2  # the middle of a dwell
+    found: list[int] = []
+    top = bottom = (float(x[0]), -1)
+    up: bool | None = None  # until the motion has gone far enough in one direction
+    for value, at in (*zip(x[turns].tolist(), turns.tolist(), strict=True), (float(x[-1]), -1)):
+        if up is not False and value > top[0]:
+            top = value, at
+        if up is not True and value < bottom[0]:
+            bottom = value, at
+        if up is not False and value <= top[0] - least:
+            found += [top[1]] if up else []
+            up, bottom = False, (value, at)
+        elif up is not True and value >= bottom[0] + least:
+            found += [bottom[1]] if up is False else []
+            up, top = True, (value, at)
+    return np.array(found, dtype=int)
 
 
 def _steady(
