@@ -198,3 +198,13 @@ def test_our_own_faults_are_not_a_reason_to_leave_a_run_out(bundled, monkeypatch
     monkeypatch.setattr(workflow, "equivalent_sine", broken)
     with pytest.raises(ValueError, match="a fault of the program"):
         workflow.usable_sines(bundled)
+
+
+def test_terms_the_runs_do_not_show_are_not_in_the_model(study):
+    for rig in study.rigs:
+        known = rig.damper.certainty
+        for name in ("cq", "qb", "c1", "h1", "m"):  # what `identify_jointly` may do without
+            if name in known.names:
+                at = known.names.index(name)
+                value, error = rig.damper.own_numbers[name].value, known.covariance[at, at] ** 0.5
+                assert abs(value) > 1.5 * error, f"{rig.rig}: {name} {value:.3g} within {error:.2g} of none"

@@ -144,7 +144,7 @@ def identify_jointly(
         found = final.fit(start=evidence.start(final), rounds=1, most_steps=8, settled=_ROUGHLY / 10)
     progress("one model for all runs", 1.0)
     left_out, before = (Evidence.of(p, f).everything() for p, f in ((final, found), (problem, fit)))
-    if _total(left_out, before) > 1.0:  # what one step promised, the search did not keep
+    if _better(before, left_out):  # what one step promised, the search did not keep: terms earn their place here too
         final, found, left_out = problem, fit, before
     tried = (*tried, *more)
     kept = "; ".join(t.term for t in tried if t.kept)
