@@ -27,19 +27,26 @@ ROOMS = (
     _room("identification.loop_analysis", "identification/test_loop_analysis.py"),
     _room("identification.covariance", "identification/test_covariance.py"),
     _room("functions.forms functions.fitting", "functions"),
-    _room("reproduction.verdicts reproduction.claims", "reproduction/test_verdicts.py reproduction/test_claims.py"),
+    _room(
+        "reproduction.verdicts reproduction.claims reproduction.seeds",
+        "reproduction/test_verdicts.py reproduction/test_claims.py reproduction/test_measured.py"
+        " reproduction/test_seeds.py",
+    ),
+    _room("reproduction.output", "reproduction/test_output.py"),
     _room("reproduction.sensitivity", "reproduction/test_sensitivity.py"),
     _room("reproduction.virtual_rig", "reproduction/test_virtual_rig.py"),
-    _room("reproduction.output reproduction.ways reproduction.switches reproduction.study", "reproduction"),
-    _room("dampers.paper dampers.modified", "dampers/test_paper.py"),
+    _room("report.tables study.recipe", "report/test_tables.py study/test_recipe.py"),
+    _room("dampers.paper dampers.modified", "dampers/test_paper.py study/test_recipe.py"),
     _room("dampers.joint", "dampers/test_joint.py"),
     _room(
         "dampers.published.ali dampers.published.boada dampers.published.dominguez dampers.published.lei"
         " dampers.published.lv dampers.published.base",
-        "dampers/test_published_laws.py",
+        "dampers/test_published_laws.py dampers/test_published_fits.py",
     ),
     _room("models.play_bypass", "models/test_play_bypass.py"),
-    _room("identification.methods.paper identification.harmonic_balance", "identification/test_harmonic_balance.py"),
-    _room("report.tables", "report/test_tables.py"),
+    _room(
+        "identification.methods.paper identification.harmonic_balance",
+        "identification/test_harmonic_balance.py dampers/test_paper.py",
+    ),
     _room("rig_files.quality.loop", "rig_files/test_quality.py"),
 )

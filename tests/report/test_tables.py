@@ -4,14 +4,22 @@ import csv
 import math
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
+import pytest
 from support.dampers import joint_damper
 from support.synthetic import synthetic_run
 
+from mrdamper.data import Condition
 from mrdamper.files.dataset import save_dataset
 from mrdamper.files.encoding import csv_text
 from mrdamper.files.model_file import save_model
+from mrdamper.metrics import Scores
+from mrdamper.models.bingham import Bingham
+from mrdamper.report.study import _validation_table
+from mrdamper.report.tables import identification_rows, prediction_rows, score_row
+from mrdamper.validation import RunScore, Validation
 
 PLAIN = """
 import sys
@@ -51,3 +59,64 @@ def test_a_table_keeps_every_digit_and_leaves_gaps_empty():
     assert float(rows[0]["a"]) == value
     assert rows[0]["b"] == rows[0]["c"] == ""
     assert rows[1] == {"a": "1", "b": "", "c": "x, y"}
+
+
+def scores_of(start):
+    """Six scores that are all different."""
+    return Scores(*(start + k / 100 for k in range(6)))
+
+
+def test_an_identification_stands_in_the_columns_that_name_it():
+    found = SimpleNamespace(
+        run_id="a", rig="bench", method="balance", model=Bingham(fy=300.0, c=1500.0, f0=20.0),
+        condition=Condition(1.5, 2.5, 0.0125), scores=scores_of(0.1), floor=0.004, free=("fy", "c"),
+        standard_errors={"c": 3.0, "fy": 4.0}, interval={"fy": (290.0, 310.0)}.get, delay=0.002, at_bounds=("fy", "c"),
+        evaluations=77, ending="converged", notes=("one", "two"), doubts=("three",),
+    )  # fmt: skip
+    (row,) = identification_rows([found])
+    wanted = {
+        "run_id": "a", "rig": "bench", "model": "bingham", "method": "balance", "current_A": 1.5, "frequency_Hz": 2.5,
+        "amplitude_m": 0.0125, "nrmse_pp": 0.1, "repeatability_nrmse_pp": 0.004, "wape": found.scores.wape,
+        **{f"{i.name} [{i.unit}]": getattr(found.model, i.name) for i in Bingham.parameters()},
+        "standard error c": 3.0, "standard error fy": 4.0, "fy low 95 %": 290.0, "fy high 95 %": 310.0,
+        "c low 95 %": None, "c high 95 %": None, "delay_s": 0.002, "at_bounds": "fy c", "evaluations": 77,
+        "message": "converged", "notes": "one; two; three",
+    }  # fmt: skip
+    assert row == wanted
+    assert (row["fy [N]"], row["c [N s/m]"], row["f0 [N]"]) == (300.0, 1500.0, 20.0)
+
+
+def test_a_prediction_stands_in_the_columns_of_the_contract():
+    motion = SimpleNamespace(time=np.array([0.0, 0.5]), displacement=np.array([1.0, 2.0]),
+                             velocity=np.array([3.0, 4.0]), current=np.array([5.0, 6.0]))  # fmt: skip
+    prediction = SimpleNamespace(motion=motion, force=np.array([7.0, 8.0]), extrapolation=("current", "amplitude"))
+    plain = {"time_s": 0.5, "displacement_m": 2.0, "velocity_m_s": 4.0, "current_A": 6.0, "force_N": 8.0}
+    flags = {"extrapolation": "current amplitude"}
+    assert prediction_rows(prediction)[1] == {**plain, **flags}
+    band = SimpleNamespace(low=np.array([6.5, 7.5]), high=np.array([9.0, 9.5]))
+    assert prediction_rows(prediction, band)[1] == {**plain, "force_low_N": 7.5, "force_high_N": 9.5, **flags}
+
+
+def test_scores_are_fractions_under_their_own_names():
+    run = RunScore("one", "bench", Condition(0, 1, 0.01), scores_of(0.1), 0.01, ("current",))
+    assert score_row(run) == pytest.approx(
+        {"nrmse_pp": 0.1, "nrmse_std": 0.11, "wape": 0.12, "peak_error": 0.13, "energy_error": 0.14}
+        | {"run_id": "one", "extrapolation": "current"}
+    )
+
+
+def test_left_out_and_held_out_errors_stand_in_their_own_rows():
+    def scored(name, start):
+        return Validation("x", (RunScore(name, "bench", Condition(0, 1, 0.01), scores_of(start), None, ()),))
+
+    candidate = SimpleNamespace(
+        recipe=SimpleNamespace(model="dahl", way="joint"),
+        train=scored("fitted", 0.3), left_out=scored("left", 0.1), held_out=scored("held", 0.2),
+    )  # fmt: skip
+    study = SimpleNamespace(rigs=(SimpleNamespace(rig="bench", candidates=(candidate,)),))
+    rows = list(csv.DictReader(_validation_table(study).splitlines()))
+    told = [(r["rig"], r["model"], r["way"], r["set"], r["run_id"], float(r["nrmse_pp"])) for r in rows]
+    assert told == [
+        ("bench", "dahl", "joint", "left out", "left", 0.1),
+        ("bench", "dahl", "joint", "held out", "held", 0.2),
+    ]

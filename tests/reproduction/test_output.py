@@ -1,0 +1,134 @@
+"""Tables of the reproduction by made results whose numbers are all different: each in its own column and row."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mrdamper.data import Condition
+from mrdamper.functions.fitting import FunctionFit
+from mrdamper.functions.forms import ParameterFunction
+from mrdamper.metrics import Scores
+from mrdamper.reproduction import output
+from mrdamper.reproduction.claims import Claim
+from mrdamper.reproduction.found import Ended, GeneticCheck
+from mrdamper.reproduction.output import verdicts
+from mrdamper.reproduction.sensitivity import OneAtATime, Sobol
+from mrdamper.reproduction.switches import Switches
+from mrdamper.validation import RunScore, Validation
+
+
+def scored(name, current, start):
+    scores = Scores(*(start + k / 100 for k in range(6)))
+    return RunScore(name, "rig", Condition(current, 1.0, 0.08), scores, None, ())
+
+
+def contender(title, way, start, seconds):
+    runs = (scored("h0", 0.0, start), scored("h1", 1.0, start + 0.2), scored("h2", 2.0, start + 0.5))
+    return SimpleNamespace(
+        recipe=SimpleNamespace(title=title, way=way, basis=None),
+        damper=SimpleNamespace(parameter_count=round(100 * start)),
+        held_out=Validation(title, runs), train=Validation(title, ()), left_out=Validation(title, ()),
+        per_run=start / 7, seconds=seconds, identifications=(), fit=None,
+    )  # fmt: skip
+
+
+def study(**more):
+    given = dict(
+        contenders=(contender("one", "paper", 0.1, 3.0), contender("two", "joint", 0.3, 5.0)),
+        seed_errors={"two": np.array([0.31, 0.33, 0.38])}, seed_verdicts={}, loops=(), held_out=(), genetic=(),
+        ended=(),
+        sensitivity=(), sobol=None, rig=None, switches=Switches(), conditions=(),
+    )  # fmt: skip
+    made = SimpleNamespace(**(given | more))
+    made.contender = lambda title: next((c for c in made.contenders if c.recipe.title == title), None)
+    return made
+
+
+def test_table_5_holds_the_median_and_the_worst_of_the_held_out_runs():
+    first, second = verdicts(study())
+    assert first == {
+        "verdict": "paper (literal)", "method": "one", "numbers": 10, "nrmse_pp": pytest.approx(0.3),
+        "worst_nrmse_pp": pytest.approx(0.6), "nrmse_std": pytest.approx(0.31), "wape": pytest.approx(0.32),
+        "mean_relative_error": pytest.approx(0.35), "per_run_nrmse_pp": pytest.approx(0.1 / 7), "seconds": 3.0,
+        "seeds": None, "seed_median_nrmse_pp": None, "seed_lowest_nrmse_pp": None, "seed_highest_nrmse_pp": None,
+    }  # fmt: skip
+    spread = [second[f"seed_{name}_nrmse_pp"] for name in ("lowest", "median", "highest")]
+    assert (second["verdict"], second["seeds"], spread) == ("joint", 3, [0.31, 0.33, 0.38])
+
+
+def tables(**more):
+    claim = Claim("phase", "text", "Eq. 1", "holds", "recovered", "1 rad", "limit", "fig12", "20 of 20")
+    return output._tables(study(**more), (claim,))
+
+
+def test_table_4_holds_every_run_of_every_method_under_its_own_name():
+    made, absent = tables()
+    rows = made["table4_errors"]
+    assert [(r["method"], r["run_id"], r["current_A"]) for r in rows] == [
+        (title, f"h{n}", float(n)) for title in ("one", "two") for n in range(3)
+    ]
+    assert rows[4] == {
+        "method": "two", "run_id": "h1", "current_A": 1.0, "frequency_Hz": 1.0, "amplitude_m": 0.08,
+        "mean_relative_error": pytest.approx(0.55), "wape": pytest.approx(0.52), "nrmse_pp": pytest.approx(0.5),
+        "nrmse_std": pytest.approx(0.51),
+    }  # fmt: skip
+    assert made["seeds"] == [{"method": "two", "seed": n, "nrmse_pp": v} for n, v in ((1, 0.31), (2, 0.33), (3, 0.38))]
+    assert made["claims"][0] == {
+        "key": "phase", "text": "text", "source": "Eq. 1", "verdict": "holds", "said": "recovered", "evidence": "1 rad",
+        "threshold": "limit", "figure": "fig12", "seeds": "20 of 20",
+    }  # fmt: skip
+    assert absent["genetic"] == "no genetic search was made"
+    assert absent["virtual_rig"] == "the data are not of the virtual rig"
+    assert absent["table1_tests"] == "the data allow no row of it"
+    assert not set(absent) & set(made)
+
+
+def test_tests_and_searches_stand_in_their_columns():
+    loop = SimpleNamespace(run_id="a", split="train", condition=Condition(0.5, 2.0, 0.03), peak_force=900.0,
+                           dissipated_energy=33.0)  # fmt: skip
+    minimum = SimpleNamespace(evaluations=123, point=np.array([4e5, 7e6]))
+    check = GeneticCheck(Condition(1.0, 1.5, 0.05), minimum, 21.0, 20.0, 8.0)
+    made, _ = tables(loops=(loop,), genetic=(check,), ended=(Ended("a", 3, 1.5, 0.2, 1.01, 0.7),))
+    assert made["table1_tests"] == [
+        {"run_id": "a", "split": "train", "current_A": 0.5, "frequency_Hz": 2.0, "amplitude_m": 0.03,
+         "peak_force_N": 900.0, "dissipated_energy_J": 33.0}
+    ]  # fmt: skip
+    assert made["genetic"] == [
+        {"current_A": 1.0, "frequency_Hz": 1.5, "amplitude_m": 0.05, "reached_rmse_N": 21.0, "least_rmse_N": 20.0,
+         "evaluations": 123, "seconds": 8.0, "alpha": 4e5, "beta": 7e6}
+    ]  # fmt: skip
+    assert made["genetic_runs"] == [
+        {"run_id": "a", "seed": 3, "alpha_over_optimum": 1.5, "beta_over_optimum": 0.2, "error_over_least": 1.01,
+         "seconds": 0.7}
+    ]  # fmt: skip
+
+
+def test_sensitivities_and_functions_stand_in_their_columns():
+    numbers = [np.array([k + 0.1, k + 0.2]) for k in (1, 2, 3, 4)]
+    indices = Sobol(("c", "n"), *numbers, 0.2)
+    single = (OneAtATime("n", 0.1, 0.7, 0.02), OneAtATime("A", 0.1, 0.5, float("nan")))
+    made, _ = tables(sensitivity=single, sobol=indices)
+    assert made["sensitivity"] == [
+        {"parameter": "n", "change": 0.1, "effect": 0.7, "left_after_identifying_anew": 0.02, "sobol_first": 1.2,
+         "sobol_first_half_width": 3.2, "sobol_total": 2.2, "sobol_total_half_width": 4.2},
+        {"parameter": "A", "change": 0.1, "effect": 0.5, "left_after_identifying_anew": None},
+    ]  # fmt: skip
+
+
+def test_a_parameter_that_was_held_has_no_r2(monkeypatch):
+    def function(value, r2):
+        return FunctionFit(ParameterFunction("linear-current", (value, 1.0)), r2, 0.5)
+
+    fit = SimpleNamespace(
+        functions={"c": function(2.0, 0.9), "k1": function(3.0, 1.0)},
+        values={"c": np.array([1.0, 2.0]), "k1": np.array([5.0, 5.0])},
+    )
+    monkeypatch.setattr(output, "ModifiedFit", SimpleNamespace)
+    one = contender("one", "paper", 0.1, 3.0)
+    one.fit = fit
+    rows = output._function_rows(study(contenders=(one,)))
+    assert [(r["method"], r["parameter"], r["form"], r["function"], r["r2"], r["coefficients"]) for r in rows] == [
+        ("one", "c", "linear-current", "2 I +1", 0.9, "2.0 1.0"),
+        ("one", "k1", "linear-current", "3 I +1", None, "3.0 1.0"),
+    ]

@@ -1,0 +1,194 @@
+"""Recipes by dampers that remember: what was fitted, left out and held out; refits know only what is kept."""
+
+from dataclasses import astuple, dataclass, replace
+from itertools import pairwise
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from support.synthetic import synthetic_run
+
+from mrdamper.data import Condition, Run
+from mrdamper.errors import IdentificationError, InputError
+from mrdamper.identification.methods.balance import Balance
+from mrdamper.metrics import Scores
+from mrdamper.motion import sine
+from mrdamper.reproduction.ways import one_per_current, through_chosen
+from mrdamper.study import recipe as recipes
+from mrdamper.study.recipe import (
+    Basis,
+    Made,
+    Recipe,
+    by_the_paper,
+    follow,
+    follow_all,
+    identified,
+    run_by_run,
+    stretches,
+)
+from mrdamper.validation import RunScore, Validation
+
+
+@dataclass(frozen=True)
+class Said:
+    force: np.ndarray
+    motion: object
+    condition: Condition
+    extrapolation: tuple = ()
+
+
+class Memory:
+    """Knows the force of the runs it was made of, and says zero of all others."""
+
+    title = "memory"
+
+    def __init__(self, runs):
+        self.known = {run.id for run in runs}
+
+    def predict_run(self, run):
+        motion = sine(run.nominal, 3, 100)
+        return Said(run.force if run.id in self.known else np.zeros(run.time.size), motion, run.nominal)
+
+
+def remember(runs, identifications):
+    return Made(Memory(runs), lambda rows: Memory([runs[i] for i in rows]))
+
+
+def made(current, frequency, name):
+    condition = Condition(current, frequency, 0.01)
+    motion = sine(condition, 3, 100)
+    window = (float(motion.time[100]), float(motion.time[-1]))
+    force = (100 + 50 * current) * motion.velocity
+    return Run(name, motion.time, motion.displacement, force, current, nominal=condition, window=window)
+
+
+TRAIN = [made(I, f, f"{I}A-{f}Hz") for I in (0.0, 1.0) for f in (1.0, 2.0)]
+HELD = [made(0.5, 1.0, "held")]
+REMEMBER = Recipe("memory", Basis("bingham"), remember)
+
+
+def test_fitted_left_out_and_held_out_errors_stay_apart():
+    errors = [SimpleNamespace(scores=SimpleNamespace(nrmse_pp=e)) for e in (0.1, 0.9, 0.2)]
+    found = follow(REMEMBER, TRAIN, errors, HELD, spent=100.0)
+    wape = {name: [run.scores.wape for run in getattr(found, name).runs] for name in ("train", "left_out", "held_out")}
+    # What it was made of it knows; without the condition, and of what was held out, it knows nothing.
+    assert wape == {"train": [0.0] * 4, "left_out": pytest.approx([1.0] * 4), "held_out": pytest.approx([1.0])}
+    assert [run.run_id for run in found.left_out.runs] == [run.id for run in TRAIN]
+    assert [run.run_id for run in found.held_out.runs] == ["held"]
+    assert found.per_run == 0.2
+    assert 100.0 <= found.seconds < 110.0
+    without = follow(REMEMBER, TRAIN, [], HELD, leave_out=False)
+    assert without.left_out.runs == ()
+    assert np.isnan(without.per_run)
+
+
+def test_what_cannot_be_made_is_refused_by_its_name_and_the_others_go_on():
+    def broken(runs, identifications):
+        raise IdentificationError("too few runs")
+
+    steps = [(Recipe("broken", None, broken), TRAIN), (Recipe("memory", None, remember), TRAIN[:2])]
+    told = []
+    scored, refused = follow_all(steps, HELD, lambda what, share: told.append((what, share)))
+    assert [s.recipe.name for s in scored] == ["memory"]
+    assert [run.run_id for run in scored[0].train.runs] == [run.id for run in TRAIN[:2]]
+    assert set(refused) == {"broken"}
+    assert "too few runs" in refused["broken"]
+    assert all(0 <= share <= 1 for _, share in told)
+    assert [share for _, share in told] == sorted(share for _, share in told)
+
+
+def test_a_run_is_identified_once_for_all_recipes_of_one_basis():
+    basis, other = Basis("bingham"), Basis("dahl")
+    found = {(basis, TRAIN[0].id): ("no motion", 1.0), (other, TRAIN[0].id): (7, 7.0)}
+    made_, spent = identified(other, TRAIN[:1], found)
+    assert (made_, spent) == ([7], 7.0)
+    assert identified(None, TRAIN, found) == ([], 0.0)
+    with pytest.raises(IdentificationError, match=f"run {TRAIN[0].id}: no motion"):
+        identified(basis, TRAIN[:1], found)
+    one, spent = identified(basis, TRAIN[1:2], found)
+    assert one[0].run_id == TRAIN[1].id
+    assert found[basis, TRAIN[1].id] == (one[0], spent)
+
+
+@pytest.fixture(scope="module")
+def tests():
+    """Runs of a Bouc–Wen damper and what single ones say."""
+    matrix = [Condition(I, f, A) for I in (0.0, 0.5, 1.0, 2.0) for f, A in ((0.5, 0.03), (1.0, 0.02), (2.0, 0.01))]
+    runs = [
+        synthetic_run(c, 3.0, seed=n, cycles=2, samples_per_cycle=100, id=f"run {n}", rig="made")
+        for n, c in enumerate(matrix)
+    ]
+    return runs, [Basis("bouc-wen", Balance()).identify(run) for run in runs]
+
+
+@pytest.mark.parametrize("make", [run_by_run, by_the_paper, one_per_current, through_chosen])
+def test_a_refit_is_what_the_kept_runs_alone_make(tests, make):
+    runs, identifications = tests
+    rows = [i for i in range(len(runs)) if i not in (1, 7)]
+    refitted = make(runs, identifications).refit(rows)
+    alone = make([runs[i] for i in rows], [identifications[i] for i in rows]).damper
+    everything = make(runs, identifications).damper
+    for condition in (Condition(0.7, 0.7, 0.02), runs[1].nominal or Condition(0.0, 1.0, 0.02)):
+        assert refitted.model_at(condition).values() == alone.model_at(condition).values()
+        if make is not one_per_current:
+            assert refitted.model_at(condition).values() != everything.model_at(condition).values()
+
+
+def test_by_the_paper_only_identifications_of_kept_runs_count_where_some_runs_have_none(tests):
+    runs, identifications = tests
+    some = identifications[2:]  # the first two runs were no pure sines
+    rows = [i for i in range(len(runs)) if i != 5]
+    refitted = by_the_paper(runs, some).refit(rows)
+    alone = by_the_paper(runs, [i for i in some if i.run_id != runs[5].id]).damper
+    assert refitted.model_at(Condition(0.7, 0.7, 0.02)).values() == alone.model_at(Condition(0.7, 0.7, 0.02)).values()
+
+
+def noise_record(seconds, rate=200):
+    time = np.arange(0, seconds, 1 / rate)
+    x = 0.01 * np.sin(2 * np.pi * time) + 0.006 * np.sin(2 * np.pi * 1.618 * time + 1)
+    return Run("sweep", time, x, 1e3 * np.gradient(x, time), 1.0, window=(2.0, float(time[-1])))
+
+
+def test_a_long_record_is_left_out_in_stretches_that_cover_it_once():
+    parts = stretches(noise_record(100.0))
+    assert 2 <= len(parts) <= 8
+    assert [part.id for part in parts] == [f"sweep {n}/{len(parts)}" for n in range(1, len(parts) + 1)]
+    edges = [part.window for part in parts]
+    assert edges[0][0] == pytest.approx(2.0, abs=0.01)
+    assert edges[-1][1] == pytest.approx(99.995, abs=0.01)
+    for (_, end), (begin, _) in pairwise(edges):
+        assert begin - end == pytest.approx(1 / 200)  # the next sample
+    # A run-in before each window but the first, for what remembers.
+    assert all(part.time[0] < part.window[0] - 0.5 for part in parts)
+    assert stretches(noise_record(15.0))[0].id == "sweep"
+    assert stretches(TRAIN[0]) == [TRAIN[0]]
+
+
+def test_stretches_are_scored_as_the_record_they_were_cut_from():
+    def score(name, k, flags):
+        return RunScore(name, "rig", Condition(0, 1, 1), Scores(*(k * np.arange(1.0, 7.0))), None, flags)
+
+    pieces = [replace(TRAIN[0], id=f"long {n}", notes={recipes._RECORD: "long"}) for n in (1, 2)] + [TRAIN[1]]
+    scores = (
+        score("long 1", 3.0, ("current",)),
+        score("long 2", 4.0, ("current", "amplitude")),
+        score(TRAIN[1].id, 9, ()),
+    )
+    whole = recipes._whole_again(Validation("x", scores), pieces)
+    assert [run.run_id for run in whole.runs] == ["long", TRAIN[1].id]
+    rms = np.sqrt((3.0**2 + 4.0**2) / 2)
+    assert astuple(whole.runs[0].scores) == pytest.approx((rms, 2 * rms, 3 * 3.5, 4 * 3.5, 5 * 3.5, 6 * 3.5))
+    assert whole.runs[0].extrapolation == ("current", "amplitude")
+    assert astuple(whole.runs[1].scores) == astuple(scores[2].scores)
+
+
+def test_a_recipe_says_its_model_and_an_unknown_fault_is_not_hidden():
+    assert Recipe("bouc-wen:joint", None, remember).model == "bouc-wen"
+    assert Recipe("play-bypass", None, remember).model == "play-bypass"
+
+    def ours(runs, identifications):
+        raise ValueError("a fault of the program")
+
+    with pytest.raises(ValueError, match="a fault"):
+        follow_all([(Recipe("ours", None, ours), TRAIN)], HELD)
+    assert not issubclass(ValueError, InputError)
