@@ -223,7 +223,7 @@ def test_reversals_are_the_peaks_that_stand_out_on_both_sides(seed):
     motions = {
         "sine": np.sin(2 * np.pi * rng.uniform(0.5, 20) * time + rng.uniform(0, 6)) + rng.normal(0, 0.01, time.size),
         "walk": np.cumsum(rng.standard_normal(time.size)),
-        "dwells": np.round(5 * np.sin(2 * np.pi * rng.uniform(0.5, 9) * time)) / 5,
+        "dwells": np.round(6 * np.sin(2 * np.pi * rng.uniform(0.5, 9) * time)) / 6,
     }
     for name, x in motions.items():
         least = 0.1 * np.ptp(x)
