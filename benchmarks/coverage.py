@@ -42,6 +42,7 @@ TRUTH = BoucWen(c=1440.0, alpha=9e5, beta=2e5, gamma=2e5, n=2.0, f0=120.0, k1=13
 CONDITION = Condition(0.5, 1.0, 0.02)
 GAIN, OFFSET, NOISE = 0.045, 0.01, 0.01  # of a session, over half the peak-to-peak force; of a sample
 _SAMPLES = 200  # a cycle
+_INSIDE = 0.1  # of a search axis: a truth at its end would have one-sided intervals
 _SETTLED = 1e-4  # of the cost; a standard error is some hundredths of it
 _RATE = 250.0  # samples a second that are kept [Hz]
 _SIZE = 20.0  # of the error [N]; half the peak-to-peak force is some 900 N
@@ -124,9 +125,14 @@ class Rig:
     def of(cls, name: str) -> Rig:
         sines = [r for r in load_dataset().rig(name) if r.split == "train" and r.excitation == "sine"]
         runs = [_slower(run) for run in sines]
-        fit = JointProblem(runs, "play-bypass").fit()
-        clean = tuple(replace(r, force=fit.damper.predict_run(r).force) for r in runs)
-        return cls(JointProblem(clean, "play-bypass"), clean, fit.damper, fit.point)
+        problem = JointProblem(runs, "play-bypass")
+        fit = problem.fit()
+        lower, upper = problem._box()
+        point = np.clip(fit.point, lower + _INSIDE * (upper - lower), upper - _INSIDE * (upper - lower))
+        linear = {info.name: getattr(fit.damper.model, info.name) for info in problem.linear}
+        truth = replace(fit.damper, model=replace(problem.bare(point), **linear))
+        clean = tuple(replace(r, force=truth.predict_run(r).force) for r in runs)
+        return cls(JointProblem(clean, "play-bypass"), clean, truth, point)
 
     def fit(self, runs: Sequence[Run]) -> tuple[JointProblem, JointFit]:
         """The joint fit to other forces on the same motions, what was prepared of these used again."""

@@ -19,6 +19,7 @@ _ROWS = 400  # samples of a run that enter
 _CYCLES = 4  # of a sine that enter, as in the joint fit
 _WARM_UP = 1.5  # cycles before them in which the model forgets its start
 _BEST = 1e-3  # nrmse_pp below which a run gains no more weight, as in the joint fit
+_DRAWS, _ROUNDS, _SEED = 600, 4, 20240813  # of sessions; of weights, as in the joint fit
 _TAKES_PART = 0.1  # in a direction, of its unit vector
 _ONE_RUN = 0.6  # share of what is known of a number from which it rests on one run
 _UNKNOWN = 1e-10  # of the largest: eigenvalue of the scaled normal matrix below which a direction is unknown
@@ -84,6 +85,7 @@ class _Part:
     prediction: Prediction
     picked: np.ndarray
     residual: Floats
+    scale: float
     weight: float
     frequency: float | None
 
@@ -105,7 +107,7 @@ class _Part:
         error = float(np.sqrt(np.mean(residual**2))) / scale
         weight = 1 / (scale * np.sqrt(picked.size) * np.sqrt(max(error, _BEST)))
         frequency = prediction.condition.frequency_Hz if prediction.is_sine else None
-        return cls(run, session_of(run), prediction, picked, residual, weight, frequency)
+        return cls(run, session_of(run), prediction, picked, residual, scale, weight, frequency)
 
     @property
     def predicted(self) -> Floats:
@@ -209,8 +211,42 @@ def _sessions(
     projected = reading[gains, gains]
     dof = float(np.trace(projected.T @ projected) ** 2 / max(np.sum((projected.T @ projected) ** 2), 1e-300))
     dof = min(dof, float(np.trace(projected)), count - 1.0)
-    variances = np.tile(found, count)
-    return float(np.sqrt(found[0])), float(np.sqrt(found[1])), max(dof, 0.0), (effect * variances) @ effect.T
+    gain, offset = float(np.sqrt(found[0])), float(np.sqrt(found[1]))
+    return gain, offset, max(dof, 0.0), _shaken(parts, slopes, sessions, gain, offset)
+
+
+def _shaken(
+    parts: Sequence[_Part], slopes: Sequence[Floats], sessions: Sequence[str], gain: float, offset: float
+) -> Floats:
+    """(P, P) covariance of the numbers by sessions whose gains and offsets are drawn anew.
+
+    The fit counts a run less the worse it is described, so a session far off moves the numbers less
+    than its gain would say. Each draw is therefore fitted as the runs were: linearised, weights and
+    numbers in turn.
+    """
+    size, count = slopes[0].shape[1], len(parts)
+    rng = np.random.default_rng(_SEED)
+    drawn = rng.standard_normal((_DRAWS, len(sessions), 2)) * [gain, offset]
+    shift = drawn[:, [sessions.index(part.session) for part in parts]]  # (draws, runs, 2)
+    grams, rest = np.empty((count, size + 2, size + 2)), np.empty(count)
+    for i, (part, slope) in enumerate(zip(parts, slopes, strict=True)):
+        table = np.column_stack([slope, part.predicted, np.ones(part.picked.size)])
+        grams[i] = table.T @ table
+        own = table[:, size:]
+        rest[i] = np.sum((part.residual - own @ np.linalg.lstsq(own, part.residual, rcond=None)[0]) ** 2)
+    pulls = np.einsum("rpk,drk->drp", grams[:, :size, size:], shift)
+    scale = np.array([part.scale * np.sqrt(part.picked.size) for part in parts])
+    moved, weight = np.zeros((_DRAWS, size)), np.ones((_DRAWS, count))
+    for _ in range(_ROUNDS):
+        pull = weight / scale**2
+        normal = np.einsum("dr,rpq->dpq", pull, grams[:, :size, :size])
+        unit = np.sqrt(np.einsum("dpp->dp", normal))
+        right = np.einsum("dr,drp->dp", pull, pulls) / unit
+        moved = np.linalg.solve(normal / unit[:, :, None] / unit[:, None, :], right[:, :, None])[:, :, 0] / unit
+        left = np.concatenate([np.broadcast_to(moved[:, None, :], (_DRAWS, count, size)), -shift], axis=2)
+        squares = np.einsum("drp,rpq,drq->dr", left, grams, left, optimize=True) + rest
+        weight = 1 / np.maximum(np.sqrt(np.maximum(squares, 0)) / scale, _BEST)
+    return moved.T @ moved / _DRAWS
 
 
 def _with_model_error(

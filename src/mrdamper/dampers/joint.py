@@ -496,8 +496,10 @@ class _Part:
         else:
             information = max(1.0, np.sqrt((time[last] - time[first]) / period))
         at = np.flatnonzero(followed)
-        unknown = min(int(np.searchsorted(motion.path.travel, found.condition.amplitude_m)), len(motion) // 4)
-        rows = at[at >= unknown]
+        x = motion.displacement
+        moved = np.maximum.accumulate(x) - np.minimum.accumulate(x)  # not the travel: that grows at rest, by noise
+        unknown = min(int(np.searchsorted(moved, found.condition.amplitude_m)), max(first, len(motion) // 4))
+        rows = at[(at >= unknown) & (at < len(motion) - 1)]  # the last sample turns towards the next run
         before, inside, after = rows[rows < first], rows[(rows >= steady) & (rows <= last)], rows[rows > last]
         inside = inside[:: max(1, int(inside.size / (_ROWS * information)))]
         every = max(1, (before.size + after.size) // _ROWS)
