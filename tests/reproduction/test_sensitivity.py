@@ -1,10 +1,12 @@
 """Sensitivity in coordinates that no unit of length changes, and what presets cost."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mrdamper.data import Condition
-from mrdamper.errors import ParameterError
+from mrdamper.errors import ParameterError, UnknownNameError
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.reproduction.sensitivity import one_at_a_time, sobol
 
@@ -52,3 +54,76 @@ def test_the_effect_of_a_linear_parameter_is_that_of_its_own_force():
     assert found["m"] / found["f0"] == pytest.approx(1.5 * velocity * 2 * np.pi / np.sqrt(2) / 12, rel=0.01)
     doubled = {s.name: s.effect for s in one_at_a_time(MODEL, condition, change=0.2, refit=())}
     assert doubled["c"] == pytest.approx(2 * found["c"], rel=1e-9)
+
+
+def loop_by_hand(model, condition, count=4096):
+    """The steady force by many small steps of dz = v − β|v| |z|^(n−1) z − γ v |z|^n, over the last of three cycles."""
+    t = np.arange(3 * count + 1) / count / condition.frequency_Hz
+    omega, X = 2 * np.pi * condition.frequency_Hz, condition.amplitude_m
+    x, v, a = X * np.sin(omega * t), X * omega * np.cos(omega * t), -X * omega**2 * np.sin(omega * t)
+    z, beta, gamma, n = np.zeros(t.size), model.beta, model.gamma, model.n
+
+    def rate(z, step):
+        return step - beta * abs(step) * abs(z) ** (n - 1) * z - gamma * step * abs(z) ** n
+
+    for i in range(t.size - 1):
+        half = (x[i + 1] - x[i]) / 2
+        middle = z[i] + rate(z[i], half)
+        z[i + 1] = z[i] + rate(middle, 2 * half)
+    force = model.c * v + model.k1 * x + model.k2 * x**2 + model.k3 * x**3 + model.m * a + model.f0 + model.alpha * z
+    return force[-count:]
+
+
+@pytest.mark.parametrize(
+    ("name", "changed"),
+    [
+        ("yield_force", {"alpha": 1.1 * 9e5}),
+        # d = (β + γ)^(−1/n) grows by a tenth at the same α d.
+        ("yield_displacement", {"alpha": 9e5 / 1.1, "beta": 2e5 / 1.21, "gamma": 2e5 / 1.21}),
+        ("c", {"c": 1.1 * 1440}),
+        ("k3", {"k3": 1.1 * 8243}),
+        # (γ − β)/(γ + β) goes from 0 to 0.1 at the same sum.
+        ("asymmetry", {"beta": 1.8e5, "gamma": 2.2e5}),
+    ],
+)
+def test_the_effect_is_the_change_of_the_force_by_brute_integration(name, changed):
+    condition = Condition(1.0, 1.3, 0.01)
+    (found,) = one_at_a_time(MODEL, condition, (name,), refit=())
+    base, other = loop_by_hand(MODEL, condition), loop_by_hand(replace(MODEL, **changed), condition)
+    expected = np.sqrt(np.mean((other - base) ** 2)) / np.std(base)
+    assert found.effect == pytest.approx(expected, rel=0.02)
+    assert (found.name, found.change) == (name, 0.1)
+
+
+def test_a_factor_of_v_acts_as_in_the_printed_equation():
+    """dz = A v − β|v| |z| z − γ v z²: with y = z/A, α A takes the place of α, β A and γ A those of β and γ."""
+    condition = Condition(1.0, 1.3, 0.01)
+    (found,) = one_at_a_time(MODEL, condition, ("A",), refit=())
+    base = loop_by_hand(MODEL, condition)
+    other = loop_by_hand(replace(MODEL, alpha=1.1 * 9e5, beta=1.1 * 2e5, gamma=1.1 * 2e5), condition)
+    assert found.effect == pytest.approx(np.sqrt(np.mean((other - base) ** 2)) / np.std(base), rel=0.02)
+
+
+def test_an_asymmetry_at_its_end_stays_a_loop():
+    steep = BoucWen.build({**MODEL.values(), "beta": 1e3, "gamma": 3.99e5})
+    (found,) = one_at_a_time(steep, Condition(1.0, 1.0, 0.05), ("asymmetry",), refit=())
+    assert np.isfinite(found.effect)
+    with pytest.raises(UnknownNameError, match="weight"):
+        one_at_a_time(MODEL, Condition(1.0, 1.0, 0.05), ("weight",))
+
+
+def test_what_is_left_is_the_misfit_of_the_best_loop_with_the_old_preset():
+    condition = Condition(1.0, 1.0, 0.02)
+    (found,) = one_at_a_time(MODEL, condition, ("n",), change=0.5, refit=("n",))
+    assert 0 < found.left < found.effect
+    (mild,) = one_at_a_time(MODEL, condition, ("n",), change=0.25, refit=("n",))
+    assert mild.left < found.left
+
+
+def test_first_order_indices_of_two_forces_add_up_and_follow_their_variance():
+    pytest.importorskip("SALib")
+    found = sobol(MODEL, Condition(1.0, 1.0, 0.05), ("c", "f0"), spread=0.1, samples=256)
+    assert (found.names, found.spread) == (("c", "f0"), 0.1)
+    assert found.first.sum() == pytest.approx(1.0, abs=0.1)
+    assert np.all(found.total >= found.first - 0.1)
+    assert found.first[0] > 0.8

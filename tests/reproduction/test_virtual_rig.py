@@ -7,6 +7,7 @@ import pytest
 
 from mrdamper.data import Condition
 from mrdamper.errors import ParameterError
+from mrdamper.gas_spring import GasSpring
 from mrdamper.metrics import dissipated_power
 from mrdamper.motion import sine
 from mrdamper.reproduction.virtual_rig import MOTIONS, SLOW_SPEED, VirtualRig, friction_test, true_runs, virtual_dataset
@@ -87,3 +88,85 @@ def test_readable_parameters_are_checked():
         VirtualRig(cavity_depth=2)
     with pytest.raises(ParameterError, match="no gas volume"):
         true_runs(VirtualRig(gas_volume=1e-5), (0.0,))
+
+
+def test_shear_thinning_is_that_of_the_formula():
+    rig = replace(BARE, thinning=0.4, thinning_speed=0.2, viscosity=1000, viscosity_per_ampere=300)
+    motion, force = last_cycle(rig)
+    v = motion.velocity
+    coefficient = 1000 + 300 * rig.magnetisation(1.0)
+    expected = coefficient * v * (1 + (v / 0.2) ** 2) ** -0.2 - rig.gas.force(-motion.displacement) + rig.offset_force
+    assert force == pytest.approx(expected, abs=1e-9)
+    assert rig.magnetisation(1.0) == pytest.approx(1.0 / (1 + (1 / 1.5) ** 6) ** (1 / 6))
+    assert rig.gas == GasSpring(1.5e6, 1.5e-4, np.pi * 0.020**2 / 4)
+
+
+def test_seal_friction_waves_along_the_stroke_and_the_mass_is_inertia():
+    rig = replace(BARE, viscosity=0, friction_low=20, friction_high=80, friction_knee=1e-7, mass=7.0)
+    motion, force = last_cycle(rig)
+    x, v = motion.displacement, motion.velocity
+    size = 50 + 30 * np.sin(2 * np.pi * x / rig.friction_wave)
+    expected = size * np.sign(v) + 7.0 * motion.acceleration - rig.gas.force(-x) + rig.offset_force
+    moving = np.abs(v) > 0.02
+    assert force[moving] == pytest.approx(expected[moving], abs=0.1)
+
+
+def test_until_the_cavity_closes_a_share_of_the_yield_force_is_missing_and_the_lag_delays_it():
+    rig = replace(BARE, viscosity=0, yield_off=500, knee=1e-7, knee_lag=0, cavity_depth=0.3, cavity_time=6e-3)
+    motion, force = last_cycle(rig)
+    hysteretic = force + rig.gas.force(-motion.displacement) - rig.offset_force
+    path = motion.path
+    length = 6e-3 * 2 * np.pi * 0.05  # time · peak speed of the stroke before
+    share = 1 - 0.3 / (1 + (path.distance / length) ** 8)
+    inner = (path.distance > 1e-4) & (path.stroke > 0)
+    assert np.abs(hysteretic)[inner] == pytest.approx(500 * share[inner], rel=2e-3)
+    late = replace(rig, knee_lag=4e-3, cavity_depth=0.0)
+    whole = sine(CONDITION, 2, 1000)
+    plain = replace(late, knee_lag=0.0).force(whole) - late.offset_force + late.gas.force(-whole.displacement)
+    lagged = late.force(whole) - late.offset_force + late.gas.force(-whole.displacement)
+    keep, state, expected = np.exp(-(whole.time[1] - whole.time[0]) / 4e-3), plain[0], []
+    for value in plain:
+        state = value + (state - value) * keep
+        expected.append(state)
+    assert lagged == pytest.approx(np.array(expected), abs=1e-9)
+
+
+def test_sensors_delay_quantise_and_add_noise():
+    motion = sine(CONDITION, 2, 500)
+    force = 1000 * np.sin(2 * np.pi * motion.time)
+    rng = np.random.default_rng(0)
+    clean = replace(BARE, force_delay=4e-3)
+    run = clean.sense(motion, force, rng, id="one")
+    assert run.force == pytest.approx(np.interp(motion.time - 4e-3, motion.time, force))
+    assert run.displacement == pytest.approx(motion.displacement)
+    coarse = replace(BARE, force_step=50.0, displacement_step=1e-3).sense(motion, force, rng, id="two")
+    assert coarse.force == pytest.approx(50 * np.round(force / 50))
+    assert coarse.displacement == pytest.approx(1e-3 * np.round(motion.displacement / 1e-3))
+    noisy = replace(BARE, force_noise=6.0, displacement_noise=5e-6).sense(motion, force, rng, id="three")
+    assert np.std(noisy.force - force) == pytest.approx(6.0, rel=0.1)
+    assert np.std(noisy.displacement - motion.displacement) == pytest.approx(5e-6, rel=0.1)
+    assert (noisy.rig, noisy.id) == ("virtual", "three")
+
+
+def test_runs_are_named_after_their_condition_and_hold_steady_cycles_after_a_run_in():
+    runs = {run.id: run for run in virtual_dataset(currents=(0.25,), cycles=3)}
+    assert set(runs) == {f"{1e3 * A:g}mm-{f:g}Hz-0.25A" for A, f in (*MOTIONS, (0.08, 1.0))}
+    run = runs["20mm-2Hz-0.25A"]
+    assert run.nominal == Condition(0.25, 2.0, 0.02)
+    assert run.window == pytest.approx((0.5, 2.0))
+    assert run.time[-1] == pytest.approx(2.0)
+    assert run.time.size == pytest.approx(4 * 250, abs=1)
+    # Every run draws noise of its own.
+    true = {f"{1e3 * c.amplitude_m:g}": f for c, _, f in true_runs(VirtualRig(), (0.25,), 3) if c.frequency_Hz == 1}
+    noise = [r.force - np.interp(r.time - 5e-4, r.time, true[a]) for r, a in
+             ((runs["20mm-1Hz-0.25A"], "20"), (runs["50mm-1Hz-0.25A"], "50"))]  # fmt: skip
+    assert abs(np.corrcoef(*noise)[0, 1]) < 0.15
+
+
+def test_the_dry_friction_test_holds_neither_yield_nor_viscous_force():
+    dry, filled = friction_test(), friction_test(filled=True)
+    assert np.ptp(filled.force) - np.ptp(dry.force) == pytest.approx(2 * VirtualRig().yield_off, abs=15)
+    assert dry.id == "friction-0.01mm-s"
+    assert dry.nominal == Condition(0.0, SLOW_SPEED / 0.08, 0.020)
+    assert np.array_equal(friction_test(seed=2).force, friction_test(seed=2).force)
+    assert not np.array_equal(friction_test(seed=2).force, dry.force)
