@@ -77,7 +77,7 @@ def program_sources(made: Program, name: str, title: str) -> dict[str, str]:
         "name": word,
         "upper": word.upper(),
         "title": c_comment(title),
-        "version": _version(),
+        "version": package_version(),
         "derived": derived,
         "members": list(made.tape.starts),
         "starts": [(member, repr(start)) for member, start in made.tape.starts.items()],
@@ -148,7 +148,7 @@ def c_facts(made: Stream, name: str, rig: str, language: type[CWriter] = CWriter
         "upper": name.upper(),
         "rig": c_comment(rig),
         "title": c_comment(made.title),
-        "version": _version(),
+        "version": package_version(),
         "equation": textwrap.wrap(c_comment((type(made.model).__doc__ or "").split("\n\n")[0]), 96)
         if made.model
         else [],
@@ -228,7 +228,8 @@ def _envelope(made: Stream) -> list[tuple[str, str, str]]:
     ]
 
 
-def _version() -> str:
+def package_version() -> str:
+    """Of mrdamper."""
     from importlib.metadata import version
 
     return version("mrdamper")

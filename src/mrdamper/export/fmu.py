@@ -7,7 +7,7 @@ import io
 import math
 import uuid
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -27,7 +27,7 @@ from mrdamper.streaming import FLAGS, Stepper, Stream, stream
 
 _SAMPLES_A_CYCLE = 200
 _INTERNAL_STEP = 2.0**-9  # s; two milliseconds, so that the usual communication step of one is taken whole
-_MOST_STEPS = 1_000_000  # internal ones, in a communication step
+MOST_STEPS = 1_000_000  # internal ones, in a communication step
 _DATE = (1980, 1, 1, 0, 0, 0)  # the earliest a zip file knows: the same FMU has the same bytes
 _TESTED = (
     ("current", "current_A", 1.0, "A"),
@@ -66,8 +66,11 @@ class FMUExporter(Exporter):
             raise InputError(f"no platform {', '.join(sorted(unknown))}", mend=f"known: {known}", code="E_PLATFORM")
 
     def export(self, damper: Damper | Model, name: str) -> Written:
-        files = fmu_texts(damper, identifier(name), self.fmi)
-        binaries, notes = self._binaries(files, identifier(name))
+        return self.packed(fmu_texts(damper, identifier(name), self.fmi), identifier(name))
+
+    def packed(self, files: Mapping[str, bytes], name: str) -> Written:
+        """The texts of an FMU with binaries of their sources, zipped."""
+        binaries, notes = self._binaries(files, name)
         return Written({f"{name}{self.suffix}": zipped({**files, **binaries})}, tuple(notes))
 
     def _binaries(self, files: Mapping[str, bytes], name: str) -> tuple[dict[str, bytes], list[str]]:
@@ -152,9 +155,12 @@ def fmu_texts(damper: Damper | Model, name: str, fmi: int) -> dict[str, bytes]:
     known = reference(made)
     rig = damper_of(damper).rig
     facts = _facts(made, name, rig, fmi, known)
-    draft = _texts(made, facts, known, rig, token="")
-    token = token_of(draft)
-    return _texts(made, facts, known, rig, token=token)
+    return with_token(lambda token: _texts(made, facts, known, rig, token))
+
+
+def with_token(texts: Callable[[str], dict[str, bytes]]) -> dict[str, bytes]:
+    """Texts that hold the token made of them without it."""
+    return texts(token_of(texts("")))
 
 
 def token_of(files: Mapping[str, bytes]) -> str:
@@ -193,7 +199,7 @@ def _facts(made: Stream, name: str, rig: str, fmi: int, known: Reference) -> dic
     ]
     return facts | {
         "fmi": fmi,
-        "most_steps": _MOST_STEPS,
+        "most_steps": MOST_STEPS,
         "stop_time": repr(known.step * (known.force.size - 1)),
         "about": f"{made.title}{f' of rig {rig}' if rig else ''}, made by mrdamper.",
     }
@@ -214,11 +220,11 @@ def _texts(made: Stream, facts: Mapping[str, Any], known: Reference, rig: str, t
         "modelDescription.xml": render(f"modelDescription_fmi{fmi}.xml.j2", **facts, token=token, source_files=listed),
         **{f"sources/{file}": text for file, text in sources.items()},
         "documentation/index.html": render("fmu_documentation.html.j2", **facts),
-        "resources/reference_in.csv": _table(
+        "resources/reference_in.csv": csv_table(
             ("time", "displacement", "velocity", "current"),
             (_times(known), known.displacement, known.velocity, known.current),
         ),
-        "resources/reference_out.csv": _table(
+        "resources/reference_out.csv": csv_table(
             ("time", "force", *(f"outside_{flag}" for flag in FLAGS)),
             (_times(known), known.force, *(known.flags >> bit & 1 for bit in range(len(FLAGS)))),
         ),
@@ -230,6 +236,7 @@ def _times(known: Reference) -> Floats:
     return known.step * np.arange(known.force.size, dtype=np.float64)
 
 
-def _table(head: Iterable[str], columns: Iterable[np.ndarray]) -> str:
+def csv_table(head: Iterable[str], columns: Iterable[np.ndarray]) -> str:
+    """Rows of numbers under their names, all digits."""
     rows = zip(*(column.tolist() for column in columns), strict=True)
     return "".join(f"{','.join(row)}\n" for row in [head, *(map(repr, row) for row in rows)])

@@ -126,10 +126,11 @@ def _variables(made: Stream, fmi: int, internal_step: float, current: float) -> 
             info.name, _sentence(info.meaning), "real", *kind, unit=unit, start=value, symbol=f"p_{info.name}", **bounds
         )
     shown = [(reference, v) for reference, v in enumerate(named) if fmi == 3 or v["name"] != "time"]
-    return [_variable(v, reference, index) for index, (reference, v) in enumerate(shown, 1)]
+    return [variable(v, reference, index) for index, (reference, v) in enumerate(shown, 1)]
 
 
-def _variable(v: dict[str, Any], reference: int, index: int) -> Variable:
+def variable(v: dict[str, Any], reference: int, index: int) -> Variable:
+    """One variable from what is known of it by name."""
     attributes = []
     if "type" in v:
         attributes.append(("declaredType", v["type"]))

@@ -11,8 +11,6 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-_INPUTS = ("displacement", "velocity", "current")
-
 
 def main(folder: str, report: str, tolerance: str, *binary: str) -> None:
     """Look at the FMU unpacked in `folder`, its binary too if told so."""
@@ -35,7 +33,6 @@ def main(folder: str, report: str, tolerance: str, *binary: str) -> None:
     try:
         described: Any = read_model_description(folder, validate=False)
         references = {v.name: v.valueReference for v in described.modelVariables}
-        force, inputs = references["force"], [references[name] for name in _INPUTS]
     except Exception as error:  # whatever FMPy's parser meets
         failed("E_FMU_DESCRIPTION", f"modelDescription.xml: {error!r}")
     if described.fmiVersion not in ("2.0", "3.0") or described.coSimulation is None:
@@ -44,10 +41,15 @@ def main(folder: str, report: str, tolerance: str, *binary: str) -> None:
         motion, known = (_table(Path(folder, f"resources/reference_{way}.csv")) for way in ("in", "out"))
         if motion.size != known.size or motion.size < 3:
             raise ValueError("the tables do not fit together")
-        dt, rows = float(motion["time"][1]), [[float(row[name]) for name in _INPUTS] for row in motion]
-        forces = known["force"]
+        names, main = (motion.dtype.names or ())[1:], (known.dtype.names or ())[1]
+        dt, rows = float(motion["time"][1]), [[float(row[name]) for name in names] for row in motion]
+        forces = known[main]
     except (OSError, ValueError, IndexError) as error:
         failed("E_FMU_REFERENCE", f"the reference cannot be read: {error}")
+    try:
+        force, inputs = references[main], [references[name] for name in names]
+    except KeyError as error:
+        failed("E_FMU_DESCRIPTION", f"modelDescription.xml: no variable {error}")
     if not binary:
         return say("end")
 
@@ -70,12 +72,12 @@ def main(folder: str, report: str, tolerance: str, *binary: str) -> None:
     say("stage", "reference")
     end = dict(stop_time=motion["time"][-1], output_interval=dt)
     try:
-        answer: Any = simulate_fmu(folder, input=motion, output=["force"], validate=False, **end)["force"]
+        answer: Any = simulate_fmu(folder, input=motion, output=[main], validate=False, **end)[main]
     except FMICallException as error:
         failed("E_FMU_REFERENCE", f"the reference is not answered: {error}")
     worst = np.abs(answer - forces).max() if answer.shape == forces.shape else np.nan
     if not worst <= float(tolerance) * np.abs(forces).max():
-        say("E_FMU_REFERENCE", f"the force differs from the reference by {worst:.3g} N")
+        say("E_FMU_REFERENCE", f"{main} differs from the reference by {worst:.3g}")
 
     if described.fmiVersion == "2.0":
         fmu.setupExperiment()
@@ -90,7 +92,7 @@ def main(folder: str, report: str, tolerance: str, *binary: str) -> None:
     fmu.enterInitializationMode()
     put(inputs, rows[0])
     fmu.exitInitializationMode()
-    tries = {"input nan": lambda: put(inputs, [np.nan, 0.0, 0.0])}
+    tries = {"input nan": lambda: put(inputs, [np.nan, *rows[0][1:]])}
     tries |= {f"step {bad}": lambda bad=bad: fmu.doStep(0.0, bad) for bad in (0.0, -dt, np.nan, np.inf)}
     for name, attempt in tries.items():
         with contextlib.suppress(FMICallException):

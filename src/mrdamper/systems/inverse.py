@@ -9,9 +9,10 @@ reversal, it keeps the current it had: there is nothing to be gained, and a sear
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -161,6 +162,11 @@ class Inverse:
         From displacement [m], velocity [m/s], acceleration [m/s²], wanted force [N] and dt [s] to
         current [A], force [N] and the reachable interval [N].
     """
+
+    units: ClassVar[Mapping[str, str]] = {
+        **{"displacement": "m", "velocity": "m/s", "acceleration": "m/s2", "wanted": "N"},
+        **{"current": "A", "force": "N", "lowest": "N", "highest": "N"},
+    }
 
     def __init__(self, program: Program, title: str):
         self.program, self.title = program, title

@@ -129,14 +129,14 @@ def make_walk(elements: Sequence[Stage], control: Stage | None, machine: bool) -
         stage, begin = elements[index], ends[index].tolist()
         step = stage.compiled() if machine else stage.step
         keep = compile_(_keeper(begin[2], len(stage.start)))
-        cuts = [cut(b, size) for b, size in zip(begin, stage.sizes, strict=True)]
-        first = compile_(_one(step, begin[0] - 2, *cuts, keep))
+        p, d, m = (cut(b, size) for b, size in zip(begin, stage.sizes, strict=True))
+        first = compile_(_one(step, begin[0] - 2, p, d, m, keep))
         evaluate = compile_(_either(index, first, evaluate))
     command = compile_(_no_command)
     if control is not None:
         step = control.compiled() if machine else control.step
-        cuts = [cut(b, size) for b, size in zip((2, 0, 0, 0), (*control.sizes, control.inputs), strict=True)]
-        command = compile_(_command(step, *cuts, compile_(_keeper(0, len(control.start)))))
+        p, d, m = (cut(b, size) for b, size in zip((2, 0, 0), control.sizes, strict=True))
+        command = compile_(_command(step, p, d, m, cut(0, control.inputs), compile_(_keeper(0, len(control.start)))))
     return compiled.walk_of(evaluate, command) if machine else partial(walk, evaluate, command)
 
 

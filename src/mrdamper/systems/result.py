@@ -145,7 +145,7 @@ class Simulation:
 
     @property
     def energy_gap(self) -> float:
-        """Largest imbalance of energy over the most that was put in."""
+        """Largest imbalance of energy over the most that was put in, stored or spent."""
         spent = sum(series for name, series in self.energy.items() if name != "input")
-        most = max(float(np.abs(self.energy["input"]).max()), np.finfo(float).tiny)
+        most = max(max(float(np.abs(series).max()) for series in self.energy.values()), np.finfo(float).tiny)
         return float(np.abs(self.energy["input"] - spent).max()) / most

@@ -16,13 +16,15 @@ def register(app: typer.Typer) -> None:
         to: str = typer.Option(..., "--to", help="c, fmu, page, latex, markdown, table, adams."),
         out: Path = typer.Option(..., "--out", help="Folder to write into; for fmu, page, latex, markdown a file."),
         name: str | None = typer.Option(None, "--name", help="Of files and symbols; default: the rig."),
-        inverse: bool = typer.Option(False, "--inverse", help="For c: the current for a wanted force instead."),
+        inverse: bool = typer.Option(False, "--inverse", help="For c and fmu: the current for a wanted force instead."),
         fmi: int | None = typer.Option(None, "--fmi", help="For fmu: version of the standard, 2 (default) or 3."),
     ) -> None:
         """Export a saved model: C99 source, FMU, web page, LaTeX or Markdown equations, force–velocity tables."""
         from mrdamper.errors import InputError
         from mrdamper.export import exporter
         from mrdamper.export.base import identifier, write_export
+        from mrdamper.export.fmu import FMUExporter
+        from mrdamper.export.fmu_program import write_program_fmu
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.model_file import load_model
 
@@ -34,15 +36,23 @@ def register(app: typer.Typer) -> None:
         require_writable(out)
         damper = load_model(model)
         called = identifier(name or damper.rig or "damper")
-        if inverse and to != "c":
-            raise InputError(f"--inverse with --to {to}", mend="export --to c", code="E_OPTION")
         if inverse:
-            from mrdamper.export.c import write_program
             from mrdamper.systems.inverse import invert
 
-            turned = invert(damper)
-            for path in write_program(turned.program, f"{called}_inverse", turned.title, out):
+            turned, named = invert(damper), f"{called}_inverse"
+            notes: tuple[str, ...] = ()
+            if to == "c":
+                from mrdamper.export.c import write_program
+
+                paths = write_program(turned.program, named, turned.title, out)
+            elif isinstance(made, FMUExporter):
+                paths, notes = write_program_fmu(turned.program, named, turned.title, turned.units, out, exporter=made)
+            else:
+                raise InputError(f"--inverse with --to {to}", mend="export --to c or fmu", code="E_OPTION")
+            for path in paths:
                 typer.echo(path)
+            for note in notes:
+                typer.echo(f"note: {note}", err=True)
             return
         written = made.export(damper, called)
         for path in write_export(written, out, kind.suffix):

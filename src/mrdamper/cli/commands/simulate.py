@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from mrdamper.systems.controllers import Controller
     from mrdamper.systems.monte_carlo import Bands
     from mrdamper.systems.result import Simulation
+    from mrdamper.systems.simulate import Loop
 
 
 def register(app: typer.Typer) -> None:
@@ -49,6 +50,7 @@ def register(app: typer.Typer) -> None:
             None, "--out", help="Folder for simulation.html, time histories and measures."
         ),
         law_out: Optional[Path] = typer.Option(None, "--c", help="Folder for the control law as C99."),  # noqa: UP045
+        law_fmu: Optional[Path] = typer.Option(None, "--fmu", help="File for the control law as an FMU."),  # noqa: UP045
         as_json: bool = typer.Option(False, "--json", help="Print JSON, SI units."),
     ) -> None:
         """Simulate a building or a vehicle with its dampers, and print what they let through."""
@@ -89,14 +91,8 @@ def register(app: typer.Typer) -> None:
         others = [_controller(text) for text in _all_of(beside or [])]
         if others and not dampers:
             raise InputError("controllers without a damper", mend="leave out --without-damper or --beside")
-        if law_out is not None:
-            from mrdamper.export.c import write_program
-
-            law = Loop(found.system, shaken_by, dampers, controller, highest).control.program
-            if law is None:
-                raise InputError(f"{type(controller).name} has no law to export", mend="give --control a law")
-            for path in write_program(law, type(controller).name, controller.title, law_out):
-                typer.echo(f"{path}", err=True)
+        if law_out is not None or law_fmu is not None:
+            _export_law(Loop(found.system, shaken_by, dampers, controller, highest), law_out, law_fmu)
         drawn = None
         if draws is not None:
             if not dampers:
@@ -119,6 +115,23 @@ def register(app: typer.Typer) -> None:
         else:
             _print(done)
             _print_bands(done, bands, dampers)
+
+
+def _export_law(loop: Loop, folder: Path | None, fmu: Path | None) -> None:
+    """The law of a loop as C99 in a folder, and as an FMU."""
+    from mrdamper.errors import InputError
+    from mrdamper.export.c import write_program
+    from mrdamper.export.fmu_program import write_program_fmu
+
+    law, (name, title) = loop.control.program, (type(loop.controller).name, type(loop.controller).title)
+    if law is None:
+        raise InputError(f"{name} has no law to export", mend="give --control a law")
+    paths, notes = [] if folder is None else write_program(law, name, title, folder), ()
+    if fmu is not None:
+        made, notes = write_program_fmu(law, name, title, loop.control.units, fmu, loop.period, loop.control.start)
+        paths += made
+    for line in (*paths, *(f"note: {note}" for note in notes)):
+        typer.echo(f"{line}", err=True)
 
 
 def _all_of(names: list[str]) -> list[str]:

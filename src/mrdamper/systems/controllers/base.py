@@ -18,6 +18,11 @@ from mrdamper.systems.inverse import check_monotone, invert_on
 from mrdamper.systems.structure import Link, System
 from mrdamper.tracing import Program, Tape, program
 
+_UNITS = {
+    **{"position": "m", "velocity": "m/s", "acceleration": "m/s2"},
+    **{"stroke": "m", "stroke_rate": "m/s", "force": "N"},
+}
+
 
 @dataclass(frozen=True)
 class Sight:
@@ -126,6 +131,15 @@ class Control:
     signals: tuple[str, ...]
     start: tuple[float, ...]
     limits: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of every input but dt, and of every output, by its name in the program."""
+        assert self.program is not None
+        inputs = zip(self.program.tape.inputs, self.signals, strict=False)  # dt comes last and is no signal
+        return {name: _UNITS[signal.rpartition(".")[2]] for name, signal in inputs} | dict.fromkeys(
+            self.program.outputs, "A"
+        )
 
 
 class Controller(ABC):

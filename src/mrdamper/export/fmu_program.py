@@ -1,0 +1,157 @@
+"""FMUs of programs that are no dampers: control laws, inverses. They share the damper's FMI functions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from mrdamper.data import Floats
+from mrdamper.export.base import Written, identifier, write_export
+from mrdamper.export.c import package_version, program_sources
+from mrdamper.export.fmu import MOST_STEPS, FMUExporter, csv_table, with_token
+from mrdamper.export.fmu_description import units_of, variable
+from mrdamper.export.templates import render
+from mrdamper.files.encoding import c_comment
+from mrdamper.tracing import Program
+from mrdamper.tracing.python import python_functions
+
+_STEP = 2.0**-10  # s, of the reference where the program has no clock of its own
+_ROWS = 401
+_USUAL = {"m": 0.01, "m/s": 0.1, "m/s2": 1.0, "N": 500.0}  # amplitudes of the reference's inputs
+
+
+def write_program_fmu(
+    made: Program,
+    name: str,
+    title: str,
+    units: Mapping[str, str],
+    out: str | Path,
+    period: float = 0.0,
+    start: Sequence[float] = (),
+    exporter: FMUExporter | None = None,
+) -> tuple[list[Path], tuple[str, ...]]:
+    """Write a program as an FMU, whole or not at all.
+
+    Parameters
+    ----------
+    made : Program
+        With dt as its last input and no parameters.
+    name, title : str
+        Of files and symbols; for people.
+    units : mapping of str to str
+        Of every input but dt, and every output.
+    out : path
+    period : float
+        Between two samples [s]; 0: a sample every communication step.
+    start : sequence of float
+        Outputs before the first sample.
+    exporter : FMUExporter, optional
+        With version and platforms.
+
+    Returns
+    -------
+    list of Path, tuple of str
+        What was written; notes, such as platforms left out.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    """
+    kind, word = exporter or FMUExporter(), identifier(name)
+    facts = _facts(made, word, title, units, period, tuple(start) or (0.0,) * len(made.outputs), kind.fmi)
+    written: Written = kind.packed(with_token(lambda token: _texts(made, {**facts, "token": token})), word)
+    return write_export(written, out, kind.suffix), written.notes
+
+
+def _facts(
+    made: Program,
+    word: str,
+    title: str,
+    units: Mapping[str, str],
+    period: float,
+    start: Sequence[float],
+    fmi: Literal[2, 3],
+) -> dict[str, Any]:
+    seen = [name for name in made.tape.inputs if name != "dt"]
+    named = [("time", "independent"), *((name, "input") for name in seen), *((name, "output") for name in made.outputs)]
+    shown = [(reference, name, way) for reference, (name, way) in enumerate(named) if fmi == 3 or name != "time"]
+    variables = [
+        variable(
+            {"name": name, "description": name.replace("_", " ").capitalize(), "symbol": name, "kind": "real"}
+            | {"causality": way, "variability": "continuous", "unit": {"time": "s", **units}[name]}
+            | ({"start": 0.0} if way == "input" else {}),
+            reference,
+            index,
+        )
+        for index, (reference, name, way) in enumerate(shown, 1)
+    ]
+    place = {"independent": "time", "input": "set.{}", "output": "held.{}"}
+    readable = [(v.reference, place[v.causality].format(v.name)) for v in variables]
+    serial = [("real", f"program.{member}") for member in made.tape.starts]
+    serial += [("real", where) for _, where in readable if where != "time"] + [("real", "due"), ("real", "time")]
+    return {
+        "name": word,
+        "upper": word.upper(),
+        "title": c_comment(title),
+        "about": f"{title}, made by mrdamper.",
+        "version": package_version(),
+        "fmi": fmi,
+        "variables": variables,
+        "units": units_of(v.unit for v in variables),
+        "types": (),
+        "most_steps": MOST_STEPS,
+        "period": repr(float(period)),
+        "sampled": period,
+        "internal_step": repr(period or _STEP),
+        "stop_time": repr((period or _STEP) * (_ROWS - 1)),
+        "held": [(name, repr(float(value))) for name, value in zip(made.outputs, start, strict=True)],
+        "readable": readable,
+        "settable": [(v.reference, f"set.{v.name}") for v in variables if v.causality == "input"],
+        "serial": [*serial, ("int", "program.samples"), ("int", "phase")],
+    }
+
+
+def _texts(made: Program, facts: dict[str, Any]) -> dict[str, bytes]:
+    name, fmi = facts["name"], facts["fmi"]
+    sources = {
+        **program_sources(made, name, facts["title"]),
+        f"{name}_fmu.h": render("fmu_program.h.j2", **facts),
+        f"{name}_fmu.c": render("fmu_program.c.j2", **facts),
+        f"{name}_fmi{fmi}.c": render(f"fmi{fmi}_functions.c.j2", **facts),
+    }
+    listed = sorted(file for file in sources if file.endswith(".c"))
+    if fmi == 3:
+        sources["buildDescription.xml"] = render("buildDescription.xml.j2", **facts, source_files=listed)
+    time, given, found = _reference(made, facts)
+    texts = {
+        "modelDescription.xml": render(f"modelDescription_fmi{fmi}.xml.j2", **facts, source_files=listed),
+        **{f"sources/{file}": text for file, text in sources.items()},
+        "documentation/index.html": render("fmu_program.html.j2", **facts),
+        "resources/reference_in.csv": csv_table(("time", *given), (time, *given.values())),
+        "resources/reference_out.csv": csv_table(("time", *found), (time, *found.values())),
+    }
+    return {path: text.encode() for path, text in texts.items()}
+
+
+def _reference(made: Program, facts: dict[str, Any]) -> tuple[Floats, dict[str, Floats], dict[str, Floats]]:
+    """Growing sines, and what the program answers: each row to the inputs of the row before."""
+    step = facts["sampled"] or _STEP
+    time = step * np.arange(_ROWS, dtype=np.float64)
+    given = {
+        v.name: _USUAL.get(v.unit, 1.0) * time / time[-1] * np.sin(2 * math.pi * (2 + 0.37 * i) * time / time[-1] * 2)
+        for i, v in enumerate(v for v in facts["variables"] if v.causality == "input")
+    }
+    prepare, advance = python_functions(made)
+    _, derived = prepare(())
+    memory = tuple(made.tape.starts.values())
+    rows = [tuple(float(value) for _, value in facts["held"])]
+    for sample in list(zip(*(column.tolist() for column in given.values()), strict=True))[:-1]:
+        _, outputs, memory = advance((), derived, memory, (*sample, step))
+        rows.append(outputs)
+    columns = (np.array(column) for column in zip(*rows, strict=True))
+    return time, given, dict(zip(made.outputs, columns, strict=True))
