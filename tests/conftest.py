@@ -15,6 +15,13 @@ from mrdamper.data import Condition
 from mrdamper.files.dataset import load_dataset
 
 
+def pytest_collection_modifyitems(items):
+    """The study is computed by one process of several, which runs all that look at it."""
+    for item in items:
+        if "bundled_study" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.xdist_group("study"))
+
+
 @pytest.fixture(scope="session")
 def bundled():
     return load_dataset()

@@ -40,6 +40,6 @@ def test_a_run_described_far_worse_than_the_others_is_named_by_its_factor():
     fit = JointFit(joint_damper(), np.array([0.02, 0.02, 0.09]), ("d",), np.zeros(2), Ending.SETTLED, 9, 0.1)
     sentences = doubts(scored(fit), ())
     assert any("4.5 times the median" in s for s in sentences)
-    assert any("at a limit of their range: d" in s for s in sentences)
+    assert any("known from one side only: d (half the play and seat" in s for s in sentences)
     calm = replace(fit, nrmse_pp=np.array([0.02, 0.02, 0.03]), at_bounds=())
     assert not any("times the median" in s or "limit" in s for s in doubts(scored(calm), ()))

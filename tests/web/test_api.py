@@ -367,9 +367,12 @@ def test_identified_values_are_those_of_identify(client, app, session, small_rig
     assert report["state"] == "done", report
     for shown in report["answer"]["runs"]:
         assert shown["values"] == pytest.approx(identify(small_rig[shown["id"]], "bingham").model.values(), rel=1e-12)
-        assert shown["errors"] == pytest.approx(identify(small_rig[shown["id"]], "bingham").standard_errors)
+        alone = identify(small_rig[shown["id"]], "bingham")
+        assert shown["intervals"]
+        for name, ends in shown["intervals"].items():
+            assert ends == pytest.approx(alone.interval(name))
     held = wait(client, session, client.post(f"{session}/identify", json={**choice, "fixed": {"f0": 12.0}}).json())
-    assert all(run["values"]["f0"] == 12.0 and "f0" not in run["errors"] for run in held["answer"]["runs"])
+    assert all(run["values"]["f0"] == 12.0 and "f0" not in run["intervals"] for run in held["answer"]["runs"])
     wait(client, session, client.post(f"{session}/identify", json=choice).json())
     head, curves = opened(client.get(f"{session}/identified/runs/0").content)
     assert head["id"] == report["answer"]["runs"][0]["id"]

@@ -106,9 +106,11 @@ class Characteristics:
         slowest = [min(s.peak_velocity[side] for s in self.at(c)) for c in self.currents for side in (0, 1)]
         fastest = [max(s.peak_velocity[side] for s in self.at(c)) for c in self.currents for side in (0, 1)]
         low, high = float(np.median(slowest)), float(np.median(fastest))
-        unit = 10.0 ** np.floor(np.log10(max(high - low, 1e-3 * high)) - 1)
-        steps = np.linspace(np.ceil(low / unit), np.floor(high / unit), _STEPS).round() * unit
-        return tuple(sorted({float(f"{v:.6g}") for v in steps}))
+        for step in (10.0**power * mantissa for power in range(-5, 3) for mantissa in (1, 2, 2.5, 5)):
+            count = np.floor(high / step + 1e-9) - np.ceil(low / step - 1e-9) + 1
+            if 1 <= count <= _STEPS:
+                return tuple(float(f"{step * (np.ceil(low / step - 1e-9) + i):.6g}") for i in range(int(count)))
+        return (float(f"{high:.3g}"),)
 
 
 def characterise(runs: Sequence[Run]) -> Characteristics:

@@ -15,6 +15,7 @@ from mrdamper.identification.loop_analysis import LoopAnalysis
 from mrdamper.study.recipe import Scored
 from mrdamper.validation import Validation
 
+_SEARCHED = {"seat_share": "elastic displacement of the seat, as a share of the play"}
 _WEAK_FUNCTION = 0.9  # left-out error over spread from which a function hardly beats the mean
 
 
@@ -85,7 +86,10 @@ def _functions(fit: ModifiedFit) -> list[str]:
 def _joint(fit: JointFit) -> list[str]:
     sentences = []
     if fit.at_bounds:
-        sentences.append(f"Parameters at a limit of their range: {', '.join(fit.at_bounds)}.")
+        words = {info.name: f"{info.name} ({info.meaning})" for info in fit.damper.model.parameters()}
+        words |= {axis: f"{axis} ({about})" for axis, about in _SEARCHED.items()}
+        named = ", ".join(words.get(name, name) for name in fit.at_bounds)
+        sentences.append(f"At a limit of what is looked for, known from one side only: {named}.")
     if not fit.ending.converged:
         sentences.append(f"The search for one set of parameters {fit.ending}.")
     ratio = float(np.max(fit.nrmse_pp) / np.median(fit.nrmse_pp))

@@ -22,7 +22,9 @@ from fpdf.outline import OutlineSection
 _MARGIN = 18.0  # mm
 _INK, _FAINT, _RULE = (27, 31, 36), (91, 101, 112), (217, 222, 227)
 _SIZES = {"h1": 18.0, "h2": 14.0, "h3": 11.0, "p": 9.5, "table": 8.0, "caption": 8.0}  # pt
-_SMALLEST = 5.0  # pt, below which a table turns its page instead
+_SMALLEST = 6.0  # pt, below which a table turns its page instead
+_PADDING = 3.8  # mm beside a cell's text
+_NARROWEST = 28.0  # mm of a column whose text runs over lines
 _KEEP = 42.0  # mm a heading wants below itself, so that it never ends a page
 _VOID = frozenset({"br", "img", "meta", "link", "hr", "input"})
 _INLINE = frozenset({"b", "strong", "code", "a", "span", "br", "em", "i", "sup", "sub"})
@@ -133,6 +135,7 @@ class _Writer:
     def __init__(self, paper: _Paper, figures: Mapping[str, bytes]) -> None:
         self.paper, self.figures = paper, figures
         self.kept = 0.0  # mm that a heading wants below itself for what follows it
+        self.wide = False  # what follows is a table that needs a page turned
         self.places: list[tuple[str, int, float, float, float]] = []  # figure, page, left, bottom [mm], width
 
     def block(self, element: _Element) -> None:
@@ -142,6 +145,8 @@ class _Writer:
         known = {"h1": self.heading, "h2": self.heading, "h3": self.heading, "table": self.table}
         known |= {"figure": self.figure, "li": self.item, "p": self.paragraph, "summary": self.folded}
         if element.tag in known:
+            if self.turned and element.tag != "table":
+                self.paper.add_page(orientation="P")
             known[element.tag](element)
         elif "big" in (element.attributes.get("class") or ""):
             self.numbers(element)
@@ -151,8 +156,20 @@ class _Writer:
                 self.paragraph(_Element("p", element.attributes, list(loose)))
             blocks = [c for c in element.children if isinstance(c, _Element) and c.tag not in _INLINE]
             for child, following in zip(blocks, [*blocks[1:], None], strict=True):
-                self.kept = self._height(following)
+                self.kept, self.wide = self._height(following), self._is_wide(following)
                 self.block(child)
+
+    @property
+    def turned(self) -> bool:
+        """Whether the page lies on its side."""
+        return self.paper.w > self.paper.h
+
+    def _is_wide(self, element: _Element | None) -> bool:
+        table = next(element.elements("table"), None) if element and element.tag == "div" else element
+        if table is None or table.tag != "table":
+            return False
+        rows = _cells(table)
+        return bool(rows) and self._fitted([[cell.text for cell in row] for row in rows], rows)[0] < _SMALLEST
 
     def heading(self, element: _Element) -> None:
         """A heading, with room below it for what it heads."""
@@ -195,7 +212,9 @@ class _Writer:
 
     def folded(self, element: _Element) -> None:
         """What a folded part of the page is called; here the part stands open."""
-        if self.paper.will_page_break(_KEEP):
+        if self.wide:
+            self.paper.add_page(orientation="L")
+        elif self.paper.will_page_break(_KEEP):
             self.paper.add_page()
         self.paragraph(_Element("p", {}, [_Element("b", {}, [element.text])]))
 
@@ -239,20 +258,21 @@ class _Writer:
         """A table whose headings stand on every page it runs over."""
         paper = self.paper
         caption = next(element.elements("caption"), None)
-        rows = [list(row.elements("th", "td")) for row in element.elements("tr")]
+        rows = _cells(element)
         if not rows:
             return
         texts = [[cell.text for cell in row] for row in rows]
         size, widths = self._fitted(texts, rows)
-        turned = size < _SMALLEST and paper.cur_orientation == "P"
-        if turned:
+        if size < _SMALLEST and not self.turned:
             paper.add_page(orientation="L")
             size, widths = self._fitted(texts, rows)
         elif paper.will_page_break(14 + 0.5 * size * min(len(rows), 4)):
             paper.add_page()
         if caption:
             self.paragraph(_Element("p", {"class": "caption"}, caption.children), _SIZES["caption"])
-        size = max(size, _SMALLEST)
+        size, room = max(size, _SMALLEST), paper.h - 2 * _MARGIN - 16
+        while size > _SMALLEST and room < len(rows) * (0.5 * size + 0.8) < 1.3 * room:
+            size -= 0.25  # a few rows more than a page holds: they need no page of their own
         paper.set_font("text", size=size)
         paper.set_draw_color(*_RULE)
         headed = bool(rows[0]) and rows[0][0].tag == "th"
@@ -271,8 +291,6 @@ class _Writer:
                 for cell, text in zip(row, words, strict=True):
                     line.cell(text, align=_alignment(cell, first=cell is row[0]))
         paper.ln(2)
-        if turned:
-            paper.add_page(orientation="P")
 
     def _fitted(self, texts: list[list[str]], rows: list[list[_Element]]) -> tuple[float, list[float]]:
         """Size of type at which a table fits the page, and its columns' widths [mm]."""
@@ -280,25 +298,33 @@ class _Writer:
         columns = max(len(row) for row in texts)
         while True:
             paper.set_font("text", "B", size)
-            widths, wraps = [0.0] * columns, [False] * columns
+            widths, words, wraps = [0.0] * columns, [0.0] * columns, [False] * columns
             for row, cells in zip(texts, rows, strict=True):
                 for i, (text, cell) in enumerate(zip(row, cells, strict=True)):
-                    wide = max(paper.get_string_width(line) for line in text.split("\n")) + 2.5
+                    wide = max(paper.get_string_width(line) for line in text.split("\n")) + _PADDING
                     wraps[i] |= "wrap" in (cell.attributes.get("class") or "")
                     widths[i] = max(widths[i], wide)
+                    longest = max((paper.get_string_width(word) for word in text.split()), default=0.0)
+                    words[i] = max(words[i], longest + _PADDING)
             free = sum(w for w, wrap in zip(widths, wraps, strict=True) if wrap)
             kept = sum(w for w, wrap in zip(widths, wraps, strict=True) if not wrap)
             room = paper.epw - kept
             if free <= room:
                 return size, widths
-            least = 28.0 * sum(wraps)
-            if any(wraps) and room >= least:
-                shared = zip(widths, wraps, strict=True)
-                return size, [max(28.0, w * room / free) if wrap else w for w, wrap in shared]
+            least = {i: max(_NARROWEST, words[i]) for i, wrap in enumerate(wraps) if wrap}
+            spare = room - sum(least.values())
+            if least and spare >= 0:  # it goes to the columns by what they lack
+                lack = {i: max(0.0, widths[i] - least[i]) for i in least}
+                share = spare / (sum(lack.values()) or 1.0)
+                return size, [least[i] + share * lack[i] if i in least else w for i, w in enumerate(widths)]
             if size <= _SMALLEST:
                 scale = paper.epw / (free + kept)
                 return _SMALLEST - 0.1, [w * scale for w in widths]
             size -= 0.5
+
+
+def _cells(table: _Element) -> list[list[_Element]]:
+    return [list(row.elements("th", "td")) for row in table.elements("tr")]
 
 
 def _alignment(cell: _Element, *, first: bool) -> str:
@@ -334,15 +360,37 @@ def _size_of(figure: bytes) -> tuple[float, float]:
 
 
 def _with_figures(text: bytes, places: list[Any], figures: Mapping[str, bytes]) -> bytes:
-    from pypdf import PdfReader, PdfWriter, Transformation
+    """Lay figures into their places, each as one object: their drawing is not taken apart, which takes seconds."""
+    from pypdf import PdfReader, PdfWriter
+    from pypdf.generic import ArrayObject, DecodedStreamObject, DictionaryObject, NameObject
 
     whole = PdfWriter(clone_from=io.BytesIO(text))
     point = 72 / 25.4
-    for name, page, left, bottom, width in places:
+    drawn: dict[int, list[tuple[str, Any, str]]] = {}
+    for number, (name, page, left, bottom, width) in enumerate(places):
         figure = PdfReader(io.BytesIO(figures[name])).pages[0]
+        form, content = DecodedStreamObject(), figure.get_contents()
+        form.set_data(content.get_data() if content is not None else b"")
+        form[NameObject("/Type")], form[NameObject("/Subtype")] = NameObject("/XObject"), NameObject("/Form")
+        form[NameObject("/BBox")] = ArrayObject(figure.mediabox)
+        form[NameObject("/Resources")] = figure["/Resources"].clone(whole)  # type: ignore[union-attr]
         scale = width * point / float(figure.mediabox.width)
-        moved = Transformation().scale(scale).translate(left * point, bottom * point)
-        whole.pages[page].merge_transformed_page(figure, moved)
+        put = f"q {scale:.5f} 0 0 {scale:.5f} {left * point:.3f} {bottom * point:.3f} cm /Figure{number} Do Q"
+        drawn.setdefault(page, []).append((f"/Figure{number}", whole._add_object(form.flate_encode()), put))
+    for page, objects in drawn.items():
+        sheet = whole.pages[page]
+        shared: Any = sheet["/Resources"].get_object()
+        resources = DictionaryObject(shared)  # a page's own: pages share theirs
+        known = resources.get("/XObject", DictionaryObject()).get_object()
+        resources[NameObject("/XObject")] = DictionaryObject(
+            {**known, **{NameObject(name): reference for name, reference, _ in objects}}
+        )
+        sheet[NameObject("/Resources")] = resources
+        more = DecodedStreamObject()
+        more.set_data("\n".join(put for _, _, put in objects).encode())
+        before = sheet.raw_get("/Contents")
+        before = list(before) if isinstance(before, ArrayObject) else [before]
+        sheet[NameObject("/Contents")] = ArrayObject([*before, whole._add_object(more)])
     made = io.BytesIO()
     whole.write(made)
     return made.getvalue()

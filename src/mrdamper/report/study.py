@@ -25,7 +25,7 @@ from mrdamper.report.about import About, Limit
 from mrdamper.report.damper_tests import facts_of_tests, figures_of_tests, force_rows, provenance
 from mrdamper.report.distrust import doubts
 from mrdamper.report.page import made_from, render_page
-from mrdamper.report.plots.model import parameter_curves, predicted_loops, residual_map, score_strip
+from mrdamper.report.plots.model import BAND_LEVEL, parameter_curves, predicted_loops, residual_map, score_strip
 from mrdamper.report.plots.reversal import force_since_reversal
 from mrdamper.report.plots.rig_tests import measured_loops, test_analysis, test_matrix
 from mrdamper.report.plots.style import Picture
@@ -224,6 +224,11 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
             "Held-out runs, last cycle of the steady window: the model has seen none of them."
             if held
             else "Train runs, last cycle of the steady window: the dataset holds no validate runs."
+        )
+        + (
+            f" Dotted: where the force of a session nobody has seen lies, {100 * BAND_LEVEL:.0f} in a hundred."
+            if chosen.damper.certainty
+            else ""
         ),
         "figures": pictures,
     }

@@ -3,27 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
+from mrdamper.dampers.bands import band
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.modified import ModifiedFit
-from mrdamper.data import Run, same_motion
+from mrdamper.data import Floats, Run, same_motion
 from mrdamper.motion import equivalent_sine
 from mrdamper.report.plots.style import (
     MEASURED,
     MM,
+    MOST_NAMED,
     PALETTE,
     PREDICTED,
     current_colours,
     house_style,
     label,
+    levels,
     new_figure,
+    powered,
+    speed_colours,
     thin,
 )
 from mrdamper.validation import Validation
 
+BAND_LEVEL = 0.9  # share of the sessions nobody has seen whose force the band holds
 _WORST_SHOWN = 25.0  # per cent; a run beyond is drawn as an arrow at the edge
 _AXES = {
     "c": ("Viscous damping c (N s/m)", 1.0),
@@ -50,17 +58,26 @@ def predicted_loops(damper: Damper, runs: Sequence[Run]) -> Figure:
             end = run.window[1] if run.window else float(run.time[-1])
             last = (run.time <= end) & (run.time >= end - 1.02 * period)
             motion = prediction.motion
-            for force, colour, name in ((run.force, MEASURED, "measured"), (prediction.force, PREDICTED, "predicted")):
-                over_x.plot(MM * thin(motion.displacement[last]), thin(force[last]), color=colour, label=name)
-                over_v.plot(thin(motion.velocity[last]), thin(force[last]), color=colour, label=name)
-            over_x.set_title(str(prediction.condition), loc="left", fontsize=8)
+            x, v = thin(motion.displacement[last]), thin(motion.velocity[last])
+            curves: list[tuple[Floats, dict[str, Any]]] = [(run.force[last], {"color": MEASURED, "label": "measured"})]
+            if around := band(damper, prediction, BAND_LEVEL, last):
+                edge = {"color": PREDICTED, "lw": 0.6, "ls": ":"}
+                curves += [
+                    (around.low, edge),
+                    (around.high, {**edge, "label": f"{100 * BAND_LEVEL:.0f} % of sessions"}),
+                ]
+            curves.append((prediction.force[last], {"color": PREDICTED, "label": "predicted"}))
+            for force, look in curves:
+                over_x.plot(MM * x, thin(force), **look)
+                over_v.plot(v, thin(force), **look)
+            over_x.set_title(str(prediction.condition), loc="left", fontsize=8 if columns == 2 else 7)
             label(over_x, "Displacement (mm)", "Force (N)" if column == 0 else "")
             label(over_v, "Velocity (m/s)", "Force (N)" if column == 0 else "")
         for unused in range(len(runs), columns * -(-len(runs) // columns)):
             row, column = divmod(unused, columns)
             axes[2 * row * columns + column].set_visible(False)
             axes[(2 * row + 1) * columns + column].set_visible(False)
-        axes[0].legend(loc="center")
+        axes[0].legend(loc="center", fontsize=7)
         return figure
 
 
@@ -68,39 +85,39 @@ def parameter_curves(fit: ModifiedFit) -> Figure:
     """Identified values over current, one colour a motion, and the functions through them."""
     names = [name for name in fit.functions if np.ptp(fit.values[name]) > 0] or list(fit.functions)
     with house_style():
-        columns = 2
-        rows = -(-len(names) // columns)
-        figure, axes = new_figure(rows, columns, 2.5 * rows)
+        rows = -(-len(names) // 2)
+        figure, axes = new_figure(rows, 2, 2.5 * rows, right=1.75)
         groups = sorted(same_motion(fit.conditions, tolerance=0.08), key=lambda g: fit.conditions[g[0]].peak_velocity)
-        shades = current_colours([fit.conditions[g[0]].peak_velocity for g in groups])
+        speeds = [fit.conditions[g[0]].peak_velocity for g in groups]
+        few = len(groups) <= MOST_NAMED
+        shades = current_colours(speeds) if few else speed_colours(figure, speeds)
         dense = np.linspace(0, fit.damper.envelope.current_A[1], 60)
+        middle = fit.conditions[len(fit.conditions) // 2]
+        lines = [fit.conditions[g[0]] for g in groups] if few else [middle]
         for panel, name in zip(axes, names, strict=False):
+            function = fit.functions[name].function
             text, scale = _AXES.get(name, (name, 1.0))
+            curves = [scale * function(dense, c.frequency_Hz, c.amplitude_m) for c in lines]
+            largest = float(np.max(np.abs([*np.ravel(curves), *np.ravel(scale * np.asarray(fit.values[name]))])))
+            text, more = powered(text, 0.0 if function.log else largest)
             for group in groups:
                 first = fit.conditions[group[0]]
-                shade = shades[first.peak_velocity]
-                panel.plot(
-                    [fit.conditions[i].current_A for i in group],
-                    scale * fit.values[name][group],
-                    "o",
-                    ms=3.5,
-                    color=shade,
-                    label=f"{first.frequency_Hz:.2g} Hz, {MM * first.amplitude_m:.3g} mm",
-                )
-                if len(groups) <= 10:
-                    curve = fit.functions[name].function(dense, first.frequency_Hz, first.amplitude_m)
-                    panel.plot(dense, scale * curve, lw=0.9, color=shade)
-            if len(groups) > 10:
-                middle = fit.conditions[len(fit.conditions) // 2]
-                curve = fit.functions[name].function(dense, middle.frequency_Hz, middle.amplitude_m)
-                panel.plot(dense, scale * curve, lw=1.0, color=MEASURED)
-            if fit.functions[name].function.log:
+                currents = [fit.conditions[i].current_A for i in group]
+                key = f"{first.frequency_Hz:.2g} Hz, {MM * first.amplitude_m:.3g} mm"
+                values = more * scale * fit.values[name][group]
+                panel.plot(currents, values, "o", ms=3.5, color=shades[first.peak_velocity], label=key)
+            for condition, curve in zip(lines, curves, strict=True):
+                panel.plot(dense, more * curve, lw=0.9, color=shades[condition.peak_velocity] if few else MEASURED)
+            if function.log:
                 panel.set_yscale("log")
-            label(panel, "Current (A)", text, fit.functions[name].function.form)
+                panel.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+                panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+                panel.yaxis.set_minor_locator(NullLocator())
+            label(panel, "Current (A)", text)
         for panel in axes[len(names) :]:
             panel.set_visible(False)
-        if len(groups) <= 10:
-            axes[0].legend(loc="best", fontsize=6.5)
+        if few:
+            axes[min(1, len(names) - 1)].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         return figure
 
 
@@ -131,9 +148,10 @@ def score_strip(validations: Mapping[str, Validation]) -> Figure:
 def residual_map(damper: Damper, runs: Sequence[Run]) -> Figure:
     """Where the residual lives: mean and spread over velocity and over phase, relative to peak-to-peak force."""
     with house_style():
-        figure, (over_v, over_phase) = new_figure(1, 2, 2.8, sharey=True)
-        colours = current_colours([run.mean_current for run in runs])
-        for run in runs:
+        figure, (over_v, over_phase) = new_figure(1, 2, 2.8, right=1.1, sharey=True)
+        steps = levels([run.mean_current for run in runs])
+        colours = current_colours(steps)
+        for step, run in zip(steps, runs, strict=True):
             found = equivalent_sine(run)
             if not found.is_sine:
                 continue
@@ -143,7 +161,7 @@ def residual_map(damper: Damper, runs: Sequence[Run]) -> Figure:
             error = 100 * (prediction.force - run.force)[inside] / np.ptp(run.force[inside])
             omega = 2 * np.pi * found.condition.frequency_Hz
             phase = np.degrees(np.arctan2(motion.displacement, motion.velocity / omega)) % 360
-            colour = colours[run.mean_current]
+            colour = colours[step]
             for axes, key, bins in (
                 (over_v, motion.velocity / np.max(np.abs(motion.velocity)), np.linspace(-1, 1, 41)),
                 (over_phase, phase, np.linspace(0, 360, 61)),
@@ -153,7 +171,7 @@ def residual_map(damper: Damper, runs: Sequence[Run]) -> Figure:
                 axes.plot((bins[1:] + bins[:-1]) / 2, mean, color=colour, lw=0.9, alpha=0.8)
         for current, colour in colours.items():
             over_phase.plot([], [], color=colour, label=f"{current:g} A")
-        over_phase.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=len(colours))
+        over_phase.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         label(over_v, "Velocity over its peak (–)", "Residual (% of peak-to-peak)")
         label(over_phase, "Phase of the motion (°)", "")
         over_phase.set_xticks([0, 90, 180, 270, 360])

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Floats, Run
-from mrdamper.report.plots.style import MM, PREDICTED, current_colours, house_style, label, new_figure
+from mrdamper.report.plots.style import MM, PREDICTED, current_colours, house_style, label, levels, new_figure
 
 _FARTHEST = 1.5e-3  # m
 
@@ -21,11 +21,12 @@ def force_since_reversal(runs: Sequence[Run], damper: Damper) -> Figure:
     """
     with house_style():
         figure, (axes,) = new_figure(1, 1, 3.0, right=1.2)
-        colours = current_colours([run.mean_current for run in runs])
+        steps = levels([run.mean_current for run in runs])
+        colours = current_colours(steps)
         bins = np.concatenate([np.linspace(0, 0.6e-3, 31), np.linspace(0.65e-3, _FARTHEST, 18)])
         middle = (bins[1:] + bins[:-1]) / 2
         for current, colour in colours.items():
-            members = [run for run in runs if run.mean_current == current]
+            members = [run for step, run in zip(steps, runs, strict=True) if step == current]
             curves = np.array([_means(run, damper, bins) for run in members])
             counts = np.isfinite(curves).sum(axis=0)
             mean = np.where(counts > 0, np.nansum(curves, axis=0) / np.maximum(counts, 1), np.nan)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,37 +13,56 @@ from matplotlib.transforms import ScaledTranslation
 from mrdamper.data import Dataset, same_motion
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, whole_cycles
 from mrdamper.motion import measured_motion
-from mrdamper.report.plots.style import KN, MM, current_colours, house_style, label, new_figure, thin
+from mrdamper.report.plots.style import (
+    KN,
+    MM,
+    MOST_NAMED,
+    current_colours,
+    house_style,
+    label,
+    levels,
+    new_figure,
+    speed_colours,
+    thin,
+)
+
+_BESIDE = 0.07  # inches between the marks of two currents
+_RIGHT: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
 
 
 def test_matrix(loops: Sequence[LoopAnalysis]) -> Figure:
     """Measured frequency against amplitude, one colour a current; hollow marks are held out."""
     with house_style():
-        colours = current_colours([loop.condition.current_A for loop in loops])
-        entries = len({(loop.condition.current_A, loop.split) for loop in loops})
+        steps = levels([loop.condition.current_A for loop in loops])
+        colours = current_colours(steps)
+        entries = len({(step, loop.split) for step, loop in zip(steps, loops, strict=True)})
         figure, (axes,) = new_figure(1, 1, max(3.0, 0.8 + 0.16 * entries), right=1.7)
         for number, (current, colour) in enumerate(colours.items()):
-            beside = ScaledTranslation(4 * (number - (len(colours) - 1) / 2) / 72, 0, figure.dpi_scale_trans)
+            # Marks of one motion stand beside each other, one place a current.
+            aside = ScaledTranslation((number - (len(colours) - 1) / 2) * _BESIDE, 0, figure.dpi_scale_trans)
             for split, face in (("train", colour), ("validate", "none")):
                 chosen = [
-                    loop.condition for loop in loops if loop.condition.current_A == current and loop.split == split
+                    loop.condition
+                    for step, loop in zip(steps, loops, strict=True)
+                    if step == current and loop.split == split
                 ]
                 if not chosen:
                     continue
+                points = np.array([(c.frequency_Hz, MM * c.amplitude_m) for c in chosen])
+                axes.update_datalim(points)  # marks that are set aside are not counted
                 name = f"{current:g} A" + ("" if split == "train" else ", held out")
-                motions = np.array([(c.frequency_Hz, MM * c.amplitude_m) for c in chosen])
-                axes.update_datalim(motions)
-                axes.scatter(
-                    *motions.T,
-                    s=18,
-                    transform=axes.transData + beside,  # currents tested at one motion stand side by side
-                    facecolors=[face],
-                    edgecolors=[colour],
-                    linewidths=1.1,
+                axes.plot(
+                    *points.T,
+                    "o",
+                    ms=5,
+                    mfc=face,
+                    mec=colour,
+                    mew=1.1,
+                    transform=axes.transData + aside,
                     label=name,
                 )
-        axes.autoscale_view()
         label(axes, "Frequency (Hz)", "Amplitude (mm)")
+        axes.autoscale_view()
         axes.set_ylim(bottom=0)
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         return figure
@@ -51,15 +71,14 @@ def test_matrix(loops: Sequence[LoopAnalysis]) -> Figure:
 def measured_loops(dataset: Dataset, loops: Sequence[LoopAnalysis]) -> Figure:
     """Force–displacement and force–velocity loops: over current, then over the motion at one current."""
     with house_style():
-        figure, axes = new_figure(2, 2, 5.6)
+        figure, axes = new_figure(2, 2, 5.6, right=1.7)
         over_current = _over_current(loops)
-        colours = current_colours([loop.condition.current_A for loop in over_current])
-        for loop in over_current:
-            name = f"{loop.condition.current_A:g} A"
-            _draw_loop(axes[0], axes[1], dataset, loop, name, colours[loop.condition.current_A])
-        first = over_current[0].condition
+        colours = current_colours(list(over_current))
+        for current, loop in over_current.items():
+            _draw_loop(axes[0], axes[1], dataset, loop, f"{current:g} A", colours[current])
+        first = next(iter(over_current.values())).condition
         axes[0].set_title(f"{first.frequency_Hz:.3g} Hz, {MM * first.amplitude_m:.3g} mm", loc="left")
-        axes[1].legend(loc="lower right")
+        axes[1].legend(**_RIGHT)
 
         over_motion = _over_motion(loops)
         shades = current_colours([loop.condition.peak_velocity for loop in over_motion])
@@ -67,15 +86,15 @@ def measured_loops(dataset: Dataset, loops: Sequence[LoopAnalysis]) -> Figure:
             condition = loop.condition
             name = f"{condition.frequency_Hz:.2g} Hz, {MM * condition.amplitude_m:.3g} mm"
             _draw_loop(axes[2], axes[3], dataset, loop, name, shades[condition.peak_velocity])
-        axes[2].set_title(f"{over_motion[0].condition.current_A:g} A", loc="left")
-        axes[3].legend(loc="lower right")
+        axes[2].set_title(f"{over_motion[0].condition.current_A:.3g} A", loc="left")
+        axes[3].legend(**_RIGHT)
         return figure
 
 
 def test_analysis(loops: Sequence[LoopAnalysis], ranges: Sequence[DynamicRange]) -> Figure:
     """Peak force, dissipated energy, equivalent damping and dynamic range over current."""
     with house_style():
-        figure, axes = new_figure(2, 2, 5.2)
+        figure, axes = new_figure(2, 2, 5.2, right=1.75)
         quantities: list[tuple[str, Callable[[LoopAnalysis], float]]] = [
             ("Peak force (N)", lambda loop: loop.peak_force),
             ("Dissipated energy (J per cycle)", lambda loop: loop.dissipated_energy),
@@ -83,7 +102,8 @@ def test_analysis(loops: Sequence[LoopAnalysis], ranges: Sequence[DynamicRange])
         ]
         groups = [[loops[i] for i in g] for g in same_motion([loop.condition for loop in loops])]
         groups.sort(key=lambda g: g[0].condition.peak_velocity)
-        shades = current_colours([g[0].condition.peak_velocity for g in groups])
+        speeds = [g[0].condition.peak_velocity for g in groups]
+        shades = current_colours(speeds) if len(groups) <= MOST_NAMED else speed_colours(figure, speeds)
         for panel, (name, value) in zip(axes, quantities, strict=False):
             for group in groups:
                 condition = group[0].condition
@@ -106,26 +126,24 @@ def test_analysis(loops: Sequence[LoopAnalysis], ranges: Sequence[DynamicRange])
             axes[3].set_ylim(bottom=0)
         else:
             axes[3].text(0.5, 0.5, "no motion was tested at two currents", ha="center", transform=axes[3].transAxes)
-        if len(groups) <= 10:
-            axes[0].legend(loc="best", fontsize=7)
+        if len(groups) <= MOST_NAMED:
+            axes[1].legend(**_RIGHT)
         return figure
 
 
-def _over_current(loops: Sequence[LoopAnalysis]) -> list[LoopAnalysis]:
-    """The motion tested at the most currents."""
-    groups = same_motion([loop.condition for loop in loops])
-    best = max(groups, key=lambda g: len({loops[i].condition.current_A for i in g}))
-    chosen = {loops[i].condition.current_A: loops[i] for i in best}
-    return [chosen[current] for current in sorted(chosen)]
+def _over_current(loops: Sequence[LoopAnalysis]) -> dict[float, LoopAnalysis]:
+    """The motion tested at the most currents, by current."""
+    steps = levels([loop.condition.current_A for loop in loops])
+    best = max(same_motion([loop.condition for loop in loops]), key=lambda g: len({steps[i] for i in g}))
+    return dict(sorted({steps[i]: loops[i] for i in best}.items()))
 
 
 def _over_motion(loops: Sequence[LoopAnalysis], most: int = 5) -> list[LoopAnalysis]:
     """Motions at the current with the most tests, slow to fast."""
-    currents = [loop.condition.current_A for loop in loops]
-    common = max(sorted(set(currents)), key=currents.count)
-    chosen = sorted(
-        (loop for loop in loops if loop.condition.current_A == common), key=lambda loop: loop.condition.peak_velocity
-    )
+    steps = levels([loop.condition.current_A for loop in loops])
+    common = max(sorted(set(steps)), key=steps.count)
+    chosen = [loop for step, loop in zip(steps, loops, strict=True) if step == common]
+    chosen.sort(key=lambda loop: loop.condition.peak_velocity)
     picks = np.unique(np.linspace(0, len(chosen) - 1, min(most, len(chosen))).round().astype(int))
     return [chosen[i] for i in picks]
 

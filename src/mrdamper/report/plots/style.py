@@ -12,17 +12,21 @@ from typing import Any, Self
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from mrdamper.data import Floats
+from mrdamper.data import Floats, current_levels
 from mrdamper.files.encoding import csv_text
 
 # Okabe and Ito's palette, black first.
 PALETTE = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442")
 MEASURED, PREDICTED = PALETTE[0], PALETTE[2]
+_SCALE = "scale of colours"  # what such axes are called
 WIDTH = 7.2  # inches, two journal columns
 MM, KN = 1e3, 1e-3
+MOST_NAMED = 10  # motions a list beside a figure can name; more are read off a scale
 
 _RC: dict[Any, Any] = {
     "font.size": 9,
@@ -100,14 +104,55 @@ def current_colours(currents: Sequence[float]) -> dict[float, tuple[float, float
     return {level: tuple(shades[i]) for i, level in enumerate(levels)}  # type: ignore[misc]
 
 
+def levels(currents: Sequence[float]) -> list[float]:
+    """The level of the test matrix of each current [A]: what differs by noise alone has one colour."""
+    return current_levels([abs(current) for current in currents])
+
+
+def speed_colours(
+    figure: Figure, speeds: Sequence[float], text: str = "Peak velocity (m/s)"
+) -> dict[float, tuple[float, float, float, float]]:
+    """One colour a value on a scale that is drawn in the right margin: for more values than a list can name."""
+    shades = ListedColormap(matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, 256)))
+    low, high = min(speeds), max(speeds)
+    scale = ScalarMappable(Normalize(low, high if high > low else low + 1), shades)
+    place = figure.subplotpars
+    bar = figure.add_axes(
+        (place.right + 0.35 / WIDTH, place.bottom, 0.12 / WIDTH, place.top - place.bottom), label=_SCALE
+    )
+    figure.colorbar(scale, cax=bar, label=text)
+    return {speed: tuple(scale.to_rgba(speed)) for speed in speeds}  # type: ignore[misc]
+
+
+def powered(text: str, largest: float) -> tuple[str, float]:
+    """An axis title with its unit in a power of a thousand, and what to multiply by: no power floats above an axis."""
+    power = 3 * int(np.floor(np.log10(largest) / 3)) if largest >= 1e5 or 0 < largest < 1e-3 else 0
+    if not power:
+        return text, 1.0
+    name, _, unit = text.rpartition("(")
+    return f"{name}($10^{{{power}}}$ {unit}", 10.0**-power
+
+
 def label(axes: Axes, x: str, y: str, title: str = "") -> None:
-    """Name the axes; quantities first, units in brackets."""
+    """Name the axes; quantities first, units in brackets; as many ticks as there is room for."""
     axes.set_xlabel(x)
-    if axes.get_xscale() == "linear":
-        axes.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
+    if axes.get_xscale() == "linear" and (figure := axes.get_figure(root=True)) is not None:
+        wide = axes.get_position().width * figure.get_size_inches()[0]
+        axes.xaxis.set_major_locator(MaxNLocator(int(np.clip(wide / 0.42, 2, 6)), steps=[1, 2, 2.5, 5, 10]))
     axes.set_ylabel(y)
     if title:
         axes.set_title(title, loc="left")
+
+
+def letter(figure: Figure) -> None:
+    """(a), (b), ... before the title of each panel, where there are several."""
+    panels = [axes for axes in figure.axes if axes.get_visible() and axes.get_label() != _SCALE]
+    if len(panels) < 2:
+        return
+    for number, axes in enumerate(panels):
+        name, title = chr(ord("a") + number % 26) * (1 + number // 26), axes.get_title(loc="left")
+        if not title.startswith(f"({name})"):
+            axes._left_title.set_text(f"({name}) {title}".strip())  # type: ignore[attr-defined]  # its size stays
 
 
 def thin(array: Floats, most: int = 400) -> Floats:
@@ -144,6 +189,7 @@ class Picture:
         }
         drawn = {}
         with house_style():
+            letter(figure)
             for kind in ("svg", *also):
                 made = io.BytesIO()
                 figure.savefig(made, format=kind, **options[kind])

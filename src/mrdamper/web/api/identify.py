@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from base64 import b64decode
 from dataclasses import replace
 from inspect import signature
@@ -195,7 +196,7 @@ def _identified(one: Identification) -> dict[str, Any]:
         "nrmse_pp": number(one.scores.nrmse_pp),
         "floor": number(one.floor),
         "values": {n: number(v) for n, v in one.model.values().items()},
-        "errors": {n: number(v) for n, v in one.standard_errors.items()},
+        "intervals": {name: ends for name in one.free if (ends := one.interval(name))},
         "at_bounds": one.at_bounds,
         "free": one.free,
         "message": str(one.ending),
@@ -215,7 +216,7 @@ def _joint(scored: Scored | str) -> dict[str, Any]:
     assert isinstance(scored, Scored)
     return {
         "values": {n: number(v) for n, v in fit.damper.model.values().items()},
-        "intervals": {str(r["name"]): (r["low"], r["high"]) for r in intervals(scored.damper) if r["low"] != ""},
+        "intervals": {r["name"]: (r["low"], r["high"]) for r in intervals(scored.damper) if math.isfinite(r["low"])},
         "at_bounds": fit.at_bounds,
         "runs": [
             {"id": run.run_id, "nrmse_pp": number(error)}

@@ -9,7 +9,6 @@ import { workBox } from "../work.js";
 export const id = "identify";
 export const label = "Identify";
 
-const INTERVAL = 1.96; // standard errors of a 95 % interval
 
 export function create(bench) {
   return new IdentifyView(bench);
@@ -150,10 +149,7 @@ class IdentifyView {
         const screen = onScreen(p.unit);
         const value = (run) => screen.factor * (run.values[p.name] ?? NaN);
         const { power, print } = column(runs.map(value));
-        const sure = (run) => {
-          const half = INTERVAL * screen.factor * (run.errors[p.name] ?? NaN);
-          return Number.isFinite(half) ? h("span", { class: "faint" }, ` ± ${figures(half / 10 ** power, 2)}`) : null;
-        };
+        const sure = (run) => h("span", { class: "faint" }, spread(value(run), run.intervals[p.name]?.map((end) => screen.factor * end), 10 ** power));
         return { title: heading(p.name, screen.unit, power), number: true, value: (run) => [print(value(run)), sure(run), run.at_bounds.includes(p.name) ? h("span", { class: "badge warn" }, "at bound") : null] };
       }));
       columns.push({ title: "At bounds", value: (run) => run.at_bounds.join(", ") || "–" });
@@ -187,6 +183,14 @@ class IdentifyView {
     x.draw(two("x"), said);
     r.draw([{ x: arrays["measured.t"], y: arrays.residual, color: "predicted", width: 1.5, name: "residual" }], said);
   }
+}
+
+/** The 95 % interval of a value as it stands behind it: its half width, or its ends where they differ. */
+function spread(value, ends, scale) {
+  if (!ends?.every(Number.isFinite)) return "";
+  const [below, above] = [value - ends[0], ends[1] - value];
+  if (Math.abs(above - below) <= 0.1 * (above + below)) return ` ± ${figures((above + below) / 2 / scale, 2)}`;
+  return ` (${ends.map((end) => figures(end / scale, 2)).join(" to ")})`;
 }
 
 function jointCard(answer) {

@@ -1,0 +1,190 @@
+"""The report of the bundled study as a reader sees it: page, print and figures are looked at, not read."""
+
+import csv
+import io
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pypdf import PdfReader
+from support.browser import AUDIT
+from typer.testing import CliRunner
+
+from mrdamper.cli import application
+from mrdamper.report.about import About
+from mrdamper.report.study import write_study
+from mrdamper.study.comparison import compare
+
+FIGURE_AUDIT = (Path(__file__).parents[1] / "support" / "figure_audit.js").read_text(encoding="utf-8")
+WIDE = 'A "maker" & <b>sons</b>, of a name as long as a name can be without being cut anywhere on a page of paper'
+
+
+@pytest.fixture(scope="session")
+def written(bundled_study, tmp_path_factory):
+    """The report with everything in it, made once."""
+    folder = tmp_path_factory.mktemp("report") / "out"
+    write_study(bundled_study, folder, about=About(title="A report", maker=WIDE, notes="Notes. " * 60), also=("pdf",))
+    return folder
+
+
+@pytest.fixture(scope="session")
+def drawings(written):
+    return {path.stem: path.read_text(encoding="utf-8") for path in sorted((written / "figures").glob("*.svg"))}
+
+
+@pytest.fixture
+def shown(browser):
+    """A page of the browser that complains of nothing."""
+    context = browser.new_context(viewport={"width": 1280, "height": 900})
+    page = context.new_page()
+    complaints = []
+    page.on("console", lambda m: complaints.append(m.text) if m.type in ("error", "warning") else None)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    yield page
+    context.close()
+    assert not complaints
+
+
+def laid_out(drawings):
+    bodies = (text[text.index("<svg") :].replace("<svg", f'<svg data-name="{n}"', 1) for n, text in drawings.items())
+    return f"<!doctype html><body>{''.join(bodies)}</body>"
+
+
+def test_no_text_of_a_figure_lies_over_another_or_past_the_edge(shown, drawings):
+    assert len(drawings) >= 20
+    shown.set_content(laid_out(drawings))
+    assert shown.evaluate(FIGURE_AUDIT) == []
+
+
+def test_the_audit_of_figures_sees_what_is_wrong(shown):
+    text = '<text x="{x}" y="20">words that lie here</text>'
+    figure = f'<svg width="200" height="40">{text.format(x=5)}{text.format(x=60)}{text.format(x=150)}</svg>'
+    shown.set_content(laid_out({"bad": figure}))
+    found = shown.evaluate(FIGURE_AUDIT)
+    assert any("over" in said for said in found)
+    assert any("past the edge" in said for said in found)
+
+
+def test_panels_are_lettered_and_titled_in_plain_words(drawings):
+    for name, text in drawings.items():
+        panels = len(re.findall(r'id="axes_\d+"', text)) - len(re.findall("QuadMesh", text))
+        assert ("(b)" in text) == (panels > 1), name
+        assert "quadratic" not in text
+        assert "linear-current" not in text
+
+
+@pytest.mark.parametrize("width", [1280, 700, 390])
+def test_the_page_passes_at_any_width(shown, written, width):
+    shown.set_viewport_size({"width": width, "height": 800})
+    shown.goto((written / "report.html").as_uri())
+    assert shown.evaluate(AUDIT) == []
+    if width == 1280:
+        axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+        assert axe.Axe().run(shown).response["violations"] == []
+
+
+@pytest.fixture(scope="session")
+def paper(written):
+    return PdfReader(io.BytesIO((written / "report.pdf").read_bytes()))
+
+
+def lines_of(page):
+    """Texts of a page as (y from below, text) [pt]."""
+    found = []
+    page.extract_text(
+        visitor_text=lambda text, cm, tm, font, size: text.strip() and found.append((tm[5], text.strip()))
+    )
+    return found
+
+
+def headings_of(paper):
+    flat, open_ = [], list(paper.outline)
+    while open_:
+        entry = open_.pop(0)
+        if isinstance(entry, list):
+            open_ = entry + open_
+        else:
+            flat.append((entry.title, paper.get_destination_page_number(entry)))
+    return flat
+
+
+def test_no_heading_ends_a_printed_page(paper):
+    headings = headings_of(paper)
+    assert len(headings) > 15
+    for title, number in headings:
+        page = paper.pages[number]
+        lines = lines_of(page)
+        at = next((y for y, text in lines if title.startswith(text[:30]) or text.startswith(title[:30])), None)
+        assert at is not None, title
+        below = [text for y, text in lines if 60 < y < at - 5]  # the number of the page stands under 60
+        drawn = any("/Figure" in name for name in page["/Resources"].get("/XObject", {}))
+        assert below or drawn, f"{title} stands alone at the foot of page {number + 1}"
+
+
+def test_figures_are_drawn_in_the_print(paper, drawings):
+    objects = [
+        form.get_object()
+        for page in paper.pages
+        for name, form in page["/Resources"].get("/XObject", {}).items()
+        if name.startswith("/Figure")
+    ]
+    assert len(objects) == len(drawings)
+    assert all(len(form.get_data()) > 2000 for form in objects)
+
+
+def test_nothing_of_the_page_is_lost_in_the_print(paper, bundled_study, written):
+    text = " ".join(page.extract_text() for page in paper.pages)
+    squeezed = re.sub(r"\s", "", text)
+    for run in bundled_study.dataset:
+        if run.excitation == "sine":
+            assert run.id in squeezed
+    assert re.sub(r"\s", "", WIDE) in squeezed
+    assert "Every run: motion and loop" in text  # folded on the page
+    for number in range(1, len(paper.pages) + 1):
+        assert f"page {number} of {len(paper.pages)}" in text
+
+
+def test_no_cell_of_a_printed_table_is_cut_inside_a_number(paper):
+    text = "\n".join(page.extract_text() for page in paper.pages)
+    assert not re.search(r"\de[+-]?\n\d", text)
+    assert not re.search(r"\d\.\n\d", text)
+
+
+def test_one_number_stands_everywhere(bundled, bundled_study, written, tmp_path, monkeypatch):
+    """Terminal, table, page, comparison and bench say the same of the same model on the same runs."""
+    from mrdamper.report.study import _validation_table
+    from mrdamper.study import workflow
+    from mrdamper.web.api.identify import _candidate
+
+    monkeypatch.setattr(workflow, "run_study", lambda *args, **options: bundled_study)
+    monkeypatch.setattr("mrdamper.report.study.write_study", lambda *args, **options: [written / "report.html"])
+    terminal = CliRunner().invoke(application(), ["study", "--out", str(tmp_path / "out")]).stdout
+    page = (written / "report.html").read_text(encoding="utf-8")
+    rows = list(csv.DictReader(io.StringIO((written / "validation.csv").read_text(encoding="utf-8"))))
+    assert rows == list(csv.DictReader(io.StringIO(_validation_table(bundled_study))))
+    compared = {rig.rig: rig for rig in compare(bundled, ["bingham"], jobs=1).rigs}
+    for rig in bundled_study.rigs:
+        chapter = page[page.index(f"<h2>{rig.rig}</h2>") :]
+        for candidate in rig.candidates:
+            own = [r for r in rows if (r["rig"], r["model"], r["way"]) == (rig.rig, *_way(candidate))]
+            said = {}
+            for name, scores in (("left out", candidate.left_out), ("held out", candidate.held_out)):
+                values = [float(r["nrmse_pp"]) for r in own if r["set"] == name]
+                said[name] = float(np.median(values))
+                assert said[name] == scores.median()
+            line = rf"{re.escape(candidate.title)}\s+{100 * said['left out']:.2f} %\s+{100 * said['held out']:.2f} %"
+            assert re.search(line, terminal), candidate.title
+            cells = "".join(f"<td>{100 * said[name]:.1f}</td>" for name in ("left out", "held out"))
+            cells = rf"<td>{re.escape(candidate.title)}</td>.*?{cells}"
+            assert re.search(cells, chapter), candidate.title
+            bench = _candidate(candidate, "damper1")
+            assert (bench["left_out"], bench["held_out"]) == (said["left out"], said["held out"])
+            if _way(candidate) == ("bingham", "run by run"):
+                (entry,) = compared[rig.rig].entries
+                assert entry.left_out.median() == pytest.approx(said["left out"], rel=1e-9)
+                assert entry.held_out.median() == pytest.approx(said["held out"], rel=1e-9)
+
+
+def _way(candidate):
+    return candidate.recipe.model, candidate.recipe.way
