@@ -33,7 +33,7 @@ from mrdamper.optimizers.linear import on_one_blas_thread, robust_weights, solve
 
 RISE, FALL = "coil.rise_s", "coil.fall_s"  # names of the coil's lags on the search axes
 _ROWS = 400  # samples of a steady run that enter the least squares, about
-_TURNING, _RUNNING = 400, 60  # samples of a cycle that are followed: where the motion turns, and elsewhere
+_TURNING, _RUNNING, _RESTING = 400, 60, 15  # samples of a cycle that are followed: where it turns, runs on, rests
 _SLOW = 0.4  # of the peak velocity, below which a motion turns
 _AT_REST = 0.05  # cycles of rest around a sample at which nothing turns any more
 _CURRENT_MOVES = 1e-3  # of the largest current; where it changes by more, every sample is followed
@@ -563,9 +563,10 @@ def _carrying(motion: Excitation, condition: Condition) -> NDArray[np.bool_]:
     speed = np.abs(motion.velocity) / condition.peak_velocity
     reach = max(1, int(_AT_REST * cycle))
     moving = np.cumsum(np.concatenate([np.zeros(reach + 1), speed > _STILL, np.zeros(reach)]))
-    turning = (speed < _SLOW) & (moving[2 * reach + 1 :] > moving[: -2 * reach - 1])
+    resting = moving[2 * reach + 1 :] == moving[: -2 * reach - 1]
     place = np.arange(size)
-    kept = (place % dense == 0) & (turning | (place % sparse == 0))
+    every = np.where(resting, sparse * round(_RUNNING / _RESTING), np.where(speed < _SLOW, dense, sparse))
+    kept = place % every == 0
     current = np.abs(np.diff(motion.current)) > _CURRENT_MOVES * float(np.max(np.abs(motion.current)))
     kept[:-1] |= current
     kept[1:] |= current
