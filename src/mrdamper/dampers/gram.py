@@ -32,6 +32,8 @@ _RUNG = 1500 ** (1 / 40)  # from one yield displacement to the next; between the
 _LATTICE = 2e-6  # m, one of the rungs, whatever the data
 _SHORTEST = 5e-4  # yield displacement looked for, in the smallest amplitude; the longest is the largest amplitude
 _AT_ONCE = 2**17  # states held at a time
+_SETTLED = 1e-6  # relative gain of a step at which a search ends
+_SAME_WEIGHTS = 1e-3  # change of the robust weights below which another round changes nothing
 _BEST = 1e-4  # nrmse_pp below which a run gains no more weight
 _RIDGE = 1e-7  # interpolated Gram matrices of nearly parallel columns may lose positivity by less
 
@@ -233,10 +235,12 @@ def fit_jointly(
         def residual(u: Floats, weights: Floats = weights) -> Floats:
             return design.solve(data.at(shape_values(u)), weights).residual
 
-        found = least_squares(residual, centre, centre - reach, centre + reach, most_steps=most_steps)
+        found = least_squares(residual, centre, centre - reach, centre + reach, most_steps, _SETTLED)
         centre = found.point
         solution = design.solve(data.at(shape_values(centre)), weights)
-        weights = robust_weights(solution.nrmse_pp, _BEST)
+        before, weights = weights, robust_weights(solution.nrmse_pp, _BEST)
+        if np.max(np.abs(weights / before - 1)) < _SAME_WEIGHTS:
+            break
     function = ParameterFunction(start.form, tuple((centre / scale).tolist()), start.rates, log=True)
     made = _finish(design, solution, {data.shape: function})
     reached, ends = shape_values(centre), data.ladder[[0, -1]]
@@ -258,13 +262,13 @@ def leave_out_errors(
         if data.shape
         else np.full(data.scale.size, data.ladder[0])
     )
-    gram = data.at(shapes)
+    table = design.table(data.at(shapes))
     weights = robust_weights(fit.nrmse_pp, _BEST)
     errors = np.zeros(data.scale.size)
     for group in groups:
         kept = weights.copy()
         kept[list(group)] = 0.0
-        solution = design.solve(gram, kept)
+        solution = _solve(table, kept)
         errors[list(group)] = solution.nrmse_pp[list(group)]
     return errors
 
@@ -293,16 +297,23 @@ class _Design:
             at += block.shape[1]
         self.matrix[:, -1, -1] = 1.0
 
-    def solve(self, gram: Floats, weights: Floats) -> _Solution:
-        """Coefficients of least weighted squares; residuals are those of the condensed runs."""
+    def table(self, gram: Floats) -> Floats:
+        """(R, L+1, P+1) rows that stand for a run's samples: by coefficient and, last, the measured force."""
         size = np.sqrt(np.maximum(np.einsum("rii->ri", gram), 1e-300))
         scaled = gram / size[:, :, None] / size[:, None, :]
         factor = _factor(scaled + _RIDGE * np.eye(gram.shape[1])) * size[:, None, :]
-        table = factor @ self.matrix
-        weighted = (weights[:, None, None] * table).reshape(-1, table.shape[2])
-        solution = solve_linear(weighted[:, :-1], weighted[:, -1], rank_limit=1e-10)
-        error = table[:, :, :-1] @ solution - table[:, :, -1]
-        return _Solution(solution, (weights[:, None] * error).ravel(), np.sqrt(np.sum(error**2, axis=1)))
+        return np.asarray(factor @ self.matrix, dtype=float)
+
+    def solve(self, gram: Floats, weights: Floats) -> _Solution:
+        """Coefficients of least weighted squares; residuals are those of the condensed runs."""
+        return _solve(self.table(gram), weights)
+
+
+def _solve(table: Floats, weights: Floats) -> _Solution:
+    weighted = (weights[:, None, None] * table).reshape(-1, table.shape[2])
+    solution = solve_linear(weighted[:, :-1], weighted[:, -1], rank_limit=1e-10)
+    error = table[:, :, :-1] @ solution - table[:, :, -1]
+    return _Solution(solution, (weights[:, None] * error).ravel(), np.sqrt(np.sum(error**2, axis=1)))
 
 
 def _factor(gram: Floats) -> Floats:
