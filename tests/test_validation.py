@@ -8,6 +8,7 @@ import pytest
 
 from mrdamper import validation
 from mrdamper.data import Condition, Run
+from mrdamper.metrics import dissipated_power
 from mrdamper.motion import sine
 from mrdamper.validation import (
     RunScore,
@@ -179,15 +180,23 @@ def test_the_band_of_the_peak_is_told_beside_the_measured_peak_of_the_window(mon
 
     def said(damper, prediction, level, shown):
         asked.update(level=level, shown=shown)
-        return SimpleNamespace(peak=(8.0, 13.0)) if level > 0.5 else None
+        return SimpleNamespace(peak=(8.0, 13.0), energy=(-0.1, 0.2)) if level > 0.5 else None
 
     monkeypatch.setattr(validation, "band", said)
     half = np.ptp(run.force[100:]) / 2
-    expected = {"peak_force_measured_N": half, "peak_force_low_N": 8.0, "peak_force_high_N": 13.0}
-    assert peak_band(Exact(), run) == pytest.approx(expected)
+    seen = Exact().predict_run(run)
+    inside, of_a_cycle = run.in_window, 1 / seen.condition.frequency_Hz
+    energy, expected = (
+        of_a_cycle * dissipated_power(force[inside], seen.motion.velocity[inside], run.time[inside])
+        for force in (run.force, seen.force)
+    )
+    measured = {"peak_force_measured_N": half, "energy_measured_J": energy}
+    band = {"peak_force_low_N": 8.0, "peak_force_high_N": 13.0}
+    band |= {"energy_low_J": 0.9 * expected, "energy_high_J": 1.2 * expected}
+    assert peak_band(Exact(), run) == pytest.approx({**measured, **band})
     assert asked["level"] == 0.9
     assert np.array_equal(asked["shown"], run.in_window)
-    assert peak_band(Exact(), run, 0.3) == pytest.approx({"peak_force_measured_N": half})
+    assert peak_band(Exact(), run, 0.3) == pytest.approx(measured)
 
 
 def test_the_floor_of_several_runs_is_their_median():

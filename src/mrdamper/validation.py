@@ -12,7 +12,7 @@ from mrdamper.dampers.bands import band
 from mrdamper.dampers.base import Damper, Prediction
 from mrdamper.data import Condition, Run, Shown, same_condition
 from mrdamper.errors import InputError, RunError
-from mrdamper.metrics import Scores, peak_force, score
+from mrdamper.metrics import Scores, dissipated_power, peak_force, score
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,16 +140,22 @@ def score_run(damper: Damper, run: Run) -> RunScore:
 
 
 def peak_band(damper: Damper, run: Run, level: float = 0.9) -> dict[str, float]:
-    """Half the peak-to-peak force of a run's steady window [N], measured, and the ends of its predicted band.
+    """Half the peak-to-peak force [N] and the energy of a cycle [J] in a run's steady window, and their bands.
 
     The ends are missing where the damper does not know how sure it is.
     """
-    measured = {"peak_force_measured_N": peak_force(run.force[run.in_window])}
-    prediction = damper.predict_run(run)
-    known = band(damper, prediction, level, shown=run.in_window)
+    prediction, inside = damper.predict_run(run), run.in_window
+    velocity, time = prediction.motion.velocity[inside], run.time[inside]
+    cycles = max(prediction.condition.frequency_Hz, 1e-9)
+    energy = dissipated_power(run.force[inside], velocity, time) / cycles
+    row = {"peak_force_measured_N": peak_force(run.force[inside]), "energy_measured_J": energy}
+    known = band(damper, prediction, level, shown=inside)
     if known is None:
-        return measured
-    return {**measured, "peak_force_low_N": known.peak[0], "peak_force_high_N": known.peak[1]}
+        return row
+    predicted = dissipated_power(prediction.force[inside], velocity, time) / cycles
+    low, high = (predicted * (1 + share) for share in known.energy)
+    row |= {"peak_force_low_N": known.peak[0], "peak_force_high_N": known.peak[1]}
+    return {**row, "energy_low_J": low, "energy_high_J": high}
 
 
 def leave_one_condition_out(

@@ -10,8 +10,8 @@ from support.sessions import session_runs
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
-from mrdamper.dampers.bands import band
-from mrdamper.dampers.certainty import Certainty, unsure
+from mrdamper.dampers.bands import band, no_band
+from mrdamper.dampers.certainty import Certainty, table, unsure
 from mrdamper.dampers.covariance import certain, session_of
 from mrdamper.data import Condition
 from mrdamper.errors import InputError, ModelFileError
@@ -39,9 +39,9 @@ def test_a_certainty_is_saved_bit_by_bit(damper):
     back = parse_model(dump_model(damper)).certainty
     assert np.array_equal(back.covariance, damper.certainty.covariance)
     assert np.array_equal(back.dof, damper.certainty.dof)
-    assert (back.names, back.gain, back.offset) == (
-        damper.certainty.names, damper.certainty.gain, damper.certainty.offset
-    )  # fmt: skip
+    for name in ("names", "gain", "offset", "words", "taught", "unknown", "one_sided"):
+        assert getattr(back, name) == getattr(damper.certainty, name)
+    assert sum(back.taught.values()) == pytest.approx(1.0)
     assert "covariance" not in json.loads(dump_model(joint_damper()))
 
 
@@ -129,3 +129,47 @@ def test_the_command_writes_the_band(damper, tmp_path):
     got = runner.invoke(application(), ["predict", str(path), *ask, "--out", str(tmp_path / "b.csv")])
     assert "force_low_N" not in (tmp_path / "b.csv").read_text()
     assert "no band" in got.stderr
+
+
+def test_one_session_or_one_run_gives_no_band(tmp_path):
+    truth = joint_damper()
+    runs = [replace(run, notes={"session": "monday"}) for run in session_runs(truth)]
+    for few in (runs, runs[:1]):
+        made = certain(truth, few)
+        assert band(made, made.predict(Condition(0.5, 1.0, 0.01))) is None
+        assert "All runs are of one session" in " ".join(unsure(made))
+        assert no_band(made) != no_band(truth)
+    save_model(made, tmp_path / "m.json")
+    ask = ["predict", str(tmp_path / "m.json"), "--current", "0.5", "--frequency", "1", "--amplitude", "10"]
+    got = CliRunner().invoke(application(), ask)
+    assert got.exit_code == 0
+    assert "one session" in got.stderr
+    assert "force_low_N" not in got.stdout
+
+
+def test_a_perfect_fit_claims_nothing_infinite_and_writes_zero():
+    truth = joint_damper()
+    made = certain(truth, session_runs(truth, gain=0.0, noise=0.0))
+    ends = np.array([made.certainty.interval(made, name) for name in made.certainty.names])
+    assert np.isfinite(ends).all()
+    assert f"f0 = {truth.model.f0:g}" in repr(made)
+
+
+def test_numbers_held_by_the_search_are_one_sided():
+    truth = joint_damper()
+    made = certain(truth, session_runs(truth), held=("h0",))
+    assert made.certainty.one_sided == ("h0",)
+    state = {row["name"]: row["state"] for row in table(made)}
+    assert state["h0"] == "one-sided: at a limit of what was searched"
+    assert "(one-sided" in repr(made)
+
+
+def test_what_does_the_same_to_the_force_has_no_interval_though_the_rest_has():
+    truth = joint_damper()
+    made = certain(truth, [run for run in session_runs(truth, gain=0.0) if run.current_A == 0.5])
+    said = " ".join(unsure(made))
+    for pair in ("c0 and c1", "fy0 and fy1", "h0 and h1"):
+        assert f"{pair} cannot both be known from one current" in said
+    assert set(made.certainty.unknown) == {"c0", "c1", "fy0", "fy1", "h0", "h1"}
+    low, high = made.certainty.interval(made, "f0")
+    assert low < truth.model.f0 < high

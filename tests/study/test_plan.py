@@ -77,6 +77,7 @@ def test_the_records_are_read_back(damper, tmp_path):
     asked = ["plan", str(tmp_path / "m.json"), "--hours", "0.2", "--out", str(tmp_path / "next")]
     got = CliRunner().invoke(application(), asked)
     assert got.exit_code == 0, got.output
+    assert "existing runs that taught least: r" in got.stdout
     with (tmp_path / "next" / "plan.csv").open() as file:
         listed = list(csv.DictReader(file))
     for row in listed:

@@ -47,7 +47,7 @@ class Band:
 def band(
     damper: Damper, prediction: Prediction, level: float = 0.9, shown: NDArray[np.bool_] | None = None
 ) -> Band | None:
-    """Where the force lies at a level, in a session nobody has seen; None where nothing is known of it.
+    """Where the force lies at a level, in a session nobody has seen; None where that cannot be known.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def band(
     """
     student(level, 1.0)
     known: Certainty | None = damper.certainty
-    if known is None:
+    if known is None or known.one_session:
         return None
     seen_at = slice(None) if shown is None else shown
     force, motion = prediction.force[seen_at], prediction.motion.part(seen_at)
@@ -99,3 +99,10 @@ def band(
         force - width, force + width, np.sqrt(parameter), np.sqrt(session), np.sqrt(model),
         (max(half - unseen, 0.0), half + unseen), (-loss, loss), (max(half - seen, 0.0), half + seen),
     )  # fmt: skip
+
+
+def no_band(damper: Damper) -> str:
+    """Why there is no band, in words."""
+    if damper.certainty is None:
+        return "no band: the model was saved without its covariance"
+    return "no band: all its runs are of one session, and how far another one lies cannot be known; test on another day"

@@ -9,7 +9,8 @@ the damper (*model*): what conditions left out of the fit were wrong by, beyond 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from mrdamper.identification.intervals import interval_about, weaknesses, writte
 
 if TYPE_CHECKING:
     from mrdamper.dampers.base import Damper
+_AT_ALL = 3.0  # standard error of a logarithm from which nothing is known of the number
 _BADLY = 0.5  # standard error over the value from which a number is known to a factor only
 
 
@@ -62,6 +64,8 @@ class Certainty:
         Runs left out that say so.
     words : tuple of str
         What only the runs could tell of it: numbers that do the same to the force, or rest on one run.
+    taught : mapping of str to float
+        Share each run has in what is known of the numbers.
     """
 
     names: tuple[str, ...]
@@ -78,6 +82,7 @@ class Certainty:
     energy: float = 0.0
     left_out: int = 0
     words: tuple[str, ...] = ()
+    taught: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def one_session(self) -> bool:
@@ -122,7 +127,8 @@ def unsure(damper: Damper) -> list[str]:
         if name in known.unknown:
             continue
         if known.logs[i] and error > _BADLY:
-            said.append(f"{name} is known to a factor of {np.exp(error):.1f} only.")
+            size = f"known to a factor of {np.exp(error):.1f} only" if error < _AT_ALL else "not known at all"
+            said.append(f"{name} is {size}.")
         elif not known.logs[i] and error > _BADLY * abs(numbers[name].value):
             said.append(f"{name} cannot be told from zero: its standard error is {error:.2g} {numbers[name].unit}.")
     apart = [i for i, name in enumerate(known.names) if name not in known.unknown]

@@ -62,7 +62,8 @@ def certain(damper: Damper, runs: Sequence[Run], left_out: Sequence[Scores] = ()
     slopes = [slope[:, known] for slope in slopes]
     names = tuple(free[i] for i in known)
     influence = [inverse @ (slope * part.weight**2).T for slope, part in zip(slopes, parts, strict=True)]
-    words += _rest_on_one_run(names, parts, slopes, inverse)
+    told = _told(parts, slopes, inverse)
+    words += _rest_on_one_run(names, parts, told)
     within, doubt = _within(parts, slopes, inverse)
     gain, offset, session_dof, between = _sessions(parts, slopes, influence, within)
     covariance = within + between
@@ -72,6 +73,7 @@ def certain(damper: Damper, runs: Sequence[Run], left_out: Sequence[Scores] = ()
         names, tuple(numbers[n].log for n in names), covariance, np.maximum(dof, 1.0), at_bound,
         tuple(free[i] for i in sorted({*unseen, *(i for group in alike for i in group)})),
         gain, offset, session_dof, words=tuple(words),
+        taught={part.run.id: float(np.mean(row)) if names else 0.0 for part, row in zip(parts, told, strict=True)},
     )  # fmt: skip
     return replace(damper, certainty=_with_model_error(made, damper, parts, slopes, left_out))  # type: ignore[type-var]
 
@@ -133,19 +135,21 @@ def _known(
     return [], unseen, alike, np.zeros((0, 0))
 
 
-def _rest_on_one_run(
-    names: Sequence[str], parts: Sequence[_Part], slopes: Sequence[Floats], inverse: Floats
-) -> list[str]:
+def _told(parts: Sequence[_Part], slopes: Sequence[Floats], inverse: Floats) -> Floats:
+    """(R, P) share each run has in what is known of each number."""
+    told = np.array([np.sum((s @ inverse * p.weight) ** 2, axis=0) for s, p in zip(slopes, parts, strict=True)])
+    return told / np.maximum(told.sum(axis=0), np.finfo(float).tiny)
+
+
+def _rest_on_one_run(names: Sequence[str], parts: Sequence[_Part], told: Floats) -> list[str]:
     """Numbers of which one run of several tells most, in words."""
     if len(parts) < 3 or not names:
         return []
-    told = np.array([np.sum((s @ inverse * p.weight) ** 2, axis=0) for s, p in zip(slopes, parts, strict=True)])
-    share = told / np.maximum(told.sum(axis=0), np.finfo(float).tiny)
-    best = np.argmax(share, axis=0)
+    best = np.argmax(told, axis=0)
     return [
-        f"{name} rests on one run: {parts[r].run.id} tells {100 * share[r, i]:.0f} % of it"
+        f"{name} rests on one run: {parts[r].run.id} tells {100 * told[r, i]:.0f} % of it"
         for i, (name, r) in enumerate(zip(names, best, strict=True))
-        if share[r, i] > _ONE_RUN
+        if told[r, i] > _ONE_RUN
     ]
 
 

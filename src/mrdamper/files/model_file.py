@@ -102,6 +102,7 @@ class _Covariance(_Strict):
     session: _Session
     model_error: _ModelError
     words: tuple[str, ...] = ()
+    taught: dict[str, float] = {}
 
 
 class _Document(_Strict):
@@ -272,6 +273,7 @@ def _describe_certainty(known: Certainty | None) -> _Covariance | None:
         session=_Session(gain=known.gain, offset_N=known.offset, degrees_of_freedom=known.session_dof),
         model_error=_ModelError(force=known.force, peak=known.peak, energy=known.energy, left_out=known.left_out),
         words=known.words,
+        taught=dict(known.taught),
     )
 
 
@@ -291,7 +293,7 @@ def _with_certainty(damper: Damper, saved: _Covariance, where: str) -> Damper:
     known = Certainty(
         saved.parameters, saved.logarithmic, matrix, np.array(saved.degrees_of_freedom), saved.one_sided, saved.unknown,
         session.gain, session.offset_N, session.degrees_of_freedom,
-        model.force, model.peak, model.energy, model.left_out, saved.words,
+        model.force, model.peak, model.energy, model.left_out, saved.words, saved.taught,
     )  # fmt: skip
     return replace(damper, certainty=known)  # type: ignore[type-var]
 

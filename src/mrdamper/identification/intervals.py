@@ -12,6 +12,7 @@ from mrdamper.errors import InputError
 
 _ALIKE = 0.98  # correlation from which two parameters are known together only
 _SAME = 0.03  # frequencies and amplitudes this close are one
+_WIDEST = 100.0  # half an interval of a logarithm: from nothing to everything
 _LOPSIDED = 0.1  # of an interval's half width: shifted by less, it is written with ±
 
 
@@ -33,6 +34,7 @@ def student(level: float, dof: float) -> float:
 def interval_about(value: float, error: float, dof: float, level: float, log: bool) -> tuple[float, float]:
     """Ends of an interval; of a logarithm where `log`, then `error` is that of the logarithm."""
     half = student(level, dof) * error
+    half = min(half, _WIDEST) if log else half
     return (float(value * np.exp(-half)), float(value * np.exp(half))) if log else (value - half, value + half)
 
 

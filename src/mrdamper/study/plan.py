@@ -235,6 +235,13 @@ def plan_tests(damper: Damper, limits: Limits, hours: float) -> list[Planned]:
         chosen.append(Planned(at + 1, conditions[best], minutes, math.sqrt(before), after, reason))
 
 
+def taught_least(damper: Damper, count: int = 3) -> list[tuple[str, float]]:
+    """The runs a damper was identified from that say least about its numbers, each with its share of what is known."""
+    known = damper.certainty
+    shares = sorted(known.taught.items(), key=lambda item: item[1]) if known else []
+    return shares[:count] if len(shares) > count else []
+
+
 def _doubts(damper: Damper, known: Certainty, condition: Condition) -> list[_Doubt]:
     """At the estimate and at some draws of the numbers."""
     rng = np.random.default_rng(_SEED)

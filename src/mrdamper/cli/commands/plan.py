@@ -26,7 +26,7 @@ def register(app: typer.Typer) -> None:
         from mrdamper.files.atomic import write_into
         from mrdamper.files.encoding import csv_text
         from mrdamper.files.model_file import load_model
-        from mrdamper.study.plan import first_matrix, limits_of, plan_tests, read_limits, record_of, rows
+        from mrdamper.study.plan import first_matrix, limits_of, plan_tests, read_limits, record_of, rows, taught_least
 
         damper = load_model(model) if model else None
         if limits is None and damper is None:
@@ -50,3 +50,6 @@ def register(app: typer.Typer) -> None:
         if damper and chosen:
             said += f"; standard deviation of the force {100 * chosen[0].before:.2f} -> {100 * chosen[-1].after:.2f} %"
         typer.echo(f"{out / 'plan.csv'}\n{said}")
+        if damper and (least := taught_least(damper)):
+            runs = ", ".join(f"{name} ({100 * share:.1f} %)" for name, share in least)
+            typer.echo(f"existing runs that taught least: {runs} of what is known")

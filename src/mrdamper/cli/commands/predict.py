@@ -43,7 +43,7 @@ def register(app: typer.Typer) -> None:
         from dataclasses import replace
 
         from mrdamper.cli.output import put
-        from mrdamper.dampers.bands import band
+        from mrdamper.dampers.bands import band, no_band
         from mrdamper.dampers.coil import Coil
         from mrdamper.data import Condition
         from mrdamper.errors import ConditionError, InputError
@@ -78,23 +78,28 @@ def register(app: typer.Typer) -> None:
                 err=True,
             )
         known = band(damper, prediction, level)
-        typer.echo(_said(prediction, known, level), err=True)
+        typer.echo(_said(prediction, known, level) if known else f"note: {no_band(damper)}", err=True)
         put(prediction_rows(prediction, known), out, as_json, csv_text)
 
 
-def _said(prediction: Prediction, known: Band | None, level: float) -> str:
+def _said(prediction: Prediction, known: Band, level: float) -> str:
     """The peak force, its band, and where the band comes from."""
-    from mrdamper.metrics import peak_force
+    from mrdamper.metrics import dissipated_power, peak_force
 
-    if known is None:
-        return "note: no band: the model was saved without its covariance"
     parts = ", ".join(
         f"{name} {float((part**2).mean() ** 0.5):.3g} N"
         for name, part in (("parameters", known.parameter), ("session", known.session), ("model", known.model))
     )
+    motion, c = prediction.motion, prediction.condition
+    power = dissipated_power(prediction.force, motion.velocity, motion.time)
+    energy = power / c.frequency_Hz if c.frequency_Hz > 0 else math.nan  # of a cycle
+    # Of the linear damper that takes as much out of the same sine: C = E/(π ω X²).
+    damping = 2 * power / c.peak_velocity**2 if c.peak_velocity > 0 else math.nan
+    low, high = (1 + share for share in known.energy)
     return (
         f"peak force {peak_force(prediction.force):.4g} N; {100 * level:g} % band {known.peak[0]:.4g} to "
         f"{known.peak[1]:.4g} N in an unknown session, {known.known_session[0]:.4g} to {known.known_session[1]:.4g} N "
-        f"once its gain is known; dissipated energy {100 * known.energy[0]:+.2g} to {100 * known.energy[1]:+.2g} %; "
+        f"once its gain is known; dissipated energy {energy:.4g} J a cycle ({energy * low:.4g} to "
+        f"{energy * high:.4g}), equivalent damping {damping:.4g} N s/m ({damping * low:.4g} to {damping * high:.4g}); "
         f"standard deviations: {parts}"
     )

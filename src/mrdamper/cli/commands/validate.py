@@ -55,7 +55,7 @@ def register(app: typer.Typer) -> None:
         inside = [
             p["peak_force_low_N"] <= p["peak_force_measured_N"] <= p["peak_force_high_N"]
             for p in peaks.values()
-            if len(p) > 1
+            if "peak_force_low_N" in p
         ]
         if inside:
             few = " (too few runs to tell a share)" if len(inside) < 20 else ""
