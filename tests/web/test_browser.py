@@ -402,11 +402,44 @@ def test_a_refused_file_is_mended_by_its_profile(page, small_rig, shoot):
     page.locator(".cell").wait_for()
     page.locator(".message.bad").filter(has_text="E_DISSIPATION_SIGN").wait_for()
     shoot(page, "15-refused")
+    page.get_by_text("Rig profile as text").click()
     profile = page.get_by_label("Rig profile, TOML")
     before, force, after = profile.input_value().partition("[channels.force]")
     profile.fill(before + force + after.replace("sign = 1", "sign = -1", 1))
     page.get_by_role("button", name="Read the refused file").click()
     page.locator(".cell").nth(1).wait_for()
+    assert page.locator(".message.bad").count() == 0
+
+
+def test_the_test_list_mends_currents_and_split_by_click(page, small_rig, shoot):
+    runs = list(small_rig)[:4]
+    drop(page, {f"test {i}.csv": csv_of(run) for i, run in enumerate(runs, 1)})
+    tests = page.locator("#tests")
+    tests.locator(".badge.bad").nth(3).wait_for()  # their names state no current: refused, and listed one by one
+    page.complaints.clear()  # the browser notes that nothing could be taken
+    for i, run in enumerate(runs, 1):
+        place = tests.get_by_label(f"Current of test_{i}, ampere")
+        place.fill(str(run.current_A))
+        place.press("Enter")
+        tests.get_by_label(f"Hold test_{i} out").wait_for()
+    assert tests.locator(".badge.bad").count() == 0
+    shoot(page, "17-test-list")
+    tests.get_by_role("button", name="Hold test_1 out").click()
+    tests.get_by_role("button", name="Hold test_1 out", pressed=True).wait_for()
+    page.locator(".cell.validate").first.wait_for()
+    tests.get_by_role("button", name="Nothing").click()
+    tests.get_by_role("button", name="Hold test_1 out", pressed=False).wait_for()
+
+
+def test_columns_are_picked_by_eye(page, small_rig):
+    run = next(iter(small_rig))
+    drop(page, {f"{run.current_A:g}A.csv": csv_of(run, "Time (s),A,Sensor B (N)")})
+    tests = page.locator("#tests")
+    tests.get_by_label("Column of displacement").select_option(label="A")
+    page.complaints.clear()  # the browser notes that nothing could be taken
+    tests.get_by_label("Unit of displacement").select_option("mm")
+    tests.get_by_role("button", name="Read with these columns").click()
+    page.locator(".matrix .cell").first.wait_for()
     assert page.locator(".message.bad").count() == 0
 
 

@@ -140,3 +140,52 @@ def test_files_of_one_name_in_two_folders_are_two_runs(drop, small_rig):
     found = read_drop(drop)
     assert len({r.id for r in found.dataset}) == 2
     assert [v.name for v in found.verdicts] == [f"day 1/{run.id}.csv", f"day 2/{run.id}.csv"]
+
+
+def put_files(client, session, files):
+    drop = client.post(f"{session}/drops").json()["drop"]
+    for name, content in files.items():
+        client.put(f"{session}/drops/{drop}/files", params={"name": name}, content=content).raise_for_status()
+    return client.post(f"{session}/drops/{drop}/read", json={})
+
+
+def test_a_file_may_hold_good_and_refused_tests(client, session, small_rig):
+    first, second = list(small_rig)[:2]
+    rows = [csv_of(run).decode().splitlines() for run in (first, replace(second, force=-second.force))]
+    text = "\n".join(["run," + rows[0][0], *(f"{i},{line}" for i, part in enumerate(rows, 1) for line in part[1:]), ""])
+    put_files(client, session, {"both_0.5A.csv": text.encode()}).raise_for_status()
+    tests = client.get(f"{session}/tests").json()["tests"]
+    assert [(test["test"][-1], test["state"]) for test in tests] == [("2", "refused"), ("1", "taken")]
+    assert "E_DISSIPATION_SIGN" in [code for code, _ in tests[0]["findings"]]
+
+
+def test_a_dropped_table_of_tests_is_used_and_a_click_overrules_it(client, session, small_rig):
+    files = {f"t{i}.csv": csv_of(run) for i, run in enumerate(list(small_rig)[:2])}
+    files["tests.csv"] = b"file,current_A,split\nt0.csv,0.3,train\nt1.csv,0.7,validate\n"
+    put_files(client, session, files).raise_for_status()
+    tests = client.get(f"{session}/tests").json()["tests"]
+    assert [(test["current_A"], test["split"]) for test in tests] == [(0.3, "train"), (0.7, "validate")]
+    stated = {"file": tests[0]["file"], "run": tests[0]["test"], "current_A": 0.4}
+    client.post(f"{session}/tests/current", json=stated).raise_for_status()
+    assert client.get(f"{session}/tests").json()["tests"][0]["current_A"] == 0.4
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "code"),
+    [
+        ("current", {"file": 99, "run": "t0", "current_A": 1.0}, "E_NAME"),
+        ("current", {"file": 0, "run": "stranger", "current_A": 1.0}, "E_TESTS"),
+        ("columns", {"channels": {"force": {"column": 2, "unit": "mm"}}}, "E_PROFILE"),
+        ("columns", {"channels": {"colour": {"column": 2}}}, "E_PROFILE"),
+        ("split", {"runs": ["stranger"]}, "E_NAME"),
+        ("split", {"currents": [0.3, 0.7]}, "E_SPLIT"),
+    ],
+)
+def test_a_wrong_wish_changes_nothing(client, session, small_rig, path, body, code):
+    files = {f"t{i}.csv": csv_of(run) for i, run in enumerate(list(small_rig)[:2])}
+    files["tests.csv"] = b"file,current_A\nt0.csv,0.3\nt1.csv,0.7\n"
+    put_files(client, session, files).raise_for_status()
+    before = client.get(f"{session}/tests").json()["tests"]
+    answer = client.post(f"{session}/tests/{path}", json=body)
+    assert (answer.status_code, answer.json()["code"]) == (422, code)
+    assert client.get(f"{session}/tests").json()["tests"] == before

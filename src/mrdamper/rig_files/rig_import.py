@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -26,19 +26,44 @@ from mrdamper.rig_files.rig_record import joined, records_of
 from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests
 
+_ROWS_SHOWN, _MOST_SHOWN = 6, 30  # rows and columns of a preview
+
 
 @dataclass(frozen=True, eq=False)
 class Refusal:
-    """A file that cannot be used, and why.
+    """A file or a test of it that cannot be used, and why.
 
     Attributes
     ----------
     file : str
     error : InputError
+    run : str
+        Of a test that could be read and not used, its name.
     """
 
     file: str
     error: InputError
+    run: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Preview:
+    """How a file begins, and what its columns are taken for.
+
+    Attributes
+    ----------
+    names, units : tuple of str
+        One a column.
+    rows : tuple of tuple of str
+        The first, cell by cell.
+    channels : mapping of str to (int or None, str, int)
+        By channel its column, unit and sign, as far as they are known.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    channels: Mapping[str, tuple[int | None, str, int]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +160,39 @@ def guess_profile(path: str | Path, profile: Profile | str | Path | None = None)
     return profile.model_copy(update=update)
 
 
+def preview(path: str | Path, profile: Profile | str | Path | None = None) -> Preview:
+    """How a file begins, for columns to be chosen by eye.
+
+    Raises
+    ------
+    InputError
+        If the form of the file cannot be found.
+    """
+    profile = _profile(profile)
+    with raw_tables(path, profile.file) as tables:
+        table, channels = _guess_channels(_parts(tables, profile), profile)
+        cells = [_first_cells(table, column) for column in range(min(len(table.names), _MOST_SHOWN))]
+        places = {
+            name: (_place(table, channel.column), channel.unit or "", channel.sign)
+            for name, channel in channels.items()
+        }
+    rows = tuple(tuple(column[i] if i < len(column) else "" for column in cells) for i in range(_ROWS_SHOWN))
+    return Preview(table.names[:_MOST_SHOWN], table.units[:_MOST_SHOWN], rows, places)
+
+
+def _first_cells(table: RawTable, column: int) -> list[str]:
+    try:
+        return [f"{value:g}" for value in table.read([column]).values[column][:_ROWS_SHOWN]]
+    except InputError:
+        return [table.odd[column]] if table.odd else []
+
+
+def _place(table: RawTable, column: str | int | None) -> int | None:
+    if isinstance(column, str):
+        return table.names.index(column) if column in table.names else None
+    return None if column is None else column - 1
+
+
 def _guess_channels(tables: list[RawTable], profile: Profile) -> tuple[RawTable, dict[str, Channel]]:
     try:
         table = _tables_with_channels(tables, profile)[0]
@@ -164,7 +222,7 @@ def import_files(
     paths: Iterable[str | Path],
     profile: Profile | str | Path | None = None,
     *,
-    tests: str | Path | None = None,
+    tests: str | Path | TestsTable | None = None,
     progress: Callable[[str, float], None] = lambda what, share: None,
 ) -> ImportResult:
     """Read and judge files and folders of files; a refused file or test does not stop the others.
@@ -175,7 +233,7 @@ def import_files(
         Of a folder, every file with a suffix of a known format is read, in the order of names.
     profile : Profile or path, optional
         For all of them.
-    tests : path, optional
+    tests : TestsTable or path, optional
         Table of tests; default: `tests.csv` of the folder, if it holds one.
     progress : callable
         Is told the file and the share done.
@@ -188,7 +246,9 @@ def import_files(
     profile = _profile(profile)
     with unpacked(paths) as given:
         beside = [path / TESTS for path in given if (path / TESTS).is_file()]
-        table = load_tests(tests) if tests is not None else load_tests(beside[0]) if beside else None
+        if tests is None and beside:
+            tests = beside[0]
+        table = tests if tests is None or isinstance(tests, TestsTable) else load_tests(tests)
         files, left_out = _files(given)
         records: list[Record] = []
         refusals: list[Refusal] = []
@@ -255,7 +315,7 @@ def _read_judged(
                     judged = step(judged)
                 except InputError as error:
                     problems.append(error)
-            refusals += [Refusal(where, problem) for problem in problems]
+            refusals += [Refusal(where, problem, record.id) for problem in problems]
             if not problems:
                 good.append(judged)
     return good, refusals, [record.id for record in records]

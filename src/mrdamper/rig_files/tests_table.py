@@ -58,6 +58,10 @@ class TestsTable:
         own.sort(key=lambda row: row.run == "")
         return own[0] if own else None
 
+    def of_file(self, path: Path) -> tuple[Row, ...]:
+        """The rows of a file's tests."""
+        return tuple(row for row in self.rows if _is_file(row.file, path))
+
     def require_found(self, tests: Iterable[tuple[Path, str]]) -> None:
         """Refuse rows of files or runs that are not there.
 

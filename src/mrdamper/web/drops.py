@@ -9,6 +9,7 @@ from pathlib import Path, PurePosixPath
 from mrdamper.data import Dataset
 from mrdamper.errors import InputError
 from mrdamper.rig_files.record import Record
+from mrdamper.rig_files.rig_import import Refusal
 
 FILE_LIMIT = 20_000_000
 FILE_COUNT_LIMIT = 1000
@@ -92,9 +93,15 @@ class Drop:
     size : int
         Bytes so far.
     taken : dict of Path to records
-        Of rig files that were read.
-    refused : dict of Path to InputError
-        Of rig files that were not.
+        Of rig files, the tests that were taken.
+    refused : dict of Path to refusals
+        Of rig files or of some of their tests.
+    toml : str
+        Profile they were last read with; empty where it was guessed.
+    currents : dict of (Path, str) to float
+        Coil current of a test of a file, where it was stated on the page [A].
+    held_out : frozenset of str or None
+        Runs held out on the page; None where nobody chose.
     """
 
     key: str
@@ -103,7 +110,10 @@ class Drop:
     places: int = 0
     size: int = 0
     taken: dict[Path, tuple[Record, ...]] = field(default_factory=dict)
-    refused: dict[Path, InputError] = field(default_factory=dict)
+    refused: dict[Path, tuple[Refusal, ...]] = field(default_factory=dict)
+    toml: str = ""
+    currents: dict[tuple[Path, str], float] = field(default_factory=dict)
+    held_out: frozenset[str] | None = None
 
     def place(self, name: str) -> Path:
         """Where a file of that name is stored.

@@ -33,7 +33,7 @@ def _bundled() -> Intake:
     return Intake(load_dataset(), "bundled")
 
 
-def read_drop(drop: Drop, profile: str = "", refused_only: bool = False) -> Intake:
+def read_drop(drop: Drop, profile: str = "", refused_only: bool = False, only: Path | None = None) -> Intake:
     """Make data of a drop.
 
     Parameters
@@ -43,6 +43,8 @@ def read_drop(drop: Drop, profile: str = "", refused_only: bool = False) -> Inta
         Rig profile as TOML that replaces the guessed one; empty to guess.
     refused_only : bool
         Keep the rig files that were taken before, and read the refused ones.
+    only : path, optional
+        Read this rig file, and keep what was said of the others.
 
     Raises
     ------
@@ -53,7 +55,7 @@ def read_drop(drop: Drop, profile: str = "", refused_only: bool = False) -> Inta
         raise DropError("no files", mend="drop rig files, or a dataset folder")
     try:
         parts = _dataset_parts(drop.names)
-        return _read_dataset(drop, parts) if parts else read_rig_files(drop, profile, refused_only)
+        return _read_dataset(drop, parts) if parts else read_rig_files(drop, profile, refused_only, only)
     except NothingTakenError:
         raise
     except InputError as error:

@@ -6,19 +6,24 @@ round), so what was taken can be kept while the refused ones are read again.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
+from mrdamper.data import Dataset
 from mrdamper.errors import InputError
+from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.record import Record
+from mrdamper.rig_files.rig_import import ImportResult, Refusal
+from mrdamper.rig_files.tests_table import NAME as TESTS
+from mrdamper.rig_files.tests_table import Row, TestsTable, load_tests
 from mrdamper.web.drops import Drop, Intake, NothingTakenError, Verdict
 
 _PROFILES_TRIED = 5  # files looked at for the first whose form can be guessed
 
 
-def read_rig_files(drop: Drop, toml: str, refused_only: bool) -> Intake:
-    """Read the files of a drop, or those refused before, with a profile as TOML; empty to guess.
+def read_rig_files(drop: Drop, toml: str, refused_only: bool, only: Path | None = None) -> Intake:
+    """Read the files of a drop, those refused before or one, with a profile as TOML; empty to guess.
 
     Raises
     ------
@@ -31,12 +36,16 @@ def read_rig_files(drop: Drop, toml: str, refused_only: bool) -> Intake:
     from mrdamper.rig_files.rig_import import import_files, to_dataset
 
     profile = parse_profile(toml) if toml.strip() else None
-    wanted = [path for path in drop.names if not refused_only or path in drop.refused]
-    found = {path: import_files([path], profile) for path in wanted}
-    drop.taken |= {path: result.records for path, result in found.items() if result.records}
-    drop.refused = {path: r.error for path, result in found.items() for r in result.refusals}
-    for path in drop.refused:
-        drop.taken.pop(path, None)
+    files = [path for path in drop.names if PurePosixPath(drop.names[path]).name != TESTS]
+    wanted = [path for path in files if not refused_only or path in drop.refused]
+    wanted = wanted if only is None else [only]
+    table = _table_of(drop)
+    for path in wanted:
+        result = _imported(drop, path, profile, table, import_files)
+        drop.taken[path], drop.refused[path] = result.records, result.refusals
+    drop.taken = {path: records for path, records in drop.taken.items() if records}
+    drop.refused = {path: refusals for path, refusals in drop.refused.items() if refusals}
+    drop.toml = toml
     verdicts = _verdicts(drop)
     shown = toml if toml.strip() else _guessed(wanted)
     if not drop.taken:
@@ -44,7 +53,35 @@ def read_rig_files(drop: Drop, toml: str, refused_only: bool) -> Intake:
         text = "the file was refused" if count == 1 else f"all {count} files were refused"
         raise NothingTakenError(text, verdicts, shown)
     records = _with_own_ids(record for path in _by_name(drop) for record in drop.taken.get(path, ()))
-    return Intake(to_dataset(records, _name(drop, len(records))), "drop", verdicts, shown)
+    dataset = to_dataset(records, _name(drop, len(records)))
+    return Intake(split_again(dataset, drop.held_out), "drop", verdicts, shown)
+
+
+def split_again(dataset: Dataset, held_out: Collection[str] | None) -> Dataset:
+    """The dataset with those of its runs held out; as it is where nobody chose."""
+    if held_out is None:
+        return dataset
+    runs = [replace(run, split="validate" if run.id in held_out else "train") for run in dataset]
+    return dataset.only(runs)
+
+
+def _table_of(drop: Drop) -> TestsTable | None:
+    """The table of tests that was dropped beside the files."""
+    found = [path for path, name in drop.names.items() if PurePosixPath(name).name == TESTS]
+    return load_tests(found[0]) if found else None
+
+
+def _imported(
+    drop: Drop, path: Path, profile: Profile | None, table: TestsTable | None, read: Callable[..., ImportResult]
+) -> ImportResult:
+    """A file read with what the dropped table says of its tests, and the currents that the page states for them."""
+    rows = () if table is None else table.of_file(Path(drop.names[path]))
+    stated = [Row(0, "", run, current) for (file, run), current in drop.currents.items() if file == path]
+    if not rows and not stated:
+        return read([path], profile)
+    runs = {row.run for row in stated}
+    told = (*stated, *(replace(row, file="") for row in rows if row.run not in runs))
+    return read([path], profile, tests=TestsTable(path.with_name(TESTS), told))
 
 
 def _by_name(drop: Drop) -> list[Path]:
@@ -54,9 +91,9 @@ def _by_name(drop: Drop) -> list[Path]:
 def _verdicts(drop: Drop) -> tuple[Verdict, ...]:
     """What is said of each file, those to be mended first."""
     refused = [
-        Verdict(drop.names[path], "refused", ((error.code, drop.named(_reason(error, path))),))
+        Verdict(_named(drop.names[path], refusals), "refused", reasons(drop, path, refusals))
         for path in _by_name(drop)
-        if (error := drop.refused.get(path))
+        if (refusals := drop.refused.get(path))
     ]
     taken = [
         Verdict(drop.names[path], "noted" if findings else "taken", findings)
@@ -65,6 +102,16 @@ def _verdicts(drop: Drop) -> tuple[Verdict, ...]:
         for findings in (tuple((f.code, f.text) for record in drop.taken[path] for f in record.findings),)
     ]
     return (*refused, *sorted(taken, key=lambda verdict: verdict.state != "noted"))
+
+
+def _named(name: str, refusals: Sequence[Refusal]) -> str:
+    runs = list(dict.fromkeys(refusal.run for refusal in refusals))
+    return name if len(runs) == 1 else f"{name}, {len(runs)} tests"
+
+
+def reasons(drop: Drop, path: Path, refusals: Iterable[Refusal]) -> tuple[tuple[str, str], ...]:
+    """Code and text of refusals, each once."""
+    return tuple(dict.fromkeys((r.error.code, drop.named(_reason(r.error, path))) for r in refusals))
 
 
 def _reason(error: InputError, path: Path) -> str:

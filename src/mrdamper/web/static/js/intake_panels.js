@@ -17,7 +17,7 @@ export function profilePanel(found, drop) {
   const text = h("textarea", { "aria-label": "Rig profile, TOML", spellcheck: "false", rows: String(Math.min(30, found.profile.split("\n").length + 1)) });
   text.value = found.profile;
   const some = refused > 0 && refused < found.verdicts.length;
-  return h("details", { class: "group", open: refused > 0 }, h("summary", {}, "Rig profile: columns, units, signs"),
+  return h("details", { class: "group" }, h("summary", {}, "Rig profile as text"),
     h("div", { class: "group" },
       h("p", { class: "small faint" }, "As guessed or last given. Correct it and read the files again."), text,
       h("div", { class: "row" },

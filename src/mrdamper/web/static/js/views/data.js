@@ -7,6 +7,7 @@ import { figures, count } from "../format.js";
 import { fileList, profilePanel } from "../intake_panels.js";
 import { rigChooser } from "../rig_chooser.js";
 import { RunFacts } from "../run_facts.js";
+import { TestList } from "../test_list.js";
 import { TestMatrix } from "../test_matrix.js";
 
 export const id = "data";
@@ -20,6 +21,7 @@ class DataView {
   constructor(bench) {
     this.bench = bench;
     this.drop = new DropZone(bench);
+    this.tests = new TestList(bench, this.drop);
     this.parts = { files: h("div", {}), profile: h("div", {}), rigs: h("div", {}), quality: h("div", {}) };
     this.stage = h("div", { class: "stage fill" });
     this.facts = new RunFacts();
@@ -58,7 +60,7 @@ class DataView {
     if (bench.busy || !bench.overview) {
       this.matrix = null;
       put(parts.quality);
-      put(this.stage, bench.busy ? busy(`${bench.busy} …`) : welcome(bench));
+      put(this.stage, bench.busy ? busy(`${bench.busy} …`) : [this.tests.element, this.tests.element.hidden ? welcome(bench) : null]);
       return;
     }
     const { rig } = bench.state;
@@ -77,7 +79,7 @@ class DataView {
   layOut(table, rig) {
     this.matrix = new TestMatrix(table, (key) => this.bench.store.commit({ run: key }));
     this.matrix.rig = rig;
-    put(this.stage, h("div", { class: "bench-top" }, this.matrix.element, this.facts.element), this.figures);
+    put(this.stage, this.tests.element, h("div", { class: "bench-top" }, this.matrix.element, this.facts.element), this.figures);
   }
 
   async drawRun(run, rig, current) {
@@ -107,6 +109,8 @@ class DataView {
   showIntake(found) {
     put(this.parts.files, fileList(found));
     put(this.parts.profile, profilePanel(found, this.drop));
+    this.tests.show(found);
+    if (!this.bench.overview) this.shown();
   }
 }
 
