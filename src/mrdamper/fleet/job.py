@@ -29,6 +29,7 @@ from mrdamper.fleet.loops import (
 )
 from mrdamper.models import SearchAxis
 from mrdamper.motion import equivalent_sine
+from mrdamper.study.workflow import believed, study_rig, usable
 
 OTHER_RIG = "W_OTHER_RIG"  # tested on another rig than most of the line: compared with them all the same
 _ROUNDS, _STEPS, _SETTLED = 1, 40, 1e-8  # one least squares without reweighting, searched to its end: the optimum
@@ -286,8 +287,6 @@ def _change(axis: SearchAxis) -> float:
 
 def _study(dataset: Dataset) -> dict[str, Any]:
     """What the full study says of a damper that stands out; which candidates it has is its own affair."""
-    from mrdamper.study.workflow import study_rig
-
     try:
         chosen = study_rig(dataset).chosen
     except InputError as error:
@@ -296,17 +295,13 @@ def _study(dataset: Dataset) -> dict[str, Any]:
 
 
 def _usable(dataset: Dataset) -> list[Run]:
-    """Train runs with a steady motion; a damper with none raises what was wrong with the first."""
-    runs, first = [], None
-    for run in dataset.split("train"):
-        try:
-            equivalent_sine(run)
-            runs.append(run)
-        except InputError as error:
-            first = first or error
+    """Train runs that can be believed and move; a damper with none raises what was wrong with the first."""
+    kept, refused = believed(dataset.split("train"))
+    runs, unusable = usable(kept)
     if runs:
         return runs
-    raise first or FleetError("no train run", where=dataset.name, mend="check the column split", code="E_FLEET_EMPTY")
+    why = next(iter({**refused, **unusable}.values()), "no train run; check the column split")
+    raise FleetError(why, where=dataset.name, code="E_FLEET_EMPTY")
 
 
 def _stands_out(fit: JointFit, away: float, plan: Plan) -> bool:

@@ -291,7 +291,7 @@ def _refuse_clipped(run: Run, clipped: bool) -> None:
     refuse_clipped(replace(run, notes={**run.notes, "findings": f"{run.notes.get('findings', '')} {seen}"}), clipped)
 
 
-def believed(dataset: Dataset) -> tuple[list[Run], dict[str, str]]:
+def believed(dataset: Iterable[Run]) -> tuple[list[Run], dict[str, str]]:
     """The runs that physics allows to believe, each once, and why the others are left out of everything."""
     kept: list[Run] = []
     refused: dict[str, str] = {}

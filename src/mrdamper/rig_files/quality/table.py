@@ -13,6 +13,7 @@ from mrdamper.errors import QualityError
 from mrdamper.rig_files.quality import judge
 from mrdamper.rig_files.quality.current import current_in
 from mrdamper.rig_files.quality.follow import force_follows
+from mrdamper.rig_files.quality.force_lag import force_channel
 from mrdamper.rig_files.quality.loop import repeatability
 from mrdamper.rig_files.quality.motion import cycles_of, drift_of, steady_window
 from mrdamper.rig_files.quality.view import View
@@ -113,10 +114,14 @@ def record_of(run: Run) -> Record:
 
 @once_per_run
 def judged(run: Run) -> tuple[QualityError | None, tuple[Finding, ...]]:
-    """Why a stored run cannot be believed, None if it can, and what else was noticed: as if it were imported now."""
+    """Why a stored run cannot be believed, None if it can, and what else was noticed: as if it were imported now.
+
+    The search for a late force, which refuses nothing and takes as long as all other checks, is left out.
+    """
     try:
-        record = judge(record_of(run))
-        force_follows(View(record))  # of a channel that died there is little left to identify from
+        record = judge(record_of(run), without=(force_channel,))
+        if any(finding.code == "W_FROZEN" for finding in record.findings):
+            force_follows(View(replace(record, findings=())))  # of a channel that died there may be nothing to identify
         return None, record.findings
     except QualityError as error:
         return error, ()
