@@ -1,15 +1,23 @@
 """A small line on disk, identified once."""
 
 import pytest
+from support.fleets import LINE
 
-from mrdamper.fleet.generator import Line, write_fleet
+from mrdamper.fleet.generator import write_fleet
 from mrdamper.fleet.line import run_fleet
+
+
+def pytest_collection_modifyitems(items):
+    """All in one process, which identifies the line once."""
+    for item in items:
+        if "/fleet/" in item.nodeid:
+            item.add_marker(pytest.mark.xdist_group("fleet"))
 
 
 @pytest.fixture(scope="session")
 def line(tmp_path_factory):
     folder = tmp_path_factory.mktemp("line") / "records"
-    write_fleet(Line(dampers=6, sessions=2, golden=1, faults={"wrong coil": 1}, seed=3), folder)
+    write_fleet(LINE, folder)
     return folder
 
 

@@ -10,7 +10,7 @@ import time
 
 import distributed
 import pytest
-from support.fleets import same_bits
+from support.fleets import ROWS, planned, same_bits
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
@@ -59,7 +59,7 @@ def cluster(tmp_path):
 
 def test_jobs_on_a_cluster_give_the_same_bits(line, identified, tmp_path):
     with distributed.LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as local:
-        run_fleet(line, tmp_path / "out", scheduler=local.scheduler_address)
+        run_fleet(line, planned(identified, tmp_path / "out"), scheduler=local.scheduler_address)
     assert same_bits(tmp_path / "out") == same_bits(identified.table.parent)
 
 
@@ -89,7 +89,7 @@ def test_a_cluster_whose_worker_is_killed_gives_the_same_bits(line, identified, 
 
     found = run_when_ready(line, tmp_path / "out", cluster, progress=progress)
     assert killed.is_set()
-    assert found.done == 8
+    assert found.done == ROWS
     assert same_bits(tmp_path / "out") == same_bits(identified.table.parent)
 
 

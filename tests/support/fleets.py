@@ -1,10 +1,27 @@
-"""What fleets are compared by."""
+"""What fleets are compared by, and a line that is small."""
+
+import shutil
+import sqlite3
 
 import polars as pl
 
+from mrdamper.fleet.generator import Line
 from mrdamper.fleet.table import TIMES
+
+LINE = Line(dampers=4, sessions=2, golden=1, faults={"wrong coil": 1}, seed=3)
+ROWS = 6  # four dampers, and the golden one in two sessions
 
 
 def same_bits(folder):
     """What has to agree to the last bit: the table without columns that hold times or a host."""
     return pl.read_parquet(folder / "dampers.parquet").drop(TIMES).rows()
+
+
+def planned(identified, out):
+    """A journal that holds the line's plan and the one full study, so that only fast searches are left to do."""
+    out.mkdir()
+    shutil.copyfile(identified.table.parent / "journal.sqlite", out / "journal.sqlite")
+    with sqlite3.connect(out / "journal.sqlite") as base:
+        base.execute("DELETE FROM results WHERE json_extract(row, '$.lane') = 'fast'")
+    base.close()
+    return out

@@ -27,7 +27,8 @@ from mrdamper.fleet.loops import (
     shape_deviation,
     velocity_ladder,
 )
-from mrdamper.models import SearchAxis
+from mrdamper.identification.covariance import spread
+from mrdamper.models import Model, SearchAxis
 from mrdamper.motion import equivalent_sine
 from mrdamper.study.workflow import believed, study_rig, usable
 
@@ -37,6 +38,8 @@ _ROUNDS, _STEPS, _SETTLED = 1, 40, 1e-8  # one least squares without reweighting
 _SPEED_STEPS = (0.25, 0.5, 0.75, 1.0)  # of the velocity ladder, over the line's highest test speed
 _CANDIDATES = 2  # of the line's start
 _WORTH = 0.02  # relative rise of the squared error by which a parameter counts as determined
+_TOGETHER = 4  # samples that are averaged for the standard errors
+_STEP = 1e-4  # of a search axis's coordinate, for slopes of parameters
 _RIDGE = 1e-12  # keeps the curvature of what changes nothing invertible
 _FAR = 6.0  # robust standard deviations from the line at which a damper is studied in full
 
@@ -221,6 +224,7 @@ def _identify(dataset: Dataset, settings: Settings, plan: Plan | None) -> dict[s
             more |= {
                 "axes": [axis.name for axis in problem.axes],
                 "changes": [_change(axis) for axis in problem.axes],
+                "stands_for": [_stands_for(fit.damper.model, axis.name) for axis in problem.axes],
                 "curvature": _curvature(problem, fit),
             }
     row: dict[str, Any] = {
@@ -233,6 +237,7 @@ def _identify(dataset: Dataset, settings: Settings, plan: Plan | None) -> dict[s
         "nrmse_pp_worst": float(np.max(fit.nrmse_pp)),
         "at_bounds": " ".join(fit.at_bounds),
         "parameters": dict(fit.damper.model.values()),
+        "standard_errors": _standard_errors(problem, fit),
         "point": fit.point.tolist(),
         "tests": tests,
         "loops": np.round(loops, 3).tolist(),
@@ -283,6 +288,42 @@ def _curvature(problem: JointProblem, fit: JointFit) -> list[list[float]]:
 def _change(axis: SearchAxis) -> float:
     """A change of a search axis that would matter to an engineer."""
     return 0.2 if axis.log else 0.05 * (axis.upper - axis.lower)
+
+
+def _standard_errors(problem: JointProblem, fit: JointFit) -> dict[str, float]:
+    """Of the parameters that this damper's own records determined, those held at the line's value being right."""
+    residual, jacobian, _ = problem.linearised(fit)
+    model, held = fit.damper.model, set(fit.at_bounds)
+    values = model.values()
+    slopes = np.zeros((len(values), jacobian.shape[1]))
+    axes = [axis for axis in problem.axes if hasattr(model, axis.name)]
+    own = {axis.name: axis.value(float(u)) for axis, u in zip(problem.axes, fit.point, strict=True) if axis in axes}
+    for i, (axis, u) in enumerate(zip(problem.axes, fit.point, strict=True)):
+        if axis in axes:
+            step = _STEP if axis.value(float(u) + _STEP) <= axis.upper else -_STEP
+            moved = type(model).build({**values, **own, axis.name: axis.value(float(u) + step)}).values()
+            slopes[:, i] = [(moved[name] - values[name]) / step for name in values]
+    for i, info in enumerate(problem.linear):
+        slopes[list(values).index(info.name), len(problem.axes) + i] = 1.0
+    kept = residual.size // _TOGETHER * _TOGETHER  # what is slower than a few samples is what makes errors large
+    means = (a[:kept].reshape(-1, _TOGETHER, *a.shape[1:]).mean(axis=1) for a in (jacobian, residual))
+    covariance = spread(*means).covariance
+    found = {}
+    for name, slope in zip(values, slopes, strict=True):
+        of = np.flatnonzero(slope)
+        variance = float(slope[of] @ covariance[np.ix_(of, of)] @ slope[of])
+        if of.size and name not in held and 0 < variance < np.inf:
+            found[name] = float(np.sqrt(variance))
+    return found
+
+
+def _stands_for(model: Model, axis: str) -> list[str]:
+    """Parameters that a search axis is made of: one by its name, or those of a ratio."""
+    values = model.values()
+    if axis in values or not hasattr(model, axis):
+        return [axis]
+    own = getattr(model, axis)
+    return [name for name, value in values.items() if getattr(replace(model, **{name: 0.9 * value}), axis) != own]
 
 
 def _study(dataset: Dataset) -> dict[str, Any]:
@@ -354,29 +395,28 @@ def holding(plan: Plan, rows: Sequence[dict[str, Any]]) -> Plan:
     A few records cannot tell all parameters of a model from each other. One that could change by a
     fifth (on an axis that is no logarithm, by a twentieth of its width) while the others make up for
     it and the squared error rises by less than a fiftieth is held, the least determined first.
-    What is left has one minimum, the same from any start near the line, and can be compared.
+    A ratio of which a part is held is held too: of lost motion that no test determines, none
+    determines which share the seat takes. What is left has one minimum, the same from any start,
+    and can be compared.
     """
     curvature = np.array([row["curvature"] for row in rows])
-    names = rows[0]["axes"]
+    names, parts = rows[0]["axes"], rows[0]["stands_for"]
     free = list(range(len(names)))
     while free:
         some = [c[np.ix_(free, free)] for c in curvature]
         inverse = [np.linalg.inv(c + _RIDGE * (1 + np.trace(c)) * np.eye(len(free))) for c in some]
         rises = np.median([1 / np.diag(i) for i in inverse], axis=0)
         rises = rises * np.array([rows[0]["changes"][i] for i in free]) ** 2
-        rises[[names[i] not in rows[0]["parameters"] for i in free]] = (
-            np.inf
-        )  # an axis of several parameters stays free
+        rises[[len(parts[i]) > 1 for i in free]] = np.inf
         if rises.min() > _WORTH:
             break
         del free[int(np.argmin(rises))]
-    held = {
-        name: float(np.median([row["parameters"][name] for row in rows]))
-        for i, name in enumerate(names)
-        if i not in free
-    }
+    held = {parts[i][0] for i in range(len(names)) if i not in free}
+    free = [i for i in free if not held & set(parts[i])]
+    held |= {part for i in range(len(names)) if i not in free for part in parts[i]}
+    values = {name: float(np.median([row["parameters"][name] for row in rows])) for name in sorted(held)}
     points = np.array([row["point"] for row in rows])
-    return replace(plan, start=tuple(np.median(points[:, free], axis=0).tolist()), held=held)
+    return replace(plan, start=tuple(np.median(points[:, free], axis=0).tolist()), held=values)
 
 
 def settled(plan: Plan, rows: Sequence[dict[str, Any]]) -> Plan:

@@ -33,7 +33,7 @@ def write_table(rows: Iterable[dict[str, Any]], parameters: Iterable[str], plan:
     ----------
     rows : iterable of dict
     parameters : iterable of str
-        Names of the model's parameters; each becomes a column `p_NAME`.
+        Names of the model's parameters; each becomes a column `p_NAME`, its standard error `se_NAME`.
     plan : Plan, optional
         Its velocity ladder becomes columns `rebound_N_0.1m_s_1A` and `compression_N_...`.
     path : path
@@ -79,7 +79,9 @@ def _schema(parameters: tuple[str, ...], forces: tuple[str, ...]) -> dict[str, p
     kinds: dict[str, Any] = dict.fromkeys(_TEXT, pl.String)
     kinds["golden"] = pl.Boolean
     kinds |= dict.fromkeys(("runs", "tests_missing"), pl.Int64)
-    kinds |= dict.fromkeys((*_NUMBERS, *(f"p_{name}" for name in parameters), *forces), pl.Float64)
+    kinds |= dict.fromkeys(
+        (*_NUMBERS, *(f"{what}_{name}" for name in parameters for what in ("p", "se")), *forces), pl.Float64
+    )
     kinds["loops"] = pl.List(pl.List(pl.Float64))
     kinds |= {name: pl.Float64 if name.endswith("_s") else pl.String for name in TIMES}
     return kinds
@@ -87,4 +89,5 @@ def _schema(parameters: tuple[str, ...], forces: tuple[str, ...]) -> dict[str, p
 
 def _flat(row: dict[str, Any], forces: tuple[str, ...]) -> dict[str, Any]:
     parameters = {f"p_{name}": value for name, value in (row.get("parameters") or {}).items()}
+    parameters |= {f"se_{name}": value for name, value in (row.get("standard_errors") or {}).items()}
     return {**row, **parameters, **dict(zip(forces, row.get("ladder") or (), strict=False))}
