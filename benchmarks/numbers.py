@@ -99,9 +99,7 @@ def of_study(study: Study) -> list[Told]:
     return [
         Table("README.md", "| | numbers | utfsm left out", tuple(rows)),
         Sentence(page, r"gains of (\S+)–(\S+) % \(standard deviation\)", gains),
-        Sentence(
-            page, r"would leave (\S+) % \(labcontrol\) and (\S+) % \(utfsm\)", tuple(100 * d.floor for d in drifts)
-        ),
+        Sentence(page, r"would leave (\S+) % \(labcontrol\) and (\S+) % \(utfsm\)", rest),
         Sentence(page, r"rig utfsm\): (\S+) % raw", (raw,), tolerance=3 * POINTS),
         Sentence(page, r"force zero lies (\S+) N from", (offset,), 0, 5.0),
         Sentence(page, r"own offset (\S+) % remain", (left,), tolerance=3 * POINTS),
