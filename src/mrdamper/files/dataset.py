@@ -136,6 +136,9 @@ def _load(folder: Path, name: str, *, trusted: bool = False) -> Dataset:
 
 
 def _runs_table(folder: Path) -> list[dict[str, Any]]:
+    if folder.is_file():
+        mend = "give the folder that holds runs.csv; files of a rig become one with mrdamper import"
+        raise DatasetError("a file, no dataset folder", where=str(folder), mend=mend)
     if not folder.is_dir():
         raise DatasetError("no such folder", where=str(folder), mend="give a folder that holds runs.csv")
     path = folder / "runs.csv"

@@ -49,9 +49,10 @@ def opened(path: Path, *, folder: bool = False) -> Iterator[Source]:
             yield _gunzip(source) if head.startswith(_GZIP) else source
             return
         if packed and source.suffix not in (".gz", ".zip", ".gzip", ""):
-            raise source.refuse(
-                "E_FORMAT", f"the name says {source.suffix}, the content is a packed file", mend="rename it"
+            mend = (
+                "an FMU is a model: mrdamper check reads it" if source.suffix == ".fmu" else "rename it to .zip or .gz"
             )
+            raise source.refuse("E_FORMAT", f"the name says {source.suffix}, the content is a packed file", mend=mend)
         if packed:
             source = _unzip(source) if head.startswith(b"PK") else _gunzip(source)
             _refuse_nested(source)
