@@ -2,22 +2,60 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from typing import TypeVar
 
+Item = TypeVar("Item")
 Progress = Callable[[str, float], None]
+_SOON = 2.0  # seconds before which the time left is a guess nobody needs
 
 
 @contextmanager
 def progress_on_stderr(quiet: bool = False) -> Iterator[Progress]:
-    """Give a function (what is being done, share done 0...1) that shows progress on stderr."""
+    """Give a function (what is being done, share done 0...1) that shows progress and the time left on stderr."""
     if quiet:
         yield lambda what, share: None
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("{task.fields[left]}"))
+    began = time.monotonic()
     with Progress(*columns, console=Console(stderr=True), transient=False) as bar:
-        task = bar.add_task("", total=1.0)
-        yield lambda what, share: bar.update(task, description=what, completed=share)
+        task = bar.add_task("", total=1.0, left="")
+
+        def tell(what: str, share: float) -> None:
+            bar.update(task, description=what, completed=share, left=time_left(time.monotonic() - began, share))
+
+        yield tell
+
+
+def watched(items: Sequence[Item], what: str) -> Iterator[Item]:
+    """Items one after the other, with progress from the second second on."""
+    began = time.monotonic()
+    with ExitStack() as stack:
+        tell = None
+        for number, item in enumerate(items):
+            if tell is None and time.monotonic() - began > 1.0:
+                tell = stack.enter_context(progress_on_stderr())
+            if tell is not None:
+                tell(f"{what} {number + 1} of {len(items)}", number / len(items))
+            yield item
+        if tell is not None:
+            tell(f"{len(items)} {what}s", 1.0)
+
+
+def time_left(seconds: float, share: float) -> str:
+    """How long it will take from here if it goes on as before; empty where that cannot be said yet.
+
+    Examples
+    --------
+    >>> time_left(30.0, 0.25)
+    'about 90 s left'
+    """
+    if seconds < _SOON or not 0.02 < share < 1:
+        return ""
+    left = seconds * (1 - share) / share
+    return f"about {left / 60:.0f} min left" if left >= 100 else f"about {left:.0f} s left"

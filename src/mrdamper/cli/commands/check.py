@@ -43,6 +43,7 @@ def register(app: typer.Typer) -> None:
         An FMU that mrdamper exported is loaded and has to answer its reference motion.
         """
         from mrdamper.cli.output import put
+        from mrdamper.cli.progress import watched
         from mrdamper.errors import InputError
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.dataset import load_dataset
@@ -56,7 +57,7 @@ def register(app: typer.Typer) -> None:
         if figure is not None:
             require_writable(figure)
             _require_format(figure)
-        verdicts = quality_table(record_of(run) for run in load_dataset(data))
+        verdicts = quality_table(record_of(run) for run in watched(load_dataset(data).runs, "run"))
         put([row(verdict) for verdict in verdicts], None, as_json, _text_table)
         for verdict in verdicts:
             if verdict.refusal is not None:

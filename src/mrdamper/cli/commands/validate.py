@@ -22,6 +22,7 @@ def register(app: typer.Typer) -> None:
     ) -> None:
         """Score a saved model on the runs of its rig: nrmse, wape, peak force and energy."""
         from mrdamper.cli.output import put
+        from mrdamper.cli.progress import watched
         from mrdamper.errors import InputError, UnknownNameError
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.dataset import load_dataset
@@ -44,7 +45,7 @@ def register(app: typer.Typer) -> None:
         runs = [run for run in dataset.rig(wanted) if split in (None, run.split)]
         if not runs:
             raise InputError(f"no {split} runs", where=f"rig {wanted}", mend="leave out --split")
-        validation = score(damper, runs)
+        validation = score(damper, watched(runs, "run"))
         for name, why in validation.refused.items():
             typer.echo(f"not scored: {name}: {why}", err=True)
         if not validation.runs:

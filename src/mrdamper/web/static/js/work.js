@@ -17,7 +17,7 @@ export function workBox(bench) {
   );
   const said = h("div", { role: "status" });
   const element = h("div", { class: "field", hidden: true }, box, said);
-  let [running, quarter] = [null, 0];
+  let [running, quarter, done] = [null, 0, 0];
   cancel.addEventListener("click", () => bench.api.delete(`/jobs/${running}`).catch((error) => bench.fail(error)));
 
   function tell(report) {
@@ -28,7 +28,14 @@ export function workBox(bench) {
     if (Math.floor(share / 25) > quarter) bench.speak(`${share} per cent`); // now and then, not at every report
     quarter = Math.floor(share / 25);
     what.textContent = report.what;
-    clock.textContent = seconds(report.seconds);
+    done = report.share;
+    tick(report.seconds);
+  }
+
+  /** The time it took, and what it will take if it goes on as before. */
+  function tick(took) {
+    const left = took < 2 || done <= 0.02 || done >= 1 ? "" : `, about ${seconds(Math.round((took * (1 - done)) / done))} left`;
+    clock.textContent = seconds(took) + left;
   }
 
   /** Begin work; its answer, or null if it did not end well. */
@@ -50,7 +57,7 @@ export function workBox(bench) {
     bench.speak("Working");
     tell({ share: 0, what: "starting a worker", seconds: 0 });
     let began = performance.now();
-    const ticking = setInterval(() => (clock.textContent = seconds((performance.now() - began) / 1000)), 200);
+    const ticking = setInterval(() => tick((performance.now() - began) / 1000), 200);
     try {
       const job = await begin();
       began -= 1000 * job.seconds;
