@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.optimizers.linear import on_one_blas_thread
 from mrdamper.rig_files.quality.flat import flagged_samples, flat_tops
 from mrdamper.rig_files.quality.noise import sample_noise
 from mrdamper.rig_files.quality.view import View
@@ -68,6 +69,7 @@ def force_channel(view: View) -> Iterator[Finding]:
         )
 
 
+@on_one_blas_thread
 def force_lag(view: View) -> ForceLag | None:
     """Best delay of the force on a sine; None where the motion is none."""
     motion = view.motion
@@ -105,7 +107,7 @@ def _misfit(phase: Floats, columns: Floats, ramp: Floats, force: Floats) -> floa
     free = columns[low] * (1 - part) + columns[(low + 1) % _POINTS] * part
     table = np.column_stack([np.ones(force.size), ramp, free, force])
     # A triangle of the size of the columns holds all that the fit needs of the rows.
-    gram = np.einsum("ij,ik->jk", table, table)  # too small a product to share among threads
+    gram = table.T @ table
     gram[np.diag_indices_from(gram)] *= 1 + 1e-12
     try:
         triangle = np.linalg.cholesky(gram).T
