@@ -10,6 +10,7 @@ import numpy as np
 
 from mrdamper.dampers.bands import band
 from mrdamper.dampers.base import Damper, Prediction
+from mrdamper.dampers.sessions import KNOWN, UNKNOWN, Expected, Reading, Sessions, When
 from mrdamper.data import Condition, Run, Shown, same_condition
 from mrdamper.errors import InputError, RunError
 from mrdamper.metrics import Scores, dissipated_power, peak_force, score
@@ -30,6 +31,13 @@ class RunScore:
         Cycle-to-cycle scatter of the run as nrmse_pp.
     extrapolation : tuple of str
         Quantities outside the envelope of the tests the damper was identified from.
+    rest : float or None
+        RMS error while the motion stands still, anywhere in the record, over the peak-to-peak
+        force; None where it never does.
+    session : str
+        "unknown": predicted as it is; "known": corrected by other runs of its session.
+    reading : Reading or None
+        Gain and offset that would have fitted the run best; no score is corrected by them.
     """
 
     run_id: str
@@ -38,6 +46,9 @@ class RunScore:
     scores: Scores
     floor: float | None
     extrapolation: tuple[str, ...]
+    rest: float | None = None
+    session: str = UNKNOWN
+    reading: Reading | None = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -70,6 +81,7 @@ class Validation(Shown):
         return {
             "run_id": [run.run_id for run in self.runs],
             **{name: [float(getattr(run.scores, name)) for run in self.runs] for name in names},
+            "session": [run.session for run in self.runs],
             "extrapolation": [" ".join(run.extrapolation) for run in self.runs],
         }
 
@@ -86,7 +98,9 @@ class Validation(Shown):
         return replace(self, runs=tuple(run for run in self.runs if run.run_id in run_ids))
 
 
-def validate(damper: Damper, runs: Iterable[Run], title: str | None = None) -> Validation:
+def validate(
+    damper: Damper, runs: Iterable[Run], title: str | None = None, *, known: Sessions | None = None
+) -> Validation:
     """Predict runs from their measured motion and score them inside their steady windows.
 
     A run that cannot be predicted, for want of motion say, does not stop the others: it is among
@@ -98,6 +112,8 @@ def validate(damper: Damper, runs: Iterable[Run], title: str | None = None) -> V
     runs : iterable of Run
     title : str, optional
         Default: the damper's.
+    known : Sessions, optional
+        What is known of the runs' sessions (`sessions_known`); by default nothing is, and nothing is corrected.
 
     Raises
     ------
@@ -117,14 +133,14 @@ def validate(damper: Damper, runs: Iterable[Run], title: str | None = None) -> V
     scored, refused = [], {}
     for run in runs:
         try:
-            scored.append(score_run(damper, run))
+            scored.append(score_run(damper, run, known))
         except InputError as error:
             refused[run.id] = str(error)
     return Validation(title or damper.title, tuple(scored), refused)
 
 
-def score_run(damper: Damper, run: Run) -> RunScore:
-    """Predict and score one run.
+def score_run(damper: Damper, run: Run, known: Sessions | None = None) -> RunScore:
+    """Predict and score one run, corrected where its session is known.
 
     Raises
     ------
@@ -134,22 +150,43 @@ def score_run(damper: Damper, run: Run) -> RunScore:
     if np.ptp(run.force[run.in_window]) == 0:
         raise RunError("the force does not change", where=f"run {run.id}", mend="check the channel")
     prediction = damper.predict_run(run)
+    inside = run.in_window
+    reading = Reading.of(run.force[inside], prediction.force[inside])
+    expected = known.expected(When.of(run), without=run.id) if known else None
+    if expected is not None:
+        prediction = expected.corrected(prediction)
     return RunScore(
-        run.id, run.rig, prediction.condition, _scores(run, prediction), run.repeatability, prediction.extrapolation
+        run.id,
+        run.rig,
+        prediction.condition,
+        _scores(run, prediction),
+        run.repeatability,
+        prediction.extrapolation,
+        _at_rest(run, prediction),
+        UNKNOWN if expected is None else KNOWN,
+        reading,
     )
 
 
-def peak_band(damper: Damper, run: Run, level: float = 0.9) -> dict[str, float]:
+def _at_rest(run: Run, prediction: Prediction) -> float | None:
+    still = prediction.motion.resting
+    if not still.any():
+        return None
+    return float(np.sqrt(np.mean((prediction.force - run.force)[still] ** 2)) / np.ptp(run.force))
+
+
+def peak_band(damper: Damper, run: Run, level: float = 0.9, expected: Expected | None = None) -> dict[str, float]:
     """Half the peak-to-peak force [N] and the energy of a cycle [J] in a run's steady window, and their bands.
 
     The ends are missing where the damper does not know how sure it is.
     """
     prediction, inside = damper.predict_run(run), run.in_window
+    known = (expected.band if expected else band)(damper, prediction, level, inside)
+    prediction = expected.corrected(prediction) if expected else prediction
     velocity, time = prediction.motion.velocity[inside], run.time[inside]
     cycles = max(prediction.condition.frequency_Hz, 1e-9)
     energy = dissipated_power(run.force[inside], velocity, time) / cycles
     row = {"peak_force_measured_N": peak_force(run.force[inside]), "energy_measured_J": energy}
-    known = band(damper, prediction, level, shown=inside)
     if known is None:
         return row
     predicted = dissipated_power(prediction.force[inside], velocity, time) / cycles

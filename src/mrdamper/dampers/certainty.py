@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mrdamper.dampers.sessions import Sessions
 from mrdamper.data import Floats
 from mrdamper.errors import InputError
 from mrdamper.identification.intervals import interval_about, weaknesses, written
@@ -62,6 +63,8 @@ class Certainty:
         of the peak force and of the dissipated energy, relative.
     left_out : int
         Runs left out that say so.
+    sessions : Sessions or None
+        What sessions share, day and hour, where the tests could tell.
     words : tuple of str
         What only the runs could tell of it: numbers that do the same to the force, or rest on one run.
     taught : mapping of str to float
@@ -83,6 +86,7 @@ class Certainty:
     left_out: int = 0
     words: tuple[str, ...] = ()
     taught: Mapping[str, float] = field(default_factory=dict)
+    sessions: Sessions | None = None
 
     @property
     def one_session(self) -> bool:

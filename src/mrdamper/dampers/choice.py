@@ -142,6 +142,11 @@ def identify_jointly(
     if off or coil != problem.given_coil:
         final = JointProblem(runs, MODEL, {**problem.fixed, **off}, free=problem.free, coil=coil, parts=problem.parts)
         found = final.fit(start=evidence.start(final), rounds=1, most_steps=8, settled=_ROUGHLY / 10)
+    coil, gone = _absent(final, found)
+    if gone or coil != final.given_coil:
+        fixed = {**final.fixed, **dict.fromkeys(gone, 0.0)}
+        final = JointProblem(runs, MODEL, fixed, free=final.free, coil=coil, parts=final.parts)
+        found = final.fit(start=final.from_point(found), rounds=1, most_steps=4, settled=_ROUGHLY / 10)
     progress("one model for all runs", 1.0)
     left_out, before = (Evidence.of(p, f).everything() for p, f in ((final, found), (problem, fit)))
     if _better(before, left_out):  # what one step promised, the search did not keep: terms earn their place here too
@@ -181,7 +186,7 @@ def _level_laws(problem: JointProblem) -> tuple[Term, ...]:
     """Forms of the level law that the currents of the tests can determine, the shortest first."""
     if any(part.changes for part in problem.parts) or len(levels_of(problem)) > 3:
         return LEVEL_LAWS[0], LEVEL_LAWS[-1]
-    return LEVEL_LAWS[:2] if len(levels_of(problem)) == 3 else ()
+    return LEVEL_LAWS[:2] if len(levels_of(problem)) > 2 else ()
 
 
 def _level_law(

@@ -255,11 +255,6 @@ class JointProblem:
         table = _Table(self, [self.parts[i] for i in rows])
         return np.sqrt(np.bincount(table.owner, table.residual(fit.point, fit.damper.model) ** 2))
 
-    @property
-    def rests(self) -> bool:
-        """Whether the motion ever stops for longer than a fraction of a cycle, as ramps and holds do."""
-        return any(part.rests for part in self.parts)
-
     @cached_property
     def start(self) -> Floats:
         """(D,) the best of the model's starts on the search axes."""
@@ -524,15 +519,6 @@ class _Part:
             float(np.max(run.displacement)),
             (int(np.searchsorted(at, inside[0])), int(np.searchsorted(at, inside[-1]))),
         )
-
-    @property
-    def rests(self) -> bool:
-        """Whether the motion stands still for a fifth of a cycle or more."""
-        speed = np.abs(self.motion.velocity)
-        moving = np.concatenate([[-1], np.flatnonzero(speed > _STILL * self.condition.peak_velocity), [speed.size]])
-        longest = int(np.argmax(np.diff(moving)))
-        begin, end = max(int(moving[longest]), 0), min(int(moving[longest + 1]), speed.size - 1)
-        return float(self.motion.time[end] - self.motion.time[begin]) > 0.2 / self.condition.frequency_Hz
 
     def steady_end(self) -> _Part:
         """The last cycles of the steady part, of other records the last third: enough to compare starts and forms."""

@@ -19,13 +19,14 @@ from mrdamper.dampers import all_kinds
 from mrdamper.dampers.base import Damper, Envelope
 from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.coil import Coil, Driver
+from mrdamper.dampers.sessions import Sessions
 from mrdamper.data import require_name
 from mrdamper.errors import InputError, ModelFileError
 from mrdamper.files.atomic import path_of, write_file
 from mrdamper.files.strict_json import parse_json
 
 FORMAT = "mrdamper-model"
-MAJOR, MINOR = 1, 3
+MAJOR, MINOR = 1, 4
 _LARGEST = 64_000_000  # bytes of a file
 UNITS = {
     "time": "s",
@@ -103,6 +104,7 @@ class _Covariance(_Strict):
     model_error: _ModelError
     words: tuple[str, ...] = ()
     taught: dict[str, float] = {}
+    sessions: Sessions | None = None  # since 1.4
 
 
 class _Document(_Strict):
@@ -274,6 +276,7 @@ def _describe_certainty(known: Certainty | None) -> _Covariance | None:
         model_error=_ModelError(force=known.force, peak=known.peak, energy=known.energy, left_out=known.left_out),
         words=known.words,
         taught=dict(known.taught),
+        sessions=known.sessions,
     )
 
 
@@ -294,6 +297,7 @@ def _with_certainty(damper: Damper, saved: _Covariance, where: str) -> Damper:
         saved.parameters, saved.logarithmic, matrix, np.array(saved.degrees_of_freedom), saved.one_sided, saved.unknown,
         session.gain, session.offset_N, session.degrees_of_freedom,
         model.force, model.peak, model.energy, model.left_out, saved.words, saved.taught,
+        saved.sessions,
     )  # fmt: skip
     return replace(damper, certainty=known)  # type: ignore[type-var]
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from mrdamper.data import Floats
 from mrdamper.motion.path import Path
+
+_STILL, _REST = 0.01, 0.1  # share of the peak speed below which a motion stands still, and for how long [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +44,17 @@ class Excitation:
     def path(self) -> Path:
         """The motion cut into strokes."""
         return Path.of(self.displacement)
+
+    @cached_property
+    def resting(self) -> NDArray[np.bool_]:
+        """(N,) where the motion, once it has begun, stands still for a tenth of a second or longer."""
+        speed = np.abs(self.velocity)
+        moving = np.flatnonzero(speed > _STILL * speed.max()) if len(self) else np.zeros(0, dtype=int)
+        still = np.zeros(len(self), dtype=bool)
+        for begin, end in pairwise([*moving.tolist(), len(self)]):
+            if end - begin > 2 and self.time[end - 1] - self.time[begin + 1] >= _REST:
+                still[begin + 1 : end] = True
+        return still
 
     def part(self, mask: ArrayLike | slice) -> Excitation:
         """The samples selected by a mask, slice or index."""

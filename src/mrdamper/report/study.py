@@ -270,7 +270,19 @@ def _drift(rig: RigStudy) -> str:
         f"From run to run the measured force differs from the prediction by gains of {100 * drift.gain:.1f} % and "
         f"offsets of {drift.offset:.0f} N (standard deviations): the session's, or the model's own misfit at that "
         f"condition; these tests alone do not tell which. A gain and an offset of each run's own would leave "
-        f"{100 * drift.floor:.1f} %."
+        f"{100 * drift.floor:.1f} %. {_left_out(rig)}"
+    )
+
+
+def _left_out(rig: RigStudy) -> str:
+    """What was left out, and whether sessions were known; every other score is of sessions nobody has seen."""
+    found = {k: v for k, v in rig.damper.provenance.items() if k.startswith("left out, ")}
+    text = "".join(f"Mean error with a {k.removeprefix('left out, ')} left out: {v}. " for k, v in found.items())
+    if isinstance(rig.session_known, str):
+        return f"{text}All scores are of unknown sessions: {rig.session_known}."
+    return (
+        f"{text}All scores are of unknown sessions; corrected by the other runs of their day, left-out conditions "
+        f"have a median error of {100 * rig.session_known:.2f} %."
     )
 
 

@@ -72,6 +72,8 @@ def score_row(run: RunScore) -> dict[str, Any]:
         "wape": s.wape,
         "energy_error": s.energy_error,
         "peak_error": s.peak_error,
+        "rest_nrmse_pp": run.rest,
+        "session": run.session,
         "extrapolation": " ".join(run.extrapolation),
     }
 

@@ -275,7 +275,9 @@ def _joined(name: str, scores: Sequence[RunScore]) -> RunScore:
 
     whole = replace(scores[0].scores, **{f.name: joined(f.name) for f in fields(scores[0].scores)})
     flags = tuple(dict.fromkeys(flag for score in scores for flag in score.extrapolation))
-    return replace(scores[0], run_id=name, scores=whole, extrapolation=flags)
+    rests = [score.rest for score in scores if score.rest is not None]
+    rest = float(np.sqrt(np.mean(np.square(rests)))) if rests else None
+    return replace(scores[0], run_id=name, scores=whole, extrapolation=flags, rest=rest, reading=None)
 
 
 def follow_all(

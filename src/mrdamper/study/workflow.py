@@ -18,6 +18,7 @@ from mrdamper.dampers.base import Damper
 from mrdamper.dampers.covariance import certain
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
+from mrdamper.dampers.sessions import Sessions, known_errors
 from mrdamper.data import Dataset, Run, Shown
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError
 from mrdamper.identification import refuse_clipped
@@ -70,6 +71,9 @@ class RigStudy(Shown):
         Recipes whose damper could not be determined from this rig's data.
     asked_for : bool
         The user named the model; the evidence did not choose it.
+    session_known : float or str
+        Median nrmse_pp of left-out conditions corrected by the other runs of their session, beside
+        the scores, which are of sessions nobody has seen; or why there is none.
     """
 
     rig: str
@@ -80,6 +84,7 @@ class RigStudy(Shown):
     not_identified: Mapping[str, str]
     refused: Mapping[str, str]
     asked_for: bool = False
+    session_known: float | str = ""
 
     @property
     def headline(self) -> str:
@@ -246,10 +251,28 @@ def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None, *
     candidates.sort(key=lambda c: c is not chosen)
     held = chosen.fit.at_bounds if isinstance(chosen.fit, JointFit | ModifiedFit) else ()
     errors_left_out = [r.scores for r in chosen.left_out.runs]
-    candidates[0] = replace(chosen, damper=certain(chosen.damper, train, errors_left_out, held))
+    chosen = replace(chosen, damper=certain(chosen.damper, train, errors_left_out, held))
+    candidates[0], known = _with_sessions(chosen, dataset)
     return RigStudy(
-        rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), refused, impossible, model is not None
+        rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), refused, impossible, model is not None, known
     )
+
+
+def _with_sessions(chosen: Scored, dataset: Dataset) -> tuple[Scored, float | str]:
+    """The candidate whose damper knows what sessions share, and its left-out error with them known, or why not."""
+    damper, own = chosen.damper, {score.run_id: score.reading for score in chosen.train.runs}
+    left_out = [score for score in chosen.left_out.runs if own.get(score.run_id) is not None]
+    runs = [dataset[score.run_id] for score in left_out]
+    seen = [score.reading for score in left_out if score.reading is not None]
+    try:
+        sessions = Sessions.of(runs, seen, [own[score.run_id] for score in left_out])  # type: ignore[misc]
+        error = float(np.median(known_errors(runs, seen)))
+    except InputError as reason:
+        return chosen, str(reason)
+    if damper.certainty is None:
+        return chosen, error
+    known = replace(damper.certainty, sessions=sessions)
+    return replace(chosen, damper=replace(damper, certainty=known)), error  # type: ignore[type-var]
 
 
 def _judged_on_all(candidate: Scored, everything: Sequence[Run]) -> Scored:

@@ -35,6 +35,12 @@ def register(app: typer.Typer) -> None:
         coil_lag: float | None = typer.Option(
             None, "--coil-lag", help="Time constant of the coil [ms], in place of the model's own."
         ),
+        check_run: list[str] = typer.Option(
+            [], "--check-run", help="Predict for the session of this run of --data, corrected by it."
+        ),
+        data: Path | None = typer.Option(
+            None, "--data", help="Dataset with the check runs; default: the bundled tests."
+        ),
         level: float = typer.Option(0.9, "--level", help="Share of sessions whose force the band holds."),
         out: Path | None = typer.Option(None, "--out", help="CSV to write; default: standard output."),
         as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
@@ -78,6 +84,20 @@ def register(app: typer.Typer) -> None:
                 err=True,
             )
         known = band(damper, prediction, level)
+        if check_run:
+            from mrdamper.dampers.sessions import When, sessions_known
+            from mrdamper.files.dataset import load_dataset
+
+            dataset = load_dataset(data)
+            runs = [dataset[name] for name in check_run]
+            expected = sessions_known(damper, runs).expected(When.of(runs[-1]))
+            assert expected is not None  # the last check run's own session
+            known, prediction = expected.band(damper, prediction, level), expected.corrected(prediction)
+            typer.echo(
+                f"session known by {', '.join(check_run)}: gain {expected.gain:.3f} ± {expected.gain_spread:.3f}, "
+                f"offset {expected.offset:.3g} ± {expected.offset_spread:.2g} N",
+                err=True,
+            )
         typer.echo(_said(prediction, known, level) if known else f"note: {no_band(damper)}", err=True)
         put(prediction_rows(prediction, known), out, as_json, csv_text)
 

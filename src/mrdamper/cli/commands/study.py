@@ -90,6 +90,7 @@ def _summary(result, written: list[str]) -> dict:
                     }
                     for c in rig.candidates
                 },
+                "left_out_session_known": rig.session_known if isinstance(rig.session_known, float) else None,
             }
             for rig in result.rigs
         },

@@ -16,6 +16,12 @@ def register(app: typer.Typer) -> None:
         data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests."),
         rig: str | None = typer.Option(None, "--rig", help="Score the runs of this rig instead."),
         split: str | None = typer.Option(None, "--split", help="Only train or only validate runs."),
+        check_run: list[str] = typer.Option(
+            [], "--check-run", help="Correct the runs of its session by this run; once for each."
+        ),
+        own_sessions: bool = typer.Option(
+            False, "--own-sessions", help="Correct runs of the model's own sessions by what it was identified from."
+        ),
         level: float = typer.Option(0.9, "--level", help="Share of runs whose peak force the band holds."),
         out: Path | None = typer.Option(None, "--out", help="CSV to write; default: standard output."),
         as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
@@ -23,6 +29,7 @@ def register(app: typer.Typer) -> None:
         """Score a saved model on the runs of its rig: nrmse, wape, peak force and energy."""
         from mrdamper.cli.output import put
         from mrdamper.cli.progress import watched
+        from mrdamper.dampers.sessions import KNOWN, When, sessions_known
         from mrdamper.errors import InputError, UnknownNameError
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.dataset import load_dataset
@@ -45,13 +52,22 @@ def register(app: typer.Typer) -> None:
         runs = [run for run in dataset.rig(wanted) if split in (None, run.split)]
         if not runs:
             raise InputError(f"no {split} runs", where=f"rig {wanted}", mend="leave out --split")
-        validation = score(damper, watched(runs, "run"))
+        whole = dataset.rig(wanted)
+        known = (
+            sessions_known(damper, [whole[n] for n in check_run], own_sessions) if check_run or own_sessions else None
+        )
+        validation = score(damper, watched([run for run in runs if run.id not in check_run], "run"), known=known)
         for name, why in validation.refused.items():
             typer.echo(f"not scored: {name}: {why}", err=True)
         if not validation.runs:
             raise InputError("no run could be scored", where=f"rig {wanted}", mend="see the lines above")
         by_id = {run.id: run for run in runs}
-        peaks = {name: peak_band(damper, run, level) for name, run in by_id.items() if name not in validation.refused}
+        peaks = {
+            run.run_id: peak_band(
+                damper, by_id[run.run_id], level, known and known.expected(When.of(by_id[run.run_id]), run.run_id)
+            )
+            for run in validation.runs
+        }
         put([{**score_row(run), **peaks[run.run_id]} for run in validation.runs], out, as_json, csv_text)
         inside = [
             p["peak_force_low_N"] <= p["peak_force_measured_N"] <= p["peak_force_high_N"]
@@ -66,10 +82,11 @@ def register(app: typer.Typer) -> None:
         floors = [run.floor for run in validation.runs if run.floor is not None]
         outside = sum(bool(run.extrapolation) for run in validation.runs)
         typer.echo(
-            f"{damper.title} on {len(runs)} runs of {wanted or dataset.name}: median nrmse_pp "
+            f"{damper.title} on {len(validation.runs)} runs of {wanted or dataset.name}: median nrmse_pp "
             f"{100 * validation.median():.2f} %, worst {100 * validation.worst().scores.nrmse_pp:.2f} % "
             f"({validation.worst().run_id}), median energy error {100 * validation.median('energy_error'):.1f} %"
             + (f", scatter of the rig {100 * sorted(floors)[len(floors) // 2]:.2f} %" if floors else "")
-            + (f"; {outside} runs extrapolate" if outside else ""),
+            + (f"; {outside} runs extrapolate" if outside else "")
+            + f"; session known in {sum(run.session == KNOWN for run in validation.runs)}",
             err=True,
         )

@@ -1,0 +1,376 @@
+"""Sessions: gains and offsets that records of one day and hour share, learnt from a damper's own tests.
+
+From day to day the same test differs by a few per cent in force, within an hour by less: oil and
+room temperature, a preload, a load cell's zero. What one run of a day shows then tells of the
+others. Gain and offset are random, with a covariance of three parts: shared by a session (its
+day), shared the more the closer two runs lie in it, and each run's own. [Rasmussen and Williams
+2006, Gaussian processes; the three variances by maximum likelihood]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from itertools import pairwise
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mrdamper.data import Floats, Run
+from mrdamper.errors import InputError
+
+if TYPE_CHECKING:
+    from mrdamper.dampers.bands import Band
+    from mrdamper.dampers.base import Damper, Prediction
+
+STRICT = {"extra": "forbid", "allow_inf_nan": False}  # of what is read from a saved model
+Mask = NDArray[np.bool_]
+UNKNOWN, KNOWN = "unknown", "known"  # session of a score: predicted as it is, or corrected by other runs of the day
+_HOURS = (0.5, 1.0, 2.0, 4.0, 8.0)  # over which what an hour shares is forgotten
+_LEAST = 0.2  # of the spread: each run has at least so much of its own, for the model misses every condition anew
+_NEEDED = "record a condition twice a day, on two days or more; recorded_at or session in runs.csv say when"
+
+
+@dataclass(frozen=True)
+class When:
+    """When a run was recorded.
+
+    Attributes
+    ----------
+    session : str
+        As stated, or the day; the run by itself where neither is known.
+    hour : float or None
+        Hours since 1970; None where only a day or a name is known.
+    """
+
+    __pydantic_config__: ClassVar = STRICT
+
+    session: str
+    hour: float | None = None
+
+    @classmethod
+    def of(cls, run: Run) -> When:
+        """From the notes `session` and `recorded_at` (ISO 8601) of a run.
+
+        Raises
+        ------
+        InputError
+            E_CLOCK if the clock is no date.
+        """
+        clock, named = run.notes.get("recorded_at", ""), run.notes.get("session", "")
+        if not clock:
+            return cls(named or f"run {run.id}")
+        try:
+            at = datetime.fromisoformat(clock)
+        except ValueError:
+            raise InputError(
+                f"recorded_at is {clock!r}", where=f"run {run.id}", mend="write 2024-05-31T14:05:00", code="E_CLOCK"
+            ) from None
+        since = at.replace(tzinfo=None) - datetime(1970, 1, 1)
+        return cls(named or clock[:10], None if len(clock) <= 10 else since.total_seconds() / 3600)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a prediction p of a run would have to be changed to fit best: gain · p + offset.
+
+    Attributes
+    ----------
+    gain : float
+    offset : float
+        [N]
+    mean, square : float
+        Mean of p [N] and of p² [N²].
+    rest : float
+        Mean square of what is left [N²].
+    pp : float
+        Peak-to-peak measured force [N].
+    """
+
+    gain: float
+    offset: float
+    mean: float
+    square: float
+    rest: float
+    pp: float
+
+    @classmethod
+    def of(cls, measured: Floats, predicted: Floats) -> Reading:
+        """Least squares of one run."""
+        mean, square = float(np.mean(predicted)), float(np.mean(predicted**2))
+        spread = square - mean**2
+        shared = float(np.mean(predicted * measured)) - mean * float(np.mean(measured))
+        gain = shared / spread if spread > 1e-12 * max(square, 1e-300) else 1.0
+        offset = float(np.mean(measured)) - gain * mean
+        rest = float(np.mean((gain * predicted + offset - measured) ** 2))
+        return cls(gain, offset, mean, square, rest, float(np.ptp(measured)))
+
+    def error(self, gain: float, offset: float) -> float:
+        """nrmse_pp of the prediction after another gain and offset."""
+        g, o = gain - self.gain, offset - self.offset
+        return float(np.sqrt(max(self.rest + g**2 * self.square + 2 * g * o * self.mean + o**2, 0.0)) / self.pp)
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Standard deviations of one quantity between runs.
+
+    Attributes
+    ----------
+    session, hour, run : float
+        Shared by a session, by neighbours in it, by nobody.
+    hours : float
+        In which what neighbours share is forgotten to 1/e [h].
+    """
+
+    __pydantic_config__: ClassVar = STRICT
+
+    session: float
+    hour: float
+    run: float
+    hours: float
+
+    @property
+    def total(self) -> float:
+        """Of a run in a session nobody has seen."""
+        return float(np.sqrt(self.session**2 + self.hour**2 + self.run**2))
+
+    def covariance(self, a: Sequence[When], b: Sequence[When]) -> Floats:
+        """(A, B) of runs that are not the same."""
+        same = np.array([[x.session == y.session for y in b] for x in a], dtype=float).reshape(len(a), len(b))
+        hours = [[np.nan if w.hour is None else w.hour for w in when] for when in (a, b)]
+        apart = np.abs(np.subtract.outer(*hours))
+        near = np.where(np.isfinite(apart), np.exp(-np.nan_to_num(apart) / self.hours), 0.0)
+        return same * (self.session**2 + self.hour**2 * near)
+
+    def given(self, at: When, seen: Sequence[When], values: Floats) -> tuple[float, float]:
+        """Mean and standard deviation of a run's value about zero, those of others being known."""
+        if not len(seen) or self.total == 0:
+            return 0.0, self.total
+        own = max(self.run, _LEAST * self.total) ** 2
+        k = self.covariance([at], seen)[0]
+        K = self.covariance(seen, seen) + own * np.eye(len(seen))
+        solved = np.linalg.solve(K, np.column_stack([values, k]))
+        left = self.total**2 - float(k @ solved[:, 1])
+        return float(k @ solved[:, 0]), float(np.sqrt(max(left, own)))
+
+    @classmethod
+    def likeliest(cls, when: Sequence[When], values: Floats) -> Spread:
+        """Of greatest likelihood: the shares by halving steps from many starts, the scale in closed form."""
+        size = len(values)
+        alike = cls(1.0, 0.0, 0.0, 1.0).covariance(when, when)
+
+        def cost(shares: Floats, near: Floats) -> tuple[float, float]:
+            K = shares[0] * alike + shares[1] * near + shares[2] * np.eye(size)
+            sign, log = np.linalg.slogdet(K)
+            scale = float(values @ np.linalg.solve(K, values)) / size
+            return (np.inf, 0.0) if sign <= 0 or scale <= 0 else (log + size * np.log(scale), scale)
+
+        best = (np.inf, cls(0.0, 0.0, float(np.sqrt(np.mean(values**2))), _HOURS[0]))
+        for hours in _HOURS:
+            near = cls(0.0, 1.0, 0.0, hours).covariance(when, when)
+            np.fill_diagonal(near, 1.0)
+            for start in ((1.0, 1.0), (1.0, 0.01), (0.01, 1.0), (0.01, 0.01)):
+                point, step = np.log([*start]), 2.0
+                now = cost(np.append(np.exp(point), 1.0), near)
+                while step > 0.02:
+                    trials = [point + step * d for d in (*np.eye(2), *-np.eye(2))]
+                    costs = [cost(np.append(np.exp(np.clip(t, -14, 9)), 1.0), near) for t in trials]
+                    least = min(range(4), key=lambda i: costs[i][0])
+                    if costs[least][0] < now[0] - 1e-9:
+                        point, now = np.clip(trials[least], -14, 9), costs[least]
+                    else:
+                        step /= 2
+                if now[0] < best[0] - 1e-6:
+                    session, hour = np.sqrt(now[1] * np.exp(point))
+                    best = now[0], cls(float(session), float(hour), float(np.sqrt(now[1])), hours)
+        return best[1]
+
+
+@dataclass(frozen=True)
+class Expected:
+    """Gain and offset of a run, as far as others tell.
+
+    Attributes
+    ----------
+    gain, gain_spread : float
+    offset, offset_spread : float
+        [N]
+    """
+
+    gain: float
+    gain_spread: float
+    offset: float
+    offset_spread: float
+
+    def corrected(self, prediction: Prediction) -> Prediction:
+        """A prediction as this gain and offset make it."""
+        return replace(prediction, force=self.gain * prediction.force + self.offset)
+
+    def band(self, damper: Damper, prediction: Prediction, level: float, shown: Mask | None = None) -> Band | None:
+        """The band of an uncorrected prediction, laid about the corrected one, its session as sure as it is now."""
+        from mrdamper.dampers.bands import band
+
+        if damper.certainty is None:
+            return None
+        left = replace(damper.certainty, gain=self.gain_spread, offset=self.offset_spread)
+        found = band(replace(damper, certainty=left), prediction, level, shown)  # type: ignore[type-var]
+        if found is None:
+            return None
+        peaks = {name: tuple(self.gain * v for v in getattr(found, name)) for name in ("peak", "known_session")}
+        ends = {name: self.gain * getattr(found, name) + self.offset for name in ("low", "high")}
+        return replace(found, **ends, **peaks)
+
+
+@dataclass(frozen=True)
+class Sessions:
+    """How sessions differ on a rig, and what is known of those a damper was identified in.
+
+    Attributes
+    ----------
+    gain, offset : Spread
+        Of gains [-] and of offsets [N].
+    run_ids : tuple of str, length R
+    when : tuple of When, length R
+    gains, offsets : (R,) tuples of float
+        Of the damper's own tests, against the damper.
+
+    Raises
+    ------
+    InputError
+        If the lists differ in length.
+    """
+
+    __pydantic_config__: ClassVar = STRICT
+
+    gain: Spread
+    offset: Spread
+    run_ids: tuple[str, ...]
+    when: tuple[When, ...]
+    gains: tuple[float, ...]
+    offsets: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if len({len(each) for each in (self.run_ids, self.when, self.gains, self.offsets)}) > 1:
+            raise InputError("sessions: the lists differ in length", mend="write the model again")
+
+    @classmethod
+    def of(cls, runs: Sequence[Run], left_out: Sequence[Reading], own: Sequence[Reading]) -> Sessions:
+        """Learn them from a damper's tests.
+
+        Parameters
+        ----------
+        runs : sequence of Run, length R
+        left_out : sequence of Reading, length R
+            Each predicted without its condition: their spread is that of sessions to come.
+        own : sequence of Reading, length R
+            Against the damper itself.
+
+        Raises
+        ------
+        InputError
+            E_SESSION if no session has two runs, or there is one session; E_CLOCK if sessions overlap in time.
+        """
+        when = tuple(When.of(run) for run in runs)
+        _refuse_disorder(runs, when)
+        names = [w.session for w in when]
+        if len(set(names)) < 2 or len(set(names)) == len(names):
+            found = "one session" if len(set(names)) == 1 else "sessions of one run each"
+            raise InputError(f"{found}: what a day shares cannot be told", mend=_NEEDED, code="E_SESSION")
+        gain = Spread.likeliest(when, np.array([r.gain - 1 for r in left_out]))
+        offset = Spread.likeliest(when, np.array([r.offset for r in left_out]))
+        gains, offsets = tuple(r.gain for r in own), tuple(r.offset for r in own)
+        return cls(gain, offset, tuple(run.id for run in runs), when, gains, offsets)
+
+    def expected(self, at: When, without: str = "") -> Expected | None:
+        """Gain and offset of a run recorded then; None if nothing is known of its session.
+
+        Parameters
+        ----------
+        at : When
+        without : str
+            Run whose own reading is not looked at.
+        """
+        rows = [i for i, name in enumerate(self.run_ids) if name != without]
+        when = [self.when[i] for i in rows]
+        if all(w.session != at.session for w in when):
+            return None
+        gain, gain_spread = self.gain.given(at, when, np.array([self.gains[i] for i in rows]) - 1)
+        offset, offset_spread = self.offset.given(at, when, np.array([self.offsets[i] for i in rows]))
+        return Expected(1 + gain, gain_spread, offset, offset_spread)
+
+    def seen(self, damper: Damper, runs: Iterable[Run], own: bool) -> Sessions:
+        """What is known once further runs were looked at, of them alone or of the damper's own tests too.
+
+        Parameters
+        ----------
+        damper : Damper
+        runs : iterable of Run
+            Check runs of a day, say.
+        own : bool
+        """
+        found = [(run.id, When.of(run), reading_of(damper, run)) for run in runs]
+        names = {name for name, _, _ in found}
+        if own:
+            rows = [i for i, name in enumerate(self.run_ids) if name not in names]
+            still = [Reading(self.gains[i], self.offsets[i], 0.0, 0.0, 0.0, 1.0) for i in rows]
+            found += [(self.run_ids[i], self.when[i], r) for i, r in zip(rows, still, strict=True)]
+        ids, when, readings = zip(*found, strict=True) if found else ((), (), ())
+        gains, offsets = tuple(r.gain for r in readings), tuple(r.offset for r in readings)
+        return replace(self, run_ids=ids, when=when, gains=gains, offsets=offsets)
+
+
+def sessions_known(damper: Damper, runs: Iterable[Run] = (), own: bool = False) -> Sessions:
+    """What is known of sessions by check runs, by a damper's own tests, or by both.
+
+    Raises
+    ------
+    InputError
+        E_SESSION if the damper's tests could not tell what a session shares.
+    """
+    known = damper.certainty.sessions if damper.certainty else None
+    if known is None:
+        raise InputError(
+            "its tests could not tell what runs of a session share", where=damper.title, mend=_NEEDED, code="E_SESSION"
+        )
+    return known.seen(damper, runs, own)
+
+
+def reading_of(damper: Damper, run: Run) -> Reading:
+    """Gain and offset of a run against a damper, inside the steady window."""
+    inside = run.in_window
+    return Reading.of(run.force[inside], damper.predict_run(run).force[inside])
+
+
+def known_errors(runs: Sequence[Run], left_out: Sequence[Reading]) -> Floats:
+    """(R,) nrmse_pp of runs predicted without their condition, corrected by the other runs of their session.
+
+    Raises
+    ------
+    InputError
+        As `Sessions.of`.
+    """
+    sessions = Sessions.of(runs, left_out, left_out)
+    errors = []
+    for run, reading in zip(runs, left_out, strict=True):
+        found = sessions.expected(When.of(run), without=run.id)
+        errors.append(reading.error(found.gain, found.offset) if found else reading.error(1.0, 0.0))
+    return np.array(errors)
+
+
+def _refuse_disorder(runs: Sequence[Run], when: Sequence[When]) -> None:
+    """A session is one stretch of time: runs of another within it say that a clock or a name is wrong."""
+    timed = sorted((i for i, w in enumerate(when) if w.hour is not None), key=lambda i: when[i].hour or 0.0)
+    ended: set[str] = set()
+    for i, j in pairwise(timed):
+        if when[i].session != when[j].session:
+            ended.add(when[i].session)
+            if when[j].session in ended:
+                raise InputError(
+                    f"session {when[j].session!r} goes on after session {when[i].session!r} began",
+                    where=f"run {runs[j].id}",
+                    mend="check recorded_at, or give each session a name of its own",
+                    code="E_CLOCK",
+                )

@@ -1,0 +1,116 @@
+"""Sessions: what runs of a day share is learnt, corrects others of that day, and nothing else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mrdamper.dampers.certainty import Certainty
+from mrdamper.dampers.joint import damper_of
+from mrdamper.dampers.sessions import Reading, Sessions, Spread, When, known_errors, sessions_known
+from mrdamper.data import Condition, Run
+from mrdamper.errors import InputError
+from mrdamper.models.bingham import Bingham
+from mrdamper.motion import sine
+from mrdamper.simulation import simulate
+from mrdamper.validation import validate
+
+DAMPER = damper_of(Bingham(c=9000.0, fy=1.0))
+
+
+def recorded(name, clock, gain=1.0, offset=0.0, amplitude=0.01, **notes):
+    motion = sine(Condition(0.0, 1.0, amplitude), 2, 100)
+    force = gain * simulate(DAMPER.one_model, motion).force + offset
+    return Run(name, motion.time, motion.displacement, force, 0.0, notes={"recorded_at": clock, **notes})
+
+
+def reading(gain, offset=0.0):
+    return Reading(gain, offset, 0.0, 1e4, 0.04, 400.0)
+
+
+def test_a_reading_is_least_squares_and_knows_every_other_error():
+    run = recorded("a", "2024-05-01T10:00:00", gain=1.1, offset=7.0)
+    predicted = simulate(DAMPER.one_model, sine(Condition(0.0, 1.0, 0.01), 2, 100)).force
+    noisy = run.force + 5 * np.sin(np.arange(run.force.size))
+    found = Reading.of(noisy, predicted)
+    assert (found.gain, found.offset) == pytest.approx((1.1, 7.0), rel=0.02)
+    for gain, offset in ((1.0, 0.0), (1.3, -20.0)):
+        direct = np.sqrt(np.mean((gain * predicted + offset - noisy) ** 2)) / np.ptp(noisy)
+        assert found.error(gain, offset) == pytest.approx(direct)
+
+
+def test_the_three_spreads_are_found_from_many_days():
+    rng = np.random.default_rng(0)
+    truth = Spread(0.03, 0.02, 0.01, 2.0)
+    when = [When(f"day {day}", 24.0 * day + hour) for day in range(40) for hour in (0, 1, 2, 4, 7)]
+    K = truth.covariance(when, when)
+    np.fill_diagonal(K, truth.total**2)
+    found = Spread.likeliest(when, np.linalg.cholesky(K) @ rng.standard_normal(len(when)))
+    assert found.total == pytest.approx(truth.total, rel=0.15)
+    assert found.session == pytest.approx(truth.session, rel=0.35)
+    assert 0.004 < found.run < 0.02
+
+
+def test_what_is_given_is_the_conditional_normal():
+    spread = Spread(0.03, 0.0, 0.02, 1.0)
+    mean, left = spread.given(When("a"), [When("a"), When("a"), When("b")], np.array([0.05, 0.03, -0.5]))
+    share = 0.03**2 / (0.03**2 + 0.02**2 / 2)  # two runs of the day, the other day tells nothing
+    assert mean == pytest.approx(share * 0.04)
+    assert left == pytest.approx(np.sqrt(0.03**2 * (1 - share) + 0.02**2))
+
+
+def days(count=6):
+    rng = np.random.default_rng(1)
+    runs, readings = [], []
+    for day in range(1, count + 1):
+        shared = rng.normal(0, 0.04)
+        for hour in (9, 11, 15):
+            runs.append(recorded(f"{day}-{hour}", f"2024-05-{day:02}T{hour:02}:00:00"))
+            readings.append(reading(1 + shared + rng.normal(0, 0.005)))
+    return runs, readings
+
+
+def test_other_runs_of_the_day_take_most_of_a_day_away():
+    runs, readings = days()
+    unknown = [each.error(1.0, 0.0) for each in readings]
+    assert np.mean(known_errors(runs, readings)) < 0.6 * np.mean(unknown)
+    shuffled = [replace(r, notes={"session": f"{i % 6} {i // 6}"}) for i, r in enumerate(runs[:12])]
+    with pytest.raises(InputError, match="one run each") as caught:
+        known_errors(shuffled, readings[:12])
+    assert caught.value.code == "E_SESSION"
+
+
+def test_a_check_run_corrects_its_day_only_and_the_scores_say_so():
+    runs, readings = days()
+    sessions = Sessions.of(runs, readings, readings)
+    damper = replace(DAMPER, certainty=Certainty((), (), np.zeros((0, 0)), np.zeros(0), sessions=sessions))
+    hot = [recorded(f"hot {i}", f"2024-06-01T1{i}:00:00", gain=0.9, amplitude=0.01 + 0.002 * i) for i in range(3)]
+    other = recorded("other", "2024-06-02T10:00:00", gain=0.9)
+    plain = validate(damper, [*hot, other])
+    scores = validate(damper, [*hot[1:], other], known=sessions_known(damper, hot[:1]))
+    assert [run.session for run in plain.runs] == ["unknown"] * 4
+    assert [run.session for run in scores.runs] == ["known", "known", "unknown"]
+    assert all(run.scores.nrmse_pp < 0.2 * plain.median() for run in scores.runs[:2])
+    assert scores.runs[2].scores == plain.runs[3].scores
+    itself = validate(damper, hot[:1], known=sessions_known(damper, hot[:1]))
+    assert itself.runs[0].session == "unknown"  # a run does not correct itself
+    with pytest.raises(InputError, match="could not tell") as caught:
+        sessions_known(DAMPER, hot[:1])
+    assert caught.value.code == "E_SESSION"
+
+
+@pytest.mark.parametrize(
+    ("notes", "said"),
+    [
+        ([{"recorded_at": "yesterday"}], "recorded_at is 'yesterday'"),
+        (
+            [{"recorded_at": f"2024-05-01T1{hour}:00:00", "session": name} for hour, name in enumerate("ABA")],
+            "goes on after session",
+        ),
+    ],
+)
+def test_a_clock_that_cannot_be_is_refused(notes, said):
+    runs = [replace(recorded(str(i), "2024-05-01"), notes=note) for i, note in enumerate(notes)]
+    with pytest.raises(InputError, match=said) as caught:
+        known_errors(runs, [reading(1.0)] * len(runs))
+    assert caught.value.code == "E_CLOCK"
