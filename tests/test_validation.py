@@ -165,6 +165,7 @@ def test_a_table_holds_every_score_under_its_own_name():
         "wape": [s.wape for s in scores],
         "energy_error": [s.energy_error for s in scores],
         "peak_error": [s.peak_error for s in scores],
+        "session": ["unknown", "unknown"],
         "extrapolation": ["current", "current"],
     }
     # A dashpot's force spans √8 standard deviations; every number by hand, none a per cent.
