@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from mrdamper.dampers.bands import PortableBand, portable_band
 from mrdamper.dampers.base import Damper, Envelope
 from mrdamper.dampers.causal import trace
 from mrdamper.dampers.joint import damper_of
@@ -43,6 +44,8 @@ class Stream:
         Ranges of the tests behind it.
     model : Model or None
         The model whose parameters can be set; None where they are functions.
+    damper : Damper
+        What was traced.
     """
 
     title: str
@@ -50,6 +53,12 @@ class Stream:
     drives: Mapping[str, Program]
     envelope: Envelope | None
     model: Model | None
+    damper: Damper
+
+    @cached_property
+    def band(self) -> PortableBand | None:
+        """Where the force lies in a session nobody has seen; None where nothing is known of it."""
+        return portable_band(self.damper)
 
 
 def stream(damper: Damper | Model) -> Stream:
@@ -66,7 +75,7 @@ def stream(damper: Damper | Model) -> Stream:
     damper = damper_of(damper)
     drives = {"displacement": _from_displacement(), "velocity": _from_velocity()}
     tested = damper.envelope if damper.envelope.tested else None
-    return Stream(damper.title, trace(damper), drives, tested, damper.one_model)
+    return Stream(damper.title, trace(damper), drives, tested, damper.one_model, damper)
 
 
 def _from_displacement() -> Program:

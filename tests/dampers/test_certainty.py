@@ -10,7 +10,7 @@ from support.sessions import session_runs
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
-from mrdamper.dampers.bands import band, no_band
+from mrdamper.dampers.bands import band, no_band, portable_band
 from mrdamper.dampers.certainty import Certainty, table, unsure
 from mrdamper.dampers.covariance import certain, session_of
 from mrdamper.data import Condition
@@ -62,6 +62,17 @@ def test_a_higher_level_is_wider_and_an_unknown_session_wider_than_a_known(dampe
     for bad in (0.0, 1.0, 90.0, float("nan")):
         with pytest.raises(InputError, match="E_LEVEL"):
             band(damper, prediction, bad)
+
+
+def test_three_numbers_say_nearly_what_the_whole_covariance_says(damper):
+    three = portable_band(damper, 0.9)
+    for condition in (Condition(0.1, 1.0, 0.01), Condition(0.5, 2.0, 0.008), Condition(1.4, 1.0, 0.012)):
+        prediction = damper.predict(condition)
+        whole = band(damper, prediction, 0.9)
+        force, half = prediction.force, np.ptp(prediction.force) / 2
+        width = np.sqrt((three.gain * force) ** 2 + three.offset_N**2 + (three.of_peak * half) ** 2)
+        assert np.mean(width) == pytest.approx(np.mean(whole.high - force), rel=0.15)
+    assert portable_band(joint_damper()) is None
 
 
 def test_the_band_of_the_peak_holds_new_sessions():

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 from support.browser import AUDIT
 from support.dampers import all_dampers, joint_damper, modified_damper
+from support.sessions import session_runs
 
+from mrdamper.dampers.covariance import certain
 from mrdamper.dampers.joint import JointDamper
 from mrdamper.data import Condition, Run
 from mrdamper.export import page as page_module
@@ -153,6 +155,17 @@ def test_beyond_the_tests_curves_are_dashed_and_said_so(opened, no_compiler):
     assert page.locator("#over-displacement path.outside").count() == 1
     put(page, frequency=1.0)
     assert page.locator("#over-displacement path.outside").count() == 0
+
+
+def test_a_band_is_shaded_where_it_was_tested_and_nowhere_else(opened, no_compiler):
+    truth = joint_damper()
+    page = opened(certain(truth, session_runs(truth)))
+    assert "Shaded: where 90 % of forces lie" in page.locator("main").inner_text()
+    assert page.locator("#over-displacement path.band, #over-velocity path.band").count() == 2
+    assert re.search(r"extension\s+[\d,.]+ ± [\d,.]+ N", page.locator("#numbers").inner_text())
+    put(page, frequency=6.0)
+    assert page.locator("path.band").count() == 0
+    assert "±" not in page.locator("#numbers").inner_text()
 
 
 def test_a_motion_of_ones_own_is_predicted_as_on_the_command_line(opened, no_compiler):

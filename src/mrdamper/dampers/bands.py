@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,3 +106,58 @@ def no_band(damper: Damper) -> str:
     if damper.certainty is None:
         return "no band: the model was saved without its covariance"
     return "no band: all its runs are of one session, and how far another one lies cannot be known; test on another day"
+
+
+@dataclass(frozen=True)
+class PortableBand:
+    """A band in three numbers, for where a damper travels without its covariance.
+
+    The force F of a loop with half its peak-to-peak force P lies within
+    sqrt((gain F)² + offset_N² + (of_peak P)²) of the prediction, in a session nobody has seen.
+
+    Attributes
+    ----------
+    level : float
+    gain : float
+        Of the force.
+    offset_N : float
+        [N]
+    of_peak : float
+        Of half the peak-to-peak force: the model's own error and that of its numbers.
+    """
+
+    level: float
+    gain: float
+    offset_N: float
+    of_peak: float
+
+
+def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
+    """The band of a damper in three numbers, from loops at the lowest, middle and highest tested current.
+
+    None where nothing is known of it. The error that comes from the damper's numbers is taken at
+    its root mean square over these loops, so a band may differ by some per cent from `band`.
+
+    Raises
+    ------
+    InputError
+        E_LEVEL if the level is not between 0 and 1.
+    """
+    known, tested = damper.certainty, damper.envelope
+    if known is None or not tested.tested:
+        return None
+    at = tested.middle
+    if not 0 < at.peak_velocity <= tested.peak_velocity_m_s[1]:
+        at = replace(at, amplitude_m=tested.peak_velocity_m_s[1] / (2 * np.pi * at.frequency_Hz))
+    currents = sorted({*tested.current_A, at.current_A})
+    own, quantile = [], []
+    for current in currents:
+        prediction = damper.predict(replace(at, current_A=current))
+        found = band(damper, prediction, level)
+        if found is None:
+            return None
+        parts = np.sqrt(found.parameter**2 + found.session**2 + found.model**2)
+        own.append(np.mean(found.parameter**2) / peak_force(prediction.force) ** 2)
+        quantile.append(np.mean(found.high - prediction.force) / (np.mean(parts) or 1.0))
+    t = float(np.mean(quantile))
+    return PortableBand(level, t * known.gain, t * known.offset, t * float(np.sqrt(known.force**2 + np.mean(own))))

@@ -154,6 +154,7 @@ def c_facts(made: Stream, name: str, rig: str, language: type[CWriter] = CWriter
         else [],
         "flags": FLAGS,
         "envelope": _envelope(made),
+        "band": made.band,
         "parameters": [_parameter(info, getattr(made.model, info.name)) for info in infos],
         "derived": derived,
         "members": [member for member, _ in starts],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import math
+from dataclasses import asdict
 from importlib.resources import files
 from typing import Any, ClassVar
 
@@ -70,6 +71,7 @@ def _facts(damper: Damper | Model, made: Stream, name: str, library: bytes | Non
         "tested": envelope and _tested(envelope),
         "slack": SLACK,
         "flags": FLAGS,
+        "band": made.band and asdict(made.band),
     }
     folder = files("mrdamper.export.templates")
     return {
@@ -136,6 +138,8 @@ def _words(damper: Damper | Model, made: Stream) -> list[str]:
         )
         if made.model is None:
             sentences.append(_FUNCTIONS)
+        if made.band is not None:
+            sentences.append(f"Shaded: where {100 * made.band.level:g} % of forces lie in a session nobody has seen.")
     else:
         sentences.append("A model without tests behind it.")
     return sentences

@@ -102,6 +102,12 @@
   const extremes = (values) => values.reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [Infinity, -Infinity]);
   const number = (v, digits = 3) => (Number.isFinite(v) ? Number(v.toPrecision(digits)).toLocaleString("en", { maximumSignificantDigits: digits }).replace("-", "−") : "–");
 
+  // Half the width of the band around each force of a loop.
+  function widths(force) {
+    const [low, high] = extremes(force), { gain, offset_N, of_peak } = facts.band;
+    return force.map((F) => Math.hypot(gain * F, offset_N, of_peak * (high - low) / 2));
+  }
+
   // Which quantities of a sine lie outside the tests, with what was tested.
   function outside(current, frequency, amplitude) {
     if (!facts.tested) return [];
@@ -135,17 +141,18 @@
     return made;
   }
 
-  // lines: { x, y, kind, skip, label }; a point is left out of its line where skip(i) holds; the label stands at its middle.
+  // lines: { x, y, kind, spread, skip, label }; a point is left out of its line where skip(i) holds; the label stands at its middle.
   function chart(id, title, xLabel, yLabel, lines) {
     const host = $(id), width = Math.max(host.clientWidth - 34, 240), height = 280;
     const left = 58, right = 18, top = 8, bottom = 40;
     let [x0, x1, y0, y1] = [Infinity, -Infinity, Infinity, -Infinity];
-    for (const { x, y } of lines) {
+    for (const { x, y, spread } of lines) {
       for (let i = 0; i < x.length; i++) {
+        const half = spread ? spread[i] : 0;
         if (x[i] < x0) x0 = x[i];
         if (x[i] > x1) x1 = x[i];
-        if (y[i] < y0) y0 = y[i];
-        if (y[i] > y1) y1 = y[i];
+        if (y[i] - half < y0) y0 = y[i] - half;
+        if (y[i] + half > y1) y1 = y[i] + half;
       }
     }
     if (!(x1 > x0)) { x0 -= 1; x1 += 1; }
@@ -166,8 +173,17 @@
     }
     svg.append(element("text", { x: (left + width - right) / 2, y: height - 4, "text-anchor": "middle" }, xLabel));
     svg.append(element("text", { x: 12, y: (height - bottom) / 2, "text-anchor": "middle", transform: `rotate(-90 12 ${(height - bottom) / 2})` }, yLabel));
-    for (const { x, y, kind = "", skip, label } of lines) {
+    for (const { x, y, kind = "", skip, label, spread } of lines) {
       let d = "", pen = false;
+      if (spread) {  // a loop turns back on itself: one strip from point to point, drawn as one faint shape
+        let strips = "";
+        for (let i = 1; i < x.length; i++) {
+          const corner = (k, side) => `${px(x[k]).toFixed(1)} ${py(y[k] + side * spread[k]).toFixed(1)}`;
+          const [a, b] = x[i] < x[i - 1] ? [i, i - 1] : [i - 1, i];
+          strips += `M${corner(a, -1)}L${corner(a, 1)}L${corner(b, 1)}L${corner(b, -1)}Z`;
+        }
+        svg.append(element("path", { d: strips, class: "band" }));
+      }
       for (let i = 0; i < x.length; i++) {
         if (skip && skip(i)) { pen = false; continue; }
         d += `${pen ? "L" : "M"}${px(x[i]).toFixed(1)} ${py(y[i]).toFixed(1)}`;
@@ -199,14 +215,16 @@
     if (!found) return say("outside", "The model has no force at this condition: come nearer to the tests.", "bad");
     shown = found;
     const [low, high] = extremes(found.force), kind = away.length ? "outside" : "";
+    const spread = facts.band && !away.length ? widths(found.force) : null;  // nothing is known of it where nobody measured
+    const within = (peak) => `${number(peak)}${spread ? ` ± ${number(spread[found.force.indexOf(peak)], 2)}` : ""} N`;
     show([
-      ["Peak force, extension", `${number(high)} N`], ["Peak force, compression", `${number(low)} N`],
+      ["Peak force, extension", within(high)], ["Peak force, compression", within(low)],
       ["Dissipated energy", `${number(energy(found))} J per cycle`],
       ["Peak velocity", `${number(2e3 * Math.PI * frequency * amplitude)} mm/s`],
     ]);
     const force = found.force;
-    chart("over-displacement", "Force over displacement", "Displacement [mm]", "Force [N]", [{ x: times(found.displacement, 1e3), y: force, kind }]);
-    chart("over-velocity", "Force over velocity", "Velocity [mm/s]", "Force [N]", [{ x: times(found.velocity, 1e3), y: force, kind }]);
+    chart("over-displacement", "Force over displacement", "Displacement [mm]", "Force [N]", [{ x: times(found.displacement, 1e3), y: force, kind, spread }]);
+    chart("over-velocity", "Force over velocity", "Velocity [mm/s]", "Force [N]", [{ x: times(found.velocity, 1e3), y: force, kind, spread }]);
   }
 
   function drawCurrents() {
