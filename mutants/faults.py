@@ -19,7 +19,7 @@ _SWAPS: dict[type[ast.AST], type[ast.AST]] = {
     ast.And: ast.Or, ast.Or: ast.And, ast.In: ast.NotIn, ast.NotIn: ast.In, ast.Is: ast.IsNot, ast.IsNot: ast.Is,
 }  # fmt: skip
 _FUNCTIONS = {"min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum", "mean": "sum", "sin": "cos",
-              "cos": "sin", "exp": "expm1", "median": "max", "std": "var", "ptp": "std", "sqrt": "abs",
+              "cos": "sin", "exp": "expm1", "median": "max", "std": "var", "ptp": "max", "sqrt": "abs",
               "any": "all", "all": "any", "argmin": "argmax", "argmax": "argmin", "log": "log1p"}  # fmt: skip
 _TWINS = (
     ("train", "held_out"), ("current_A", "frequency_Hz"), ("frequency_Hz", "amplitude_m"), ("nrmse_pp", "nrmse_std"),
@@ -31,6 +31,7 @@ _TWINS = (
 _SYMMETRIC = {"max", "min", "maximum", "minimum", "hypot", "rmse", "isclose", "dict",
               "dissipated_power"}  # fmt: skip
 _GUARD = 1e-6  # a number below it only keeps a division or a step alive
+_TELLS = {"progress", "round", "isclose"}  # words for whoever waits, and how near is the same
 _TWIN = {a: b for a, b in _TWINS} | {b: a for a, b in reversed(_TWINS)}
 
 
@@ -97,12 +98,14 @@ def _places(tree: ast.Module) -> Iterator[_Place]:
 def _inside(node: ast.AST) -> Iterator[_Place]:
     if isinstance(node, ast.Raise | ast.JoinedStr | ast.FunctionDef | ast.Assert):
         return  # messages, and functions that are walked themselves
+    if isinstance(node, ast.Call) and _called(node) in _TELLS:
+        return
     if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
         return  # a docstring
     if isinstance(node, ast.expr | ast.stmt):
         yield from ((node, change, plant) for change, plant in _changes(node))
     for name, child in _children(node):
-        if name not in ("annotation", "returns") and not isinstance(child, ast.Lambda):
+        if name not in ("annotation", "returns", "type") and not isinstance(child, ast.Lambda):
             yield from _inside(child)
         elif isinstance(child, ast.Lambda):
             child.top = False  # type: ignore[attr-defined]
@@ -153,8 +156,7 @@ def _call_changes(node: ast.Call, func: ast.expr) -> Iterator[tuple[str, Callabl
         yield f"{func.attr} → {_FUNCTIONS[func.attr]}", lambda: setattr(func, "attr", _FUNCTIONS[func.attr])
     if isinstance(func, ast.Name) and func.id in _FUNCTIONS:
         yield f"{func.id} → {_FUNCTIONS[func.id]}", lambda: setattr(func, "id", _FUNCTIONS[func.id])
-    name = func.attr if isinstance(func, ast.Attribute) else getattr(func, "id", "")
-    if len(node.args) > 1 and name not in _SYMMETRIC:
+    if len(node.args) > 1 and _called(node) not in _SYMMETRIC:
         yield from _exchanges("arguments", node.args)
     values = [keyword for keyword in node.keywords if not isinstance(keyword.value, ast.Constant)]
     for a, b in zip(values[:-1:2], values[1::2], strict=False):
@@ -179,6 +181,10 @@ def _exchanges(
             items[a], items[b] = items[b], items[a]
 
         yield f"{what} {a} and {b} exchanged", exchange
+
+
+def _called(node: ast.Call) -> str:
+    return node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
 
 
 def _starred(node: ast.expr) -> bool:

@@ -1,6 +1,7 @@
 """Coefficients of the "-type" dampers come back from models made by them; formulas of the start written once more."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +11,7 @@ from mrdamper.dampers.base import Envelope
 from mrdamper.dampers.published import all_published
 from mrdamper.dampers.published.base import fit_quadratic
 from mrdamper.data import Condition, Run
-from mrdamper.errors import IdentificationError
+from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.models.bingham import Bingham
 from mrdamper.models.guo import Guo
 from mrdamper.motion import sine
@@ -101,11 +102,11 @@ def test_dominguez_at_one_current_has_no_slope():
     found, truth = regressed("dominguez-type", DOMINGUEZ, conditions)
     for condition in conditions:
         assert found.model_at(condition).yield_force == pytest.approx(truth.model_at(condition).yield_force, rel=1e-6)
-    close(found.coefficients, {"k2": 0.0, "gamma2": 0.0})
+    close(found.coefficients, {"k1": 700.0 + 300.0 * 0.9, "k2": 0.0, "gamma1": 4e6, "gamma2": 0.0, "beta": 4e6})
 
 
 def test_lv_starts_from_the_medians_of_bingham():
-    models = [Bingham(fy=150 + 900 * c.current_A, c=1200.0 + n, f0=-12.0) for n, c in enumerate(CONDITIONS)]
+    models = [Bingham(fy=150 + 900 * c.current_A, c=1200.0 + n, f0=-12.0 + (n == 3)) for n, c in enumerate(CONDITIONS)]
     found = all_published()["lv-type"].regressed(identified(models))
     speed = np.median([2 * np.pi * c.frequency_Hz * c.amplitude_m for c in CONDITIONS])
     consistency = np.median([1200.0 + n for n in range(16)]) * speed**0.2 / 3
@@ -165,3 +166,22 @@ def test_three_identifications_of_its_own_model_are_needed():
         cls.regressed(some[:2])
     with pytest.raises(IdentificationError, match="another model"):
         all_published()["lei-type"].regressed(some)
+
+
+@pytest.mark.parametrize("name", ["ali-type", "lei-type", "lv-type", "dominguez-type"])
+def test_a_saved_damper_has_the_same_laws_and_damaged_ones_are_refused(name):
+    lv = {"fy0": 150.0, "fy1": 900.0, "fy2": -80.0, "m": 0.7, "consistency_log": 7.8, "f0": -12.0}
+    ali = {**ALI, "c1_floor": 1.0, "c0_floor": 1.0, "yield_force_floor": 1.0}
+    own = {"ali-type": ali, "lei-type": LEI, "dominguez-type": DOMINGUEZ, "lv-type": lv}
+    cls, envelope = all_published()[name], Envelope.of(CONDITIONS)
+    one = cls("bench", own[name], REFERENCE, envelope)
+    saved = one.to_saved()
+    again = cls.from_saved(saved, "bench", envelope, {"a": "b"}, None)
+    at = Condition(0.7, 0.9, 0.017)
+    assert again.model_at(at).values() == one.model_at(at).values()
+    assert (again.rig, again.envelope, again.reference, dict(again.provenance)) == (
+        "bench", envelope, REFERENCE, {"a": "b"},
+    )  # fmt: skip
+    missing = replace(saved, coefficients={k: v for k, v in own[name].items() if k != "f0"})
+    with pytest.raises(ParameterError, match="coefficients do not fit"):
+        cls.from_saved(missing, "bench", envelope, {}, None)

@@ -159,3 +159,31 @@ def test_boada(condition):
         row = rest[i * (hidden + 1) : (i + 1) * (hidden + 1)]
         output = sum(w * u for w, u in zip(row[:-1], units, strict=True)) + row[-1]
         assert value == pytest.approx(middle[i] + width[i] * output, rel=1e-9), names[i]
+
+
+@pytest.mark.parametrize(("gamma1", "gamma2", "share"), [(9e6, 0.0, 1.0), (0.0, 1e8, -0.999)])
+def test_dominguez_keeps_a_loop_that_closes(gamma1, gamma2, share):
+    laws = {f"{name}{i}": 1.0 for name in ("c", "alpha") for i in range(1, 5)}
+    c = {**laws, "d2": 0.0, "d4": 0.0, "beta": 4e6, "gamma1": gamma1, "gamma2": gamma2, "k1": 0.0, "k2": 0.0, "f0": 0.0}
+    assert damper("dominguez-type", c).model_at(CONDITIONS[1]).gamma == pytest.approx(share * 4e6, rel=1e-9)
+
+
+def test_branches_of_lei_meet_where_quadratics_cross():
+    c = {f"{name}{i}": 0.0 for name in ("cpo", "cpr", "fy", "v0") for i in range(3)} | {"f0": 0.0}
+    c |= {"cpo0": 500.0, "cpr0": 100.0, "fy0": 20.0, "v00": 5.0}
+    model = damper("lei-type", c).model_at(CONDITIONS[0])
+    slope = 1.01 * 500 + 1
+    wanted = type(model).from_wereley(500.0, slope, 20.0, 0.999 * 20 / slope, 0.0)
+    assert model.values() == pytest.approx(wanted.values(), rel=1e-12)
+    weak = damper("lei-type", {**c, "cpo0": -5.0, "cpr0": 900.0, "fy0": -3.0, "v00": -1.0}).model_at(CONDITIONS[0])
+    assert weak.values() == pytest.approx(type(model).from_wereley(0.0, 900.0, 1.0, 0.0, 0.0).values(), rel=1e-12)
+
+
+@pytest.mark.parametrize(("given", "index"), [(0.01, 0.1), (7.0, 2.0), (0.6, 0.6)])
+def test_the_flow_index_of_lv_is_kept_physical(given, index):
+    c = {"fy0": 150.0, "fy1": 0.0, "fy2": 0.0, "m": given, "consistency_log": math.log(2500.0), "f0": 0.0}
+    model = damper("lv-type", c).model_at(CONDITIONS[0])
+    assert model.m == pytest.approx(index)
+    assert model.vc == pytest.approx(min(max((150 / 2500) ** (1 / index), 1e-9), 1e6), rel=1e-9)
+    stiff = damper("lv-type", {**c, "fy0": 1e12, "m": 0.5}).model_at(CONDITIONS[0])
+    assert stiff.vc == 1e6

@@ -13,7 +13,7 @@ from mrdamper.simulation import simulate
 P = {"f0": 48.8, "k": 832.0, "c0": 632.0, "c1": 3622.0, "fy0": 143.0, "fy1": 1019.0, "d": 1.98e-4, "e": 2.55e-5,
      "cb": 3.74e4, "h0": 0.4, "h1": 0.35, "vh": 2.06e-3, "T": 3.4e-3, "asymmetry": 0.05, "m": 6.6}  # fmt: skip
 PRESET = {"cq": 0.0, "qb": 0.0, "Ic": 0.12, "si": 0.0}
-OTHER = {"cq": 150.0, "qb": 0.3, "Ic": 0.25, "si": 0.6}
+OTHER = {"cb": 4e3, "cq": 150.0, "qb": 0.3, "Ic": 0.25, "si": 0.6}
 
 
 def by_hand(p, t, x, v, a, I):
@@ -54,7 +54,7 @@ def test_force_is_that_of_the_equations(current, more, sign):
     t = np.linspace(0, 1.0, 40_001)
     x = sign * (5e-3 * np.sin(2 * np.pi * 1.5 * t) + 1e-3 * np.sin(2 * np.pi * 4 * t))
     motion = moved_by(t, x, current)
-    ours = simulate(PlayBypass(**P, **more), motion).force
+    ours = simulate(PlayBypass(**{**P, **more}), motion).force
     hand = by_hand({**P, **more}, t, motion.displacement, motion.velocity, motion.acceleration, motion.current)
     assert np.max(np.abs(ours - hand)[10:]) < 0.01 * np.ptp(hand)
     assert np.sqrt(np.mean((ours - hand) ** 2)) < 1e-3 * np.ptp(hand)
@@ -100,6 +100,8 @@ def test_searches_follow_the_scale_of_the_data():
     assert {a.name for a in scaled if a.log} >= {"seat_share", "d", "T", "Ic", "leak"}
     (short,) = [a for a in PlayBypass.search_axes(Scale(2e-5, V, F, 0.0), free) if a.name == "d"]
     assert (short.upper, *short.grid) == pytest.approx((1.4e-5, 0.2 * 1.4e-5))
+    (rise,) = [a for a in PlayBypass.search_axes(Scale(X, V, F, 0.0), free) if a.name == "fy1"]
+    assert rise.upper == pytest.approx(30 * F)  # no current flowed: an ampere
     (long,) = [a for a in scaled if a.name == "d"]
     assert long.upper == 1e-2
 

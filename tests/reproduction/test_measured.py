@@ -1,5 +1,6 @@
 """What claims read off runs and results, on made ones whose numbers were put in."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -54,6 +55,9 @@ def test_the_lost_length_ends_where_nine_tenths_of_the_force_beyond_the_viscous_
     assert lost_length(reversals([0.010], full=100.0), 800.0) == pytest.approx(0.9 * 0.010, rel=0.01)
     # One stroke in six is slow to recover: the median does not care.
     assert lost_length(reversals([0.005] * 5 + [0.02]), 800.0) == pytest.approx(0.9 * 0.005, rel=0.02)
+    # Strokes 3, 4 and 5 lie whole in the window; the ones cut off at its ends do not count.
+    some = replace(reversals([0.02, 0.02, 0.02, 0.003, 0.005, 0.008, 0.02, 0.02, 0.02]), window=(1.0, 3.0))
+    assert lost_length(some, 800.0) == pytest.approx(0.9 * 0.005, rel=0.05)
     # Without the viscous force taken out, the force at mid-stroke counts for more.
     assert lost_length(reversals([0.005]), 0.0) > 0.0055
     assert measured_motion(reversals([0.005])).path.stroke[-1] >= 7
@@ -63,6 +67,12 @@ def test_a_bulge_on_one_stroke_alone_is_seen_there():
     motion = sine(Condition(1.0, 1.0, 0.02), 4, 2000)
     run = Run("one", motion.time, motion.displacement, 300 * np.maximum(motion.velocity, 0) + 7.0, 1.0)
     assert claims.bulge(run) == pytest.approx(1 / 0.6, rel=0.01)
+
+
+def test_the_width_is_taken_at_one_place_of_both_strokes():
+    motion = sine(Condition(1.0, 1.0, 0.02), 4, 2000)
+    run = Run("one", motion.time, motion.displacement, (1 + motion.displacement / 0.02) * np.sign(motion.velocity), 1.0)
+    assert claims.bulge(run) == pytest.approx(2.0 / 3.6, rel=0.01)
 
 
 def test_the_largest_spread_over_amplitudes_counts_and_three_motions_are_enough():
@@ -97,11 +107,21 @@ def test_shares_of_loops_and_of_steps_are_counted():
         found = claims._bulge(study_of(train=[0.9, 1.1, 1.2, 1.3]))
     assert found.numbers == {"share of loops wider at x = 0 than at 0.8 X": 0.75}
     assert found.evidence == "ratio of widths 0.90–1.30"
-    energies = {(0.0, 1.0): 5.0, (1.0, 1.0): 9.0, (0.0, 2.0): 7.0, (1.0, 2.0): 6.0}
+    energies = {(0.0, 1.0): 5.0, (1.0, 1.0): 9.0, (0.0, 2.0): 7.0, (1.0, 2.0): 9.5}
     loops = [loop(I, f, energy=E) for (I, f), E in energies.items()]
     found = claims._energy(study_of(loops=loops))
-    assert list(found.numbers.values()) == [0.5, 0.5]
-    assert found.evidence == "5–9 J a cycle"
+    assert list(found.numbers.values()) == [1.0, 1.0]
+    assert found.evidence == "5–9.5 J a cycle"
+    falling = claims._energy(study_of(loops=[*loops, loop(2.0, 1.0, energy=1.0)][::-1]))
+    assert list(falling.numbers.values()) == pytest.approx([2 / 3, 1.0])
+
+
+def test_the_phase_counts_runs_in_the_band_and_the_motion_that_changes_most():
+    conditions = [Condition(I, f, 0.02) for f in (1.0, 2.0) for I in (0.0, 1.0)] + [Condition(0.0, 0.5, 0.05)]
+    readings = [SimpleNamespace(phase=p) for p in (1.41, 1.45, 1.45, 1.30, 1.2)]
+    found = claims._phase(study_of(conditions=conditions, readings=readings))
+    assert list(found.numbers.values()) == pytest.approx([3 / 5, 0.15])
+    assert found.evidence == f"1.200–1.450 rad; smallest sine {np.sin(1.2):.3f}"
 
 
 def test_the_stroke_end_compares_the_fastest_with_the_slowest_motion_at_the_highest_current():

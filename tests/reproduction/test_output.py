@@ -6,15 +6,20 @@ import numpy as np
 import pytest
 
 from mrdamper.data import Condition
+from mrdamper.errors import ExcitationError
 from mrdamper.functions.fitting import FunctionFit
 from mrdamper.functions.forms import ParameterFunction
 from mrdamper.metrics import Scores
+from mrdamper.models.bingham import Bingham
+from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.reproduction import output
 from mrdamper.reproduction.claims import Claim
 from mrdamper.reproduction.found import Ended, GeneticCheck
 from mrdamper.reproduction.output import verdicts
 from mrdamper.reproduction.sensitivity import OneAtATime, Sobol
 from mrdamper.reproduction.switches import Switches
+from mrdamper.reproduction.virtual_rig import VirtualRig
+from mrdamper.reproduction.ways import CONSISTENT, LITERAL
 from mrdamper.validation import RunScore, Validation
 
 
@@ -132,3 +137,45 @@ def test_a_parameter_that_was_held_has_no_r2(monkeypatch):
         ("one", "c", "linear-current", "2 I +1", 0.9, "2.0 1.0"),
         ("one", "k1", "linear-current", "3 I +1", None, "3.0 1.0"),
     ]
+
+
+def test_parameters_at_the_held_out_condition_are_listed_way_by_way(monkeypatch):
+    predicted, identified = (BoucWen(c=c, alpha=a, beta=b, gamma=b) for c, a, b in ((1e3, 4e5, 6e6), (900.0, 3e5, 5e6)))
+    condition = Condition(1.5, 1.0, 0.08)
+    monkeypatch.setattr(output, "SineRecord", SimpleNamespace(of=lambda run: SimpleNamespace(condition=condition)))
+
+    def refuses(_):
+        raise ExcitationError("no sine")
+
+    ways = [contender(LITERAL, "paper", 0.1, 1.0), contender("tanh", "literature", 0.2, 1.0)]
+    ways += [contender(CONSISTENT, "consistent", 0.1, 1.0), contender("broken", "joint", 0.1, 1.0)]
+    ways[0].damper.model_at, ways[1].damper.model_at = lambda at: predicted, lambda at: Bingham(fy=1.0, c=1.0, f0=0.0)
+    ways[2].damper.model_at, ways[3].damper.model_at = lambda at: predicted, refuses
+    ways[0].recipe.basis = SimpleNamespace(identify=lambda run: SimpleNamespace(model=identified))
+    ways[2].recipe.basis = SimpleNamespace(identify=refuses)
+    rows = output.parameter_rows(study(contenders=ways, held_out=(SimpleNamespace(id="h0"),), switches=Switches(A=2.0)))
+    told = [(r["method"], r["values"], r["run_id"], r["current_A"], r["c [N s/m]"], r["alpha [N/m]"]) for r in rows]
+    assert told == [
+        (LITERAL, "by the functions", "h0", 1.5, 1000.0, 2e5),
+        (CONSISTENT, "by the functions", "h0", 1.5, 1000.0, 2e5),
+        (LITERAL, "identified there", "h0", 1.5, 900.0, 1.5e5),
+    ]
+    assert (rows[0]["beta [m^-n]"], rows[0]["A [-]"], rows[0]["amplitude_m"]) == (3e6, 2.0, 0.08)
+
+
+def test_a_program_reads_verdicts_and_whether_the_data_are_synthetic(monkeypatch):
+    claim = Claim("phase", "text", "Eq. 1", "holds", "recovered", "1 rad", "limit", "fig12", "20 of 20")
+    monkeypatch.setattr(output, "judge_all", lambda study: (claim,))
+    made = study(notes=("one",), seconds=12.0)
+    found = output.summary(made)
+    assert found["claims"] == [
+        {"claim": "text", "verdict": "holds", "said": "recovered", "evidence": "1 rad", "threshold": "limit",
+         "seeds": "20 of 20"}
+    ]  # fmt: skip
+    assert (found["synthetic"], found["notes"], found["seconds"]) == (False, ["one"], 12.0)
+    assert found["verdicts"] == verdicts(made)
+    made.rig = VirtualRig()
+    assert output.summary(made)["synthetic"]
+    rows = {r["parameter"]: r for r in output._tables(made, ())[0]["virtual_rig"]}
+    assert rows["mass"]["value"] == 4.0
+    assert (rows["mass"]["unit"], rows["mass"]["meaning"]) == ("kg", "moving mass beyond the load cell")

@@ -8,10 +8,14 @@ import numpy as np
 import pytest
 from support.synthetic import synthetic_run
 
+from mrdamper.dampers.published import all_published
 from mrdamper.data import Condition, Run
-from mrdamper.errors import IdentificationError, InputError
+from mrdamper.errors import IdentificationError, InputError, UnknownNameError
+from mrdamper.gas_spring import GasSpring
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.metrics import Scores
+from mrdamper.models import model_type
+from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.motion import sine
 from mrdamper.reproduction.ways import one_per_current, through_chosen
 from mrdamper.study import recipe as recipes
@@ -19,6 +23,7 @@ from mrdamper.study.recipe import (
     Basis,
     Made,
     Recipe,
+    Settled,
     by_the_paper,
     follow,
     follow_all,
@@ -192,3 +197,78 @@ def test_a_recipe_says_its_model_and_an_unknown_fault_is_not_hidden():
     with pytest.raises(ValueError, match="a fault"):
         follow_all([(Recipe("ours", None, ours), TRAIN)], HELD)
     assert not issubclass(ValueError, InputError)
+
+
+def test_every_recipe_says_what_it_is():
+    known = recipes.catalogue()
+    assert {"bouc-wen", "bouc-wen:joint", "play-bypass", "bouc-wen:paper", "ali-type", "kernel"} <= set(known)
+    assert "play-bypass:joint" not in known
+    joint = {name.partition(":")[0] for name in known if name.endswith(":joint")}
+    assert {"bingham", "bouc-wen", "dahl"} <= joint  # at most one shape coordinate, the yield displacement
+    assert not {"lugre", "spencer", "kwok"} & joint
+    one, both, ali = known["dahl"], known["dahl:joint"], known["ali-type"]
+    assert (one.way, both.way, one.title, both.title) == (
+        "run by run", "joint", "viscous and Dahl", "viscous and Dahl, functions fitted jointly",
+    )  # fmt: skip
+    assert one.source == both.source == model_type("dahl").source
+    assert "stepped, not closed" in known["spencer"].limits
+    assert "stepped" not in one.limits
+    assert (ali.title, ali.basis.model, ali.source) == (
+        "Ali-type (Spencer-based)", "spencer", all_published()["ali-type"].source,
+    )  # fmt: skip
+    assert known["kernel"].basis is None
+    assert known["bouc-wen:paper"].basis.method == "paper"
+    assert known["bouc-wen:paper"].title.endswith("method paper")
+    assert [r.name for r in recipes.recipes(("dahl", "ali-type"))] == ["dahl", "ali-type"]
+    assert not set(recipes.GENETIC) & {r.name for r in recipes.recipes()}
+    assert set(recipes.GENETIC) <= {r.name for r in recipes.recipes(genetic=True)}
+    with pytest.raises(UnknownNameError, match="dahl"):
+        recipes.recipes(("dall",))
+    assert [Basis("bingham").costly, Basis("spencer").costly, Basis("bouc-wen", "balance").costly] == [
+        False,
+        True,
+        True,
+    ]
+
+
+def runs_with(k1, mass, frequencies):
+    model = BoucWen.build(
+        {"c": 900.0, "yield_force": 300.0, "yield_displacement": 3e-4, "f0": 0.0, "k1": k1, "m": mass}
+    )
+    return [
+        synthetic_run(Condition(0.5, f, 0.02), cycles=2, samples_per_cycle=200, id=f"{f} Hz", model=model)
+        for f in frequencies
+    ]
+
+
+def test_an_unknown_gas_spring_is_told_from_the_mass_by_the_frequencies():
+    settled = Settled.of(runs_with(1400.0, 12.0, (0.5, 1.0, 2.0)), None)
+    assert dict(settled.fixed)["k1"] == pytest.approx(1400.0, rel=0.01)
+    assert (dict(settled.fixed)["k2"], dict(settled.fixed)["k3"], settled.free) == (0.0, 0.0, ("m",))
+    assert "m = 12" in settled.notes[0] or "m = 11.9" in settled.notes[0]
+    alone = Settled.of(runs_with(1400.0, 12.0, (1.0,)), None)
+    assert (alone.gas, alone.fixed, alone.free) == (None, (), ())
+    assert "k1 holds k1 − m ω²" in alone.notes[0]
+    basis = settled.preset((("n", 3.0),)).basis("balance")
+    assert basis == Basis("bouc-wen", "balance", ("m",), (*settled.fixed, ("n", 3.0)), None)
+
+
+def test_a_gas_spring_that_is_known_must_leave_volume():
+    runs = runs_with(0.0, 0.0, (1.0,))
+    gas = GasSpring(1.5e6, 1.5e-4, 3e-4)
+    assert Settled.of(runs, gas) == Settled(gas)
+    with pytest.raises(InputError, match="gas volume"):
+        Settled.of(runs, GasSpring(1.5e6, 5e-6, 3e-4))
+
+
+def test_the_numbers_of_a_way_are_counted():
+    function = SimpleNamespace(function=SimpleNamespace(coefficients=(1.0, 2.0, 3.0), rates=(4.0,)))
+    short = SimpleNamespace(function=SimpleNamespace(coefficients=(1.0,), rates=()))
+    scored = follow(REMEMBER, TRAIN, [SimpleNamespace(free=("c", "fy"), scores=SimpleNamespace(nrmse_pp=0.1))], HELD)
+    assert (scored.numbers_per_run, scored.conditions_needed, scored.title) == (2, 3, "memory")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(recipes, "ModifiedFit", SimpleNamespace)
+        fitted = replace(scored, fit=SimpleNamespace(functions={"a": short, "b": function}))
+        assert fitted.conditions_needed == 4
+    assert follow(Recipe("memory", None, remember, "joint"), TRAIN, [], HELD).title == "memory, joint"
+    assert follow(REMEMBER, TRAIN, [], HELD).numbers_per_run == 0

@@ -65,17 +65,10 @@ class DominguezType(ConditionedDamper):
         scale = np.array([_scale(c, reference, *powers) for c in conditions])
         beta = float(np.quantile(total, 0.9)) / 2
         # Alpha follows from the yield force, which is well determined, and not from the identified alpha.
-        slope = (
-            np.polyfit(currents, np.log(total), 1) if np.ptp(currents) > 0 else np.array([0.0, np.mean(np.log(total))])
-        )
-        smooth_total = np.exp(np.polyval(slope, currents))
-        gamma = np.polyfit(currents, smooth_total - beta, 1) if np.ptp(currents) > 0 else np.array([0.0, 0.0])
+        smooth_total = np.exp(np.polyval(_line(currents, np.log(total)), currents))
+        gamma = _line(currents, smooth_total - beta)
         straight = np.maximum(np.polyval(gamma, currents) + beta, _FLOOR * beta)
-        k = (
-            np.polyfit(currents, values["k1"] / scale, 1)
-            if np.ptp(currents) > 0
-            else np.array([0.0, np.mean(values["k1"])])
-        )
+        k = _line(currents, values["k1"] / scale)
         return {
             "d2": powers[0],
             "d4": powers[1],
@@ -124,6 +117,11 @@ def _powers(
     )
     found = np.linalg.lstsq(table, np.log(np.maximum(force, 1.0)), rcond=1e-6)[0]
     return float(found[0]), float(found[1])
+
+
+def _line(currents: Floats, values: Floats) -> Floats:
+    """Slope and level over current; no slope where one current was tested."""
+    return np.polyfit(currents, values, 1) if np.ptp(currents) > 0 else np.array([0.0, float(np.mean(values))])
 
 
 def _rising(name: str, currents: Floats, values: Floats, knee: float) -> dict[str, float]:
