@@ -183,3 +183,10 @@ def test_without_an_exchange_the_files_move_one_by_one(tmp_path, monkeypatch):
     publish(tmp_path / "out", "page", result(["page", "a"], "old"))
     publish(tmp_path / "out", "page", result(["page"], "new"))
     assert {k: v for k, v in files(tmp_path / "out").items() if k != MADE} == {"page": "new"}
+
+
+def test_without_a_descriptor_to_look_into_folders_the_scratch_folder_still_goes(tmp_path, monkeypatch):
+    monkeypatch.setattr("shutil.rmtree", lambda *_, **__: None)  # what it comes to, as it ignores errors
+    with pytest.raises(ResourceError), write_file(tmp_path / "a.csv"):
+        raise OSError(errno.EMFILE, "Too many open files")
+    assert list(tmp_path.iterdir()) == []

@@ -184,9 +184,11 @@ def _beside(final: Path) -> Iterator[Path]:
         try:
             yield work
         finally:
-            shutil.rmtree(work, ignore_errors=True)
             if lock is not None:
-                os.close(lock)
+                os.close(lock)  # first: looking into a folder takes a descriptor, and this may be the last one
+            shutil.rmtree(work, ignore_errors=True)
+            with contextlib.suppress(OSError):
+                work.rmdir()  # takes none
 
 
 @contextmanager

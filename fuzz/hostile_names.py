@@ -1,0 +1,137 @@
+"""Names that mean something where they are written: C, XML, LaTeX, Markdown, CSV, file names, a terminal."""
+
+from __future__ import annotations
+
+import csv
+import io
+import random
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from xml.etree import ElementTree
+
+from fuzz.counting import NASTY, Count, bench_damper, names
+
+
+def attack_names(share: float) -> list[Count]:
+    """Names where they are written: C is compiled, XML and HTML parsed, Markdown rendered, CSV read again."""
+    from html.parser import HTMLParser
+
+    from markdown_it import MarkdownIt
+
+    from mrdamper.errors import InputError
+    from mrdamper.files import encoding
+
+    counts = {kind: Count(kind) for kind in ("name in C", "name in XML and HTML", "name in LaTeX", "name in Markdown")}
+    counts |= {kind: Count(kind) for kind in ("name in CSV", "name in a file name", "name in a terminal")}
+    rng, comments = random.Random(1), []
+    markup = MarkdownIt("commonmark").enable("table")
+    folder = Path(tempfile.mkdtemp())
+    for name in names(max(len(NASTY), int(10_000 * share)), rng):
+        comments.append(
+            f'/* {encoding.c_comment(name)}.\n * Made from a model of rig "{encoding.c_comment(name)}". */\n'
+        )
+        text = f'<a b="{encoding.xml(name)}">{encoding.xml(name)}</a>'
+        seen: list[str] = []
+        parser = HTMLParser()
+        parser.handle_starttag = lambda tag, attrs, seen=seen: seen.append(tag)  # type: ignore[method-assign]
+        parser.feed(text)
+        try:
+            element = ElementTree.fromstring(text)
+            counts["name in XML and HTML"].check(not len(element) and seen == ["a"], name)
+        except ElementTree.ParseError:
+            counts["name in XML and HTML"].check(False, name)
+        rest = re.sub(r"\\(text[a-z]+\{\}|[&%$#_{}])", "", encoding.latex(name))
+        counts["name in LaTeX"].check(not re.search(r"[\\&%$#_{}^~\n]", rest), name)
+        kinds = {child.type for child in markup.parseInline(encoding.markdown(name))[0].children or ()}
+        counts["name in Markdown"].check(kinds <= {"text", "text_special"}, name)
+        rows = list(csv.reader(io.StringIO(encoding.csv_text([{"a": name, "b": "end"}]), newline="")))
+        cell = rows[1][0]
+        held = len(rows) == 2 and rows[1][1] == "end" and encoding.csv_value(cell) == name
+        counts["name in CSV"].check(held and (not re.match(r"[=@\t\r]", cell)), name)
+        made = encoding.file_names([name])[name]
+        try:
+            (folder / f"model-{made}.json").write_bytes(b"")
+            counts["name in a file name"].check((folder / f"model-{made}.json").is_file(), name)
+        except (OSError, ValueError):
+            counts["name in a file name"].check(False, name)
+        line = str(InputError(name, where=name, mend=name))
+        counts["name in a terminal"].check(
+            len(line.splitlines()) == 1 and not re.search(r"[\x00-\x1f\x7f-\x9f]", line), name
+        )
+    shutil.rmtree(folder)
+    _compile(counts["name in C"], comments)
+    return list(counts.values())
+
+
+def _compile(count: Count, comments: list[str]) -> None:
+    """All comments in one source, between functions: each function has to be seen, and nothing else."""
+    compiler = shutil.which("gcc") or shutil.which("cc")
+    if compiler is None:
+        print("no C compiler: names in C are not compiled", file=sys.stderr)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder) / "names.c"
+        source.write_text(
+            "".join(f"{text}int f{i}(void);\nint f{i}(void) {{ return {i}; }}\n" for i, text in enumerate(comments))
+        )
+        command = [
+            compiler,
+            "-std=c99",
+            "-trigraphs",
+            "-Wall",
+            "-Wcomment",
+            "-Werror",
+            "-c",
+            source.name,
+            "-o",
+            "names.o",
+        ]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+        listed = subprocess.run(["nm", "names.o"], cwd=folder, capture_output=True, text=True, check=False).stdout
+        found = set(re.findall(r" T (\w+)", listed))
+    for i, text in enumerate(comments):
+        count.check(done.returncode == 0 and f"f{i}" in found, text)
+    count.check(found == {f"f{i}" for i in range(len(comments))}, found - {f"f{i}" for i in range(len(comments))})
+
+
+def attack_exports(share: float) -> list[Count]:
+    """Whole exports of dampers whose rig has a hostile name: compiled, parsed, no canary."""
+    from dataclasses import replace
+
+    from mrdamper.export import all_exporters
+    from mrdamper.files.model_file import dump_model, parse_model
+
+    damper = bench_damper()
+    count, rng = Count("whole export of a named rig"), random.Random(2)
+    folder = Path(tempfile.mkdtemp())
+    for rig in list(names(len(NASTY), rng))[: max(4, int(len(NASTY) * share))]:
+        named = replace(damper, rig=rig)
+        for form, kind in all_exporters().items():
+            exporter = kind(platforms=()) if form == "fmu" else kind()
+            files = exporter.export(named, "damper").files
+            for name, content in files.items():
+                if name.endswith(".c") and not name.endswith("_test.c"):
+                    (folder / "damper.h").write_bytes(files["damper.h"])
+                    (folder / name).write_bytes(content)
+                    done = subprocess.run(
+                        ["cc", "-std=c99", "-Werror", "-c", name], cwd=folder, capture_output=True, check=False
+                    )
+                    listed = subprocess.run(["nm", "damper.o"], cwd=folder, capture_output=True, check=False).stdout
+                    count.check(done.returncode == 0 and b"canary" not in listed, (form, rig))
+                elif name.endswith(".html"):
+                    count.check(b"<script>canary" not in content, (form, rig))
+                elif name.endswith(".tex"):
+                    count.check(not re.search(rb"\\(input|write)", content), (form, rig))
+                else:
+                    count.check(True, form)
+        try:
+            parse_model(dump_model(named))
+            count.check(rig.isprintable() or True, rig)
+        except ValueError as error:
+            count.check(hasattr(error, "code"), (rig, error))
+    shutil.rmtree(folder)
+    return [count]

@@ -1,0 +1,235 @@
+"""Every writing command killed, or starved of disk, memory and files: old or new, never mixed, and a code.
+
+The process that attacks has loaded the libraries once and forks for every try; it never uses them
+itself, so that no thread of theirs is lost in a fork.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import importlib
+import os
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from fuzz.counting import Count, bench_damper
+
+# What each writes, and how it is asked; {n} is 1 or 2: the second replaces what the first wrote.
+COMMANDS = {
+    "identify": ("i.csv", "identify ../data{n} --model bingham --out i.csv"),
+    "predict": ("p.csv", "predict ../model.json --current {n} --frequency 1 --amplitude 10 --out p.csv"),
+    "validate": ("v.csv", "validate ../model.json ../data{n} --out v.csv"),
+    "export": ("c", "export ../model{n}.json --to c --out c"),
+    "page": ("d.html", "export ../model{n}.json --to page --out d.html"),
+    "import": ("set{n}", "import ../files{n} --out set{n}"),
+    "study": ("s", "study ../data{n} --out s"),
+    "compare": ("m", "compare ../data{n} --models bingham --models biviscous --out m"),
+}
+_LOADED = (
+    "numpy", "scipy.optimize", "scipy.special", "polars", "matplotlib.pyplot", "jinja2", "pydantic", "mrdamper.cli.output",
+    "mrdamper.study.workflow", "mrdamper.study.comparison", "mrdamper.report.study", "mrdamper.export",
+    "mrdamper.files.dataset", "mrdamper.files.model_file", "mrdamper.validation", "mrdamper.rig_files.rig_import",
+)  # fmt: skip
+_TIMES = "made.json"  # holds when a result was made
+_GONE_S = 2.0  # in which children of a killed command must be gone
+
+
+def attack_kills(share: float) -> list[Count]:
+    """SIGKILL at random moments: nothing half-written or mixed, no orphan, no litter after the next run."""
+    if os.name != "posix":
+        return []
+    rng, counts = random.Random(6), {what: Count(f"SIGKILL: {what}") for what in ("old or new", "orphans", "litter")}
+    each = max(1, round(200 * share / len(COMMANDS)))
+    with _workplace() as root:
+        for name, (out, line) in COMMANDS.items():
+            folder, wholes = root / name, []
+            folder.mkdir()
+            for n in (1, 2):
+                began = time.monotonic()
+                said = _run(folder, line.format(n=n))
+                span = time.monotonic() - began
+                if said is not None:
+                    counts["litter"].check(False, (name, "does not run", said))
+                wholes.append(_content(folder / out.format(n=n)))
+            for i in range(each):
+                n = 1 + i % 2  # over what the other wrote
+                if "{n}" in out and rng.random() < 0.7:
+                    shutil.rmtree(folder / out.format(n=n), ignore_errors=True)
+                pid = _begin(folder, line.format(n=n))
+                time.sleep(rng.uniform(0, 1.05) * span if rng.random() < 0.5 else rng.uniform(0.6, 1.02) * span)
+                children = _descendants(pid)
+                os.kill(pid, signal.SIGKILL)
+                os.waitpid(pid, 0)
+                until = time.monotonic() + _GONE_S
+                while any(map(_alive, children)) and time.monotonic() < until:
+                    time.sleep(0.02)
+                counts["orphans"].check(not any(map(_alive, children)), (name, children))
+                found = _content(folder / out.format(n=n))
+                counts["old or new"].check(found in (*wholes, {}), (name, sorted(found)))
+            for n in (1, 2):
+                _run(folder, line.format(n=n))
+            left = sorted(path.name for path in folder.rglob(".*"))
+            counts["litter"].check(not left and _content(folder / out.format(n=2)) == wholes[1], (name, left))
+    return list(counts.values())
+
+
+def attack_limits(share: float) -> list[Count]:
+    """Full disks, limits of file size, of memory and of open files: done, or a code, and nothing half-written."""
+    if os.name != "posix":
+        return []
+    counts = {what: Count(f"starved of {what}") for what in ("disk", "file size", "memory", "files")}
+    with _workplace() as root:
+        for name, (out, line) in COMMANDS.items():
+            folder = root / name
+            folder.mkdir()
+            _run(folder, line.format(n=1))
+            before = _content(folder / out.format(n=1))
+            size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+            tries: list[tuple[str, float]] = []
+            for kind, most, points in (("disk", 1.2 * size, 8), ("file size", 1.1 * size, 5), ("memory", 3e9, 5)):
+                count = max(1, round(points * share))
+                tries += [(kind, most * ((i + 1) / count) ** 2) for i in range(count)]
+            tries += [("files", value) for value in (6, 12)[: max(1, round(2 * share))]]
+            for kind, value in tries:
+                with _starved(folder, kind, value) as (where, limit):
+                    if where is None:
+                        continue
+                    if "{n}" in out:
+                        shutil.rmtree(where / out.format(n=2), ignore_errors=True)
+                    said = _run(where, line.format(n=2), limit)
+                    found = _content(where / out.format(n=2))
+                    whole = said is None or found in (before, {})
+                    left = [path.name for path in where.rglob(".*")]
+                    typed = said is None or re.search(r"\[E_\w+\]\s*$", said) is not None
+                    counts[kind].check(typed and whole and not left, (name, f"{value:.3g}", said, left))
+            shutil.rmtree(folder)
+    return list(counts.values())
+
+
+@contextlib.contextmanager
+def _workplace() -> Iterator[Path]:
+    """Two datasets, their rig files and models, and the libraries loaded."""
+    for name in _LOADED:
+        importlib.import_module(name)
+    with tempfile.TemporaryDirectory() as folder:
+        root = Path(folder)
+        _wait(_fork(lambda: _prepare(root), root / "said"))
+        yield root
+
+
+def _prepare(root: Path) -> None:
+    from dataclasses import replace
+
+    from mrdamper.files.dataset import save_dataset
+    from mrdamper.files.model_file import save_model
+    from mrdamper.fleet.generator import Line
+
+    for n, made in enumerate(Line(dampers=2, sessions=1, golden=0), start=1):
+        save_dataset(made.dataset(), root / f"data{n}")
+        (root / f"files{n}").mkdir()
+        for run in made.dataset():
+            rows = zip(run.time, 1e3 * run.displacement, run.force, strict=True)
+            text = "time [s],displacement [mm],force [N]\n" + "".join(f"{t},{x},{f}\n" for t, x, f in rows)
+            (root / f"files{n}" / f"{run.id.split('-')[0]}_{run.current_A:g}A.csv").write_text(text)
+        save_model(replace(bench_damper(), rig=f"bench {n}"), root / f"model{n}.json")
+    shutil.copyfile(root / "model1.json", root / "model.json")
+
+
+def _fork(work: Callable[[], object], said: Path) -> int:
+    pid = os.fork()
+    if pid:
+        return pid
+    status = 1
+    try:
+        os.setsid()
+        errors = os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+        os.dup2(errors, 2)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        work()
+        status = 0
+    except SystemExit as end:
+        status = end.code if isinstance(end.code, int) else 1
+    finally:
+        os._exit(status)
+
+
+def _begin(folder: Path, line: str, limit: Callable[[], None] | None = None) -> int:
+    def work() -> None:
+        os.chdir(folder)
+        sys.argv = ["mrdamper", *line.split()]
+        if limit is not None:
+            limit()
+        from mrdamper.cli import main
+
+        main()
+
+    return _fork(work, folder.parent / "said")
+
+
+def _wait(pid: int) -> int:
+    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+
+
+def _run(folder: Path, line: str, limit: Callable[[], None] | None = None) -> str | None:
+    """What a command said that did not end well; None if it did."""
+    status = _wait(_begin(folder, line, limit))
+    said = (folder.parent / "said").read_text(errors="replace").strip().splitlines()
+    if status == 0:
+        return None
+    return said[-1] if status == 2 and said else f"status {status}: {' / '.join(said[-3:])}"
+
+
+@contextlib.contextmanager
+def _starved(folder: Path, kind: str, value: float) -> Iterator[tuple[Path | None, Callable[[], None] | None]]:
+    """A folder to work in, and what limits the process; no folder where this system cannot starve it."""
+    import resource
+
+    def limited(what: int, most: int) -> Callable[[], None]:
+        return lambda: resource.setrlimit(what, (most, resource.getrlimit(what)[1]))
+
+    if kind != "disk":
+        what = {"file size": resource.RLIMIT_FSIZE, "memory": resource.RLIMIT_AS, "files": resource.RLIMIT_NOFILE}[kind]
+        yield folder, limited(what, int(value))
+        return
+    where = folder.parent / "small disk"
+    where.mkdir(exist_ok=True)
+    mount = ["mount", "-t", "tmpfs", "-o", f"size={max(4096, int(value))}", "tmpfs", str(where)]
+    if shutil.which("mount") is None or subprocess.run(mount, capture_output=True, check=False).returncode:
+        yield None, None  # only the administrator may
+        return
+    try:
+        yield where, None
+    finally:
+        subprocess.run(["umount", "-l", str(where)], check=True)
+
+
+def _content(path: Path) -> dict[str, str]:
+    """Hash of every file by its name; empty where there is nothing."""
+    files = [path] if path.is_file() else path.rglob("*") if path.is_dir() else []
+    return {
+        file.relative_to(path.parent).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
+        for file in files
+        if file.is_file() and file.name != _TIMES and not file.name.startswith(".")
+    }
+
+
+def _descendants(process: int) -> list[int]:
+    from mrdamper.fleet.guard import descendants
+
+    return descendants(process)
+
+
+def _alive(process: int) -> bool:
+    try:
+        return Path(f"/proc/{process}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False
