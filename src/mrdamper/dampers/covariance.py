@@ -31,7 +31,14 @@ def session_of(run: Run) -> str:
     return run.notes.get("session") or (clock[:13] if len(clock) >= 13 else f"run {run.id}")
 
 
-def certain(damper: Damper, runs: Sequence[Run], left_out: Sequence[Scores] = (), held: Collection[str] = ()) -> Damper:
+def certain(
+    damper: Damper,
+    runs: Sequence[Run],
+    left_out: Sequence[Scores] = (),
+    held: Collection[str] = (),
+    *,
+    bounded: bool = True,
+) -> Damper:
     """The damper with what is known of its uncertainty.
 
     Parameters
@@ -43,15 +50,17 @@ def certain(damper: Damper, runs: Sequence[Run], left_out: Sequence[Scores] = ()
         Of runs predicted without their condition: what the form itself is wrong by.
     held : collection of str
         Parameters that ended at a limit of what was searched, inside their bounds.
+    bounded : bool
+        Numbers at a bound are held there; otherwise they count like the others, as if there were none.
     """
     if not damper.own_numbers or not runs:
         return damper
-    parts = [_Part.of(damper, run) for run in runs]
+    parts = [Part.of(damper, run) for run in runs]
     numbers = damper.own_numbers
     at_bound = tuple(
         name
         for name, own in numbers.items()
-        if name.split(".")[0] in held or np.isclose(own.value, own.bounds, rtol=1e-6, atol=1e-12).any()
+        if bounded and (name.split(".")[0] in held or np.isclose(own.value, own.bounds, rtol=1e-6, atol=1e-12).any())
     )
     free = [name for name in numbers if name not in at_bound]
     slopes = [force_slopes(damper, p.prediction, free)[p.picked] for p in parts]
@@ -79,7 +88,7 @@ def certain(damper: Damper, runs: Sequence[Run], left_out: Sequence[Scores] = ()
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
+class Part:
     """What enters of a run: samples, what was left over, and the weight its residuals had."""
 
     run: Run
@@ -92,7 +101,7 @@ class _Part:
     frequency: float | None
 
     @classmethod
-    def of(cls, damper: Damper, run: Run) -> _Part:
+    def of(cls, damper: Damper, run: Run) -> Part:
         prediction = damper.predict_run(run)
         first, last = (int(i) for i in np.flatnonzero(run.in_window)[[0, -1]])
         begin = 0
@@ -117,11 +126,16 @@ class _Part:
         return self.prediction.force[self.picked]
 
 
+def normal_of(slopes: Sequence[Floats], parts: Sequence[Part]) -> Floats:
+    """(P, P) weighted normal matrix of some runs."""
+    return np.sum([(s.T @ s) * part.weight**2 for s, part in zip(slopes, parts, strict=True)], axis=0)
+
+
 def _known(
-    slopes: Sequence[Floats], parts: Sequence[_Part], count: int
+    slopes: Sequence[Floats], parts: Sequence[Part], count: int
 ) -> tuple[list[int], list[int], list[list[int]], Floats]:
     """Columns to keep, those no run shows, groups that do the same, and the inverse of the kept ones' normal matrix."""
-    normal = np.sum([(s.T @ s) * part.weight**2 for s, part in zip(slopes, parts, strict=True)], axis=0)
+    normal = normal_of(slopes, parts)
     keep = [i for i in range(count) if normal[i, i] > 0]
     unseen, alike = [i for i in range(count) if i not in keep], []
     while keep:
@@ -135,13 +149,13 @@ def _known(
     return [], unseen, alike, np.zeros((0, 0))
 
 
-def _told(parts: Sequence[_Part], slopes: Sequence[Floats], inverse: Floats) -> Floats:
+def _told(parts: Sequence[Part], slopes: Sequence[Floats], inverse: Floats) -> Floats:
     """(R, P) share each run has in what is known of each number."""
     told = np.array([np.sum((s @ inverse * p.weight) ** 2, axis=0) for s, p in zip(slopes, parts, strict=True)])
     return told / np.maximum(told.sum(axis=0), np.finfo(float).tiny)
 
 
-def _rest_on_one_run(names: Sequence[str], parts: Sequence[_Part], told: Floats) -> list[str]:
+def _rest_on_one_run(names: Sequence[str], parts: Sequence[Part], told: Floats) -> list[str]:
     """Numbers of which one run of several tells most, in words."""
     if len(parts) < 3 or not names:
         return []
@@ -153,7 +167,7 @@ def _rest_on_one_run(names: Sequence[str], parts: Sequence[_Part], told: Floats)
     ]
 
 
-def _within(parts: Sequence[_Part], slopes: Sequence[Floats], inverse: Floats) -> tuple[Floats, Floats]:
+def _within(parts: Sequence[Part], slopes: Sequence[Floats], inverse: Floats) -> tuple[Floats, Floats]:
     """Covariance by noise and model error within the runs, and its relative variance by parameter."""
     total, doubt = np.zeros_like(inverse), np.zeros(len(inverse))
     for part, slope in zip(parts, slopes, strict=True):
@@ -169,7 +183,7 @@ def _within(parts: Sequence[_Part], slopes: Sequence[Floats], inverse: Floats) -
 
 
 def _sessions(
-    parts: Sequence[_Part], slopes: Sequence[Floats], influence: Sequence[Floats], within: Floats
+    parts: Sequence[Part], slopes: Sequence[Floats], influence: Sequence[Floats], within: Floats
 ) -> tuple[float, float, float, Floats]:
     """Spread of gains and offsets between sessions, its degrees of freedom, and what it does to the parameters.
 
@@ -220,7 +234,7 @@ def _sessions(
 
 
 def _shaken(
-    parts: Sequence[_Part], slopes: Sequence[Floats], sessions: Sequence[str], gain: float, offset: float
+    parts: Sequence[Part], slopes: Sequence[Floats], sessions: Sequence[str], gain: float, offset: float
 ) -> Floats:
     """(P, P) covariance of the numbers by sessions whose gains and offsets are drawn anew.
 
@@ -254,7 +268,7 @@ def _shaken(
 
 
 def _with_model_error(
-    made: Certainty, damper: Damper, parts: Sequence[_Part], slopes: Sequence[Floats], left_out: Sequence[Scores]
+    made: Certainty, damper: Damper, parts: Sequence[Part], slopes: Sequence[Floats], left_out: Sequence[Scores]
 ) -> Certainty:
     """What left-out conditions were wrong by, less what the numbers and the sessions explain."""
     if not left_out:

@@ -1,0 +1,93 @@
+"""`mrdamper certainty`: how sure the numbers of a saved model are, and what its runs cannot tell."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+
+    @app.command(epilog="Example: mrdamper certainty model.json rig/ --profile c1 --out sure/")
+    def certainty(
+        model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
+        data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests."),
+        level: float = typer.Option(0.95, "--level", help="Share of such intervals that hold the truth."),
+        profile: list[str] = typer.Option(
+            [], "--profile", help="Number whose likelihood is followed; may be repeated."
+        ),
+        samples: bool = typer.Option(False, "--samples", help="Markov chains over all numbers; needs mrdamper[uq]."),
+        steps: int = typer.Option(4000, "--steps", help="Of each chain."),
+        out: Path | None = typer.Option(None, "--out", help="Folder for numbers.csv, profile.svg, corner.svg."),
+    ) -> None:
+        """Say how sure a model's numbers are: intervals, what the tests cannot tell, profiles, samples."""
+        from mrdamper.dampers.certainty import table, unsure
+        from mrdamper.dampers.covariance import certain
+        from mrdamper.errors import InputError
+        from mrdamper.files.atomic import require_writable, write_into
+        from mrdamper.files.dataset import load_dataset
+        from mrdamper.files.encoding import csv_text
+        from mrdamper.files.model_file import load_model
+        from mrdamper.identification.intervals import student
+
+        student(level, 1.0)  # refuses a level that is none
+        if steps < 10:
+            raise InputError(f"--steps {steps}", mend="give some thousands")
+        if out is not None:
+            require_writable(out)
+        damper = load_model(model)
+        runs = []
+        if damper.certainty is None or profile or samples:
+            dataset = load_dataset(data)
+            if damper.rig not in dataset.rigs:
+                raise InputError(f"the dataset has no rig {damper.rig!r}", mend=f"rigs: {', '.join(dataset.rigs)}")
+            runs = _used(dataset.rig(damper.rig))
+        if damper.certainty is None:
+            damper = certain(damper, runs)
+        rows = table(damper, level)
+        for row in rows:
+            print(f"{row['name']} = {row['written']}")
+        for doubt in unsure(damper):
+            print(doubt)
+        found, drawn = [], None
+        if profile or samples:
+            from mrdamper.dampers.likelihood import Likelihood
+            from mrdamper.dampers.likelihood import profile as profiled
+            from mrdamper.dampers.posterior import posterior
+
+            likelihood = Likelihood.of(damper, runs)
+            for name in profile:
+                found.append(profiled(likelihood, name))
+                low, high = found[-1].interval
+                print(
+                    f"profile of {name}: {found[-1].kind}, 95 % from {low:.4g} to {high:.4g} {found[-1].unit}".strip()
+                )
+            if samples:
+                drawn = posterior(likelihood, steps)
+                print(f"{drawn.steps} steps, autocorrelation time {drawn.time:.0f}, split-R̂ {drawn.split_rhat:.3f}")
+        if out is None:
+            return
+        from mrdamper.report.plots.certainty import corner, profile_curves, quantiles
+        from mrdamper.report.plots.style import save_figure
+
+        with write_into(out) as folder:
+            (folder / "numbers.csv").write_text(csv_text(rows), encoding="utf-8")
+            if found:
+                save_figure(profile_curves(found), folder / "profile")
+            if drawn is not None:
+                save_figure(corner(drawn), folder / "corner")
+                (folder / "samples.csv").write_text(csv_text(quantiles(drawn, level)), encoding="utf-8")
+        print(out)
+
+
+def _used(dataset) -> list:
+    """The runs the study identifies from: train runs with a steady sine."""
+    from mrdamper.errors import InputError
+    from mrdamper.study.workflow import usable_sines
+
+    runs = [run for run in usable_sines(dataset)[0] if run.split == "train"]
+    if not runs:
+        raise InputError("no train runs with a steady sine", mend="check the split column of runs.csv")
+    return runs

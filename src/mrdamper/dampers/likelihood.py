@@ -1,0 +1,269 @@
+"""What the runs say of any values of a damper's numbers: profiles of one, samples of all.
+
+The likelihood is that of the score: what a set of numbers leaves over, seen through the derivatives
+at the estimate and weighed by the covariance of that score, noise, repeated model error and sessions
+in it. It is greatest at the estimate, has the damper's covariance as its curvature there, and follows
+the whole, not the linearised model away from it [Hansen 1982, Econometrica 50, 1029].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mrdamper.dampers.base import Damper
+from mrdamper.dampers.certainty import Certainty
+from mrdamper.dampers.covariance import Part, certain, normal_of
+from mrdamper.dampers.joint import string
+from mrdamper.dampers.slopes import force_slopes
+from mrdamper.data import Floats, Run
+from mrdamper.errors import InputError
+from mrdamper.motion import Excitation
+
+CROSSED = 3.84  # fall of twice the logarithm at which a 95 % interval ends: chi squared of one
+_FORGETS = 20  # samples before those that count: a run has turned by then
+_POINTS, _REACH = 12, 4.0  # of a profile to either side, and how many standard errors it goes
+_TRIES, _SETTLED = 12, 1e-3  # steps of the other numbers at one point; gain at which they rest
+
+Kind = Literal["bounded", "one-sided", "flat"]
+
+
+@dataclass(frozen=True, eq=False)
+class Likelihood:
+    """Minus twice the logarithm of the likelihood of a damper's numbers, zero at the estimate.
+
+    Attributes
+    ----------
+    damper : Damper
+        With its covariance.
+    names : tuple of str, length P
+        Numbers it is of, those at a bound among them.
+    start : (P,) array
+        The estimate; logarithms where the damper has them.
+    covariance : (P, P) array
+    """
+
+    damper: Damper
+    names: tuple[str, ...]
+    start: Floats
+    covariance: Floats
+    logs: tuple[bool, ...]
+    bounds: Floats
+    parts: tuple[Part, ...]
+    instruments: Floats
+    measured: Floats
+    offset: Floats
+    turned: Floats
+
+    @classmethod
+    def of(cls, damper: Damper, runs: Sequence[Run]) -> Likelihood:
+        """Of the runs a damper was identified from.
+
+        Raises
+        ------
+        InputError
+            E_CERTAINTY if the runs determine none of its numbers.
+        """
+        whole = certain(damper, runs, bounded=False)
+        known: Certainty | None = whole.certainty
+        if known is None or not known.names:
+            raise InputError(
+                "these runs determine no number of the damper", mend="give its train runs", code="E_CERTAINTY"
+            )
+        names, numbers = known.names, damper.own_numbers
+        parts = tuple(Part.of(damper, run) for run in runs)
+        slopes = [force_slopes(damper, p.prediction, names)[p.picked] for p in parts]
+        normal = normal_of(slopes, parts)
+        root = np.linalg.cholesky(positive(normal @ known.covariance @ normal))
+        rows = np.concatenate([s * p.weight**2 for s, p in zip(slopes, parts, strict=True)])
+        instruments: Floats = np.asarray(np.linalg.solve(root, rows.T), dtype=float)
+        measured = np.concatenate([p.predicted - p.residual for p in parts])
+        # What robust weights left of the score belongs to the estimate; what a bound holds back does not.
+        score = rows.T @ np.concatenate([p.residual for p in parts])
+        score[[name in damper_bounds(damper) for name in names]] = 0.0
+        logs = tuple(numbers[n].log for n in names)
+        start = np.array(
+            [np.log(numbers[n].value) if log else numbers[n].value for n, log in zip(names, logs, strict=True)]
+        )
+        bounds = np.array([_coordinates(numbers[n].bounds, log) for n, log in zip(names, logs, strict=True)])
+        return cls(
+            damper, names, start, known.covariance, logs, bounds, parts, instruments, measured,
+            np.asarray(np.linalg.solve(root, score), dtype=float),
+            np.asarray(np.linalg.solve(root, normal), dtype=float),
+        )  # fmt: skip
+
+    def score(self, point: Floats) -> Floats:
+        """(P,) whitened score at a point; not finite outside the bounds."""
+        if np.any(point < self.bounds[:, 0]) or np.any(point > self.bounds[:, 1]):
+            return np.full(len(self.names), np.inf)
+        values = {
+            n: float(np.exp(u)) if log else float(u) for n, u, log in zip(self.names, point, self.logs, strict=True)
+        }
+        moved = self.damper.with_numbers(values)
+        return self.instruments @ (self._force(moved) - self.measured) - self.offset
+
+    def __call__(self, point: Floats) -> float:
+        """Minus twice the logarithm at a point; infinite outside the bounds."""
+        e = self.score(point)
+        return float(e @ e) if np.all(np.isfinite(e)) else np.inf
+
+    def _force(self, damper: Damper) -> Floats:
+        model = damper.one_model
+        if model is None or self._strung is None:
+            return np.concatenate([damper.again(p.prediction)[p.picked] for p in self.parts])
+        whole, picked, seen = self._strung
+        return model.force(seen, model.state(whole)[picked])
+
+    @cached_property
+    def _strung(self) -> tuple[Excitation, NDArray[np.intp], Excitation] | None:
+        """All runs in one motion, followed faster than many short ones; None where one does not forget the other."""
+        if self.damper.one_model is None or min(int(p.picked[0]) for p in self.parts) < _FORGETS:
+            return None
+        motions = [self.damper.felt(p.prediction.motion) for p in self.parts]
+        begins = np.cumsum([0, *(len(m) for m in motions)])[:-1]
+        picked = np.concatenate([p.picked + b for p, b in zip(self.parts, begins, strict=True)])
+        whole = string(motions)
+        return whole, picked, whole.part(picked)
+
+
+def damper_bounds(damper: Damper) -> set[str]:
+    """Numbers at a bound, by value."""
+    return {
+        name
+        for name, own in damper.own_numbers.items()
+        if np.isclose(own.value, own.bounds, rtol=1e-6, atol=1e-12).any()
+    }
+
+
+def positive(matrix: Floats) -> Floats:
+    """A covariance made symmetric, and positive where rounding left it singular."""
+    even = (matrix + matrix.T) / 2
+    return even + 1e-12 * np.diag(np.diag(even))
+
+
+def _coordinates(bounds: tuple[float, float], log: bool) -> tuple[float, float]:
+    if not log:
+        return bounds
+    low, high = bounds
+    return (float(np.log(low)) if low > 0 else -np.inf), float(np.log(high))
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """How much worse the best of all other numbers describes the runs as one number moves.
+
+    Attributes
+    ----------
+    name, unit : str
+    values : (K,) array
+    fall : (K,) array
+        Minus twice the logarithm of the likelihood, over its least.
+    estimate : float
+    interval : (float, float)
+        Where the fall reaches 3.84; infinite on an open side.
+    kind : "bounded", "one-sided" or "flat"
+    """
+
+    name: str
+    unit: str
+    values: Floats
+    fall: Floats
+    estimate: float
+    interval: tuple[float, float]
+    kind: Kind
+
+
+def profile(likelihood: Likelihood, name: str) -> Profile:
+    """Profile likelihood of one of a damper's numbers.
+
+    Raises
+    ------
+    InputError
+        E_CERTAINTY if the damper has no such number.
+    """
+    own = likelihood.damper.own_numbers.get(name)
+    if own is None:
+        known = ", ".join(likelihood.damper.own_numbers)
+        raise InputError(f"no number {name}", mend=f"known: {known}", code="E_CERTAINTY")
+    if name not in likelihood.names or name in (likelihood.damper.certainty or _NONE).unknown:
+        flat = np.array([own.value])
+        return Profile(name, own.unit, flat, np.zeros(1), own.value, (-np.inf, np.inf), "flat")
+    i = likelihood.names.index(name)
+    error = float(np.sqrt(likelihood.covariance[i, i]))
+    points, falls = [likelihood.start], [likelihood(likelihood.start)]
+    for side in (-1.0, 1.0):
+        at = likelihood.start
+        for step in range(1, _POINTS + 1):
+            u = likelihood.start[i] + side * error * _REACH * step / _POINTS
+            u = float(np.clip(u, *likelihood.bounds[i]))
+            if not np.isfinite(u) or u == at[i]:
+                break
+            at, fall = _others(likelihood, i, u, at)
+            points.append(at)
+            falls.append(fall)
+            if fall > 3 * CROSSED:
+                break
+    order = np.argsort([p[i] for p in points])
+    us, fall = np.array([points[k][i] for k in order]), np.array([falls[k] for k in order])
+    fall = fall - fall.min()
+    best = int(np.argmin(fall))
+    low, high = _crossing(us[: best + 1][::-1], fall[: best + 1][::-1]), _crossing(us[best:], fall[best:])
+    log = likelihood.logs[i]
+    ends = [float(np.exp(u)) if log else u for u in (low, high)]
+    ends[0] = max(ends[0], own.bounds[0])
+    ends[1] = min(ends[1], own.bounds[1])
+    closed = int(np.isfinite(low)) + int(np.isfinite(high))
+    kind: Kind = ("flat", "one-sided", "bounded")[closed]
+    values = np.exp(us) if log else us
+    return Profile(name, own.unit, values, fall, own.value, (ends[0], ends[1]), kind)
+
+
+_NONE = Certainty((), (), np.zeros((0, 0)), np.zeros(0))
+
+
+def _others(likelihood: Likelihood, held: int, value: float, start: Floats) -> tuple[Floats, float]:
+    """The other numbers that describe the runs best where one is held: chords, shortened where they overshoot."""
+    free = np.arange(len(start)) != held
+    solve = np.linalg.pinv(likelihood.turned[:, free])
+    at = start.copy()
+    at[free] -= np.linalg.lstsq(
+        likelihood.turned[:, free], likelihood.turned[:, held] * (value - start[held]), rcond=None
+    )[0]
+    at[held] = value
+    at = np.clip(at, likelihood.bounds[:, 0], likelihood.bounds[:, 1])
+    e = likelihood.score(at)
+    for _ in range(_TRIES):
+        step, share, better = solve @ e, 1.0, None
+        while share > 0.05:
+            there = at.copy()
+            there[free] -= share * step
+            there = np.clip(there, likelihood.bounds[:, 0], likelihood.bounds[:, 1])
+            moved = likelihood.score(there)
+            if moved @ moved < e @ e:
+                better = (there, moved)
+                break
+            share /= 3
+        if better is None:
+            break
+        gain = float(e @ e - better[1] @ better[1])
+        at, e = better
+        if gain < _SETTLED:
+            break
+    return at, float(e @ e)
+
+
+def _crossing(values: Floats, fall: Floats) -> float:
+    """Where a fall first reaches `CROSSED` along a side; infinite if it does not."""
+    over = np.flatnonzero(fall >= CROSSED)
+    if not over.size or over[0] == 0:
+        return float(np.sign(values[-1] - values[0]) or 1.0) * np.inf if not over.size else float(values[0])
+    k = int(over[0])
+    # The fall is a parabola nearly: straight in its root.
+    root = np.sqrt(np.maximum(fall, 0))
+    share = (np.sqrt(CROSSED) - root[k - 1]) / (root[k] - root[k - 1])
+    return float(values[k - 1] + share * (values[k] - values[k - 1]))

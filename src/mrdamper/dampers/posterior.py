@@ -1,0 +1,122 @@
+"""Samples of a damper's numbers by Markov chains over their likelihood, refused where they have not converged."""
+
+from __future__ import annotations
+
+import importlib.util
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrdamper.dampers.likelihood import Likelihood, positive
+from mrdamper.data import Floats
+from mrdamper.errors import InputError, MissingExtraError
+
+_TAILS = 5.0  # degrees of freedom of the proposals
+_THROWN = 0.2  # of a chain: where it begins
+_TIMES, _RHAT = 50, 1.01  # autocorrelation times a chain must hold, and split-R̂ it may have
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Draws from the posterior of a damper's numbers, flat priors within their bounds.
+
+    Attributes
+    ----------
+    names : tuple of str, length P
+    values : (N, P) array
+    time : float
+        Longest autocorrelation time [steps].
+    steps : int
+        Of each walker, after what was thrown away.
+    split_rhat : float
+        Largest split-R̂ of any number.
+    """
+
+    names: tuple[str, ...]
+    values: Floats
+    time: float
+    steps: int
+    split_rhat: float
+
+
+def posterior(likelihood: Likelihood, steps: int = 2000, walkers: int = 0, seed: int = 1) -> Samples:
+    """Markov chains over the likelihood, within the bounds.
+
+    Half of the moves propose from the covariance with wider tails, whatever the chain's place, the
+    others are stretch moves [Goodman and Weare 2010].
+
+    Parameters
+    ----------
+    likelihood : Likelihood
+    steps : int
+        Of each walker; the first fifth is thrown away.
+    walkers : int
+        Default: 2 P + 2.
+    seed : int
+
+    Raises
+    ------
+    MissingExtraError
+        If emcee is not installed.
+    InputError
+        E_CONVERGENCE below 50 autocorrelation times or above a split-R̂ of 1.01.
+    """
+    if importlib.util.find_spec("emcee") is None:
+        raise MissingExtraError("samples need emcee", mend="pip install 'mrdamper[uq]'")
+    import emcee
+
+    size = len(likelihood.names)
+    count = walkers or 2 * size + 2
+    root = np.linalg.cholesky(positive(likelihood.covariance))
+    inverse = np.linalg.inv(root)
+    rng = np.random.default_rng(seed)
+
+    def wide(points: Floats) -> Floats:
+        """Logarithm of the density the proposals come from: Student's t of five degrees."""
+        return (
+            -0.5 * (_TAILS + size) * np.log1p(np.sum(((points - likelihood.start) @ inverse.T) ** 2, axis=1) / _TAILS)
+        )
+
+    def propose(points: Floats, random) -> tuple[Floats, Floats]:
+        shape = points.shape
+        scale = np.sqrt(_TAILS / random.chisquare(_TAILS, shape[0]))
+        new = likelihood.start + (random.standard_normal(shape) * scale[:, None]) @ root.T
+        return new, wide(points) - wide(new)
+
+    begin = likelihood.start + 0.5 * rng.standard_normal((count, size)) @ root.T
+    begin = np.clip(begin, likelihood.bounds[:, 0], likelihood.bounds[:, 1])
+    moves = [(emcee.moves.MHMove(propose), 0.7), (emcee.moves.StretchMove(), 0.3)]
+    sampler = emcee.EnsembleSampler(count, size, lambda u: -0.5 * likelihood(u), moves=moves)
+    sampler.random_state = np.random.RandomState(seed).get_state()
+    sampler.run_mcmc(begin, steps, skip_initial_state_check=True)
+    kept: Floats = np.asarray(sampler.get_chain(discard=int(_THROWN * steps)), dtype=float)  # (steps, walkers, P)
+    time = float(np.max(emcee.autocorr.integrated_time(kept, tol=0)))
+    rhat = split_rhat(kept)
+    if not (len(kept) > _TIMES * time and rhat <= _RHAT):
+        raise InputError(
+            f"not converged: {len(kept)} steps of {time:.0f} autocorrelation times each, split-R̂ {rhat:.3f}",
+            mend=f"take {int(70 * time * 1.25)} steps or more; more than 50 times and 1.01 at most are asked for",
+            code="E_CONVERGENCE",
+        )
+    flat = kept[:: max(1, int(time))].reshape(-1, size)
+    return Samples(
+        likelihood.names,
+        np.where(likelihood.logs, np.exp(np.where(likelihood.logs, flat, 0)), flat),
+        time,
+        len(kept),
+        rhat,
+    )
+
+
+def split_rhat(chains: Floats) -> float:
+    """Largest potential scale reduction of chains cut in halves [Gelman et al. 2013].
+
+    Parameters
+    ----------
+    chains : (steps, walkers, P) array
+    """
+    half = len(chains) // 2
+    parts = np.concatenate([chains[:half], chains[half : 2 * half]], axis=1)
+    within = parts.var(axis=0, ddof=1).mean(axis=0)
+    between = parts.mean(axis=0).var(axis=0, ddof=1)
+    return float(np.max(np.sqrt((half - 1) / half + between / np.maximum(within, 1e-300))))
