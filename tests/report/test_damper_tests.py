@@ -104,6 +104,8 @@ def test_the_report_has_page_print_and_tables(folder, dataset, tmp_path):
     assert "A &lt;b&gt;report&lt;/b&gt;" in page
     assert "ACME &amp; sons" in page
     assert "21 °C" in page
+    assert "datasets: made, 12 runs; worn, 4 runs" in page
+    assert "fastest test of made at each current" in page  # whose loops these are
     for verdict in ("pass", "fail", "not tested"):
         assert f"<strong>{verdict}</strong>" in page
     rows = list(csv.DictReader(io.StringIO((out / "forces.csv").read_text())))

@@ -71,7 +71,7 @@ def write_test_report(
         page = render_page(
             "tests.html.j2",
             about.title or f"Damper test report: {', '.join(found)}",
-            made_from(first) + ".",
+            made_from(*specimens.values()) + ".",
             about=about,
             provenance=provenance(specimens),
             names=", ".join(found),

@@ -29,9 +29,10 @@ def render_page(template: str, title: str, footer: str, **facts: object) -> str:
     return _ENVIRONMENT.get_template(template).render(title=title, footer=footer, **facts)
 
 
-def made_from(dataset: Dataset) -> str:
+def made_from(*datasets: Dataset) -> str:
     """How a page's footer begins: this program's version and what was studied."""
-    return f"mrdamper {version('mrdamper')}; dataset: {dataset.name}, {len(dataset)} runs"
+    said = "; ".join(f"{dataset.name}, {len(dataset)} runs" for dataset in datasets)
+    return f"mrdamper {version('mrdamper')}; dataset{'s' if len(datasets) > 1 else ''}: {said}"
 
 
 def inline_svg(picture: bytes, alt: str) -> Markup:
