@@ -98,10 +98,11 @@ def test_a_prediction_stands_in_the_columns_of_the_contract():
 
 
 def test_scores_are_fractions_under_their_own_names():
-    run = RunScore("one", "bench", Condition(0, 1, 0.01), scores_of(0.1), 0.01, ("current",))
+    known = {"rest": 0.15, "session": "a day"}
+    run = RunScore("one", "bench", Condition(0, 1, 0.01), scores_of(0.1), 0.01, ("current",), **known)
     assert score_row(run) == pytest.approx(
         {"nrmse_pp": 0.1, "nrmse_std": 0.11, "wape": 0.12, "peak_error": 0.13, "energy_error": 0.14}
-        | {"run_id": "one", "extrapolation": "current"}
+        | {"run_id": "one", "rest_nrmse_pp": 0.15, "session": "a day", "extrapolation": "current"}
     )
 
 
