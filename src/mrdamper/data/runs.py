@@ -18,6 +18,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mrdamper.data.pieces import pieces, taken
 from mrdamper.data.shown import Shown
 from mrdamper.errors import ConditionError, NonFiniteError, RunError, TimeOrderError, UnknownNameError, printable
 
@@ -197,9 +198,11 @@ class Run(Shown):
         size = time.size
         if size < 3:
             raise RunError(f"{size} samples", where=self._where, mend="a run needs at least 3")
-        backwards = np.flatnonzero(np.diff(time) <= 0)
-        if backwards.size:
-            i = int(backwards[0]) + 1
+        for at, piece in pieces(time, overlap=1):
+            backwards = np.flatnonzero(np.diff(piece) <= 0)
+            if not backwards.size:
+                continue
+            i = at + int(backwards[0]) + 1
             raise TimeOrderError(
                 f"time goes from {time[i - 1]:.6g} s to {time[i]:.6g} s at sample {i}",
                 where=self._where,
@@ -285,7 +288,9 @@ class Run(Shown):
         """(N,) mask of the samples inside the steady window."""
         if self.window is None:
             return np.ones(self.time.size, dtype=bool)
-        return (self.time >= self.window[0]) & (self.time <= self.window[1])
+        inside = np.zeros(self.time.size, dtype=bool)
+        inside[np.searchsorted(self.time, self.window[0]) : np.searchsorted(self.time, self.window[1], "right")] = True
+        return inside
 
     def steady(self) -> Run:
         """The part of the run inside its steady window."""
@@ -332,10 +337,10 @@ class Run(Shown):
                 where=self._where,
                 mend="trim or resample the run",
             )
-        bad = np.flatnonzero(~np.isfinite(array))
-        if bad.size:
+        bad = [at + i for at, piece in pieces(array) for i in np.flatnonzero(~np.isfinite(piece))]
+        if bad:
             raise NonFiniteError(
-                f"{name} has {bad.size} values that are not finite, the first at sample {bad[0]}",
+                f"{name} has {len(bad)} values that are not finite, the first at sample {bad[0]}",
                 where=self._where,
                 mend="remove these samples",
             )
@@ -376,6 +381,7 @@ def once_per_run(function: Callable[[Run], T]) -> Callable[[Run], T]:
     return remembered
 
 
+_MOST = 2_000_000  # samples of a current looked at
 _BLOCKS = 64  # stretches of a record whose mean currents are compared
 _TREND_A, _TREND = 0.01, 0.03  # a current may differ by so much from begin to end: [A], and of its mean
 _SLOW_A, _SLOW = 0.016, 0.01  # RMS of its slow part: a rectifier's or a chopper's ripple, seen at a slow rate
@@ -387,8 +393,10 @@ _WHITE = 1.0  # von Neumann's ratio: two for white noise, near zero for a curren
 
 @once_per_run
 def _held_current(run: Run) -> tuple[float, str]:
-    inside = run.current[run.in_window]
-    return held_current(inside if inside.size >= 3 else run.current)
+    first, last = run.window or (-math.inf, math.inf)
+    start, stop = int(np.searchsorted(run.time, first)), int(np.searchsorted(run.time, last, "right"))
+    start, stop = (start, stop) if stop - start >= 3 else (0, run.time.size)
+    return held_current(taken(run.current, np.arange(start, stop, 1 + (stop - start) // _MOST)))
 
 
 def held_current(current: Floats) -> tuple[float, str]:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mrdamper.data import Condition, Dataset, Run
+from mrdamper.data.pieces import pieces, release
 from mrdamper.errors import ColumnError, DatasetError
 from mrdamper.files.atomic import path_of, write_file, write_folder
 from mrdamper.files.encoding import csv_text, csv_value
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 BUNDLED = "two_rigs"
-_PIECE = 2**20  # samples written at once
+_PIECE = 2**18  # samples written at once
 _MOST_RUNS, _RUNS_BYTES = 100_000, 2**26  # of a table of runs
 _KNOWN_RUN_COLUMNS = (
     "run_id", "rig", "excitation", "current_A", "nominal_frequency_Hz", "nominal_amplitude_m",
@@ -263,7 +264,7 @@ def _write_samples(dataset: Dataset, folder: Path) -> None:
     import polars as pl
 
     path = folder / "samples.parquet"
-    if sum(run.time.size for run in dataset) <= 2 * _PIECE:
+    if sum(run.time.size for run in dataset) <= 8 * _PIECE:
         pl.concat(_samples(dataset), how="diagonal").write_parquet(path, compression="zstd", statistics=False)
         return
     parts = []
@@ -277,7 +278,7 @@ def _write_samples(dataset: Dataset, folder: Path) -> None:
         for part, schema in zip(parts, schemas, strict=True)
     ]
     pl.concat([table.select(names) for table in tables]).sink_parquet(
-        path, compression="zstd", statistics=False, row_group_size=_PIECE // 4
+        path, compression="zstd", statistics=False, row_group_size=_PIECE
     )
     for part in parts:
         part.unlink()
@@ -299,8 +300,11 @@ def _samples(dataset: Dataset) -> Iterable[pl.DataFrame]:
             inside = slice(start, min(start + _PIECE, run.time.size))
             size = inside.stop - inside.start
             columns = {name: np.array(values[inside]) for name, values in channels.items()}
+            for values in channels.values():
+                release(values)
             yield pl.DataFrame({"run_id": pl.repeat(run.id, size, eager=True), **columns})
 
 
 def _varies(current: np.ndarray) -> bool:
-    return float(np.min(current)) != float(np.max(current))
+    ends = [(float(np.min(piece)), float(np.max(piece))) for _, piece in pieces(current)]
+    return min(low for low, _ in ends) != max(high for _, high in ends)

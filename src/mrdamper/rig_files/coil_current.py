@@ -7,6 +7,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from mrdamper.data import Floats, held_current
+from mrdamper.data.pieces import pieces
 from mrdamper.errors import ColumnError, InputError, printable
 from mrdamper.rig_files.column_names import names_condition, role_of, split_name
 from mrdamper.rig_files.conditions import Statement, agreed, contradicts, currents_in, stated_by_lines, stated_in_titles
@@ -37,6 +38,8 @@ def current_of(
         statements = [] if found is None else [Statement(found, "file name")]
     else:
         statements = _statements(table, path)
+        if not statements and channel is None:
+            statements = _set_points(table) or _once(stated_in_titles(table.remarks)) or _folders(table, path)
     where = printable(table.source.name)
     mend = "correct the name or the line, or say [current] value = ... in a profile"
     try:
@@ -68,7 +71,7 @@ def _statements(table: RawTable, path: Path) -> list[Statement]:
         stated = currents_in(text)
         if len(stated) == 1:
             found.append(Statement(stated[0], whence if whence == "file name" else f"{whence} {text!r}"))
-    return found or _set_points(table) or _once(stated_in_titles(table.remarks)) or _folders(table, path)
+    return found
 
 
 def _set_points(table: RawTable) -> list[Statement]:
@@ -122,9 +125,10 @@ def as_data(text: str) -> str:
 
 def without_gaps(current: Floats) -> tuple[Floats, tuple[Finding, ...]]:
     """A current that is recorded at every n-th sample only, by its mean, where it is constant."""
-    there = np.flatnonzero(np.isfinite(current))
-    if there.size < _FEWEST_SLOW or there.size > 0.6 * current.size:
+    count = sum(int(np.count_nonzero(np.isfinite(piece))) for _, piece in pieces(current))
+    if count < _FEWEST_SLOW or count > 0.6 * current.size:
         return current, ()
+    there = np.flatnonzero(np.isfinite(current))
     steps = np.diff(there)
     usual = int(np.median(steps))
     whole = there[0] <= usual and current.size - there[-1] <= usual and steps.max() <= 2 * usual

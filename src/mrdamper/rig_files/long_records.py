@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from mrdamper.data.pieces import release
 from mrdamper.errors import InputError
 from mrdamper.rig_files.quality.current import change_of
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED, Finding, Record
-from mrdamper.rig_files.text.spool import release
 
-PART = 2**20  # samples: minutes of a test at 10 kHz, some ten megabytes a channel
+PART = 2**19  # samples: a minute of a test at 10 kHz, some megabytes a channel
 _MAY_REST = ("E_NO_EXCITATION",)  # a long test may pause; it may not be one long pause
 _OF_THE_WHOLE = ("W_SHORT", "W_DRIFT")
 _ONCE = ("W_CURRENT_VARIES",)  # judged over the whole record: parts may each hold another current

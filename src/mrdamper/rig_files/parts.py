@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from mrdamper.data.pieces import pieces
 from mrdamper.rig_files.column_names import role_of, split_name
 from mrdamper.rig_files.conditions import currents_in
 from mrdamper.rig_files.file_form import FileForm
@@ -238,8 +239,10 @@ def stretches_of_time(time: np.ndarray) -> list[slice]:
     swapped rows are no new test: they do not come back to the first value, or they leave from
     a count's end.
     """
-    known = np.flatnonzero(np.isfinite(time))
     whole = [slice(0, time.size)]
+    if not _turns_back(time):
+        return whole
+    known = np.flatnonzero(np.isfinite(time))
     if known.size < 2 * _FEWEST_ROWS:
         return whole
     stamps = time[known]
@@ -258,6 +261,16 @@ def stretches_of_time(time: np.ndarray) -> list[slice]:
         return whole
     at = [0, *(int(known[i + 1]) for i in back), time.size]
     return [slice(a, b) for a, b in pairwise(at)]
+
+
+def _turns_back(time: np.ndarray) -> bool:
+    last = -np.inf
+    for _, piece in pieces(time):
+        stamps = piece[np.isfinite(piece)]
+        if stamps.size and (stamps[0] < last or np.any(np.diff(stamps) < 0)):
+            return True
+        last = stamps[-1] if stamps.size else last
+    return False
 
 
 def _wraps(end: float, step: float) -> bool:

@@ -13,6 +13,7 @@ from typing import overload
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.pieces import pieces
 
 REQUIRED = ("time", "displacement", "force")
 OPTIONAL = ("velocity", "acceleration", "current", "voltage", "temperature", "pressure")
@@ -135,8 +136,11 @@ class Record:
     @property
     def present(self) -> np.ndarray:
         """(N,) mask of the samples at which time, displacement, force and current are there."""
-        there = np.isfinite(self.time) & np.isfinite(self.displacement) & np.isfinite(self.force)
-        return there if self.current is None else there & np.isfinite(self.current)
+        there = np.ones(self.time.size, dtype=bool)
+        for values in (self.time, self.displacement, self.force, self.current):
+            for at, piece in () if values is None else pieces(values):
+                there[at : at + piece.size] &= np.isfinite(piece)
+        return there
 
     def noticed(self, *findings: Finding) -> Record:
         """The same record with further findings."""

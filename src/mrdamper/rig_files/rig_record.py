@@ -20,7 +20,7 @@ from mrdamper.rig_files.profile import Correction, Profile
 from mrdamper.rig_files.readers import RawTable, RigFileError, suffixes
 from mrdamper.rig_files.record import OPTIONAL, Finding, Record
 from mrdamper.rig_files.text.spool import rescale
-from mrdamper.rig_files.units import parse_unit
+from mrdamper.rig_files.units import Unit, parse_unit
 
 _KEPT = {"temperature": "C", "pressure": "Pa", "voltage": "V", "acceleration": "m_s2", "length": "m", "force": "N"}
 _MOST_FURTHER = 12  # channels
@@ -134,20 +134,31 @@ def _curvature(time: Floats, displacement: Floats) -> Floats:
 def _further(table: RawTable, found: dict[str, Assigned], size: int) -> dict[str, Floats]:
     """Second sensors of a kind, in SI, by their name and unit: kept, never identified from."""
     used = {entry.column for entry in found.values()}
-    kept: dict[str, Floats] = {}
+    wanted: dict[str, tuple[int, Unit]] = {}
     for column, (name, unit) in enumerate(zip(table.names, table.units, strict=True)):
         bare, stated = split_name(name, unit)
         known = parse_unit(stated) if stated else None
-        if column in used or known is None or known.dimension not in _KEPT or len(kept) >= _MOST_FURTHER:
-            continue
-        try:
-            values = table.read([column]).values[column]
-        except InputError:
+        if column in used or known is None or known.dimension not in _KEPT or len(wanted) >= _MOST_FURTHER:
             continue
         key = f"{re.sub(r'[^A-Za-z0-9]+', '_', bare).strip('_')[:40].lower() or 'column'}_{_KEPT[known.dimension]}"
-        if values.size == size and key not in kept:
-            kept[key] = rescale(values, known.factor, known.offset)
-    return kept
+        wanted.setdefault(key, (column, known))
+    values = _at_once(table, [column for column, _ in wanted.values()])
+    return {
+        key: rescale(values[column], unit.factor, unit.offset)
+        for key, (column, unit) in wanted.items()
+        if column in values and values[column].size == size
+    }
+
+
+def _at_once(table: RawTable, columns: list[int]) -> dict[int, Floats]:
+    """Columns read in one pass; one by one, where one of them cannot be read."""
+    try:
+        return dict(table.read(columns).values) if columns else {}
+    except InputError:
+        found: dict[int, Floats] = {}
+        for column in columns if len(columns) > 1 else ():
+            found |= _at_once(table, [column])
+        return found
 
 
 def thousands_in(values: Floats) -> bool:

@@ -7,13 +7,13 @@ from itertools import pairwise
 import numpy as np
 
 from mrdamper.data import Run
+from mrdamper.data.pieces import pieces, release
 from mrdamper.errors import ColumnError, RunError
 from mrdamper.rig_files.quality import judge
 from mrdamper.rig_files.quality.loop import repeatability
 from mrdamper.rig_files.quality.motion import steady_window
 from mrdamper.rig_files.quality.view import SHORTEST, View
 from mrdamper.rig_files.record import FURTHER, Record
-from mrdamper.rig_files.text.spool import release
 
 
 def to_run(record: Record) -> Run:
@@ -80,8 +80,8 @@ def _further(record: Record, keep: np.ndarray | slice) -> dict[str, np.ndarray]:
 
 def _kept(record: Record) -> np.ndarray:
     keep = record.present
-    if record.velocity is not None:
-        keep = keep & np.isfinite(record.velocity)
+    for at, piece in () if record.velocity is None else pieces(record.velocity):
+        keep[at : at + piece.size] &= np.isfinite(piece)
     for start, stop in record.segments:
         if np.count_nonzero(keep[start:stop]) < SHORTEST:
             keep[start:stop] = False

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mrdamper.data import Floats, held_current
+from mrdamper.data.pieces import taken
 from mrdamper.rig_files.quality.motion import steady_window
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding, Record
@@ -34,8 +35,8 @@ def change_of(record: Record, window: tuple[float, float] | None) -> Iterator[Fi
 def current_in(record: Record, window: tuple[float, float] | None) -> Floats:
     """The current's samples that are there within a window of time, thinned where they are many."""
     assert record.current is not None
-    thinned = slice(None, None, max(1, record.time.size // _MOST))
-    time, current = record.time[thinned], np.asarray(record.current[thinned])
+    thinned = np.arange(0, record.time.size, max(1, record.time.size // _MOST))
+    time, current = taken(record.time, thinned), taken(record.current, thinned)
     there = np.isfinite(current)
     if window is not None:
         there &= (time >= window[0]) & (time <= window[1])

@@ -9,7 +9,7 @@ from mrdamper.errors import QualityError
 from mrdamper.rig_files.quality.view import View, place
 
 _OF_RANGE = {"displacement": 0.3, "force": 0.5}  # of the channel's range: a leap that stays
-_OFF_BY = {"displacement": 0.3, "force": 1.0}  # of the range without it: a sample that stands alone
+OFF_BY = {"displacement": 0.3, "force": 1.0}  # of the range without it: a sample that stands alone
 _FAR = 10.0  # times as far as the channel moves by itself between two samples
 _WIDEST = 3  # samples of a spike
 _MOST = 0.01  # of the samples
@@ -21,7 +21,7 @@ def spikes(view: View) -> None:
     """Refuse single samples far from their neighbours on both sides, which agree with each other."""
     for name in ("displacement", "force"):
         values = view.channels[name][:_CHUNK]
-        found = spikes_in(values, _OFF_BY[name])
+        found = spikes_in(values, OFF_BY[name])
         if found.size:
             raise QualityError(
                 f"{name} has {found.size} sample{'s' * (found.size > 1)} far off between ordinary ones, "

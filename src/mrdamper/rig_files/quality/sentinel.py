@@ -20,7 +20,7 @@ _DIGITS = np.array([*_NINES, *_ENDS])
 _LEAP = 0.25  # of the channel's range: a code stands that far from the samples around it
 _FAR = 2.0  # times as far as all but a hundredth of the channel's own leaps
 _PULSES = 9  # times as far, a value that no logger writes for missing ones is no pulse of a supply
-_COARSEST = {"current": 0.1}  # leaps below are a supply's own [A]: ripple and a chopper's pulses
+COARSEST = {"current": 0.1}  # leaps below are a supply's own [A]: ripple and a chopper's pulses
 _RARE = 0.1  # of the samples: a value held more often is the channel's own
 _FEW = 50  # distinct values of a channel that does not vary
 _CHUNK = 1_000_000  # samples looked at together
@@ -31,7 +31,7 @@ _ENOUGH = 50  # of a channel's own samples, below which its leaps say nothing
 def missing_value_codes(view: View) -> Iterator[Finding]:
     """Refuse a channel in which one exact value stands for missing samples; say so of one no run needs."""
     for name, values in view.channels.items():
-        code = None if np.isinf(values).any() else _code_in(values, _COARSEST.get(name, 0.0))
+        code = None if np.isinf(values).any() else code_in(values, COARSEST.get(name, 0.0))
         if code is not None:
             at = np.flatnonzero(values == code)
             text = (
@@ -43,7 +43,15 @@ def missing_value_codes(view: View) -> Iterator[Finding]:
             yield Finding("W_MISSING", f"{text}; the channel is not used")
 
 
-def _code_in(values: Floats, coarsest: float) -> float | None:
+def code_in(values: Floats, coarsest: float) -> float | None:
+    """The value that stands for missing samples in a channel; None if there is none.
+
+    Parameters
+    ----------
+    values : (N,) array
+    coarsest : float
+        Leaps below are the channel's own, in its unit.
+    """
     present = np.isfinite(values)
     if not present.any():
         return None

@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from mrdamper.data import Floats, Run
+from mrdamper.data.pieces import taken
 from mrdamper.errors import ExcitationError
 from mrdamper.motion import Excitation, MotionAnalysis, analyse_motion, measured_motion
 from mrdamper.rig_files.quality.strokes import Strokes, find_strokes
@@ -65,7 +66,7 @@ class View:
         """Usual step of time [s]."""
         time = self.record.time
         at = np.arange(0, time.size - 1, max(1, time.size // MOST_SAMPLES))
-        steps = time[at + 1] - time[at]
+        steps = taken(time, at + 1) - taken(time, at)
         steps = steps[np.isfinite(steps)]
         return float(np.median(steps)) if steps.size else 0.0
 
@@ -77,10 +78,10 @@ class View:
         bounds = np.searchsorted(index, [a for a, _ in self.segments] + [self.segments[-1][1]])
         return Run(
             id=self.record.id,
-            time=self.record.time[index],
-            displacement=self.record.displacement[index],
-            force=self.record.force[index],
-            current=np.zeros(index.size) if current is None else current[index],
+            time=taken(self.record.time, index),
+            displacement=taken(self.record.displacement, index),
+            force=taken(self.record.force, index),
+            current=np.zeros(index.size) if current is None else taken(current, index),
             segments=tuple((int(a), int(b)) for a, b in pairwise(bounds) if b > a),
         )
 
@@ -128,7 +129,7 @@ class View:
             return self._in_segments(np.flatnonzero(record.present))
         most = record.time.size // MOST_SAMPLES
         coarse = self._there(np.arange(0, record.time.size, most))
-        period = find_strokes(record.time[coarse], record.displacement[coarse]).period
+        period = find_strokes(taken(record.time, coarse), taken(record.displacement, coarse)).period
         stride = 1 if period is None or self.step <= 0 else int(np.clip(period / self.step / _FINE, 1, most))
         thinned = np.arange(0, record.time.size, stride)
         middle = max(0, thinned.size - MOST_SAMPLES) // 2
@@ -150,7 +151,7 @@ class View:
 
     def _there(self, index: np.ndarray) -> np.ndarray:
         channels = (self.record.time, self.record.displacement, self.record.force, self.record.current)
-        return index[np.all([np.isfinite(c[index]) for c in channels if c is not None], axis=0)]
+        return index[np.all([np.isfinite(taken(c, index)) for c in channels if c is not None], axis=0)]
 
 
 UNITS = {

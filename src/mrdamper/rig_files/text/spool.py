@@ -7,17 +7,16 @@ memory, and nothing stays behind.
 
 from __future__ import annotations
 
-import mmap
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import IO
 
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.pieces import pieces
 
-LARGE = 64 * 2**20  # bytes
-PIECE = 2**20  # samples
+LARGE = 16 * 2**20  # bytes
 
 
 class Spool:
@@ -58,25 +57,12 @@ class Spool:
             waiting.clear()
 
 
-def pieces(size: int) -> Iterator[slice]:
-    """Slices that cover an array in order."""
-    return (slice(at, min(at + PIECE, size)) for at in range(0, size, PIECE))
-
-
 def rescale(values: Floats, factor: float, offset: float = 0.0) -> Floats:
     """Values times a factor, plus an offset; a memory-mapped array is changed in place, piece by piece."""
     if factor == 1.0 and offset == 0.0:
         return values
     if not isinstance(values, np.memmap):
         return factor * values + offset if offset else factor * values
-    for piece in pieces(values.size):
-        values[piece] = factor * values[piece] + offset
-        release(values)
+    for _, piece in pieces(values):
+        piece[:] = factor * piece + offset
     return values
-
-
-def release(values: Floats) -> None:
-    """Let go of the memory of a memory-mapped array; its numbers stay in its file."""
-    inner = getattr(values, "_mmap", None)
-    if inner is not None and hasattr(mmap, "MADV_DONTNEED"):
-        inner.madvise(mmap.MADV_DONTNEED)

@@ -1,0 +1,41 @@
+"""Long arrays in pieces: what looks at every sample of a column that lies in a file lets go of its memory."""
+
+from __future__ import annotations
+
+import mmap
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+PIECE = 2**20  # samples
+
+
+def pieces(values: NDArray, overlap: int = 0) -> Iterator[tuple[int, NDArray]]:
+    """Start and samples of every piece of an array, in order; each but the last holds `overlap` samples of the next."""
+    for at in range(0, max(values.size, 1), PIECE):
+        yield at, values[at : at + PIECE + overlap]
+        release(values)
+
+
+def taken(values: NDArray, index: NDArray) -> NDArray:
+    """The samples of an increasing index, without holding all of a memory-mapped array at once."""
+    if values.size <= PIECE:
+        return values[index]
+    bounds = np.searchsorted(index, np.arange(PIECE, values.size, PIECE))
+    parts = []
+    for part in np.split(index, bounds):
+        parts.append(values[part])
+        release(values)
+    return np.concatenate(parts)
+
+
+def release(values: NDArray) -> None:
+    """Let go of the memory of a memory-mapped array, or of a view of one; its numbers stay in its file."""
+    held: object = values
+    while held is not None:
+        inner = getattr(held, "_mmap", None)
+        if inner is not None and hasattr(mmap, "MADV_DONTNEED"):
+            inner.madvise(mmap.MADV_DONTNEED)
+            return
+        held = getattr(held, "base", None)
