@@ -156,18 +156,29 @@ def test_the_same_study_runs_on_real_data_whose_gas_spring_is_unknown(bundled, q
     ).read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(("currents", "motions"), [((1.0,), 6), ((0.0, 1.0), 2), ((0.0, 0.5, 1.0, 2.0), 1)])
-def test_thin_data_give_what_they_allow_and_say_why_the_rest_is_missing(quick, tmp_path, currents, motions):
+@pytest.mark.parametrize(
+    ("currents", "motions", "held"), [((1.0,), 6, True), ((0.0, 1.0), 2, False), ((0.0, 0.5, 1.0, 2.0), 1, True)]
+)
+def test_thin_data_give_what_they_allow_and_say_why_the_rest_is_missing(quick, tmp_path, currents, motions, held):
     whole = virtual_dataset(currents=currents)
     train = list(whole.split("train"))[: motions * len(currents)]
-    found = reproduce(whole.only([*train, *whole.split("validate")]), with_comparators=False, jobs=1)
+    held_out = list(whole.split("validate")) if held else []
+    found = reproduce(whole.only([*train, *held_out]), with_comparators=False, jobs=1)
     written = write_reproduction(found, tmp_path / "out")
     page = written[0].read_text(encoding="utf-8")
     unjudged = [c for c in judge_all(found) if c.verdict == "cannot be judged"]
     assert unjudged
     assert all(c.evidence for c in unjudged)
     for path in (tmp_path / "out" / "tables").glob("*.csv"):
-        assert len(path.read_text(encoding="utf-8").splitlines()) > 1, path.name
+        text = path.read_text(encoding="utf-8")
+        assert len(text.splitlines()) > 1, path.name
+        assert "nan" not in text.lower().replace("nanm", ""), path.name
+    if not held:
+        assert "No run is held out: nothing here says how the ways predict." in page
+        assert "table4_errors is not made: no run is held out" in page
+        assert found.best is None
+        (generalisation,) = [c for c in unjudged if c.key == "generalisation"]
+        assert "predicts no held-out run" in generalisation.evidence
     drawn = {path.stem for path in (tmp_path / "out" / "figures").glob("*.svg")}
     for number in (3, 4, 5, 6, 9, *range(10, 27)):
         name = f"fig{number:02d}"
@@ -238,8 +249,8 @@ def test_the_direct_search_comes_near_on_an_easy_run():
 
 def test_what_cannot_be_studied_is_refused_with_the_remedy():
     dataset = virtual_dataset(currents=(1.0,))
-    with pytest.raises(IdentificationError, match="no validate run"):
-        reproduce(dataset.only(dataset.split("train")))
+    with pytest.raises(IdentificationError, match="no train run"):
+        reproduce(dataset.only(dataset.split("validate")))
     with pytest.raises(ParameterError, match="leaves no gas volume"):
         reproduce(dataset, gas=GasSpring(1.5e6, 1e-5, 3e-4))
     conditions = [Condition(1.0, f, 0.02) for f in (1.0, 1.5, 2.0)]

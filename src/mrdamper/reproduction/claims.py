@@ -82,7 +82,10 @@ def judge_all(study: Reproduction) -> tuple[Claim, ...]:
     for key, text, source, figure, built_in, measure in _CLAIMS:
         found = measure(study)
         verdict = judge(key, found.numbers)
-        numbers = "; ".join(f"{name} {value:.3g}" for name, value in found.numbers.items())
+        numbers = "; ".join(
+            f"{name} {value:.3g}" if np.isfinite(value) else f"{name}: not tested"
+            for name, value in found.numbers.items()
+        )
         said = RECOVERED.get(verdict, verdict) if built_in and study.rig is not None else verdict
         evidence = "; ".join(part for part in (numbers, found.evidence) if part)
         seeds = steadiness(verdict, study.seed_verdicts.get(key, ()))
@@ -418,8 +421,8 @@ def _accuracy(study: Reproduction) -> Measured:
 
 def _few_parameters(study: Reproduction) -> Measured:
     literal, ali = study.contender(LITERAL), study.contender(ALI)
-    if literal is None or ali is None or not ali.held_out.runs:
-        return Measured(evidence="Ali's model could not be followed on these runs")
+    if literal is None or ali is None or not (ali.held_out.runs and literal.held_out.runs):
+        return Measured(evidence="Ali's model could not be followed on these runs, or no run is held out")
     return Measured(
         {
             "median held-out error over the Ali-type's": literal.held_out.median() / ali.held_out.median(),

@@ -300,6 +300,8 @@ def genetic_figure(study: Reproduction) -> Made:
 
 def errors_figure(study: Reproduction) -> Made:
     """Error of every held-out run by contender, over current."""
+    if not any(c.held_out.runs for c in study.contenders):
+        return "nothing predicts a held-out run"
     with house_style():
         figure, (axes,) = new_figure(1, 1, 3.2, right=2.6)
         for number, contender in enumerate(study.contenders):

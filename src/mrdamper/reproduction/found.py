@@ -120,6 +120,7 @@ class Reproduction:
         return next((c for c in self.contenders if c.recipe.title == title), None)
 
     @property
-    def best(self) -> Scored:
-        """The contender that predicts the held-out runs best."""
-        return min(self.contenders, key=lambda c: c.held_out.median())
+    def best(self) -> Scored | None:
+        """The contender that predicts the held-out runs best, where there are any."""
+        judged = [c for c in self.contenders if c.held_out.runs]
+        return min(judged, key=lambda c: c.held_out.median(), default=None)

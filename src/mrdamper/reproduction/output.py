@@ -111,17 +111,18 @@ def verdicts(study: Reproduction) -> Rows:
     rows = []
     for contender in study.contenders:
         held = contender.held_out
+        median = held.median if held.runs else lambda name="": None
         spread = study.seed_errors.get(contender.recipe.title)
         rows.append(
             {
                 "verdict": _GROUPS[contender.recipe.way],
                 "method": contender.recipe.title,
                 "numbers": contender.damper.parameter_count,
-                "nrmse_pp": held.median(),
-                "worst_nrmse_pp": held.worst().scores.nrmse_pp if held.runs else float("nan"),
-                "nrmse_std": held.median("nrmse_std"),
-                "wape": held.median("wape"),
-                "mean_relative_error": held.median("mean_relative_error"),
+                "nrmse_pp": median("nrmse_pp"),
+                "worst_nrmse_pp": held.worst().scores.nrmse_pp if held.runs else None,
+                "nrmse_std": median("nrmse_std"),
+                "wape": median("wape"),
+                "mean_relative_error": median("mean_relative_error"),
                 "per_run_nrmse_pp": contender.per_run,
                 "seconds": contender.seconds,
                 "seeds": None if spread is None else spread.size,
@@ -184,6 +185,8 @@ def _tables(study: Reproduction, claims: tuple[Claim, ...]) -> tuple[dict[str, R
         "seeds": "noise seeds need the virtual rig",
         "virtual_rig": "the data are not of the virtual rig",
     }
+    if not study.held_out:
+        reasons |= dict.fromkeys(("table3_parameters", "table4_errors"), "no run is held out")
     absent = {name: reasons.get(name, "the data allow no row of it") for name, rows in tables.items() if not rows}
     return {name: rows for name, rows in tables.items() if rows}, absent
 

@@ -74,7 +74,7 @@ def reproduce(
     Raises
     ------
     IdentificationError
-        If the data hold no sine runs of one of the splits, or allow no way at all.
+        If the data hold no sine runs to identify from, or allow no way at all.
     """
     begin = time.perf_counter()
 
@@ -139,13 +139,12 @@ def _splits(dataset: Dataset) -> tuple[list[Run], list[Run], tuple[str, ...]]:
         except InputError as error:
             refused[run.id] = str(error)
     train, held_out = ([r for r in pure if r.split == split] for split in ("train", "validate"))
-    for split, runs in (("train", train), ("validate", held_out)):
-        if not runs:
-            raise IdentificationError(
-                f"no {split} run with a steady sine",
-                where=dataset.name,
-                mend="mark some in the split column of runs.csv",
-            )
+    if not train:
+        raise IdentificationError(
+            "no train run with a steady sine", where=dataset.name, mend="mark some in the split column of runs.csv"
+        )
+    if not held_out:
+        refused["every prediction"] = "no validate run with a steady sine; mark some in the split column of runs.csv"
     return train, held_out, tuple(f"not used: {name}: {why}" for name, why in refused.items())
 
 

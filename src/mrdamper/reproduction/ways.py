@@ -57,7 +57,8 @@ def ways(train: Sequence[Run], held_out: Sequence[Run], settled: Settled, switch
         (Recipe("bouc-wen:consistent", consistent, through_chosen, "consistent", CONSISTENT), train),
         (Recipe("bouc-wen:joint", plain, at_once, "joint", JOINT), train),
     ]
-    for title, speed in ((TRADITIONAL, peak_velocity(held_out)), (SLOWEST, 0.0)):
+    nearest = [(TRADITIONAL, peak_velocity(held_out))] if held_out else []
+    for title, speed in (*nearest, (SLOWEST, 0.0)):
         recipe = Recipe(f"bouc-wen:{title}", consistent, one_per_current, "traditional", title)
         steps.append((recipe, nearest_speed(train, speed)))
     return steps
@@ -71,7 +72,7 @@ def comparators(train: Sequence[Run], held_out: Sequence[Run], settled: Settled)
     direct = Recipe("bouc-wen:direct-genetic", settled.basis("direct-genetic"), one_per_current, "traditional", DIRECT)
     ali = conditioned(all_published()["ali-type"])
     return [
-        (direct, nearest_speed(train, peak_velocity(held_out))),
+        (direct, nearest_speed(train, peak_velocity(held_out or train))),
         (replace(ali, way="literature", title=ALI), _fewer_currents(train)),
     ]
 

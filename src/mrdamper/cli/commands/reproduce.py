@@ -74,7 +74,8 @@ def register(app: typer.Typer) -> None:
             print("virtual rig: every number is synthetic")
         print(f"  {'held out, nrmse_pp':52}{'median':>9}{'worst':>9}{'s':>8}")
         for row in found["verdicts"]:
-            shown = f"{100 * row['nrmse_pp']:7.2f} %{100 * row['worst_nrmse_pp']:7.2f} %"
+            errors = (row["nrmse_pp"], row["worst_nrmse_pp"])
+            shown = "".join(f"{'–':>9}" if error is None else f"{100 * error:7.2f} %" for error in errors)
             print(f"  {row['method']:52}{shown}{row['seconds']:8.1f}")
         for claim in found["claims"]:
             print(f"  {claim['said']:20} {claim['claim']}")
