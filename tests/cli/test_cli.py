@@ -104,6 +104,13 @@ def test_validate_scores_the_models_rig(model):
     assert other.stdout.count("lab_") == 7
 
 
+def test_a_lag_is_not_asked_of_constant_currents(tmp_path):
+    done = mrdamper("study", "--lag", "--out", tmp_path / "result")
+    assert done.returncode == 2
+    assert "the current changes in no train run" in done.stderr
+    assert "[E_LAG]" in done.stderr
+
+
 def test_identify_chosen_runs_with_a_fixed_parameter(tmp_path):
     out = tmp_path / "i.csv"
     done = mrdamper("identify", "--run", "utf_5mm4Hz_1A", "--fix", "n=1", "--fix", "k3=0", "--out", out)

@@ -204,3 +204,33 @@ def test_rows_of_a_run_need_not_stand_together(tmp_path):
     (tmp_path / "runs.csv").write_text("run_id,current_A\na,0\nb,1\n")
     (tmp_path / "samples.csv").write_text(rows(*(f"{r},{t},{t % 2},{t}" for t in range(4) for r in "ba")))
     assert [run.force.tolist() for run in load_dataset(tmp_path)] == [[0, 1, 2, 3]] * 2
+
+
+def written_with_volts(folder, **columns):
+    time = np.arange(200) / 100
+    volts = np.where(time > 1, 2.0, 0.5)
+    table = pl.DataFrame(
+        {"run_id": "a", "time_s": time, "displacement_m": np.sin(time), "force_N": time, "voltage_V": volts}
+    )
+    folder.mkdir()
+    table.write_csv(folder / "samples.csv")
+    (folder / "runs.csv").write_text(f"{','.join(['run_id', *columns])}\n{','.join(['a', *columns.values()])}\n")
+    return time, volts
+
+
+def test_a_voltage_is_a_current_once_its_gain_is_stated(tmp_path):
+    _, volts = written_with_volts(tmp_path / "plain", amperes_per_volt="0.5")
+    np.testing.assert_allclose(load_dataset(tmp_path / "plain")["a"].current, 0.5 * volts)
+    time, _ = written_with_volts(tmp_path / "coil", amperes_per_volt="0.5", resistance_ohm="5", inductance_H="0.5")
+    current = load_dataset(tmp_path / "coil")["a"].current
+    after = time > 1.02
+    np.testing.assert_allclose(current[after], 1 - 0.75 * np.exp(-(time[after] - 1) / 0.1), atol=0.05)
+    save_dataset(load_dataset(tmp_path / "coil"), tmp_path / "again")
+    np.testing.assert_array_equal(load_dataset(tmp_path / "again")["a"].current, current)
+
+
+def test_volts_without_a_gain_are_refused(tmp_path):
+    written_with_volts(tmp_path / "d")
+    with pytest.raises(ColumnError, match="voltage_V without a gain") as caught:
+        load_dataset(tmp_path / "d")
+    assert caught.value.code == "E_DRIVER"

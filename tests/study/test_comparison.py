@@ -11,16 +11,18 @@ from typer.testing import CliRunner
 
 from mrdamper.cli import application
 from mrdamper.dampers.published import all_published, conditioned_type
-from mrdamper.data import Condition, Dataset
+from mrdamper.data import Condition, Dataset, Run
 from mrdamper.errors import IdentificationError, ModelFileError, UnknownNameError
 from mrdamper.export.equations import equations
 from mrdamper.files.model_file import dump_model, parse_model
 from mrdamper.identification import identify
 from mrdamper.models import all_models
 from mrdamper.models.bouc_wen import BoucWen
+from mrdamper.models.play_bypass import PlayBypass
 from mrdamper.models.spencer import Spencer
-from mrdamper.motion import sine
+from mrdamper.motion import random_motion, sine
 from mrdamper.report.comparison import summary_rows, write_comparison
+from mrdamper.simulation import simulate
 from mrdamper.streaming import stepper
 from mrdamper.study.comparison import compare
 from mrdamper.study.parallel import shortened
@@ -245,3 +247,17 @@ def test_damaged_coefficients_are_refused(conditioned):
     del document["damper"]["coefficients"]["fy0"]
     with pytest.raises(ModelFileError, match="do not fit"):
         parse_model(json.dumps(document))
+
+
+def test_the_joint_model_is_compared_on_records_of_any_motion():
+    """One random record with a switched current, and no sine: it is left out in parts."""
+    time = np.arange(4000) / 200
+    rng = np.random.default_rng(0)
+    current = np.repeat(rng.uniform(0, 1, 20), 200)
+    motion = random_motion(rng, 20.0, 5e-3, (0.5, 3.0), 0.0, 200.0).part(slice(4000)).with_current(current)
+    model = PlayBypass(50, 900, 700, 1500, 100, 900, 3e-4, 1e-4, 3.5e4, 0.4, 0.2, 3e-3, 5e-3)
+    force = simulate(model, motion).force
+    record = Run("random", time, motion.displacement, force, current, rig="any", excitation="random")
+    entry = compare(Dataset((record,)), ["play-bypass"]).rigs[0].entries[0]
+    assert [run.run_id for run in entry.left_out.runs] == ["random"]
+    assert entry.left_out.median() < 0.02

@@ -15,7 +15,9 @@ import numpy as np
 
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.joint import FALL, RISE, JointFit, JointProblem
+from mrdamper.dampers.sessions import When
 from mrdamper.data import Floats, Run, same_condition
+from mrdamper.errors import InputError
 from mrdamper.optimizers.linear import on_one_blas_thread, solve_linear
 
 _ROUGHLY = 1e-4  # relative gain of a step that is enough to tell forms apart
@@ -127,7 +129,7 @@ def identify_jointly(
     fit = short.fit(rounds=2, most_steps=15, settled=_ROUGHLY)
     short, fit, tried = _lost_motion(short, fit)
     progress("how the force rises with current", 0.3)
-    law, fit, more = _level_law(short, fit, laws)
+    law, fit, more, current = _level_law(short, fit, laws)
     tried = (*tried, *more)
     progress("whole records", 0.5)
     problem = problem.with_free((*_FREE, *law), short.fixed)
@@ -151,6 +153,7 @@ def identify_jointly(
     left_out, before = (Evidence.of(p, f).everything() for p, f in ((final, found), (problem, fit)))
     if _better(before, left_out):  # what one step promised, the search did not keep: terms earn their place here too
         final, found, left_out = problem, fit, before
+    left_out = {**left_out, **current, **Evidence.of(final, found, _by_session).everything()}
     tried = (*tried, *more)
     kept = "; ".join(t.term for t in tried if t.kept)
     about = {**found.damper.provenance, "terms": kept or "none beyond the plain form"}
@@ -191,7 +194,7 @@ def _level_laws(problem: JointProblem) -> tuple[Term, ...]:
 
 def _level_law(
     longest: JointProblem, fit: JointFit, forms: Sequence[Term]
-) -> tuple[tuple[str, ...], JointFit, tuple[Tried, ...]]:
+) -> tuple[tuple[str, ...], JointFit, tuple[Tried, ...], dict[str, float]]:
     """Form of the yield force over current that predicts what is left out, the shortest first.
 
     Currents are left out where there are inner ones: one step does not carry a form from current
@@ -219,7 +222,8 @@ def _level_law(
         if kept:
             best = form, found, scores
     assert best is not None
-    return best[0], best[1], tuple(tried)
+    current = {what: error for what, error in best[2].items() if what == "current"}
+    return best[0], best[1], tuple(tried), current
 
 
 def _left_out_current(problem: JointProblem, fit: JointFit, levels: Sequence[Sequence[int]]) -> float:
@@ -254,6 +258,9 @@ def _undetermined(runs: Sequence[Run]) -> dict[str, float]:
     return {"fy1": 0.0, "c1": 0.0, "h1": 0.0} if one_level else {}
 
 
+Grouping = Callable[[JointProblem, np.ndarray], dict[str, list[np.ndarray]]]
+
+
 class Evidence:
     """The linearisation of a fit by all parameters, and what to leave out of it."""
 
@@ -273,8 +280,8 @@ class Evidence:
         self.step = np.zeros(len(self.names))
 
     @classmethod
-    def of(cls, problem: JointProblem, fit: JointFit) -> Evidence:
-        """Linearise a problem where a fit of it ended."""
+    def of(cls, problem: JointProblem, fit: JointFit, by: Grouping | None = None) -> Evidence:
+        """Linearise a problem where a fit of it ended; by default conditions are left out."""
         table = problem.table(fit.nrmse_pp)
         residual, jacobian, owner = table.linearise(fit.point, fit.damper.model)
         names = [*(a.name for a in problem.axes), *(i.name for i in problem.linear)]
@@ -283,7 +290,7 @@ class Evidence:
         for k, name in enumerate(names):
             if any(name in term.names for term in TERMS):
                 neutral[k] = 0.0
-        rows = _rows_of(problem, owner)
+        rows = (by or _by_condition)(problem, owner)
 
         def error(weighted: Floats, group: np.ndarray) -> float:
             runs = float(np.sum(table.share[group]))  # one for each whole run
@@ -360,7 +367,7 @@ def _better(scores: Mapping[str, float], before: Mapping[str, float]) -> bool:
     return _total(scores, before) < _WORTH and all(scores[w] < _HARM * before[w] for w in scores)
 
 
-def _rows_of(problem: JointProblem, owner: np.ndarray) -> dict[str, list[np.ndarray]]:
+def _by_condition(problem: JointProblem, owner: np.ndarray) -> dict[str, list[np.ndarray]]:
     """Rows left out together: of a condition, or a stretch of another record."""
     found = {}
     sines = [i for i, part in enumerate(problem.parts) if part.is_sine and not part.changes]
@@ -374,3 +381,15 @@ def _rows_of(problem: JointProblem, owner: np.ndarray) -> dict[str, list[np.ndar
     if len(groups) > 2:
         found["condition"] = groups
     return found
+
+
+def _by_session(problem: JointProblem, owner: np.ndarray) -> dict[str, list[np.ndarray]]:
+    """Rows of runs recorded in one session, where there are sessions of several runs."""
+    try:
+        sessions = [When.of(run).session for run in problem.runs]
+    except InputError:
+        return {}  # a clock that is no date: what sessions share is refused where it is asked for
+    found = dict.fromkeys(sessions)
+    if not 2 < len(found) < len(sessions):
+        return {}
+    return {"session": [np.flatnonzero(np.isin(owner, [i for i, s in enumerate(sessions) if s == n])) for n in found]}

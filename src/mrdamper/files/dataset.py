@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mrdamper.data import Condition, Dataset, Run
+from mrdamper.data import Condition, Dataset, Floats, Run
 from mrdamper.data.pieces import pieces, release
 from mrdamper.errors import ColumnError, DatasetError
 from mrdamper.files.atomic import path_of, write_file, write_folder
@@ -212,7 +212,7 @@ def _run(row: dict[str, Any], samples: Channels, folder: Path) -> Run:
     channels = {n: values for n, values in samples.items() if n in REQUIRED or not np.isnan(values).all()}
     current = channels.get("current_A", number("current_A"))
     if current is None:
-        raise ColumnError("no current_A", where=where, mend="add the column current_A to runs.csv or to the samples")
+        current = _driven(channels, number, where)
     start, end = number("steady_t0_s"), number("steady_t1_s")
     frequency, amplitude = number("nominal_frequency_Hz"), number("nominal_amplitude_m")
     nominal = None
@@ -234,6 +234,30 @@ def _run(row: dict[str, Any], samples: Channels, folder: Path) -> Run:
         further={name: values for name, values in channels.items() if name not in (*REQUIRED, *OPTIONAL)},
         notes={k: v for k, v in row.items() if k not in _KNOWN_RUN_COLUMNS and v},
     )
+
+
+def _driven(channels: Channels, number: Callable[[str], float | None], where: str) -> Floats:
+    """(N,) current [A] that a driver of stated gain makes of a command voltage."""
+    from mrdamper.dampers.coil import Driver
+
+    volts, gain = channels.get("voltage_V", number("voltage_V")), number("amperes_per_volt")
+    if volts is None:
+        raise ColumnError("no current_A", where=where, mend="add the column current_A to runs.csv or to the samples")
+    if gain is None:
+        raise ColumnError(
+            "voltage_V without a gain",
+            where=where,
+            mend="add amperes_per_volt to runs.csv: the amplifier's, or one over the coil's resistance",
+            code="E_DRIVER",
+        )
+    time, limit = channels["time_s"], number("limit_A")
+    driver = Driver(
+        gain,
+        number("resistance_ohm") or 0.0,
+        number("inductance_H") or 0.0,
+        math.inf if limit is None else limit,
+    )
+    return driver.current(time, np.broadcast_to(volts, time.shape))
 
 
 def _row(run: Run) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from mrdamper.errors import IdentificationError
 from mrdamper.identification import Identification
 from mrdamper.study.parallel import identify_all
 from mrdamper.study.recipe import Basis, Found, Progress, Recipe, Scored, follow_all, recipes
-from mrdamper.study.workflow import believed, usable_sines
+from mrdamper.study.workflow import believed, judged_on_all, usable, usable_sines
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,7 @@ def compare(
     UnknownNameError
         If there is no such model.
     IdentificationError
-        If a rig has too few train sines.
+        If a rig has too few train sines, and no record of other motion.
     """
     begin = time.perf_counter()
     chosen = recipes(names, genetic)
@@ -91,7 +91,7 @@ def compare(
     rigs = [dataset.rig(name) for name in dataset.rigs]
     sorted_runs = [usable_sines(rig) for rig in rigs]
     for rig, (sines, _) in zip(rigs, sorted_runs, strict=True):
-        if len([run for run in sines if run.split == "train"]) < 3:
+        if len([run for run in sines if run.split == "train"]) < 3 and not _others(rig, sines):
             raise IdentificationError(
                 "under three train runs with a steady sine", where=f"rig {rig.name}", mend="check the split column"
             )
@@ -119,7 +119,8 @@ def _compare_rig(
     progress: Progress,
 ) -> RigComparison:
     train = [run for run in sines if run.split == "train"]
-    steps = [(recipe, train) for recipe in chosen]
+    everything = [*train, *_others(rig, sines)]
+    steps = [(recipe, train if recipe.basis else everything) for recipe in chosen]
     held_out = [run for run in believed(rig)[0] if run.split == "validate"]
     entries, refused = follow_all(steps, held_out, progress, found=found)
     if not entries:
@@ -129,10 +130,17 @@ def _compare_rig(
             where=f"rig {rig.rigs[0] or rig.name}",
             mend="choose other models with --models, or leave this rig out of the dataset",
         )
+    entries = [judged_on_all(entry, everything) for entry in entries]
     entries = [replace(entry, per_run=_per_run(entry.recipe.basis, sines, found)) for entry in entries]
     entries.sort(key=lambda entry: entry.left_out.median())
     steady = frozenset(run.id for run in sines)
     return RigComparison(rig.rigs[0], rig, steady, tuple(entries), refused, not_identified)
+
+
+def _others(rig: Dataset, sines: Sequence[Run]) -> list[Run]:
+    """Train runs of any other motion or a current that changes, which the joint model takes too."""
+    known = {run.id for run in sines}
+    return usable(run for run in believed(rig)[0] if run.split == "train" and run.id not in known)[0]
 
 
 def _per_run(basis: Basis | None, sines: Sequence[Run], found: Found) -> float:

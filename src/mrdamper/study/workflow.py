@@ -234,7 +234,7 @@ def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None, *
         [run for run in trusted if run.split == "validate"],
         lambda what, share: progress(f"{rig or 'rig'}: {what}", share),
     )
-    candidates = [_judged_on_all(c, everything) for c in candidates]
+    candidates = [judged_on_all(c, everything) for c in candidates]
     eligible = [c for c in candidates if model in (None, c.recipe.model)]
     if not eligible:
         name, reason = next(iter(impossible.items()))
@@ -275,7 +275,7 @@ def _with_sessions(chosen: Scored, dataset: Dataset) -> tuple[Scored, float | st
     return replace(chosen, damper=replace(damper, certainty=known)), error  # type: ignore[type-var]
 
 
-def _judged_on_all(candidate: Scored, everything: Sequence[Run]) -> Scored:
+def judged_on_all(candidate: Scored, everything: Sequence[Run]) -> Scored:
     """The same with the train runs that its recipe could not take among the left-out ones: it never saw them."""
     known = {score.run_id for score in (*candidate.train.runs, *candidate.left_out.runs)}
     others = validate(candidate.damper, [run for run in everything if run.id not in known])

@@ -23,12 +23,14 @@ def register(app: typer.Typer) -> None:
         limits: Path | None = typer.Option(None, "--limits", help="TOML with bands the measured forces must lie in."),
         pdf: bool = typer.Option(False, "--pdf", help="report.pdf too, and every figure as PDF."),
         png: bool = typer.Option(False, "--png", help="Figures as PNG beside the SVG."),
+        lag: bool = typer.Option(False, "--lag", help="Refuse tests that cannot show the lags of the coil."),
         as_json: bool = typer.Option(False, "--json", help="Print a summary a program can read."),
     ) -> None:
         """Study a dataset: identify every run, map the parameters, validate; write report and models."""
         from mrdamper.cli.output import percent
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.dampers.certainty import table, unsure
+        from mrdamper.errors import IdentificationError
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.dataset import load_dataset
         from mrdamper.report.about import load_about, load_limits
@@ -40,6 +42,12 @@ def register(app: typer.Typer) -> None:
         also = [kind for kind, wanted in (("pdf", pdf or about is not None), ("png", png)) if wanted]
         require_writable(out)
         dataset = load_dataset(data)
+        if lag and not any(run.current_changes for run in dataset.split("train")):
+            raise IdentificationError(
+                "the current changes in no train run, and a lag of the coil shows nowhere else",
+                mend="record a current that is switched, or leave out --lag",
+                code="E_LAG",
+            )
         workers = min(os.cpu_count() or 1, len(dataset.rigs))
         with progress_on_stderr() as progress, several(workers) as processes:
             result = run_study(
