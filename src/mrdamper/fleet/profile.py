@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from mrdamper.errors import InputError
 from mrdamper.rig_files.profile import ProfileError
+from mrdamper.rig_files.strict_toml import read_toml
 
 FACTS = ("serial", "session", "batch", "date", "golden")
 COLUMNS: dict[str, tuple[str, ...]] = {
@@ -153,10 +154,10 @@ def load_limits(path: str | Path) -> dict[str, Limit]:
 
 def _read(path: Path, kind: type[T], refuse: type[InputError]) -> T:
     try:
-        return kind.model_validate(tomllib.loads(path.read_text(encoding="utf-8-sig")))
+        return kind.model_validate(read_toml(path.read_text(encoding="utf-8-sig")))
     except OSError as error:
         raise refuse(error.strerror or str(error), where=str(path), mend="give a TOML file") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise refuse(str(error), where=path.name, mend="correct the TOML") from error
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False)[0]

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from mrdamper.errors import InputError
+from mrdamper.rig_files.strict_toml import read_toml
 
 _LARGEST_LOGO = 500_000  # bytes; it stands in every page
 _LARGEST_FILE = 100_000  # bytes of a TOML file
@@ -168,10 +169,10 @@ def _toml(path: Path) -> Mapping[str, Any]:
     try:
         if path.stat().st_size > _LARGEST_FILE:
             raise AboutError(f"{path.stat().st_size:,} bytes", where=str(path), mend="a few lines of TOML are expected")
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return read_toml(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise AboutError(error.strerror or str(error), where=str(path), mend="give a TOML file that exists") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         mend = 'write one `name = "text"` a line, in UTF-8'
         raise AboutError(f"is no TOML: {str(error).splitlines()[0]}", where=str(path), mend=mend) from error
 

@@ -18,6 +18,7 @@ from mrdamper.errors import InputError
 from mrdamper.rig_files.conditions import amperes, currents_in
 from mrdamper.rig_files.file_form import NAME, FileForm, Table
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED
+from mrdamper.rig_files.strict_toml import read_toml
 from mrdamper.rig_files.units import DIMENSION, parse_unit
 
 _LARGEST = 64 * 1024  # bytes; a profile is a page
@@ -181,8 +182,8 @@ def parse_profile(text: str, where: str = "profile") -> Profile:
         If it is no TOML, or a key or value is not known.
     """
     try:
-        return Profile.model_validate(tomllib.loads(text))
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        return Profile.model_validate(read_toml(text))
+    except tomllib.TOMLDecodeError as error:
         raise ProfileError(str(error) or "nested too deeply", where=where, mend="correct the TOML") from error
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False)[0]

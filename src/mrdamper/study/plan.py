@@ -24,6 +24,7 @@ from mrdamper.dampers.slopes import force_slopes
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import InputError
 from mrdamper.motion import Excitation, sine
+from mrdamper.rig_files.strict_toml import read_toml
 
 _LEVELS = (4, 4, 4)  # currents, frequencies, amplitudes on the grid of candidates
 _SAMPLES = 24  # of a cycle that count; model error leaves fewer independent ones than a rig records
@@ -116,7 +117,7 @@ def read_limits(path: Path) -> Limits:
         E_LIMITS if the file cannot be read, or a key is unknown, missing, or no number.
     """
     try:
-        given = tomllib.loads(path.read_text(encoding="utf-8"))
+        given = read_toml(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(
             str(error).splitlines()[0], where=str(path), mend="give a TOML file of limits", code="E_LIMITS"

@@ -16,6 +16,7 @@ from mrdamper.dampers.base import Damper
 from mrdamper.data import Floats
 from mrdamper.errors import StructureError, UnknownNameError
 from mrdamper.files.model_file import load_model
+from mrdamper.rig_files.strict_toml import read_toml
 from mrdamper.systems.structure import Link, System, building, half_car, quarter_car, shear_building
 
 Positive = Annotated[float, Field(gt=0)]
@@ -150,7 +151,7 @@ def load_system(name: str | Path) -> SystemFile:
             raise StructureError("no such file", where=str(path), mend="give a system TOML file")
         raise UnknownNameError.of("system", str(name), known)
     try:
-        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+        raw = read_toml(path.read_text(encoding="utf-8"))
         document = _Document.model_validate(raw)
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise StructureError(
