@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from mrdamper.dampers.choice import identify_jointly
 from mrdamper.dampers.coil import Coil
-from mrdamper.dampers.joint import JointProblem, string
+from mrdamper.dampers.joint import JointProblem
+from mrdamper.dampers.strung import string
 from mrdamper.data import Condition, Run
 from mrdamper.errors import IdentificationError, RunError
 from mrdamper.files.model_file import dump_model, parse_model

@@ -10,7 +10,7 @@ so that one drifting session cannot bend the model (iteratively reweighted).
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
@@ -22,31 +22,19 @@ from numpy.typing import NDArray
 from mrdamper.dampers.base import UNTESTED, Damper, Envelope, Saved
 from mrdamper.dampers.certainty import Certainty, OwnNumber
 from mrdamper.dampers.coil import Coil
+from mrdamper.dampers.strung import Part, Table, beside
 from mrdamper.data import Condition, Floats, Run
-from mrdamper.errors import IdentificationError, ParameterError, RunError
-from mrdamper.identification.columns import bounds_of, linear_table
+from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.models import Model, Scale, SearchAxis, model_type
-from mrdamper.motion import Excitation, equivalent_sine, measured_motion
 from mrdamper.optimizers.ending import Ending
-from mrdamper.optimizers.levenberg_marquardt import forward_differences, least_squares
-from mrdamper.optimizers.linear import on_one_blas_thread, robust_weights, solve_bounded
+from mrdamper.optimizers.levenberg_marquardt import least_squares
+from mrdamper.optimizers.linear import on_one_blas_thread
 
 RISE, FALL = "coil.rise_s", "coil.fall_s"  # names of the coil's lags on the search axes
-_ROWS = 400  # samples of a steady run that enter the least squares, about
-_TURNING, _RUNNING, _RESTING = 400, 60, 15  # samples of a cycle that are followed: where it turns, runs on, rests
-_SLOW = 0.4  # of the peak velocity, below which a motion turns
-_AT_REST = 0.05  # cycles of rest around a sample at which nothing turns any more
-_CURRENT_MOVES = 1e-3  # of the largest current; where it changes by more, every sample is followed
-_TRANSIENT = 0.1  # weight of what lies outside a steady window, ramps and rests, against what lies inside
-_CYCLES = 4  # of a sine that enter: more repeat the same
-_WARM_UP = 1.5  # cycles before the scored samples in which the model forgets its start
 _SETTLED = 1e-6  # relative gain of a step at which the search ends
-_BEST = 1e-3  # nrmse_pp below which a run gains no more weight
-_STILL = 0.01  # share of the peak velocity below which a damper rests
 _LAGS, _LAG = (1e-4, 0.2), 8e-3  # of a coil's field [s]
 _FEW, _FEW_STEPS = 6, 5  # runs on which starts are tried, and steps from each
 _AGAIN, _AGAIN_STEPS = 5e-4, 6  # relative gain of a step at which a fit without some runs ends, and its steps
-_NEARLY = 1e-11  # keeps columns apart that are nearly alike
 _CLEARLY = 0.85  # share of the first start's cost that another one must come below
 
 
@@ -213,7 +201,7 @@ class JointProblem:
         *,
         free: Sequence[str] = (),
         coil: Coil | Literal["determined"] | None = "determined",
-        parts: Sequence[_Part] = (),
+        parts: Sequence[Part] = (),
     ):
         if not runs:
             raise IdentificationError("no runs", mend="give at least one")
@@ -226,7 +214,7 @@ class JointProblem:
         infos = self.model_type.parameters()
         self.free = tuple(i.name for i in infos if i.name not in self.fixed and (not i.preset or i.name in free))
         self.linear = [info for info in infos if info.linear and info.name in self.free]
-        self.parts = list(parts) or [_Part.of(run) for run in runs]
+        self.parts = list(parts) or [Part.of(run) for run in runs]
         self.axes: tuple[SearchAxis, ...] = self.model_type.search_axes(_scale(self.parts), self.free)
         self.given_coil: Coil | Literal["determined"] | None = coil
         self.coil = None if coil == "determined" else coil
@@ -238,7 +226,7 @@ class JointProblem:
         held = {**self.fixed, **(fixed or {})}
         return JointProblem(self.runs, self.model_type, held, free=free, coil=self.given_coil, parts=self.parts)
 
-    def with_parts(self, parts: Sequence[_Part]) -> JointProblem:
+    def with_parts(self, parts: Sequence[Part]) -> JointProblem:
         """The same problem on other stretches of the runs."""
         return JointProblem(self.runs, self.model_type, self.fixed, free=self.free, coil=self.given_coil, parts=parts)
 
@@ -252,7 +240,7 @@ class JointProblem:
 
     def errors(self, fit: JointFit, rows: Sequence[int]) -> Floats:
         """(len(rows),) nrmse_pp of some runs predicted by a fit to others."""
-        table = _Table(self, [self.parts[i] for i in rows])
+        table = Table(self, [self.parts[i] for i in rows])
         return np.sqrt(np.bincount(table.owner, table.residual(fit.point, fit.damper.model) ** 2))
 
     @cached_property
@@ -262,13 +250,13 @@ class JointProblem:
         if len(grid) == 1:
             return grid[0]
         few = self.parts[:: max(1, len(self.parts) // _FEW)]
-        table = _Table(self, [part.steady_end() for part in few])
+        table = Table(self, [part.steady_end() for part in few])
         costs = np.array([float(np.sum(table.solve(u).nrmse_pp)) for u in grid])
         # Each length of lost motion has a valley of its own: the best start in each, some steps on.
         lengths = np.array([u[[len(axis.grid) > 1 for axis in self.axes]][0] for u in grid])
         kinds = [np.flatnonzero(lengths == d) for d in dict.fromkeys(lengths.tolist())]
         best = [grid[min(kind, key=costs.__getitem__)] for kind in kinds]
-        lower, upper = self._box()
+        lower, upper = self.box()
         found = [
             least_squares(table.solved_residual, u, lower, upper, _FEW_STEPS, 1e-3, slopes=table.slopes) for u in best
         ]
@@ -297,13 +285,13 @@ class JointProblem:
             Relative gain of a step at which the search ends; below the default its curvature is learnt too.
         """
         begin = time.perf_counter()
-        table = _Table(self, self.parts if rows is None else [self.parts[i] for i in rows])
+        table = Table(self, self.parts if rows is None else [self.parts[i] for i in rows])
         point = self.start if start is None else start
         return self._search(table, point, [table.slopes] * rounds, most_steps, settled, begin)
 
     def _search(
         self,
-        table: _Table,
+        table: Table,
         point: Floats,
         rounds: Sequence[Callable[[Floats], Floats]],
         most_steps: int,
@@ -312,7 +300,7 @@ class JointProblem:
     ) -> JointFit:
         """Search with some derivatives in each round, weights by the errors found between them."""
         evaluations, ending = 0, Ending.SOLVED
-        lower, upper = self._box()
+        lower, upper = self.box()
         for slopes in rounds:
             if self.axes:
                 curved = settled < _SETTLED
@@ -353,14 +341,14 @@ class JointProblem:
         begin, rows = time.perf_counter(), sorted(rows)
         _, jacobian, owner = self.linearised(fit)
         jacobian = jacobian[np.isin(owner, rows)]
-        table = _Table(self, [self.parts[i] for i in rows])
+        table = Table(self, [self.parts[i] for i in rows])
         table.weigh(fit.nrmse_pp[rows])
         known = table.weights
 
         def known_slopes(point: Floats) -> Floats:
             weighted = jacobian * (table.weights / known)[table.owner][:, None]
             own, linear = np.split(weighted, [len(self.axes)], axis=1)
-            return _beside(own, linear)
+            return beside(own, linear)
 
         return self._search(table, fit.point, (known_slopes, known_slopes, table.slopes), _AGAIN_STEPS, settled, begin)
 
@@ -380,15 +368,15 @@ class JointProblem:
             self._linearisation = (fit, *self.table(fit.nrmse_pp).linearise(fit.point, fit.damper.model))
         return self._linearisation[1:]
 
-    def table(self, errors: Floats) -> _Table:
+    def table(self, errors: Floats) -> Table:
         """All runs, weighted as after a fit that left these errors."""
-        table = _Table(self, self.parts)
+        table = Table(self, self.parts)
         table.weigh(errors)
         return table
 
     _linearisation: tuple[JointFit, Floats, Floats, NDArray[np.intp]] | None = None
 
-    def _damper(self, model: Model, point: Floats, parts: Sequence[_Part]) -> JointDamper:
+    def _damper(self, model: Model, point: Floats, parts: Sequence[Part]) -> JointDamper:
         about = {"runs": str(len(parts)), "fit": "joint, all runs at once"}
         return JointDamper(
             self.rig,
@@ -418,7 +406,8 @@ class JointProblem:
             found += [axis.name] if axis.name in own or not stands_for else stands_for
         return found
 
-    def _box(self) -> tuple[Floats, Floats]:
+    def box(self) -> tuple[Floats, Floats]:
+        """Lower and upper ends of the search axes."""
         return (
             np.array([axis.coordinate(axis.lower) for axis in self.axes]),
             np.array([axis.coordinate(axis.upper) for axis in self.axes]),
@@ -431,7 +420,7 @@ class JointProblem:
         return self.model_type.build({**self.fixed, **values, **{info.name: 0.0 for info in self.linear}})
 
 
-def _envelope(parts: Sequence[_Part]) -> Envelope:
+def _envelope(parts: Sequence[Part]) -> Envelope:
     """Ranges of the sines at one current, and every sample of the others."""
     found = Envelope.of([part.condition for part in parts])
     others = [part for part in parts if part.changes or not part.is_sine]
@@ -441,7 +430,7 @@ def _envelope(parts: Sequence[_Part]) -> Envelope:
     return found
 
 
-def _scale(parts: Sequence[_Part]) -> Scale:
+def _scale(parts: Sequence[Part]) -> Scale:
     """Sizes of all runs: the middle motion, the largest force and current."""
     return Scale(
         amplitude=float(np.median([part.condition.amplitude_m for part in parts])),
@@ -449,244 +438,3 @@ def _scale(parts: Sequence[_Part]) -> Scale:
         force=max(part.scale for part in parts) / 2,
         current=max(float(np.max(np.abs(part.motion.current))) for part in parts),
     )
-
-
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """What of a run is followed, which samples enter, and how much each counts: by the time it stands for.
-
-    Of a steady sine the middle cycles are left out: they repeat the last ones. What a record begins
-    with, before it has moved by its amplitude, tells of a state nobody knows.
-    """
-
-    motion: Excitation
-    picked: NDArray[np.intp]
-    target: Floats
-    share: Floats
-    condition: Condition
-    scale: float
-    information: float
-    changes: bool
-    is_sine: bool
-    lowest: float
-    highest: float
-    steady: tuple[int, int]
-
-    @classmethod
-    def of(cls, run: Run) -> _Part:
-        found = equivalent_sine(run)
-        motion = measured_motion(run).about(found.centre)
-        window = np.flatnonzero(run.in_window)
-        first, last = int(window[0]), int(window[-1])
-        scale = float(np.ptp(run.force[first : last + 1]))
-        if scale == 0:
-            raise RunError("the force does not change", where=f"run {run.id}", mend="leave the run out")
-        period, time = 1 / found.condition.frequency_Hz, run.time
-        information = 1.0
-        followed = _carrying(motion, found.condition)
-        steady = first
-        if found.is_sine:
-            steady = max(first, int(np.searchsorted(time, time[last] - _CYCLES * period)))
-            followed &= (time <= time[first] + period) | (time >= time[steady] - _WARM_UP * period)
-        else:
-            information = max(1.0, np.sqrt((time[last] - time[first]) / period))
-        at = np.flatnonzero(followed)
-        x = motion.displacement
-        moved = np.maximum.accumulate(x) - np.minimum.accumulate(x)  # not the travel: that grows at rest, by noise
-        unknown = min(int(np.searchsorted(moved, found.condition.amplitude_m)), max(first, len(motion) // 4))
-        rows = at[(at >= unknown) & (at < len(motion) - 1)]  # the last sample turns towards the next run
-        before, inside, after = rows[rows < first], rows[(rows >= steady) & (rows <= last)], rows[rows > last]
-        inside = inside[:: max(1, int(inside.size / (_ROWS * information)))]
-        every = max(1, (before.size + after.size) // _ROWS)
-        before, after = before[::every], after[::every]
-        picked = np.concatenate([before, inside, after])
-        transient = _TRANSIENT if before.size + after.size else 0.0
-        lasting = [_lasting(time[part]) for part in (before, inside, after)]
-        outside = float(lasting[0].sum() + lasting[2].sum())
-        sizes = (transient / max(outside, 1e-300), 1 / lasting[1].sum(), transient / max(outside, 1e-300))
-        share = np.concatenate([size * part for size, part in zip(sizes, lasting, strict=True)]) / (1 + transient)
-        return cls(
-            motion.part(at),
-            np.searchsorted(at, picked),
-            run.force[picked],
-            share,
-            found.condition,
-            scale,
-            information,
-            run.current_changes,
-            found.is_sine,
-            float(np.min(run.displacement)),
-            float(np.max(run.displacement)),
-            (int(np.searchsorted(at, inside[0])), int(np.searchsorted(at, inside[-1]))),
-        )
-
-    def steady_end(self) -> _Part:
-        """The last cycles of the steady part, of other records the last third: enough to compare starts and forms."""
-        kept = np.flatnonzero((self.picked >= self.steady[0]) & (self.picked <= self.steady[1]))
-        kept = kept[-_ROWS if self.is_sine else -max(_ROWS, kept.size // 3) :]
-        begin, end = int(self.picked[kept[0]]), int(self.picked[kept[-1]]) + 1
-        begin = max(0, int(begin - 0.4 * (end - begin)))  # to forget the start in
-        return replace(
-            self,
-            motion=self.motion.part(slice(begin, end)),
-            picked=self.picked[kept] - begin,
-            target=self.target[kept],
-            share=self.share[kept] / self.share[kept].sum(),
-            steady=(int(self.picked[kept[0]]) - begin, end - 1 - begin),
-        )
-
-
-def _carrying(motion: Excitation, condition: Condition) -> NDArray[np.bool_]:
-    """Samples without which the motion would be another: dense where it turns, few where it runs on or rests.
-
-    A damper's force changes within a short way after a reversal; between two it changes slowly,
-    however fast the record was sampled.
-    """
-    size, duration = len(motion), float(motion.time[-1] - motion.time[0])
-    cycle = (size - 1) / (duration * condition.frequency_Hz)  # samples
-    dense = max(1, int(cycle / _TURNING))
-    sparse = dense * max(1, round(cycle / _RUNNING / dense))
-    speed = np.abs(motion.velocity) / condition.peak_velocity
-    reach = max(1, int(_AT_REST * cycle))
-    moving = np.cumsum(np.concatenate([np.zeros(reach + 1), speed > _STILL, np.zeros(reach)]))
-    resting = moving[2 * reach + 1 :] == moving[: -2 * reach - 1]
-    place = np.arange(size)
-    every = np.where(resting, sparse * round(_RUNNING / _RESTING), np.where(speed < _SLOW, dense, sparse))
-    kept = place % every == 0
-    current = np.abs(np.diff(motion.current)) > _CURRENT_MOVES * float(np.max(np.abs(motion.current)))
-    kept[:-1] |= current
-    kept[1:] |= current
-    return kept
-
-
-def _lasting(time: Floats) -> Floats:
-    """(N,) time each of some samples stands for: half of the way to its neighbours on either side [s]."""
-    if time.size < 2:
-        return np.ones(time.size)
-    steps = np.diff(time)
-    return (np.concatenate([steps[:1], steps]) + np.concatenate([steps, steps[-1:]])) / 2
-
-
-@dataclass(frozen=True, eq=False)
-class _Solved:
-    model: Model
-    residual: Floats
-    nrmse_pp: Floats
-    held: tuple[str, ...]
-    columns: Floats
-
-
-class _Table:
-    """Some runs strung together, with the weight of each."""
-
-    def __init__(self, problem: JointProblem, parts: Sequence[_Part]):
-        self.problem, self.parts = problem, parts
-        self.motion = string(part.motion for part in parts)
-        self.offsets = np.cumsum([0, *(len(part.motion) for part in parts)])
-        self.picked = np.concatenate([part.picked + at for part, at in zip(parts, self.offsets[:-1], strict=True)])
-        self.target = np.concatenate([part.target for part in parts])
-        self.owner = np.repeat(np.arange(len(parts)), [part.target.size for part in parts])
-        # Multiplies residuals so that their squares sum to each run's nrmse_pp².
-        self.share = np.concatenate([part.share for part in parts])
-        self.unit = np.sqrt(self.share) / np.repeat([part.scale for part in parts], [p.target.size for p in parts])
-        self.information = np.sqrt([part.information for part in parts])
-        self.weights = self.information
-        self.solved: tuple[Floats, _Solved | None] = np.zeros(0), None  # the last point
-        self.felt(problem.coil)
-
-    def weigh(self, errors: Floats) -> None:
-        """Robust weights: the sum of the errors counts, not of their squares; long records by their information."""
-        self.weights = self.information * robust_weights(errors, _BEST)
-        self.solved = np.zeros(0), None
-
-    def felt(self, coil: Coil | None) -> None:
-        """Lay the current that the field feels along the motion, and remember it."""
-        if getattr(self, "seen", None) is not None and coil == self.coil:
-            return
-        self.coil = coil
-        current = np.abs(self.motion_current)
-        if coil is not None:
-            for part, begin, end in zip(self.parts, self.offsets[:-1], self.offsets[1:], strict=True):
-                if part.changes:
-                    current[begin:end] = coil.along(part.motion.time, part.motion.current)
-        self.motion = self.motion.with_current(current)
-        self.seen = self.motion.part(self.picked)
-
-    @cached_property
-    def motion_current(self) -> Floats:
-        """The measured current along the strung motion [A]."""
-        return np.concatenate([part.motion.current for part in self.parts])
-
-    def solve(self, point: Floats) -> _Solved:
-        """Linear parameters of least weighted squares at a point of the search axes."""
-        linear = self.problem.linear
-        bare = self.problem.bare(point)
-        self.felt(self.problem.coil_at(point))
-        base, columns = linear_table(bare, linear, self.seen, bare.state(self.motion)[self.picked])
-        factor = self.weights[self.owner] * self.unit
-        columns, right = columns * factor[:, None], (self.target - base) * factor
-        solution, held = solve_bounded(columns, right, *bounds_of(linear))
-        residual = columns @ solution - right
-        errors = np.sqrt(np.bincount(self.owner, residual**2)) / self.weights
-        model = replace(bare, **{i.name: float(s) for i, s in zip(linear, solution, strict=True)})
-        stopped = tuple(i.name for i, h in zip(linear, held, strict=True) if h)
-        self.solved = point, _Solved(model, residual, errors, stopped, columns[:, ~held])
-        return self.solved[1]
-
-    def solved_residual(self, point: Floats) -> Floats:
-        """(N,) weighted residual at a point of the search axes, the linear parameters solved for."""
-        return self.solve(point).residual
-
-    def slopes(self, point: Floats) -> Floats:
-        """(N, D) derivatives of the residual at a point, the linear parameters following.
-
-        They follow to first order: the gradient is exact, and an axis costs one force instead of a
-        least squares of its own [Kaufman 1975, BIT 15, 49].
-        """
-        known, solved = self.solved
-        if solved is None or not np.array_equal(known, point):
-            solved = self.solve(point)
-        factor, model = self.weights[self.owner], solved.model
-        moved = forward_differences(
-            lambda u: self.residual(u, model) * factor, point, solved.residual, *self.problem._box()
-        )
-        return _beside(moved, solved.columns)
-
-    def residual(self, point: Floats, model: Model) -> Floats:
-        """(N,) of the linear parameters of a model at a point; its squares sum to each run's nrmse_pp²."""
-        moved = replace(self.problem.bare(point), **{i.name: getattr(model, i.name) for i in self.problem.linear})
-        self.felt(self.problem.coil_at(point))
-        return (moved.force(self.seen, moved.state(self.motion)[self.picked]) - self.target) * self.unit
-
-    def linearise(self, point: Floats, model: Model) -> tuple[Floats, Floats, NDArray[np.intp]]:
-        """Weighted residual of a model, derivatives by search axes and linear parameters, owners."""
-        factor = self.weights[self.owner] * self.unit
-
-        def residual(u: Floats) -> Floats:
-            return self.residual(u, model) * self.weights[self.owner]
-
-        r = residual(point)
-        slopes = forward_differences(residual, point, r, *self.problem._box())
-        bare = self.problem.bare(point)
-        self.felt(self.problem.coil_at(point))
-        state = bare.state(self.motion)[self.picked]
-        columns = linear_table(bare, self.problem.linear, self.seen, state)[1] * factor[:, None]
-        return r, np.column_stack([slopes, columns]), self.owner
-
-
-def _beside(slopes: Floats, columns: Floats) -> Floats:
-    """(N, D) what of some slopes no combination of columns takes up."""
-    scale = np.sqrt(np.einsum("nl,nl->l", columns, columns))
-    scaled = columns / np.where(scale > 0, scale, 1.0)
-    return slopes - scaled @ np.linalg.solve(scaled.T @ scaled + _NEARLY * np.eye(scale.size), scaled.T @ slopes)
-
-
-def string(motions: Iterable[Excitation]) -> Excitation:
-    """Several motions one after the other, a second apart."""
-    parts = list(motions)
-    time, clock = [], 0.0
-    for part in parts:
-        time.append(part.time - part.time[0] + clock)
-        clock = float(time[-1][-1]) + 1.0
-    names = ("displacement", "velocity", "acceleration", "current")
-    return Excitation(np.concatenate(time), *(np.concatenate([getattr(p, n) for p in parts]) for n in names))

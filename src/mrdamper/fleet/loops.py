@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from mrdamper.dampers.joint import string
+from mrdamper.dampers.strung import string
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.models import Model
 from mrdamper.motion import equivalent_sine, measured_motion, sine

@@ -1,0 +1,295 @@
+"""Runs strung into one motion: which samples are followed, which enter the least squares, and their residuals.
+
+All runs are strung into one motion: a model with fading memory forgets one run while it
+follows the next, and one long array is followed faster than many short ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mrdamper.dampers.coil import Coil
+from mrdamper.data import Condition, Floats, Run
+from mrdamper.errors import RunError
+from mrdamper.identification.columns import bounds_of, linear_table
+from mrdamper.models import Model
+from mrdamper.motion import Excitation, equivalent_sine, measured_motion
+from mrdamper.optimizers.levenberg_marquardt import forward_differences
+from mrdamper.optimizers.linear import robust_weights, solve_bounded
+
+if TYPE_CHECKING:
+    from mrdamper.dampers.joint import JointProblem
+
+_ROWS = 400  # samples of a steady run that enter the least squares, about
+_TURNING, _RUNNING, _RESTING = 400, 60, 15  # samples of a cycle that are followed: where it turns, runs on, rests
+_SLOW = 0.4  # of the peak velocity, below which a motion turns
+_AT_REST = 0.05  # cycles of rest around a sample at which nothing turns any more
+_CURRENT_MOVES = 1e-3  # of the largest current; where it changes by more, every sample is followed
+_TRANSIENT = 0.1  # weight of what lies outside a steady window, ramps and rests, against what lies inside
+_CYCLES = 4  # of a sine that enter: more repeat the same
+_WARM_UP = 1.5  # cycles before the scored samples in which the model forgets its start
+_BEST = 1e-3  # nrmse_pp below which a run gains no more weight
+_STILL = 0.01  # share of the peak velocity below which a damper rests
+_NEARLY = 1e-11  # keeps columns apart that are nearly alike
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """What of a run is followed, which samples enter, and how much each counts: by the time it stands for.
+
+    Of a steady sine the middle cycles are left out: they repeat the last ones. What a record begins
+    with, before it has moved by its amplitude, tells of a state nobody knows.
+    """
+
+    motion: Excitation
+    picked: NDArray[np.intp]
+    target: Floats
+    share: Floats
+    condition: Condition
+    scale: float
+    information: float
+    changes: bool
+    is_sine: bool
+    lowest: float
+    highest: float
+    steady: tuple[int, int]
+
+    @classmethod
+    def of(cls, run: Run) -> Part:
+        found = equivalent_sine(run)
+        motion = measured_motion(run).about(found.centre)
+        window = np.flatnonzero(run.in_window)
+        first, last = int(window[0]), int(window[-1])
+        scale = float(np.ptp(run.force[first : last + 1]))
+        if scale == 0:
+            raise RunError("the force does not change", where=f"run {run.id}", mend="leave the run out")
+        period, time = 1 / found.condition.frequency_Hz, run.time
+        information = 1.0
+        followed = _carrying(motion, found.condition)
+        steady = first
+        if found.is_sine:
+            steady = max(first, int(np.searchsorted(time, time[last] - _CYCLES * period)))
+            followed &= (time <= time[first] + period) | (time >= time[steady] - _WARM_UP * period)
+        else:
+            information = max(1.0, np.sqrt((time[last] - time[first]) / period))
+        at = np.flatnonzero(followed)
+        x = motion.displacement
+        moved = np.maximum.accumulate(x) - np.minimum.accumulate(x)  # not the travel: that grows at rest, by noise
+        unknown = min(int(np.searchsorted(moved, found.condition.amplitude_m)), max(first, len(motion) // 4))
+        rows = at[(at >= unknown) & (at < len(motion) - 1)]  # the last sample turns towards the next run
+        before, inside, after = rows[rows < first], rows[(rows >= steady) & (rows <= last)], rows[rows > last]
+        inside = inside[:: max(1, int(inside.size / (_ROWS * information)))]
+        every = max(1, (before.size + after.size) // _ROWS)
+        before, after = before[::every], after[::every]
+        picked = np.concatenate([before, inside, after])
+        transient = _TRANSIENT if before.size + after.size else 0.0
+        lasting = [_lasting(time[part]) for part in (before, inside, after)]
+        outside = float(lasting[0].sum() + lasting[2].sum())
+        sizes = (transient / max(outside, 1e-300), 1 / lasting[1].sum(), transient / max(outside, 1e-300))
+        share = np.concatenate([size * part for size, part in zip(sizes, lasting, strict=True)]) / (1 + transient)
+        return cls(
+            motion.part(at),
+            np.searchsorted(at, picked),
+            run.force[picked],
+            share,
+            found.condition,
+            scale,
+            information,
+            run.current_changes,
+            found.is_sine,
+            float(np.min(run.displacement)),
+            float(np.max(run.displacement)),
+            (int(np.searchsorted(at, inside[0])), int(np.searchsorted(at, inside[-1]))),
+        )
+
+    def steady_end(self) -> Part:
+        """The last cycles of the steady part, of other records the last third: enough to compare starts and forms."""
+        kept = np.flatnonzero((self.picked >= self.steady[0]) & (self.picked <= self.steady[1]))
+        kept = kept[-_ROWS if self.is_sine else -max(_ROWS, kept.size // 3) :]
+        begin, end = int(self.picked[kept[0]]), int(self.picked[kept[-1]]) + 1
+        begin = max(0, int(begin - 0.4 * (end - begin)))  # to forget the start in
+        return replace(
+            self,
+            motion=self.motion.part(slice(begin, end)),
+            picked=self.picked[kept] - begin,
+            target=self.target[kept],
+            share=self.share[kept] / self.share[kept].sum(),
+            steady=(int(self.picked[kept[0]]) - begin, end - 1 - begin),
+        )
+
+
+def _carrying(motion: Excitation, condition: Condition) -> NDArray[np.bool_]:
+    """Samples without which the motion would be another: dense where it turns, few where it runs on or rests.
+
+    A damper's force changes within a short way after a reversal; between two it changes slowly,
+    however fast the record was sampled.
+    """
+    size, duration = len(motion), float(motion.time[-1] - motion.time[0])
+    cycle = (size - 1) / (duration * condition.frequency_Hz)  # samples
+    dense = max(1, int(cycle / _TURNING))
+    sparse = dense * max(1, round(cycle / _RUNNING / dense))
+    speed = np.abs(motion.velocity) / condition.peak_velocity
+    reach = max(1, int(_AT_REST * cycle))
+    moving = np.cumsum(np.concatenate([np.zeros(reach + 1), speed > _STILL, np.zeros(reach)]))
+    resting = moving[2 * reach + 1 :] == moving[: -2 * reach - 1]
+    place = np.arange(size)
+    every = np.where(resting, sparse * round(_RUNNING / _RESTING), np.where(speed < _SLOW, dense, sparse))
+    kept = place % every == 0
+    current = np.abs(np.diff(motion.current)) > _CURRENT_MOVES * float(np.max(np.abs(motion.current)))
+    kept[:-1] |= current
+    kept[1:] |= current
+    return kept
+
+
+def _lasting(time: Floats) -> Floats:
+    """(N,) time each of some samples stands for: half of the way to its neighbours on either side [s]."""
+    if time.size < 2:
+        return np.ones(time.size)
+    steps = np.diff(time)
+    return (np.concatenate([steps[:1], steps]) + np.concatenate([steps, steps[-1:]])) / 2
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """Linear parameters solved for at a point.
+
+    Attributes
+    ----------
+    model : Model
+    residual : (N,) array
+        Weighted.
+    nrmse_pp : (R,) array
+        Of each run.
+    held : tuple of str
+        Linear parameters at a bound.
+    columns : (N, K) array
+        Weighted, of the others.
+    """
+
+    model: Model
+    residual: Floats
+    nrmse_pp: Floats
+    held: tuple[str, ...]
+    columns: Floats
+
+
+class Table:
+    """Some runs strung together, with the weight of each."""
+
+    def __init__(self, problem: JointProblem, parts: Sequence[Part]):
+        self.problem, self.parts = problem, parts
+        self.motion = string(part.motion for part in parts)
+        self.offsets = np.cumsum([0, *(len(part.motion) for part in parts)])
+        self.picked = np.concatenate([part.picked + at for part, at in zip(parts, self.offsets[:-1], strict=True)])
+        self.target = np.concatenate([part.target for part in parts])
+        self.owner = np.repeat(np.arange(len(parts)), [part.target.size for part in parts])
+        # Multiplies residuals so that their squares sum to each run's nrmse_pp².
+        self.share = np.concatenate([part.share for part in parts])
+        self.unit = np.sqrt(self.share) / np.repeat([part.scale for part in parts], [p.target.size for p in parts])
+        self.information = np.sqrt([part.information for part in parts])
+        self.weights = self.information
+        self.solved: tuple[Floats, Solved | None] = np.zeros(0), None  # the last point
+        self.felt(problem.coil)
+
+    def weigh(self, errors: Floats) -> None:
+        """Robust weights: the sum of the errors counts, not of their squares; long records by their information."""
+        self.weights = self.information * robust_weights(errors, _BEST)
+        self.solved = np.zeros(0), None
+
+    def felt(self, coil: Coil | None) -> None:
+        """Lay the current that the field feels along the motion, and remember it."""
+        if getattr(self, "seen", None) is not None and coil == self.coil:
+            return
+        self.coil = coil
+        current = np.abs(self.motion_current)
+        if coil is not None:
+            for part, begin, end in zip(self.parts, self.offsets[:-1], self.offsets[1:], strict=True):
+                if part.changes:
+                    current[begin:end] = coil.along(part.motion.time, part.motion.current)
+        self.motion = self.motion.with_current(current)
+        self.seen = self.motion.part(self.picked)
+
+    @cached_property
+    def motion_current(self) -> Floats:
+        """The measured current along the strung motion [A]."""
+        return np.concatenate([part.motion.current for part in self.parts])
+
+    def solve(self, point: Floats) -> Solved:
+        """Linear parameters of least weighted squares at a point of the search axes."""
+        linear = self.problem.linear
+        bare = self.problem.bare(point)
+        self.felt(self.problem.coil_at(point))
+        base, columns = linear_table(bare, linear, self.seen, bare.state(self.motion)[self.picked])
+        factor = self.weights[self.owner] * self.unit
+        columns, right = columns * factor[:, None], (self.target - base) * factor
+        solution, held = solve_bounded(columns, right, *bounds_of(linear))
+        residual = columns @ solution - right
+        errors = np.sqrt(np.bincount(self.owner, residual**2)) / self.weights
+        model = replace(bare, **{i.name: float(s) for i, s in zip(linear, solution, strict=True)})
+        stopped = tuple(i.name for i, h in zip(linear, held, strict=True) if h)
+        self.solved = point, Solved(model, residual, errors, stopped, columns[:, ~held])
+        return self.solved[1]
+
+    def solved_residual(self, point: Floats) -> Floats:
+        """(N,) weighted residual at a point of the search axes, the linear parameters solved for."""
+        return self.solve(point).residual
+
+    def slopes(self, point: Floats) -> Floats:
+        """(N, D) derivatives of the residual at a point, the linear parameters following.
+
+        They follow to first order: the gradient is exact, and an axis costs one force instead of a
+        least squares of its own [Kaufman 1975, BIT 15, 49].
+        """
+        known, solved = self.solved
+        if solved is None or not np.array_equal(known, point):
+            solved = self.solve(point)
+        factor, model = self.weights[self.owner], solved.model
+        moved = forward_differences(
+            lambda u: self.residual(u, model) * factor, point, solved.residual, *self.problem.box()
+        )
+        return beside(moved, solved.columns)
+
+    def residual(self, point: Floats, model: Model) -> Floats:
+        """(N,) of the linear parameters of a model at a point; its squares sum to each run's nrmse_pp²."""
+        moved = replace(self.problem.bare(point), **{i.name: getattr(model, i.name) for i in self.problem.linear})
+        self.felt(self.problem.coil_at(point))
+        return (moved.force(self.seen, moved.state(self.motion)[self.picked]) - self.target) * self.unit
+
+    def linearise(self, point: Floats, model: Model) -> tuple[Floats, Floats, NDArray[np.intp]]:
+        """Weighted residual of a model, derivatives by search axes and linear parameters, owners."""
+        factor = self.weights[self.owner] * self.unit
+
+        def residual(u: Floats) -> Floats:
+            return self.residual(u, model) * self.weights[self.owner]
+
+        r = residual(point)
+        slopes = forward_differences(residual, point, r, *self.problem.box())
+        bare = self.problem.bare(point)
+        self.felt(self.problem.coil_at(point))
+        state = bare.state(self.motion)[self.picked]
+        columns = linear_table(bare, self.problem.linear, self.seen, state)[1] * factor[:, None]
+        return r, np.column_stack([slopes, columns]), self.owner
+
+
+def beside(slopes: Floats, columns: Floats) -> Floats:
+    """(N, D) what of some slopes no combination of columns takes up."""
+    scale = np.sqrt(np.einsum("nl,nl->l", columns, columns))
+    scaled = columns / np.where(scale > 0, scale, 1.0)
+    return slopes - scaled @ np.linalg.solve(scaled.T @ scaled + _NEARLY * np.eye(scale.size), scaled.T @ slopes)
+
+
+def string(motions: Iterable[Excitation]) -> Excitation:
+    """Several motions one after the other, a second apart."""
+    parts = list(motions)
+    time, clock = [], 0.0
+    for part in parts:
+        time.append(part.time - part.time[0] + clock)
+        clock = float(time[-1][-1]) + 1.0
+    names = ("displacement", "velocity", "acceleration", "current")
+    return Excitation(np.concatenate(time), *(np.concatenate([getattr(p, n) for p in parts]) for n in names))
