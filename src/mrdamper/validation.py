@@ -93,6 +93,10 @@ class Validation(Shown):
         """The run with the largest magnitude of a score."""
         return max(self.runs, key=lambda run: abs(getattr(run.scores, name)))
 
+    def worst_error(self, name: str = "nrmse_pp") -> float:
+        """Its magnitude in that run; NaN without runs."""
+        return abs(float(getattr(self.worst(name).scores, name))) if self.runs else float("nan")
+
     def only(self, run_ids: Collection[str]) -> Validation:
         """The scores of some runs."""
         return replace(self, runs=tuple(run for run in self.runs if run.run_id in run_ids))

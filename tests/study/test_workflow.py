@@ -111,7 +111,10 @@ def test_tables_carry_units_and_numbers(folder):
     assert all(0 < float(row["nrmse_pp"]) < np.inf for row in rows)
     assert all(float(row["nrmse_pp"]) < 0.15 for row in rows if row["model"] == "play-bypass")
     with (folder / "identifications.csv").open() as file:
-        names = next(csv.reader(file))
+        identifications = list(csv.DictReader(file))
+    names = identifications[0]
+    told = [(row["run_id"], row["model"], row["method"]) for row in identifications]
+    assert len(set(told)) == len(told)  # two recipes are made of the same ones
     assert {"alpha [N/m]", "alpha low 95 %", "alpha high 95 %"} <= set(names)
     with (folder / "parameters.csv").open() as file:
         numbers = list(csv.DictReader(file))

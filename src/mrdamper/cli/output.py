@@ -13,6 +13,7 @@ from mrdamper.files.atomic import write_file
 
 if TYPE_CHECKING:
     from mrdamper.gas_spring import GasSpring
+    from mrdamper.validation import Validation
 
 Rows = Sequence[Mapping[str, Any]]
 
@@ -34,6 +35,11 @@ def put(rows: Rows, out: Path | None, as_json: bool, as_csv: Callable[[Rows], st
 def percent(share: float) -> str:
     """A share in per cent, or a dash where there is none."""
     return f"{100 * share:.2f} %" if math.isfinite(share) else "–"
+
+
+def spread(scores: Validation) -> str:
+    """Median error of some runs and, in brackets, the worst."""
+    return f"{percent(scores.median())} ({percent(scores.worst_error())})" if scores.runs else percent(math.nan)
 
 
 def parse_fixed(pairs: Sequence[str]) -> dict[str, float]:

@@ -106,7 +106,9 @@ def _rows(rig: RigComparison) -> list[dict[str, Any]]:
                 "per_run_nrmse_pp": _plain(entry.per_run),
                 "train_nrmse_pp": _plain(entry.train.median()),
                 "left_out_nrmse_pp": _plain(entry.left_out.median()),
+                "left_out_worst_nrmse_pp": _plain(entry.left_out.worst_error()),
                 "held_out_nrmse_pp": _plain(entry.held_out.median()),
+                "held_out_worst_nrmse_pp": _plain(entry.held_out.worst_error()),
                 "held_out_energy_error": _plain(entry.held_out.median("energy_error")),
                 "numbers_per_run": entry.numbers_per_run,
                 "numbers": entry.damper.parameter_count,
@@ -186,12 +188,15 @@ def _plain(value: float) -> float | None:
 
 def text_table(rows: Sequence[Mapping[str, Any]]) -> str:
     """The ranking for a terminal."""
-    lines = [f"{'':3} {'model':42} {'per run':>8} {'train':>6} {'left out':>8} {'held out':>8} {'numbers':>7} {'s':>6}"]
+    lines = [
+        f"{'':3} {'model':42} {'per run':>8} {'train':>6} {'left out':>8} {'worst':>6} {'held out':>8} {'worst':>6} "
+        f"{'numbers':>7} {'s':>6}"
+    ]
+    names = ("per_run", "train", "left_out", "left_out_worst", "held_out", "held_out_worst")
     for row in rows:
-        scores = [row[f"{name}_nrmse_pp"] for name in ("per_run", "train", "left_out", "held_out")]
-        shown = ["–" if s is None else f"{100 * s:.2f}" for s in scores]
+        shown = ["–" if (s := row[f"{name}_nrmse_pp"]) is None else f"{100 * s:.2f}" for name in names]
         lines.append(
-            f"{row['rank']:3} {row['title']:42} {shown[0]:>8} {shown[1]:>6} {shown[2]:>8} {shown[3]:>8} "
-            f"{row['numbers']:7} {row['seconds']:6.1f}"
+            f"{row['rank']:3} {row['title']:42} {shown[0]:>8} {shown[1]:>6} {shown[2]:>8} {shown[3]:>6} {shown[4]:>8} "
+            f"{shown[5]:>6} {row['numbers']:7} {row['seconds']:6.1f}"
         )
     return "\n".join(lines)

@@ -127,7 +127,9 @@ def _draw(rig: RigStudy, progress: Progress, *, also: tuple[str, ...]) -> dict[s
 
 
 def _all_identifications(study: Study) -> list[Identification]:
-    return [i for rig in study.rigs for candidate in rig.candidates for i in candidate.identifications]
+    """Each once: run by run and jointly are made of the same ones."""
+    found = [i for rig in study.rigs for candidate in rig.candidates for i in candidate.identifications]
+    return list({id(one): one for one in found}.values())
 
 
 def _validation_table(study: Study) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from pathlib import Path
 
@@ -27,7 +26,7 @@ def register(app: typer.Typer) -> None:
         as_json: bool = typer.Option(False, "--json", help="Print a summary a program can read."),
     ) -> None:
         """Study a dataset: identify every run, map the parameters, validate; write report and models."""
-        from mrdamper.cli.output import percent
+        from mrdamper.cli.output import percent, spread
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.dampers.certainty import table, unsure
         from mrdamper.errors import IdentificationError
@@ -72,11 +71,10 @@ def register(app: typer.Typer) -> None:
             return
         for rig in result.rigs:
             print(f"{rig.rig or dataset.name}: {rig.damper.title} ({rig.damper.parameter_count} numbers)")
-            print(f"  {'nrmse_pp, median over runs':38}{'left out':>10}{'held out':>10}{'one by one':>12}")
+            print(f"  {'nrmse_pp, median (worst) of the runs':38}{'left out':>19}{'held out':>19}{'one by one':>12}")
             for candidate in rig.candidates:
-                held_out = percent(candidate.held_out.median() if candidate.held_out.runs else math.nan)
-                one_by_one = percent(candidate.per_run)
-                print(f"  {candidate.title:38}{percent(candidate.left_out.median()):>10}{held_out:>10}{one_by_one:>12}")
+                left_out, held_out = (spread(scores) for scores in (candidate.left_out, candidate.held_out))
+                print(f"  {candidate.title:38}{left_out:>19}{held_out:>19}{percent(candidate.per_run):>12}")
             numbers = (f"{row['name']} {row['written']}" for row in table(rig.damper))
             print(f"  numbers, 95 %: {'; '.join(numbers)}")
             for doubt in unsure(rig.damper):
@@ -94,7 +92,9 @@ def _summary(result, written: list[str]) -> dict:
                         "parameters": c.damper.parameter_count,
                         "per_run_nrmse_pp": c.per_run if c.identifications else None,
                         "left_out_nrmse_pp": c.left_out.median(),
+                        "left_out_worst_nrmse_pp": c.left_out.worst_error(),
                         "held_out_nrmse_pp": c.held_out.median() if c.held_out.runs else None,
+                        "held_out_worst_nrmse_pp": c.held_out.worst_error() if c.held_out.runs else None,
                     }
                     for c in rig.candidates
                 },
