@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.covariance import Part, certain, normal_of
-from mrdamper.dampers.joint import string
 from mrdamper.dampers.slopes import force_slopes
+from mrdamper.dampers.strung import string
 from mrdamper.data import Floats, Run
 from mrdamper.errors import InputError
 from mrdamper.motion import Excitation
