@@ -351,6 +351,33 @@ def test_dark_projector_and_narrow(on_model, shoot):
         shoot(page, name)
 
 
+def test_a_ride_moves_with_its_loop(on_model, shoot):
+    page = on_model
+    open_tab(page, "Ride")
+    mark = page.locator('section[aria-label="The damper\'s loop"] .points path')
+    mark.wait_for(state="attached")
+    page.get_by_role("button", name="Pause").click()
+    tyre, moment = page.locator(".ride-tyre"), page.get_by_label("Moment of the ride")
+
+    def at(sample):
+        moment.fill(str(sample))
+        return tyre.get_attribute("cy"), mark.get_attribute("transform")
+
+    first, later = at(400), at(470)
+    assert first[0] != later[0]
+    assert first[1] != later[1]
+    assert at(400) == first
+    shoot(page, "ride-car")
+    page.get_by_label("In", exact=True).select_option("dyke1996")
+    page.locator(".ride-scene[aria-label^='Three-storey']").wait_for()
+    comes_to(page, lambda: page.locator(".ride-mass").get_attribute("d").count("M"), 3)
+    page.get_by_label("Control law").select_option("passive")
+    page.locator("text=passive, constant current.").wait_for()
+    page.get_by_role("button", name="Pause").click()
+    moment.fill("600")
+    shoot(page, "ride-frame")
+
+
 def test_work_can_be_cancelled(page):
     page.get_by_role("button", name="Open the bundled tests", exact=True).click()
     page.locator(".matrix").wait_for()

@@ -41,7 +41,7 @@ def main(folder: str, report: str, tolerance: str, *binary: str) -> None:
         motion, known = (_table(Path(folder, f"resources/reference_{way}.csv")) for way in ("in", "out"))
         if motion.size != known.size or motion.size < 3:
             raise ValueError("the tables do not fit together")
-        names, main = (motion.dtype.names or ())[1:], (known.dtype.names or ())[1]
+        names, main = [*(motion.dtype.names or ())][1:], [*(known.dtype.names or ())][1]
         dt, rows = float(motion["time"][1]), [[float(row[name]) for name in names] for row in motion]
         forces = known[main]
     except (OSError, ValueError, IndexError) as error:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -118,31 +118,52 @@ def make_walk(elements: Sequence[Stage], control: Stage | None, machine: bool) -
     machine : bool
         Compile what is new in these stages; takes seconds, and gains a hundredfold.
     """
-    compiled: Any = None
-    if machine:
-        from mrdamper.systems import machine as compiled
-    compile_ = compiled.compile_ if machine else lambda function: function
-    cut = compiled.cut if machine else _cut
-    evaluate = compile_(_nothing)
+    tools = _tools(machine)
+    command = tools.compile_(_no_command)
+    if control is not None:
+        step = control.compiled() if machine else control.step
+        p, d, m = (tools.cut(b, size) for b, size in zip((2, 0, 0), control.sizes, strict=True))
+        keep = tools.compile_(_keeper(0, len(control.start)))
+        command = tools.compile_(_command(step, p, d, m, tools.cut(0, control.inputs), keep))
+    return tools.walk_of(_evaluation(tuple(elements), machine), tools.command(command))
+
+
+@lru_cache(maxsize=8)  # laws side by side share what their dampers answer
+def _evaluation(elements: tuple[Stage, ...], machine: bool) -> Any:
+    """What the elements answer, by their number."""
+    tools = _tools(machine)
+    evaluate = tools.compile_(_nothing)
     ends = np.cumsum([[2, 0, 0], *([2 + p, d, m] for p, d, m in (e.sizes for e in elements))], axis=0)
     for index in reversed(range(len(elements))):
         stage, begin = elements[index], ends[index].tolist()
         step = stage.compiled() if machine else stage.step
-        keep = compile_(_keeper(begin[2], len(stage.start)))
-        p, d, m = (cut(b, size) for b, size in zip(begin, stage.sizes, strict=True))
-        first = compile_(_one(step, begin[0] - 2, p, d, m, keep))
-        evaluate = compile_(_either(index, first, evaluate))
-    command = compile_(_no_command)
-    if control is not None:
-        step = control.compiled() if machine else control.step
-        p, d, m = (cut(b, size) for b, size in zip((2, 0, 0), control.sizes, strict=True))
-        command = compile_(_command(step, p, d, m, cut(0, control.inputs), compile_(_keeper(0, len(control.start)))))
-    return compiled.walk_of(evaluate, command) if machine else partial(walk, evaluate, command)
+        keep = tools.compile_(_keeper(begin[2], len(stage.start)))
+        p, d, m = (tools.cut(b, size) for b, size in zip(begin, stage.sizes, strict=True))
+        first = tools.compile_(_one(step, begin[0] - 2, p, d, m, keep))
+        evaluate = tools.compile_(_either(index, first, evaluate))
+    return tools.evaluation(evaluate)
 
 
-def _cut(begin: int, size: int) -> Any:
-    """A function from an array to a tuple of `size` of its numbers."""
-    return lambda values: tuple(values[begin : begin + size].tolist())
+class _Interpreter:
+    """What `mrdamper.systems.machine` does for machine code, for plain functions: nothing."""
+
+    compile_ = command = evaluation = staticmethod(lambda function: function)
+
+    @staticmethod
+    def walk_of(evaluate: Any, command: Any) -> Callable[..., int]:
+        return partial(walk, evaluate, command)
+
+    @staticmethod
+    def cut(begin: int, size: int) -> Any:
+        return lambda values: tuple(values[begin : begin + size].tolist())
+
+
+def _tools(machine: bool) -> Any:
+    if not machine:
+        return _Interpreter
+    from mrdamper.systems import machine as compiled
+
+    return compiled
 
 
 def _nothing(j, p, d, memory, later, x, v, a, current, dt):

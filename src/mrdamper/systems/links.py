@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 from mrdamper.dampers.base import Damper
@@ -29,11 +30,13 @@ def stage_of(program: Program) -> Stage:
     return Stage(step, given, tuple(derived), memory, compiled, lines, prepare, len(tape.inputs), names)
 
 
+@lru_cache(maxsize=32)  # a loop is made again for every law
 def damper_stage(damper: Damper, free: bool = False) -> Stage:
     """A damper as a stage, its own numbers free to change if asked for; raises as `stream`."""
     return stage_of(trace(damper, free))
 
 
+@lru_cache(maxsize=32)
 def contact_stage(link: Link) -> Stage:
     """A bump stop, or the part of a tyre's force that is missing while it is in the air."""
     step = _stop if link.role == "stop" else _tyre

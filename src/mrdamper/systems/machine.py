@@ -32,14 +32,23 @@ _walk = njit(
 )(kernel.walk)  # fmt: skip
 
 
+def evaluation(evaluate: Any) -> Any:
+    """What answers for the elements, as an address."""
+    return cfunc(_evaluate)(evaluate.py_func)
+
+
+def command(command: Any) -> Any:
+    """What answers for the law, as an address."""
+    return cfunc(_command)(command.py_func)
+
+
 def walk_of(evaluate: Any, command: Any) -> Callable[..., int]:
     """`kernel.walk` with what answers for the elements, and for the law."""
-    addresses = cfunc(_evaluate)(evaluate.py_func), cfunc(_command)(command.py_func)
 
     def walk(*arguments: Any) -> int:
         with warnings.catch_warnings():  # functions by address are called experimental since numba 0.49
             warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
-            return _walk(*addresses, *arguments)
+            return _walk(evaluate, command, *arguments)
 
     return walk
 

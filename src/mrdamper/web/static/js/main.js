@@ -11,9 +11,10 @@ import * as data from "./views/data.js";
 import * as identify from "./views/identify.js";
 import * as model from "./views/model.js";
 import * as compare from "./views/compare.js";
+import * as ride from "./views/ride.js";
 import * as takeaway from "./views/takeaway.js";
 
-const VIEWS = [data, identify, model, compare, takeaway];
+const VIEWS = [data, identify, model, compare, ride, takeaway];
 const BEAT = 60_000;
 
 async function start() {

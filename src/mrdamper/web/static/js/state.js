@@ -82,7 +82,7 @@ export function imported(raw) {
   if (!raw || raw.format !== "mrdamper-bench-state") throw new Error("this is no state of the live bench");
   if (raw.version > VERSION) throw new Error("this state was saved by a newer mrdamper; update it");
   const state = { ...BLANK };
-  if (["data", "identify", "model", "compare", "takeaway"].includes(raw.view)) state.view = raw.view;
+  if (["data", "identify", "model", "compare", "ride", "takeaway"].includes(raw.view)) state.view = raw.view;
   if (["bundled", "drop"].includes(raw.source)) state.source = raw.source;
   if (typeof raw.dataName === "string") state.dataName = raw.dataName.slice(0, 300);
   if (Number.isInteger(raw.rig) && raw.rig >= 0) state.rig = raw.rig;

@@ -1,0 +1,131 @@
+"""The Ride view: a damper of the bench at work in a building or a vehicle, under a control law."""
+
+from __future__ import annotations
+
+from threading import Lock
+from typing import Any
+
+import numpy as np
+from fastapi import APIRouter
+from fastapi.responses import Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from mrdamper.data import Floats
+from mrdamper.errors import UnknownNameError
+from mrdamper.parameters import with_values
+from mrdamper.systems.controllers import controller_type, controller_types
+from mrdamper.systems.controllers.passive import Passive
+from mrdamper.systems.inputs import Input, bundled_records, load_input, made_inputs
+from mrdamper.systems.measures import cost
+from mrdamper.systems.result import Simulation
+from mrdamper.systems.simulate import Loop, simulate_system
+from mrdamper.systems.structure import System
+from mrdamper.systems.system_file import bundled_systems, load_system
+from mrdamper.web.frames import frame, number
+from mrdamper.web.sessions import Current
+
+router = APIRouter(prefix="/sessions/{session}/ride")
+_LENGTH = 8.0  # s of a road
+_SAMPLES = 2000  # of a history that travel to the page
+_TURN = Lock()  # one at a time: each takes seconds
+_SLOWEST = 0.2  # Hz; what of the ground's motion is slower than this is left out of the picture
+
+
+class Ask(BaseModel):
+    """What the panel says."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    damper: str = Field(max_length=64)
+    system: str = Field(max_length=64)
+    source: str = Field(max_length=64)
+    control: str = Field(max_length=64)
+    current_A: float = Field(ge=0, le=1000)
+
+
+@router.get("/choices")
+def choices() -> dict[str, Any]:
+    """Systems, what shakes them, and laws."""
+    records = [{"name": f"{name}@{speed}", "title": f"{name}, {speed} × speed" if speed > 1 else name}
+               for name in bundled_records() for speed in (5, 1)]  # fmt: skip
+    roads = [name for name, (kind, _) in made_inputs().items() if kind.kind == "road"]
+    laws = [{"name": name, "title": kind.title} for name, kind in controller_types().items() if name != "passive"]
+    systems = [(name, load_system(name).system) for name in bundled_systems()]
+    return {
+        "systems": [{"name": name, "title": s.title, "kind": _kind(s)} for name, s in systems],
+        "sources": {"ground": records, "road": [{"name": name, "title": name} for name in roads]},
+        "controls": [{"name": "passive", "title": Passive.title}, *laws],
+    }
+
+
+@router.post("")
+def ride(ask: Ask, session: Current) -> Response:
+    """Histories of a system with a damper under a law, and with that damper left without current."""
+    if ask.system not in bundled_systems():  # a name, never a path of this machine
+        raise UnknownNameError.of("system", ask.system, bundled_systems())
+    damper, system = session.damper(ask.damper).damper, load_system(ask.system).system
+    source = _source(ask.source, system)
+    dampers = dict.fromkeys((link.name for link in system.dampers), damper)
+    kind = controller_type(ask.control)
+    law = with_values(kind, {"current_A": ask.current_A}) if kind is Passive else kind()
+    with _TURN:
+        done = simulate_system(system, source, dampers, law, highest=None if kind is Passive else ask.current_A)
+        idle = Loop(system, source, dampers, Passive()).run(done.step)
+    every = slice(None, None, -(-done.time.size // _SAMPLES))
+    arrays = {name: values[every] for name, values in (_histories(done, source) | _idle(idle)).items()}
+    head = {
+        "kind": _kind(system),
+        "title": f"{system.title}, {type(law).title}",
+        "coordinates": system.coordinates,
+        "channels": system.channels,
+        "dampers": [link.name for link in done.dampers],
+        "calm": system.coordinates[-1 if system.ground is not None else 0],
+        "peaks": {name: values.tolist() for name, values in done.peaks.items()},
+        "gain": number(1 - (cost(done) / cost(idle)) ** 0.5 if cost(idle) > 0 else None),
+        "outside": done.outside,
+        "settled": done.settled,
+        "step_s": done.step,
+        "halving": number(done.halving),
+        "energy_gap": number(done.energy_gap),
+    }
+    return frame(head, arrays)
+
+
+def _kind(system: System) -> str:
+    return "ground" if system.ground is not None else "road"
+
+
+def _source(name: str, system: System) -> Input:
+    record, _, speed = name.partition("@")
+    known = made_inputs() if _kind(system) == "road" else bundled_records()
+    if record not in known:
+        raise UnknownNameError.of("input", record, known)
+    if _kind(system) == "road":
+        return load_input(record, {"length_s": _LENGTH})
+    return load_input(record, time_scale=5.0 if speed == "5" else 1.0)
+
+
+def _histories(done: Simulation, source: Input) -> dict[str, Floats]:
+    found = {"time": done.time}
+    for i, name in enumerate(done.system.coordinates):
+        found |= {f"x.{name}": done.x[:, i], f"a.{name}": done.a[:, i]}
+    for i, link in enumerate(done.links):
+        if link.role == "damper":
+            found |= {f"stroke.{link.name}": done.stroke[:, i], f"force.{link.name}": done.force[:, i]}
+            found[f"current.{link.name}"] = done.current[:, i]
+    if done.system.ground is not None:
+        return found | {"way.ground": _moved(source.value(done.time), done.step)}
+    return found | {f"way.{name}": done.road[:, i] for i, name in enumerate(done.system.channels)}
+
+
+def _idle(done: Simulation) -> dict[str, Floats]:
+    return {f"idle.{name}": done.a[:, i] for i, name in enumerate(done.system.coordinates)}
+
+
+def _moved(acceleration: Floats, step: float) -> Floats:
+    """(N,) displacement [m] behind an acceleration, without what is too slow to be told from drift."""
+    omega = 2 * np.pi * np.fft.rfftfreq(2 * acceleration.size, step)
+    spectrum = np.fft.rfft(acceleration, 2 * acceleration.size)
+    kept = omega > 2 * np.pi * _SLOWEST
+    moved = np.where(kept, -spectrum / np.where(kept, omega, 1.0) ** 2, 0.0)
+    return np.fft.irfft(moved, 2 * acceleration.size)[: acceleration.size]
