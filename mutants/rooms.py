@@ -25,7 +25,7 @@ def _room(modules: str, tests: str) -> Room:
 ROOMS = (
     _room("validation metrics", "test_validation.py test_metrics.py"),
     _room("identification.loop_analysis", "identification/test_loop_analysis.py"),
-    _room("identification.covariance", "identification/test_covariance.py"),
+    _room("identification.covariance", "identification/test_covariance.py identification/test_covariance_by_hand.py"),
     _room("functions.forms functions.fitting", "functions"),
     _room(
         "reproduction.verdicts reproduction.claims reproduction.seeds",

@@ -1,0 +1,170 @@
+"""Parts of the covariance beside brute force: covariance matrices written out, recursions in plain Python."""
+
+import math
+
+import numpy as np
+import pytest
+
+from mrdamper.identification import covariance
+from mrdamper.identification.covariance import spread
+
+RNG = np.random.default_rng(11)
+
+
+def spectrum(model, omega):
+    response = 1 + sum(a * np.exp(-1j * omega * k) for k, a in enumerate(model[1:], 1))
+    return model[0] / abs(response) ** 2
+
+
+def test_a_spectrum_is_that_of_the_recursion():
+    model = np.array([2.0, -0.6, 0.2])
+    omega = np.array([0.0, 0.3, 1.7, np.pi])
+    assert covariance._spectrum(model, omega) == pytest.approx([spectrum(model, w) for w in omega])
+
+
+def burg(series):
+    """Burg's recursion with the mean's bias taken out of the first order, and the corrected criterion of Akaike."""
+    N = len(series)
+    f = b = [v - sum(series) / N for v in series]
+    variance, a = sum(v * v for v in f) / N, []
+    best, least = [variance], N * math.log(variance) + 2
+    for order in range(1, min(12, N // 10) + 1):
+        ahead, behind = f[1:], b[:-1]
+        k = (
+            -2
+            * sum(p * q for p, q in zip(ahead, behind, strict=True))
+            / sum(p * p + q * q for p, q in zip(ahead, behind, strict=True))
+        )
+        if order == 1:
+            k = max(k - max(1 - 3 * k, 0.0) / N, -0.9995)
+        f = [p + k * q for p, q in zip(ahead, behind, strict=True)]
+        b = [q + k * p for p, q in zip(ahead, behind, strict=True)]
+        a = [*(p + k * q for p, q in zip(a, a[::-1], strict=True)), k]
+        variance *= 1 - k * k
+        criterion = N * math.log(variance) + 2 * (order + 1) * N / max(N - order - 2, 1)
+        if criterion < least:
+            best, least = [variance, *a], criterion
+    return best
+
+
+@pytest.mark.parametrize("size", [35, 130, 300])
+@pytest.mark.parametrize("coefficients", [(), (-0.7,), (-1.4, 0.6), (-0.2, 0.1, 0.5)])
+def test_an_autoregression_is_burgs(size, coefficients):
+    noise = np.random.default_rng(size).standard_normal(size + 50)
+    series = noise.copy()
+    for i in range(len(coefficients), series.size):
+        series[i] = noise[i] - sum(a * series[i - k] for k, a in enumerate(coefficients, 1))
+    series = series[50:] + 3.0
+    assert covariance._autoregression(series) == pytest.approx(np.array(burg(series.tolist())))
+    assert covariance._autoregression(np.full(40, 2.0)).tolist() == [0.0]
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.6, -0.4])
+def test_noise_gives_the_score_of_its_covariance_matrix(monkeypatch, rho):
+    N, variance = 90, 1.7
+    model = np.array([variance, -rho]) if rho else np.array([variance])
+    monkeypatch.setattr(covariance, "_autoregression", lambda residual: model)
+    J = RNG.standard_normal((N, 3)) * [1.0, 2.0, 0.5]
+    inverse = np.linalg.inv(J.T @ J)
+    (score, relative), memory = covariance._noise(J, RNG.standard_normal(N), inverse)
+
+    def by_matrix(r):
+        lag = np.abs(np.subtract.outer(np.arange(N), np.arange(N)))
+        return J.T @ (variance * r**lag / (1 - r * r)) @ J
+
+    whole = variance / (1 - rho**2)
+    plain = by_matrix(rho)
+    taken = np.trace(inverse @ plain) / (N * whole)
+    assert score == pytest.approx(plain / (1 - taken), rel=1e-6)
+    assert memory == pytest.approx((1 + rho) / (1 - rho), rel=1e-6)
+    # Relative variance of each variance: 2/N of the innovation, and what an uncertain coefficient bends.
+    if not rho:
+        assert relative == pytest.approx([2 / N] * 3)
+        return
+    step = 1e-5
+    shares = [np.diag(inverse @ by_matrix(rho + s) @ inverse) for s in (-step, 0.0, step)]
+    slope = (shares[2] - shares[0]) / (2 * step) / shares[1]
+    assert relative == pytest.approx(2 / N + slope**2 * (1 - rho**2) / N, rel=1e-3)
+
+
+def test_repeated_power_follows_a_power_of_the_order():
+    orders, left = np.arange(1.0, 9.0), np.ones(8)
+    odd = orders % 2 == 1
+    power = np.where(odd, 9.0, 0.4) * orders**-2.0
+    level, relative = covariance._power_law(orders, power, np.zeros(8), left)
+    assert level == pytest.approx(power)
+    lifted, _ = covariance._power_law(orders, power, np.full(8, 0.3), left)
+    assert lifted == pytest.approx(np.maximum(power - 0.3, 0.0))
+    X = np.column_stack([odd, ~odd, -np.log(orders)]).astype(float)
+    assert relative == pytest.approx(X @ np.linalg.inv(X.T @ X) @ X.T)
+
+
+def test_parts_add_up_and_doubt_follows_their_shares(monkeypatch):
+    J = RNG.standard_normal((60, 2))
+    inverse = np.linalg.inv(J.T @ J)
+    lines, noise = np.diag([3.0, 1.0]), np.diag([1.0, 5.0])
+    rest = np.ones(60)
+    monkeypatch.setattr(covariance, "_repeated", lambda *args: (rest, [(lines, np.array([0.5, 0.4]))]))
+    monkeypatch.setattr(covariance, "_noise", lambda J, r, inverse: ((noise, np.array([0.1, 0.02])), 4.0))
+    time = np.arange(60) / 20
+    total, dof, length = covariance.score_covariance(J, rest, time, 1.0, inverse)
+    assert total == pytest.approx(lines + noise)
+    share = np.diag(inverse @ lines @ inverse) / np.diag(inverse @ (lines + noise) @ inverse)
+    doubt = share**2 * [0.5, 0.4] + (1 - share) ** 2 * [0.1, 0.02]
+    assert dof == pytest.approx(2 / doubt)
+    assert length == pytest.approx(60 / 4)
+    alone, dof, _ = covariance.score_covariance(J, rest, None, None, inverse)
+    assert alone == pytest.approx(noise)
+    assert dof == pytest.approx([20.0, 100.0])
+
+
+def test_what_repeats_is_taken_out_and_counted_once_however_many_cycles():
+    N, cycles = 800, 8
+    time = np.arange(N) / N * cycles
+    phase = 2 * np.pi * time
+    repeated = sum(20 / k**2 * np.cos(k * phase + k) for k in range(1, 20, 2))
+    noise = np.random.default_rng(2).standard_normal(N)
+    J = np.column_stack([np.cos(2.5 * phase), np.sin(3 * phase)])
+    inverse = np.linalg.inv(J.T @ J)
+    rest, parts = covariance._repeated(J, repeated + noise, time, 1.0, inverse)
+    assert np.std(rest) == pytest.approx(np.sqrt((N - 48) / N), rel=0.08)
+    (lines, relative), *more = parts
+    assert not more
+    # sin 3θ sees its own line alone: N/2 times it, with a mean square that the power law says.
+    assert lines[1, 1] == pytest.approx((N / 2) ** 2 * (20 / 9) ** 2 / 2, rel=0.4)
+    assert lines[0, 0] < 1e-3 * lines[1, 1]
+    assert np.all(relative > 0)
+    plain, none = covariance._repeated(J, noise, time, 1.0, inverse)
+    assert np.array_equal(plain, noise)
+    assert none == []
+    short, parts = covariance._repeated(
+        J[:150], (repeated + noise)[:150], time[:150], 1.0, np.linalg.inv(J[:150].T @ J[:150])
+    )
+    assert np.array_equal(short, (repeated + noise)[:150])  # 1.5 cycles: what repeats cannot be told from what does not
+    assert len(parts) == 1
+
+
+def test_a_long_record_is_looked_at_in_means_and_its_errors_are_those_of_the_means():
+    N, block = 2001 * 4 + 3, 4
+    time = np.arange(N) / 1000
+    J = np.column_stack([np.cos(2 * np.pi * time), np.ones(N)])
+    residual = np.random.default_rng(5).standard_normal(N)
+    kept = N // block * block
+    thin = [a[:kept].reshape(-1, block, *a.shape[1:]).mean(axis=1) for a in (J, residual, time)]
+    assert spread(J, residual, time, 1.0).errors == pytest.approx(spread(*thin, 1.0).errors)
+    as_it_is = spread(J[:4001], residual[:4001]).errors  # less than two blocks: every sample
+    assert as_it_is == pytest.approx(np.sqrt([2.0, 1.0]) / np.sqrt(4001), rel=0.1)
+
+
+def test_degrees_of_freedom_and_effective_samples_of_white_noise():
+    N = 400
+    J = RNG.standard_normal((N, 2)) * [1.0, 30.0]
+    residual = np.random.default_rng(6).standard_normal(N)
+    residual -= J @ np.linalg.lstsq(J, residual, rcond=None)[0]
+    found = spread(J, residual)
+    assert found.effective == pytest.approx([N, N], rel=0.1)
+    assert found.dof == pytest.approx([N - 2, N - 2], rel=0.05)
+    nothing = spread(np.zeros((N, 2)), residual)
+    assert np.isinf(nothing.errors).all()
+    assert nothing.effective.tolist() == [0.0, 0.0]
+    assert nothing.dof.tolist() == [1.0, 1.0]
