@@ -82,3 +82,12 @@ def test_a_noisy_current_identifies_as_a_clean_one():
     noisy = replace(clean, current=clean.current + noise - np.mean(noise))
     found = [identify(run, "smooth-bingham").model for run in (clean, noisy)]
     assert found[0] == found[1]
+
+
+@pytest.mark.parametrize("code", [0.0, -999.0])
+def test_a_code_among_samples_of_its_own_size_is_found_by_how_often_it_comes(code):
+    record = clean_record(3, cycles=4, points=200)
+    rng = np.random.default_rng(24)
+    force = np.round(record.force * 1500 / np.max(np.abs(record.force)) + rng.normal(0, 20, record.time.size), 3)
+    force[rng.choice(np.arange(5, force.size - 5), 9, replace=False)] = code
+    assert "E_SENTINEL" in codes_of(replace(record, force=force))

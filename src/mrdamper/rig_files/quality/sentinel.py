@@ -25,6 +25,8 @@ _RARE = 0.1  # of the samples: a value held more often is the channel's own
 _FEW = 50  # distinct values of a channel that does not vary
 _CHUNK = 1_000_000  # samples looked at together
 _LONG = 20  # a value held longer than this on average is a plateau, no code
+_OFTEN, _MORE = 2, 4  # times, and times more for each that a level beside it comes again
+_AROUND, _APART = 20, 0.4  # levels on either side, share that leaps
 _ENOUGH = 50  # of a channel's own samples, below which its leaps say nothing
 
 
@@ -78,6 +80,32 @@ def code_in(values: Floats, coarsest: float) -> float | None:
         off, share = _scattered(values, value, leap)
         scattered = share >= 0.5 or off >= 2 if usual else share >= 0.8
         if scattered and _stands_out(values, value, leap):
+            return value
+    return _too_often(values, extremes - {0.0})
+
+
+def _too_often(values: Floats, ends: set[float]) -> float | None:
+    """A code in use, or zero, that a fine channel holds far more often than the values around it.
+
+    Among samples of its own size a code does not stand off; but a channel passes each of its
+    levels about as often, and its samples are smooth.
+    """
+    some = values[np.isfinite(values)][:_CHUNK]
+    levels, counts = np.unique(some, return_counts=True)
+    if levels.size < _FEW:
+        return None
+    for at in np.flatnonzero(counts >= _OFTEN):
+        value = float(levels[at])
+        if value in ends or not (value == 0.0 or _known(value)):
+            continue
+        around = np.r_[counts[max(0, at - _AROUND) : at], counts[at + 1 : at + 1 + _AROUND]]
+        if counts[at] < _OFTEN + _MORE * (int(np.max(around, initial=1)) - 1):
+            continue
+        steps = np.abs(values[1:-1] - 0.5 * (values[:-2] + values[2:]))[:_CHUNK]
+        same = values[1:-1][:_CHUNK] == value
+        own = steps[~same & np.isfinite(steps)]
+        apart = steps[same & np.isfinite(steps)]
+        if apart.size and np.mean(apart > 3 * np.quantile(own, 0.9)) > _APART:
             return value
     return None
 
