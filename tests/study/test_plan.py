@@ -1,6 +1,8 @@
 """Plans: records inside the limits and the hours, each with a reason, that shrink the doubt."""
 
 import csv
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +16,9 @@ from mrdamper.errors import InputError
 from mrdamper.files.model_file import save_model
 from mrdamper.files.motion import load_motion
 from mrdamper.study.plan import Limits, first_matrix, plan_tests, read_limits
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+from benchmarks.planning import designs
 
 LIMITS = Limits((0.0, 1.0), (0.5, 4.0), (2.0, 20.0), velocity_m_s=0.2, force_N=1500.0)
 
@@ -89,3 +94,10 @@ def test_the_records_are_read_back(damper, tmp_path):
         ["import", *(str(tmp_path / "next" / row["file"]) for row in listed), "--out", str(tmp_path / "d")],
     )
     assert read.exit_code == 0, read.output
+
+
+def test_a_plan_of_little_rig_time_beats_chance_and_the_factorial_grid():
+    found = designs(0.2, seeds=9)
+    assert found["plan"] < 0.7 * found["random records (median)"]
+    assert found["plan"] < 0.7 * found["factorial grid"]
+    assert found["plan"] < found["plan that ignores drift"] < found["before"]

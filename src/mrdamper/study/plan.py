@@ -199,41 +199,84 @@ def plan_tests(damper: Damper, limits: Limits, hours: float) -> list[Planned]:
             mend="study the tests again, or plan without a model",
             code="E_CERTAINTY",
         )
-    conditions = limits.candidates()
-    _refuse_short(limits, hours, conditions)
-    doubts = [_doubts(damper, known, condition) for condition in conditions]
-    prior: Floats = np.asarray(
-        np.linalg.inv(known.covariance + 1e-12 * np.diag(np.diag(known.covariance))), dtype=float
-    )
-    goal = np.mean(
-        [np.mean([d.slopes.T @ d.slopes / len(d.slopes) for d in drawn], axis=0) for drawn in doubts], axis=0
-    )
-    spread = max(known.force, _FLOOR)
-    columns = [[_whitened(d, spread) for d in drawn] for drawn in doubts]
+    reckoning = Reckoning.of(damper, limits)
+    _refuse_short(limits, hours, reckoning.conditions)
+    return reckoning.chosen(hours)
 
-    def variance(precision: Floats) -> float:
-        return float(np.trace(np.linalg.solve(precision, goal)))
 
-    played: list[list[int]] = [[] for _ in range(limits.sessions)]
-    chosen, left, total = [], hours * 60, prior
-    while True:
-        at = min(range(limits.sessions), key=lambda s: sum(limits.minutes(conditions[i]) for i in played[s]))
-        rest = total - _information(columns, played[at], known)
-        options = [i for i in range(len(conditions)) if limits.minutes(conditions[i]) <= left]
-        if not options:
-            return chosen
-        before = variance(total)
-        gains = [
-            (before - variance(rest + _information(columns, [*played[at], i], known))) / limits.minutes(conditions[i])
-            for i in options
-        ]
-        best = options[int(np.argmax(gains))]
-        played[at].append(best)
-        total = rest + _information(columns, played[at], known)
-        left -= limits.minutes(conditions[best])
-        reason, after = _reason(known, total - prior, prior, at + 1), math.sqrt(variance(total))
-        minutes = limits.minutes(conditions[best])
-        chosen.append(Planned(at + 1, conditions[best], minutes, math.sqrt(before), after, reason))
+@dataclass(frozen=True, eq=False)
+class Reckoning:
+    """What records on a grid of conditions would tell, session by session.
+
+    Attributes
+    ----------
+    known : Certainty
+    limits : Limits
+    conditions : sequence of Condition
+    prior : (P, P) array
+        Precision of the numbers before any new record.
+    goal : (P, P) array
+        Weight of the numbers' variances in that of the force over the envelope.
+    columns : derivatives of each condition's force, at each draw of the numbers
+    """
+
+    known: Certainty
+    limits: Limits
+    conditions: Sequence[Condition]
+    prior: Floats
+    goal: Floats
+    columns: Sequence[Sequence[Floats]]
+
+    @classmethod
+    def of(cls, damper: Damper, limits: Limits) -> Reckoning:
+        """Of a damper with its covariance, over the limits' grid."""
+        known: Certainty = damper.certainty  # type: ignore[assignment]
+        conditions = limits.candidates()
+        doubts = [_doubts(damper, known, condition) for condition in conditions]
+        even = known.covariance + 1e-12 * np.diag(np.diag(known.covariance))
+        goal = np.mean(
+            [np.mean([d.slopes.T @ d.slopes / len(d.slopes) for d in drawn], axis=0) for drawn in doubts], axis=0
+        )
+        spread = max(known.force, _FLOOR)
+        columns = [[_whitened(d, spread) for d in drawn] for drawn in doubts]
+        return cls(known, limits, conditions, np.asarray(np.linalg.inv(even), dtype=float), goal, columns)
+
+    def variance(self, precision: Floats) -> float:
+        """Mean variance of the force over the envelope, relative."""
+        return float(np.trace(np.linalg.solve(precision, self.goal)))
+
+    def precision(self, played: Sequence[Sequence[int]]) -> Floats:
+        """Of the numbers after records, given as indices of conditions a session."""
+        return self.prior + sum(_information(self.columns, rows, self.known) for rows in played)
+
+    def spread(self, played: Sequence[Sequence[int]]) -> float:
+        """Standard deviation of the force over the envelope after records."""
+        return math.sqrt(self.variance(self.precision(played)))
+
+    def chosen(self, hours: float) -> list[Planned]:
+        """Records one by one, each the one that lowers the variance most for its rig time."""
+        known, limits, conditions = self.known, self.limits, self.conditions
+        played: list[list[int]] = [[] for _ in range(limits.sessions)]
+        made, left, total = [], hours * 60, self.prior
+        while True:
+            at = min(range(limits.sessions), key=lambda s: sum(limits.minutes(conditions[i]) for i in played[s]))
+            rest = total - _information(self.columns, played[at], known)
+            options = [i for i in range(len(conditions)) if limits.minutes(conditions[i]) <= left]
+            if not options:
+                return made
+            before = self.variance(total)
+            gains = [
+                (before - self.variance(rest + _information(self.columns, [*played[at], i], known)))
+                / limits.minutes(conditions[i])
+                for i in options
+            ]
+            best = options[int(np.argmax(gains))]
+            played[at].append(best)
+            total = rest + _information(self.columns, played[at], known)
+            minutes = limits.minutes(conditions[best])
+            left -= minutes
+            reason, after = _reason(known, total - self.prior, self.prior, at + 1), math.sqrt(self.variance(total))
+            made.append(Planned(at + 1, conditions[best], minutes, math.sqrt(before), after, reason))
 
 
 def taught_least(damper: Damper, count: int = 3) -> list[tuple[str, float]]:
