@@ -37,8 +37,9 @@ echo "SBOM: $($bin/python -c 'import json; print(len(json.load(open("dist/mrdamp
 # The oldest versions pyproject.toml admits; `make test` runs with the newest.
 rm -rf .venv-lowest && python3 -m venv .venv-lowest
 .venv-lowest/bin/python -m pip install --quiet -r release/lowest.txt
-PYTHONPATH=src .venv-lowest/bin/python -m pytest -m "not slow" -W ignore \
-  tests/{files,functions,hysteresis,identification,models,motion,dampers,cli}
+.venv-lowest/bin/python -m pip install --quiet --no-deps dist/*.whl
+.venv-lowest/bin/python -m pytest -m "not slow" -W ignore \
+  tests/{data,files,functions,hysteresis,identification,models,motion,dampers,export,cli}
 rm -rf .venv-lowest
 echo "the oldest admitted versions serve"
 
