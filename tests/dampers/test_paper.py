@@ -1,5 +1,7 @@
 """The paper's identification with its biases, as they were worked out, and its switches."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,9 @@ from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.gas_spring import GasSpring
 from mrdamper.hysteresis import steady_loop
 from mrdamper.identification import identify
+from mrdamper.identification.harmonic_balance import SineRecord
 from mrdamper.identification.methods.paper import Paper
+from mrdamper.identification.problem import Problem
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.motion import sine
 from mrdamper.optimizers.generation import GeneticSettings
@@ -136,3 +140,30 @@ def test_what_the_recipe_cannot_do_is_refused(request_, text):
     run = steady_run(Condition(1.0, 1.0, 0.05), samples=200)
     with pytest.raises(IdentificationError, match=text):
         identify(run, **{"model": "bouc-wen", **request_}, method=Paper(search="optimum"))
+
+
+def test_the_cost_is_the_error_over_all_samples_and_a_box_is_told_where_it_ends_the_search():
+    run = steady_run(Condition(1.0, 1.0, 0.05), samples=400)
+    method = Paper(search="optimum")
+    found = identify(run, "bouc-wen", method, gas=GAS)
+    problem = Problem.of(run, BoucWen, gas=GAS)
+    record = SineRecord.of(run)
+    points = [(found.model.alpha, found.model.beta), (2e5, 3e5), (0.0, 1e6)]
+    for (alpha, beta), cost in zip(points, method.cost(problem)(np.array(points)), strict=True):
+        model = replace(found.model, alpha=alpha, beta=beta, gamma=beta)
+        state = model.yield_displacement * steady_loop(model.shape, record.condition.amplitude_m, record.theta)
+        assert cost == pytest.approx(
+            np.sqrt(np.mean((model.force(record.motion, state) - record.force) ** 2)), rel=1e-6
+        )
+    assert found.at_bounds == ()
+    assert found.evaluations > 24
+    assert found.seed is None
+    best = method.cost(problem)(np.array([[a * found.model.alpha, b * found.model.beta] for a, b in
+                                          ((1, 1), (1.02, 1), (0.98, 1), (1, 1.05), (1, 0.95))]))  # fmt: skip
+    assert int(np.argmin(best)) == 0
+    low = identify(run, "bouc-wen", Paper(search="optimum", bounds=((0.0, 1e3), (0.0, 1e8))), gas=GAS)
+    assert low.at_bounds == ("alpha",)
+    assert low.model.alpha == pytest.approx(1e3)
+    steep = identify(run, "bouc-wen", Paper(search="optimum", bounds=((0.0, 1e8), (0.0, 1e4))), gas=GAS)
+    assert steep.at_bounds == ("beta",)
+    assert steep.model.beta == pytest.approx(1e4, rel=1e-6)
