@@ -251,7 +251,9 @@ def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None, *
     candidates.sort(key=lambda c: c is not chosen)
     held = chosen.fit.at_bounds if isinstance(chosen.fit, JointFit | ModifiedFit) else ()
     errors_left_out = [r.scores for r in chosen.left_out.runs]
-    chosen = replace(chosen, damper=certain(chosen.damper, train, errors_left_out, held))
+    chosen = replace(
+        chosen, damper=certain(chosen.damper, train if chosen.recipe.basis else everything, errors_left_out, held)
+    )
     candidates[0], known = _with_sessions(chosen, dataset)
     return RigStudy(
         rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), refused, impossible, model is not None, known
