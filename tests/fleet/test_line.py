@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import polars as pl
 import pytest
 from support.fleets import LINE, ROWS, planned, same_bits
@@ -16,6 +17,8 @@ from mrdamper.cli import application
 from mrdamper.errors import InputError
 from mrdamper.files.dataset import load_dataset, save_dataset
 from mrdamper.fleet.generator import Line
+from mrdamper.fleet.items import find_items
+from mrdamper.fleet.lake import lake_dataset
 from mrdamper.fleet.line import run_fleet
 from mrdamper.fleet.profile import FleetProfile
 
@@ -221,3 +224,43 @@ def test_forces_of_the_line_are_those_of_its_records(line, identified):
         assert row[top] == pytest.approx(fastest.max(), rel=0.06)
         assert row["gas_force_N"] == pytest.approx(damper.rig.offset_force, abs=6)
         assert row["friction_N"] == pytest.approx(damper.rig.friction_high + damper.rig.yield_off, rel=0.3)
+
+
+def test_a_damaged_lake_is_refused_by_file(tmp_path):
+    t = np.arange(200) / 100
+    channels = {"time_s": t, "displacement_m": 0.01 * np.sin(6 * t), "force_N": 300 * np.cos(6 * t), "current_A": 0 * t}
+    table = pl.DataFrame({"serial": ["D1"] * 200, "run_id": ["a"] * 200, **channels})
+    table.write_parquet(tmp_path / "a.parquet")
+    whole = (tmp_path / "a.parquet").read_bytes()
+    rng = np.random.default_rng(2)
+    codes = set()
+    for _ in range(40):
+        content = bytearray(whole)
+        for at in rng.integers(0, len(whole), 4):
+            content[at] = rng.integers(256)
+        (tmp_path / "b.parquet").write_bytes(content)
+        for item in find_items(tmp_path, FleetProfile()):
+            try:
+                if item.error is not None:
+                    raise item.error
+                lake_dataset(item)
+            except InputError as error:
+                codes.add(error.code)
+    assert "E_FORMAT" in codes
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "code"),
+    [("force_N", pl.lit(None, pl.Float64), "E_NONFINITE"), ("steady_t0_s", pl.lit("soon"), "E_COLUMN")],
+)
+def test_what_a_lake_lacks_is_said_of_the_damper(line, tmp_path, column, value, code):
+    dataset = load_dataset(line / next(path.name for path in sorted(line.iterdir())))
+    facts = pl.DataFrame([{**_facts(run), "serial": "D1"} for run in dataset])
+    samples = pl.concat([pl.DataFrame({"run_id": run.id, "time_s": run.time, "displacement_m": run.displacement,
+                                       "force_N": run.force}) for run in dataset])  # fmt: skip
+    samples.join(facts, on="run_id", maintain_order="left").with_columns(value.alias(column)).write_parquet(
+        tmp_path / "a.parquet"
+    )
+    with pytest.raises(InputError) as refused:
+        lake_dataset(next(iter(find_items(tmp_path, FleetProfile()))))
+    assert refused.value.code == code

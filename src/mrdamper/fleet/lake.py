@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mrdamper.data import Dataset, Run
-from mrdamper.errors import ColumnError, UnitError
+from mrdamper.errors import ColumnError, InputError, UnitError
 from mrdamper.fleet.items import FleetError, Item, make_item
 from mrdamper.fleet.profile import COLUMNS, FACTS, FleetProfile
 
@@ -47,7 +48,13 @@ def lake_items(paths: Sequence[Path], profile: FleetProfile) -> list[Item]:
         columns = {fact: c for fact in FACTS if (c := _column_of(fact, names, profile)) is not None}
         keys = [pl.col(column).cast(pl.String).alias(fact) for fact, column in columns.items()]
         table = pl.scan_parquet(path, hive_partitioning=False).select(keys).with_row_index("row")
-        table = table.group_by(list(columns)).agg(pl.min("row").alias("first"), pl.max("row").alias("last")).collect()
+        table = table.group_by(list(columns)).agg(pl.min("row").alias("first"), pl.max("row").alias("last"))
+        try:
+            with _refusing_damage(path):
+                table = table.collect()
+        except FleetError as damaged:
+            refused.append(Item(path.stem, kind="lake", paths=(str(path),), error=damaged))
+            continue
         for row in table.sort(list(columns)).iter_rows(named=True):
             first, last = row.pop("first"), row.pop("last")
             if row["serial"] is None:
@@ -76,13 +83,14 @@ def lake_dataset(item: Item) -> Dataset:
 
     parts = []
     for path, (first, count) in zip(item.paths, item.rows, strict=True):
-        part = pl.scan_parquet(path, hive_partitioning=False).slice(first, count)
-        wanted = pl.col(item.column).cast(pl.String) == item.serial
-        for fact in ("session", "date"):  # a golden damper comes again
-            column = next((c for c in COLUMNS[fact] if c in part.collect_schema().names()), None)
-            if column is not None and getattr(item, fact):
-                wanted &= pl.col(column).cast(pl.String) == getattr(item, fact)
-        parts.append(part.filter(wanted).collect())
+        with _refusing_damage(Path(path)):
+            part = pl.scan_parquet(path, hive_partitioning=False).slice(first, count)
+            wanted = pl.col(item.column).cast(pl.String) == item.serial
+            for fact in ("session", "date"):  # a golden damper comes again
+                column = next((c for c in COLUMNS[fact] if c in part.collect_schema().names()), None)
+                if column is not None and getattr(item, fact):
+                    wanted &= pl.col(column).cast(pl.String) == getattr(item, fact)
+            parts.append(part.filter(wanted).collect())
     table = pl.concat(parts, how="diagonal_relaxed")
     runs = [_run(rows) for rows in table.partition_by("run_id", maintain_order=True)]
     return Dataset(tuple(runs), item.serial)
@@ -93,13 +101,16 @@ def _run(rows: pl.DataFrame) -> Run:
     where = f"run {first['run_id']}"
     channels = {}
     for name in (*_NEEDED[1:], "velocity_m_s"):
-        if name in rows.columns and rows[name].null_count() < rows.height:
+        if name in rows.columns and (name in _NEEDED[:-1] or rows[name].null_count() < rows.height):
             if not rows[name].dtype.is_numeric():
                 raise ColumnError(f"column {name} holds text", where=where, mend="write plain numbers")
-            channels[name] = np.array(rows[name].cast(float).to_numpy())
+            channels[name] = np.array(rows[name].cast(float).fill_null(float("nan")).to_numpy())
     if "current_A" not in channels:
         raise ColumnError("no current_A", where=where, mend="fill in the column current_A")
     start, end = first.get("steady_t0_s"), first.get("steady_t1_s")
+    for name, value in (("steady_t0_s", start), ("steady_t1_s", end)):
+        if not isinstance(value, int | float | None):
+            raise ColumnError(f"{name} is {value!r}", where=where, mend="give a number or leave the cell empty")
     return Run(
         id=str(first["run_id"]),
         time=channels["time_s"],
@@ -114,12 +125,27 @@ def _run(rows: pl.DataFrame) -> Run:
     )
 
 
+@contextmanager
+def _refusing_damage(path: Path) -> Iterator[None]:
+    """Turn whatever the library raises on a damaged file into a refusal; its panics are no `Exception`."""
+    try:
+        yield
+    except (InputError, KeyboardInterrupt, SystemExit, MemoryError):
+        raise
+    except BaseException as error:
+        found = (str(error).strip().splitlines() or ["unreadable"])[0][:120]
+        raise FleetError(
+            f"damaged Parquet ({found})", where=str(path), mend="write it again", code="E_FORMAT"
+        ) from error
+
+
 def _columns(path: Path) -> list[str] | None:
     import polars as pl
 
     try:
-        return [*pl.read_parquet_schema(path)]
-    except (pl.exceptions.PolarsError, OSError):
+        with _refusing_damage(path):
+            return [*pl.read_parquet_schema(path)]
+    except FleetError:
         return None
 
 
