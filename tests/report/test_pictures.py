@@ -89,13 +89,20 @@ def paper(written):
     return PdfReader(io.BytesIO((written / "report.pdf").read_bytes()))
 
 
-def lines_of(page):
-    """Texts of a page as (y from below, text) [pt]."""
+@pytest.fixture(scope="session")
+def texts(paper):
+    """Of each page its text, and the pieces of it as (y from below, text) [pt]."""
+    return [pieces_of(page) for page in paper.pages]
+
+
+def pieces_of(page):
     found = []
-    page.extract_text(
-        visitor_text=lambda text, cm, tm, font, size: text.strip() and found.append((tm[5], text.strip()))
-    )
-    return found
+
+    def take(text, cm, tm, font, size):
+        if text.strip():
+            found.append((tm[5], text.strip()))
+
+    return page.extract_text(visitor_text=take), found
 
 
 def headings_of(paper):
@@ -109,12 +116,12 @@ def headings_of(paper):
     return flat
 
 
-def test_no_heading_ends_a_printed_page(paper):
+def test_no_heading_ends_a_printed_page(paper, texts):
     headings = headings_of(paper)
     assert len(headings) > 15
     for title, number in headings:
         page = paper.pages[number]
-        lines = lines_of(page)
+        _, lines = texts[number]
         at = next((y for y, text in lines if title.startswith(text[:30]) or text.startswith(title[:30])), None)
         assert at is not None, title
         below = [text for y, text in lines if 60 < y < at - 5]  # the number of the page stands under 60
@@ -133,20 +140,20 @@ def test_figures_are_drawn_in_the_print(paper, drawings):
     assert all(len(form.get_data()) > 2000 for form in objects)
 
 
-def test_nothing_of_the_page_is_lost_in_the_print(paper, bundled_study, written):
-    text = " ".join(page.extract_text() for page in paper.pages)
+def test_nothing_of_the_page_is_lost_in_the_print(texts, bundled_study):
+    text = " ".join(whole for whole, _ in texts)
     squeezed = re.sub(r"\s", "", text)
     for run in bundled_study.dataset:
         if run.excitation == "sine":
             assert run.id in squeezed
     assert re.sub(r"\s", "", WIDE) in squeezed
     assert "Every run: motion and loop" in text  # folded on the page
-    for number in range(1, len(paper.pages) + 1):
-        assert f"page {number} of {len(paper.pages)}" in text
+    for number, (whole, _) in enumerate(texts, 1):
+        assert f"page {number} of {len(texts)}" in whole
 
 
-def test_no_cell_of_a_printed_table_is_cut_inside_a_number(paper):
-    text = "\n".join(page.extract_text() for page in paper.pages)
+def test_no_cell_of_a_printed_table_is_cut_inside_a_number(texts):
+    text = "\n".join(whole for whole, _ in texts)
     assert not re.search(r"\de[+-]?\n\d", text)
     assert not re.search(r"\d\.\n\d", text)
 

@@ -98,7 +98,9 @@ function band(head, arrays, a, b) {
 
 function predictedLoop(loop, head, arrays) {
   const now = loop.name === "now";
-  const untested = head.extrapolation.some((flag) => now || flag !== "current"); // those of a family lie at tested currents
+  const [low, high] = head.tested_A; // a family lies at the currents of the data, of which this damper may know few
+  const inside = loop.current_A >= 0.999 * low - 1e-9 && loop.current_A <= 1.001 * high + 1e-9;
+  const untested = head.extrapolation.some((flag) => now || flag !== "current") || !(now || inside);
   const dash = untested ? "dash" : "solid";
   const look = now
     ? { color: "predicted", width: 2.6, name: "predicted", dash }
