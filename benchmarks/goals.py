@@ -29,7 +29,7 @@ class Goal:
         return {True: "met", False: "missed", None: "not measured"}[self.met]
 
 
-_STUDY = "the slower rig's fits, then 16 figures drawn twice, follow each other: see the parts below"
+_STUDY = "each rig's fits, then the drawing of its figures, follow one another in its process: see the parts below"
 _STREAM = "a step is the whole force of the model, every parameter free to change, not the state alone"
 
 

@@ -44,7 +44,7 @@ def page(results: Results) -> str:
         "not installed is left out (`pip install openseespy` brings the one that `make bench` does not).",
         "## Goals",
         _table(
-            ("goal", "limit", "measured", "", "why missed"),
+            ("goal", "limit", "measured", "verdict", "why missed"),
             (
                 (
                     g.name,
