@@ -41,4 +41,19 @@ EXPLAINED: dict[tuple[str, str, str], str] = {
         "levels = [np.isclose(currents, level, atol=2e-3) for level in np.unique(np.round(currents, 3))]",
         "3 → 4",
     ): "the tests' currents have fewer digits",
+    (
+        "reproduction.verdicts",
+        'sign = 1.0 if self.sense == "below" else -1.0',
+        "1.0 → 10.0",
+    ): "only the sign decides on which side a number lies",
+    (
+        "reproduction.verdicts",
+        'return Limit(number, "below", holds, holds if near is None else near)',
+        "arguments 0 and 2 exchanged",
+    ): "runs when the module is loaded, before a fault is planted; the tests repeat every limit",
+    (
+        "reproduction.verdicts",
+        'return Limit(number, "above", holds, holds if near is None else near)',
+        "arguments 0 and 2 exchanged",
+    ): "runs when the module is loaded, before a fault is planted; the tests repeat every limit",
 }
