@@ -168,8 +168,8 @@ class Loop:
             If there are too many steps, or one has no solution.
         """
         system, n = self.system, len(self.system.coordinates)
-        samples = int(self.source.duration / dt + 1e-6) + 1
-        if not (dt > 0 and 2 < samples <= _MOST_STEPS):
+        samples = int(min(self.source.duration / dt, 2.0 * _MOST_STEPS) + 1e-6) + 1 if 0 < dt < math.inf else 0
+        if not 2 < samples <= _MOST_STEPS:
             raise StepError(
                 f"{self.source.duration:g} s in steps of {dt:g} s",
                 where=system.name,
@@ -200,7 +200,10 @@ class Loop:
             rows = (*rows, road @ self.D.T, road_rate @ self.D.T, H, seen)
             held = (numbers.given, numbers.derived, numbers.start.copy(), control.given, control.derived, control.start)
             written = (current, x, v, force, flags)
-            failed = self._walk(machine)(float(dt), every, *map(np.ascontiguousarray, rows), *held, *written)
+            try:
+                failed = self._walk(machine)(float(dt), every, *map(np.ascontiguousarray, rows), *held, *written)
+            except ArithmeticError:  # of the interpreter, where machine code goes on with what is not finite
+                failed = int(np.flatnonzero(x.any(axis=1))[-1]) + 1 if x.any() else 1
         if failed >= 0 or not np.isfinite(x).all():
             raise StepError(
                 f"no solution at {time[max(failed, 0)]:.6g} s",

@@ -15,6 +15,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import StructureError, UnknownNameError
 
+_FASTEST = 1e6  # Hz, of a natural frequency: beyond, a unit is wrong
 _SYMMETRY = 1e-9  # relative difference of K and K' that rounding may leave
 
 
@@ -114,6 +115,13 @@ class System:
                     mend="check the signs off the diagonal",
                     code=f"E_{_CODES[letter]}",
                 )
+        if not (highest := float(self.frequencies_Hz().max(initial=0.0))) < _FASTEST:
+            raise StructureError(
+                f"a natural frequency of {highest:.3g} Hz",
+                where=self.name,
+                mend="check the units of masses and stiffnesses",
+                code="E_STIFFNESS",
+            )
         for link in self.links:
             for end in (link.above, link.below):
                 if end not in self.known:

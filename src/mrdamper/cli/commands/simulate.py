@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -158,10 +159,10 @@ def _amperes(current: float | None, volts: float | None, dampers: dict[str, Damp
     if current is not None and volts is not None:
         raise InputError("--current beside --volts", mend="give one")
     if volts is None or not dampers:
-        if current is not None and not current >= 0:
+        if current is not None and not 0 <= current < math.inf:
             raise InputError(f"--current {current:g}", mend="give zero or more")
         return current
-    if not volts >= 0:
+    if not 0 <= volts < math.inf:
         raise InputError(f"--volts {volts:g}", mend="give zero or more")
     gains = {d.coil.driver if d.coil else None for d in dampers.values()}
     driver = gains.pop()
