@@ -53,10 +53,10 @@ def test_parameters_of_another_kind_of_damper_are_found_without_tuning():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("virtual", DAMPERS, ids=[virtual.name for virtual in DAMPERS])
-def test_every_made_damper_is_predicted_to_twice_its_noise(virtual):
+def test_every_made_damper_is_predicted_to_thrice_its_noise(virtual):
     made = identified(virtual)
     assert not made.astray
-    assert made.left_out < 2 * virtual.noise
+    assert made.left_out < 3 * virtual.noise
     if virtual.tests in ("random", "switched"):
         assert made.unseen < 2 * virtual.noise
     if not virtual.lost:
