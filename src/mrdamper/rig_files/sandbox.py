@@ -32,10 +32,21 @@ _SECONDS = 0.6  # processor time of the child for the smallest file; a busy mach
 _BYTES, _BYTES_PER_BYTE = 96 * 2**20, 3 * MOST_RATIO  # memory the child may write to beyond what its library holds
 _GLANCE, _GLANCES = 0.15, 4  # seconds between looks at a silent child, looks at which it sleeps until it is ended
 _PATIENCE = 30  # real time over processor time, on a loaded machine
-_START = (
-    "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
-    "from mrdamper.rig_files.sandbox_worker import serve; serve()"
-)
+# It ends with its parent even while it still loads libraries, before it listens.
+_START = """
+import json, os, sys, threading, time
+
+def watch(parent):
+    while os.getppid() == parent:
+        time.sleep(0.2)
+    os._exit(0)
+
+if os.name == "posix":
+    threading.Thread(target=watch, args=(int(sys.argv[2]),), daemon=True).start()
+sys.path[:] = json.loads(sys.argv[1])
+from mrdamper.rig_files.sandbox_worker import serve
+serve()
+"""
 
 
 @contextlib.contextmanager
@@ -117,7 +128,7 @@ class _Sandbox:
     def __init__(self) -> None:
         environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "POLARS_MAX_THREADS": "2"}
         self._process = subprocess.Popen(
-            [sys.executable, "-c", _START, json.dumps(sys.path)],
+            [sys.executable, "-c", _START, json.dumps(sys.path), str(os.getpid())],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment,
         )  # fmt: skip
 
