@@ -414,7 +414,8 @@ def _files(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:
         known = [file for file in inside if file.suffix.lower() in suffixes()]
         known = known or [file for file in inside if _is_table(file)]  # suffixes of a laboratory's own: run.001
         files += known
-        others += [file for file in inside if file not in set(known)]
+        read = set(known)
+        others += [file for file in inside if file not in read]
     if not files:
         where = ", ".join(path.name for path in paths)
         raise RigFileError("E_NO_DATA", "no rig's file in this folder", file=where, mend="give another folder")
