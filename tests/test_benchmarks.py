@@ -101,7 +101,7 @@ def test_parts_of_a_study_add_up_run_by_run():
 def test_a_missed_goal_says_why():
     rows = [commands.ProcessRow("mrdamper study, caches filled", 7.0, 12.0, 200.0)]
     text = page.page(page.Results(quick=True, processes=rows))
-    assert "| 7.00 | missed | the slower rig" in text
+    assert "| 7.00 | missed | each rig's fits" in text
     met = page.page(page.Results(quick=True, processes=[commands.ProcessRow(rows[0].name, 4.0, 6.0, 200.0)]))
     assert "| 4.00 | met |  |" in met
 
