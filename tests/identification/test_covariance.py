@@ -138,3 +138,18 @@ def test_standard_errors_are_the_scatter_of_repeated_identifications():
         scatter = float(np.std([getattr(i.model, name) for i in found], ddof=1))
         said = float(np.median([i.standard_errors[name] for i in found]))
         assert said == pytest.approx(scatter, rel=0.25), name  # 60 repeats know their scatter to 9 %
+
+
+@pytest.mark.parametrize(
+    ("value", "ends", "unit", "text"),
+    [
+        (731.2, (620.0, 842.4), "N s/m", "730 ± 110 N s/m"),
+        (2e-4, (1.96e-4, 2.04e-4), "m", "0.2 ± 0.004 mm"),
+        (4.9e-3, (3.6e-3, 6.5e-3), "m/s", "4.9 (3.6 to 6.5) mm/s"),
+        (0.3, (0.2, 0.4), "-", "0.3 ± 0.1"),
+        (2200.0, (4e-11, 1e17), "N/A", "2200 N/A (not known by itself)"),
+        (0.5, None, "m", "500 mm"),
+    ],
+)
+def test_a_number_is_written_as_an_engineer_reads_it(value, ends, unit, text):
+    assert written(value, ends, unit) == text

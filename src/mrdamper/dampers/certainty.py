@@ -134,7 +134,8 @@ def unsure(damper: Damper) -> list[str]:
             size = f"known to a factor of {np.exp(error):.1f} only" if error < _AT_ALL else "not known at all"
             said.append(f"{name} is {size}.")
         elif not known.logs[i] and error > _BADLY * abs(numbers[name].value):
-            said.append(f"{name} cannot be told from zero: its standard error is {error:.2g} {numbers[name].unit}.")
+            about = written(error, None, numbers[name].unit)
+            said.append(f"{name} cannot be told from zero: its standard error is {about}.")
     apart = [i for i, name in enumerate(known.names) if name not in known.unknown]
     names, block = [known.names[i] for i in apart], known.covariance[np.ix_(apart, apart)]
     return [*said, *(f"{text}." for text in weaknesses(names, block))]

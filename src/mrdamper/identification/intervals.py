@@ -38,16 +38,24 @@ def interval_about(value: float, error: float, dof: float, level: float, log: bo
     return (float(value * np.exp(-half)), float(value * np.exp(half))) if log else (value - half, value + half)
 
 
-def written(value: float, ends: tuple[float, float] | None, unit: str = "") -> str:
-    """A number with its interval and unit, to two digits of the half width: 730 ± 110 N s/m, 0.3 (0.1 to 0.9) m.
+_SHOWN = {"-": (1.0, ""), "m": (1e3, "mm"), "m/s": (1e3, "mm/s")}  # how a unit stands on screens
+_DECADES = 1e4
 
-    `ends` is None where nothing is known of it.
+
+def written(value: float, ends: tuple[float, float] | None, unit: str = "") -> str:
+    """A number with its interval and unit, to two digits of the half width: 730 ± 110 N s/m, 0.3 (0.1 to 0.9) mm.
+
+    Lengths and speeds in millimetres, as on every screen. `ends` is None where nothing is known
+    of it; an interval over four decades says that only others with it are known.
     """
-    unit = "" if unit == "-" else unit
+    factor, unit = _SHOWN.get(unit, (1.0, unit))
+    value, ends = factor * value, ends and (factor * ends[0], factor * ends[1])
     if ends is None or not all(map(math.isfinite, ends)):
         return f"{_plain(value, 4)} {unit}".strip()
     low, high = ends
     half = (high - low) / 2
+    if 0 < low * _DECADES < high:
+        return f"{_plain(value, 2)} {unit} (not known by itself)"
     if half == 0:
         return f"{_plain(value, 6)} ± 0 {unit}".strip()
     digits = max(1, math.floor(math.log10(max(abs(value), half))) - math.floor(math.log10(half)) + 2)
