@@ -37,6 +37,8 @@ class Spread:
         Degrees of freedom behind each variance, for Student's t.
     effective : (P,) array
         Independent samples that would give each parameter's error, were the residual white.
+    textbook : (P,) array
+        Standard errors by s² (JᵀJ)⁻¹, as if the residual were white.
     memory : float
         Length of the record in lags of its residual; a record shorter than some ten says little.
     alike : tuple of tuples of int
@@ -46,6 +48,7 @@ class Spread:
     covariance: Floats
     dof: Floats
     effective: Floats
+    textbook: Floats
     memory: float
     alike: tuple[tuple[int, ...], ...] = ()
 
@@ -82,7 +85,7 @@ def spread(jacobian: Floats, residual: Floats, time: Floats | None = None, frequ
     size, count = residual.size, scale.size
     covariance = np.diag(np.full(count, np.inf))
     if not known.any():
-        return Spread(covariance, np.ones(count), np.zeros(count), np.inf)
+        return Spread(covariance, np.ones(count), np.zeros(count), np.full(count, np.inf), np.inf)
     unit = jacobian[:, known] / scale[known]
     values, vectors = np.linalg.eigh(unit.T @ unit)
     safe = np.maximum(values, np.finfo(float).eps * values[-1] * known.sum())
@@ -99,12 +102,12 @@ def spread(jacobian: Floats, residual: Floats, time: Floats | None = None, frequ
         covariance[row, row] = np.inf
     textbook = np.full(count, np.inf)
     variance = float(residual @ residual) / max(size - known.sum(), 1)
-    textbook[rows] = variance * np.diag(inverse) / scale[known] ** 2
+    textbook[rows] = np.where(lost, np.inf, variance * np.diag(inverse) / scale[known] ** 2)
     with np.errstate(invalid="ignore", divide="ignore"):
         effective = np.nan_to_num(size * textbook / np.diag(covariance), nan=0.0, posinf=float(size))
     free = np.ones(count)
     free[rows] = np.clip(dof, 1.0, max(size - known.sum(), 1))
-    return Spread(covariance, free, np.minimum(effective, size), memory, alike)
+    return Spread(covariance, free, np.minimum(effective, size), np.sqrt(textbook), memory, alike)
 
 
 def score_covariance(
