@@ -42,6 +42,14 @@ def test_round_trip_keeps_every_bit(tmp_path):
     assert after["a"].velocity is None
 
 
+def test_a_relative_path_is_of_the_folder_one_stands_in(tmp_path, monkeypatch):
+    for name in ("first", "second"):  # the process that reads was started in the first
+        (tmp_path / name).mkdir()
+        monkeypatch.chdir(tmp_path / name)
+        save_dataset(dataset(), f"{name}-tests")
+        assert len(load_dataset(f"{name}-tests")) == 2
+
+
 def test_a_killed_save_leaves_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(pl.DataFrame, "write_parquet", lambda *a, **k: (_ for _ in ()).throw(OSError("disk full")))
     with pytest.raises(OSError, match="disk full"):

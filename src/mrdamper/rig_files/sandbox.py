@@ -69,7 +69,8 @@ def guarded_tables(source: Source, reader: Reader, form: FileForm) -> Iterator[l
     with contextlib.ExitStack() as stack:
         path = _on_disk(source, stack)
         sandbox = stack.enter_context(SANDBOXES.taken(reader.name))
-        request = {"reader": reader.name, "path": str(path), "name": source.name, "suffix": source.suffix}
+        # The child keeps the folder it was started in; this process may stand in another by now.
+        request = {"reader": reader.name, "path": str(path.absolute()), "name": source.name, "suffix": source.suffix}
         limits = {
             "seconds": _SECONDS + reader.seconds_per_byte * source.size,
             "bytes": _BYTES + _BYTES_PER_BYTE * source.size,
@@ -128,7 +129,7 @@ class _Sandbox:
     def __init__(self) -> None:
         environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "POLARS_MAX_THREADS": "2"}
         self._process = subprocess.Popen(
-            [sys.executable, "-c", _START, json.dumps(sys.path), str(os.getpid())],
+            [sys.executable, "-c", _START, json.dumps([str(Path(p).absolute()) for p in sys.path]), str(os.getpid())],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment,
         )  # fmt: skip
 

@@ -90,8 +90,11 @@ def choices(session: Current) -> dict[str, Any]:
     }
 
 
+_NO_HEAD = Head()
+
+
 @router.post("/study")
-def start_study(head: Head, session: Current) -> dict[str, Any]:
+def start_study(session: Current, head: Head = _NO_HEAD) -> dict[str, Any]:
     """Begin the whole method on all data."""
     folder, about = session.folder / session.key("study"), head.given
     return session.start(
