@@ -169,12 +169,14 @@ def test_a_signal_ends_a_command_with_its_number_and_one_line(name, code):
         "def busy(prog_name):\n    print('up', flush=True)\n    time.sleep(60)\n"
         "c.application = lambda: busy\nc.main()"
     )
-    process = subprocess.Popen(
-        [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    assert process.stdout.readline() == "up\n"
-    process.send_signal(getattr(signal, name))
-    _, said = process.communicate(timeout=20)
+    number = getattr(signal, name)
+    with subprocess.Popen(
+        [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(number, signal.SIG_DFL),  # under nohup the tests begin with it ignored
+    ) as process:  # fmt: skip
+        assert process.stdout.readline() == "up\n"
+        process.send_signal(number)
+        _, said = process.communicate(timeout=20)
     assert process.returncode == code
     assert said == f"mrdamper: ended by {name}; what was not finished is not written\n"
 

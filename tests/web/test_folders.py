@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from pathlib import Path
 
 import pytest
 
@@ -33,3 +34,9 @@ def test_folders_of_killed_benches_go_and_others_stay(tmp_path, monkeypatch):
     assert other.is_dir()
     assert link.is_symlink()
     assert precious.is_dir()
+
+
+def test_a_folder_that_goes_while_it_is_looked_at_is_no_fault(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(Path, "glob", lambda folder, pattern: [tmp_path / "mrdamper-bench-1-gone"])
+    assert bench_folder().is_dir()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import stat
 import tempfile
 from pathlib import Path
 
@@ -24,8 +25,11 @@ def bench_folder() -> Path:
 def _is_mine(path: Path) -> bool:
     if os.name != "posix":  # without process ids that can be asked for, nothing is removed
         return False
-    status = path.lstat()
-    return path.is_dir() and not path.is_symlink() and status.st_uid == os.getuid()
+    try:
+        status = path.lstat()
+    except FileNotFoundError:  # its own bench, or another that sweeps, was faster
+        return False
+    return stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid()
 
 
 def _runs(process: int) -> bool:
