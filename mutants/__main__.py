@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import importlib
 import os
-import pickle
 import signal
 import sys
 import time
@@ -20,6 +19,7 @@ from pathlib import Path
 
 from mutants.explained import EXPLAINED
 from mutants.faults import SOURCE, Fault, faults_of
+from mutants.fork import in_fork
 from mutants.rooms import ROOMS, Room
 
 ROOT = Path(__file__).parent.parent
@@ -78,43 +78,21 @@ def _share(module: str, share: float) -> list[Fault]:
 
 def _try_room(room: Room, faults: list[Fault], jobs: int) -> tuple[list[Fault], str]:
     """Survivors among the faults of a room, or why they could not be tried; in a process of its own."""
-    reader, writer = os.pipe()
-    child = os.fork()
-    if child == 0:
-        os.close(reader)
-        answer: tuple[list[Fault], str] = [], "the tests could not be collected"
-        try:
-            from mutants.trial import Trial
 
-            trial = Trial(faults, jobs, PATIENCE, os.dup(2))
-            silent = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(silent, 1)
-            os.dup2(silent, 2)
-            import pytest
+    def work() -> tuple[list[Fault], str]:
+        from mutants.trial import Trial
 
-            arguments = [
-                "-q",
-                "-m",
-                "not slow",
-                "-p",
-                "no:cacheprovider",
-                "-p",
-                "no:xdist",
-                "-p",
-                "no:benchmark",
-                "--tb=no",
-            ]
-            pytest.main([*arguments, *room.tests], plugins=[trial])
-            answer = trial.survivors, trial.why
-        finally:
-            with os.fdopen(writer, "wb") as pipe:
-                pickle.dump(answer, pipe)
-            os._exit(0)
-    os.close(writer)
-    with os.fdopen(reader, "rb") as pipe:
-        answer = pickle.load(pipe)
-    os.waitpid(child, 0)
-    return answer
+        trial = Trial(faults, jobs, PATIENCE, os.dup(2))
+        silent = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(silent, 1)
+        os.dup2(silent, 2)
+        import pytest
+
+        plain = ["-q", "-m", "not slow", "-p", "no:cacheprovider", "-p", "no:xdist", "-p", "no:benchmark", "--tb=no"]
+        pytest.main([*plain, *room.tests], plugins=[trial])
+        return trial.survivors, trial.why
+
+    return in_fork(work) or ([], "the tests could not be collected")
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 from mutants.faults import Fault, path_of, planted
+from mutants.fork import in_fork
 
 
 class Trial:
@@ -49,7 +50,7 @@ class Trial:
         for module in {fault.module for fault in self.faults}:
             importlib.import_module(module)  # what is found and loaded later would be loaded whole again
         files = {str(path_of(fault.module)) for fault in self.faults}
-        answer = _in_fork(lambda: self._healthy(session, files), 600)
+        answer = in_fork(lambda: self._healthy(session, files), 600)
         if not isinstance(answer, tuple):
             self.why = f"fail without any fault ({answer}): mend them first"
             return True
@@ -172,25 +173,3 @@ def _key(code: CodeType) -> tuple[str, str, int]:
 def _fixtures(item: pytest.Item) -> set[str]:
     found = item._fixtureinfo.name2fixturedefs
     return {f"fixture {d.baseid}::{name}" for name, definitions in found.items() for d in definitions}
-
-
-def _in_fork(work: Any, limit: int) -> Any:
-    """What the work returns, from a fork; None where it broke off."""
-    import pickle
-
-    reader, writer = os.pipe()
-    child = os.fork()
-    if child == 0:
-        signal.alarm(limit)
-        answer = None
-        try:
-            answer = work()
-        finally:
-            with os.fdopen(writer, "wb") as pipe:
-                pickle.dump(answer, pipe)
-            os._exit(0)
-    os.close(writer)
-    with os.fdopen(reader, "rb") as pipe:
-        answer = pickle.load(pipe)
-    os.waitpid(child, 0)
-    return answer
