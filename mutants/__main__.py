@@ -24,7 +24,7 @@ from mutants.rooms import ROOMS, Room
 
 ROOT = Path(__file__).parent.parent
 MOST = 0.05  # of the faults may survive
-PATIENCE = 10.0  # a fault may make tests this much slower [s], beyond five times
+PATIENCE = 4.0  # a fault may make tests this much slower [s], beyond five times
 LIBRARIES = ("numpy", "scipy.optimize", "scipy.special", "scipy.signal", "scipy.stats", "polars", "matplotlib.figure",
              "pydantic", "typer.testing", "jinja2", "pytest")  # fmt: skip
 

@@ -18,8 +18,8 @@ _SWAPS: dict[type[ast.AST], type[ast.AST]] = {
     ast.Lt: ast.GtE, ast.LtE: ast.Gt, ast.Gt: ast.LtE, ast.GtE: ast.Lt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
     ast.And: ast.Or, ast.Or: ast.And, ast.In: ast.NotIn, ast.NotIn: ast.In, ast.Is: ast.IsNot, ast.IsNot: ast.Is,
 }  # fmt: skip
-_FUNCTIONS = {"min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum", "mean": "sum", "sin": "cos",
-              "cos": "sin", "exp": "expm1", "median": "max", "std": "var", "ptp": "max", "sqrt": "abs",
+_FUNCTIONS = {"min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum", "mean": "median", "sin": "cos",
+              "cos": "sin", "exp": "expm1", "median": "mean", "std": "var", "ptp": "max", "sqrt": "abs",
               "any": "all", "all": "any", "argmin": "argmax", "argmax": "argmin", "log": "log1p"}  # fmt: skip
 _TWINS = (
     ("train", "held_out"), ("current_A", "frequency_Hz"), ("frequency_Hz", "amplitude_m"), ("nrmse_pp", "nrmse_std"),
@@ -30,6 +30,8 @@ _TWINS = (
 )  # fmt: skip
 _SYMMETRIC = {"max", "min", "maximum", "minimum", "hypot", "rmse", "isclose", "dict",
               "dissipated_power"}  # fmt: skip
+_TEXTS = {"train": "validate", "validate": "train", "below": "above", "above": "below",
+          "nrmse_pp": "nrmse_std", "energy_error": "peak_error", "peak_error": "energy_error"}  # fmt: skip
 _GUARD = 1e-6  # a number below it only keeps a division or a step alive
 _TELLS = {"progress", "round", "isclose"}  # words for whoever waits, and how near is the same
 _TWIN = {a: b for a, b in _TWINS} | {b: a for a, b in reversed(_TWINS)}
@@ -133,6 +135,8 @@ def _changes(node: ast.expr | ast.stmt) -> Iterator[tuple[str, Callable[[], None
             yield f"{_name(op)} → {_name(new)}", lambda: setattr(node, "op", new)
         case ast.UnaryOp(op=ast.USub() | ast.Not()):
             yield f"{_name(node.op)} dropped", lambda: _become(node, node.operand)
+        case ast.Constant(value=str() as text) if text in _TEXTS:
+            yield f"{text} → {_TEXTS[text]}", lambda: setattr(node, "value", _TEXTS[text])
         case ast.Constant(value=bool()) | ast.Constant(value=None) | ast.Constant(value=str()):
             return
         case ast.Constant(value=int() | float() as value) if value == 0 or abs(value) > _GUARD:
@@ -156,6 +160,10 @@ def _call_changes(node: ast.Call, func: ast.expr) -> Iterator[tuple[str, Callabl
         yield f"{func.attr} → {_FUNCTIONS[func.attr]}", lambda: setattr(func, "attr", _FUNCTIONS[func.attr])
     if isinstance(func, ast.Name) and func.id in _FUNCTIONS:
         yield f"{func.id} → {_FUNCTIONS[func.id]}", lambda: setattr(func, "id", _FUNCTIONS[func.id])
+    if _called(node) == "abs":
+        yield "abs dropped", lambda: setattr(node, "func", ast.parse("__import__('operator').pos", mode="eval").body)
+    if _called(node) == "sorted" and all(keyword.arg != "reverse" for keyword in node.keywords):
+        yield "sorted backwards", lambda: node.keywords.append(_backwards())
     if len(node.args) > 1 and _called(node) not in _SYMMETRIC:
         yield from _exchanges("arguments", node.args)
     values = [keyword for keyword in node.keywords if not isinstance(keyword.value, ast.Constant)]
@@ -195,6 +203,10 @@ def _text(node: ast.expr) -> bool:
     return isinstance(node, ast.JoinedStr) or (
         isinstance(node, ast.Constant) and isinstance(node.value, str | type(None))
     )
+
+
+def _backwards() -> ast.keyword:
+    return ast.keyword("reverse", ast.Constant(True))
 
 
 def _become(node: ast.UnaryOp, operand: ast.expr) -> None:

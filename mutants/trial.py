@@ -27,7 +27,7 @@ class Trial:
     jobs : int
         Forks at a time.
     patience : float
-        Seconds a fault may add.
+        Seconds of processor time a fault may add.
     console : int
         File descriptor for progress.
     """
@@ -55,7 +55,8 @@ class Trial:
             self.why = f"fail without any fault ({answer}): mend them first"
             return True
         self.seconds, self.through = answer
-        self.functions = [f for f in gc.get_objects() if isinstance(f, FunctionType)]
+        alive = (f for f in gc.get_objects() if isinstance(f, FunctionType))
+        self.functions = [f for f in alive if f.__code__.co_filename in files]
         gc.freeze()  # forks then share the pages of what is there
         self._try_all(session)
         return True
@@ -63,11 +64,11 @@ class Trial:
     @pytest.hookimpl(hookwrapper=True)
     def pytest_fixture_setup(self, fixturedef: Any) -> Iterator[None]:
         """A shared fixture's calls and time count for every test that uses it."""
-        begin = time.perf_counter()
+        begin = time.process_time()
         self.running.append(f"fixture {fixturedef.baseid}::{fixturedef.argname}")
         yield
         name = self.running.pop()
-        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begin
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.process_time() - begin
 
     def _healthy(self, session: pytest.Session, files: set[str]) -> Any:
         def trace(frame: FrameType, event: str, argument: object) -> None:
@@ -77,9 +78,9 @@ class Trial:
 
         sys.settrace(trace)
         for item in session.items:
-            self.running, begin = [item.nodeid], time.perf_counter()
+            self.running, begin = [item.nodeid], time.process_time()
             item.config.hook.pytest_runtest_protocol(item=item, nextitem=None)
-            self.seconds[item.nodeid] = time.perf_counter() - begin
+            self.seconds[item.nodeid] = time.process_time() - begin
             if session.testsfailed:
                 return item.nodeid
         return self.seconds, self.through
@@ -95,7 +96,8 @@ class Trial:
             limit = self.patience + 5 * sum(self._cost(item) for item in tests)
             child = os.fork()
             if child == 0:
-                signal.alarm(int(limit) + 1)
+                signal.setitimer(signal.ITIMER_PROF, limit)  # of processor time: a busy machine notices nothing
+                signal.alarm(10 * int(limit))  # one that waits for ever uses none
                 os._exit(_noticed(session, self.functions, changed, tests))
             running[child] = fault
             while len(running) >= self.jobs:
@@ -134,10 +136,9 @@ def _noticed(
 ) -> int:
     """1 where a test fails with the fault planted, 0 where none does."""
     try:
-        file = changed[0][0].co_filename
         new = dict(changed)
         for function in functions:
-            if function.__code__.co_filename == file and function.__code__ in new:
+            if function.__code__ in new:
                 function.__code__ = new[function.__code__]
         for item in tests:
             item.config.hook.pytest_runtest_protocol(item=item, nextitem=None)
