@@ -34,7 +34,7 @@ def steady_peak(shape: Shape, amplitude: ArrayLike) -> float | Floats:
         Z/z_max [-]: kappa · amplitude far below yield, 1 far beyond. Derived: the distances from −Z to 0
         and from 0 to Z add up to the stroke.
     """
-    peaks = [-math.expm1(-_SteadyLoop.of(one, x).saturation) for one, x in _pairs(shape, amplitude)]
+    peaks = [-math.expm1(-loop.saturation) for loop in _loops(shape, amplitude)]
     return _like_pairs(peaks, shape, amplitude)
 
 
@@ -55,11 +55,18 @@ def steady_loop(shape: Shape, amplitude: float, theta: ArrayLike) -> Floats:
     (N,) array, or (P, N)
         zeta [-].
     """
-    if shape.is_many:
-        return np.stack([steady_loop(one, amplitude, theta) for one in shape])
     half_cycle, since_reversal = np.divmod(np.asarray(theta, dtype=float) + np.pi / 2, np.pi)
-    sign = 1.0 - 2.0 * (half_cycle % 2)
-    return sign * _SteadyLoop.of(shape, amplitude).loading(since_reversal)
+    sign, share = 1.0 - 2.0 * (half_cycle % 2), _share_of_stroke(since_reversal)
+    loops = list(_loops(shape, amplitude))
+    if not shape.is_many:
+        return sign * loops[0].loading(share)
+    found = np.empty((len(loops), share.size))
+    for rho in dict.fromkeys(loop.rho for loop in loops):  # alike: one curve for all of their samples
+        alike = [i for i, loop in enumerate(loops) if loop.rho == rho]
+        reach, to_zero = np.array([(loops[i].reach, loops[i].to_zero) for i in alike]).T[:, :, None]
+        phi = 2 * reach * share - to_zero
+        found[alike] = on_curve(loops[alike[0]].curve, rho, phi.ravel()).reshape(phi.shape)
+    return sign * found
 
 
 def loop_harmonics(shape: Shape, amplitude: ArrayLike, orders: Sequence[int] = (1, 3, 5, 7)) -> tuple[Floats, Floats]:
@@ -79,7 +86,7 @@ def loop_harmonics(shape: Shape, amplitude: ArrayLike, orders: Sequence[int] = (
     sine, cosine : (K,) arrays, or (P, K)
         [-], to 1e-13 for n = 1 and 2. The first cosine is loop_area/(π · amplitude).
     """
-    pairs = [_SteadyLoop.of(one, x).harmonics(np.asarray(orders)) for one, x in _pairs(shape, amplitude)]
+    pairs = [loop.harmonics(np.asarray(orders)) for loop in _loops(shape, amplitude)]
     sine, cosine = (np.array(side) for side in zip(*pairs, strict=True))
     return (sine, cosine) if len(_pair_shape(shape, amplitude)) else (sine[0], cosine[0])
 
@@ -100,7 +107,7 @@ def loop_area(shape: Shape, amplitude: ArrayLike) -> float | Floats:
         [m]. Derived: 2 (1 − rho)/kappa · ∫_0^Z y^(n+1)/((1 − y^n)(1 − rho y^n)) dy. Every term is
         positive, so the digits stay both in tiny and in saturated loops.
     """
-    areas = [_SteadyLoop.of(one, x).area() / float(one.kappa) for one, x in _pairs(shape, amplitude)]
+    areas = [loop.area() / loop.kappa for loop in _loops(shape, amplitude)]
     return _like_pairs(areas, shape, amplitude)
 
 
@@ -124,7 +131,7 @@ class _SteadyLoop:
     ----------
     curve, n, rho
         Of the shape.
-    reach : float
+    kappa, reach : float
         kappa · amplitude: amplitude in yield displacements.
     saturation : float
         r = −ln(1 − Z), which keeps its digits where Z is 1 to rounding.
@@ -133,11 +140,12 @@ class _SteadyLoop:
     curve: MasterCurve
     n: float
     rho: float
+    kappa: float
     reach: float
     saturation: float
 
     @classmethod
-    def of(cls, shape: Shape, amplitude: float) -> Self:
+    def of(cls, kappa: float, rho: float, n: float, amplitude: float) -> Self:
         """Solve for the peak.
 
         Distance −Z → 0 plus distance 0 → Z is the stroke. Both grow ever slower with r, so
@@ -145,8 +153,7 @@ class _SteadyLoop:
         """
         if not (amplitude > 0 and math.isfinite(amplitude)):
             raise ExcitationError(f"the amplitude is {amplitude:g} m", mend="give a positive amplitude")
-        n, rho, curve = shape.n, float(shape.rho), master_curve(shape.n)
-        reach = float(shape.kappa) * amplitude
+        curve, reach = master_curve(n), kappa * amplitude
         r = reach  # the first step from r = 0
         for _ in range(100):
             miss = 2 * reach - curve.climb_distance(r) - _to_zero(curve, rho, r)
@@ -155,17 +162,16 @@ class _SteadyLoop:
             r += max(step, 0.0)
             if step <= 4e-16 * r:
                 break
-        return cls(curve, n, rho, reach, r)
+        return cls(curve, n, rho, kappa, reach, r)
 
     @cached_property
     def to_zero(self) -> float:
         """Distance from the reversal to zeta = 0 [yield displacements]."""
         return _to_zero(self.curve, self.rho, self.saturation)
 
-    def loading(self, since_reversal: Floats) -> Floats:
-        """State at phases 0...pi after the lower reversal."""
-        distance = 2 * self.reach * np.sin(since_reversal / 2) ** 2  # = 1 − cos, without its cancellation
-        return on_curve(self.curve, self.rho, distance - self.to_zero)
+    def loading(self, share: Floats) -> Floats:
+        """State at shares of the stroke after the lower reversal."""
+        return on_curve(self.curve, self.rho, 2 * self.reach * share - self.to_zero)
 
     def harmonics(self, orders: np.ndarray) -> tuple[Floats, Floats]:
         """Fourier coefficients, by Gauss points on pieces of the phase on which the loop is smooth.
@@ -177,7 +183,7 @@ class _SteadyLoop:
         share = np.clip(np.append(distance, 2 * self.reach) / (2 * self.reach), 0.0, 1.0)
         share[-1] = 1.0
         phase, weight = _gauss_points(2 * np.arcsin(np.sqrt(share)), 16 + int(orders.max(initial=1)))
-        loading = self.loading(phase)
+        loading = self.loading(_share_of_stroke(phase))
         angle = np.multiply.outer(orders, phase - np.pi / 2)
         odd = np.where(orders % 2, 2 / np.pi, 0.0)
         return odd * (np.sin(angle) @ (weight * loading)), odd * (np.cos(angle) @ (weight * loading))
@@ -191,6 +197,11 @@ class _SteadyLoop:
         loss = (-np.expm1(-r)) ** (self.n + 1) / (rate * ((1 - self.rho) + self.rho * gap * rate))
         saturated = max(self.saturation - SATURATED, 0.0) / self.n
         return 2 * ((1 - self.rho) * float(weight @ loss) + saturated)
+
+
+def _share_of_stroke(since_reversal: Floats) -> Floats:
+    """Share of the stroke behind at phases 0...pi after a reversal: (1 − cos)/2 without its cancellation."""
+    return np.sin(since_reversal / 2) ** 2
 
 
 def _to_zero(curve: MasterCurve, rho: float, r: float) -> float:
@@ -221,9 +232,9 @@ def _pair_shape(shape: Shape, amplitude: ArrayLike) -> tuple[int, ...]:
     return np.broadcast(shape.kappa, shape.rho, np.asarray(amplitude)).shape
 
 
-def _pairs(shape: Shape, amplitude: ArrayLike) -> Iterator[tuple[Shape, float]]:
+def _loops(shape: Shape, amplitude: ArrayLike) -> Iterator[_SteadyLoop]:
     for kappa, rho, x in np.broadcast(shape.kappa, shape.rho, np.asarray(amplitude)):
-        yield Shape(float(kappa), float(rho), shape.n), float(x)
+        yield _SteadyLoop.of(float(kappa), float(rho), shape.n, float(x))
 
 
 def _like_pairs(values: list[float], shape: Shape, amplitude: ArrayLike) -> float | Floats:

@@ -14,7 +14,7 @@ from mrdamper.parameters import ParameterInfo
 
 
 def linear_table(
-    bare: Model, linear: Sequence[ParameterInfo], motion: Excitation, state: Floats
+    bare: Model, linear: Sequence[ParameterInfo], motion: Excitation, state: Floats, base: Floats | None = None
 ) -> tuple[Floats, Floats]:
     """Force of a model without its linear parameters, and what one unit of each adds.
 
@@ -26,6 +26,8 @@ def linear_table(
     motion : Excitation
         N samples.
     state : (N,) array
+    base : (N,) array, optional
+        Where it is known.
 
     Returns
     -------
@@ -34,7 +36,7 @@ def linear_table(
     columns : (N, L) array
         [N per unit of the parameter]
     """
-    base = bare.force(motion, state)
+    base = bare.force(motion, state) if base is None else base
     units = [1.0 if info.bounds[0] <= 1.0 <= info.bounds[1] else info.bounds[1] for info in linear]
     columns = [
         (replace(bare, **{info.name: unit}).force(motion, state) - base) / unit

@@ -104,18 +104,28 @@ class _Balanced:
         self.motion = record.motion
         self.linear = [i for i in problem.model_type.parameters() if i.linear and i.name in problem.free]
         self.measured = project(record.force)
+        self._once: tuple[Floats, Floats] | None = None
 
     def at(self, point: Mapping[str, float]) -> tuple[Model, Floats, tuple[str, ...]]:
         """Model, residual harmonics (orthonormal) and parameters held at a bound."""
         zero = {i.name: 0.0 for i in self.linear}
         bare = self.problem.model_type.build({**self.problem.fixed, **point, **zero})
-        state = steady_state(bare, self.record)
-        base, forces = linear_table(bare, self.linear, self.motion, state)
+        base, forces = self._table(bare, steady_state(bare, self.record))
         columns, right = self.project(forces), self.measured - self.project(base)
         solution, held = solve_bounded(columns, right, *bounds_of(self.linear))
         names = [i.name for i in self.linear]
         model = replace(bare, **dict(zip(names, solution.tolist(), strict=True)))
         return model, columns @ solution - right, tuple(n for n, h in zip(names, held, strict=True) if h)
+
+    def _table(self, bare: Model, state: Floats) -> tuple[Floats, Floats]:
+        """`linear_table`, made once where a shape changes one column alone."""
+        infos = [i for i in self.linear if i.name == bare.state_column]
+        if self._once is None or not infos:
+            self._once = linear_table(bare, self.linear, self.motion, state)
+            return self._once
+        base, forces = self._once
+        forces[:, self.linear.index(infos[0])] = linear_table(bare, infos, self.motion, state, base)[1][:, 0]
+        return base, forces
 
 
 def steady_state(model: Model, record: SineRecord) -> Floats:

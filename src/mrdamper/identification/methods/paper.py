@@ -8,7 +8,7 @@ consistent counterpart.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
@@ -16,7 +16,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import IdentificationError
-from mrdamper.hysteresis import steady_loop
+from mrdamper.hysteresis import Shape, steady_loop
 from mrdamper.identification.harmonic_balance import (
     AmplitudeReading,
     OffsetReading,
@@ -35,6 +35,7 @@ from mrdamper.optimizers.genetic import GeneticMinimum, genetic
 from mrdamper.optimizers.levenberg_marquardt import least_squares
 
 _SEARCH_SAMPLES = 400  # two numbers are searched; more samples change them by less than the search does
+_TINY = float(np.finfo(float).tiny)  # a beta above zero
 _SMALL = 0.05  # share of c that may be hysteretic before the reader is warned
 
 
@@ -154,15 +155,17 @@ class Paper(Method):
         X = rest.record.condition.amplitude_m
         edge = np.log([max(rest.length(steepest), 1e-6 * X), min(20 * X, rest.longest)])
 
-        def residual(u: Floats) -> Floats:
-            z = rest.state(rest.beta(float(np.exp(u[0]))))
+        def explained(z: Floats) -> Floats:
             return np.clip(z @ rest.force / (z @ z), low, high) * z - rest.force
 
+        def residual(u: Floats) -> Floats:
+            return explained(rest.states([rest.beta(float(np.exp(u[0])))])[0])
+
         grid = np.linspace(edge[0], edge[1], 24)
-        costs = [float(np.sum(residual(np.array([u])) ** 2)) for u in grid]
+        costs = [float(np.sum(explained(z) ** 2)) for z in rest.states([rest.beta(float(u)) for u in np.exp(grid)])]
         best = least_squares(residual, np.array([grid[int(np.argmin(costs))]]), edge[:1], edge[1:])
         beta = rest.beta(float(np.exp(best.point[0])))
-        z = rest.state(beta)
+        (z,) = rest.states([beta])
         alpha = float(np.clip(z @ rest.force / (z @ z), low, high))
         return _Searched(alpha, beta, best.evaluations + grid.size, best.ending)
 
@@ -194,10 +197,11 @@ class _Rest:
         record = SineRecord(self.record.run_id, self.record.condition, self.record.theta[pick], self.record.force[pick])
         return _Rest(self.problem, record, self.force[pick])
 
-    def state(self, beta: float) -> Floats:
-        """Z [m] on the exact loop."""
-        model = self._model(beta)
-        return model.yield_displacement * steady_loop(model.shape, self.record.condition.amplitude_m, self.record.theta)
+    def states(self, betas: Sequence[float]) -> Floats:
+        """Z [m] on the exact loops of B betas, (B, N)."""
+        shape = self._shape(np.array(betas))
+        zeta = steady_loop(shape, self.record.condition.amplitude_m, self.record.theta)
+        return np.reshape(shape.yield_displacement, (-1, 1)) * zeta
 
     def costs(self, points: Floats) -> Floats:
         """RMS error [N] of many (alpha, beta) at once.
@@ -206,8 +210,8 @@ class _Rest:
         most betas unchanged.
         """
         total = float(self.force @ self.force)
-        for beta in set(points[:, 1].tolist()) - self._products.keys():
-            z = self.state(max(beta, np.finfo(float).tiny))
+        new = [beta for beta in dict.fromkeys(points[:, 1].tolist()) if beta not in self._products]
+        for beta, z in zip(new, self.states([max(beta, _TINY) for beta in new]) if new else (), strict=True):
             self._products[beta] = float(z @ self.force), float(z @ z)
         linear, square = np.array([self._products[beta] for beta in points[:, 1].tolist()]).T
         alpha = points[:, 0]
@@ -220,7 +224,7 @@ class _Rest:
 
     def length(self, beta: float) -> float:
         """Yield displacement [m] of a beta."""
-        return self._model(beta).yield_displacement
+        return float(self._shape(beta).yield_displacement)
 
     @property
     def longest(self) -> float:
@@ -228,9 +232,9 @@ class _Rest:
         gamma = self.problem.fixed.get("gamma", 0.0)
         return 0.999 * gamma ** (-1 / self.problem.fixed["n"]) if gamma > 0 else np.inf
 
-    def _model(self, beta: float) -> BoucWen:
-        fixed = {name: self.problem.fixed[name] for name in ("gamma", "n") if name in self.problem.fixed}
-        return BoucWen.build({**fixed, "c": 0.0, "alpha": 0.0, "beta": beta})
+    def _shape(self, beta: float | Floats) -> Shape:
+        fixed = self.problem.fixed
+        return Shape.from_bouc_wen(beta, fixed.get("gamma", beta), fixed.get("n", BoucWen.n))
 
 
 def _require_bouc_wen(problem: Problem) -> None:
