@@ -17,8 +17,8 @@ import numpy as np
 from mrdamper.data import Dataset, Run
 from mrdamper.errors import IdentificationError
 from mrdamper.identification import Identification
-from mrdamper.study.parallel import identify_all
-from mrdamper.study.recipe import Basis, Found, Progress, Recipe, Scored, follow_all, recipes
+from mrdamper.study.parallel import crew
+from mrdamper.study.recipe import Basis, Found, Progress, Recipe, Scored, recipes
 from mrdamper.study.workflow import believed, judged_on_all, usable, usable_sines
 
 
@@ -88,59 +88,69 @@ def compare(
     begin = time.perf_counter()
     chosen = recipes(names, genetic)
     workers = jobs or os.cpu_count() or 1
-    rigs = [dataset.rig(name) for name in dataset.rigs]
-    sorted_runs = [usable_sines(rig) for rig in rigs]
-    for rig, (sines, _) in zip(rigs, sorted_runs, strict=True):
-        if len([run for run in sines if run.split == "train"]) < 3 and not _others(rig, sines):
-            raise IdentificationError(
-                "under three train runs with a steady sine", where=f"rig {rig.name}", mend="check the split column"
-            )
-    runs = [run for sines, _ in sorted_runs for run in sines]
+    seen = [_seen(dataset.rig(name)) for name in dataset.rigs]
+    runs = [run for rig in seen for run in rig.sines]
     bases = list(dict.fromkeys(recipe.basis for recipe in chosen if recipe.basis))
-    tasks = [(basis, run) for basis in bases for run in runs]
-    found = identify_all(tasks, workers, lambda what, share: progress(what, 0.7 * share))
-    compared = []
-    for number, (rig, (sines, refused)) in enumerate(zip(rigs, sorted_runs, strict=True)):
-
-        def tell(what: str, share: float, number: int = number) -> None:
-            progress(what, 0.7 + 0.3 * (number + share) / len(rigs))
-
-        compared.append(_compare_rig(rig, sines, refused, chosen, found, tell))
+    steps = [(recipe, rig.train if recipe.basis else rig.everything) for rig in seen for recipe in chosen]
+    with crew(dataset, workers) as processes:
+        found = processes.identify(
+            [(basis, run) for basis in bases for run in runs], lambda what, share: progress(what, 0.5 * share)
+        )
+        followed = processes.follow(
+            [step for step in steps if step[1]],
+            {rig.dataset.rigs[0]: rig.held_out for rig in seen},
+            found,
+            lambda what, share: progress(what, 0.5 + 0.5 * share),
+        )
+    compared = tuple(_ranked(rig, chosen, followed, found) for rig in seen)
     progress("compared", 1.0)
-    return Comparison(dataset, tuple(compared), time.perf_counter() - begin, workers)
+    return Comparison(dataset, compared, time.perf_counter() - begin, workers)
 
 
-def _compare_rig(
-    rig: Dataset,
-    sines: Sequence[Run],
-    not_identified: Mapping[str, str],
-    chosen: Sequence[Recipe],
-    found: Found,
-    progress: Progress,
-) -> RigComparison:
-    train = [run for run in sines if run.split == "train"]
-    everything = [*train, *_others(rig, sines)]
-    steps = [(recipe, train if recipe.basis else everything) for recipe in chosen]
-    held_out = [run for run in believed(rig)[0] if run.split == "validate"]
-    entries, refused = follow_all(steps, held_out, progress, found=found)
-    if not entries:
-        name, reason = next(iter(refused.items()))
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """The runs of one rig as a comparison sees them."""
+
+    dataset: Dataset
+    sines: Sequence[Run]
+    train: Sequence[Run]
+    everything: Sequence[Run]
+    held_out: Sequence[Run]
+    not_identified: Mapping[str, str]
+
+
+def _seen(rig: Dataset) -> _Seen:
+    sines, not_identified = usable_sines(rig)
+    trusted = believed(rig)[0]
+    train, known = [run for run in sines if run.split == "train"], {run.id for run in sines}
+    # Any other motion, or a current that changes: the joint model takes them too.
+    others = usable(run for run in trusted if run.split == "train" and run.id not in known)[0]
+    if len(train) < 3 and not others:
         raise IdentificationError(
-            f"no model could be compared; {name}: {reason}",
-            where=f"rig {rig.rigs[0] or rig.name}",
+            "under three train runs with a steady sine", where=f"rig {rig.name}", mend="check the split column"
+        )
+    held_out = [run for run in trusted if run.split == "validate"]
+    return _Seen(rig, sines, train, [*train, *others], held_out, not_identified)
+
+
+def _ranked(
+    rig: _Seen, chosen: Sequence[Recipe], followed: Mapping[tuple[str, str], Scored | str], found: Found
+) -> RigComparison:
+    name = rig.dataset.rigs[0]
+    made = {recipe.name: followed.get((name, recipe.name), "no train runs with a steady sine") for recipe in chosen}
+    refused = {recipe: why for recipe, why in made.items() if isinstance(why, str)}
+    entries = [judged_on_all(one, rig.everything) for one in made.values() if isinstance(one, Scored)]
+    if not entries:
+        recipe, reason = next(iter(refused.items()))
+        raise IdentificationError(
+            f"no model could be compared; {recipe}: {reason}",
+            where=f"rig {name or rig.dataset.name}",
             mend="choose other models with --models, or leave this rig out of the dataset",
         )
-    entries = [judged_on_all(entry, everything) for entry in entries]
-    entries = [replace(entry, per_run=_per_run(entry.recipe.basis, sines, found)) for entry in entries]
+    entries = [replace(entry, per_run=_per_run(entry.recipe.basis, rig.sines, found)) for entry in entries]
     entries.sort(key=lambda entry: entry.left_out.median())
-    steady = frozenset(run.id for run in sines)
-    return RigComparison(rig.rigs[0], rig, steady, tuple(entries), refused, not_identified)
-
-
-def _others(rig: Dataset, sines: Sequence[Run]) -> list[Run]:
-    """Train runs of any other motion or a current that changes, which the joint model takes too."""
-    known = {run.id for run in sines}
-    return usable(run for run in believed(rig)[0] if run.split == "train" and run.id not in known)[0]
+    steady = frozenset(run.id for run in rig.sines)
+    return RigComparison(name, rig.dataset, steady, tuple(entries), refused, rig.not_identified)
 
 
 def _per_run(basis: Basis | None, sines: Sequence[Run], found: Found) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
@@ -22,7 +22,7 @@ from mrdamper.identification.methods.projection import Projection
 from mrdamper.models import model_type
 from mrdamper.motion import analyse_motion
 from mrdamper.study.processes import processes
-from mrdamper.study.recipe import Basis, Found, Progress
+from mrdamper.study.recipe import Basis, Found, Progress, Recipe, Scored, follow_all
 
 _CYCLES = 2  # of a run that costly identifications see
 _PER_CYCLE = 200  # samples of a cycle they see
@@ -80,28 +80,73 @@ def _quietly(function: Callable[[T, Progress], R], item: T) -> R:
 
 
 def identify_all(tasks: Sequence[tuple[Basis, Run]], workers: int, progress: Progress) -> Found:
-    """Every basis from its run, in processes of one thread each, so that their number changes no bit."""
-    named = [(basis, run.id) for basis, run in sorted(tasks, key=lambda task: not task[0].costly)]
-    runs = {run.id: run for _, run in tasks}.values()
-    if not tasks:
-        return {}
+    """Every basis from its run, in several processes."""
+    with crew([run for _, run in tasks], workers) as several_of_us:
+        return several_of_us.identify(tasks, progress)
+
+
+@contextmanager
+def crew(runs: Iterable[Run], workers: int) -> Iterator[Crew]:
+    """Processes that hold these runs, of one thread each, so that their number changes no bit."""
+    held = {run.id: run for run in runs}.values()
     before = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update(dict.fromkeys(_THREADS, "1"))
     try:
-        with processes(workers, _receive, ([_packed(run) for run in runs],)) as pool:
-            waiting = {pool.submit(_identify_one, *task): task for task in named}
-            found: Found = {}
-            for done in as_completed(waiting):
-                task = waiting[done]
-                found[task] = done.result()
-                progress(f"{task[0].model}, run {task[1]}", len(found) / len(tasks))
+        with processes(workers, _receive, ([_packed(run) for run in held],)) as pool:
+            yield Crew(pool)
     finally:
         for name, value in before.items():
             if value is None:
                 del os.environ[name]
             else:
                 os.environ[name] = value
-    return found
+
+
+@dataclass(frozen=True)
+class Crew:
+    """Processes that hold the runs of a dataset; `crew` makes it."""
+
+    pool: Executor
+
+    def identify(self, tasks: Sequence[tuple[Basis, Run]], progress: Progress) -> Found:
+        """Every basis from its run; what takes long begins first."""
+        named = [(basis, run.id) for basis, run in sorted(tasks, key=lambda task: not task[0].costly)]
+        return self._each(_identify_one, {one: one for one in named}, "identified", progress)
+
+    def follow(
+        self,
+        steps: Sequence[tuple[Recipe, Sequence[Run]]],
+        held_out: Mapping[str, Sequence[Run]],
+        found: Found,
+        progress: Progress,
+    ) -> dict[tuple[str, str], Scored | str]:
+        """Recipes followed from identifications there are already, or why not, by rig and name of the recipe.
+
+        Parameters
+        ----------
+        steps : sequence of (Recipe, train runs)
+            The runs of one step are of one rig.
+        held_out : mapping of rig to runs
+        found : mapping
+            Identifications, by basis and run id.
+        progress : callable
+        """
+        tasks: dict[tuple[str, str], tuple[Any, ...]] = {}
+        for recipe, runs in sorted(steps, key=lambda step: step[0].basis is not None and not step[0].basis.costly):
+            own = {(recipe.basis, run.id): found[recipe.basis, run.id] for run in runs if recipe.basis}
+            ids, held = [run.id for run in runs], [run.id for run in held_out[runs[0].rig]]
+            tasks[runs[0].rig, recipe.name] = (recipe, ids, held, own)
+        return self._each(_follow_one, tasks, "followed", progress)
+
+    def _each(
+        self, function: Callable[..., R], tasks: Mapping[T, tuple[Any, ...]], what: str, progress: Progress
+    ) -> dict[T, R]:
+        waiting = {self.pool.submit(function, *task): key for key, task in tasks.items()}
+        results: dict[T, R] = {}
+        for done in as_completed(waiting):
+            results[waiting[done]] = done.result()
+            progress(f"{len(results)} of {len(waiting)} {what}", len(results) / len(waiting))
+        return results
 
 
 _RUNS: dict[str, Run] = {}  # of a worker process, received once
@@ -129,6 +174,12 @@ def _identify_one(basis: Basis, run_id: str) -> tuple[Identification | str, floa
         return conclude(basis.problem(run), method, solution), time.perf_counter() - begin
     except InputError as error:
         return str(error), time.perf_counter() - begin
+
+
+def _follow_one(recipe: Recipe, runs: Sequence[str], held_out: Sequence[str], found: Found) -> Scored | str:
+    train = [_RUNS[run_id] for run_id in runs]
+    scored, refused = follow_all([(recipe, train)], [_RUNS[run_id] for run_id in held_out], found=found)
+    return scored[0] if scored else refused[recipe.name]
 
 
 def shortened(run: Run) -> Run:
