@@ -89,7 +89,8 @@ def _try_room(room: Room, faults: list[Fault], jobs: int) -> tuple[list[Fault], 
         import pytest
 
         plain = ["-q", "-m", "not slow", "-p", "no:cacheprovider", "-p", "no:xdist", "-p", "no:benchmark", "--tb=no"]
-        pytest.main([*plain, *room.tests], plugins=[trial])
+        words = ["-k", " and ".join(f"not {word}" for word in room.without)] if room.without else []
+        pytest.main([*plain, *words, *room.tests], plugins=[trial])
         return trial.survivors, trial.why
 
     return in_fork(work) or ([], "the tests could not be collected")

@@ -32,7 +32,9 @@ _SYMMETRIC = {"max", "min", "maximum", "minimum", "hypot", "rmse", "isclose", "d
               "dissipated_power"}  # fmt: skip
 _TEXTS = {"train": "validate", "validate": "train", "below": "above", "above": "below",
           "nrmse_pp": "nrmse_std", "energy_error": "peak_error", "peak_error": "energy_error"}  # fmt: skip
+_BUDGETS = {"linspace", "geomspace"}  # how finely is looked: their third argument, and the order of the ends
 _GUARD = 1e-6  # a number below it only keeps a division or a step alive
+_STEPS = "most_steps"  # of a search
 _TELLS = {"progress", "round", "isclose"}  # words for whoever waits, and how near is the same
 _TWIN = {a: b for a, b in _TWINS} | {b: a for a, b in reversed(_TWINS)}
 
@@ -100,7 +102,11 @@ def _places(tree: ast.Module) -> Iterator[_Place]:
 def _inside(node: ast.AST) -> Iterator[_Place]:
     if isinstance(node, ast.Raise | ast.JoinedStr | ast.FunctionDef | ast.Assert):
         return  # messages, and functions that are walked themselves
-    if isinstance(node, ast.Call) and _called(node) in _TELLS:
+    if isinstance(node, ast.Call) and _called(node) in _TELLS or isinstance(node, ast.keyword) and node.arg == _STEPS:
+        return
+    if isinstance(node, ast.Call) and _called(node) in _BUDGETS:
+        for argument in node.args[:2]:
+            yield from _inside(argument)
         return
     if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
         return  # a docstring

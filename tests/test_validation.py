@@ -107,6 +107,25 @@ def test_scores_are_taken_inside_the_window_only():
     assert score.scores.peak_error == pytest.approx(0.0, abs=1e-12)
 
 
+def test_standing_still_has_an_error_of_its_own_and_the_best_gain_and_offset_are_of_the_window():
+    run = made(1.0, 1.0, "one", gain=1.25, offset=4.0)
+    still = run.time > 2.5
+    wrong = run.force + np.where(still, np.where(np.arange(still.size) % 2, 30.0, 40.0), 0.0)
+
+    class Resting(Exact):
+        def predict_run(self, run):
+            said = super().predict_run(run)
+            velocity = np.where(still, 0.0, said.motion.velocity)
+            return replace(said, motion=SimpleNamespace(velocity=velocity, resting=still))
+
+    score = score_run(Resting(), replace(run, force=wrong))
+    miss = wrong - 0.8 * (run.force - 4.0)
+    assert score.rest == pytest.approx(np.sqrt(np.mean(miss[still] ** 2)) / np.ptp(wrong))
+    assert score_run(Exact(), run).rest is None
+    reading = score_run(Exact(), run).reading
+    assert (reading.gain, reading.offset) == pytest.approx((1.25, 4.0))
+
+
 def test_a_force_too_large_has_positive_errors():
     score = score_run(Exact(), made(1.0, 1.0, "one", gain=0.8))
     assert score.scores.peak_error == pytest.approx(0.25)
@@ -123,6 +142,9 @@ def test_median_and_worst_count_magnitudes_and_refused_runs_stay_apart():
     assert [run.scores.energy_error for run in found.runs] == pytest.approx(errors)
     assert found.median("energy_error") == pytest.approx(0.2)
     assert found.worst("energy_error").run_id == "0.5"
+    assert found.worst_error("energy_error") == pytest.approx(1.0)
+    assert replace(found, runs=found.runs[2:]).worst_error("energy_error") == pytest.approx(0.2)
+    assert np.isnan(Validation("none", ()).worst_error())
     assert found.only({"1.25"}).runs[0].run_id == "1.25"
     assert Validation("none", ()).only({"x"}).runs == ()
     assert isinstance(found.runs[0], RunScore)
@@ -174,13 +196,13 @@ def test_a_table_holds_every_score_under_its_own_name():
 
 
 def test_the_band_of_the_peak_is_told_beside_the_measured_peak_of_the_window(monkeypatch):
-    run = made(1.0, 1.0, "one")
+    run = made(1.0, 2.0, "one", gain=0.9)
     spoiled = run.force.copy()
     spoiled[50] = 1e4  # before the window
     run, asked = replace(run, force=spoiled), {}
 
     def said(damper, prediction, level, shown):
-        asked.update(level=level, shown=shown)
+        asked.update(level=level, shown=shown, title=damper.title, predicted=prediction.condition)
         return SimpleNamespace(peak=(8.0, 13.0), energy=(-0.1, 0.2)) if level > 0.5 else None
 
     monkeypatch.setattr(validation, "band", said)
@@ -195,9 +217,12 @@ def test_the_band_of_the_peak_is_told_beside_the_measured_peak_of_the_window(mon
     band = {"peak_force_low_N": 8.0, "peak_force_high_N": 13.0}
     band |= {"energy_low_J": 0.9 * expected, "energy_high_J": 1.2 * expected}
     assert peak_band(Exact(), run) == pytest.approx({**measured, **band})
-    assert asked["level"] == 0.9
+    assert (asked["level"], asked["title"], asked["predicted"]) == (0.9, "exact", run.nominal)
     assert np.array_equal(asked["shown"], run.in_window)
     assert peak_band(Exact(), run, 0.3) == pytest.approx(measured)
+    shifted = SimpleNamespace(band=said, corrected=lambda p: replace(p, force=2 * p.force))
+    known = peak_band(Exact(), run, expected=shifted)
+    assert known == pytest.approx({**measured, **band, "energy_low_J": 1.8 * expected, "energy_high_J": 2.4 * expected})
 
 
 def test_the_floor_of_several_runs_is_their_median():

@@ -208,7 +208,49 @@ def test_terms_that_rest_on_the_scatter_of_a_rig_are_not_determined():
         require_determined("decaying-current", CONDITIONS)
 
 
-@pytest.mark.parametrize(("top", "turn"), [(2.0, 1.5), (1.1, 1.5), (0.9, None)])
+@pytest.mark.parametrize("eps", [1.5e-5, 2.5e-5])
+def test_columns_are_told_apart_from_an_angle_on(eps):
+    # Of unit vectors at a small angle ε the singular values are √2 and ε/√2: their ratio is ε/2, the limit 1e-5.
+    assert fitting._determined(np.array([[1.0, 3.0], [0.0, 3 * eps]])) is (eps > 2e-5)
+
+
+def test_a_refusal_counts_levels_to_a_micrometre():
+    few = [Condition(0.5 * (k > 1), f, a) for k, (f, a) in enumerate([(1, 0.02), (2, 0.0200001), (3, 0.021)])]
+    with pytest.raises(IdentificationError, match="2 currents, 3 frequencies, 2 amplitudes"):
+        fit_function("plane", few, [1.0, 2.0, 3.0])
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_rates_are_the_best_of_all_though_the_error_has_several_valleys(seed):
+    values = np.random.default_rng(seed).normal(0, 1, CURRENT.size)
+    found = fit_function("decaying-current", CONDITIONS, values)
+    least = min(
+        float(np.sum((X @ np.linalg.lstsq(X, values, rcond=None)[0] - values) ** 2))
+        for X in (np.column_stack([np.exp(-r * CURRENT), np.ones(CURRENT.size)]) for r in np.geomspace(0.2, 30, 400))
+    )
+    spread = float(np.sum((values - values.mean()) ** 2))
+    assert found.r2 >= 1 - least / spread - 1e-6
+
+
+def test_r2_of_small_values_and_errors_known_to_be_none():
+    small = fit_function("linear-current", CONDITIONS, 1e-3 * VALUES)
+    assert small.r2 == pytest.approx(fit_function("linear-current", CONDITIONS, VALUES).r2)
+    assert small.r2 < 0.999
+    # Where a quarter is without error nothing says what the others' are worth beside it.
+    none = np.where(np.arange(CURRENT.size) % 3, 5.0, 0.0)
+    assert fitting._weights(none, VALUES).tolist() == [1.0] * CURRENT.size
+    assert fitting._weights(np.full(3, np.nan), VALUES[:3]).tolist() == [1.0] * 3
+
+
+def test_functions_take_plain_lists():
+    assert ParameterFunction("linear-current", (2.0, 1.0))([0.0, 1.0], 1, 0.02).tolist() == [1.0, 3.0]
+
+
+def test_a_parameter_that_does_not_change_does_not_turn():
+    assert ParameterFunction("constant", (2.0,)).turning_point(2.0, 1.0, 0.02) is None
+
+
+@pytest.mark.parametrize(("top", "turn"), [(2.0, 1.5), (1.1, 1.5), (0.9, None), (6.0, 1.5)])
 def test_a_parabola_turns_where_its_slope_is_zero_within_half_more_than_was_tested(top, turn):
     found = ParameterFunction("quadratic-current", (-1.0, 3.0, 0.0)).turning_point(top, 1.0, 0.02)
     assert found is None if turn is None else found == pytest.approx(turn, abs=1.5 * top / 600)

@@ -178,18 +178,16 @@ def _left_out(columns: Floats, target: Floats, weight: Floats, rates: int) -> fl
     leverage = np.sum(q**2, axis=1)
     residual = target * weight - q @ (q.T @ (target * weight))
     spare = np.maximum(1.0 - leverage, 1e-9)
-    penalty = target.size / max(target.size - rates, 1)
+    penalty = target.size / (target.size - rates)
     return float(np.sqrt(np.sum((residual / spare) ** 2) / np.sum(weight**2)) * penalty)
 
 
 def _weights(uncertainty: ArrayLike | None, target: Floats) -> Floats:
-    if uncertainty is None:
-        return np.ones(target.size)
-    errors = np.asarray(uncertainty, dtype=float)
+    errors = np.full(target.size, np.inf) if uncertainty is None else np.asarray(uncertainty, dtype=float)
     known = errors[np.isfinite(errors)]
-    if not known.size:
+    floor = float(np.quantile(known, 0.25)) if known.size else 0.0
+    if not floor:
         return np.ones(target.size)
-    floor = float(np.quantile(known, 0.25)) or 1.0
     return floor / np.maximum(np.where(np.isfinite(errors), errors, known.max()), floor)
 
 
@@ -198,7 +196,7 @@ def _determined(columns: Floats) -> bool:
     if np.any(scale == 0):
         return False
     singular = np.linalg.svd(columns / scale, compute_uv=False)
-    return columns.shape[0] >= columns.shape[1] and bool(singular[-1] > _RANK_LIMIT * singular[0])
+    return bool(singular[-1] > _RANK_LIMIT * singular[0])
 
 
 def _undetermined(form: Form, found: str, I: Floats, f: Floats, A: Floats) -> IdentificationError:

@@ -182,8 +182,8 @@ class ParameterFunction:
         """Current [A] within 0...1.5 × the highest at which the parameter turns over, if any."""
         currents = np.linspace(0, 1.5 * highest_current, 601)
         slope = np.sign(np.diff(self(currents, frequency, amplitude)))
-        turns = np.flatnonzero(slope[1:] * slope[:-1] < 0)
-        return float(currents[turns[0] + 1]) if turns.size else None
+        turned = np.flatnonzero(slope * slope[0] < 0)
+        return float(currents[turned[0]]) if turned.size else None
 
 
 def _numbers(value: Any) -> Any:
