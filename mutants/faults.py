@@ -29,7 +29,7 @@ _TWINS = (
     ("reached", "optimum"), ("measured", "predicted"), ("median", "worst"), ("split", "rig"), ("yield_off", "mass"),
 )  # fmt: skip
 _SYMMETRIC = {"max", "min", "maximum", "minimum", "hypot", "rmse", "isclose", "dict",
-              "dissipated_power"}  # fmt: skip
+              "clip", "dissipated_power"}  # fmt: skip
 _TEXTS = {"train": "validate", "validate": "train", "below": "above", "above": "below",
           "nrmse_pp": "nrmse_std", "energy_error": "peak_error", "peak_error": "energy_error"}  # fmt: skip
 _BUDGETS = {"linspace", "geomspace"}  # how finely is looked: their third argument, and the order of the ends
@@ -102,7 +102,9 @@ def _places(tree: ast.Module) -> Iterator[_Place]:
 def _inside(node: ast.AST) -> Iterator[_Place]:
     if isinstance(node, ast.Raise | ast.JoinedStr | ast.FunctionDef | ast.Assert):
         return  # messages, and functions that are walked themselves
-    if isinstance(node, ast.Call) and _called(node) in _TELLS or isinstance(node, ast.keyword) and node.arg == _STEPS:
+    if (isinstance(node, ast.Call) and _called(node) in _TELLS) or (
+        isinstance(node, ast.keyword) and node.arg == _STEPS
+    ):
         return
     if isinstance(node, ast.Call) and _called(node) in _BUDGETS:
         for argument in node.args[:2]:

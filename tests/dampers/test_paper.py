@@ -1,6 +1,7 @@
 """The paper's identification with its biases, as they were worked out, and its switches."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,10 +12,13 @@ from mrdamper.gas_spring import GasSpring
 from mrdamper.hysteresis import steady_loop
 from mrdamper.identification import identify
 from mrdamper.identification.harmonic_balance import SineRecord
+from mrdamper.identification.methods import paper
 from mrdamper.identification.methods.paper import Paper
 from mrdamper.identification.problem import Problem
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.motion import sine
+from mrdamper.optimizers import levenberg_marquardt
+from mrdamper.optimizers.ending import Ending
 from mrdamper.optimizers.generation import GeneticSettings
 
 GAS = GasSpring(1.5e6, 1.5e-4, np.pi * 1e-4)
@@ -93,6 +97,56 @@ def test_the_genetic_search_comes_to_the_optimum_it_is_after():
     assert found.model.c == optimum.model.c
     assert found.scores.nrmse_std == pytest.approx(optimum.scores.nrmse_std, rel=2e-3)
     assert found.model.yield_force == pytest.approx(optimum.model.yield_force, rel=0.02)
+
+
+def test_the_genetic_search_alone_is_the_one_that_identifies():
+    run = steady_run(Condition(1.0, 1.0, 0.05), samples=200)
+    method = Paper(genetic=GeneticSettings(generations=3, population=8), explain=False)
+    alone = method.genetic_search(Problem.of(run, BoucWen, gas=GAS))
+    found = identify(run, "bouc-wen", method, gas=GAS)
+    assert (found.model.alpha, found.model.beta) == pytest.approx(alone.point.tolist())
+    assert (found.evaluations, found.ending) == (alone.evaluations, alone.ending)
+    assert found.end == {"beta": found.model.beta}
+
+
+def test_the_search_for_the_optimum_begins_at_the_best_of_its_grid(monkeypatch):
+    run = steady_run(Condition(1.0, 1.0, 0.05), samples=400)
+    method, asked = Paper(search="optimum", bounds=((0.0, 1e8), (0.0, 1e7))), {}
+
+    def search(residual, start, lower, upper):
+        asked.update(residual=residual, start=start, lower=lower, upper=upper)
+        return levenberg_marquardt.least_squares(residual, start, lower, upper)
+
+    monkeypatch.setattr(paper, "least_squares", search)
+    found = identify(run, "bouc-wen", method, gas=GAS)
+    X = SineRecord.of(run).condition.amplitude_m
+    steepest = BoucWen.build({"c": 0.0, "alpha": 0.0, "beta": 1e7}).yield_displacement
+    ends = [float(asked[name][0]) for name in ("lower", "upper")]
+    assert ends == pytest.approx(np.log([steepest, 20 * X]))
+    grid = np.linspace(*ends, 24)
+    costs = [float(np.sum(asked["residual"](np.array([u])) ** 2)) for u in grid]
+    assert asked["start"][0] == pytest.approx(grid[int(np.argmin(costs))])
+    assert np.log(found.model.yield_displacement) == pytest.approx(asked["start"][0], abs=grid[1] - grid[0])
+
+
+def test_a_gamma_that_is_held_ends_where_it_leaves_nothing_for_beta():
+    def longest(**fixed):
+        return paper._Rest(SimpleNamespace(fixed=fixed), None, None).longest
+
+    assert longest(gamma=0.5, n=2.0) == pytest.approx(0.999 * 0.5**-0.5)
+    assert longest(gamma=8e3, n=3.0) == pytest.approx(0.999 / 20)
+    assert longest(n=2.0) == longest(gamma=0.0, n=2.0) == np.inf
+
+
+@pytest.mark.parametrize(
+    ("alpha", "beta", "ended"),
+    [(10.0005, 5e6, ("alpha",)), (10.00101, 5e6, ()), (1009.9995, 1e7 - 1, ("alpha", "beta")), (500.0, 3.0, ("beta",))],
+)
+def test_a_search_ended_at_its_box_within_a_millionth_of_it(monkeypatch, alpha, beta, ended):
+    monkeypatch.setattr(Paper, "_by_optimum", lambda *_: paper._Searched(alpha, beta, 1, Ending.SETTLED))
+    run = steady_run(Condition(1.0, 1.0, 0.05), samples=200)
+    method = Paper(search="optimum", bounds=((10.0, 1010.0), (0.0, 1e7)), explain=False)
+    assert identify(run, "bouc-wen", method, gas=GAS).at_bounds == ended
 
 
 def test_every_switch_changes_what_it_is_named_after():

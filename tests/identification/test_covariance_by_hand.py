@@ -168,3 +168,63 @@ def test_degrees_of_freedom_and_effective_samples_of_white_noise():
     assert np.isinf(nothing.errors).all()
     assert nothing.effective.tolist() == [0.0, 0.0]
     assert nothing.dof.tolist() == [1.0, 1.0]
+
+
+def test_a_spread_is_put_together_from_its_parts(monkeypatch):
+    N, seen = 50, [0, 2, 3]
+    J = np.zeros((N, 4))
+    J[:, seen] = RNG.standard_normal((N, 3)) * [1.0, 20.0, 0.5]
+    residual, time = RNG.standard_normal(N), np.arange(N) / 10
+    S = np.array([[9.0, 1.0, 0.5], [1.0, 0.2, 0.1], [0.5, 0.1, 4.0]])
+    given = {}
+
+    def score(unit, residual, time, frequency, inverse):
+        given.update(unit=unit, residual=residual, time=time, frequency=frequency, inverse=inverse)
+        return S, np.array([0.3, 20.0, 200.0]), 7.5
+
+    monkeypatch.setattr(covariance, "score_covariance", score)
+    found = spread(J, residual, time, 2.5)
+    scale = np.sqrt((J[:, seen] ** 2).sum(axis=0))
+    inverse = np.linalg.inv((J[:, seen] / scale).T @ (J[:, seen] / scale))
+    assert given["unit"] == pytest.approx(J[:, seen] / scale)
+    assert given["inverse"] == pytest.approx(inverse)
+    assert (given["residual"] is residual, given["time"] is time, given["frequency"]) == (True, True, 2.5)
+    expected = inverse @ S @ inverse / np.outer(scale, scale)
+    assert found.covariance[np.ix_(seen, seen)] == pytest.approx(expected)
+    assert found.covariance[1].tolist() == found.covariance[:, 1].tolist() == [0.0, np.inf, 0.0, 0.0]
+    textbook = residual @ residual / (N - 3) * np.diag(np.linalg.inv(J[:, seen].T @ J[:, seen]))
+    assert found.textbook[seen] == pytest.approx(np.sqrt(textbook))
+    assert np.isinf(found.textbook[1])
+    assert found.effective[seen] == pytest.approx(np.minimum(N * textbook / np.diag(expected), N))
+    assert 0 < found.effective[0] < N == pytest.approx(found.effective[2])
+    assert found.effective[1] == 0.0
+    assert found.dof.tolist() == [1.0, 1.0, 20.0, N - 3]
+    assert (found.memory, found.alike) == (7.5, ())
+
+
+def test_what_two_parameters_do_alike_is_lost_and_says_so():
+    a, b = RNG.standard_normal((2, 60))
+    found = spread(np.column_stack([np.zeros(60), a, b, -2 * a]), RNG.standard_normal(60))
+    assert found.alike == ((1, 3),)
+    assert np.isinf(np.diag(found.covariance)).tolist() == [True, True, False, True]
+    off = found.covariance[~np.eye(4, dtype=bool)]
+    assert off.tolist() == [0.0] * 12
+    assert np.isinf(found.textbook[[1, 3]]).all()
+    assert found.effective[[1, 3]].tolist() == [0.0, 0.0]
+    # Of unit vectors at a small angle δ the eigenvalues are 2 and δ²/2; below 2e-12 nothing is known.
+    for eigenvalue, lost in ((1.5e-12, True), (3e-12, False)):
+        delta = np.sqrt(2 * eigenvalue)
+        J = np.array([[1.0, np.cos(delta)], [0.0, np.sin(delta)], [0.0, 0.0]])
+        assert bool(spread(J, np.array([0.1, 0.2, 0.3])).alike) is lost
+
+
+def test_three_samples_of_a_thousand_become_one(monkeypatch):
+    monkeypatch.setattr(covariance, "_MOST", 10)
+    J, residual, time = RNG.standard_normal((35, 2)), RNG.standard_normal(35), np.arange(35) / 7
+    thin = [np.array([a[3 * k : 3 * k + 3].mean(axis=0) for k in range(11)]) for a in (J, residual, time)]
+    monkeypatch.setattr(covariance, "score_covariance", lambda *given: (given[0].T @ given[0], np.ones(2), 1.0))
+    found, expected = spread(J, residual, time, 1.0), spread(*thin, 1.0)
+    assert found.covariance == pytest.approx(expected.covariance)
+    assert found.textbook == pytest.approx(expected.textbook)
+    none = spread(J[:19], residual[:19])  # less than two of ten
+    assert none.covariance == pytest.approx(np.linalg.inv(J[:19].T @ J[:19]))

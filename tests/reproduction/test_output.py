@@ -86,7 +86,50 @@ def test_table_4_holds_every_run_of_every_method_under_its_own_name():
     assert absent["genetic"] == "no genetic search was made"
     assert absent["virtual_rig"] == "the data are not of the virtual rig"
     assert absent["table1_tests"] == "the data allow no row of it"
+    assert absent["table3_parameters"] == "no run is held out"
     assert not set(absent) & set(made)
+    assert made["table5_methods"] == verdicts(study())
+
+
+def test_everything_is_written_and_shown_in_its_place(monkeypatch, tmp_path):
+    claim = Claim("phase", "text", "Eq. 1", "holds", "recovered", "1 rad", "limit", "fig12", "20 of 20")
+    page, saved = {}, {}
+
+    def save(figure, path, formats):
+        saved[path.name] = figure, formats
+        path.with_suffix(".svg").write_text("picture", encoding="utf-8")
+        return b"picture"
+
+    def render(template, title, about, **given):
+        page.update(given, template=template, about=about)
+        return "<p>page</p>"
+
+    monkeypatch.setattr(output, "judge_all", lambda study: (claim,))
+    monkeypatch.setattr(output, "figures", lambda study: ({"fig12": ("drawn", "the phase")}, {"fig09": "one motion"}))
+    monkeypatch.setattr(output, "save_figure", save)
+    monkeypatch.setattr(output, "render_page", render)
+    monkeypatch.setattr(output, "made_from", lambda dataset: f"from {dataset}")
+    made = study(notes=("first",), seconds=12.4, dataset="rig 1", best="one")
+    told = []
+    written = output.write_reproduction(made, tmp_path / "out", lambda what, share: told.append((what, share)))
+    assert written[0] == tmp_path / "out" / "reproduction.html"
+    assert written[0].read_text(encoding="utf-8") == "<p>page</p>"
+    assert (tmp_path / "out" / "figures" / "fig12.svg").is_file()
+    assert (tmp_path / "out" / "tables" / "claims.csv").read_text(encoding="utf-8").startswith("key,text,source")
+    assert saved == {"fig12": ("drawn", ())}
+    assert page["pictures"] == {"fig12": ("the phase", b"picture")}
+    tables, absent = output._tables(made, (claim,))
+    assert page["tables"] == tables
+    assert page["claims"] == (claim,)
+    missing = [f"{name} is not made: {why}" for name, why in absent.items()]
+    assert page["notes"] == ("first", "fig09 is not drawn: one motion", *missing)
+    assert (page["study"], page["best"], page["synthetic"]) == (made, "one", False)
+    assert page["about"].startswith("from rig 1; computed in 12 s.")
+    assert told[-1] == ("written", 1.0)
+    made.rig = VirtualRig()
+    output.write_reproduction(made, tmp_path / "out", png=True)
+    assert page["synthetic"]
+    assert saved["fig12"] == ("drawn", ("png",))
 
 
 def test_tests_and_searches_stand_in_their_columns():
@@ -126,8 +169,8 @@ def test_a_parameter_that_was_held_has_no_r2(monkeypatch):
         return FunctionFit(ParameterFunction("linear-current", (value, 1.0)), r2, 0.5)
 
     fit = SimpleNamespace(
-        functions={"c": function(2.0, 0.9), "k1": function(3.0, 1.0)},
-        values={"c": np.array([1.0, 2.0]), "k1": np.array([5.0, 5.0])},
+        functions={"c": function(2.0, 0.9), "k1": function(3.0, 1.0), "k2": function(4.0, 0.8)},
+        values={"c": np.array([1.0, 2.0]), "k1": np.array([5.0, 5.0]), "k2": np.array([-5.0, -5.0 + 1e-9])},
     )
     monkeypatch.setattr(output, "ModifiedFit", SimpleNamespace)
     one = contender("one", "paper", 0.1, 3.0)
@@ -136,6 +179,7 @@ def test_a_parameter_that_was_held_has_no_r2(monkeypatch):
     assert [(r["method"], r["parameter"], r["form"], r["function"], r["r2"], r["coefficients"]) for r in rows] == [
         ("one", "c", "linear-current", "2 I +1", 0.9, "2.0 1.0"),
         ("one", "k1", "linear-current", "3 I +1", None, "3.0 1.0"),
+        ("one", "k2", "linear-current", "4 I +1", None, "4.0 1.0"),
     ]
 
 
@@ -161,6 +205,15 @@ def test_parameters_at_the_held_out_condition_are_listed_way_by_way(monkeypatch)
         (LITERAL, "identified there", "h0", 1.5, 900.0, 1.5e5),
     ]
     assert (rows[0]["beta [m^-n]"], rows[0]["A [-]"], rows[0]["amplitude_m"]) == (3e6, 2.0, 0.08)
+    ways[2].recipe.basis = SimpleNamespace(identify=lambda run: SimpleNamespace(model=predicted))
+    held = (SimpleNamespace(id="h0"),)
+    rows = output.parameter_rows(study(contenders=ways, held_out=held))
+    there = [(r["method"], r["c [N s/m]"]) for r in rows if r["values"] == "identified there"]
+    assert there == [(LITERAL, 900.0), (CONSISTENT, 1000.0)]
+    rows = output.parameter_rows(study(contenders=ways[:2], held_out=held))
+    assert [r["method"] for r in rows] == [LITERAL, LITERAL]
+    _, absent = tables(contenders=ways[1:2], held_out=held)
+    assert absent["table3_parameters"] == "the data allow no row of it"
 
 
 def test_a_program_reads_verdicts_and_whether_the_data_are_synthetic(monkeypatch):

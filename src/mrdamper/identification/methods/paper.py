@@ -133,7 +133,7 @@ class Paper(Method):
                 "unless fixed",
             )
         c, m = damping_and_mass(reading, X, omega, known["k1"], k3)
-        known |= {name: value for name, value in (("c", c), ("m", m)) if name in problem.free}
+        known |= {name: value for name, value in {"c": c, "m": m}.items() if name in problem.free}
         if self.quadratic_stiffness == "dropped":
             known["k2"] = 0.0
         if "f0" in problem.free:
