@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from support.rig_files import NAMES, channels, rows, text, write
 
@@ -70,6 +70,7 @@ WRONG = {
 }
 
 
+@settings(max_examples=50, suppress_health_check=[HealthCheck.too_slow])
 @given(profile=PROFILES)
 def test_a_written_profile_reads_back_equal(profile):
     assert parse_profile(profile_text(profile)) == profile

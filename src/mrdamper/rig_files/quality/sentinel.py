@@ -16,17 +16,19 @@ from mrdamper.rig_files.record import Finding
 # Only digits are compared: a unit prefix moves the decimal point.
 _NINES = (9.99, 9.999, 9.9999, 9.99999, 9.999999, 9.9925, 9.91)
 _ENDS = (3.2767, 3.2768, 6.5535, 8.388607, 8.388608, 2.147483647, 2.147483648, 4.294967295)
-_DIGITS = np.array([*_NINES, *_ENDS])
+_DIGITS = np.sort([*_NINES, *_ENDS])
+_MIDDLES = 0.5 * (_DIGITS[1:] + _DIGITS[:-1])
 _LEAP = 0.25  # of the channel's range: a code stands that far from the samples around it
 _FAR = 2.0  # times as far as all but a hundredth of the channel's own leaps
 _PULSES = 9  # times as far, a value that no logger writes for missing ones is no pulse of a supply
-COARSEST = {"current": 0.1}  # leaps below are a supply's own [A]: ripple and a chopper's pulses
+COARSEST = {"current": 0.1, "voltage": 1.0}  # leaps below are a supply's own [A, V]: ripple and a chopper's pulses
 _RARE = 0.1  # of the samples: a value held more often is the channel's own
 _FEW = 50  # distinct values of a channel that does not vary
 _CHUNK = 1_000_000  # samples looked at together
 _LONG = 20  # a value held longer than this on average is a plateau, no code
 _OFTEN, _MORE = 2, 4  # times, and times more for each that a level beside it comes again
 _AROUND, _APART = 20, 0.4  # levels on either side, share that leaps
+_TURNS, _ONE_TURN, _SLOPES = 2.5, 8.0, 2.0  # times as far as the channel's own turns and slopes: twice, or once
 _ENOUGH = 50  # of a channel's own samples, below which its leaps say nothing
 
 
@@ -65,10 +67,15 @@ def code_in(values: Floats, coarsest: float) -> float | None:
     low = float(np.min(values, where=present, initial=np.inf))
     high = float(np.max(values, where=present, initial=-np.inf))
     scale = (high - low) + 0.05 * max(abs(low), abs(high)) + coarsest
-    varies = np.unique(values[present][:10_000]).size >= _FEW
+    levels = np.unique(values[present][:10_000])
+    varies = levels.size >= _FEW
     for value in sorted(rare, key=abs, reverse=True):
         away = max(low - value, value - high)
         if away > scale and (_known(value) or (varies and counts[value] > 1 and away > scale + _PULSES * coarsest)):
+            return value
+    codes = _codes_among(values[:_CHUNK]) if coarsest == 0.0 or varies else set()
+    for value in codes if coarsest == 0.0 and levels.size > 1 else ():
+        if _drops_to(values[:_CHUNK], value, float(np.min(np.diff(levels)))):
             return value
     if not varies:
         return None  # a channel that flickers between a few levels leaps there and back all the time
@@ -81,33 +88,68 @@ def code_in(values: Floats, coarsest: float) -> float | None:
         scattered = share >= 0.5 or off >= 2 if usual else share >= 0.8
         if scattered and _stands_out(values, value, leap):
             return value
-    return _too_often(values, extremes - {0.0})
+    return next((code for code in codes - extremes | codes & {0.0} if _too_often(values[:_CHUNK], code)), None)
 
 
-def _too_often(values: Floats, ends: set[float]) -> float | None:
-    """A code in use, or zero, that a fine channel holds far more often than the values around it.
+def _drops_to(values: Floats, value: float, step: float) -> bool:
+    """Whether a channel leaps to a value and back, much further than it turns back anywhere else.
+
+    A force that changes its sign leaps past zero, and a V turns at its tip: neither counts.
+    """
+    starts, stops = runs_of(values == value)
+    inner = (starts > 1) & (stops < values.size - 1)
+    starts, stops = starts[inner], stops[inner]
+    if not starts.size or np.mean(stops - starts) > _LONG:
+        return False
+    before, after = values[starts - 1] - value, values[stops] - value
+    slope = np.maximum(np.abs(values[starts - 2] - values[starts - 1]), np.abs(values[stops + 1] - values[stops]))
+    away = np.where(before * after > 0, np.minimum(np.abs(before), np.abs(after)) - _SLOPES * slope, 0.0)
+    steps = np.diff(values)
+    turns = np.where(steps[1:] * steps[:-1] < 0, np.minimum(np.abs(steps[1:]), np.abs(steps[:-1])), 0.0)
+    same = values == value
+    own = max(step, float(np.nanmax(turns, where=~(same[:-2] | same[1:-1] | same[2:]), initial=0.0)))
+    return bool(np.count_nonzero(away > _TURNS * own) >= 2 or np.any(away > _ONE_TURN * own))
+
+
+def _too_often(values: Floats, value: float) -> bool:
+    """Whether a fine channel holds a value far more often than the levels around it, and stands off there.
 
     Among samples of its own size a code does not stand off; but a channel passes each of its
     levels about as often, and its samples are smooth.
     """
-    some = values[np.isfinite(values)][:_CHUNK]
-    levels, counts = np.unique(some, return_counts=True)
-    if levels.size < _FEW:
-        return None
-    for at in np.flatnonzero(counts >= _OFTEN):
-        value = float(levels[at])
-        if value in ends or not (value == 0.0 or _known(value)):
-            continue
-        around = np.r_[counts[max(0, at - _AROUND) : at], counts[at + 1 : at + 1 + _AROUND]]
-        if counts[at] < _OFTEN + _MORE * (int(np.max(around, initial=1)) - 1):
-            continue
-        steps = np.abs(values[1:-1] - 0.5 * (values[:-2] + values[2:]))[:_CHUNK]
-        same = values[1:-1][:_CHUNK] == value
-        own = steps[~same & np.isfinite(steps)]
-        apart = steps[same & np.isfinite(steps)]
-        if apart.size and np.mean(apart > 3 * np.quantile(own, 0.9)) > _APART:
-            return value
-    return None
+    often, around = _levels_around(values[np.isfinite(values)], value)
+    if often < _OFTEN + _MORE * (int(np.max(around, initial=1)) - 1):
+        return False
+    steps = np.abs(values[1:-1] - 0.5 * (values[:-2] + values[2:]))
+    same = values[1:-1] == value
+    own = steps[~same & np.isfinite(steps)]
+    apart = steps[same & np.isfinite(steps)]
+    return bool(apart.size and np.mean(apart > 3 * np.quantile(own, 0.9)) > _APART)
+
+
+def _codes_among(values: Floats) -> set[float]:
+    """Zero and codes in use that a channel holds more than once."""
+    values = values[np.isfinite(values)]
+    size = np.abs(values)
+    if not np.any(size):
+        return set()
+    decades = 10.0 ** np.arange(np.floor(np.log10(np.max(size))) - 6, np.floor(np.log10(np.max(size))) + 1)
+    codes = np.outer(decades, _DIGITS).reshape(-1)
+    middles = 0.5 * (codes[1:] + codes[:-1])
+    near = np.abs(size / codes[np.searchsorted(middles, size)] - 1) < 1e-9
+    found, counts = np.unique(values[near | (size == 0.0)], return_counts=True)
+    return set(found[counts >= _OFTEN].tolist())
+
+
+def _levels_around(values: Floats, value: float) -> tuple[int, np.ndarray]:
+    """How often a channel holds a value, and each of the levels next to it on either side."""
+    width, span = 1e-4, float(np.ptp(values))
+    while True:
+        levels, counts = np.unique(values[np.abs(values - value) <= width * span], return_counts=True)
+        at = int(np.searchsorted(levels, value))
+        if min(at, levels.size - 1 - at) >= _AROUND or width >= 1:
+            return int(counts[at]), np.r_[counts[max(0, at - _AROUND) : at], counts[at + 1 : at + 1 + _AROUND]]
+        width *= 10
 
 
 def _repeated_leaps(values: Floats, leap: float) -> list[tuple[float, int]]:
@@ -123,13 +165,18 @@ def _repeated_leaps(values: Floats, leap: float) -> list[tuple[float, int]]:
 
 
 def _known(value: float) -> bool:
-    size = abs(value)
-    if size >= 1e20:
-        return True
-    if size == 0.0:
-        return False
-    digits = size / 10.0 ** np.floor(np.log10(size))
-    return bool(np.any(np.abs(digits / _DIGITS - 1) < 1e-9))
+    return bool(_are_known(np.array([value]))[0])
+
+
+def _are_known(values: Floats) -> np.ndarray:
+    """(N,) mask of the values that are codes in use."""
+    size = np.abs(values)
+    known = size >= 1e20
+    there = np.flatnonzero(~known & (size > 0))
+    digits = size[there] / 10.0 ** np.floor(np.log10(size[there]))
+    nearest = np.searchsorted(_MIDDLES, digits)
+    known[there] = np.abs(digits / _DIGITS[nearest] - 1) < 1e-9
+    return known
 
 
 def _scattered(values: Floats, value: float, leap: float) -> tuple[int, float]:

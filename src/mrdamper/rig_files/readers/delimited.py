@@ -26,7 +26,7 @@ _ODD = re.compile("[\udc80-\udcff\ufffd\x80-\x9fÿþðÞÐ¤¦¬¸¨÷×]")  # b
 _HEADER_LINES, _BREAKS = 200, 12  # lines in which a quoted name may be broken, and into how many
 _FOOTER = 8192  # bytes in which lines of words below the rows are looked for
 _HEAD_LINES = 4000  # in which the data must have begun
-BULK_FROM = 2**19  # bytes; below, reading cell by cell takes less time than loading the fast reader
+BULK_FROM = 2**16  # bytes; below, reading cell by cell takes less time than loading the fast reader
 
 
 class DelimitedText(Reader):

@@ -99,13 +99,14 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
     RigFileError
         E_NO_DATA, E_AMBIGUOUS, E_FIELD_COUNT, E_TOO_MANY_COLUMNS, E_QUOTE.
     """
-    separator = form.separator or _separator(lines, source)
-    first, width, trailing = _first_row(lines, separator, source, form)
+    content = _content(lines)
+    separator = form.separator or _separator(lines, content, source)
+    above = form.data_line - 1 if form.data_line else form.header_line or 0
+    first, width, trailing = _first_row(content, above, separator, source)
     if form.header_line is None and form.data_line is None:
         again = _below_preamble(lines, first, separator)
         if again:
-            below = form.model_copy(update={"data_line": again + 1})
-            first, width, trailing = _first_row(lines, separator, source, below)
+            first, width, trailing = _first_row(content, again, separator, source)
     if width > MOST_COLUMNS:
         raise source.refuse("E_TOO_MANY_COLUMNS", f"{width} columns", line=first + 1, mend="is one sample one line?")
     rows = _rows(lines[first:], separator, width, trailing)
@@ -234,22 +235,22 @@ def _content(lines: Sequence[str]) -> list[tuple[int, str]]:
     return [(i, line) for i, line in enumerate(lines) if line.strip() and not is_comment(line)]
 
 
-def _separator(lines: Sequence[str], source: Source) -> str:
+def _separator(lines: Sequence[str], content: Sequence[tuple[int, str]], source: Source) -> str:
     """The one under which the last lines at hand split into most numbers, evenly."""
-    content = [line for _, line in _content(lines)]
-    if not content:
+    last = [line for _, line in content[-_SAMPLE:]]
+    if not last:
         raise source.refuse(
             "E_NO_DATA", f"only remarks in the first {len(lines)} lines", mend="remove them, or export the data again"
         )
     best, most = "", 0.0
     for separator in _SEPARATORS:
-        score = _evenness(content[-_SAMPLE:], separator)
+        score = _evenness(last, separator)
         if score > most + 1e-9:
             best, most = separator, score
     if best:
         return best
     # One column, or only a header: the separator does not matter, or the header shows it.
-    counts = {s: content[-1].count(s) for s in _SEPARATORS[:-1]}
+    counts = {s: last[-1].count(s) for s in _SEPARATORS[:-1]}
     return max(counts, key=lambda s: counts[s]) if any(counts.values()) else ","
 
 
@@ -271,10 +272,10 @@ def _is_row(cells: Sequence[str]) -> bool:
     return numeric >= 1 and (numeric >= 2 or len(filled) <= 2) and 3 * numeric >= len(filled)
 
 
-def _first_row(lines: Sequence[str], separator: str, source: Source, form: FileForm) -> tuple[int, int, bool]:
-    """Index of the first row of data, number of columns, whether rows end with a separator."""
-    above = (form.data_line or 1) - 1 if form.data_line else (form.header_line or 0)
-    content = [(i, line) for i, line in _content(lines) if i >= above]
+def _first_row(content: Sequence[tuple[int, str]], above: int, separator: str, source: Source) -> tuple[int, int, bool]:
+    """Index of the first row of data from an index on, number of columns, whether rows end with a separator."""
+    before = [entry for entry in content if entry[0] < above]
+    content = content[len(before) :]
     sample = [_try_split(line, separator) for _, line in content[-_SAMPLE:]]
     rows = [cells for cells in sample if _is_row(cells)]
     named = any(_names_columns(line, mark) for _, line in content[-_SAMPLE:] for mark in _SEPARATORS[:-1])
@@ -288,7 +289,8 @@ def _first_row(lines: Sequence[str], separator: str, source: Source, form: FileF
     )
     trailing = width > 1 and separator != SPACES and not cells[-1] and not any(r[-1] for r in rows if len(r) == width)
     if trailing:
-        header = [c for _, c in _split_all(_content(lines[:first]), separator) if len(c) in (width, width - 1)]
+        over = [entry for entry in (*before, *content) if entry[0] < first]
+        header = [c for _, c in _split_all(over, separator) if len(c) in (width, width - 1)]
         trailing = not header or len(header[-1]) == width - 1 or not header[-1][-1]
     return first, width - trailing, trailing
 

@@ -46,7 +46,13 @@ def number(token: str, mark: str) -> float | None:
 def looks_numeric(token: str) -> bool:
     """Whether a cell is meant as a value, in whatever writing: tells rows of data from headers."""
     token = token.strip(_SPACE)
-    if token.lower() in MISSING or stamp(token) is not None or _INFINITE.fullmatch(token) or FORTRAN.fullmatch(token):
+    if (
+        NUMBER["."].fullmatch(token)
+        or token.lower() in MISSING
+        or stamp(token) is not None
+        or _INFINITE.fullmatch(token)
+        or FORTRAN.fullmatch(token)
+    ):
         return True
     if len(token) > 40 or not any(unicodedata.decimal(c, None) is not None for c in token):
         return False
