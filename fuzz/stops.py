@@ -7,6 +7,7 @@ itself, so that no thread of theirs is lost in a fork.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import hashlib
 import importlib
 import os
@@ -30,56 +31,144 @@ COMMANDS = {
     "validate": ("v.csv", "validate ../model.json ../data{n} --out v.csv"),
     "export": ("c", "export ../model{n}.json --to c --out c"),
     "page": ("d.html", "export ../model{n}.json --to page --out d.html"),
+    "fmu": ("d.fmu", "export ../model{n}.json --to fmu --out d.fmu"),
     "import": ("set{n}", "import ../files{n} --out set{n}"),
+    "add": ("set", "import ../files{n} --add --out set"),
+    "split": ("set", "split set --run {n}Hz-0A --replace"),
+    "check": ("loops.svg", "check ../data{n} --figure loops.svg"),
     "study": ("s", "study ../data{n} --out s"),
     "compare": ("m", "compare ../data{n} --models bingham --models biviscous --out m"),
+    "certainty": ("sure", "certainty ../study{n}/model.json ../data{n} --out sure"),
+    "report": ("r", "report ../data{n} --out r"),
+    "plan": ("plan", "plan --limits ../limits.toml --hours {n} --out plan"),
+    "simulate": (
+        "ride",
+        "simulate quarter-car --input bump --damper ../model{n}.json --current 0.5 --step 0.01 --out ride",
+    ),
+    "law": ("law", "simulate quarter-car --input bump --damper ../model{n}.json --step 0.01 --control skyhook --c law"),
+    "reproduce": ("claims", "reproduce --data ../data{n} --no-comparators --jobs 1 --out claims"),
 }
+_CHANGE = ("add", "split")  # what they find there: a copy of the first dataset
+_DEAR = {"reproduce": 0.4}  # of the usual number of tries
 _LOADED = (
-    "numpy", "scipy.optimize", "scipy.special", "polars", "matplotlib.pyplot", "jinja2", "pydantic", "mrdamper.cli.output",
-    "mrdamper.study.workflow", "mrdamper.study.comparison", "mrdamper.report.study", "mrdamper.export",
+    "numpy", "scipy.optimize", "scipy.special", "polars", "matplotlib.pyplot", "matplotlib.backends.backend_svg", "jinja2",
+    "pydantic", "mrdamper.cli.output", "mrdamper.study.workflow", "mrdamper.study.comparison", "mrdamper.report.study",
+    "mrdamper.report.comparison", "mrdamper.report.damper_tests", "mrdamper.report.simulation", "mrdamper.export",
     "mrdamper.files.dataset", "mrdamper.files.model_file", "mrdamper.validation", "mrdamper.rig_files.rig_import",
+    "mrdamper.systems.simulate", "mrdamper.study.plan", "mrdamper.reproduction.output",
 )  # fmt: skip
+_STEPS = ("os.rename", "os.link", "os.remove", "os.rmdir", "os.mkdir", "ctypes.dlsym")  # the last: before an exchange
 _TIMES = "made.json"  # holds when a result was made
 _GONE_S = 2.0  # in which children of a killed command must be gone
 
 
 def attack_kills(share: float) -> list[Count]:
-    """SIGKILL at random moments: nothing half-written or mixed, no orphan, no litter after the next run."""
+    """SIGKILL at every rename and at random: nothing half-written or mixed, no orphan, no litter after the next run."""
     if os.name != "posix":
         return []
     rng, counts = random.Random(6), {what: Count(f"SIGKILL: {what}") for what in ("old or new", "orphans", "litter")}
-    each = max(1, round(200 * share / len(COMMANDS)))
     with _workplace() as root:
+        _adopt_orphans()
         for name, (out, line) in COMMANDS.items():
-            folder, wholes = root / name, []
+            folder = root / name
             folder.mkdir()
+            said, span, wholes = [], 0.0, []
             for n in (1, 2):
+                _begin_anew(folder, n)
                 began = time.monotonic()
-                said = _run(folder, line.format(n=n))
+                said += [_run(folder, line.format(n=n))]
                 span = time.monotonic() - began
-                if said is not None:
-                    counts["litter"].check(False, (name, "does not run", said))
                 wholes.append(_content(folder / out.format(n=n)))
+            runs = said == [None, None] and all(wholes) and wholes[0] != wholes[1]
+            counts["litter"].check(runs, (name, "does not run, or writes the same twice", said))
+            each = max(2, round(200 * share * _DEAR.get(name, 1.0) / len(COMMANDS))) if runs else 0
+            steps = _steps(folder, line.format(n=1))
+            wanted = sorted(rng.sample(range(steps), min(steps, each - each // 3)))
             for i in range(each):
-                n = 1 + i % 2  # over what the other wrote
-                if "{n}" in out and rng.random() < 0.7:
-                    shutil.rmtree(folder / out.format(n=n), ignore_errors=True)
-                pid = _begin(folder, line.format(n=n))
-                time.sleep(rng.uniform(0, 1.05) * span if rng.random() < 0.5 else rng.uniform(0.6, 1.02) * span)
-                children = _descendants(pid)
-                os.kill(pid, signal.SIGKILL)
-                os.waitpid(pid, 0)
-                until = time.monotonic() + _GONE_S
-                while any(map(_alive, children)) and time.monotonic() < until:
-                    time.sleep(0.02)
-                counts["orphans"].check(not any(map(_alive, children)), (name, children))
+                n, step = 1 + i % 2, wanted[i] if i < len(wanted) else None
+                _begin_anew(folder, n, empty=step is None and rng.random() < 0.5)
+                before = _content(folder / out.format(n=n))
+                pid = _begin(folder, line.format(n=n), _kill_at(folder, step) if step is not None else None)
+                if step is None:
+                    time.sleep(rng.uniform(0, 1.05) * span)
+                    with contextlib.suppress(ProcessLookupError):
+                        os.kill(pid, signal.SIGKILL)
+                _wait(pid)
+                left = _orphans()
+                counts["orphans"].check(not left, (name, step, left))
                 found = _content(folder / out.format(n=n))
-                counts["old or new"].check(found in (*wholes, {}), (name, sorted(found)))
+                counts["old or new"].check(found in (before, wholes[n - 1]), (name, step, sorted(found)))
             for n in (1, 2):
+                _begin_anew(folder, n)
                 _run(folder, line.format(n=n))
-            left = sorted(path.name for path in folder.rglob(".*"))
+            left = sorted(path.name for path in [*folder.rglob(".*"), *(root / "tmp").iterdir()])
             counts["litter"].check(not left and _content(folder / out.format(n=2)) == wholes[1], (name, left))
+            print(
+                f"    {name:12}{each:4} kills, {len(wanted)} of them before one of {steps} steps of publishing",
+                flush=True,
+            )
     return list(counts.values())
+
+
+def _begin_anew(folder: Path, n: int, empty: bool = False) -> None:
+    """What a command must find: the dataset it changes, no dataset where it makes one, the other result or nothing."""
+    out = folder / COMMANDS[folder.name][0].format(n=n)
+    if folder.name in _CHANGE or empty or "{n}" in COMMANDS[folder.name][0]:
+        shutil.rmtree(out) if out.is_dir() else out.unlink(missing_ok=True)
+    if folder.name in _CHANGE:
+        shutil.copytree(folder.parent / "data1", out)
+
+
+def _adopt_orphans() -> None:
+    """What a killed command leaves running becomes a child of this process, which is how it is seen."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(36, 1, 0, 0, 0)  # PR_SET_CHILD_SUBREAPER
+
+
+def _orphans() -> list[str]:
+    """Command lines of what still runs once it had its time to end."""
+    until = time.monotonic() + _GONE_S
+    while True:
+        with contextlib.suppress(ChildProcessError):
+            while os.waitpid(-1, os.WNOHANG)[0]:
+                pass
+        left = _descendants(os.getpid())
+        if not left or time.monotonic() > until:
+            return [Path(f"/proc/{pid}/cmdline").read_text()[:200] for pid in left]
+        time.sleep(0.02)
+
+
+def _steps(folder: Path, line: str) -> int:
+    """How many steps of publishing a run takes."""
+    _begin_anew(folder, 1)
+    seen = folder.parent / "steps"
+    seen.write_bytes(b"")
+    _wait(_begin(folder, line, lambda: _at_steps(folder, lambda: _add_to(seen))))
+    return seen.stat().st_size
+
+
+def _add_to(path: Path) -> None:
+    with path.open("ab") as file:
+        file.write(b".")
+
+
+def _kill_at(folder: Path, wanted: int) -> Callable[[], None]:
+    def limit() -> None:
+        count = iter(range(10**6))
+        _at_steps(folder, lambda: os.kill(os.getpid(), signal.SIGKILL) if next(count) == wanted else None)
+
+    return limit
+
+
+def _at_steps(folder: Path, tell: Callable[[], object]) -> None:
+    """Call before each step a command takes on the files of its folder."""
+
+    def hook(event: str, arguments: tuple[object, ...]) -> None:
+        if event in _STEPS and (str(folder) in str(arguments[0]) or "renameat2" in arguments[:2]):
+            tell()
+
+    process = os.getpid()
+    sys.addaudithook(lambda event, arguments: hook(event, arguments) if os.getpid() == process else None)
 
 
 def attack_limits(share: float) -> list[Count]:
@@ -91,24 +180,26 @@ def attack_limits(share: float) -> list[Count]:
         for name, (out, line) in COMMANDS.items():
             folder = root / name
             folder.mkdir()
+            _begin_anew(folder, 1)
             _run(folder, line.format(n=1))
-            before = _content(folder / out.format(n=1))
             size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
             tries: list[tuple[str, float]] = []
             for kind, most, points in (("disk", 1.2 * size, 8), ("file size", 1.1 * size, 5), ("memory", 3e9, 5)):
-                count = max(1, round(points * share))
+                count = max(1, round(points * share * _DEAR.get(name, 1.0)))
                 tries += [(kind, most * ((i + 1) / count) ** 2) for i in range(count)]
             tries += [("files", value) for value in (6, 12)[: max(1, round(2 * share))]]
             for kind, value in tries:
                 with _starved(folder, kind, value) as (where, limit):
                     if where is None:
                         continue
-                    if "{n}" in out:
-                        shutil.rmtree(where / out.format(n=2), ignore_errors=True)
+                    if where == folder:
+                        _begin_anew(folder, 2)
+                    elif name in _CHANGE:
+                        continue  # the dataset to be changed has no room there
+                    before = _content(where / out.format(n=2))
                     said = _run(where, line.format(n=2), limit)
-                    found = _content(where / out.format(n=2))
-                    whole = said is None or found in (before, {})
-                    left = [path.name for path in where.rglob(".*")]
+                    whole = said is None or _content(where / out.format(n=2)) == before
+                    left = [path.name for path in [*where.rglob(".*"), *(root / "tmp").iterdir()]]
                     typed = said is None or re.search(r"\[E_\w+\]\s*$", said) is not None
                     counts[kind].check(typed and whole and not left, (name, f"{value:.3g}", said, left))
             shutil.rmtree(folder)
@@ -122,7 +213,11 @@ def _workplace() -> Iterator[Path]:
         importlib.import_module(name)
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder)
+        (root / "tmp").mkdir()
+        os.environ["TMPDIR"] = str(root / "tmp")
         _wait(_fork(lambda: _prepare(root), root / "said"))
+        for n in (1, 2):
+            _run(root / "data1", f"study ../data{n} --out ../study{n}")
         yield root
 
 
@@ -142,6 +237,8 @@ def _prepare(root: Path) -> None:
             (root / f"files{n}" / f"{run.id.split('-')[0]}_{run.current_A:g}A.csv").write_text(text)
         save_model(replace(bench_damper(), rig=f"bench {n}"), root / f"model{n}.json")
     shutil.copyfile(root / "model1.json", root / "model.json")
+    limits = "current_A = [0.0, 1.0]\nfrequency_Hz = [0.5, 4.0]\namplitude_mm = [4, 20]\n"
+    (root / "limits.toml").write_text(limits)
 
 
 def _fork(work: Callable[[], object], said: Path) -> int:

@@ -12,7 +12,6 @@ import json
 import re
 import subprocess
 import sys
-import tempfile
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -20,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from mrdamper.data.temporary import temporary_folder
 from mrdamper.errors import MissingExtraError
 from mrdamper.export import fmu_probe
 from mrdamper.export.c import TOLERANCE
@@ -109,8 +109,8 @@ def _binary_for_here(files: Mapping[str, bytes]) -> tuple[dict[str, bytes], list
 
 def _probed(files: Mapping[str, bytes], loadable: bool) -> list[Finding]:
     """What a process that validates and simulates the unpacked FMU found, and how it ended if not well."""
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        unpacked, report = Path(folder, "fmu"), Path(folder, "report")
+    with temporary_folder() as folder:
+        unpacked, report = folder / "fmu", folder / "report"
         for name, content in files.items():
             (unpacked / name).parent.mkdir(parents=True, exist_ok=True)
             (unpacked / name).write_bytes(content)

@@ -7,10 +7,10 @@ import platform
 import shutil
 import subprocess
 import sys
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+
+from mrdamper.data.temporary import temporary_folder
 
 # Results are those of the Python stepper to the last bit: no contraction, no unsafe mathematics.
 _EXACT = ("-std=c99", "-O2", "-ffp-contract=off")
@@ -109,10 +109,10 @@ def build_webassembly(sources: Mapping[str, bytes]) -> Built:
 
 
 def _built(sources: Mapping[str, bytes], command: Sequence[str], libraries: Sequence[str]) -> Built:
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         for name, text in sources.items():
-            (Path(folder) / name).write_bytes(text)
-        library = Path(folder) / "library"
+            (folder / name).write_bytes(text)
+        library = folder / "library"
         files = sorted(name for name in sources if name.endswith(".c"))
         try:
             done = subprocess.run(

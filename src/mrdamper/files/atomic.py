@@ -15,16 +15,15 @@ import json
 import os
 import shutil
 import sys
-import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from mrdamper.data.temporary import temporary_folder
 from mrdamper.errors import OutputError, resource_error
 
 MADE = "made.json"  # which files of a folder are a result's, and what differs from run to run: times
-_PARTIAL = ".partial"
 _FEW = 200  # foreign files of a folder that are carried over into its successor
 _ELSEWHERE = "choose a folder you may write to"
 
@@ -141,9 +140,9 @@ def write_file(path: str | Path) -> Iterator[Path]:
     if final.is_dir():
         raise OutputError("is a folder", where=str(final), mend="give a file name")
     if final.exists() and not final.is_file():  # a device or a pipe: nothing to replace
-        with _coded(final), tempfile.TemporaryDirectory() as folder:
-            yield Path(folder) / final.name
-            final.write_bytes((Path(folder) / final.name).read_bytes())
+        with _coded(final), temporary_folder() as folder:
+            yield folder / final.name
+            final.write_bytes((folder / final.name).read_bytes())
         return
     with _beside(final) as work:
         inner = work / final.name
@@ -172,23 +171,18 @@ def require_writable(path: str | Path) -> None:
 
 @contextmanager
 def _beside(final: Path) -> Iterator[Path]:
-    """A scratch folder on the same file system, so that a rename suffices; gone and unlocked at the end."""
+    """A scratch folder on the same file system, so that a rename suffices."""
     parent = final.absolute().parent
     with _coded(final):
         parent.mkdir(parents=True, exist_ok=True)
-        _sweep(parent, final.name)
-        work, lock = _locked_folder(parent, final.name)
-        if final.is_dir():
-            with contextlib.suppress(OSError):
-                shutil.copymode(final, work)
-        try:
+        with temporary_folder(parent, f".{final.name[:40]}.", ".partial") as work:
+            umask = os.umask(0)
+            os.umask(umask)
+            work.chmod(0o777 & ~umask)
+            if final.is_dir():
+                with contextlib.suppress(OSError):
+                    shutil.copymode(final, work)
             yield work
-        finally:
-            if lock is not None:
-                os.close(lock)  # first: looking into a folder takes a descriptor, and this may be the last one
-            shutil.rmtree(work, ignore_errors=True)
-            with contextlib.suppress(OSError):
-                work.rmdir()  # takes none
 
 
 @contextmanager
@@ -205,46 +199,6 @@ def _coded(final: Path) -> Iterator[None]:
         if any(Path(name).absolute().is_relative_to(place) for name in names):
             raise OutputError(error.strerror or str(error), where=str(final), mend=_ELSEWHERE) from error
         raise
-
-
-def _locked_folder(parent: Path, name: str) -> tuple[Path, int | None]:
-    while True:
-        work = Path(tempfile.mkdtemp(prefix=f".{name[:40]}.", suffix=_PARTIAL, dir=parent))
-        umask = os.umask(0)
-        os.umask(umask)
-        work.chmod(0o777 & ~umask)
-        lock = _lock(work)
-        if work.exists():  # else another process swept it before it was locked
-            return work, lock
-
-
-def _lock(folder: Path) -> int | None:
-    """An open lock on a folder; None if another process has one, or the system knows none."""
-    if os.name != "posix":
-        return None
-    import fcntl
-
-    try:
-        found = os.open(folder, os.O_RDONLY)
-    except OSError:
-        return None
-    try:
-        fcntl.flock(found, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        os.close(found)
-        return None
-    return found
-
-
-def _sweep(parent: Path, name: str) -> None:
-    """Remove what killed processes left of this name."""
-    with os.scandir(parent) as entries:
-        left = [e.path for e in entries if e.name.startswith(f".{name[:40]}.") and e.name.endswith(_PARTIAL)]
-    for path in left:
-        lock = _lock(Path(path))
-        if lock is not None:
-            shutil.rmtree(path, ignore_errors=True)
-            os.close(lock)
 
 
 def _require_absent(final: Path) -> None:

@@ -6,13 +6,13 @@ import contextlib
 import shutil
 import stat
 import tarfile
-import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePosixPath
 from typing import IO
 
+from mrdamper.data.temporary import temporary_folder
 from mrdamper.rig_files.readers.archive import (
     UNREADABLE_ZIP,
     bomb,
@@ -74,7 +74,7 @@ def _is_junk(name: str) -> bool:
 
 
 def _folder_of(path: Path, stack: contextlib.ExitStack) -> Path:
-    top = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="mrdamper-"))) / path.name
+    top = stack.enter_context(temporary_folder()) / path.name
     top.mkdir()
     if path.suffix.lower() == ".zip":
         with opened_zip(path) as source:

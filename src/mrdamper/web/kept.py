@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import io
 import shutil
-import tempfile
 import zipfile
 import zlib
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Dataset
+from mrdamper.data.temporary import temporary_folder
 from mrdamper.errors import InputError
 from mrdamper.files.dataset import SAMPLE_FILES, load_dataset, save_dataset
 from mrdamper.files.model_file import dump_model, parse_model
@@ -115,8 +115,8 @@ def keep(session: Session, state: str, shown: str | None) -> bytes:
 
 
 def _write_data(dataset: Dataset, made: zipfile.ZipFile) -> None:
-    with tempfile.TemporaryDirectory() as place:
-        folder = Path(place) / DATA
+    with temporary_folder() as place:
+        folder = place / DATA
         save_dataset(dataset, folder)
         for path in sorted(folder.iterdir()):
             made.write(path, f"{DATA}/{path.name}")

@@ -11,6 +11,7 @@ import shutil
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
@@ -19,9 +20,9 @@ from fastapi import Depends, Request
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Dataset
+from mrdamper.data.temporary import temporary_folder
 from mrdamper.errors import InputError, UnknownNameError
 from mrdamper.web.drops import Drop, Intake
-from mrdamper.web.folders import bench_folder
 from mrdamper.web.rig_table import RigTable, rig_table
 from mrdamper.web.work import Job
 
@@ -165,7 +166,8 @@ class Sessions:
     """All sessions of one bench."""
 
     def __init__(self) -> None:
-        self.folder = bench_folder()
+        self._keep = ExitStack()
+        self.folder = self._keep.enter_context(temporary_folder())
         self._open: dict[str, Session] = {}
         self._lock = threading.Lock()
 
@@ -225,7 +227,7 @@ class Sessions:
         deadline = time.monotonic() + _LAST_WAIT
         for job in jobs:  # a worker that is just being started can be ended only then
             job.wait(max(0.0, deadline - time.monotonic()))
-        shutil.rmtree(self.folder, ignore_errors=True)
+        self._keep.close()
 
 
 def _current(session: str, request: Request) -> Session:

@@ -1,0 +1,72 @@
+"""Folders that do not stay when their process is killed: each is locked while its process lives, and swept later."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+_PREFIX, _SUFFIX = "mrdamper-", ".scratch"
+
+
+@contextmanager
+def temporary_folder(parent: Path | None = None, prefix: str = _PREFIX, suffix: str = _SUFFIX) -> Iterator[Path]:
+    """Give a new folder that goes with the block; those of its kind whose process was killed go first.
+
+    Parameters
+    ----------
+    parent : path, optional
+        Default: where this system keeps temporary files.
+    prefix, suffix : str
+        The names of the kind begin and end so.
+    """
+    parent = Path(tempfile.gettempdir()) if parent is None else parent
+    _sweep(parent, prefix, suffix)
+    made, lock = _locked(parent, prefix, suffix)
+    try:
+        yield made
+    finally:
+        if lock is not None:
+            os.close(lock)  # first: looking into a folder takes a descriptor, and this may be the last one
+        shutil.rmtree(made, ignore_errors=True)
+        with suppress(OSError):
+            made.rmdir()  # takes none
+
+
+def _locked(parent: Path, prefix: str, suffix: str) -> tuple[Path, int | None]:
+    while True:
+        made = Path(tempfile.mkdtemp(prefix=prefix, suffix=suffix, dir=parent))
+        lock = _lock(made)
+        if made.exists():  # else another process swept it before it was locked
+            return made, lock
+
+
+def _lock(folder: Path) -> int | None:
+    """An open lock on a folder; None if another process has one, or the system knows none."""
+    if os.name != "posix":
+        return None
+    import fcntl
+
+    try:
+        found = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(found, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(found)
+        return None
+    return found
+
+
+def _sweep(parent: Path, prefix: str, suffix: str) -> None:
+    with os.scandir(parent) as entries:
+        left = [e.path for e in entries if e.name.startswith(prefix) and e.name.endswith(suffix)]
+    for path in left:
+        lock = _lock(Path(path))
+        if lock is not None:
+            shutil.rmtree(path, ignore_errors=True)
+            os.close(lock)
