@@ -128,6 +128,8 @@ class Model(ABC):
         for info in self.parameters():
             value = getattr(self, info.name)
             low, high = info.bounds
+            if type(value) is float and low <= value <= high and -math.inf < value < math.inf:
+                continue  # searches make models by the thousand
             if not is_number(value):
                 raise ParameterError(f"{info.name} = {value!r:.60}", where=self.title, mend="give a number")
             if not (low <= value <= high and -math.inf < value < math.inf):

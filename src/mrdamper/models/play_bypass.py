@@ -18,7 +18,7 @@ from mrdamper.data import Floats
 from mrdamper.models.base import Model, Scale, SearchAxis
 from mrdamper.motion import Excitation, Path
 from mrdamper.motion.lag import first_order_lag, leaking_load
-from mrdamper.motion.path import last_along_a_path
+from mrdamper.motion.path import last_along
 from mrdamper.parameters import param
 from mrdamper.tracing import Tape, streamed
 
@@ -199,7 +199,7 @@ def play_position(path: Path, limit: float, start: float = 0.0) -> Floats:
     return _stopped(path, limit, start)
 
 
-@last_along_a_path
+@last_along
 def _stopped(path: Path, limit: float, start: float) -> Floats:
     turned = path.first_direction * np.where(np.arange(len(path.lengths)) % 2, -1.0, 1.0) * path.lengths
     at_start = np.concatenate([[start], _clipped_sums(turned, limit, start)])

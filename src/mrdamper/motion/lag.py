@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.motion.path import Path, last_along_a_path
+from mrdamper.motion.path import Path, last_along
 from mrdamper.tracing import Tape, choose, streamed
 
 _SHORT = 1e-4  # step over time constant below which a series loses fewer digits
 _FORGOTTEN = 1e-18  # share of the past below which it is rounding
+_LONG = 200_000  # samples from which weights are not worth their memory
 
 
 def lag_step(tape: Tape, time: Any, signal: Any, time_constant: Any) -> Any:
@@ -45,22 +47,43 @@ def first_order_lag(time: Floats, signal: Floats, time_constant: float) -> Float
     """
     if time_constant <= 0:
         return signal.copy()
+    rows = iter(_known_weights(time, time_constant) if time.size < _LONG else _weights(time, time_constant))
+    value = np.zeros(signal.size)
+    value[1:] = next(rows)[1:] * signal[:-1]
+    value[1:] += next(rows)[1:] * signal[1:]
+    return _summed(rows, value)
+
+
+def _weights(time: Floats, time_constant: float) -> Iterator[Floats]:
+    """(N,) weights of the two ends of the straight pieces, then of the past, span by span."""
     step = np.diff(time) / time_constant
     keep = np.concatenate([[0.0], np.exp(-step)])
-    # Weights of the two ends of a straight piece; the series where their difference would cancel.
+    # The series where the difference of the two would cancel.
     gain = np.where(step > _SHORT, (1 - keep[1:]) / np.where(step > 0, step, 1.0), 1 - step / 2 + step**2 / 6)
-    value = np.concatenate([[0.0], (gain - keep[1:]) * signal[:-1] + (1 - gain) * signal[1:]])
-    return _summed(keep, value)
+    yield np.append(0.0, gain - keep[1:])
+    yield np.append(0.0, 1 - gain)
+    yield from _spans(keep)
 
 
-def _summed(keep: Floats, value: Floats) -> Floats:
-    """Y with y_i = keep_i y_(i−1) + value_i: spans of 1, 2, 4, ... samples are joined until the past is forgotten."""
+@last_along
+def _known_weights(time: Floats, time_constant: float) -> Floats:
+    """The same as rows of a table, for the next signal along these times."""
+    return np.stack(list(_weights(time, time_constant)))
+
+
+def _spans(keep: Floats) -> Iterator[Floats]:
+    """What is kept over spans of 1, 2, 4, ... samples, until the past is forgotten."""
     span = 1
-    while span < value.size and keep.max() > _FORGOTTEN:
-        value[span:] += keep[span:] * value[:-span]
-        keep[span:] = keep[span:] * keep[:-span]
-        keep[:span] = 0.0
+    while span < keep.size and keep.max() > _FORGOTTEN:
+        yield keep
+        keep = np.concatenate([np.zeros(span), keep[span:] * keep[:-span]])
         span *= 2
+
+
+def _summed(spans: Iterable[Floats], value: Floats) -> Floats:
+    """Y with y_i = keep_i y_(i−1) + value_i, in place: spans are joined."""
+    for power, keep in enumerate(spans):
+        value[1 << power :] += keep[1 << power :] * value[: -(1 << power)]
     return value
 
 
@@ -93,9 +116,9 @@ def leaking_load(time: Floats, path: Path, length: float, leak: float) -> Floats
     return np.ones(time.size) if leak <= 0 else _loaded(path, time, length, leak)
 
 
-@last_along_a_path
+@last_along
 def _loaded(path: Path, time: Floats, length: float, leak: float) -> Floats:
     built, leaked = np.diff(path.travel) / length, leak * np.diff(time)
     both = np.maximum(built + leaked, np.finfo(float).tiny)
     keep = np.concatenate([[0.0], np.exp(-both)])
-    return _summed(keep, np.concatenate([[1.0], (1 - keep[1:]) * built / both]))
+    return _summed(_spans(keep), np.concatenate([[1.0], (1 - keep[1:]) * built / both]))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import wraps
 from typing import Any, Literal, Self
-from weakref import WeakKeyDictionary
+from weakref import ref
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -95,23 +95,24 @@ class Path:
         return np.cumsum([0.0, *self.lengths])[self.stroke] + self.distance
 
 
-def last_along_a_path(function: Callable[..., Floats]) -> Callable[..., Floats]:
-    """Remember what a function of a path, its times and some numbers gave last, as long as the path lives.
+def last_along(function: Callable[..., Floats]) -> Callable[..., Floats]:
+    """Remember what a function of a path or of times, and of some numbers, gave last, as long as the first lives.
 
     A search moves one parameter at a time; what the others lead to stays.
     """
-    known: WeakKeyDictionary[Path, tuple[tuple[Any, ...], Floats]] = WeakKeyDictionary()
+    known: dict[int, tuple[ref[Any], tuple[Any, ...], Floats]] = {}
 
     @wraps(function)
-    def remembered(path: Path, *given: Any) -> Floats:
-        before = known.get(path)
+    def remembered(first: Any, *given: Any) -> Floats:
+        before = known.get(id(first))
         if before is None or any(
-            a is not b and (isinstance(a, np.ndarray) or a != b) for a, b in zip(before[0], given, strict=True)
+            a is not b and (isinstance(a, np.ndarray) or a != b) for a, b in zip(before[1], given, strict=True)
         ):
-            made = function(path, *given)
+            made = function(first, *given)
             made.flags.writeable = False
-            before = known[path] = (given, made)
-        return before[1]
+            alive = ref(first, lambda _, key=id(first): known.pop(key, None))
+            before = known[id(first)] = (alive, given, made)
+        return before[2]
 
     return remembered
 

@@ -38,15 +38,16 @@ def solve_linear(columns: Floats, right: Floats, rank_limit: float | None = None
     -------
     (L,) array
     """
-    scale = np.sqrt(np.einsum("nl,nl->l", columns, columns))
-    scale[scale == 0] = 1.0
-    scaled = columns / scale
-    normal = scaled.T @ scaled
+    gram = columns.T @ columns
+    scale = np.sqrt(np.diag(gram))
+    scale = np.where(scale > 0, scale, 1.0)
+    normal = gram / scale / scale[:, None]
     if _pivots(normal).min(initial=1.0) > _WELL_APART:
         # Normal equations, then once more for what they left: as good as a factorisation of N rows.
-        found = np.linalg.solve(normal, right @ scaled)
-        return (found + np.linalg.solve(normal, (right - scaled @ found) @ scaled)) / scale
-    return np.asarray(np.linalg.lstsq(scaled, right, rcond=rank_limit)[0], dtype=float) / scale
+        inverse = np.linalg.inv(normal) / scale / scale[:, None]
+        found = inverse @ (right @ columns)
+        return found + inverse @ ((right - columns @ found) @ columns)
+    return np.asarray(np.linalg.lstsq(columns / scale, right, rcond=rank_limit)[0], dtype=float) / scale
 
 
 def solve_bounded(columns: Floats, right: Floats, lower: Floats, upper: Floats) -> tuple[Floats, NDArray[np.bool_]]:

@@ -175,17 +175,17 @@ class _Channel:
 
     def _too_quiet(self, start: int, stop: int) -> bool:
         """Whether the noise around would have shown in the stretch."""
-        chances = []
-        for side in (self.values[max(0, start - _NEAR) : start], self.values[stop : stop + _NEAR]):
-            side = side[np.isfinite(side)]
-            if side.size < _NEAR // 4:
-                continue
-            steps = np.diff(side)
-            # Below the resolution, a slow plateau of a coarse channel is as quiet.
-            if not sample_noise(side) > max(self.level, 0.02 * float(np.median(np.abs(steps)))):
-                return False
-            chances.append((np.count_nonzero(steps == 0) + 1) / (side.size + 1))
-        return bool(chances) and self.values.size * max(chances) ** (stop - start - 1) < _CHANCE
+        sides = [self.values[max(0, start - _NEAR) : start], self.values[stop : stop + _NEAR]]
+        sides = [here for side in sides if (here := side[np.isfinite(side)]).size >= _NEAR // 4]
+        steps = [np.diff(side) for side in sides]
+        chances = [(np.count_nonzero(step == 0) + 1) / (step.size + 2) for step in steps]
+        if not chances or self.values.size * max(chances) ** (stop - start - 1) >= _CHANCE:
+            return False
+        # Below the resolution, a slow plateau of a coarse channel is as quiet.
+        return all(
+            sample_noise(side) > max(self.level, 0.02 * float(np.median(np.abs(step))))
+            for side, step in zip(sides, steps, strict=True)
+        )
 
 
 def _equal_stretches(values: Floats) -> Stretches:
