@@ -1,15 +1,17 @@
 """Joint identification: one model for a whole damper, any motion."""
 
-from dataclasses import replace
+from dataclasses import astuple, replace
+from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.dampers import joint_damper
 
-from mrdamper.dampers.choice import identify_jointly
 from mrdamper.dampers.coil import Coil
-from mrdamper.dampers.joint import JointProblem
+from mrdamper.dampers.joint import JointDamper, JointFit, JointProblem
 from mrdamper.dampers.strung import string
 from mrdamper.data import Condition, Run
 from mrdamper.errors import IdentificationError, RunError
@@ -17,8 +19,10 @@ from mrdamper.files.model_file import dump_model, parse_model
 from mrdamper.models.play_bypass import PlayBypass, play_position
 from mrdamper.motion import random_motion, sine, sweep
 from mrdamper.motion.lag import first_order_lag
+from mrdamper.optimizers.ending import Ending
+from mrdamper.optimizers.levenberg_marquardt import Minimum
 from mrdamper.simulation import simulate, steady_loop
-from mrdamper.validation import leave_one_condition_out, validate
+from mrdamper.validation import validate
 
 TRUTH = PlayBypass(
     f0=50.0, k=900.0, c0=700.0, c1=1500.0, fy0=100.0, fy1=1000.0, d=2e-4, e=2.5e-5, cb=3.5e4, h0=0.4, h1=0.4,
@@ -36,9 +40,19 @@ def recorded(motion, noise=0.0, seed=0, **options):
 @pytest.fixture(scope="module")
 def runs():
     return [
-        recorded(sine(c, 4, 500), 5.0, i, id=f"r{i}", window=(1.5 / c.frequency_Hz, 4 / c.frequency_Hz))
+        recorded(sine(c, 3, 360), 5.0, i, id=f"r{i}", window=(1.5 / c.frequency_Hz, 3 / c.frequency_Hz))
         for i, c in enumerate(MATRIX)
     ]
+
+
+@pytest.fixture(scope="module")
+def problem(runs):
+    return JointProblem(runs, "play-bypass")
+
+
+@pytest.fixture(scope="module")
+def fit(problem):
+    return problem.fit()
 
 
 def test_the_stop_operator_moves_stops_and_forgets():
@@ -87,8 +101,7 @@ def test_the_force_converges_with_the_sampling():
     assert errors[1] < 0.4 * errors[0]
 
 
-def test_known_damper_is_recovered(runs):
-    fit = JointProblem(runs, "play-bypass").fit()
+def test_known_damper_is_recovered(runs, fit):
     found = fit.damper.model
     for name, tolerance in {"fy1": 0.01, "c1": 0.05, "d": 0.02, "cb": 0.05, "T": 0.1, "k": 0.1, "f0": 0.02}.items():
         assert getattr(found, name) == pytest.approx(getattr(TRUTH, name), rel=tolerance), name
@@ -96,61 +109,114 @@ def test_known_damper_is_recovered(runs):
     assert validate(fit.damper, runs).median() < 0.01
 
 
-def test_it_predicts_motions_it_was_never_shown(runs):
-    damper = JointProblem(runs, "play-bypass").fit().damper
+def test_of_each_length_the_best_start_and_the_first_length_first_unless_another_is_clearly_better(
+    problem, monkeypatch
+):
+    at = [axis.name for axis in problem.axes].index("d")
+    lengths = [problem.axes[at].coordinate(g) for g in problem.axes[at].grid]
+    grid = [np.array(u) for u in product(*([axis.coordinate(g) for g in axis.grid] for axis in problem.axes))]
+    for costs, order in (([1.0, 0.86, 0.9, 9.0], [0, 1, 2]), ([1.0, 0.9, 0.84, 9.0], [2, 0, 1])):
+        other, left = JointProblem(problem.runs, "play-bypass", parts=problem.parts), iter(costs)
+        monkeypatch.setattr(
+            JointProblem, "_downhill", lambda self, u, left=left: Minimum(u, u, next(left), 1, Ending.SETTLED)
+        )
+        assert [u[at] for u in other._promising[:3]] == [lengths[k] for k in order]
+        assert np.array_equal(other.start, other._promising[0])
+    for u in other._promising:
+        alike = [v for v in grid if v[at] == u[at]]
+        assert np.array_equal(u, min(alike, key=lambda v: float(np.sum(other._few.solve(v).nrmse_pp))))
+
+
+def ended(error, knee):
+    damper = replace(joint_damper(), model=replace(joint_damper().model, d=knee / 2))
+    return JointFit(damper, np.array([error / 2, 3 * error / 2]), (), np.zeros(2), Ending.SETTLED, 9, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("ends", "best", "second"),
+    [
+        ([(0.03, 1e-3)], 0, None),
+        ([(0.03, 1e-3), (0.031, 2e-3)], 0, (2e-3, 0.031, 1e-3, 0.03)),
+        ([(0.03, 1e-3), (0.0299, 2e-3)], 0, (2e-3, 0.0299, 1e-3, 0.03)),  # as good: the likelier length
+        ([(0.03, 1e-3), (0.029, 2e-3)], 1, (1e-3, 0.03, 2e-3, 0.029)),
+        ([(0.03, 1e-3), (0.031, 1.09e-3)], 0, None),  # the same knee
+        ([(0.03, 1e-3), (0.031, 0.89e-3)], 0, (0.89e-3, 0.031, 1e-3, 0.03)),
+        ([(0.03, 1e-3), (0.038, 2e-3)], 0, None),  # a quarter worse describes the tests no more
+        ([(0.03, 1e-3), (0.036, 2e-3), (0.033, 5e-4)], 0, (5e-4, 0.033, 1e-3, 0.03)),
+    ],
+)
+def test_a_search_ends_in_the_best_valley_and_names_the_next(problem, monkeypatch, ends, best, second):
+    made = [ended(*end) for end in ends]
+    other = JointProblem(problem.runs, "play-bypass", parts=problem.parts)
+    other.__dict__["_promising"] = [np.array([k]) for k in range(2)][: len(made)]
+    monkeypatch.setattr(JointProblem, "_downhill", lambda self, u: SimpleNamespace(point=u))
+    asked = []
+    monkeypatch.setattr(JointProblem, "fit", lambda self, start, **how: asked.append(how) or made[int(start[0])])
+    found = other.search(np.array([2]) if len(made) > 2 else None, rounds=1, most_steps=7, settled=1e-3)
+    assert (found.damper, found.error) == (made[best].damper, pytest.approx(made[best].error))
+    assert (found.second and pytest.approx(second)) == (found.second and astuple(found.second))
+    assert (found.second is None) == (second is None)
+    assert asked == [{"rounds": 1, "most_steps": 7, "settled": 1e-3}] * len(made)
+
+
+def test_constants_of_other_dampers_count_among_the_numbers(problem, fit):
+    # fy1 I (1 − exp(−I/Ic)): the 0.12 A are a number, though these tests did not give it; cq, qb, leak, si are none.
+    assert (len(fit.damper.free), fit.damper.parameter_count) == (15, 16)
+    freed = JointProblem(problem.runs, "play-bypass", free=("Ic",), parts=problem.parts)
+    assert JointDamper("", fit.damper.model, freed.free, fit.damper.envelope).parameter_count == 16
+
+
+def test_it_predicts_motions_it_was_never_shown(fit):
     rng = np.random.default_rng(7)
     unseen = [
         recorded(sweep(0.3, 4.0, 20.0, 0.006, 0.75, 500.0), id="sweep", excitation="chirp"),
         recorded(random_motion(rng, 20.0, 0.004, (0.2, 3.0), 0.75, 500.0), id="road", excitation="random"),
     ]
-    for score in validate(damper, unseen).runs:
+    for score in validate(fit.damper, unseen).runs:
         assert score.scores.nrmse_pp < 0.02, score.run_id
 
 
-def test_current_may_vary_from_sample_to_sample(runs):
-    damper = JointProblem(runs, "play-bypass").fit().damper
+def test_current_may_vary_from_sample_to_sample(fit):
     motion = sine(Condition(0.0, 1.0, 0.01), 4, 500)
     varied = motion.with_current(0.5 + 0.5 * np.sin(2 * np.pi * 0.3 * motion.time))
     truth = simulate(TRUTH, varied).force
-    assert np.sqrt(np.mean((damper.force_along(varied, MATRIX[0]) - truth) ** 2)) < 0.02 * np.ptp(truth)
+    assert np.sqrt(np.mean((fit.damper.force_along(varied, MATRIX[0]) - truth) ** 2)) < 0.02 * np.ptp(truth)
 
 
-def test_the_coil_follows_a_changed_current_late(runs):
-    damper = JointProblem(runs, "play-bypass").fit(rounds=1).damper
+def test_the_coil_follows_a_changed_current_late(fit):
     motion = sine(Condition(0.0, 1.0, 0.01), 4, 500)
     current = np.where(motion.time < 2, 0.0, 1.0)
     run = Run("step", motion.time, motion.displacement, motion.velocity, current)
-    late, prompt = (replace(damper, coil=coil).predict_run(run).force for coil in (Coil(0.05, 0.05), None))
+    late, prompt = (replace(fit.damper, coil=coil).predict_run(run).force for coil in (Coil(0.05, 0.05), None))
     before, after, later = motion.time < 2, (motion.time > 2) & (motion.time < 2.05), motion.time > 2.6
     np.testing.assert_allclose(late[before], prompt[before])
     assert np.abs(late[after]).mean() < 0.9 * np.abs(prompt[after]).mean()
     np.testing.assert_allclose(late[later], prompt[later], atol=1e-3 * np.ptp(prompt))
 
 
-def test_a_fit_without_some_runs_ends_where_a_search_that_never_saw_them_does(runs):
+def test_a_fit_without_some_runs_ends_where_a_search_that_never_saw_them_does(runs, fit):
     other = [*runs]
     for i in (6, 7, 8):  # a whole current, of another day
         other[i] = replace(runs[i], force=1.15 * runs[i].force)
     problem = JointProblem(other, "play-bypass")
-    fit = problem.fit()
+    fit = problem.fit(start=fit.point)
     rest = [i for i in range(len(runs)) if i not in (6, 7, 8)]
-    again, anew = problem.refit(fit, rest), problem.fit(rest)
+    again, anew = problem.refit(fit, rest), problem.fit(rest, fit.point)
     assert sum(again.nrmse_pp) == pytest.approx(sum(anew.nrmse_pp), rel=2e-3)
     moved = abs(anew.damper.model.fy1 - fit.damper.model.fy1)
     assert abs(again.damper.model.fy1 - anew.damper.model.fy1) < 0.1 * moved
     assert again.damper.provenance["runs"] == "9"
 
 
-def test_a_bad_session_does_not_bend_the_model(runs):
-    drifted = [*runs[:-1], recorded(sine(MATRIX[-1], 4, 500), id="bad")]
-    object.__setattr__(drifted[-1], "force", 1.5 * drifted[-1].force)
-    fit = JointProblem(drifted, "play-bypass").fit()
+def test_a_bad_session_does_not_bend_the_model(runs, fit):
+    drifted = [*runs[:-1], replace(runs[-1], id="bad", force=1.5 * runs[-1].force)]
+    fit = JointProblem(drifted, "play-bypass").fit(start=fit.point)
     assert fit.damper.model.fy1 == pytest.approx(TRUTH.fy1, rel=0.05)
     assert np.argmax(fit.nrmse_pp) == len(runs) - 1
 
 
-def test_round_trip_of_the_saved_model(runs):
-    damper = JointProblem(runs, "play-bypass", fixed={"m": 5.0}).fit().damper
+def test_round_trip_of_the_saved_model(runs, problem, fit):
+    damper = JointProblem(runs, "play-bypass", {"m": 5.0}, parts=problem.parts).fit(start=fit.point, rounds=1).damper
     assert "m" not in damper.free
     back = parse_model(dump_model(damper))
     assert back.model == damper.model
@@ -177,13 +243,9 @@ def test_nothing_several_rigs_and_dead_channels_are_refused(runs):
 
 
 @pytest.mark.parametrize(("rig", "left_out", "held_out"), [("utfsm", 0.037, 0.028), ("labcontrol", 0.028, 0.025)])
-def test_real_dampers_are_predicted_where_nobody_tested(bundled, rig, left_out, held_out):
+def test_real_dampers_are_predicted_where_nobody_tested(bundled_study, rig, left_out, held_out):
     """Bounds a little above what is measured (docs/play-and-bypass.md)."""
-    sines = [run for run in bundled.rig(rig) if run.excitation == "sine"]
-    train = [run for run in sines if run.split == "train"]
-    choice = identify_jointly(train)
-    problem, fit = choice.problem, choice.fit
-    conditions = [part.condition for part in problem.parts]
-    folds = leave_one_condition_out(train, conditions, lambda rest: problem.refit(fit, rest).damper, "joint")
-    assert folds.median() < left_out
-    assert validate(fit.damper, [run for run in sines if run.split == "validate"]).median() < held_out
+    candidates = next(r for r in bundled_study.rigs if r.rig == rig).candidates
+    joint = next(c for c in candidates if c.recipe.name == "play-bypass")
+    assert joint.left_out.median() < left_out
+    assert joint.held_out.median() < held_out

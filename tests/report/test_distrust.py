@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.dampers import joint_damper
 
-from mrdamper.dampers.joint import JointFit
+from mrdamper.dampers.joint import JointFit, Valley
 from mrdamper.optimizers.ending import Ending
 from mrdamper.report.distrust import doubts
 from mrdamper.study.recipe import Scored, play_and_bypass
@@ -34,6 +34,16 @@ def test_a_search_that_did_not_converge_is_said_so_in_a_sentence(why, said):
     if said:
         assert said in sentences[0]
         assert sentences[0].startswith("The search ")
+
+
+def test_a_second_end_of_the_search_is_told_with_its_error():
+    fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), Ending.SETTLED, 9, 0.1)
+    worse, better = (Valley(1.4e-3, e, 4e-4, 0.0266) for e in (0.0273, 0.026))
+    said = "The search also ended at a knee of 1.40 mm instead of 0.40, with a mean error of"
+    assert f"{said} 2.73 % instead of 2.66 %." in doubts(scored(replace(fit, second=worse)), ())
+    told = f"{said} 2.60 % instead of 2.66 %; conditions left out decided."
+    assert told in doubts(scored(replace(fit, second=better)), ())
+    assert not any("also ended" in s for s in doubts(scored(fit), ()))
 
 
 def test_a_run_described_far_worse_than_the_others_is_named_by_its_factor():

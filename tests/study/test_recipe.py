@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.dampers import joint_damper
 from support.synthetic import synthetic_run
 
 from mrdamper.dampers.published import all_published
@@ -15,6 +16,7 @@ from mrdamper.gas_spring import GasSpring
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.metrics import Scores
 from mrdamper.models import model_type
+from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.motion import sine
 from mrdamper.reproduction.ways import one_per_current, through_chosen
@@ -46,6 +48,7 @@ class Memory:
     """Knows the force of the runs it was made of, and says zero of all others."""
 
     title = "memory"
+    one_model = None
 
     def __init__(self, runs):
         self.known = {run.id for run in runs}
@@ -85,6 +88,17 @@ def test_fitted_left_out_and_held_out_errors_stay_apart():
     without = follow(REMEMBER, TRAIN, [], HELD, leave_out=False)
     assert without.left_out.runs == ()
     assert np.isnan(without.per_run)
+
+
+def test_parameters_spread_as_each_condition_is_left_out():
+    def of(runs):
+        return replace(joint_damper("bingham"), model=Bingham(fy=sum(run.nominal.current_A for run in runs), c=9.0))
+
+    recipe = Recipe("sum", None, lambda runs, _: Made(of(runs), lambda rows: of([runs[i] for i in rows])))
+    found = follow(recipe, [*TRAIN, made(4.0, 1.0, "4A")], [], HELD)
+    assert found.damper.model.fy == 6.0
+    assert (found.spread["fy"], found.spread["c"]) == ((2.0, 6.0), (9.0, 9.0))
+    assert follow(REMEMBER, TRAIN, [], HELD).spread == {}
 
 
 def test_what_cannot_be_made_is_refused_by_its_name_and_the_others_go_on():

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from mrdamper.dampers.coil import Coil
-from mrdamper.dampers.joint import FALL, RISE, JointFit, JointProblem
+from mrdamper.dampers.joint import FALL, RISE, JointFit, JointProblem, Valley
 from mrdamper.dampers.sessions import When
 from mrdamper.data import Floats, Run, same_condition
 from mrdamper.errors import InputError
@@ -126,8 +126,9 @@ def identify_jointly(
     progress("one model, steady ends first", 0.0)
     ends = [part.steady_end() for part in problem.parts]
     short = JointProblem(runs, MODEL, fixed, free=(*_FREE, *(_LAW if laws else ())), parts=ends)
-    fit = short.fit(rounds=2, most_steps=15, settled=_ROUGHLY)
+    fit = short.search(rounds=2, most_steps=15, settled=_ROUGHLY)
     short, fit, tried = _lost_motion(short, fit)
+    second = fit.second
     progress("how the force rises with current", 0.3)
     law, fit, more, current = _level_law(short, fit, laws)
     tried = (*tried, *more)
@@ -158,7 +159,7 @@ def identify_jointly(
     kept = "; ".join(t.term for t in tried if t.kept)
     about = {**found.damper.provenance, "terms": kept or "none beyond the plain form"}
     about |= {f"left out, {what}": f"{100 * error:.2f} %" for what, error in left_out.items()}
-    found = replace(found, damper=replace(found.damper, provenance=about))
+    found = replace(found, damper=replace(found.damper, provenance=about), second=second)
     return JointChoice(final, found, tried, left_out)
 
 
@@ -171,7 +172,9 @@ def _lost_motion(problem: JointProblem, fit: JointFit) -> tuple[JointProblem, Jo
     now, scores = (Evidence.of(p, f).everything() for p, f in ((problem, fit), (without, found)))
     kept = _better(now, scores)
     said = Tried("lost motion after a reversal", kept, scores if kept else now, now if kept else scores)
-    return (problem, fit, (said,)) if kept else (without, found, (said,))
+    if kept:
+        return problem, fit, (said,)
+    return without, replace(found, second=Valley.beside(found, [fit])), (said,)
 
 
 def _absent(problem: JointProblem, fit: JointFit) -> tuple[Coil | Literal["determined"] | None, tuple[str, ...]]:

@@ -10,7 +10,7 @@ so that one drifting session cannot bend the model (iteratively reweighted).
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
@@ -27,7 +27,7 @@ from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.models import Model, Scale, SearchAxis, model_type
 from mrdamper.optimizers.ending import Ending
-from mrdamper.optimizers.levenberg_marquardt import least_squares
+from mrdamper.optimizers.levenberg_marquardt import Minimum, least_squares
 from mrdamper.optimizers.linear import on_one_blas_thread
 
 RISE, FALL = "coil.rise_s", "coil.fall_s"  # names of the coil's lags on the search axes
@@ -36,6 +36,9 @@ _LAGS, _LAG = (1e-4, 0.2), 8e-3  # of a coil's field [s]
 _FEW, _FEW_STEPS = 6, 5  # runs on which starts are tried, and steps from each
 _AGAIN, _AGAIN_STEPS = 5e-4, 6  # relative gain of a step at which a fit without some runs ends, and its steps
 _CLEARLY = 0.85  # share of the first start's cost that another one must come below
+_BETTER = 0.995  # share of the first end's error that another one must come below
+_OTHER_KNEE = 0.1  # relative difference from which knees are two
+_NEARLY = 1.25  # times the error: a valley that describes the tests nearly as well
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,9 @@ class JointDamper(Damper):
 
     @property
     def parameter_count(self) -> int:
-        return len(self.free)
+        """Numbers from the tests of this damper, and presets at work: they came from the tests of others."""
+        held = [info.name for info in self.model.parameters() if info.preset and info.name not in self.free]
+        return len(self.free) + sum(getattr(self.model, name) != 0 for name in held)
 
     @property
     def knee(self) -> float | None:
@@ -156,6 +161,7 @@ class JointFit:
     seconds : float
     searched : tuple of str
         Names of the search axes.
+    second : Valley, optional
     """
 
     damper: JointDamper
@@ -166,6 +172,38 @@ class JointFit:
     evaluations: int
     seconds: float
     searched: tuple[str, ...] = ()
+    second: Valley | None = None
+
+    @property
+    def error(self) -> float:
+        """Mean nrmse_pp of the runs."""
+        return float(np.mean(self.nrmse_pp))
+
+
+@dataclass(frozen=True)
+class Valley:
+    """Another end of the search: parameters with another knee that describe the same samples nearly as well.
+
+    Attributes
+    ----------
+    knee, error : float
+        [m]; mean nrmse_pp.
+    chosen_knee, chosen_error : float
+        Of the end that was chosen.
+    """
+
+    knee: float
+    error: float
+    chosen_knee: float
+    chosen_error: float
+
+    @classmethod
+    def beside(cls, chosen: JointFit, ends: Iterable[JointFit]) -> Valley | None:
+        """The best of some ends of a search that differ from the chosen one, if any."""
+        own = chosen.damper.knee
+        others = [(e.error, k) for e in ends if (k := e.damper.knee) and own and abs(k - own) > _OTHER_KNEE * own]
+        error, knee = min(others, default=(np.inf, 0.0))
+        return cls(knee, error, own, chosen.error) if own and error < _NEARLY * chosen.error else None
 
 
 class JointProblem:
@@ -243,25 +281,62 @@ class JointProblem:
         table = Table(self, [self.parts[i] for i in rows])
         return np.sqrt(np.bincount(table.owner, table.residual(fit.point, fit.damper.model) ** 2))
 
-    @cached_property
+    @property
     def start(self) -> Floats:
-        """(D,) the best of the model's starts on the search axes."""
+        """(D,) the most promising of the model's starts on the search axes."""
+        return self._promising[0]
+
+    @cached_property
+    def _promising(self) -> list[Floats]:
+        """Points some steps down from the model's starts, the most promising first.
+
+        Each length of lost motion has a valley of its own: the best start in each. The first is the
+        likeliest: another must be clearly better.
+        """
         grid = [np.array(u) for u in product(*([axis.coordinate(g) for g in axis.grid] for axis in self.axes))]
         if len(grid) == 1:
-            return grid[0]
-        few = self.parts[:: max(1, len(self.parts) // _FEW)]
-        table = Table(self, [part.steady_end() for part in few])
+            return grid
+        table = self._few
         costs = np.array([float(np.sum(table.solve(u).nrmse_pp)) for u in grid])
-        # Each length of lost motion has a valley of its own: the best start in each, some steps on.
         lengths = np.array([u[[len(axis.grid) > 1 for axis in self.axes]][0] for u in grid])
         kinds = [np.flatnonzero(lengths == d) for d in dict.fromkeys(lengths.tolist())]
-        best = [grid[min(kind, key=costs.__getitem__)] for kind in kinds]
-        lower, upper = self.box()
-        found = [
-            least_squares(table.solved_residual, u, lower, upper, _FEW_STEPS, 1e-3, slopes=table.slopes) for u in best
-        ]
-        better = min(found, key=lambda minimum: minimum.cost)
-        return (better if better.cost < _CLEARLY * found[0].cost else found[0]).point
+        ends = [self._downhill(grid[min(kind, key=costs.__getitem__)]) for kind in kinds]
+        first = ends[0]
+        ends.sort(key=lambda end: _CLEARLY * end.cost if end is first else end.cost)
+        return [end.point for end in ends]
+
+    @cached_property
+    def _few(self) -> Table:
+        """A few runs on which starts are tried."""
+        few = self.parts[:: max(1, len(self.parts) // _FEW)]
+        return Table(self, [part.steady_end() for part in few])
+
+    def _downhill(self, start: Floats) -> Minimum:
+        """Some steps from a start, on few runs."""
+        table = self._few
+        return least_squares(table.solved_residual, start, *self.box(), _FEW_STEPS, 1e-3, slopes=table.slopes)
+
+    def search(
+        self, start: Floats | None = None, rounds: int = 3, most_steps: int = 25, settled: float = _SETTLED
+    ) -> JointFit:
+        """Identify from the two most promising of the model's starts, and from another if one is given.
+
+        Parameters
+        ----------
+        start : (D,) array, optional
+            Any point of the search axes; a poor one does no harm.
+        rounds, most_steps, settled
+            As `fit` takes them.
+
+        Returns
+        -------
+        JointFit
+            The best end; the next best of another knee is its `second`.
+        """
+        starts = [*self._promising[:2], *([] if start is None else [self._downhill(start).point])]
+        ends = [self.fit(start=u, rounds=rounds, most_steps=most_steps, settled=settled) for u in starts]
+        best = min(ends, key=lambda end: _BETTER * end.error if end is ends[0] else end.error)
+        return replace(best, second=Valley.beside(best, ends))
 
     @on_one_blas_thread
     def fit(

@@ -92,6 +92,12 @@ def _joint(fit: JointFit) -> list[str]:
         sentences.append(f"At a limit of what is looked for, known from one side only: {named}.")
     if not fit.ending.converged:
         sentences.append(f"The search for one set of parameters {fit.ending}.")
+    if (other := fit.second) is not None:
+        sentences.append(
+            f"The search also ended at a knee of {1e3 * other.knee:.2f} mm instead of {1e3 * other.chosen_knee:.2f}, "
+            f"with a mean error of {100 * other.error:.2f} % instead of {100 * other.chosen_error:.2f} %"
+            + ("; conditions left out decided." if other.error < other.chosen_error else ".")
+        )
     ratio = float(np.max(fit.nrmse_pp) / np.median(fit.nrmse_pp))
     if ratio > 2:
         sentences.append(f"The run described worst has {ratio:.1f} times the median error.")

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from mrdamper.dampers.base import Damper
 from mrdamper.dampers.certainty import table
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
@@ -20,6 +19,7 @@ from mrdamper.files.encoding import csv_text, file_names
 from mrdamper.files.model_file import save_model
 from mrdamper.identification import Identification
 from mrdamper.identification.characteristics import Characteristics, characterise
+from mrdamper.identification.intervals import written
 from mrdamper.models import Model
 from mrdamper.report.about import About, Limit
 from mrdamper.report.damper_tests import facts_of_tests, figures_of_tests, force_rows, provenance
@@ -36,6 +36,7 @@ from mrdamper.study.workflow import RigStudy, Study
 from mrdamper.validation import session_drift
 
 _LOOPS_SHOWN = 6
+_LEFT_OUT = ("low_left_out", "high_left_out")  # columns of a parameter's spread as conditions are left out
 
 
 def write_study(
@@ -221,7 +222,7 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
         "identifications": mapped.identifications if mapped else (),
         "parameter_names": _free_names(mapped.identifications[0]) if mapped else (),
         "mapped": mapped,
-        "joint": _joint_table(chosen.damper, chosen.fit.damper.model) if isinstance(chosen.fit, JointFit) else (),
+        "joint": _joint_table(chosen, chosen.fit.damper.model) if isinstance(chosen.fit, JointFit) else (),
         "predicted_caption": (
             "Held-out runs, last cycle of the steady window: the model has seen none of them."
             if held
@@ -245,21 +246,30 @@ def _mapped(rig: RigStudy) -> tuple[Scored, ModifiedFit] | None:
     return next(((c, c.fit) for c in rig.candidates if isinstance(c.fit, ModifiedFit)), None)
 
 
-def _joint_table(damper: Damper, model: Model) -> list[dict[str, Any]]:
-    """Parameters with their intervals; those that were held have none."""
-    known = {row["name"]: row["written"] for row in table(damper)}
+def _joint_table(chosen: Scored, model: Model) -> list[dict[str, Any]]:
+    """Parameters with their intervals and their spread as conditions are left out; those that were held have none."""
+    known = {row["name"]: row["written"] for row in table(chosen.damper)}
     return [
         {"name": info.name, "written": known.get(info.name, f"{getattr(model, info.name):.4g} {info.unit}")}
-        | {"meaning": info.meaning}
+        | {"spread": _range(chosen.spread.get(info.name), info.unit), "meaning": info.meaning}
         for info in model.parameters()
     ]
 
 
+def _range(ends: tuple[float, float] | None, unit: str) -> str:
+    return " to ".join(written(end, None, unit) for end in ends) if ends and ends[0] < ends[1] else ""
+
+
 def _parameters_table(study: Study) -> str:
-    """Numbers of the chosen dampers with the ends of their 95 % intervals, empty where there are none."""
+    """Numbers of the chosen dampers, the ends of their 95 % intervals, and of their spread as conditions are left out.
+
+    Empty where there are none.
+    """
     names = {"low": "low_95", "high": "high_95"}
     rows = [
-        {"rig": rig.rig} | {names.get(k, k): "" if v != v else v for k, v in row.items() if k != "written"}
+        {"rig": rig.rig}
+        | {names.get(k, k): "" if v != v else v for k, v in row.items() if k != "written"}
+        | dict(zip(_LEFT_OUT, rig.chosen.spread.get(row["name"], ("", "")), strict=True))
         for rig in study.rigs
         for row in table(rig.damper)
     ]

@@ -153,6 +153,8 @@ class Scored:
         Train runs; train runs predicted without their condition; held-out runs.
     seconds : float
         Spent on identification and the fit over conditions.
+    spread : mapping of str to (float, float)
+        Lowest and highest value of a parameter that holds everywhere, each condition left out in turn.
     """
 
     recipe: Recipe
@@ -164,6 +166,7 @@ class Scored:
     left_out: Validation
     held_out: Validation
     seconds: float
+    spread: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def title(self) -> str:
@@ -218,10 +221,16 @@ def follow(
     made = recipe.make(pieces, identifications)
     seconds = spent + time.perf_counter() - begin
     title, left_out = made.damper.title, None
+    without: list[Damper] = []
+
+    def refit(rows: Sequence[int]) -> Damper:
+        without.append(made.refit(rows))
+        return without[-1]
+
     if leave_out:
         motions = [equivalent_sine(run) for run in pieces]
         others = [i for i, run in enumerate(pieces) if not motions[i].is_sine or run.current_changes]
-        left_out = leave_one_condition_out(pieces, [m.condition for m in motions], made.refit, title, others)
+        left_out = leave_one_condition_out(pieces, [m.condition for m in motions], refit, title, others)
         left_out = _whole_again(left_out, pieces)
     errors = [i.scores.nrmse_pp for i in identifications]
     return Scored(
@@ -234,7 +243,14 @@ def follow(
         left_out=left_out or Validation(title, ()),
         held_out=validate(made.damper, held_out),
         seconds=seconds,
+        spread=_spread(without),
     )
+
+
+def _spread(dampers: Sequence[Damper]) -> dict[str, tuple[float, float]]:
+    """Lowest and highest of every number of the one model that some dampers are."""
+    values = [model.values() for damper in dampers if (model := damper.one_model) is not None]
+    return {name: (min(v[name] for v in values), max(v[name] for v in values)) for name in (values or [{}])[0]}
 
 
 def stretches(run: Run) -> list[Run]:
