@@ -1,5 +1,6 @@
 """Intervals hold what they say, whatever the residual is made of; a seeded tenth of `benchmarks/coverage.py`."""
 
+import pickle
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -9,10 +10,13 @@ import pytest
 from scipy.signal import lfilter
 from support.synthetic import synthetic_run
 
+from mrdamper import identification
 from mrdamper.data import Condition
 from mrdamper.identification import identify
+from mrdamper.identification.certainty import certainty_of_run
 from mrdamper.identification.covariance import spread, standard_errors
-from mrdamper.identification.intervals import weaknesses, written
+from mrdamper.identification.intervals import interval_about, weaknesses, written
+from mrdamper.identification.problem import RunCertainty
 from mrdamper.models.bingham import Bingham
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
@@ -47,7 +51,7 @@ def test_beta_has_an_interval_of_its_own_though_it_is_searched_as_a_length():
     # beta = 1 / (2 z_y²): its relative error is twice that of the length.
     relative = {n: found.standard_errors[n] / v for n, v in (("beta", found.model.beta), *found.end.items())}
     assert relative["beta"] == pytest.approx(2 * relative["yield_displacement"], rel=1e-3)
-    assert f"beta = {written(found.model.beta, (low, high), 'm^-n')}" in repr(found)
+    assert f"beta = {written(found.model.beta, (low, high), 'm^-n')} (" in repr(found)
 
 
 def test_a_motion_that_never_yields_says_so():
@@ -56,14 +60,6 @@ def test_a_motion_that_never_yields_says_so():
     assert "this motion never yields: beta unseen" in found.doubts
     assert found.interval("beta") is None
     assert identify(synthetic_run(CONDITION, 30.0, model=TRUTH)).doubts == ()
-
-
-def test_numbers_are_written_to_what_is_known_of_them():
-    assert written(727.4, (617.0, 837.8), "N s/m") == "730 ± 110 N s/m"
-    assert written(10812.3, (3012.0, 18612.6), "N") == "10800 ± 7800 N"
-    assert written(0.28, (0.027, 2.8), "A") == "0.28 (0.027 to 2.8) A"
-    assert written(2.0, None, "-") == "2"
-    assert written(0.0, (-0.5, 0.5), "N") == "0 ± 0.5 N"
 
 
 def test_what_the_tests_have_one_of_is_the_reason():
@@ -143,13 +139,49 @@ def test_standard_errors_are_the_scatter_of_repeated_identifications():
 @pytest.mark.parametrize(
     ("value", "ends", "unit", "text"),
     [
-        (731.2, (620.0, 842.4), "N s/m", "730 ± 110 N s/m"),
+        (727.4, (617.0, 837.8), "N s/m", "730 ± 110 N s/m"),
+        (10812.3, (3012.0, 18612.6), "N", "10800 ± 7800 N"),
+        (0.28, (0.027, 2.8), "A", "0.28 (0.027 to 2.8) A"),
+        (0.0, (-0.5, 0.5), "N", "0 ± 0.5 N"),
         (2e-4, (1.96e-4, 2.04e-4), "m", "0.2 ± 0.004 mm"),
         (4.9e-3, (3.6e-3, 6.5e-3), "m/s", "4.9 (3.6 to 6.5) mm/s"),
         (0.3, (0.2, 0.4), "-", "0.3 ± 0.1"),
-        (2200.0, (4e-11, 1e17), "N/A", "2200 N/A (not known by itself)"),
         (0.5, None, "m", "500 mm"),
     ],
 )
 def test_a_number_is_written_as_an_engineer_reads_it(value, ends, unit, text):
     assert written(value, ends, unit) == text
+
+
+def test_an_interval_over_four_decades_is_none():
+    assert interval_about(2200.0, 20.0, 30.0, 0.95, log=True) is None
+    assert interval_about(2200.0, np.inf, 30.0, 0.95, log=False) is None
+    low, high = interval_about(2200.0, 2.0, 1e9, 0.95, log=True)
+    assert high / low == pytest.approx(np.exp(4 * 1.96), rel=1e-3)
+    assert np.sqrt(low * high) == pytest.approx(2200.0)
+
+
+def test_what_is_known_is_computed_when_asked_and_travels_without_the_run(monkeypatch):
+    run = synthetic_run(CONDITION, 5.0, model=TRUTH)
+    asked = []
+    monkeypatch.setattr(identification, "certainty_of_run", lambda *a: asked.append(1) or certainty_of_run(*a))
+    found = identify(run)
+    assert not asked
+    there = pickle.loads(pickle.dumps(found))
+    assert found.interval("c") == there.interval("c")
+    assert asked == [1]
+    assert there.ask is RunCertainty
+    assert repr(there) == repr(found)
+    assert f"({found.certainty.effective['c']:.0f} of {found.residual.size} samples independent)" in repr(found)
+
+
+def test_a_certainty_that_cannot_be_computed_says_so():
+    def fails():
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    found = replace(identify(synthetic_run(CONDITION, 5.0, model=TRUTH)), ask=fails)
+    assert found.interval("c") is None
+    assert "c = " in repr(found)
+    assert "(cannot be known from these runs)" in repr(found)
+    assert found.table["state"][0] == "cannot be known from these runs"
+    assert "cannot be known from these runs: Singular matrix" in found.doubts[0]

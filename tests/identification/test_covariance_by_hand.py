@@ -11,17 +11,6 @@ from mrdamper.identification.covariance import spread
 RNG = np.random.default_rng(11)
 
 
-def spectrum(model, omega):
-    response = 1 + sum(a * np.exp(-1j * omega * k) for k, a in enumerate(model[1:], 1))
-    return model[0] / abs(response) ** 2
-
-
-def test_a_spectrum_is_that_of_the_recursion():
-    model = np.array([2.0, -0.6, 0.2])
-    omega = np.array([0.0, 0.3, 1.7, np.pi])
-    assert covariance._spectrum(model, omega) == pytest.approx([spectrum(model, w) for w in omega])
-
-
 def burg(series):
     """Burg's recursion with the mean's bias taken out of the first order, and the corrected criterion of Akaike."""
     N = len(series)

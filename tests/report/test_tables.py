@@ -15,6 +15,7 @@ from mrdamper.data import Condition
 from mrdamper.files.dataset import save_dataset
 from mrdamper.files.encoding import csv_text
 from mrdamper.files.model_file import save_model
+from mrdamper.identification.problem import RunCertainty
 from mrdamper.metrics import Scores
 from mrdamper.models.bingham import Bingham
 from mrdamper.report.study import _validation_table
@@ -72,6 +73,7 @@ def test_an_identification_stands_in_the_columns_that_name_it():
         condition=Condition(1.5, 2.5, 0.0125), scores=scores_of(0.1), floor=0.004, free=("fy", "c"),
         standard_errors={"c": 3.0, "fy": 4.0}, interval={"fy": (290.0, 310.0)}.get, delay=0.002, at_bounds=("fy", "c"),
         evaluations=77, ending="converged", notes=("one", "two"), doubts=("three",),
+        certainty=RunCertainty(effective={"c": 31.0}),
     )  # fmt: skip
     (row,) = identification_rows([found])
     wanted = {
@@ -79,8 +81,8 @@ def test_an_identification_stands_in_the_columns_that_name_it():
         "amplitude_m": 0.0125, "nrmse_pp": 0.1, "repeatability_nrmse_pp": 0.004, "wape": found.scores.wape,
         **{f"{i.name} [{i.unit}]": getattr(found.model, i.name) for i in Bingham.parameters()},
         "standard error c": 3.0, "standard error fy": 4.0, "fy low 95 %": 290.0, "fy high 95 %": 310.0,
-        "c low 95 %": None, "c high 95 %": None, "delay_s": 0.002, "at_bounds": "fy c", "evaluations": 77,
-        "message": "converged", "notes": "one; two; three",
+        "c low 95 %": None, "c high 95 %": None, "effective samples c": 31.0, "delay_s": 0.002, "at_bounds": "fy c",
+        "evaluations": 77, "message": "converged", "notes": "one; two; three",
     }  # fmt: skip
     assert row == wanted
     assert (row["fy [N]"], row["c [N s/m]"], row["f0 [N]"]) == (300.0, 1500.0, 20.0)

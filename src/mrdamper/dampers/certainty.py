@@ -18,7 +18,7 @@ import numpy as np
 from mrdamper.dampers.sessions import Sessions
 from mrdamper.data import Floats
 from mrdamper.errors import InputError
-from mrdamper.identification.intervals import interval_about, weaknesses, written
+from mrdamper.identification.intervals import CANNOT_BE_KNOWN, interval_about, weaknesses, written
 
 if TYPE_CHECKING:
     from mrdamper.dampers.base import Damper
@@ -69,6 +69,8 @@ class Certainty:
         What only the runs could tell of it: numbers that do the same to the force, or rest on one run.
     taught : mapping of str to float
         Share each run has in what is known of the numbers.
+    effective : mapping of str to float
+        Independent samples that would give each number's error, were there neither sessions nor memory.
     """
 
     names: tuple[str, ...]
@@ -86,12 +88,21 @@ class Certainty:
     left_out: int = 0
     words: tuple[str, ...] = ()
     taught: Mapping[str, float] = field(default_factory=dict)
+    effective: Mapping[str, float] = field(default_factory=dict)
     sessions: Sessions | None = None
 
     @property
     def one_session(self) -> bool:
         """Whether all runs are of one session, so that nobody can say how sessions differ."""
         return self.session_dof < 0.5
+
+    def ends(self, damper: Damper, name: str, level: float = 0.95) -> tuple[float, float] | None:
+        """Of a number's interval; None where a bound holds it or these runs cannot tell it."""
+        if name not in self.names or name in self.unknown:
+            return None
+        i = self.names.index(name)
+        error = float(np.sqrt(self.covariance[i, i]))
+        return interval_about(damper.own_numbers[name].value, error, self.dof[i], level, self.logs[i])
 
     def interval(self, damper: Damper, name: str, level: float = 0.95) -> tuple[float, float]:
         """Ends of a number's interval.
@@ -101,12 +112,10 @@ class Certainty:
         InputError
             E_CERTAINTY if it is not among those whose spread is known.
         """
-        if name not in self.names or name in self.unknown:
-            why = "held by a bound" if name in self.one_sided else "not determined by these runs"
-            raise InputError(f"{name} is {why}", mend="test where it matters", code="E_CERTAINTY")
-        i = self.names.index(name)
-        error = float(np.sqrt(self.covariance[i, i]))
-        return interval_about(damper.own_numbers[name].value, error, self.dof[i], level, self.logs[i])
+        if ends := self.ends(damper, name, level):
+            return ends
+        why = "is held by a bound" if name in self.one_sided else CANNOT_BE_KNOWN
+        raise InputError(f"{name} {why}", mend="test where it matters", code="E_CERTAINTY")
 
 
 def unsure(damper: Damper) -> list[str]:
@@ -119,7 +128,7 @@ def unsure(damper: Damper) -> list[str]:
     said += [f"{text}." for text in known.words]
     told = " ".join(known.words)
     if silent := [name for name in known.unknown if name not in told]:
-        said.append(f"{', '.join(silent)} cannot be known from these runs: others do the same to the force.")
+        said.append(f"{', '.join(silent)} {CANNOT_BE_KNOWN}: others do the same to the force.")
     if known.one_session:
         said.append(
             "All runs are of one session: how sessions differ cannot be known, and intervals hold for it alone."
@@ -151,31 +160,22 @@ def _limit(own: OwnNumber) -> str:
 def table(damper: Damper, level: float = 0.95) -> list[dict[str, Any]]:
     """Own numbers with the ends of their intervals and what is known of each, a row a number.
 
-    Keys: name, value, unit, low, high (NaN where there are none), state, written (as on a screen).
+    Keys: name, value, unit, low, high (NaN where there are none), effective_samples (NaN where not
+    known), state, written (as on a screen).
     """
     known: Certainty | None = damper.certainty
     rows = []
     for name, own in damper.own_numbers.items():
-        ends, state = None, "no covariance"
-        if known is not None:
-            state = "determined"
-            if name in known.one_sided:
-                state = f"one-sided: at {_limit(own)}"
-            elif name not in known.names or name in known.unknown:
-                state = "cannot be known"
-            else:
-                ends = known.interval(damper, name, level)
+        ends = known.ends(damper, name, level) if known else None
+        if known is None:
+            state = "no covariance"
+        elif name in known.one_sided:
+            state = f"one-sided: at {_limit(own)}"
+        else:
+            state = "determined" if ends else CANNOT_BE_KNOWN
         low, high = ends or (math.nan, math.nan)
-        text = written(own.value, ends, own.unit) + ("" if state == "determined" else f" ({state})")
-        rows.append(
-            {
-                "name": name,
-                "value": own.value,
-                "unit": own.unit,
-                "low": low,
-                "high": high,
-                "state": state,
-                "written": text,
-            }
-        )
+        row = {"name": name, "value": own.value, "unit": own.unit, "low": low, "high": high}
+        row["effective_samples"] = known.effective.get(name, math.nan) if known and ends else math.nan
+        text = written(own.value, ends, own.unit) + ("" if ends else f" ({state})")
+        rows.append({**row, "state": state, "written": text})
     return rows

@@ -76,13 +76,18 @@ def certain(
     within, doubt = _within(parts, slopes, inverse)
     gain, offset, session_dof, between = _sessions(parts, slopes, influence, within)
     covariance = within + between
-    share = np.diag(between) / np.maximum(np.diag(covariance), np.finfo(float).tiny)
+    variance = np.maximum(np.diag(covariance), np.finfo(float).tiny)
+    share = np.diag(between) / variance
+    samples = sum(part.picked.size for part in parts)
+    left = sum(float(part.residual @ part.residual) * part.weight**2 for part in parts)
+    effective = np.minimum(left * np.diag(inverse) / variance, samples)
     dof = 1 / (share**2 / max(session_dof, 1.0) + (1 - share) ** 2 * doubt / 2)
     made = Certainty(
         names, tuple(numbers[n].log for n in names), covariance, np.maximum(dof, 1.0), at_bound,
         tuple(free[i] for i in sorted({*unseen, *(i for group in alike for i in group)})),
         gain, offset, session_dof, words=tuple(words),
         taught={part.run.id: float(np.mean(row)) if names else 0.0 for part, row in zip(parts, told, strict=True)},
+        effective=dict(zip(names, effective.tolist(), strict=True)),
     )  # fmt: skip
     return replace(damper, certainty=_with_model_error(made, damper, parts, slopes, left_out))  # type: ignore[type-var]
 

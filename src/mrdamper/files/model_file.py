@@ -104,6 +104,7 @@ class _Covariance(_Strict):
     model_error: _ModelError
     words: tuple[str, ...] = ()
     taught: dict[str, float] = {}
+    effective: dict[str, float] = {}
     sessions: Sessions | None = None  # since 1.4
 
 
@@ -276,6 +277,7 @@ def _describe_certainty(known: Certainty | None) -> _Covariance | None:
         model_error=_ModelError(force=known.force, peak=known.peak, energy=known.energy, left_out=known.left_out),
         words=known.words,
         taught=dict(known.taught),
+        effective=dict(known.effective),
         sessions=known.sessions,
     )
 
@@ -297,7 +299,7 @@ def _with_certainty(damper: Damper, saved: _Covariance, where: str) -> Damper:
         saved.parameters, saved.logarithmic, matrix, np.array(saved.degrees_of_freedom), saved.one_sided, saved.unknown,
         session.gain, session.offset_N, session.degrees_of_freedom,
         model.force, model.peak, model.energy, model.left_out, saved.words, saved.taught,
-        saved.sessions,
+        saved.effective, saved.sessions,
     )  # fmt: skip
     return replace(damper, certainty=known)  # type: ignore[type-var]
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.identification.covariance import Spread, spread
 from mrdamper.identification.intervals import weaknesses
-from mrdamper.identification.problem import DELAY, Problem, Solution
+from mrdamper.identification.problem import DELAY, Problem, RunCertainty, Solution
 from mrdamper.motion import Excitation
+from mrdamper.optimizers.linear import on_one_blas_thread
 
 _STEP = 1e-6  # of a coordinate, for derivatives
 _WORTH = 4.0  # times what noise gives away to the columns of a hysteresis that is not there
@@ -19,23 +20,7 @@ _AT_LEAST = 20.0  # independent samples that any record of a cycle has for this 
 _SHORT = 3.0  # lags of its residual below which a record says little of its own noise
 
 
-@dataclass(frozen=True)
-class RunCertainty:
-    """Standard errors of a run's parameters and search coordinates, and what to know of them.
-
-    Attributes
-    ----------
-    errors, dof : mapping of str to float
-        Standard errors, and the degrees of freedom behind them.
-    doubts : tuple of str
-        What the samples cannot tell.
-    """
-
-    errors: Mapping[str, float] = field(default_factory=dict)
-    dof: Mapping[str, float] = field(default_factory=dict)
-    doubts: tuple[str, ...] = ()
-
-
+@on_one_blas_thread
 def certainty_of_run(
     problem: Problem, solution: Solution, motion: Excitation, state: Floats, residual: Floats
 ) -> RunCertainty:
@@ -55,10 +40,13 @@ def certainty_of_run(
         return RunCertainty()
     condition = problem.analysis.condition
     found = spread(np.column_stack(columns), residual, motion.part(problem.scored).time, condition.frequency_Hz)
-    errors, dof = dict(zip(names, found.errors, strict=True)), dict(zip(names, found.dof, strict=True))
-    errors, dof = _of_parameters(problem, point, names, found.covariance, errors, dof)
-    hidden = [name for name in errors if name == DELAY]
-    shown = {name: float(error) for name, error in errors.items() if name not in hidden}
+    errors, dof, effective = (
+        dict(zip(names, v.tolist(), strict=True)) for v in (found.errors, found.dof, found.effective)
+    )
+    for name, (variance, seen_by) in _of_parameters(problem, point, names, found.covariance).items():
+        errors[name] = math.sqrt(variance)
+        dof[name], effective[name] = (min(known[n] for n in seen_by) for known in (dof, effective))
+    shown = {name: error for name, error in errors.items() if name != DELAY}
     doubts = weaknesses(names, found.covariance, found.alike, [condition])
     if unseen := _unseen(problem, names, np.column_stack(columns), residual, found):
         doubts = [f"this motion never yields: {', '.join(unseen)} unseen", *doubts]
@@ -68,7 +56,7 @@ def certainty_of_run(
             f"the record is only {found.memory:.1f} times as long as its noise remembers: "
             "intervals are a guess, record longer"
         )
-    return RunCertainty(shown, {name: float(dof[name]) for name in shown}, tuple(doubts))
+    return RunCertainty(shown, dof, {name: effective[name] for name in shown}, tuple(doubts))
 
 
 def _unseen(problem: Problem, names: Sequence[str], columns: Floats, residual: Floats, found: Spread) -> list[str]:
@@ -109,29 +97,23 @@ def _sensitivities(
 
 
 def _of_parameters(
-    problem: Problem,
-    point: Mapping[str, float],
-    names: Sequence[str],
-    covariance: Floats,
-    errors: dict[str, float],
-    dof: dict[str, float],
-) -> tuple[dict[str, float], dict[str, float]]:
-    """Also of the free parameters that were searched in other coordinates, as beta is in the yield displacement."""
-    missing = [name for name in problem.free if name not in errors]
+    problem: Problem, point: Mapping[str, float], names: Sequence[str], covariance: Floats
+) -> dict[str, tuple[float, list[str]]]:
+    """Variances of parameters searched in other coordinates, as beta is in the yield displacement, and in which."""
+    missing = [name for name in problem.free if name not in names]
     searched = [i for i, name in enumerate(names) if name in point and name not in problem.free]
     if not missing or not searched:
-        return errors, dof
+        return {}
     at = problem.model_type.build(point)
     slopes = np.zeros((len(missing), len(searched)))
     for k, i in enumerate(searched):
         step = _STEP * abs(point[names[i]]) or _STEP
         moved = problem.model_type.build({**point, names[i]: point[names[i]] + step})
         slopes[:, k] = [(getattr(moved, name) - getattr(at, name)) / step for name in missing]
-    block = covariance[np.ix_(searched, searched)]
+    block, found = covariance[np.ix_(searched, searched)], {}
     for name, row in zip(missing, slopes, strict=True):
-        used = row != 0
-        if used.any():
+        if (used := row != 0).any():
             variance = float(row[used] @ block[np.ix_(used, used)] @ row[used])
-            errors[name] = float(np.sqrt(variance)) if np.isfinite(variance) else float("inf")
-            dof[name] = min(dof[names[i]] for i, u in zip(searched, used, strict=True) if u)
-    return errors, dof
+            seen_by = [names[i] for i, u in zip(searched, used, strict=True) if u]
+            found[name] = variance if np.isfinite(variance) else np.inf, seen_by
+    return found

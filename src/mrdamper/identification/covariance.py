@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mrdamper.data import Floats
 
@@ -75,8 +76,8 @@ def spread(jacobian: Floats, residual: Floats, time: Floats | None = None, frequ
     frequency : float, optional
         Of the motion, where it repeats [Hz].
     """
-    whole = residual.size
-    if (block := whole // _MOST) > 1:  # means over a few samples keep all that is slower than them
+    whole, squares = residual.size, float(residual @ residual)
+    if (block := max(1, whole // _MOST)) > 1:  # means over a few samples keep all that is slower than them
         kept = whole // block * block
         jacobian, residual = (a[:kept].reshape(-1, block, *a.shape[1:]).mean(axis=1) for a in (jacobian, residual))
         time = None if time is None else time[:kept].reshape(-1, block).mean(axis=1)
@@ -101,13 +102,13 @@ def spread(jacobian: Floats, residual: Floats, time: Floats | None = None, frequ
         covariance[row, :] = covariance[:, row] = 0.0
         covariance[row, row] = np.inf
     textbook = np.full(count, np.inf)
-    variance = float(residual @ residual) / max(size - known.sum(), 1)
-    textbook[rows] = np.where(lost, np.inf, variance * np.diag(inverse) / scale[known] ** 2)
+    variance = squares / max(whole - known.sum(), 1)
+    textbook[rows] = np.where(lost, np.inf, variance / block * np.diag(inverse) / scale[known] ** 2)
     with np.errstate(invalid="ignore", divide="ignore"):
-        effective = np.nan_to_num(size * textbook / np.diag(covariance), nan=0.0, posinf=float(size))
+        effective = np.nan_to_num(whole * textbook / np.diag(covariance), nan=0.0, posinf=float(whole))
     free = np.ones(count)
     free[rows] = np.clip(dof, 1.0, max(size - known.sum(), 1))
-    return Spread(covariance, free, np.minimum(effective, size), np.sqrt(textbook), memory, alike)
+    return Spread(covariance, free, np.minimum(effective, whole), np.sqrt(textbook), memory, alike)
 
 
 def score_covariance(
@@ -147,17 +148,19 @@ def _repeated(
     if most < 4:
         return residual, []
     orders: Floats = np.arange(1.0, most + 1)
-    phase = 2 * np.pi * frequency * np.outer(time - time[0], orders)
-    waves = np.stack([np.cos(phase), np.sin(phase)], axis=2).reshape(size, 2 * most)
-    amplitudes = np.linalg.solve(waves.T @ waves, waves.T @ (residual - residual.mean()))
-    rest = residual - waves @ amplitudes
-    seen = jacobian.T @ waves  # (P, 2K)
+    turned = _powers(np.exp(2j * np.pi * frequency * (time - time[0])), most)
+    waves = np.stack([turned.real, turned.imag], axis=1).reshape(2 * most, size)
+    gram = waves @ waves.T
+    amplitudes = np.linalg.solve(gram, waves @ (residual - residual.mean()))
+    rest = residual - amplitudes @ waves
+    seen = (waves @ jacobian).T  # (P, 2K)
     # Share of every wave that the parameters can take up, and so have taken out of the residual.
-    taken = np.clip(np.einsum("pk,pq,qk->k", seen, inverse, seen) / np.sum(waves**2, axis=0), 0.0, 1.0)
+    taken = np.clip(np.sum(seen * (inverse @ seen), axis=0) / np.diag(gram), 0.0, 1.0)
     left = (1 - taken).reshape(most, 2).mean(axis=1)
     power = (amplitudes**2).reshape(most, 2).mean(axis=1)
-    omega: Floats = 2 * np.pi * frequency * step * orders
-    expected = 2 * _spectrum(_autoregression(rest), omega) / max(size - 2 * most, 1)
+    model = _autoregression(rest)
+    lags = _powers(np.exp(-2j * np.pi * frequency * step * orders), model.size - 1)
+    expected = 2 * model[0] / np.abs(1 + model[1:] @ lags) ** 2 / max(size - 2 * most, 1)
     # Noise alone has power at these frequencies too; only a surplus that chance does not explain repeats.
     if np.sum(power) < (1 + 3 / np.sqrt(left.sum())) * np.sum(expected * left):
         return residual, []
@@ -168,7 +171,7 @@ def _repeated(
     weights = shares / np.maximum(shares.sum(axis=1, keepdims=True), np.finfo(float).tiny)
     if np.ptp(time) * frequency < _TELLING:
         rest = residual  # what does not repeat cannot be told from what would
-    return rest, [(lines, np.einsum("pk,kl,pl->p", weights, relative, weights))]
+    return rest, [(lines, np.sum(weights @ relative * weights, axis=1))]
 
 
 def _power_law(orders: Floats, power: Floats, expected: Floats, left: Floats) -> tuple[Floats, Floats]:
@@ -199,36 +202,27 @@ def _noise(jacobian: Floats, residual: Floats, inverse: Floats) -> tuple[Part, f
     size = residual.size
     model = _autoregression(residual)
     points = 1 << (2 * size - 1).bit_length()
-    omega = 2 * np.pi * np.arange(points // 2 + 1) / points
-    spectrum = _spectrum(model, omega)
+    response = np.fft.rfft(np.append(1.0, model[1:]), points)
+    spectrum = model[0] / np.abs(response) ** 2  # its mean over the circle is the variance
     transformed = np.fft.rfft(jacobian, points, axis=0)
     weights = np.full(spectrum.size, 2.0) / points
     weights[[0, -1]] = 1.0 / points
     score = np.real((transformed.conj().T * (weights * spectrum)) @ transformed)
-    whole = float(np.sum(weights * spectrum))
-    if whole <= 0:
+    memory = np.fft.irfft(spectrum, points)[: model.size]  # covariance of the residual at its lags
+    if memory[0] <= 0:
         return (score, np.zeros(len(inverse))), 1.0
     # The fit took a share of the noise with it.
-    taken = float(np.trace(inverse @ score)) / (size * whole)
-    influence = np.abs(transformed @ inverse) ** 2 * weights[:, None]
-    relative = _doubt_of_spectrum(model, omega, spectrum, weights, influence, size)
-    return (score / max(1 - taken, 0.2), relative), float(spectrum[0] / whole)
-
-
-def _doubt_of_spectrum(
-    model: Floats, omega: Floats, spectrum: Floats, weights: Floats, influence: Floats, size: int
-) -> Floats:
-    """Relative variance of each parameter's variance, as the coefficients of the autoregression are uncertain."""
-    order, base = model.size - 1, spectrum @ influence
-    relative = np.full(influence.shape[1], 2.0 / size)
-    if not order:
-        return relative
-    known = np.cos(np.outer(range(order), omega)) @ (weights * spectrum)
-    covariance = model[0] / size * np.linalg.pinv(known[np.abs(np.subtract.outer(range(order), range(order)))])
-    lags = np.exp(-1j * np.outer(omega, np.arange(1, order + 1)))
-    bent = -2 * np.real(lags / (1 + lags @ model[1:])[:, None]) * spectrum[:, None]  # d spectrum / d coefficient
-    slopes = bent.T @ influence / np.maximum(base, 1e-300)
-    return relative + np.einsum("kp,kl,lp->p", slopes, covariance, slopes)
+    taken = float(np.sum(inverse * score)) / (size * memory[0])
+    relative = np.full(len(inverse), 2.0 / size)
+    if order := model.size - 1:  # what uncertain coefficients bend of the spectrum, as each parameter sees it
+        lags = np.arange(order)
+        doubt = model[0] / size * np.linalg.pinv(memory[np.abs(np.subtract.outer(lags, lags))])
+        influence = np.abs(transformed @ inverse) ** 2 * spectrum[:, None]
+        base = weights @ influence
+        bent = -2 * np.fft.irfft(influence / response.conj()[:, None], points, axis=0)[1 : order + 1]
+        slopes = bent / np.maximum(base, 1e-300)
+        relative = relative + np.sum(slopes * (doubt @ slopes), axis=0)
+    return (score / max(1 - taken, 0.2), relative), float(spectrum[0] / memory[0])
 
 
 def _autoregression(residual: Floats) -> Floats:
@@ -259,10 +253,12 @@ def _autoregression(residual: Floats) -> Floats:
     return best
 
 
-def _spectrum(model: Floats, omega: Floats) -> Floats:
-    """Power spectrum of an autoregression at frequencies [rad a sample]; its mean over the circle is the variance."""
-    lags = np.exp(-1j * np.outer(omega, np.arange(1, model.size)))
-    return model[0] / np.abs(1 + lags @ model[1:]) ** 2
+def _powers(base: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:
+    """(count, N) first powers of some numbers."""
+    powers = np.empty((count, base.size), dtype=complex)
+    for k in range(count):
+        np.multiply(powers[k - 1] if k else 1.0, base, out=powers[k])
+    return powers
 
 
 def standard_errors(

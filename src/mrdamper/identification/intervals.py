@@ -12,7 +12,8 @@ from mrdamper.errors import InputError
 
 _ALIKE = 0.98  # correlation from which two parameters are known together only
 _SAME = 0.03  # frequencies and amplitudes this close are one
-_WIDEST = 100.0  # half an interval of a logarithm: from nothing to everything
+_WIDEST = math.log(1e4) / 2  # half an interval of a logarithm over which it says nothing
+CANNOT_BE_KNOWN = "cannot be known from these runs"
 _LOPSIDED = 0.1  # of an interval's half width: shifted by less, it is written with ±
 
 
@@ -31,22 +32,24 @@ def student(level: float, dof: float) -> float:
     return float(stdtrit(max(dof, 1.0), (1 + level) / 2))
 
 
-def interval_about(value: float, error: float, dof: float, level: float, log: bool) -> tuple[float, float]:
-    """Ends of an interval; of a logarithm where `log`, then `error` is that of the logarithm."""
+def interval_about(value: float, error: float, dof: float, level: float, log: bool) -> tuple[float, float] | None:
+    """Ends of an interval; of a logarithm where `log`, then `error` is that of the logarithm.
+
+    None where nothing is known: from an error that is not finite, or over more than four decades.
+    """
     half = student(level, dof) * error
-    half = min(half, _WIDEST) if log else half
-    return (float(value * np.exp(-half)), float(value * np.exp(half))) if log else (value - half, value + half)
+    if not math.isfinite(half) or (log and half > _WIDEST):
+        return None
+    return (value * math.exp(-half), value * math.exp(half)) if log else (value - half, value + half)
 
 
 _SHOWN = {"-": (1.0, ""), "m": (1e3, "mm"), "m/s": (1e3, "mm/s")}  # how a unit stands on screens
-_DECADES = 1e4
 
 
 def written(value: float, ends: tuple[float, float] | None, unit: str = "") -> str:
     """A number with its interval and unit, to two digits of the half width: 730 ± 110 N s/m, 0.3 (0.1 to 0.9) mm.
 
-    Lengths and speeds in millimetres, as on every screen. `ends` is None where nothing is known
-    of it; an interval over four decades says that only others with it are known.
+    Lengths and speeds in millimetres, as on every screen; `ends` is None where there are none.
     """
     factor, unit = _SHOWN.get(unit, (1.0, unit))
     value, ends = factor * value, ends and (factor * ends[0], factor * ends[1])
@@ -54,8 +57,6 @@ def written(value: float, ends: tuple[float, float] | None, unit: str = "") -> s
         return f"{_plain(value, 4)} {unit}".strip()
     low, high = ends
     half = (high - low) / 2
-    if 0 < low * _DECADES < high:
-        return f"{_plain(value, 2)} {unit} (not known by itself)"
     if half == 0:
         return f"{_plain(value, 6)} ± 0 {unit}".strip()
     digits = max(1, math.floor(math.log10(max(abs(value), half))) - math.floor(math.log10(half)) + 2)

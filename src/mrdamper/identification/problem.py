@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any, ClassVar
@@ -14,7 +14,7 @@ import numpy as np
 from mrdamper.data import Condition, Floats, Run, Shown
 from mrdamper.errors import IdentificationError, UnknownNameError
 from mrdamper.gas_spring import GasSpring
-from mrdamper.identification.intervals import interval_about, written
+from mrdamper.identification.intervals import CANNOT_BE_KNOWN, interval_about, written
 from mrdamper.metrics import Scores
 from mrdamper.models import Model
 from mrdamper.motion import Excitation, MotionAnalysis, analyse_motion, measured_motion
@@ -170,6 +170,26 @@ class Method(ABC):
         """Determine the free parameters of a problem."""
 
 
+@dataclass(frozen=True)
+class RunCertainty:
+    """Standard errors of a run's parameters and search coordinates, and what to know of them.
+
+    Attributes
+    ----------
+    errors, dof : mapping of str to float
+        Standard errors, and the degrees of freedom behind them.
+    effective : mapping of str to float
+        Independent samples that would give each error, were the residual white.
+    doubts : tuple of str
+        What the samples cannot tell.
+    """
+
+    errors: Mapping[str, float] = field(default_factory=dict)
+    dof: Mapping[str, float] = field(default_factory=dict)
+    effective: Mapping[str, float] = field(default_factory=dict)
+    doubts: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Identification(Shown):
     """A model identified from one run.
@@ -192,9 +212,6 @@ class Identification(Shown):
         Inside the steady window.
     floor : float or None
         The run's cycle-to-cycle scatter as nrmse_pp: no model can do better.
-    standard_errors, dof : mapping of str to float
-        Of the free parameters and the search coordinates, as the residual depends on itself
-        (`identification.covariance`), and the degrees of freedom behind them.
     start, end : mapping of str to float
         Search coordinates the refinement began and ended at.
     evaluations : int
@@ -205,10 +222,10 @@ class Identification(Shown):
         Of the random search, where one was used.
     notes : tuple of str
         What the reader should know before trusting a parameter.
-    doubts : tuple of str
-        What the samples themselves cannot tell: parameters that do the same, a record too short.
     residual : (N,) array
         Predicted minus measured force in the steady window [N].
+    ask : callable
+        For the certainty, which takes longer than the search and is computed when first wanted.
     """
 
     run_id: str
@@ -221,16 +238,37 @@ class Identification(Shown):
     delay: float
     scores: Scores
     floor: float | None
-    standard_errors: Mapping[str, float]
-    dof: Mapping[str, float]
     start: Mapping[str, float]
     end: Mapping[str, float]
     evaluations: int
     ending: Ending
     seed: int | None
     notes: tuple[str, ...]
-    doubts: tuple[str, ...]
     residual: Floats
+    ask: Callable[[], RunCertainty]
+
+    @cached_property
+    def certainty(self) -> RunCertainty:
+        """Errors, their degrees of freedom, independent samples, and what the samples cannot tell."""
+        try:
+            return self.ask()
+        except (np.linalg.LinAlgError, ArithmeticError) as error:
+            unknown = dict.fromkeys(self.free, np.inf)
+            return RunCertainty(unknown, unknown, doubts=(f"how sure the parameters are {CANNOT_BE_KNOWN}: {error}",))
+
+    @property
+    def standard_errors(self) -> Mapping[str, float]:
+        """Of the free parameters and the search coordinates, as the residual depends on itself."""
+        return self.certainty.errors
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What the samples themselves cannot tell: parameters that do the same, a record too short."""
+        return self.certainty.doubts
+
+    def __getstate__(self) -> dict[str, Any]:
+        """With its certainty known, so that no other process needs the run."""
+        return {**self.__dict__, "certainty": self.certainty, "ask": RunCertainty}
 
     @property
     def headline(self) -> str:
@@ -240,13 +278,22 @@ class Identification(Shown):
 
     @property
     def details(self) -> Sequence[str]:
-        """Free parameters with their 95 % intervals and units."""
-        return [
-            f"{info.name} = {written(getattr(self.model, info.name), self.interval(info.name), info.unit)}"
-            + ("" if info.name in self.standard_errors else " (at a bound: one-sided)")
-            for info in self.model.parameters()
-            if info.name in self.free
-        ]
+        """Free parameters with their 95 % intervals and units, and the independent samples these rest on."""
+        infos = {info.name: info for info in self.model.parameters()}
+        made = []
+        for name in self.free:
+            state, ends = self._state(name), self.interval(name)
+            count = f"{self.certainty.effective[name]:.0f} of {self.residual.size} samples independent" if ends else ""
+            made.append(f"{name} = {written(getattr(self.model, name), ends, infos[name].unit)} ({count or state})")
+        return made
+
+    def _state(self, name: str) -> str:
+        """What is known of a parameter."""
+        if name not in self.free:
+            return "held"
+        if name not in self.standard_errors:
+            return "at a bound: one-sided"
+        return "determined" if self.interval(name) else CANNOT_BE_KNOWN
 
     def interval(self, name: str, level: float = 0.95) -> tuple[float, float] | None:
         """Ends of a parameter's interval within the form of the model; None where none is known.
@@ -257,27 +304,26 @@ class Identification(Shown):
             E_LEVEL if the level is not between 0 and 1.
         """
         error = self.standard_errors.get(name)
-        if error is None or not np.isfinite(error):
+        if error is None:
             return None
         log = {info.name: info.scale == "log" for info in self.model.parameters()}.get(name, False)
         value = float(getattr(self.model, name))
-        return interval_about(value, error / value if log else error, self.dof[name], level, log)
+        return interval_about(value, error / value if log else error, self.certainty.dof[name], level, log)
 
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:
         """A row a parameter."""
         infos = self.model.parameters()
-        intervals = [self.interval(info.name) for info in infos]
+        names = [info.name for info in infos]
+        intervals = [self.interval(name) for name in names]
         return {
-            "parameter": [info.name for info in infos],
-            "value": [float(getattr(self.model, info.name)) for info in infos],
+            "parameter": names,
+            "value": [float(getattr(self.model, name)) for name in names],
             "unit": [info.unit for info in infos],
-            "standard_error": [self.standard_errors.get(info.name) for info in infos],
+            "standard_error": [self.standard_errors.get(name) for name in names],
             "low_95": [ends[0] if ends else None for ends in intervals],
             "high_95": [ends[1] if ends else None for ends in intervals],
-            "state": [
-                "held" if n not in self.free else "determined" if n in self.standard_errors else "at a bound: one-sided"
-                for n in (info.name for info in infos)
-            ],
+            "effective_samples": [self.certainty.effective.get(name) for name in names],
+            "state": [self._state(name) for name in names],
             "meaning": [info.meaning for info in infos],
         }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from base64 import b64decode
 from dataclasses import replace
 from inspect import signature
@@ -200,6 +199,7 @@ def _identified(one: Identification) -> dict[str, Any]:
         "floor": number(one.floor),
         "values": {n: number(v) for n, v in one.model.values().items()},
         "intervals": {name: ends for name in one.free if (ends := one.interval(name))},
+        "states": dict(zip(one.table["parameter"], one.table["state"], strict=True)),
         "at_bounds": one.at_bounds,
         "free": one.free,
         "message": str(one.ending),
@@ -219,7 +219,7 @@ def _joint(scored: Scored | str) -> dict[str, Any]:
     assert isinstance(scored, Scored)
     return {
         "values": {n: number(v) for n, v in fit.damper.model.values().items()},
-        "intervals": {r["name"]: (r["low"], r["high"]) for r in intervals(scored.damper) if math.isfinite(r["low"])},
+        "written": {row["name"]: row["written"] for row in intervals(scored.damper)},
         "at_bounds": fit.at_bounds,
         "runs": [
             {"id": run.run_id, "nrmse_pp": number(error)}

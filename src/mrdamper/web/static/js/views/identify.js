@@ -149,7 +149,8 @@ class IdentifyView {
         const screen = onScreen(p.unit);
         const value = (run) => screen.factor * (run.values[p.name] ?? NaN);
         const { power, print } = column(runs.map(value));
-        const sure = (run) => h("span", { class: "faint" }, spread(value(run), run.intervals[p.name]?.map((end) => screen.factor * end), 10 ** power));
+        const ends = (run) => run.intervals[p.name]?.map((end) => screen.factor * end);
+        const sure = (run) => h("span", { class: "faint", title: run.states[p.name] }, ends(run) ? spread(value(run), ends(run), 10 ** power) : run.at_bounds.includes(p.name) ? "" : " (not known)");
         return { title: heading(p.name, screen.unit, power), number: true, value: (run) => [print(value(run)), sure(run), run.at_bounds.includes(p.name) ? h("span", { class: "badge warn" }, "at bound") : null] };
       }));
       columns.push({ title: "At bounds", value: (run) => run.at_bounds.join(", ") || "–" });
@@ -187,22 +188,16 @@ class IdentifyView {
 
 /** The 95 % interval of a value as it stands behind it: its half width, or its ends where they differ. */
 function spread(value, ends, scale) {
-  if (!ends?.every(Number.isFinite)) return "";
   const [below, above] = [value - ends[0], ends[1] - value];
   if (Math.abs(above - below) <= 0.1 * (above + below)) return ` ± ${figures((above + below) / 2 / scale, 2)}`;
   return ` (${ends.map((end) => figures(end / scale, 2)).join(" to ")})`;
 }
 
 function jointCard(answer) {
-  const { values, intervals, at_bounds: bounds } = answer.joint;
-  const between = (p) => {
-    const ends = intervals[p.name]?.map((end) => figures(onScreen(p.unit).factor * end, 3));
-    return ends ? `${ends[0]} to ${ends[1]}` : "–";
-  };
+  const { values, written, at_bounds: bounds } = answer.joint;
   const columns = [
     { title: "Parameter", value: (p) => p.name },
-    { title: "Value", number: true, value: (p) => `${figures(onScreen(p.unit).factor * values[p.name])} ${unit(onScreen(p.unit).unit)}` },
-    { title: "95 % interval", number: true, value: between },
+    { title: "Value and 95 % interval", value: (p) => written[p.name] ?? `${figures(onScreen(p.unit).factor * values[p.name])} ${unit(onScreen(p.unit).unit)}` },
     { title: "Meaning", value: (p) => p.meaning },
     { title: "", value: (p) => (bounds.includes(p.name) ? h("span", { class: "badge warn" }, "at bound") : "") },
   ];
