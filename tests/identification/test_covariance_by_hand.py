@@ -214,6 +214,8 @@ def test_three_samples_of_a_thousand_become_one(monkeypatch):
     monkeypatch.setattr(covariance, "score_covariance", lambda *given: (given[0].T @ given[0], np.ones(2), 1.0))
     found, expected = spread(J, residual, time, 1.0), spread(*thin, 1.0)
     assert found.covariance == pytest.approx(expected.covariance)
-    assert found.textbook == pytest.approx(expected.textbook)
+    of_all = float(residual @ residual) / 33 * np.diag(np.linalg.inv(thin[0].T @ thin[0])) / 3
+    assert found.textbook == pytest.approx(np.sqrt(of_all))  # as if all 35 were independent
+    assert found.effective == pytest.approx(np.minimum(35 * of_all / np.diag(expected.covariance), 35))
     none = spread(J[:19], residual[:19])  # less than two of ten
     assert none.covariance == pytest.approx(np.linalg.inv(J[:19].T @ J[:19]))
