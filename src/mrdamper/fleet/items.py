@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import hashlib
+import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 
@@ -111,15 +113,20 @@ def find_items(source: str | Path, profile: FleetProfile) -> list[Item]:
 
 def digest_of(item: Item) -> str:
     """Hash of the bytes of an item's files, and of what names the damper in them."""
-    total = hashlib.blake2b(digest_size=20)
-    for path in _files(item):
-        total.update(f"{path.name}\0{path.stat().st_size}\0".encode())
-        with path.open("rb") as file:
-            while piece := file.read(2**20):
-                total.update(piece)
-    total.update(repr(sorted(item.facts.items())).encode())
-    total.update(repr((item.rows, item.column)).encode())
-    return total.hexdigest()
+    seen = [(path, path.stat()) for path in _files(item)]
+    contents = [(path.name, _content(path, about.st_size, about.st_mtime_ns)) for path, about in seen]
+    return hash_of(contents, sorted(item.facts.items()), item.rows, item.column)
+
+
+@lru_cache  # a file of a lake holds many dampers
+def _content(path: Path, size: int, changed_ns: int) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=20)).hexdigest()
+
+
+def hash_of(*parts: Any) -> str:
+    """Of anything that JSON holds."""
+    return hashlib.blake2b(json.dumps(parts, sort_keys=True).encode(), digest_size=20).hexdigest()
 
 
 def _files(item: Item) -> list[Path]:

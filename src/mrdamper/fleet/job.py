@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import socket
 import time
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from typing import Any
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.dampers.joint import JointFit, JointProblem
-from mrdamper.data import Condition, Dataset, Floats, Run, same_condition
+from mrdamper.data import Dataset, Floats, Run
 from mrdamper.errors import InputError
 from mrdamper.fleet.items import FleetError, Item, digest_of
 from mrdamper.fleet.loops import (
@@ -27,6 +26,7 @@ from mrdamper.fleet.loops import (
     shape_deviation,
     velocity_ladder,
 )
+from mrdamper.fleet.plan import Plan
 from mrdamper.identification.covariance import spread
 from mrdamper.models import Model, SearchAxis
 from mrdamper.motion import equivalent_sine
@@ -35,12 +35,8 @@ from mrdamper.study.workflow import believed, study_rig, usable
 OTHER_RIG = "W_OTHER_RIG"  # tested on another rig than most of the line: compared with them all the same
 _ROUNDS, _STEPS, _SETTLED = 1, 40, 1e-8  # one least squares without reweighting, searched to its end: the optimum
 # is then the same to 1e-6 whatever near start it was found from
-_SPEED_STEPS = (0.25, 0.5, 0.75, 1.0)  # of the velocity ladder, over the line's highest test speed
-_CANDIDATES = 2  # of the line's start
-_WORTH = 0.02  # relative rise of the squared error by which a parameter counts as determined
 _TOGETHER = 4  # samples that are averaged for the standard errors
 _STEP = 1e-4  # of a search axis's coordinate, for slopes of parameters
-_RIDGE = 1e-12  # keeps the curvature of what changes nothing invertible
 _FAR = 6.0  # robust standard deviations from the line at which a damper is studied in full
 
 
@@ -61,60 +57,6 @@ class Settings:
     model: str = "play-bypass"
     rig_profile: str = ""
     cold: bool = False
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What a line's reference dampers say: where to start, what to compare with.
-
-    Made once from dampers that depend on the serial numbers alone and kept in the journal, so
-    that no result depends on the order in which dampers are finished.
-
-    Attributes
-    ----------
-    start : tuple of float
-        Median of the free search axes.
-    held : mapping of str to float
-        Parameters that the line's tests do not determine, at the line's value.
-    error, error_spread, deviation, deviation_spread : float
-        Median, and 1.48 times the median deviation from it, of the median nrmse_pp and of the distance
-        of the measured loops from the line's.
-    matrix : tuple of (current [A], frequency [Hz], amplitude [m])
-        The line's tests.
-    loops : tuple of tuple of float
-        Median measured loop of each [N].
-    speeds : tuple of float
-        Velocity ladder [m/s].
-    rig : str
-        That most reference dampers were tested on; empty if there is none.
-    references : tuple of str
-        Names of the dampers it was made from.
-    draft : bool
-        Made to try a start: nothing stands out yet.
-    """
-
-    start: tuple[float, ...]
-    held: dict[str, float]
-    error: float
-    error_spread: float
-    deviation: float
-    deviation_spread: float
-    matrix: tuple[Test, ...]
-    loops: tuple[tuple[float, ...], ...]
-    speeds: tuple[float, ...]
-    rig: str = ""
-    references: tuple[str, ...] = ()
-    draft: bool = False
-
-    @property
-    def currents(self) -> tuple[float, ...]:
-        """The line's test currents [A]."""
-        return tuple(sorted({round(test[0], 3) for test in self.matrix}))
-
-    @property
-    def amplitude(self) -> float:
-        """Of the ladder's sines [m]."""
-        return float(np.median([test[2] for test in self.matrix]))
 
 
 def measure(job: dict[str, Any]) -> dict[str, Any]:
@@ -354,105 +296,6 @@ def _stands_out(fit: JointFit, away: float, plan: Plan) -> bool:
     return bool(poor or odd or not fit.ending.converged)
 
 
-def drafts(rows: dict[str, dict[str, Any]]) -> list[Plan]:
-    """Plans from the rows of the reference dampers by name, one for each start worth a try.
-
-    A search finds the minimum next to its start, and there may be several: the line starts where
-    most of its dampers end lowest, and the points of those best described are tried.
-    """
-    tests = [[_as_test(t) for t in row["tests"]] for row in rows.values()]
-    matrix = _matrix([test for some in tests for test in some], len(rows))
-    found: list[list[Floats]] = [[] for _ in matrix]
-    for some, row in zip(tests, rows.values(), strict=True):
-        for number, like in enumerate(by_test(some, matrix)):
-            found[number] += [np.array(row["loops"][i]) for i in like]
-    top = max(Condition(*test).peak_velocity for test in matrix)
-    rigs = [row["rig"] for row in rows.values()]
-    rig = max(sorted(set(rigs)), key=rigs.count)
-    best = sorted(rows.values(), key=lambda row: row["cost"])[:_CANDIDATES]
-    return [
-        Plan(
-            start=tuple(row["point"]),
-            held={},
-            error=0.0,
-            error_spread=0.0,
-            deviation=0.0,
-            deviation_spread=0.0,
-            matrix=matrix,
-            loops=tuple(tuple(np.round(np.median(some, axis=0), 3).tolist()) for some in found),
-            speeds=tuple(float(f"{step * top:.2g}") for step in _SPEED_STEPS),
-            rig=rig if 2 * rigs.count(rig) > len(rigs) else "",
-            references=tuple(rows),
-            draft=True,
-        )
-        for row in best
-    ]
-
-
-def holding(plan: Plan, rows: Sequence[dict[str, Any]]) -> Plan:
-    """The draft that holds, at the line's value, what the line's tests do not determine.
-
-    A few records cannot tell all parameters of a model from each other. One that could change by a
-    fifth (on an axis that is no logarithm, by a twentieth of its width) while the others make up for
-    it and the squared error rises by less than a fiftieth is held, the least determined first.
-    A ratio of which a part is held is held too: of lost motion that no test determines, none
-    determines which share the seat takes. What is left has one minimum, the same from any start,
-    and can be compared.
-    """
-    curvature = np.array([row["curvature"] for row in rows])
-    names, parts = rows[0]["axes"], rows[0]["stands_for"]
-    free = list(range(len(names)))
-    while free:
-        some = [c[np.ix_(free, free)] for c in curvature]
-        inverse = [np.linalg.inv(c + _RIDGE * (1 + np.trace(c)) * np.eye(len(free))) for c in some]
-        rises = np.median([1 / np.diag(i) for i in inverse], axis=0)
-        rises = rises * np.array([rows[0]["changes"][i] for i in free]) ** 2
-        rises[[len(parts[i]) > 1 for i in free]] = np.inf
-        if rises.min() > _WORTH:
-            break
-        del free[int(np.argmin(rises))]
-    held = {parts[i][0] for i in range(len(names)) if i not in free}
-    free = [i for i in free if not held & set(parts[i])]
-    held |= {part for i in range(len(names)) if i not in free for part in parts[i]}
-    values = {name: float(np.median([row["parameters"][name] for row in rows])) for name in sorted(held)}
-    points = np.array([row["point"] for row in rows])
-    return replace(plan, start=tuple(np.median(points[:, free], axis=0).tolist()), held=values)
-
-
-def settled(plan: Plan, rows: Sequence[dict[str, Any]]) -> Plan:
-    """The plan from what the reference dampers came to under its draft."""
-    start = np.median([row["point"] for row in rows], axis=0)
-    error, error_spread = _middle(np.array([row["nrmse_pp"] for row in rows]))
-    away, away_spread = _middle(np.array([row["loop_deviation"] for row in rows]))
-    return replace(
-        plan,
-        start=tuple(start.tolist()),
-        error=float(error),
-        error_spread=float(error_spread),
-        deviation=float(away),
-        deviation_spread=float(away_spread),
-        draft=False,
-    )
-
-
-def _middle(values: Floats) -> tuple[Floats, Floats]:
-    """Median, and 1.48 times the median deviation from it: what robust statistics take for mean and deviation."""
-    middle = np.median(values, axis=0)
-    return middle, 1.4826 * np.median(np.abs(values - middle), axis=0)
-
-
-def _matrix(tests: list[Test], dampers: int) -> tuple[Test, ...]:
-    """Tests that half the dampers or more went through, each the median of its like."""
-    groups = same_condition([Condition(*test) for test in tests])
-    common = [g for g in groups if 2 * len(g) >= dampers] or groups
-    return tuple(sorted(_as_test(np.median([tests[i] for i in g], axis=0).tolist()) for g in common))
-
-
-def _as_test(values: Sequence[float]) -> Test:
-    current, frequency, amplitude = values
-    return current, frequency, amplitude
-
-
 def as_job(item: Item, digest: str, settings: Settings, plan: Plan | None) -> dict[str, Any]:
     """The argument of `measure`."""
     bare = asdict(replace(item, error=None))
@@ -461,7 +304,7 @@ def as_job(item: Item, digest: str, settings: Settings, plan: Plan | None) -> di
         "digest": digest,
         "version": version("mrdamper"),
         "settings": asdict(settings),
-        "plan": None if plan is None else asdict(plan),
+        "plan": None if plan is None else plan.document,
     }
 
 

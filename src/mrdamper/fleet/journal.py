@@ -67,7 +67,12 @@ class Journal:
 
     def result(self, key: str) -> dict[str, Any] | None:
         """The row kept under a key."""
-        return self._kept("SELECT row FROM results WHERE key = ?", key)
+        row = self._kept("SELECT row FROM results WHERE key = ?", key)
+        return None if row is None else json.loads(row)
+
+    def status(self, key: str) -> str | None:
+        """The status of that row."""
+        return self._kept("SELECT json_extract(row, '$.status') FROM results WHERE key = ?", key)
 
     def keep(self, rows: Iterable[tuple[str, dict[str, Any]]]) -> None:
         """Make rows durable, all or none of them.
@@ -81,7 +86,8 @@ class Journal:
 
     def plan(self, key: str) -> dict[str, Any] | None:
         """The plan kept under a key."""
-        return self._kept("SELECT plan FROM plans WHERE key = ?", key)
+        plan = self._kept("SELECT plan FROM plans WHERE key = ?", key)
+        return None if plan is None else json.loads(plan)
 
     def keep_plan(self, key: str, plan: dict[str, Any]) -> None:
         """Make a plan durable; raises as `keep`."""
@@ -96,13 +102,13 @@ class Journal:
             os.close(self._lock)
             self._lock = -1
 
-    def _kept(self, query: str, key: str) -> dict[str, Any] | None:
+    def _kept(self, query: str, key: str) -> str | None:
         assert self._base is not None
         try:
             kept = self._base.execute(query, (key,)).fetchone()
         except sqlite3.Error as error:
             raise self._refusal(error) from error
-        return None if kept is None else json.loads(kept[0])
+        return None if kept is None else kept[0]
 
     def _open(self) -> None:
         try:

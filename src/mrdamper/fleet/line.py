@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
@@ -17,9 +15,10 @@ from mrdamper.errors import InputError
 from mrdamper.files.atomic import require_writable
 from mrdamper.fleet.engine import Submit, cluster_engine, local_engine, outcome
 from mrdamper.fleet.guard import Limits
-from mrdamper.fleet.items import Item, digest_of, find_items
-from mrdamper.fleet.job import Plan, Settings, as_job, drafts, holding, refused, settled
+from mrdamper.fleet.items import Item, digest_of, find_items, hash_of
+from mrdamper.fleet.job import Settings, as_job, refused
 from mrdamper.fleet.journal import FORMAT, Journal
+from mrdamper.fleet.plan import Plan, drafts, holding, settled
 from mrdamper.fleet.profile import FleetProfile
 from mrdamper.fleet.table import write_table
 from mrdamper.models import model_type
@@ -179,12 +178,12 @@ class _Line:
 
     def _make_plan(self, submit: Submit, slots: int) -> None:
         """From the first dampers that can be identified, in an order that their names alone decide."""
-        key = _hash("plan", asdict(self._for(None)), version("mrdamper"), FORMAT)
+        key = hash_of("plan", asdict(self._for(None)), version("mrdamper"), FORMAT)
         kept = self._journal.plan(key)
         if kept is not None:
             self.plan = Plan(**{k: _deep_tuple(v) for k, v in kept.items()})
             return
-        order = sorted(self._digests, key=lambda n: _hash(self._items[n].serial, self._items[n].session))
+        order = sorted(self._digests, key=lambda n: hash_of(self._items[n].serial, self._items[n].session))
         found: dict[str, dict[str, Any]] = {}
         for begin in range(0, len(order), REFERENCES):
             some = order[begin : begin + REFERENCES]
@@ -199,7 +198,7 @@ class _Line:
             tried = [(plan, self._under(plan, order, found, submit, slots)) for plan in drafts(found)]
             draft = holding(*min(tried, key=lambda t: sum(row["cost"] for row in t[1])))
             self.plan = settled(draft, self._under(draft, order, found, submit, slots))
-            self._journal.keep_plan(key, asdict(self.plan))
+            self._journal.keep_plan(key, self.plan.document)
 
     def _under(
         self, plan: Plan, order: Sequence[int], found: dict[str, dict[str, Any]], submit: Submit, slots: int
@@ -216,8 +215,7 @@ class _Line:
         """Run the jobs whose rows are not in the journal; what is finished together is kept together."""
         waiting = [n for n in numbers if n not in self._failed and not self._is_kept(n, plan)]
         if count:
-            kept = (self._journal.result(self._key(n, plan)) for n in numbers)
-            self._already = sum(row is not None and row["status"] == "done" for row in kept)
+            self._already = sum(self._journal.status(self._key(n, plan)) == "done" for n in numbers)
         running: dict[Future[dict[str, Any]], int] = {}
         todo, done, begin = iter(waiting), 0, time.monotonic()
         while True:
@@ -232,12 +230,10 @@ class _Line:
             self._progress(*_pace(done, len(waiting), time.monotonic() - begin, plan is None))
 
     def _is_kept(self, number: int, plan: Plan | None) -> bool:
-        if self._journal.result(self._key(number, plan)) is not None:
+        if self._journal.status(self._key(number, plan)) is not None:
             return True
-        if plan is None:
-            return False
-        first = self._journal.result(self._key(number, None))  # refused records stay refused
-        return first is not None and first["status"] == "refused"
+        # Records that were refused without a plan stay refused.
+        return plan is not None and self._journal.status(self._key(number, None)) == "refused"
 
     def _keep(self, rows: Iterable[tuple[int, dict[str, Any]]], plan: Plan | None) -> None:
         good = []
@@ -255,8 +251,8 @@ class _Line:
         return replace(self._settings, cold=self._settings.cold and plan is not None and not plan.draft)
 
     def _key(self, number: int, plan: Plan | None) -> str:
-        about = None if plan is None else asdict(plan)
-        return _hash(self._digests[number], asdict(self._for(plan)), version("mrdamper"), FORMAT, about)
+        about = None if plan is None else plan.digest
+        return hash_of(self._digests[number], asdict(self._for(plan)), version("mrdamper"), FORMAT, about)
 
 
 def _pace(done: int, total: int, seconds: float, reference: bool) -> tuple[str, float]:
@@ -284,7 +280,3 @@ def _unreadable(item: Item, error: OSError) -> dict[str, Any]:
 
 def _deep_tuple(value: Any) -> Any:
     return tuple(map(_deep_tuple, value)) if isinstance(value, list) else value
-
-
-def _hash(*parts: Any) -> str:
-    return hashlib.blake2b(json.dumps(parts, sort_keys=True).encode(), digest_size=20).hexdigest()

@@ -14,7 +14,8 @@ from mrdamper.data import Floats
 from mrdamper.errors import ColumnError
 from mrdamper.files.atomic import write_file
 from mrdamper.fleet.charts import Gauge, capability, ewma, gauge_study, individuals
-from mrdamper.fleet.job import OTHER_RIG, Plan
+from mrdamper.fleet.job import OTHER_RIG
+from mrdamper.fleet.plan import Plan
 from mrdamper.fleet.profile import Limit
 from mrdamper.fleet.verdicts import FEATURES, clock_findings, drift, suspects, with_features
 from mrdamper.report.page import render_page

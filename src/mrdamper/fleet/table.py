@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrdamper.files.atomic import write_file
-from mrdamper.fleet.job import Plan
+from mrdamper.fleet.plan import Plan
 
 if TYPE_CHECKING:
     import polars as pl
