@@ -90,6 +90,14 @@ def test_the_page_traces_everything_by_serial_number(identified, tmp_path):
     assert "<script" not in text
 
 
+def test_a_long_line_is_charted_by_medians(identified, tmp_path):
+    table = pl.concat([pl.read_parquet(identified.table)] * 200).with_row_index("n")
+    table = table.with_columns(serial=pl.format("{}-{}", "serial", "n")).drop("n")
+    table.write_parquet(tmp_path / "dampers.parquet")
+    write_page(tmp_path / "dampers.parquet", identified.plan, {}, tmp_path / "fleet.html")
+    assert "medians of 2 dampers in the order of sessions" in (tmp_path / "fleet.html").read_text(encoding="utf-8")
+
+
 def test_a_limit_for_no_column_is_refused(identified, tmp_path):
     with pytest.raises(ColumnError, match="gas_force_N"):
         write_page(identified.table, identified.plan, {"gas": Limit(lower=1)}, tmp_path / "fleet.html")

@@ -24,7 +24,7 @@ from mrdamper.report.plots.style import PALETTE, Picture, label, new_figure
 if TYPE_CHECKING:
     import polars as pl
 
-_MOST_POINTS = 500  # of a chart; more dampers are charted by the medians of their sessions
+_MOST_POINTS = 500  # of a chart; more dampers are charted by medians of a few
 _WORST = 10
 _MOST_NAMED = 50  # refused or failed dampers, and suspects, that the page lists
 
@@ -87,7 +87,8 @@ def write_page(table: Path, plan: Plan | None, limits: Mapping[str, Limit], path
             "fleet.html.j2", "A line of dampers", f"mrdamper {version('mrdamper')}; {table.name}", **facts
         )
         target.write_text(text, encoding="utf-8")
-    said = [f"stands out: {s.serial} {s.session}: {s.cause} ({', '.join(s.findings)})" for s in found]
+    said = [f"stands out: {s.serial} {s.session}: {s.cause} ({', '.join(s.findings)})" for s in found[:_MOST_NAMED]]
+    said += [f"and {len(found) - _MOST_NAMED} more stand out"] * (len(found) > _MOST_NAMED)
     said += [f"{features[n][0]}: {d.text}" for n, d in drifts.items() if d.verdict != "none"]
     return said + [f"limits of {v['name']}: {v['outside']} of {v['count']} outside" for v in verdicts] + facts["notes"]
 
@@ -135,8 +136,9 @@ def _described(line: pl.DataFrame, name: str, about: tuple[str, str]) -> dict[st
     values = _values(line, name)
     charted, what = values, "dampers in the order of sessions and serial numbers"
     if values.size > _MOST_POINTS:
-        medians = line.drop_nulls(name).group_by("session", maintain_order=True).median()
-        charted, what = _values(medians, name), "medians of sessions"
+        together = -(-values.size // _MOST_POINTS)
+        charted = np.array([np.median(values[i : i + together]) for i in range(0, values.size, together)])
+        what = f"medians of {together} {what}"
     quantiles = np.quantile(values, [0.00135, 0.05, 0.5, 0.95, 0.99865]).tolist()
     first, ranges = individuals(charted)
     sigma = max((first.upper[0] - first.centre) / 3, 1e-12)
