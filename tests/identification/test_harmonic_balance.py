@@ -142,6 +142,72 @@ def test_the_projection_keeps_size_and_takes_drift_out():
     assert project(theta - theta.mean()) == pytest.approx(np.zeros(7), abs=1e-9)
 
 
+@pytest.mark.parametrize("begin", [0.0, 1.0, 2.5, 4.0, 5.5])
+def test_a_record_is_read_as_a_sine_from_any_phase_on(begin):
+    X, f, I = 0.02, 1.6, 0.7
+    time = np.arange(0, 2.2, 2e-3)
+    angle = 2 * np.pi * f * time + begin
+    force = 900 * np.sin(angle + 0.6) + 40
+    record = SineRecord.of(Run("sine", time, X * np.sin(angle), force, I))  # type: ignore[arg-type]
+    assert np.sin(record.theta) == pytest.approx(np.sin(angle), abs=1e-6)
+    assert 0 <= record.theta[0] < 2 * np.pi + 1e-9
+    assert (record.condition.current_A, record.condition.frequency_Hz) == (I, pytest.approx(f))
+    motion = record.motion
+    assert motion.displacement == pytest.approx(X * np.sin(angle), abs=1e-8)
+    assert motion.velocity == pytest.approx(2 * np.pi * f * X * np.cos(angle), abs=1e-6)
+    assert motion.acceleration == pytest.approx(-((2 * np.pi * f) ** 2) * motion.displacement, abs=1e-6)
+    assert motion.current.tolist() == [I] * time.size
+    assert np.diff(motion.time) == pytest.approx(np.diff(time))
+    for phase in ("harmonic", "peaks"):
+        # Peaks are known to a sample, 1/312 of a cycle.
+        assert read_force(record, phase=phase).phase == pytest.approx(0.6, abs=0.021 if phase == "peaks" else 1e-6)
+    behind = SineRecord("late", record.condition, record.theta, -record.force)
+    assert read_force(behind).phase == pytest.approx(0.6 - np.pi)
+    assert read_force(behind, phase="peaks").phase == pytest.approx(0.6 - np.pi, abs=0.021)
+
+
+@pytest.mark.parametrize("cycles", [3.0, 3.4])
+def test_extremes_are_medians_over_whole_cycles(cycles):
+    per = 100
+    theta = 1.0 + 2 * np.pi * np.arange(int(cycles * per)) / per
+    number = np.arange(theta.size) // per
+    sizes, leads = np.array([1.0, 5.0, 1.5, 9.0])[number], np.array([0.2, 0.5, 1.2, 0.1])[number]
+    record = SineRecord("drifting", Condition(0.0, 1.0, 0.02), theta, sizes * np.sin(theta + leads) + 0.1 * number)
+    tops, bottoms = [], []
+    for k in range(3):
+        part = [i for i in range(theta.size) if number[i] == k]
+        for best, found in ((max, tops), (min, bottoms)):
+            found.append(best(part, key=lambda i: record.force[i]))
+    top, bottom = (sorted(record.force[at])[1] for at in (tops, bottoms))
+    found = read_force(record, "half-peak-to-peak", "peaks")
+    assert (found.amplitude, found.offset) == (pytest.approx((top - bottom) / 2), pytest.approx((top + bottom) / 2))
+    assert read_force(record, "maximum").amplitude == pytest.approx(top)
+    places = [np.angle(sum(np.exp(1j * theta[i]) for i in at)) for at in (tops, bottoms)]
+    middle = np.angle(np.exp(1j * places[0]) + np.exp(1j * (places[1] - np.pi)))
+    assert np.exp(1j * found.phase) == pytest.approx(np.exp(1j * (np.pi / 2 - middle)))
+
+
+def test_a_projection_keeps_every_wave_but_what_a_drift_takes():
+    theta = np.linspace(0.3, 0.3 + 4.6 * np.pi, 400)
+    project = HarmonicProjection(theta, 4)
+    drift = (theta - theta.mean()) / np.linalg.norm(theta - theta.mean())
+    for wave in (np.ones(400), np.sin(theta), np.cos(3 * theta), np.sin(4 * theta), np.cos(theta) - np.sin(2 * theta)):
+        assert np.sum(project(wave) ** 2) == pytest.approx(np.sum(wave**2) - (drift @ wave) ** 2)
+    gap = np.concatenate([np.arange(0, 6, 0.1), 60 + np.arange(0, 6, 0.1)])
+    assert HarmonicProjection(gap, 50).harmonics == 31  # π over the middle step
+    assert HarmonicProjection(np.arange(0, 40, 2.0), 50).harmonics == 1
+
+
+def test_two_frequencies_a_thirtieth_apart_are_two():
+    near, apart = ([Condition(0.0, f, 0.02) for f in (1.0, other)] for other in (1.0305, 1.1))
+    with pytest.raises(IdentificationError, match="2 runs at one frequency"):
+        separate_mass(near, [1.0, 2.0], with_cubic=True)
+    found = separate_mass(apart, [1e3 - 15 * (2 * np.pi * c.frequency_Hz) ** 2 for c in apart])
+    assert (found.k1, found.m) == pytest.approx((1e3, 15.0))
+    with pytest.raises(IdentificationError, match="2 runs at one amplitude"):
+        separate_mass(apart, [1.0, 2.0], with_cubic=True)
+
+
 def test_mass_is_told_from_stiffness_by_two_frequencies():
     conditions = [Condition(0.0, f, X) for f, X in ((0.5, 0.05), (1.0, 0.05), (2.0, 0.02))]
     in_phase = [1400 + 0.75 * 8e3 * c.amplitude_m**2 - 15 * (2 * np.pi * c.frequency_Hz) ** 2 for c in conditions]

@@ -1,6 +1,7 @@
 """Sensitivity in coordinates that no unit of length changes, and what presets cost."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,13 +9,14 @@ import pytest
 from mrdamper.data import Condition
 from mrdamper.errors import ParameterError, UnknownNameError
 from mrdamper.models.bouc_wen import BoucWen
+from mrdamper.reproduction import sensitivity
 from mrdamper.reproduction.sensitivity import one_at_a_time, sobol
 
 MODEL = BoucWen(c=1440, alpha=9e5, beta=2e5, gamma=2e5, f0=120, k1=1382, k3=8243, m=15.0)
 
 
 def test_a_preset_that_others_make_up_for_costs_nothing():
-    found = {s.name: s for s in one_at_a_time(MODEL, Condition(1.0, 1.0, 0.05))}
+    found = {s.name: s for s in one_at_a_time(MODEL, Condition(0.7, 1.3, 0.05))}
     assert found["A"].effect > 0.01
     assert found["A"].left < 1e-9  # A is redundant: α, β, γ absorb it exactly
     assert found["n"].left < 0.01
@@ -37,13 +39,50 @@ def test_sensitivity_does_not_depend_on_the_unit_of_length():
 def test_sobol_indices_have_intervals_and_rank_like_single_changes():
     pytest.importorskip("SALib")
     names = ("c", "yield_force", "m")
-    found = sobol(MODEL, Condition(1.0, 1.0, 0.05), names, samples=128)
+    found = sobol(MODEL, Condition(1.0, 1.0, 0.05), names, samples=64)
     single = {s.name: s.effect for s in one_at_a_time(MODEL, Condition(1.0, 1.0, 0.05), names, refit=())}
     assert [names[i] for i in np.argsort(found.total)] == sorted(names, key=single.get)
     assert np.all(found.total > -0.05)
     assert np.all((found.total_confidence > 0) & (found.total_confidence < 0.5))
-    with pytest.raises(ParameterError, match="spread is 2"):
-        sobol(MODEL, Condition(1.0, 1.0, 0.05), spread=2.0)
+    with pytest.raises(ParameterError, match=r"spread is 1\.5"):
+        sobol(MODEL, Condition(1.0, 1.0, 0.05), spread=1.5)
+
+
+def test_indices_are_those_of_the_change_of_the_force(monkeypatch):
+    analysis = pytest.importorskip("SALib.analyze.sobol")
+    condition, given = Condition(0.7, 1.3, 0.05), {}
+    points = np.array([[1.1, 1.0], [0.9, 1.0], [1.0, 1.05]])
+
+    def sample(problem, samples, calc_second_order, seed):
+        given.update(problem=problem, samples=samples)
+        return points
+
+    def analyze(problem, changes, calc_second_order, seed):
+        given["changes"] = changes
+        return {name: np.zeros(2) for name in ("S1", "ST", "S1_conf", "ST_conf")}
+
+    monkeypatch.setattr("SALib.sample.sobol.sample", sample)
+    monkeypatch.setattr(analysis, "analyze", analyze)
+    sobol(MODEL, condition, ("c", "f0"), spread=0.1, samples=3)
+    assert given["problem"] == {"num_vars": 2, "names": ["c", "f0"], "bounds": [[0.9, 1.1]] * 2}
+    # A tenth of the viscous force, its mean square that of a cosine; a twentieth of the offset.
+    viscous = 144 * 2 * np.pi * 1.3 * 0.05 / np.sqrt(2)
+    assert given["changes"] == pytest.approx([viscous, viscous, 6.0], rel=3e-3)
+
+
+def test_what_is_left_is_of_the_changed_force(monkeypatch):
+    condition, asked = Condition(0.7, 1.3, 0.05), []
+    monkeypatch.setattr(
+        sensitivity, "_left_after_refit", lambda model, changed, at: asked.append((model, changed.n, at)) or 0.3
+    )
+    (found,) = one_at_a_time(MODEL, condition, ("n",))
+    assert (found.left, asked) == (0.3, [(MODEL, pytest.approx(1.1 * MODEL.n), condition)])
+    monkeypatch.undo()
+    other = replace(MODEL, f0=150.0)
+    monkeypatch.setattr(sensitivity, "identify", lambda *_, **__: SimpleNamespace(model=replace(other, c=1500.0)))
+    left = sensitivity._left_after_refit(MODEL, other, condition)
+    missed = 60 * 2 * np.pi * 1.3 * 0.05 / np.sqrt(2)
+    assert left == pytest.approx(missed / np.std(loop_by_hand(other, condition)), rel=3e-3)
 
 
 def test_the_effect_of_a_linear_parameter_is_that_of_its_own_force():
@@ -108,6 +147,7 @@ def test_an_asymmetry_at_its_end_stays_a_loop():
     steep = BoucWen.build({**MODEL.values(), "beta": 1e3, "gamma": 3.99e5})
     (found,) = one_at_a_time(steep, Condition(1.0, 1.0, 0.05), ("asymmetry",), refit=())
     assert np.isfinite(found.effect)
+    assert sensitivity._varied(steep, {"asymmetry": 1.1}).shape.rho == pytest.approx(0.98)
     with pytest.raises(UnknownNameError, match="weight"):
         one_at_a_time(MODEL, Condition(1.0, 1.0, 0.05), ("weight",))
 

@@ -10,7 +10,16 @@ from mrdamper.errors import ParameterError
 from mrdamper.gas_spring import GasSpring
 from mrdamper.metrics import dissipated_power
 from mrdamper.motion import sine
-from mrdamper.reproduction.virtual_rig import MOTIONS, SLOW_SPEED, VirtualRig, friction_test, true_runs, virtual_dataset
+from mrdamper.reproduction.virtual_rig import (
+    MOTIONS,
+    SLOW_SPEED,
+    VirtualRig,
+    _follow_lag,
+    _speed_before,
+    friction_test,
+    true_runs,
+    virtual_dataset,
+)
 
 CONDITION = Condition(1.0, 1.0, 0.05)
 BARE = VirtualRig(
@@ -131,6 +140,42 @@ def test_until_the_cavity_closes_a_share_of_the_yield_force_is_missing_and_the_l
     assert lagged == pytest.approx(np.array(expected), abs=1e-9)
 
 
+def test_the_yield_force_builds_up_over_the_knee_and_the_seal_breaks_away_over_its_own():
+    rig = replace(BARE, yield_off=100.0, cavity_depth=0.0, friction_low=30.0, friction_high=30.0)
+    tiny = sine(Condition(0.0, 1.0, 1e-6), 0.2, 2000)
+    assert rig._hysteretic(tiny) == pytest.approx(100 * tiny.displacement / rig.knee, rel=0.01, abs=1e-9)
+    motion = sine(Condition(0.0, 1.0, 2e-4), 2, 500)
+    x, state, expected = motion.displacement, 0.0, []
+    for i in range(x.size):  # n = 1, beta alone: what is missing of the full force fades over the knee
+        way = x[i] - x[max(i - 1, 0)]
+        state = np.sign(way) + (state - np.sign(way)) * np.exp(-abs(way) / rig.friction_knee)
+        expected.append(30 * state)
+    # A reversal lies between two samples, of 2.5 µm at most.
+    assert rig._friction(x, motion.path) == pytest.approx(np.array(expected), abs=0.3)
+
+
+def test_currents_magnetise_either_way():
+    rig = VirtualRig()
+    assert rig.magnetisation(-1.2) == rig.magnetisation(1.2) > 0
+
+
+def test_the_stroke_before_is_the_one_before():
+    velocity = np.array([0.1, -0.3, 0.2, -0.5, 0.4, 0.1, 0.2])
+    stroke = np.array([0, 0, 1, 1, 1, 2, 3])
+    assert _speed_before(velocity, stroke).tolist() == [0, 0, 0.3, 0.3, 0.3, 0.5, 0.1]
+    force, time = np.array([0.0, 1.0, 3.0]), np.arange(3) / 10
+    assert _follow_lag(force, time + 7.0, 0.2) == pytest.approx(_follow_lag(force, time, 0.2))
+
+
+def test_noise_is_that_of_the_given_generator():
+    motion = sine(CONDITION, 1, 100)
+    noisy = replace(BARE, force_noise=6.0, displacement_noise=5e-6)
+    run = noisy.sense(motion, np.zeros(100 + 1)[: len(motion)], np.random.default_rng(4), id="one")
+    gauge, cell = np.random.default_rng(4).standard_normal((2, len(motion)))
+    assert run.displacement == pytest.approx(motion.displacement + 5e-6 * gauge)
+    assert run.force == pytest.approx(6.0 * cell)
+
+
 def test_sensors_delay_quantise_and_add_noise():
     motion = sine(CONDITION, 2, 500)
     force = 1000 * np.sin(2 * np.pi * motion.time)
@@ -167,6 +212,7 @@ def test_the_dry_friction_test_holds_neither_yield_nor_viscous_force():
     dry, filled = friction_test(), friction_test(filled=True)
     assert np.ptp(filled.force) - np.ptp(dry.force) == pytest.approx(2 * VirtualRig().yield_off, abs=15)
     assert dry.id == "friction-0.01mm-s"
+    assert dry.time[-1] == pytest.approx(1.25 * 0.08 / SLOW_SPEED)
     assert dry.nominal == Condition(0.0, SLOW_SPEED / 0.08, 0.020)
     assert np.array_equal(friction_test(seed=2).force, friction_test(seed=2).force)
     assert not np.array_equal(friction_test(seed=2).force, dry.force)

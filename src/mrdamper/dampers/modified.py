@@ -268,13 +268,8 @@ def fit_modified_jointly(
 
 def _uncertainty(identifications: Sequence[Identification], name: str, log: bool) -> Floats:
     errors = np.array([i.standard_errors.get(name, np.inf) for i in identifications])
-    return errors / np.array([abs(_coordinate(i, name)) or 1.0 for i in identifications]) if log else errors
+    return errors / np.array([_coordinate(i, name) for i in identifications]) if log else errors
 
 
 def _coordinate(identification: Identification, name: str) -> float:
     return float(getattr(identification.model, name))
-
-
-def without(identifications: Sequence[Identification], run_ids: set[str]) -> list[Identification]:
-    """The identifications of all other runs."""
-    return [i for i in identifications if i.run_id not in run_ids]

@@ -263,8 +263,7 @@ class HarmonicProjection:
         resolved = int(np.pi / float(np.median(np.diff(theta))))
         self.harmonics = max(1, min(harmonics, resolved))
         angle = np.outer(theta, np.arange(1, self.harmonics + 1))
-        drift = (theta - theta.mean()) / np.ptp(theta)
-        basis = np.column_stack([drift, np.ones_like(theta), np.sin(angle), np.cos(angle)])
+        basis = np.column_stack([theta - theta.mean(), np.ones_like(theta), np.sin(angle), np.cos(angle)])
         self._rows = np.linalg.qr(basis)[0].T[1:]
 
     def __call__(self, signals: Floats) -> Floats:
@@ -284,11 +283,11 @@ def _extremes(record: SineRecord) -> tuple[_Extreme, _Extreme]:
     parts = [np.flatnonzero(cycle == number) for number in range(cycle[-1] + 1)]
     most = max(part.size for part in parts)
     whole = [part for part in parts if part.size >= 0.95 * most]
-    found = []
-    for sign in (1.0, -1.0):
-        at = [part[np.argmax(sign * record.force[part])] for part in whole]
-        found.append(_Extreme(float(np.median(record.force[at])), _circular_mean(*record.theta[at])))
-    return found[0], found[1]
+    highest, lowest = ([part[pick(record.force[part])] for part in whole] for pick in (np.argmax, np.argmin))
+    top, bottom = (
+        _Extreme(float(np.median(record.force[at])), _circular_mean(*record.theta[at])) for at in (highest, lowest)
+    )
+    return top, bottom
 
 
 def _circular_mean(*angles: float) -> float:

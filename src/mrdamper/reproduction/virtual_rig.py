@@ -132,7 +132,7 @@ class VirtualRig:
         along = path.direction * follow(Shape(1 / self.knee, self.knee_asymmetry, self.knee_sharpness), path)
         closed = self.cavity_time * _speed_before(motion.velocity, path.stroke)
         filled = (path.distance / np.maximum(closed, 1e-12)) ** 8
-        share = 1 - self.cavity_depth / (1 + np.minimum(filled, 1e12))
+        share = 1 - self.cavity_depth / (1 + filled)
         return self.yield_force(motion.current) * path.direction * np.where(along > 0, along * share, along)
 
     def _friction(self, x: Floats, path: Path) -> Floats:
