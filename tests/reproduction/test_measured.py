@@ -41,6 +41,29 @@ def test_friction_is_half_the_force_between_the_strokes_where_both_were_measured
     assert friction == pytest.approx(50 + 1000 * found, abs=0.5)
 
 
+def test_friction_is_compared_where_both_strokes_were():
+    x = np.concatenate([np.linspace(0, -0.02, 500), np.linspace(-0.02, 0.02, 2000), np.linspace(0.02, -0.01, 1500)])
+    force = 60 * np.sign(np.gradient(x)) + 2e3 * x
+    found, friction = friction_along(Run("slow", np.arange(x.size) / 100, x, force, 0.0))  # type: ignore[arg-type]
+    assert (found[0], found[-1]) == pytest.approx((-0.01 + 0.0015, 0.02 - 0.0015), abs=8e-4)
+    assert friction == pytest.approx(60, abs=0.5)
+    found, _ = friction_along(Run("slow", np.arange(x.size) / 100, -x, -force, 0.0))  # type: ignore[arg-type]
+    assert (found[0], found[-1]) == pytest.approx((-0.02 + 0.0015, 0.01 - 0.0015), abs=8e-4)
+
+
+def test_mid_stroke_is_a_third_of_the_stroke_either_side():
+    A, L = 0.03, 0.02
+    motion = sine(Condition(1.0, 1.0, A), 4, 8000)
+    path, x = motion.path, motion.displacement
+    size = np.minimum(path.distance / L, 1) * (1 + np.abs(x) / A)
+    run = Run("one", motion.time, x + 0.05, 400 * path.direction * size, 1.0, window=(1.0, float(motion.time[-1])))
+    # Of a sine the phases within 0.3 X are even: the middle one lies at sin(asin(0.3)/2).
+    full = 0.9 * (1 + np.sin(np.arcsin(0.3) / 2))
+    ways = np.linspace(0, L, 4001)
+    expected = ways[np.flatnonzero(ways / L * (1 + (A - ways) / A) >= full)[0]]
+    assert lost_length(run, 0.0) == pytest.approx(expected, rel=3e-3)
+
+
 def reversals(lengths, damping=800.0, full=400.0, offset=90.0):
     """A sine whose force is back over a length [m] after every reversal, a length a stroke."""
     motion = sine(Condition(1.0, 1.0, 0.03), 4, 4000)
@@ -83,6 +106,11 @@ def test_the_largest_spread_over_amplitudes_counts_and_three_motions_are_enough(
     first, last = claims.scatter_over_motions(three, np.array([1.0, 2.0, 3.0, 0.0, 9.0, 0.0, 2.0, 4.0, 6.0]))
     assert last / first == pytest.approx(2.0)
     assert np.isnan(claims.scatter_over_motions(three[:5], np.arange(5.0))[0])
+    # A level with two motions does not count; two levels with three do.
+    found = claims.scatter_over_motions(three[1:], np.array([9.0, 0.0, 0.0, 9.0, 0.0, 2.0, 4.0, 6.0]))
+    assert found == pytest.approx((np.std([0.0, 9.0, 0.0]), np.std([2.0, 4.0, 6.0])))
+    negative = claims.amplitude_spread(conditions, np.array([-10.0, -12.0, 10.0, 17.0, 11.0]))
+    assert negative == pytest.approx(7 / 12)
 
 
 def test_gas_and_friction_are_measured_where_they_were_tested():
@@ -119,6 +147,8 @@ def test_shares_of_loops_and_of_steps_are_counted():
 def test_the_phase_counts_runs_in_the_band_and_the_motion_that_changes_most():
     conditions = [Condition(I, f, 0.02) for f in (1.0, 2.0) for I in (0.0, 1.0)] + [Condition(0.0, 0.5, 0.05)]
     readings = [SimpleNamespace(phase=p) for p in (1.41, 1.45, 1.45, 1.30, 1.2)]
+    above = claims._phase(study_of(conditions=conditions, readings=[*readings[:4], SimpleNamespace(phase=1.55)]))
+    assert above.numbers["share of runs within 1.4–1.5 rad"] == 3 / 5
     found = claims._phase(study_of(conditions=conditions, readings=readings))
     assert list(found.numbers.values()) == pytest.approx([3 / 5, 0.15])
     assert found.evidence == f"1.200–1.450 rad; smallest sine {np.sin(1.2):.3f}"
@@ -126,7 +156,7 @@ def test_the_phase_counts_runs_in_the_band_and_the_motion_that_changes_most():
 
 def test_the_stroke_end_compares_the_fastest_with_the_slowest_motion_at_the_highest_current():
     speeds = {"slow": 0.5, "fast": 2.0, "middle": 1.0, "other": 9.0}
-    conditions = [Condition(2.0 if name != "other" else 1.0, f, 0.02) for name, f in speeds.items()]
+    conditions = [Condition(2.0 if name != "other" else 1.95, f, 0.02) for name, f in speeds.items()]
     models = [SimpleNamespace(c=100.0 + n) for n in range(4)]
     consistent = SimpleNamespace(identifications=[SimpleNamespace(model=m) for m in models])
     lengths = {("slow", 100.0): 0.002, ("fast", 101.0): 0.005}
@@ -214,7 +244,7 @@ def test_a_mass_that_was_held_or_has_another_function_is_not_judged(form):
 
 
 def test_time_and_accuracy_are_ratios_of_ours_to_theirs():
-    ended = [Ended("a", 0, 1, 1, 1, 2.0), Ended("b", 1, 1, 1, 1, 4.0)]
+    ended = [Ended(name, 0, 1, 1, 1, seconds) for name, seconds in (("a", 1.0), ("b", 1.5), ("c", 6.5))]
     direct = SimpleNamespace(identifications=(1, 2, 3, 4), seconds=6.0)
     found = claims._fast(study_of({DIRECT: direct}, ended=ended))
     assert list(found.numbers.values()) == [2.0]
@@ -230,6 +260,13 @@ def test_time_and_accuracy_are_ratios_of_ours_to_theirs():
     found = claims._few_parameters(study_of({LITERAL: literal, ALI: ali}))
     assert list(found.numbers.values()) == pytest.approx([3.9, 0.25])
     assert found.evidence.startswith("held out 15.6 % against 4.0 %; worst 17.4 % and 17.4 %; 2 searched against 8")
+    ali.numbers_per_run = 1
+    assert claims._few_parameters(study_of({LITERAL: literal, ALI: ali})).numbers == pytest.approx(
+        {"median held-out error over the Ali-type's": 3.9, "searched parameters a run over the Ali-type's": 2.0}
+    )
+    empty = SimpleNamespace(held_out=SimpleNamespace(runs=()))
+    for pair in ({LITERAL: empty, ALI: ali}, {LITERAL: literal, ALI: empty}, {LITERAL: literal}, {ALI: ali}):
+        assert "no run is held out" in claims._few_parameters(study_of(pair)).evidence
     found = claims._generalisation(study_of({LITERAL: literal}))
     assert list(found.numbers.values()) == pytest.approx([1.56, 0.174])
     assert found.evidence == "median 15.6 %, worst 17.4 % at 2 A, 1 Hz, 80 mm"
@@ -246,6 +283,63 @@ def test_slopes_of_the_saturation_are_in_newtons_an_ampere_and_motions_are_avera
     assert found.evidence == "F0 rises by 800 N/A up to 1 A and by 80 N/A above 1.5 A"
     some = [c for c in conditions if c.current_A <= 1.0]
     assert "tested up to 1 A" in claims._saturation(study_of(conditions=some, readings=readings[:6])).evidence
+
+
+def test_two_currents_on_either_side_are_enough_for_the_saturation():
+    conditions = [Condition(I, 1.0, 0.02) for I in (0.5, 1.0, 1.5, 2.0)]
+    readings = [SimpleNamespace(amplitude=F) for F in (300.0, 700.0, 900.0, 980.0)]
+    found = claims._saturation(study_of(conditions=conditions, readings=readings))
+    assert list(found.numbers.values()) == pytest.approx([0.2])
+
+
+def identified(**values):
+    numbers = [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
+    return SimpleNamespace(identifications=[SimpleNamespace(model=SimpleNamespace(**n), at_bounds=()) for n in numbers])
+
+
+def test_the_closed_form_is_compared_where_both_balances_were_followed():
+    both = {LITERAL: identified(c=[200.0, 300.0, 900.0]), CONSISTENT: identified(c=[100.0] * 3)}
+    assert list(claims._viscosity(study_of(both)).numbers.values()) == [3.0]
+    for pair in ({LITERAL: both[LITERAL], CONSISTENT: identified(c=[100.0])}, {CONSISTENT: both[CONSISTENT]}, {}):
+        assert "could not be followed" in claims._viscosity(study_of(pair)).evidence
+
+
+def test_accuracy_is_compared_by_medians_of_the_runs_both_were_made_of():
+    def errors(**by_run):
+        return SimpleNamespace(
+            identifications=[
+                SimpleNamespace(run_id=name, scores=SimpleNamespace(nrmse_pp=e)) for name, e in by_run.items()
+            ]
+        )
+
+    pair = {LITERAL: errors(a=0.02, b=0.03, c=0.4, d=9.0), DIRECT: errors(c=0.3, b=0.01, a=0.02)}
+    assert claims._beside_direct(study_of(pair)) == pytest.approx((0.03, 0.02))
+    assert claims._beside_direct(study_of({LITERAL: errors(d=1.0), DIRECT: errors(a=1.0)})) is None
+
+
+def test_functions_are_those_of_the_literal_recipe(monkeypatch):
+    fit = SimpleNamespace(functions={"alpha": "its function"})
+    monkeypatch.setattr(claims, "ModifiedFit", SimpleNamespace)
+    assert claims._function(study_of({LITERAL: SimpleNamespace(fit=fit)}), "alpha") == "its function"
+    assert claims._function(study_of({LITERAL: SimpleNamespace(fit=fit)}), "beta") is None
+    assert claims._function(study_of({CONSISTENT: SimpleNamespace(fit=fit)}), "alpha") is None
+    assert claims._function(study_of({LITERAL: SimpleNamespace(fit=None)}), "alpha") is None
+    assert "too few motions" in claims._alpha(study_of()).evidence
+    assert "could not be followed" in claims._beta(study_of()).evidence
+    monkeypatch.setattr(claims, "_function", lambda study, name: SimpleNamespace(r2=0.9, function="any"))
+    assert "could not be followed" in claims._beta(study_of()).evidence
+    monkeypatch.setattr(claims, "_function", lambda study, name: SimpleNamespace(function=SimpleNamespace(form="tilt")))
+    assert "too few motions" in claims._alpha(study_of()).evidence
+
+
+def test_the_scatter_of_beta_is_that_of_its_logarithm(monkeypatch):
+    monkeypatch.setattr(claims, "_function", lambda study, name: SimpleNamespace(r2=0.9))
+    conditions = [Condition(I, f, 0.01) for I in (0.0, 1.0) for f in (1.0, 2.0, 3.0)]
+    # Betas about one: the logarithm of one more would be another.
+    study = study_of({LITERAL: identified(beta=[0.1, 1.0, 10.0, 1.0, 2.0, 4.0])}, conditions=conditions)
+    found = claims._beta(study)
+    ratio = np.std(np.log([1.0, 2.0, 4.0])) / np.std(np.log([0.1, 1.0, 10.0]))
+    assert list(found.numbers.values()) == pytest.approx([ratio, 0.9, 0.0])
 
 
 def test_a_quadratic_needs_four_currents_at_a_motion():

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from mrdamper.errors import UnknownNameError
-from mrdamper.reproduction.verdicts import LIMITS, Limit, judge, thresholds
+from mrdamper.reproduction.verdicts import LIMITS, Limit, _above, _below, judge, thresholds
 
 # Every threshold once more, so that none moves unseen: sense, limit, wider limit.
 KEPT = {
@@ -78,3 +78,9 @@ def test_unknown_claims_and_numbers_are_refused():
         judge("weather", {})
     with pytest.raises(UnknownNameError):
         judge("quadratic", {"R squared": 1.0})
+
+
+def test_a_limit_without_a_wider_one_is_its_own():
+    for make, sense in ((_below, "below"), (_above, "above")):
+        assert make("a number", 2.0) == Limit("a number", sense, 2.0, 2.0)
+        assert make("a number", 2.0, 3.0) == Limit("a number", sense, 2.0, 3.0)

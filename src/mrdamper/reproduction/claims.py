@@ -107,7 +107,7 @@ def friction_along(run: Run) -> tuple[Floats, Floats]:
         width = max(1, order.size // 60)
         keep = order.size // width * width
         x, force = (c[inside][order][:keep].reshape(-1, width).mean(1) for c in (run.displacement, run.force))
-        sweeps.append((x, force, float(np.median(path.direction[inside]))))
+        sweeps.append((x, force, path.direction[inside][0]))
     (xa, fa, direction), (xb, fb, _) = sweeps
     low, high = max(xa[0], xb[0]), min(xa[-1], xb[-1])
     x = np.linspace(low + 0.05 * (high - low), high - 0.05 * (high - low), 80)

@@ -45,8 +45,8 @@ class Limit:
 
     def grade(self, value: float) -> int:
         """2 within the limit, 1 within the wider one, 0 beyond both."""
-        sign = 1.0 if self.sense == "below" else -1.0
-        return 2 if sign * value <= sign * self.holds else 1 if sign * value <= sign * self.near else 0
+        holds, near = (value <= end if self.sense == "below" else value >= end for end in (self.holds, self.near))
+        return 2 if holds else 1 if near else 0
 
     @property
     def text(self) -> str:
