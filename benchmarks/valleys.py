@@ -18,6 +18,7 @@ from mrdamper.data import Run
 from mrdamper.files.dataset import load_dataset
 
 _SAME = 1.005  # times the least error
+_TERMS = ("leak", "cq", "qb", "Ic", "si")  # free in the first search of a study too
 
 
 def ends(problem: JointProblem, starts: int) -> tuple[list[JointFit], list[JointFit]]:
@@ -42,7 +43,7 @@ def main() -> None:
         if given.only not in name:
             continue
         begin = time.process_time()
-        problem = JointProblem(runs, "play-bypass")
+        problem = JointProblem(runs, "play-bypass", free=_TERMS)
         problem = problem.with_parts([part.steady_end() for part in problem.parts])
         single, searched = ends(problem, given.starts)
         least = min(end.error for end in [*single, *searched])

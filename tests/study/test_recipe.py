@@ -18,7 +18,7 @@ from mrdamper.metrics import Scores
 from mrdamper.models import model_type
 from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.motion import sine
+from mrdamper.motion import measured_motion, sine
 from mrdamper.reproduction.ways import one_per_current, through_chosen
 from mrdamper.study import recipe as recipes
 from mrdamper.study.recipe import (
@@ -183,6 +183,114 @@ def test_a_long_record_is_left_out_in_stretches_that_cover_it_once():
     assert stretches(TRAIN[0]) == [TRAIN[0]]
 
 
+@pytest.mark.parametrize(("seconds", "count"), [(20.0, 1), (28.0, 2), (52.0, 4)])
+def test_a_stretch_has_a_dozen_cycles_and_a_lead_in_of_one_and_a_half(seconds, count):
+    time = np.arange(0, seconds, 0.01)
+    run = Run("made", time, 0.01 * np.sin(2 * np.pi * time) + 1e-5, np.cos(2 * np.pi * time), 1.0)
+    changing = replace(run, current=np.where(time < 3, 0.5, 1.0))
+    with pytest.MonkeyPatch.context() as patch:
+        condition = Condition(1.0, 1.0, 0.01)
+        patch.setattr(recipes, "equivalent_sine", lambda run: SimpleNamespace(condition=condition, is_sine=False))
+        parts = stretches(run)
+        assert len(parts) == count
+        assert count == 1 or [len(p.time) for p in parts[1:-1]] == pytest.approx([1350] * (count - 2), abs=200)
+        for part in parts[1:]:
+            assert part.window[0] - part.time[0] == pytest.approx(1.5)
+        slow = Condition(1.0, 0.5, 0.01)
+        patch.setattr(recipes, "equivalent_sine", lambda run: SimpleNamespace(condition=slow, is_sine=False))
+        assert len(stretches(run)) == max(1, count // 2)
+        assert len(stretches(replace(run, window=(10.0, seconds - 0.01)))) == max(1, int((seconds - 10) / 24))
+        # A sine whose current changes is cut too, a sine at one current stays whole.
+        patch.setattr(recipes, "equivalent_sine", lambda run: SimpleNamespace(condition=condition, is_sine=True))
+        assert (len(stretches(run)), len(stretches(changing))) == (1, count)
+
+
+class Zero:
+    title, one_model = "zero", None
+
+    def predict_run(self, run):
+        return Said(np.zeros(run.time.size), measured_motion(run), Condition(0.0, 1.0, 0.01))
+
+
+def test_records_that_are_no_sine_are_cut_and_left_out_by_themselves(monkeypatch):
+    asked = {}
+
+    def leave(pieces, conditions, refit, title, alone):
+        asked.update(ids=[p.id for p in pieces], alone=list(alone), conditions=len(conditions))
+        return Validation(title, ())
+
+    monkeypatch.setattr(recipes, "leave_one_condition_out", leave)
+    changing = replace(TRAIN[1], id="changing", current=np.linspace(0, 1, TRAIN[1].time.size))
+    train = [TRAIN[0], noise_record(40.0), changing]
+    parts = [part.id for part in stretches(train[1])]
+    zero = Made(Zero(), lambda rows: Zero())
+    follow(Recipe("zero", None, lambda runs, _: zero), train, [], [])
+    ids = [TRAIN[0].id, *parts, "changing"]
+    assert asked == {"ids": ids, "alone": list(range(1, len(ids))), "conditions": len(ids)}
+    assert len(parts) > 1
+    follow(Recipe("zero", Basis("bingham"), lambda runs, _: zero), train, [], [])
+    assert asked["ids"] == [TRAIN[0].id, "sweep", "changing"]
+
+
+def test_a_basis_asks_for_what_it_names(monkeypatch):
+    basis = Basis("bouc-wen", Balance(), ("n",), (("m", 2.0),), GasSpring(1.5e6, 1.5e-4, 3e-4))
+    problem = basis.problem(TRAIN[3])
+    assert problem.fixed["m"] == 2.0
+    assert "n" in problem.free
+    assert problem.model_type is BoucWen
+    asked = {}
+    monkeypatch.setattr(recipes, "identify", lambda *given, **more: asked.update(more, given=given))
+    basis.identify(TRAIN[3])
+    assert asked == {"given": (TRAIN[3], "bouc-wen", basis.method), "free": ("n",), "fixed": {"m": 2.0},
+                     "gas": basis.gas}  # fmt: skip
+
+
+def test_joint_ways_hand_on_what_their_fits_make(monkeypatch):
+    identifications = [SimpleNamespace(method="balance")] * 2
+    asked = []
+    fit = SimpleNamespace(damper="damper")
+    monkeypatch.setattr(recipes, "fit_modified_jointly", lambda *given: asked.append(given) or (fit, "refit"))
+    made_ = recipes.at_once("ab", identifications)
+    assert (made_.damper, made_.refit, made_.fit) == ("damper", "refit", fit)
+    assert asked == [("ab", identifications, {"method": "balance", "train runs": "2", "functions": "joint"})]
+    problem = SimpleNamespace(refit=lambda fit, rows: SimpleNamespace(damper=(fit, rows)))
+    monkeypatch.setattr(recipes, "identify_jointly", lambda runs: SimpleNamespace(problem=problem, fit=fit))
+    made_ = recipes.one_set("ab", [])
+    assert (made_.damper, made_.fit, made_.refit([1])) == ("damper", fit, (fit, [1]))
+    law = SimpleNamespace(basis="spencer", fit=lambda *given: given)
+    made_ = recipes.by_its_laws(law, "abc", [7, 8, 9])
+    assert made_.damper == (["a", "b", "c"], [7, 8, 9], {"train runs": "3"})
+    assert made_.refit([2, 0]) == (["c", "a"], [9, 7], {"train runs": "3"})
+    law.basis = None
+    assert recipes.by_its_laws(law, "abc", []).damper == (["a", "b", "c"], [], {"train runs": "3"})
+
+
+def test_steps_tell_how_far_they_are_and_take_pure_sines_where_they_must(monkeypatch):
+    monkeypatch.setattr(recipes, "analyse_motion", lambda run: SimpleNamespace(is_sine=run.id != "sweep"))
+    told, found, given = [], {}, []
+    zero = Made(Zero(), lambda rows: Zero())
+
+    def make(runs, identifications):
+        given.append(([run.id for run in runs], [i.run_id for i in identifications]))
+        return zero
+
+    runs = [TRAIN[2], noise_record(15.0), TRAIN[3]]
+    steps = [(Recipe(name, Basis("bingham"), make, pure=pure), runs) for name, pure in (("all", False), ("pure", True))]
+    scored, refused = follow_all(
+        steps, HELD, lambda what, share: told.append((what, share)), leave_out=False, found=found
+    )
+    assert refused == {}
+    names = [run.id for run in runs]
+    assert given == [(names, names), (names, [names[0], names[2]])]
+    shares = [("all, run " + name, 0.25 * k / 3) for k, name in enumerate(names)]
+    assert told == [*shares, ("all, over all conditions", 0.25), ("pure, over all conditions", 0.75)]
+    assert {run_id for _, run_id in found} == set(names)
+    assert [s.left_out.runs for s in scored] == [(), ()]
+    spent = sum(seconds for _, seconds in found.values())
+    assert spent <= scored[0].seconds < spent + 60
+    assert spent < 60
+
+
 def test_stretches_are_scored_as_the_record_they_were_cut_from():
     def score(name, k, flags):
         return RunScore(name, "rig", Condition(0, 1, 1), Scores(*(k * np.arange(1.0, 7.0))), None, flags)
@@ -199,6 +307,16 @@ def test_stretches_are_scored_as_the_record_they_were_cut_from():
     assert astuple(whole.runs[0].scores) == pytest.approx((rms, 2 * rms, 3 * 3.5, 4 * 3.5, 5 * 3.5, 6 * 3.5))
     assert whole.runs[0].extrapolation == ("current", "amplitude")
     assert astuple(whole.runs[1].scores) == astuple(scores[2].scores)
+    rests = zip(scores[:2], (3.0, None), strict=True)
+    three = [replace(s, rest=rest) for s, rest in rests] + [score("long 1", 11.0, ())]
+    three[2] = replace(three[2], condition=Condition(2, 1, 1), rest=4.0)
+    joined = recipes._joined("long", three)
+    rms = np.sqrt((3.0**2 + 4.0**2 + 11.0**2) / 3)
+    assert astuple(joined.scores) == pytest.approx((rms, 2 * rms, 3 * 6, 4 * 6, 5 * 6, 6 * 6))
+    assert (joined.rest, joined.condition) == (pytest.approx(np.sqrt(12.5)), Condition(0, 1, 1))
+    (alone,) = recipes._whole_again(Validation("x", scores[:1]), pieces).runs
+    assert (alone.run_id, astuple(alone.scores)) == ("long", pytest.approx(astuple(scores[0].scores)))
+    assert recipes._joined("long 1", [scores[0]]) is scores[0]
 
 
 def test_a_recipe_says_its_model_and_an_unknown_fault_is_not_hidden():
@@ -230,6 +348,13 @@ def test_every_recipe_says_what_it_is():
     assert (ali.title, ali.basis.model, ali.source) == (
         "Ali-type (Spencer-based)", "spencer", all_published()["ali-type"].source,
     )  # fmt: skip
+    assert (both.basis, both.make, one.basis) == (Basis("dahl"), recipes.at_once, Basis("dahl"))
+    ours = known["play-bypass"]
+    assert (ours.basis, ours.make, ours.way, ours.title, ours.source) == (
+        None, recipes.one_set, "joint", "play and bypass", model_type("play-bypass").source,
+    )  # fmt: skip
+    paper = recipes.literal(Settled(None))
+    assert (paper.name, paper.make, paper.way, paper.pure) == ("bouc-wen:literal", by_the_paper, "paper, literal", True)
     assert known["kernel"].basis is None
     assert known["bouc-wen:paper"].basis.method == "paper"
     assert known["bouc-wen:paper"].title.endswith("method paper")
@@ -273,6 +398,13 @@ def test_a_gas_spring_that_is_known_must_leave_volume():
     assert Settled.of(runs, gas) == Settled(gas)
     with pytest.raises(InputError, match="gas volume"):
         Settled.of(runs, GasSpring(1.5e6, 5e-6, 3e-4))
+    # 30 mm of gas: room for ±20 mm, none for ±40.
+    short = GasSpring(1.5e6, 9e-6, 3e-4)
+    assert Settled.of(runs, short).gas is short
+    wide = synthetic_run(Condition(0.5, 1.0, 0.04), cycles=2, samples_per_cycle=200)
+    for train in ([*runs, wide], [wide, *runs]):
+        with pytest.raises(InputError, match="gas volume"):
+            Settled.of(train, short)
 
 
 def test_the_numbers_of_a_way_are_counted():
