@@ -6,14 +6,14 @@ import csv
 import hashlib
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 
 from mrdamper.errors import InputError
 from mrdamper.files.samples import SAMPLE_FILES
-from mrdamper.fleet.profile import FleetProfile
+from mrdamper.fleet.profile import FACTS, FleetProfile
 
 Kind = Literal["dataset", "rig files", "lake"]
 
@@ -66,10 +66,7 @@ class Item:
     @property
     def facts(self) -> dict[str, Any]:
         """What the tables say of it whatever its records hold."""
-        return {k: v for k, v in asdict(replace(self, error=None)).items() if k in _FACTS}
-
-
-_FACTS = ("serial", "session", "batch", "date", "golden")
+        return {name: getattr(self, name) for name in FACTS}
 
 
 def find_items(source: str | Path, profile: FleetProfile) -> list[Item]:

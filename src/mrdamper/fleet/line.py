@@ -5,9 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ from mrdamper.files.atomic import require_writable
 from mrdamper.fleet.engine import Submit, cluster_engine, local_engine, outcome
 from mrdamper.fleet.guard import Limits
 from mrdamper.fleet.items import Item, digest_of, find_items, hash_of
-from mrdamper.fleet.job import Settings, as_job, refused
+from mrdamper.fleet.job import VERSION, Settings, as_job, refused
 from mrdamper.fleet.journal import FORMAT, Journal
 from mrdamper.fleet.plan import Plan, drafts, holding, settled
 from mrdamper.fleet.profile import FleetProfile
@@ -120,9 +119,7 @@ def run_fleet(
         )  # fmt: skip
         with engine as (submit, slots):
             line.run(submit, slots)
-        table = out / "dampers.parquet"
-        write_table(line.rows(), parameters, line.plan, table)
-        return line.result(table)
+        return line.written(out / "dampers.parquet", parameters)
     finally:
         journal.close()
 
@@ -150,18 +147,19 @@ class _Line:
         if self.plan is not None:
             self._measure(list(self._digests), self.plan, submit, slots, count=True)
 
-    def rows(self) -> Iterator[dict[str, Any]]:
-        """One row a damper, in the order of serial numbers and sessions."""
-        for number, item in enumerate(self._items):
-            yield {**item.facts, **self._row(number)}
+    def written(self, table: Path, parameters: Sequence[str]) -> Fleet:
+        """Write the table: one row a damper, in the order of serial numbers and sessions."""
+        troubled: list[tuple[str, str, str]] = []
 
-    def result(self, table: Path) -> Fleet:
-        troubled, done = [], 0
-        for row, item in zip(self.rows(), self._items, strict=True):
-            if row["status"] == "done":
-                done += 1
-            else:
-                troubled.append((item.name, row["status"], row["reason"]))
+        def rows() -> Iterator[dict[str, Any]]:
+            for number, item in enumerate(self._items):
+                row = self._row(number)
+                if row["status"] != "done":
+                    troubled.append((item.name, row["status"], row["reason"]))
+                yield {**item.facts, **row}
+
+        write_table(rows(), parameters, self.plan, table)
+        done = len(self._items) - len(troubled)
         return Fleet(table, len(self._items), done, self._already, tuple(troubled), self.plan)
 
     def _row(self, number: int) -> dict[str, Any]:
@@ -178,7 +176,7 @@ class _Line:
 
     def _make_plan(self, submit: Submit, slots: int) -> None:
         """From the first dampers that can be identified, in an order that their names alone decide."""
-        key = hash_of("plan", asdict(self._for(None)), version("mrdamper"), FORMAT)
+        key = hash_of("plan", vars(self._for(None)), VERSION, FORMAT)
         kept = self._journal.plan(key)
         if kept is not None:
             self.plan = Plan(**{k: _deep_tuple(v) for k, v in kept.items()})
@@ -248,11 +246,12 @@ class _Line:
 
     def _for(self, plan: Plan | None) -> Settings:
         """The settings; a plan is made in the same way for fast and for cold searches."""
-        return replace(self._settings, cold=self._settings.cold and plan is not None and not plan.draft)
+        plain = plan is None or plan.draft
+        return replace(self._settings, cold=False) if plain else self._settings
 
     def _key(self, number: int, plan: Plan | None) -> str:
         about = None if plan is None else plan.digest
-        return hash_of(self._digests[number], asdict(self._for(plan)), version("mrdamper"), FORMAT, about)
+        return hash_of(self._digests[number], vars(self._for(plan)), VERSION, FORMAT, about)
 
 
 def _pace(done: int, total: int, seconds: float, reference: bool) -> tuple[str, float]:
