@@ -23,7 +23,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from support.lab_exports import KINDS, LOCALES, UNITS, Lab, campaign, damper, faults
-from support.machine_exports import MACHINES
+from support.stored_exports import MACHINES
 
 from mrdamper.data import Condition, Dataset
 from mrdamper.metrics import nrmse_pp

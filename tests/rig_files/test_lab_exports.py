@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from support.lab_exports import KINDS, LOCALES, UNITS, Lab, campaign, faults
-from support.machine_exports import MACHINES
+from support.stored_exports import MACHINES
 
 from mrdamper.rig_files.parts import stretches_of_time
 from mrdamper.rig_files.rig_import import import_files, to_dataset

@@ -9,10 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.rig_files import NAMES, channels, lines_of, rows, text, write
 
-from mrdamper.errors import InputError
+from mrdamper.errors import CombinedError, InputError
 from mrdamper.rig_files.profile import parse_profile
 from mrdamper.rig_files.rig_import import read_run, read_runs
 from mrdamper.rig_files.text.bulk import read_bulk
+from mrdamper.rig_files.text.tokens import stamp
 
 CLEAN = text()
 LAST = CLEAN.rindex(",")
@@ -69,9 +70,6 @@ REFUSED = {
     "typographic minus": (lines_of({100: "0.49,−1.5,3.0"}), "E_NUMBER", 100),
     "a decimal comma among points": (lines_of({100: '0.49,"1,5",3.0'}), "E_NUMBER", 100),
     "no date": ("time,displacement_mm,force_N\n2024-13-01T00:00:00,1,2\n2024-13-01T00:00:01,1,3\n", "E_NUMBER", None),
-    "a date of two readings": (
-        "time,displacement_mm,force_N\n03/04/2024 00:00:00,1,2\n03/04/2024 00:00:01,1,3\n", "E_NUMBER", None,
-    ),
     "two points": (lines_of({100: "0.49,1.5.2,3.0"}), "E_NUMBER", 100),
     "a word": (lines_of({100: "0.49,overload,3.0"}), "E_NUMBER", 100),
     "infinity": (lines_of({100: "0.49,inf,3.0"}), "E_NONFINITE", 100),
@@ -396,3 +394,39 @@ def test_columns_too_large_for_memory_lie_in_files_and_hold_the_same(tmp_path, m
     for name in ("time", "displacement", "force"):
         np.testing.assert_array_equal(getattr(large, name), getattr(small, name))
     assert large.lines == small.lines
+
+
+@pytest.mark.parametrize(
+    ("cell", "seconds"),
+    [("03/01/2024 09:59:58:005", 35998.005), ("59:58.005", 3598.005), ("12:30", None), ("2024-03-01 59:58.0", None)],
+)
+def test_a_clock_is_read_with_its_date_left_out_where_that_may_mean_two_days(cell, seconds):
+    read = stamp(cell)
+    assert (read and read[0] / 1e9) == seconds
+
+
+def test_every_bad_cell_and_row_is_told_at_once(tmp_path):
+    lines = lines_of({5: "0.01,1x,3", 9: "0.02,1,2,3,4", 40: "0.2,1,abc"}).split("\n")
+    path = write(tmp_path, "a_0.5A.csv", "\n".join(lines))
+    with pytest.raises(CombinedError) as caught:
+        read_run(path)
+    assert [error.line for error in caught.value.errors] == [5, 9, 40]
+    assert [error.code for error in caught.value.errors] == ["E_NUMBER", "E_FIELD_COUNT", "E_NUMBER"]
+    path.write_text("\n".join(lines[:1] + [line.replace(".", "?") for line in lines[1:]]))
+    with pytest.raises(InputError):
+        read_run(path)
+
+
+def test_many_bad_cells_are_counted(tmp_path):
+    lines = [line if i % 20 else f"{line}?" for i, line in enumerate(lines_of().split("\n"), 1)]
+    with pytest.raises(CombinedError, match="20 more like these") as caught:
+        read_run(write(tmp_path, "a.csv", "\n".join(lines)))
+    assert len(caught.value.errors) == 11
+
+
+def test_a_date_of_two_readings_that_changes_within_the_record_is_refused(tmp_path):
+    days = ["03/04/2024 23:59:", "04/04/2024 00:00:"]
+    stamps = [f"{days[s // 60]}{s % 60:02d},{s % 7},2" for s in range(40, 80)]
+    with pytest.raises(InputError) as caught:
+        read_run(write(tmp_path, "a.csv", "\n".join(["time,displacement_mm,force_N", *stamps, ""])))
+    assert caught.value.code == "E_TIME_ORDER"

@@ -7,10 +7,6 @@ its rows and its foot; what is no text of that kind is a function.
 from __future__ import annotations
 
 import datetime
-import io
-import tarfile
-import zipfile
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -54,10 +50,12 @@ def samples(test: Truth):
     v = np.gradient(test.x, test.time)
     a = np.gradient(v, test.time) / G
     for k, (t, x, f, i) in enumerate(test.table.tolist()):
+        soon = start + datetime.timedelta(seconds=-3000, microseconds=round(1e6 * t))
         now = start + datetime.timedelta(microseconds=round(1e6 * t))
         yield {
             "k": k, "t": t, "ms": 1e3 * t, "x": 1e3 * x, "um": 1e6 * x, "inch": x / INCH, "metre": x, "F": f,
             "kN": 1e-3 * f, "daN": 0.1 * f, "lbf": f / POUND, "I": i, "mA": 1e3 * i, "now": now, "hour": now.hour,
+            "soon": soon, "ns": 1_709_283_598_000_000_000 + round(1e9 * t),
             "total": t + 120.5, "cycle": int(t * test.frequency + 1e-9), "v": v[k], "a": a[k],
             "inside": t % (1 / test.frequency), "slow": f"{i:.4f}" if k % 10 == 0 else "", "set": test.current,
             "nan": f"{i:.4f}" if k % 5 == 0 else "NaN", "warm": 25 + 0.01 * k,
@@ -231,159 +229,47 @@ TEXTS = {
         "r{n}.csv", ("timestamps,Force\\ETKC:1,Pos\\ETKC:1,Current\\ETKC:1", "s,N,mm,A"),
         "{t:.5f},{F:.3f},{x:.5f},{I:.4f}",
     ),
+    "units_behind_numbers": Text(
+        "r{n}.csv", ("Time;Stroke;Load;Current",), "{t:.5f}s;{x:.5f}mm;{kN:.6f} kN;{mA:.2f} mA",
+    ),
+    "unit_behind_one_column": Text(
+        "r{n}.csv", ("Time (s);Stroke (mm);Load;Current (A)",), "{t:.5f};{x:.5f};{F:.3f} N;{I:.4f}", comma=True,
+    ),
+    "units_above_names": Text("r{n}.csv", ("s,mm,N,A", "Time,Displacement,Force,Current"), _PLAIN),
+    "rule_below_names": Text(
+        "r{n}.txt",
+        ("Time     Displ    Force    Current", "[s]      [mm]     [N]      [A]", "-------- -------- -------- ---"),
+        "{t:9.5f}  {x:9.5f} {F:9.3f} {I:8.4f}",
+    ),
+    "between_bars": Text(
+        "r{n}.txt", ("| Time [s] | Disp [mm] | Force [N] | Current [A] |", "|---|---|---|---|"),
+        "| {t:.5f} | {x:.5f} | {F:.3f} | {I:.4f} |",
+    ),
+    "minutes_and_seconds": Text(
+        "log{n}.csv", ("Time,Position (mm),Force (N),Current (A)",), "{soon:%M:%S.%f}," + _PLAIN[8:],
+    ),
+    "epoch": Text("r{n}.csv", ("time_ns,disp_mm,force_N,current_A",), "{ns}," + _PLAIN[8:]),
+    "empty_velocity": Text(
+        "r{n}.csv", ("Time (s),Disp (mm),Velocity (mm/s),Damper force (N),I_coil (A)",),
+        "{t:.5f},{x:.5f},,{F:.3f},{I:.4f}",
+    ),
+    "marked_end": Text("r{n}.csv", ("time_s,disp_mm,force_N,current_A",), _PLAIN, foot=("", "[EOF]")),
+    "name_with_letter": Text("MRD_I{i}A_f1_A20_{n}.csv", ("time_s,disp_mm,force_N",), "{t:.5f},{x:.5f},{F:.3f}"),
+    "name_with_word": Text("Strom{mA}mA_{n}.csv", ("time_s,disp_mm,force_N",), "{t:.5f},{x:.5f},{F:.3f}"),
+    "name_in_small_letters": Text("rig {mA}ma {n}.csv", ("time_s,disp_mm,force_N",), "{t:.5f},{x:.5f},{F:.3f}"),
+    "name_with_amps": Text("damper_{i}amps_{n}.csv", ("time_s,disp_mm,force_N",), "{t:.5f},{x:.5f},{F:.3f}"),
+    "unnamed_amperes": Text("r{n}.csv", ("Time (s),Sz (mm),Fz (kN),Ch 4 (A)",), "{t:.5f},{x:.5f},{kN:.6f},{I:.4f}"),
+    "hungarian": Text(
+        "r{n}.csv", ("Idő [s];Elmozdulás [mm];Erő [N];Áram [A]",), _GERMAN, encoding="cp1250", comma=True,
+    ),
+    "greek": Text(
+        "r{n}.csv", ("Χρόνος [s];Μετατόπιση [mm];Δύναμη [N];Ρεύμα [A]",), _GERMAN, encoding="cp1253", comma=True,
+    ),
+    "ukrainian": Text(
+        "r{n}.csv", ("Час, с;Переміщення, мм;Сила, Н;Струм, А",), _GERMAN, encoding="cp1251", comma=True,
+    ),
+    "norwegian": Text(
+        "r{n}.csv", ("Tid [s];Forskyvning [mm];Kraft [N];Strøm [A]",), _GERMAN, encoding="cp1252", comma=True,
+    ),
     "own_suffix": Text("damper.{n}", ("Time (s)\tPosition (mm)\tForce (N)\tCurrent (A)",), _GERMAN.replace(";", "\t")),
-}  # fmt: skip
-
-
-def fortran(tests: tuple[Truth, ...], folder: Path) -> None:
-    """Exponents with a D."""
-    for n, test in enumerate(tests, 1):
-        rows = ["".join(f"{v:14.6E}".replace("E", "D") for v in row) for row in test.table * [1, 1e3, 1, 1]]
-        lines = ["  TIME (S)      DISP (MM)     FORCE (N)     CURRENT (A)", *rows, ""]
-        (folder / f"r{n}.dat").write_text("\n".join(lines), encoding="ascii")
-
-
-def pages(tests: tuple[Truth, ...], folder: Path) -> None:
-    """A heading a page."""
-    for n, test in enumerate(tests, 1):
-        lines = [f"TEST REPORT  coil current {test.current:.2f} A"]
-        rows = [f"{a:12.5f}{1e3 * b:12.5f}{c:12.3f}" for a, b, c, _ in test.table]
-        for at in range(0, len(rows), 50):
-            lines += [f"Page {at // 50 + 1}", "    Time [s]   Disp [mm]   Force [N]", *rows[at : at + 50], ""]
-        (folder / f"r{n}.txt").write_text("\n".join(lines), encoding="utf-8")
-
-
-def _book(rows: list[list], path: Path) -> None:
-    from openpyxl import Workbook
-
-    book = Workbook()
-    for row in rows:
-        book.active.append(row)
-    book.save(path)
-
-
-def _cells(test: Truth, columns: int = 3) -> list[list[float]]:
-    return [[round(float(v), 6) for v in row] for row in (test.table * [1, 1e3, 1, 1])[:, :columns]]
-
-
-def hand_made_sheets(tests: tuple[Truth, ...], folder: Path) -> None:
-    """A table that begins in the second column, a title, a condition, notes to the right."""
-    for n, test in enumerate(tests, 1):
-        rows = [[None, *row] for row in _cells(test)]
-        rows[0] += [None, None, "note: pump was off"]
-        rows[1] += [None, None, "looks good"]
-        head = [[None, "MR damper, my test"], [None, "Coil current", test.current, "A"], []]
-        _book([*head, [None, "Time (s)", "Disp. (mm)", "Force (N)"], *rows], folder / f"test{n}.xlsx")
-
-
-def sheets_with_statistics(tests: tuple[Truth, ...], folder: Path) -> None:
-    """Rows of statistics below."""
-    for n, test in enumerate(tests, 1):
-        foot = [[], ["Max", 20.0, 1000.0, 0.1], ["Mittelwert", 0.0, 1.0, 0.1]]
-        head = ["Zeit [s]", "Weg [mm]", "Kraft [N]", "Strom [A]"]
-        _book([head, *_cells(test, 4), *foot], folder / f"test{n}.xlsx")
-
-
-def tests_below_each_other(tests: tuple[Truth, ...], folder: Path) -> None:
-    """All tests in one sheet, a title and names of columns above each."""
-    rows: list[list] = []
-    for n, test in enumerate(tests, 1):
-        rows += [[f"Test {n}: {test.current:.1f} A"], ["Time [s]", "Disp [mm]", "Force [N]"], *_cells(test), []]
-    _book(rows, folder / "all.xlsx")
-
-
-def matlab_matrix(tests: tuple[Truth, ...], folder: Path) -> None:
-    """A matrix, its names and its units in cells, samples in rows and in columns."""
-    from scipy.io import savemat
-
-    for n, test in enumerate(tests, 1):
-        data = test.table * [1, 1e3, 1, 1]
-        words = {
-            "names": np.array(["Time", "Displacement", "Force", "Current"], dtype=object),
-            "units": np.array(["s", "mm", "N", "A"], dtype=object),
-        }
-        savemat(folder / f"r{n}.mat", {"data": data if n % 2 else data.T, **words})
-
-
-def matlab73_structs(tests: tuple[Truth, ...], folder: Path) -> None:
-    """An array of structs as MATLAB 7.3 stores it: references into a group of their own."""
-    import h5py
-
-    path = folder / "tests.mat"
-    with h5py.File(path, "w", userblock_size=512) as file:
-        store, group = file.create_group("#refs#"), file.create_group("tests")
-        fields: dict[str, list] = {"time_s": [], "disp_mm": [], "force_N": [], "current_A": []}
-        for i, test in enumerate(tests):
-            for name, values in zip(fields, (test.time, 1e3 * test.x, test.force, [test.current]), strict=True):
-                item = store.create_dataset(f"{name}{i}", data=np.reshape(values, (1, -1)))
-                item.attrs["MATLAB_class"] = np.bytes_("double")
-                fields[name].append(item.ref)
-        for name, references in fields.items():
-            kind = h5py.ref_dtype
-            group.create_dataset(name, data=np.array(references, dtype=kind).reshape(1, -1), dtype=kind)
-    head = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
-    path.write_bytes(head.ljust(512, b"\0") + path.read_bytes()[512:])
-
-
-def npz_matrix(tests: tuple[Truth, ...], folder: Path) -> None:
-    """A matrix and the names of its columns."""
-    for n, test in enumerate(tests, 1):
-        np.savez(folder / f"r{n}.npz", data=test.table, columns=np.array(["time_s", "x_m", "force_N", "current_A"]))
-
-
-def hdf5_matrix(tests: tuple[Truth, ...], folder: Path) -> None:
-    """A matrix with attributes."""
-    import h5py
-
-    for n, test in enumerate(tests, 1):
-        with h5py.File(folder / f"r{n}.h5", "w") as file:
-            item = file.create_dataset("data", data=test.table * [1, 1e3, 1, 1])
-            item.attrs["columns"] = ["Time", "Displacement", "Force", "Current"]
-            item.attrs["units"] = ["s", "mm", "N", "A"]
-
-
-def parquet_stamps(tests: tuple[Truth, ...], folder: Path) -> None:
-    """Stamps of a date, single precision."""
-    import polars as pl
-
-    for n, test in enumerate(tests, 1):
-        stamps = (np.round(1e9 * test.time).astype("int64") + 1_709_287_872 * 10**9).astype("datetime64[ns]")
-        rest = {"position_mm": 1e3 * test.x, "force_N": test.force, "current_A": test.amperes}
-        rest = {name: values.astype(np.float32) for name, values in rest.items()}
-        pl.DataFrame({"timestamp": stamps, **rest}).write_parquet(folder / f"r{n}.parquet")
-
-
-def _packed(tests: tuple[Truth, ...], *, current: bool):
-    for n, test in enumerate(tests, 1):
-        rows = [f"{a:.5f},{1e3 * b:.5f},{c:.3f}" + f",{i:.4f}" * current for a, b, c, i in test.table]
-        name = f"campaign/r{n}.csv" if current else f"campaign/{test.current:.1f}A/r{n}.csv"
-        yield name, "\n".join(["time_s,disp_mm,force_N" + ",current_A" * current, *rows, ""]).encode()
-
-
-def tar_of_a_folder(tests: tuple[Truth, ...], folder: Path) -> None:
-    """tgz."""
-    with tarfile.open(folder / "campaign.tgz", "w:gz") as archive:
-        for name, content in _packed(tests, current=True):
-            member = tarfile.TarInfo(name)
-            member.size = len(content)
-            archive.addfile(member, io.BytesIO(content))
-
-
-def zip_of_a_folder(tests: tuple[Truth, ...], folder: Path) -> None:
-    """The current in the names of folders within, and what a Mac adds."""
-    with zipfile.ZipFile(folder / "campaign.zip", "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("__MACOSX/campaign/._r1.csv", b"\0\1\2")
-        for name, content in _packed(tests, current=False):
-            archive.writestr(name, content)
-
-
-MACHINES: dict[str, Callable[[tuple[Truth, ...], Path], None]] = {
-    **TEXTS,
-    **{
-        function.__name__: function
-        for function in (
-            fortran, pages, hand_made_sheets, sheets_with_statistics, tests_below_each_other, matlab_matrix,
-            matlab73_structs, npz_matrix, hdf5_matrix, parquet_stamps, tar_of_a_folder, zip_of_a_folder,
-        )
-    },
 }  # fmt: skip

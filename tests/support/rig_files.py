@@ -92,6 +92,26 @@ def parquet_bytes(table: dict[str, np.ndarray]) -> bytes:
     return target.getvalue()
 
 
+def feather_bytes(table: dict[str, np.ndarray]) -> bytes:
+    import polars as pl
+
+    target = io.BytesIO()
+    pl.DataFrame(table).write_ipc(target)
+    return target.getvalue()
+
+
+def cdf_bytes(table: dict[str, np.ndarray]) -> bytes:
+    from scipy.io import netcdf_file
+
+    target = io.BytesIO()
+    file = netcdf_file(target, "w")
+    file.createDimension("row", len(next(iter(table.values()))))
+    for name, values in table.items():
+        file.createVariable(name, "d", ("row",))[:] = values
+    file.flush()
+    return target.getvalue()
+
+
 def mat_bytes(table: dict, **kwargs) -> bytes:
     from scipy.io import savemat
 

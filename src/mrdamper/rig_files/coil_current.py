@@ -21,9 +21,11 @@ _FOLDERS = 3  # above a file, whose names may state its current
 
 
 def current_of(
-    table: RawTable, profile: Profile, path: Path, channel: Floats | None
+    table: RawTable, profile: Profile, path: Path, channel: Floats | None, rows: slice
 ) -> tuple[float | None, dict[str, str]]:
     """The current [A] that a test states beside its columns, and where; None where the channel has it, or nothing does.
+
+    Of a table of several tests one after the other, this one has the given rows.
 
     Raises
     ------
@@ -39,7 +41,7 @@ def current_of(
     else:
         statements = _statements(table, path)
         if not statements and channel is None:
-            statements = _set_points(table) or _once(stated_in_titles(table.remarks)) or _folders(table, path)
+            statements = _set_points(table, rows) or _once(stated_in_titles(table.remarks)) or _folders(table, path)
     where = printable(table.source.name)
     mend = "correct the name or the line, or say [current] value = ... in a profile"
     try:
@@ -74,7 +76,7 @@ def _statements(table: RawTable, path: Path) -> list[Statement]:
     return found
 
 
-def _set_points(table: RawTable) -> list[Statement]:
+def _set_points(table: RawTable, rows: slice) -> list[Statement]:
     """What a column of the current that was asked for states, where it is one number."""
     for column, (name, unit) in enumerate(zip(table.names, table.units, strict=True)):
         bare, stated = split_name(name, unit)
@@ -82,7 +84,7 @@ def _set_points(table: RawTable) -> list[Statement]:
         if known is None or known.dimension != "current" or not names_condition(bare, "current"):
             continue
         try:
-            values = table.read([column]).values[column]
+            values = table.read([column]).values[column][rows]
         except InputError:
             continue
         low, high = np.nanmin(values), np.nanmax(values)

@@ -14,24 +14,27 @@ from mrdamper.rig_files.units import is_unit, parse_unit
 WORDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "time": ("time", "zeit", "temps", "tiempo", "tempo", "czas", "tijd", "tid", "timestamp", "timestamps",
-                 "zeitstempel", "elapsed", "время", "时间", "時間", "시간", "čas", "aika", "zaman"),
+                 "zeitstempel", "elapsed", "время", "时间", "時間", "시간", "čas", "aika", "zaman", "idő", "timp",
+                 "χρόνοσ", "час"),
         "displacement": ("displacement", "disp", "displ", "position", "pos", "stroke", "travel", "weg", "hub",
                          "verschiebung", "auslenkung", "läge", "förskjutning", "déplacement", "deplacement", "course",
                          "desplazamiento", "posicion", "posición", "spostamento", "corsa", "deslocamento", "lvdt",
                          "extension",
                          "compression", "jounce", "einfederung", "einfederweg",
                          "przemieszczenie", "перемещение", "位移", "変位", "변위", "ストローク", "dráha", "droga",
-                         "verplaatsing", "siirtymä", "deplasman"),
+                         "verplaatsing", "siirtymä", "deplasman", "elmozdulás", "deplasare", "μετατόπιση",
+                         "переміщення", "forskyvning", "forskydning", "pomak"),
         "force": ("force", "load", "kraft", "fuerza", "forza", "força", "forca", "charge", "carga", "carico", "siła",
                   "loadcell", "last", "kracht", "effort", "сила", "усилие", "力", "荷重", "载荷", "하중", "síla",
-                  "voima", "kuvvet"),
+                  "voima", "kuvvet", "erő", "forță", "forţă", "δύναμη", "sila"),
         "velocity": ("velocity", "vel", "speed", "geschwindigkeit", "vitesse", "velocidad", "velocità",
                      "velocidade", "скорость", "速度", "속도"),
         "acceleration": ("acceleration", "accel", "acc", "beschleunigung", "accélération", "aceleracion",
                          "aceleración", "accelerazione", "加速度", "가속도"),
         "current": ("current", "curr", "strom", "stromstärke", "courant", "corriente", "corrente", "amperage", "ток",
                     "电流", "電流", "電流値", "전류", "intensité", "intensidad", "intensità", "intensidade", "stroom",
-                    "ström", "proud", "prąd", "virta", "akım"),
+                    "ström", "proud", "prąd", "virta", "akım", "strøm", "áram", "curent", "ρεύμα", "струм", "prúd",
+                    "struja", "icoil", "ispule"),
         "voltage": ("voltage", "spannung", "tension électrique", "voltaje", "tensione", "напряжение", "电压", "電圧",
                     "전압"),
         "pressure": ("pressure", "druck", "pression", "presión", "pressione", "gasdruck", "давление", "压力", "圧力",
@@ -78,7 +81,9 @@ _ELSEWHERE = frozenset(
     ("lateral", "side", "transverse", "transversal", "radial", "bending", "shear", "quer", "querkraft", "seitenkraft",
      "motor", "pump", "pumpe", "heater", "drive", "servo", "servovalve", "leakage", "mains")
 )  # fmt: skip
-_COIL = frozenset(("coil", "spule", "spulenstrom", "bobine", "bobina", "solenoid", "magnet", "线圈电流", "damper"))
+_COIL = frozenset(
+    ("coil", "spule", "spulenstrom", "bobine", "bobina", "solenoid", "magnet", "线圈电流", "damper", "icoil", "ispule")
+)
 _FACTOR = re.compile(r"[\s_][x×*·]\s?10+(?![0-9])|\bp-p\b")  # Force x10, Force p-p
 _COMPRESSION = ("compress", "jounce", "bump", "druckkraft", "druckweg", "einfeder", "compresi", "druckstufe")
 _BRACKETED = re.compile(r"^(?P<name>.*?)\s*[\[({<](?P<unit>[^\[\](){}<>]{1,40})[\])}>]\s*$", re.DOTALL)
@@ -123,6 +128,8 @@ def role_of(name: str) -> str | None:
         return None
     if len(words) == 1 and words[0] in _SYMBOLS:
         return _SYMBOLS[words[0]]
+    if len(words) == 2 and _SYMBOLS.get(words[0]) == "current" and lower[1] in _COIL:  # I_coil
+        return "current"
     roles = [role for role in map(_role_of_word, lower) if role is not None]
     # "load displacement" is a displacement: the last word is the noun in the languages at hand.
     return roles[-1] if roles else None
@@ -159,10 +166,10 @@ def names_condition(key: str, role: str) -> bool:
 
 
 def says_nothing(name: str) -> bool:
-    """Whether a name holds no word of a channel or of a command."""
+    """Whether a name holds no word of a channel, of a command or of another place."""
     words = [w.casefold().rstrip("0123456789") for w in re.split(r"[^\w]+|_", name) if w]
-    known = {w for words_of in WORDS.values() for w in words_of}
-    return not any(word in _NOT_MEASURED or word in _MADE or word in known for word in words)
+    known = {w for words_of in WORDS.values() for w in words_of} | _NOT_MEASURED | _MADE | _ELSEWHERE | _SET
+    return not any(word in known for word in words)
 
 
 def unknown_unit(header: str) -> str:

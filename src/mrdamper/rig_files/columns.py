@@ -184,7 +184,7 @@ def propose(table: RawTable) -> dict[str, tuple[int | None, str]]:
     for role in ROLES:
         try:
             choice = _choose(table, headers, role, taken)
-        except RigFileError:
+        except InputError:
             choice = None
         if choice is not None:
             taken.add(choice)
@@ -199,7 +199,7 @@ def _choose(table: RawTable, headers: Sequence[tuple[str, str]], role: str, take
     named = [i for i, (name, _) in enumerate(headers) if i not in taken and role_of(name) == role]
     fitting = [i for i in named if _dimension(headers[i][1]) == DIMENSION[role]]
     if not named:
-        if role not in REQUIRED:
+        if role not in (*REQUIRED, "current"):
             return None
         # Without a telling name the unit decides, if it is the only one of its kind.
         fitting = [i for i, (_, unit) in enumerate(headers) if _dimension(unit) == DIMENSION[role]]
@@ -361,7 +361,7 @@ def _refuse_two_values(table: RawTable, headers: Sequence[tuple[str, str]], colu
     try:
         values = table.read(same).values
         differ = any(not _agree(values[i], headers[i][1], values[column], unit) for i in same)
-    except RigFileError:
+    except InputError:
         differ = True
     if differ:
         raise RigFileError(
@@ -380,7 +380,7 @@ def _second_clock(table: RawTable, headers: Sequence[tuple[str, str]], time: Ass
     for other in others[:3]:
         try:
             values = table.read([time.column, other]).values
-        except RigFileError:
+        except InputError:
             continue
         unit = parse_unit(headers[other][1])
         one, two = time.factor * values[time.column], (unit.factor if unit else 1.0) * values[other]

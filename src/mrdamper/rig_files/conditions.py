@@ -15,7 +15,10 @@ from mrdamper.rig_files.units import Unit, parse_unit
 
 LARGEST_STATED = 15.0  # [A]: more is no coil current of a damper but another number
 _AGREE_A, _AGREE = 0.05, 0.15  # a nominal and a measured current may differ by so much: [A], and of it
-_IN_NAME = re.compile(r"(?<![0-9A-Za-z.,])([0-9]{1,4}(?:[.,xp][0-9]{1,4})?)[ _]?(mA|A)(?:mp(?:ere)?s?)?(?![A-Za-z0-9])")
+_IN_NAME = re.compile(
+    r"(?<![0-9A-Za-z.,])(?:[iI](?:_?(?:[cC]oil|[sS]pule))?|(?:[sS]pulen|[cC]oil)?(?:[sS]trom|[cC]urr(?:ent)?|[cC]ur))?"
+    r"([0-9]{1,4}(?:[.,xp][0-9]{1,4})?)[ _]?(m?)(?:A(?:mp(?:ere)?s?)?|amp(?:ere)?s?|(?<=m)a)(?![A-Za-z0-9])"
+)
 _LINE = re.compile(
     r"^[\s#%/\"]*(?P<key>[^:=;\t]{1,60}?)[\s\"]*[:=;,\t][\s:=;,\t\"]*(?P<number>[+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]{1,2})?)"
     r"[\s;,\t\"]*[\[(]?(?P<unit>[A-Za-zµ/]{0,9})[\])]?[\s;,\t\"]*$"
@@ -55,8 +58,8 @@ def currents_in(text: str) -> tuple[float, ...]:
     if re.search(r"(?<![0-9])[0-9]_[0-9]+ ?m?A(?![A-Za-z0-9])", text):
         return ()
     # 04A may be four or 0.4 amperes; 0400mA is padded.
-    stated = [match for match in _IN_NAME.finditer(text) if match[2] == "mA" or not re.fullmatch("0[1-9]+", match[1])]
-    found = [amperes(match[1], match[2]) for match in stated]
+    stated = [match for match in _IN_NAME.finditer(text) if match[2] or not re.fullmatch("0[1-9]+", match[1])]
+    found = [amperes(match[1], f"{match[2]}A") for match in stated]
     return tuple(dict.fromkeys(found))
 
 

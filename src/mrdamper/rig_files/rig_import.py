@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from mrdamper.data import Dataset
-from mrdamper.errors import ColumnError, InputError
+from mrdamper.errors import ColumnError, CombinedError, InputError
 from mrdamper.rig_files.coil_current import as_data, held_current_of
 from mrdamper.rig_files.column_names import names_compression
 from mrdamper.rig_files.columns import assign, propose, rate_of
@@ -350,7 +350,14 @@ def _profile(profile: Profile | str | Path | None) -> Profile:
 def _unjudged(path: Path, profile: Profile) -> list[Record]:
     with raw_tables(path, profile.file) as tables:
         tables = _tables_with_channels(_parts(tables, profile), profile)
-        records = [record for table in tables for record in records_of(table, profile, path)]
+        records: list[Record] = []
+        problems: list[InputError] = []
+        for table in tables:
+            try:
+                records += records_of(table, profile, path)
+            except InputError as error:
+                problems += getattr(error, "errors", (error,))
+        CombinedError.raise_from(problems)
         digest = _digest(path)
     records = joined(records, profile, tables)
     remarks = {"file": as_data(path.name), "sha256": digest}
@@ -418,7 +425,9 @@ def _files(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:
         others += [file for file in inside if file not in read]
     if not files:
         where = ", ".join(path.name for path in paths)
-        raise RigFileError("E_NO_DATA", "no rig's file in this folder", file=where, mend="give another folder")
+        found = f"no rig's file in this folder (found {', '.join(file.name for file in others[:5]) or 'nothing'})"
+        mend = "export them as CSV, or give another folder" if others else "give another folder"
+        raise RigFileError("E_NO_DATA", found, file=where, mend=mend)
     return files, others
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.pieces import pieces
 from mrdamper.errors import ColumnError, InputError
 from mrdamper.motion.measured import smooth
 from mrdamper.rig_files.coil_current import as_data, constant, current_of, without_gaps
@@ -58,7 +59,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
         if profile.correction is not None:
             others["force_raw_N"] = part["force"]
             part["force"], remarks["force_correction"] = corrected_force(part, profile.correction)
-        current, whence = current_of(table, profile, path, part.get("current"))
+        current, whence = current_of(table, profile, path, part.get("current"), stretch)
         noticed = findings
         if "current" in part:
             part["current"], slow = without_gaps(part["current"])
@@ -92,11 +93,18 @@ def _read(table: RawTable, found: dict[str, Assigned]):
     for name in [name for name in found if name in _LENIENT]:
         try:
             raw[found[name].column] = table.read([found[name].column]).values[found[name].column]
-        except RigFileError as error:
+        except InputError as error:
             code = "W_ENCODING" if error.code == "E_ENCODING" else "W_COLUMN"
             findings.append(Finding(code, f"the {name} channel is left out: {error.found}"))
             del found[name]
+    for name in [name for name in found if name in OPTIONAL and not _holds_any(raw[found[name].column])]:
+        findings.append(Finding("W_COLUMN", f"the {name} channel is left out: its column is empty"))
+        del found[name]
     return raw, findings, content.lines
+
+
+def _holds_any(values: Floats) -> bool:
+    return any(np.isfinite(piece).any() for _, piece in pieces(values))
 
 
 def _counted_time(table: RawTable, profile: Profile, size: int) -> tuple[Floats, str]:

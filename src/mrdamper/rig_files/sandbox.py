@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from mrdamper.errors import MissingExtraError
+from mrdamper.errors import CombinedError, MissingExtraError
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import MOST_RATIO, Content, RawTable, Reader, RigFileError, Source, Words
 from mrdamper.rig_files.record import Finding, LineNumbers
@@ -96,11 +96,7 @@ class _Asked:
             )
         if "missing" in answer:
             raise MissingExtraError(answer["missing"], where=self._source.name, mend=answer["mend"])
-        if "code" in answer:
-            raise RigFileError(
-                answer["code"], answer["found"], file=self._source.name, line=answer["line"],
-                column=answer["column"], mend=answer["mend"],
-            )  # fmt: skip
+        CombinedError.raise_from(RigFileError(file=self._source.name, **told) for told in answer.get("wrong", ()))
         return answer
 
     def table(self, index: int, table: dict[str, Any]) -> RawTable:

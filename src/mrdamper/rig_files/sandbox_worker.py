@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from mrdamper.errors import MissingExtraError
+from mrdamper.errors import CombinedError, InputError, MissingExtraError
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import RawTable, Reader, RigFileError, Source
 
@@ -40,9 +40,8 @@ def serve() -> None:
                 if "prepare" in request:
                     continue
                 _send(replies, {"missing": error.found, "mend": error.mend})
-            except RigFileError as error:
-                fields = {name: getattr(error, name) for name in ("code", "found", "line", "column", "mend")}
-                _send(replies, fields)
+            except (RigFileError, CombinedError) as error:
+                _send(replies, {"wrong": [_told(one) for one in getattr(error, "errors", (error,))]})
             except MemoryError:
                 os._exit(3)
 
@@ -93,6 +92,10 @@ def _limit(seconds: float | None, size: float = 0) -> None:
 def _send(replies: BinaryIO, answer: dict[str, Any]) -> None:
     replies.write(json.dumps(answer).encode() + b"\n")
     replies.flush()
+
+
+def _told(error: InputError) -> dict[str, Any]:
+    return {name: getattr(error, name) for name in ("code", "found", "line", "column", "mend")}
 
 
 def _send_columns(replies: BinaryIO, table: RawTable, columns: list[int]) -> None:

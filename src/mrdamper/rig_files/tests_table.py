@@ -88,8 +88,9 @@ class TestsTable:
 def _is_file(name: str, path: Path) -> bool:
     if not name:
         return True
-    parts = PurePath(name.replace("\\", "/")).parts
-    return path.parts[-len(parts) :] == parts or (len(parts) == 1 and path.stem == name)
+    parts = PurePath(name.replace("\\", "/").casefold()).parts  # as file systems of Windows tell them apart
+    known = PurePath(str(path).casefold())
+    return known.parts[-len(parts) :] == parts or (len(parts) == 1 and known.stem == parts[0])
 
 
 def load_tests(path: str | Path) -> TestsTable:
@@ -187,11 +188,11 @@ def _cells(path: Path) -> list[tuple[int, list[str]]]:
     try:
         if path.stat().st_size > _LARGEST:
             raise TestsTableError("over 4 MiB", where=path.name, mend="is this a table of tests?")
-        text = path.read_bytes().decode("utf-8-sig")
+        text = _decoded(path.read_bytes())
     except OSError as error:
         raise TestsTableError(error.strerror or str(error), where=str(path), mend="give a CSV file") from error
     except UnicodeDecodeError as error:
-        raise TestsTableError("is no UTF-8 text", where=path.name, mend="save it as CSV UTF-8") from error
+        raise TestsTableError("is no text", where=path.name, mend="save it as CSV UTF-8") from error
     first = text.split("\n", 1)[0]
     separator = max(";\t,", key=first.count)
     try:
@@ -202,6 +203,16 @@ def _cells(path: Path) -> list[tuple[int, list[str]]]:
     if len(rows) < 2:
         raise TestsTableError("no rows", where=path.name, mend=f"write one row a test: {', '.join(COLUMNS)}")
     return rows
+
+
+def _decoded(content: bytes) -> str:
+    """UTF-8, UTF-16 with its mark, or what spreadsheets write without being asked."""
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return content.decode("utf-16")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("cp1252")
 
 
 def _key(name: str) -> str:

@@ -55,7 +55,7 @@ _EXACT = {
     "count": {"%": 0.01, "segments": 1, "cycles": 1, "counts": 1, "samples": 1},
 }  # fmt: skip
 _WORDS = {
-    "sec": "s", "secs": "s", "second": "s", "seconds": "s", "sekunden": "s", "sekunde": "s", "segundos": "s",
+    "sec": "s", "secs": "s", "second": "s", "seconds": "s", "sekunden": "s", "sn": "s", "sekunde": "s", "segundos": "s",
     "msec": "ms", "msecs": "ms", "millisecond": "ms", "milliseconds": "ms", "usec": "us", "microseconds": "us",
     "minutes": "min", "minute": "min", "hour": "h", "hours": "h", "hr": "h", "sek": "s",
     "meter": "m", "meters": "m", "metre": "m", "metres": "m", "millimeter": "mm", "millimeters": "mm",

@@ -33,7 +33,6 @@ _FOREIGN = MappingProxyType(
         b"\x28\xb5\x2f\xfd": "Zstandard",
         b"\x7fELF": "program",
         b"SQLite format 3": "SQLite",
-        b"ARROW1": "Arrow",
         b"\x93NUMPY": "NumPy array",
         b"{\\rtf": "RTF",
         b"<!DOCTYPE": "HTML",
@@ -109,7 +108,7 @@ def reader_of(source: Source) -> Reader:
     foreign = next((title for magic, title in _FOREIGN.items() if head.lstrip().startswith(magic)), None)
     if found is None and foreign is None and (named is None or not named.binary):
         return readers["text"]()
-    if found is None or (named is not None and found is not named):
+    if found is None or (named is not None and source.suffix not in found.suffixes):
         text = found is None and foreign is None and b"\0" not in head
         is_now = found.title if found is not None else foreign or ("text" if text else "something else")
         mend = f"rename it to {found.suffixes[0]}" if found else "rename it to .csv" if text else "export it as CSV"

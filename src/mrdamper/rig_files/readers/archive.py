@@ -83,7 +83,7 @@ def is_plain_zip(source: Source) -> bool:
     """Whether the content is a zip that is not itself a document or a NumPy file."""
     if not source.head().startswith((b"PK\x03\x04", b"PK\x05\x06")):
         return False
-    if source.suffix in (".xlsx", ".xlsm", ".npz"):
+    if source.suffix in (".xlsx", ".xlsm", ".xlsb", ".ods", ".npz"):
         return False
     try:
         names = zipped_names(source)
@@ -103,7 +103,8 @@ def zipped_names(source: Source) -> list[str]:
 
 def is_workbook(names: list[str]) -> bool:
     """Whether a zip of these members is a workbook."""
-    return "[Content_Types].xml" in names and any(name.startswith("xl/") for name in names)
+    excel = "[Content_Types].xml" in names and any(name.startswith("xl/") for name in names)
+    return excel or {"mimetype", "content.xml", "META-INF/manifest.xml"} <= set(names)
 
 
 def is_arrays(names: list[str]) -> bool:

@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from mrdamper.rig_files.readers.base import (
 from mrdamper.rig_files.units import is_unit
 
 _MOST_ACROSS = 50  # channels of a matrix that has its samples in rows
+_PACKING = ("scale_factor", "add_offset", "_FillValue", "missing_value")
 _TELLING = 2  # words that name channels make a list of names
 _NO_NUMBERS = {"b": "truth values", "c": "complex numbers", "V": "bytes"}
 _EARLY_END = (
@@ -149,6 +151,18 @@ def titles_of(width: int, texts: Iterable[Sequence[str]]) -> tuple[Sequence[str]
     if not names or any(other != names[0] for other in names):
         return None
     return names[0], units[0] if units else [""] * width
+
+
+def unpacked(says: Mapping[str, Any], values: np.ndarray) -> np.ndarray:
+    """Numbers as netCDF and others pack them: scale_factor, add_offset, and a code for missing ones."""
+    if values.dtype.kind not in "iuf" or not any(name in says for name in _PACKING):
+        return values
+    numbers = values.astype(np.float64)
+    for name in ("_FillValue", "missing_value"):
+        if name in says:
+            numbers[np.isin(values, np.asarray(says[name]))] = np.nan
+    factor, offset = (float(np.reshape(says.get(n, d), -1)[0]) for n, d in (("scale_factor", 1), ("add_offset", 0)))
+    return factor * numbers + offset
 
 
 def check_unpacked(source: Source, size: int) -> None:

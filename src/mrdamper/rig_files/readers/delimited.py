@@ -130,6 +130,7 @@ def _read(stream: TextStream, layout: Layout, block: Block, columns: tuple[int, 
         size += rows.lines.size
         odd |= rows.odd
         line += chunk.count(b"\n")
+    form.refuse_wrong()
     if not size:
         raise stream.source.refuse("E_NO_DATA", "a header without data", mend="export the file again")
     damaged = any(_ODD.search(name) for i, name in enumerate(layout.names) if i not in columns)
@@ -151,6 +152,7 @@ def _words(stream: TextStream, layout: Layout, block: Block, column: int) -> Wor
         rows, _ = split_rows(texts, line, form, at >= stream.stop)
         codes.append(np.array([known.setdefault(row[column], len(known)) for row in rows], dtype=np.int32))
         line += chunk.count(b"\n")
+    form.refuse_wrong()
     return Words(np.concatenate(codes) if codes else np.empty(0, dtype=np.int32), tuple(known))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,10 @@ from mrdamper.rig_files.readers.arrays import (
     pick,
     refusing_damage,
     titles_of,
+    unpacked,
 )
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
+from mrdamper.rig_files.units import is_unit
 
 # pyright: reportMissingImports=false, reportAttributeAccessIssue=false
 
@@ -25,7 +28,6 @@ HDF5_MARK = b"\x89HDF\r\n\x1a\n"
 _MOST_OBJECTS = 10_000
 MOST_STRUCTS = 2000  # of an array of structs
 _DEEPEST = 8  # groups within groups
-_PACKING = ("scale_factor", "add_offset", "_FillValue", "missing_value")
 _UNIT_NAMES = ("units", "unit", "Units", "Unit", "UNIT", "UNITS", "unit_string")
 
 
@@ -77,7 +79,8 @@ def hdf5_tables(source: Source, title: str) -> list[RawTable]:
         source.keep.callback(file.close)
         found = _Found(source)
         _walk(file, "", found)
-    groups, objects = found.groups, found.objects
+    groups = {group: _titled(columns, found.lists.get(group, [])) for group, columns in found.groups.items()}
+    objects = found.objects
     tables = []
     for group, columns in groups.items():
         constants = {**found.constants.get("", {}), **found.constants.get(group, {})}
@@ -110,7 +113,7 @@ def _table(
             return np.empty(2, dtype=object)  # a link, refused if it is asked for
         if isinstance(part, str):
             return dataset[part]
-        return _unpacked(dataset, pick(_upright(dataset), part))
+        return unpacked(dataset.attrs, pick(_upright(dataset), part))
 
     label = label.strip("/").replace("/", "_")
     return array_table(
@@ -122,19 +125,6 @@ def _table(
 def _above(remarks: dict[str, list[str]], group: str) -> list[str]:
     """What the attributes of a group, and of the groups around it, say."""
     return [line for path, lines in remarks.items() if f"{group}/".startswith(f"{path}/") for line in lines]
-
-
-def _unpacked(dataset: Any, values: np.ndarray) -> np.ndarray:
-    """Numbers as netCDF and others pack them: scale_factor, add_offset, and a code for missing ones."""
-    says = {name: dataset.attrs[name] for name in _PACKING if name in dataset.attrs}
-    if not says or values.dtype.kind not in "iuf":
-        return values
-    numbers = values.astype(np.float64)
-    for name in ("_FillValue", "missing_value"):
-        if name in says:
-            numbers[np.isin(values, np.asarray(says[name]))] = np.nan
-    factor, offset = (float(np.reshape(says.get(n, d), -1)[0]) for n, d in (("scale_factor", 1), ("add_offset", 0)))
-    return factor * numbers + offset
 
 
 def _upright(dataset: Any) -> np.ndarray:
@@ -152,6 +142,7 @@ class _Found:
     constants: dict[str, dict[str, float]] = field(default_factory=dict)
     objects: list[str] = field(default_factory=list)
     remarks: dict[str, list[str]] = field(default_factory=dict)
+    lists: dict[str, list[list[str]]] = field(default_factory=dict)
     seen: int = 0
     numbers: int = 0
 
@@ -179,9 +170,13 @@ def _walk(group: Any, path: str, found: _Found) -> None:
         elif isinstance(item, h5py.Dataset) and h5py.check_ref_dtype(item.dtype) is h5py.Reference:
             _follow(item, str(name), path, found)
         elif isinstance(item, h5py.Dataset):
+            if _is_words(item):
+                found.lists.setdefault(path, []).append(_words(item[()]))
             columns = _columns(item, str(name), path, found)
             if columns:
                 found.groups.setdefault(path, []).extend(columns)
+            if item.dtype.names:  # a table of records states its conditions itself
+                found.remarks[path] = [*found.remarks[path], *_attributes(item)]
 
 
 def _follow(references: Any, name: str, path: str, found: _Found) -> None:
@@ -194,6 +189,7 @@ def _follow(references: Any, name: str, path: str, found: _Found) -> None:
         found.groups.setdefault(path, []).append((name, "", None, None))
         return
     cell = _text(references.attrs.get("MATLAB_class")) == "cell"  # else a field of an array of structs
+    words: list[str] = []
     for number, reference in enumerate(np.reshape(references[()], -1), 1):
         found.seen += 1
         item = references.file[reference] if reference else None
@@ -204,11 +200,33 @@ def _follow(references: Any, name: str, path: str, found: _Found) -> None:
             _walk(item, f"{inner}/{name}_{number}" if cell else f"{inner}/{name}", found)
         elif isinstance(item, h5py.Dataset) and _text(item.attrs.get("MATLAB_class")) == "char":
             text = "".join(map(chr, np.reshape(item[()], -1)[:200].tolist())) if item.dtype.kind in "iu" else ""
+            words.append(text)
             found.remarks.setdefault(inner, []).append(f"{name}: {text}")
         elif isinstance(item, h5py.Dataset) and not cell:
             columns = _columns(item, name, inner, found)
             if columns:
                 found.groups.setdefault(inner, []).extend(columns)
+    if cell and len(words) == cells:
+        found.lists.setdefault(path, []).append(words)
+
+
+def _titled(columns: list[tuple], words: list[list[str]]) -> list[tuple]:
+    """The columns with the names and units that lists of words give those of a matrix."""
+    named = []
+    for dataset, across in ((d, list(group)) for d, group in groupby(columns, key=lambda column: column[2])):
+        lists = (
+            words
+            if dataset is None
+            else [*words, *(_words(dataset.attrs[key]) for key in list(dataset.attrs)[:MOST_COLUMNS])]
+        )
+        titles = titles_of(len(across), lists) if isinstance(across[0][3], int) else None
+        units = [column[1] for column in across]
+        if isinstance(across[0][3], str):  # fields of records
+            stated = next((words for words in lists if len(words) == len(across) and any(map(is_unit, words))), units)
+            titles = [column[0] for column in across], stated
+        for column, name, unit in zip(across, *(titles or ([c[0] for c in across], units)), strict=True):
+            named.append((name, unit or column[1], *column[2:]))
+    return named
 
 
 def _file_marks(item: Any) -> set[str]:
@@ -247,14 +265,9 @@ def _columns(dataset: Any, name: str, path: str, found: _Found) -> list[tuple]:
         return [(field, "", dataset, field) for field in kind.names]
     stated = [dataset.attrs[name] for name in _UNIT_NAMES if name in dataset.attrs]
     unit = next((_text(value) for value in stated if np.asarray(value).dtype.kind in "SUO"), "")
+    unit = unit.partition(" since ")[0]  # netCDF counts time from a date
     shape = dataset.shape[::-1] if "MATLAB_class" in dataset.attrs else dataset.shape
-    across = expand(name, shape)
-    lists = [_words(dataset.attrs[key]) for key in list(dataset.attrs)[:MOST_COLUMNS]]
-    lists += [_words(item[()]) for item in dataset.parent.values() if _is_words(item)] if len(across) > 1 else []
-    titles = titles_of(len(across), lists) if len(across) > 1 else None
-    if titles:
-        return [(n, u or unit, dataset, part) for n, u, (_, part) in zip(*titles, across, strict=True)]
-    return [(column, unit, dataset, part) for column, part in across]
+    return [(column, unit, dataset, part) for column, part in expand(name, shape)]
 
 
 def _is_words(item: Any) -> bool:

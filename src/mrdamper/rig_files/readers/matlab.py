@@ -21,6 +21,7 @@ from mrdamper.rig_files.readers.arrays import (
 )
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
 from mrdamper.rig_files.readers.hdf5 import HDF5_MARK, MOST_STRUCTS, hdf5_tables
+from mrdamper.rig_files.units import is_unit
 
 _NUMERIC = ("double", "single", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
 _OBJECTS = ("object", "opaque", "function", "unknown")
@@ -122,6 +123,8 @@ def _gather(value: Any, name: str, label: str, found: _Found, depth: int = 0) ->
         for number, item in enumerate(items, 1):
             own = f"{name}_{number}" if size > 1 else name
             inner = f"{label}_{own}" if label else own
+            if _named(item, label, found):
+                continue
             for part in array.dtype.names:
                 _gather(item[part], part, inner, found, depth + 1)
     elif kind == "O" and size and depth < _DEEPEST and all(np.asarray(item).dtype.names for item in array.flat):
@@ -135,6 +138,18 @@ def _gather(value: Any, name: str, label: str, found: _Found, depth: int = 0) ->
         found.single[label][name] = float(array.reshape(-1)[0])
     elif kind in "US" and size == 1:
         found.remarks.setdefault(label, []).append(f"{name}: {array.reshape(-1)[0]}"[:200])
+
+
+def _named(item: np.void, label: str, found: _Found) -> bool:
+    """Take a struct that holds a channel's name, unit and data, as dSPACE and others write them; whether it is one."""
+    says = {part.lower(): np.asarray(item[part]) for part in item.dtype.names or ()}
+    name, data, unit = (says.get(key, np.empty(0)) for key in ("name", "data", "unit"))
+    if name.dtype.kind != "U" or name.size != 1 or data.dtype.kind not in "iuf" or data.size < 2:
+        return False
+    title = str(name.reshape(-1)[0]).rpartition("/")[2]  # of a path in a model
+    stated = str(unit.reshape(-1)[0]) if unit.dtype.kind == "U" and unit.size == 1 else ""
+    found.columns.setdefault(label, {})[f"{title} [{stated}]" if is_unit(stated) else title] = data
+    return True
 
 
 def _words(array: np.ndarray) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
@@ -54,27 +55,43 @@ class Parquet(Reader):
         with refusing_damage(source, self.title):
             schema = pl.read_parquet_schema(content)
             rows = pl.scan_parquet(content).select(pl.len()).collect().item() if len(schema) else 0
-        if not rows:
-            raise source.refuse("E_NO_DATA", "no rows", mend="export the file again")
-        names = list(schema)
-        check_unpacked(source, 8 * rows)
 
-        def loaded(column: int) -> pl.Series:
-            return pl.read_parquet(content, columns=[names[column]], use_statistics=False).to_series()
+        def loaded(name: str) -> pl.Series:
+            return pl.read_parquet(content, columns=[name], use_statistics=False).to_series()
 
-        def column_of(column: int) -> np.ndarray:
-            kind = schema[names[column]]
-            plain = kind.is_numeric() or isinstance(kind, (pl.Datetime, pl.Duration, pl.Null))
-            return _plain(loaded(column)) if plain else _no_numbers(kind)
+        return [frame_table(source, self.title, schema, rows, loaded)]
 
-        def words(column: int) -> Words:
-            if schema[names[column]].is_nested():  # a list may hold anything any number of times
-                raise source.refuse("E_NUMBER", f"column {names[column]!r} holds lists", column=column + 1)
-            with refusing_damage(source, self.title):
-                return words_in(loaded(column))
 
-        units = ["s" if isinstance(kind, (pl.Datetime, pl.Duration)) else "" for kind in schema.values()]
-        return [replace(array_table(source, names, units, column_of, title=self.title), words=words)]
+def frame_table(
+    source: Source, title: str, schema: Mapping[str, pl.DataType], rows: int, loaded: Callable[[str], pl.Series]
+) -> RawTable:
+    """A table of typed columns, each loaded by its name when it is asked for.
+
+    Raises
+    ------
+    RigFileError
+        E_NO_DATA, E_ARCHIVE_RATIO, E_TOO_MANY_COLUMNS.
+    """
+    import polars as pl
+
+    if not rows:
+        raise source.refuse("E_NO_DATA", "no rows", mend="export the file again")
+    names = list(schema)
+    check_unpacked(source, 8 * rows)
+
+    def column_of(column: int) -> np.ndarray:
+        kind = schema[names[column]]
+        plain = kind.is_numeric() or isinstance(kind, (pl.Datetime, pl.Duration, pl.Null))
+        return _plain(loaded(names[column])) if plain else _no_numbers(kind)
+
+    def words(column: int) -> Words:
+        if schema[names[column]].is_nested():  # a list may hold anything any number of times
+            raise source.refuse("E_NUMBER", f"column {names[column]!r} holds lists", column=column + 1)
+        with refusing_damage(source, title):
+            return words_in(loaded(names[column]))
+
+    units = ["s" if isinstance(kind, (pl.Datetime, pl.Duration)) else "" for kind in schema.values()]
+    return replace(array_table(source, names, units, column_of, title=title), words=words)
 
 
 def words_in(values: pl.Series) -> Words:

@@ -1,4 +1,4 @@
-"""XLSX: a sheet is read as the text it shows, so that header and units are found as in text."""
+"""Workbooks, by calamine: a sheet is read as the text it shows, so that header and units are found as in text."""
 
 from __future__ import annotations
 
@@ -16,22 +16,25 @@ from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Sour
 from mrdamper.rig_files.readers.delimited import DelimitedText
 from mrdamper.rig_files.readers.scratch import Scratch
 
+_COMPOUND = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"  # Excel up to 2003
+_FEWEST = 2  # columns of a test: a displacement and a force
+_NOTES = 4096  # bytes of a sheet without a test in which conditions of the others may stand
 _FLAT = str.maketrans({"\t": " ", "\n": " ", "\r": " ", '"': "''", "\0": " "})
 
 
 class Workbook(Reader):
-    """Workbooks of Excel and others; cached values of formulas, nothing is computed."""
+    """Workbooks of Excel, LibreOffice and others; cached values of formulas, nothing is computed."""
 
     name = "xlsx"
-    title = "XLSX workbook"
-    suffixes = (".xlsx", ".xlsm")
-    library = "openpyxl"
+    title = "workbook"
+    suffixes = (".xlsx", ".xlsm", ".xlsb", ".xls", ".ods")
+    library = "python_calamine"
     seconds_per_byte = 5e-6  # a sheet is slow to read: some microseconds a cell of some bytes
 
     def recognises(self, source: Source) -> bool:
-        """A zip with sheets, or a damaged zip of that name."""
+        """A zip with sheets, or a damaged zip or an old compound file of that name."""
         if not source.head(4).startswith(b"PK"):
-            return False
+            return source.head(8) == _COMPOUND and source.suffix in self.suffixes
         try:
             return is_workbook(zipped_names(source))
         except UNREADABLE_ZIP:
@@ -39,37 +42,43 @@ class Workbook(Reader):
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """One table a sheet that holds one."""
-        try:
-            with zipfile.ZipFile(source.file) as archive:
-                members = archive.infolist()
-        except UNREADABLE_ZIP as error:
-            raise damaged(source, self.title, "end of file not found") from error
-        check_sizes(source, members)
+        if source.head(4).startswith(b"PK"):
+            try:
+                with zipfile.ZipFile(source.file) as archive:
+                    members = archive.infolist()
+            except UNREADABLE_ZIP as error:
+                raise damaged(source, self.title, "end of file not found") from error
+            check_sizes(source, members)
         with refusing_damage(source, self.title):
             sheets = _sheets(source, form)
         form = form.model_copy(update={"separator": "\t", "encoding": "utf-8"})
         found: list[RawTable] = []
+        beside: list[str] = []
         first: InputError | None = None
         for name, sheet in sheets:
             try:
-                found += [_labelled(table, name, source) for table in DelimitedText().tables(sheet, form)]
+                tables = DelimitedText().tables(sheet, form)
             except InputError as error:
                 first = first or error
+                tables = []
+            tables = [table for table in tables if len(table.names) >= _FEWEST]
+            found += [_labelled(table, name) for table in tables]
+            beside += () if tables else sheet.head(_NOTES).decode("utf-8", "replace").splitlines()
         if not found:
             raise first or source.refuse("E_NO_DATA", "no sheet holds data", mend="export the file again")
+        found = [replace(table, remarks=(*table.remarks, *beside)) for table in found]
         return found if len(found) > 1 else [replace(found[0], label="")]
 
 
-def _labelled(table: RawTable, sheet: str, source: Source) -> RawTable:
+def _labelled(table: RawTable, sheet: str) -> RawTable:
     return replace(table, label=table.label or sheet, form={"sheet": sheet})
 
 
 def _sheets(source: Source, form: FileForm) -> list[tuple[str, Source]]:
     source.file.seek(0)
-    book = load("openpyxl", Workbook.title).load_workbook(
-        source.file, read_only=True, data_only=True, keep_links=False, keep_vba=False
-    )
-    names = [sheet.title for sheet in book.worksheets]
+    calamine = load("python_calamine", Workbook.title)
+    book = calamine.load_workbook(source.file)
+    names = [sheet.name for sheet in book.sheets_metadata if sheet.typ == calamine.SheetTypeEnum.WorkSheet]
     if form.sheet is not None and form.sheet not in names:
         raise source.refuse(
             "E_COLUMN",
@@ -77,19 +86,16 @@ def _sheets(source: Source, form: FileForm) -> list[tuple[str, Source]]:
             mend="correct [file] sheet of the profile",
         )
     texts = []
-    for sheet in book.worksheets:
-        if form.sheet is None or sheet.title == form.sheet:
-            sheet.reset_dimensions()
-            text = _as_text(source, sheet.title, sheet.iter_rows(values_only=True))
-            if text.size:
-                texts.append((sheet.title, text))
-    book.close()
+    for name in names if form.sheet is None else [form.sheet]:
+        text = _as_text(source, name, book.get_sheet_by_name(name).iter_rows())
+        if text.size:
+            texts.append((name, text))
     if not texts:
         raise source.refuse("E_NO_DATA", "the sheets are empty", mend="export the file again")
     return texts
 
 
-def _as_text(source: Source, title: str, rows: Iterable[tuple]) -> Source:
+def _as_text(source: Source, title: str, rows: Iterable[list]) -> Source:
     ragged = Scratch(source.keep)
     width, blank = 0, 0
     for number, row in enumerate(rows, 1):
@@ -114,8 +120,6 @@ def _as_text(source: Source, title: str, rows: Iterable[tuple]) -> Source:
 
 
 def _shown(cell: object) -> str:
-    if cell is None:
-        return ""
     if isinstance(cell, bool):
         return str(cell).upper()
     if isinstance(cell, float):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from mrdamper.rig_files.text.cells import Form, Rows, read_row
-from mrdamper.rig_files.text.layout import SPACES
+from mrdamper.rig_files.text.layout import SPACES, Layout
 from mrdamper.rig_files.text.stream import LONGEST_LINE
 
 _MOST_STRAY = 0.05  # above this share, reading the whole block cell by cell is no slower
@@ -27,7 +27,7 @@ def read_bulk(block: bytes, line: int, form: Form) -> Rows | None:
         If a cell is no number.
     """
     layout = form.layout
-    if layout.separator == SPACES or b'"' in block or any(layout.kinds[c] == "stamp" for c in form.wanted):
+    if layout.separator == SPACES or b'"' in block or any(_is_slow(layout, c) for c in form.wanted):
         return None
     ends = _even_lines(block, ord(layout.separator), layout.width - 1 + layout.trailing)
     if ends is None:
@@ -45,6 +45,11 @@ def read_bulk(block: bytes, line: int, form: Form) -> Rows | None:
             value[row] = cell
     odd = not block.isascii() and not _decodes(block, form)
     return Rows(dict(zip(form.wanted, values, strict=True)), np.arange(line, line + ends.size), odd)
+
+
+def _is_slow(layout: Layout, column: int) -> bool:
+    """Whether a column needs more than numbers to be read."""
+    return layout.kinds[column] == "stamp" or (bool(layout.behind) and layout.behind[column] != "")
 
 
 def _even_lines(block: bytes, separator: int, count: int) -> np.ndarray | None:

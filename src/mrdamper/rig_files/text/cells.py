@@ -10,12 +10,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.errors import CombinedError
 from mrdamper.rig_files.readers.base import RigFileError
 from mrdamper.rig_files.text.layout import Layout, is_comment, split
 from mrdamper.rig_files.text.stream import LONGEST_LINE, TextStream, too_long
 from mrdamper.rig_files.text.tokens import NUMBER, number, stamp
 
 _MARKS = "#%/"
+_MOST_SHOWN = 10  # wrong cells and rows of a file
 
 
 @dataclass(slots=True)
@@ -45,14 +47,37 @@ class Rows:
     odd: bool = False
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(eq=False, slots=True)
 class Form:
-    """What is needed to read a row: the text, its layout, the columns wanted, the clock."""
+    """What is needed to read a row: the text, its layout, the columns wanted, the clock; and what was wrong so far."""
 
     stream: TextStream
     layout: Layout
     wanted: tuple[int, ...]
     clock: Clock = field(default_factory=Clock)
+    wrong: dict[tuple[int | None, int | None], RigFileError] = field(default_factory=dict)
+    more: int = 0  # beyond those that are shown
+
+    def note(self, error: RigFileError) -> None:
+        """Keep a refusal, so that all of a file are told at once."""
+        if len(self.wrong) < _MOST_SHOWN:
+            self.wrong.setdefault((error.line, error.column), error)
+        else:
+            self.more += 1
+
+    def refuse_wrong(self) -> None:
+        """Raise what was kept.
+
+        Raises
+        ------
+        RigFileError, CombinedError
+        """
+        errors = [self.wrong[place] for place in sorted(self.wrong, key=lambda place: (place[0] or 0, place[1] or 0))]
+        if self.more:
+            errors.append(
+                self.stream.source.refuse(errors[-1].code, f"{self.more} more like these", mend=errors[-1].mend)
+            )
+        CombinedError.raise_from(errors)
 
 
 def read_cells(block: bytes, line: int, form: Form, *, final: bool = False) -> Rows:
@@ -70,7 +95,7 @@ def read_cells(block: bytes, line: int, form: Form, *, final: bool = False) -> R
     Raises
     ------
     RigFileError
-        E_LINE_TOO_LONG, E_QUOTE, E_FIELD_COUNT, E_TRUNCATED, E_NUMBER, E_ENCODING, E_NONFINITE.
+        E_LINE_TOO_LONG, E_QUOTE, E_AMBIGUOUS. Wrong cells and rows are kept by the form.
     """
     raw = block.split(b"\n")
     if max(map(len, raw)) > LONGEST_LINE:
@@ -125,18 +150,18 @@ def split_rows(texts: Sequence[str], line: int, form: Form, final: bool) -> tupl
     Raises
     ------
     RigFileError
-        E_QUOTE, E_FIELD_COUNT, E_TRUNCATED.
+        E_QUOTE. Rows of another width are left out and kept by the form.
     """
     separator, width = form.layout.separator, form.layout.width + form.layout.trailing
     rows: list[list[str]] = []
     lines: list[int] = []
-    wrong: tuple[int, int] | None = None
+    wrong: list[tuple[int, int]] = []
+    last = 0
     for at, text in enumerate(texts, line):
         stripped = text.strip(" \t\r")
         if not stripped or (stripped[0] in _MARKS and is_comment(stripped)):
             continue
-        if wrong is not None:
-            break
+        last = at
         try:
             cells = split(text.rstrip("\r"), separator)
         except csv.Error as error:
@@ -144,15 +169,13 @@ def split_rows(texts: Sequence[str], line: int, form: Form, final: bool) -> tupl
                 "E_QUOTE", "a quote is not closed, or text follows it", line=at, mend="close it or remove it"
             ) from error
         if len(cells) != width and (len(cells) != form.layout.width):
-            wrong = at, len(cells)
+            wrong.append((at, len(cells)))
         elif any(cells):
             rows.append(cells)
             lines.append(at)
-    else:
-        if wrong is not None:
-            raise field_count(form, wrong[1], wrong[0], final)
-        return rows, lines
-    raise field_count(form, wrong[1], wrong[0], False)
+    for at, count in wrong:
+        form.note(field_count(form, count, at, final and at == last))
+    return rows, lines
 
 
 def _numbers(cells: Sequence[str], column: int, lines: Sequence[int], form: Form) -> Floats:
@@ -160,20 +183,19 @@ def _numbers(cells: Sequence[str], column: int, lines: Sequence[int], form: Form
     matches, comma = NUMBER[mark].fullmatch, mark == ","
     for sign, meant in form.layout.writes:
         cells = [cell.replace(sign, meant) for cell in cells]
+    if form.layout.behind and form.layout.behind[column]:
+        cells = [cell.removesuffix(form.layout.behind[column]).rstrip() for cell in cells]
     values = np.empty(len(cells))
     for i, cell in enumerate(cells):
         value = float(cell.replace(",", ".") if comma else cell) if matches(cell) else number(cell, mark)
         if value is None:
-            raise _no_number(cell, column, lines[i], form)
-        if math.isinf(value):
-            raise form.stream.source.refuse(
-                "E_NONFINITE",
-                f"{_shown(cell)} in {_named(form, column)} is beyond every number",
-                line=lines[i],
-                column=column + 1,
-                mend="export the channel again: an amplifier in overload is no measurement",
-            )
-        values[i] = value
+            form.note(_no_number(cell, column, lines[i], form))
+        elif math.isinf(value):
+            form.note(form.stream.source.refuse(
+                "E_NONFINITE", f"{_shown(cell)} in {_named(form, column)} is beyond every number", line=lines[i],
+                column=column + 1, mend="export the channel again: an amplifier in overload is no measurement",
+            ))  # fmt: skip
+        values[i] = math.nan if value is None else value
     return values
 
 
@@ -186,7 +208,9 @@ def _stamps(cells: Sequence[str], column: int, lines: Sequence[int], form: Form)
             if number(cell, ".") is not None and math.isnan(number(cell, ".") or 0.0):
                 values[i] = math.nan
                 continue
-            raise _no_number(cell, column, lines[i], form)
+            form.note(_no_number(cell, column, lines[i], form))
+            values[i] = math.nan
+            continue
         if clock.first is None:
             clock.first, clock.zoned = read
         if read[1] != clock.zoned:

@@ -30,6 +30,9 @@ _STRAY = 0.1  # of the sampled numbers: fewer with the other decimal mark are si
 _TELLING = 2  # columns whose names tell what they are
 _WORD = re.compile(r"[^\W\d_]{3,}")
 _NAME_AND_UNIT = re.compile(r"[^\s\[(<{]+(?:\s*\[[^\[\]]*\]|\s*\([^()]*\))?")
+_QUANTITY = re.compile(
+    r"([+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?)[ \u00a0]?([^\W\d_]\S{0,6}|°\S)"
+)
 _GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 
 
@@ -59,6 +62,8 @@ class Layout:
         One a column where the line above the names holds titles of groups of columns.
     writes : tuple of (str, str)
         Signs that the file uses throughout and what they stand for: D for the E of exponents, a typographic minus.
+    behind : tuple of str
+        One a column where its numbers have a unit behind them: 12.3 mm.
     """
 
     separator: str
@@ -75,6 +80,7 @@ class Layout:
     remarks: tuple[str, ...] = ()
     over: tuple[str, ...] = ()
     writes: tuple[tuple[str, str], ...] = ()
+    behind: tuple[str, ...] = ()
 
     @property
     def width(self) -> int:
@@ -99,6 +105,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
     RigFileError
         E_NO_DATA, E_AMBIGUOUS, E_FIELD_COUNT, E_TOO_MANY_COLUMNS, E_QUOTE.
     """
+    as_written, lines = lines, _without_units(lines)
     content = _content(lines)
     separator = form.separator or _separator(lines, content, source)
     above = form.data_line - 1 if form.data_line else form.header_line or 0
@@ -118,7 +125,12 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         raise _mismatch(source, separator, len(names), width, first, lines)
     units = _cells(lines[unit_row], separator, width) if unit_row is not None else ("",) * width
     columns = [[row[i] for row in rows if len(row) > i] for i in range(width)]
-    kinds: tuple[Kind, ...] = tuple(_kind(column) for column in columns)
+    written = _rows(as_written[first:], separator, width, trailing)
+    behind = tuple(_unit_behind([row[i] for row in written if len(row) > i]) for i in range(width))
+    units = tuple(own or its for own, its in zip(behind, units, strict=True))
+    kinds: tuple[Kind, ...] = tuple(
+        "number" if unit else _kind(column) for column, unit in zip(columns, behind, strict=True)
+    )
     above = lines[: min(first, len(lines)) if header is None else header]
     return Layout(
         separator,
@@ -135,7 +147,32 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         (*(line for line in above if line.strip()), *_notes_beside(rows)),
         _titles(above, separator, width),
         _writes(rows),
+        behind if any(behind) else (),
     )
+
+
+def _without_units(lines: Sequence[str]) -> Sequence[str]:
+    """The lines without the units behind their numbers, where no line is a row of plain numbers."""
+    last = [line for line in lines if line.strip()][-_SAMPLE:]
+    if any(_is_row(_try_split(line, mark)) for line in last for mark in _SEPARATORS):
+        return lines
+    return [next(filter(None, (_bare_row(line, mark) for mark in _SEPARATORS[:-1])), line) for line in lines]
+
+
+def _bare_row(line: str, separator: str) -> str:
+    """A row of which at least two cells are numbers with units, without the units; empty if it is none."""
+    matches = [_QUANTITY.fullmatch(cell) for cell in _try_split(line, separator) if cell]
+    if len(matches) < 2 or not all(match and is_unit(match[2]) for match in matches):
+        return ""
+    return separator.join(match[1] for match in matches if match)
+
+
+def _unit_behind(cells: Sequence[str]) -> str:
+    """The one unit that stands behind every number of a column, as it is written."""
+    matches = [_QUANTITY.fullmatch(cell) for cell in cells if cell]
+    units = {match[2] if match else "" for match in matches}
+    unit = units.pop() if len(units) == 1 else ""
+    return unit if unit and is_unit(unit) else ""
 
 
 def _writes(rows: Sequence[Sequence[str]]) -> tuple[tuple[str, str], ...]:
@@ -179,7 +216,7 @@ def is_footer(line: str, layout: Layout) -> bool:
     if not any(cells):
         return False
     at = next(i for i, cell in enumerate(cells) if cell)
-    worded = _WORD.match(cells[at]) is not None and cells[at].lower() not in MISSING
+    worded = _WORD.match(cells[at].lstrip("[<(*=-")) is not None and cells[at].lower() not in MISSING
     return worded and (at >= layout.width or layout.kinds[at] != "text")
 
 
@@ -355,6 +392,8 @@ def _header_lines(
             break
         units = next((i for i in reversed(fitting) if _is_units(_cells(lines[i], separator, width))), None)
         naming = [i for i in fitting if i != units and (units is None or i < units)]
+        if units is not None and len(fitting) > 1 and units == fitting[-2] and not naming:  # above the names
+            return last, units
         if units is not None and (units == last or not _roles(_cells(lines[last], separator, width))):
             return (naming[-1] if naming else None), units
         telling = [i for i in fitting if len(_roles(_cells(lines[i], separator, width))) >= _TELLING]

@@ -22,8 +22,8 @@ MISSING = frozenset(("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", 
 _INFINITE = re.compile(r"[+-]?(?:inf(?:inity)?|1\.#inf|∞)", re.IGNORECASE)
 _STAMP = re.compile(
     r"(?:(?:([0-9]{4})([-/])([0-9]{2})\2([0-9]{2})|([0-9]{2})\.([0-9]{2})\.([0-9]{4})"
-    r"|[0-9]{1,2}/[0-9]{1,2}/[0-9]{4}(?=.*[AP]M))(?:T| +))?"
-    r"([0-9]{1,2}):([0-9]{2}):([0-9]{2})(?:[.,]([0-9]{1,9})|:([0-9]{3}))?"
+    r"|[0-9]{1,2}/[0-9]{1,2}/[0-9]{4})(?:T| +))?"
+    r"(?:([0-9]{1,2}):)?([0-9]{2}):([0-9]{2})(?:[.,]([0-9]{1,9})|:([0-9]{3}))?"
     r"(?: ?([AP]M))?(Z|[+-][0-9]{2}:?[0-9]{2})?",
     re.IGNORECASE,
 )
@@ -62,8 +62,8 @@ def looks_numeric(token: str) -> bool:
 def stamp(token: str) -> tuple[int, bool] | None:
     """Nanoseconds of an ISO-8601 time stamp or a clock time, and whether it states its zone.
 
-    Dates also as 2024/03/31 and 31.03.2024, which mean one thing everywhere. 03/04/2024 does not;
-    before a clock of twelve hours it is not looked at, and a record that passes midnight runs backwards.
+    Dates also as 2024/03/31 and 31.03.2024, which mean one thing everywhere. 03/04/2024 does not: it is
+    not looked at, and a record that passes midnight runs backwards. Minutes and seconds need a fraction.
     Integers, as doubles would round the nanoseconds of a date. A zone's offset is taken
     off, so that the change to summer time does not bend a record.
     """
@@ -73,6 +73,10 @@ def stamp(token: str) -> tuple[int, bool] | None:
     year, _, month, day, *dotted, hour, minute, second, fraction, thousandths, half, zone = match.groups()
     if dotted[0]:
         day, month, year = dotted
+    if hour is None:
+        if fraction is None or year is not None:
+            return None  # 12:30 may be hours and minutes
+        hour = "0"
     if half is not None:
         if not 1 <= int(hour) <= 12:
             return None

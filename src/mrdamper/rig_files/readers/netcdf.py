@@ -1,0 +1,52 @@
+"""Classic netCDF, as xarray and ship's loggers still write it, by SciPy; netCDF 4 is HDF5."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.readers.arrays import array_table, check_unpacked, refusing_damage, unpacked
+from mrdamper.rig_files.readers.base import RawTable, Reader, Source
+
+
+class NetCdf(Reader):
+    """Variables as columns."""
+
+    name = "netcdf"
+    title = "classic netCDF"
+    suffixes = (".nc", ".cdf")
+    library = "scipy.io"
+
+    def recognises(self, source: Source) -> bool:
+        """By the mark at the start."""
+        return source.head(4) in (b"CDF\x01", b"CDF\x02")
+
+    def tables(self, source: Source, form: FileForm) -> list[RawTable]:
+        """The one table: single numbers and attributes stand beside it."""
+        with refusing_damage(source, self.title):
+            from scipy.io import netcdf_file
+
+            source.file.seek(0)
+            file = netcdf_file(source.file, mmap=False)
+            found = {name: variable for name, variable in file.variables.items() if np.prod(variable.shape) > 1}
+            check_unpacked(source, 8 * sum(int(np.prod(variable.shape)) for variable in found.values()))
+            units = [_text(getattr(variable, "units", "")).partition(" since ")[0] for variable in found.values()]
+            single = {
+                f"{name} [{_text(getattr(variable, 'units', ''))}]": float(np.reshape(variable[...], -1)[0])
+                for name, variable in file.variables.items()
+                if variable.shape == () and np.asarray(variable.data).dtype.kind in "iuf"
+            }
+            remarks = [f"{name}: {_text(value)}"[:200] for name, value in file._attributes.items()]
+        if not found:
+            raise source.refuse("E_NO_DATA", "no array of numbers", mend="export the file again")
+        variables = list(found.values())
+
+        def column_of(column: int) -> np.ndarray:
+            variable = variables[column]
+            return unpacked(variable._attributes, np.array(variable[:]).astype(variable[:].dtype.newbyteorder("=")))
+
+        return [array_table(source, list(found), units, column_of, title=self.title, constants=single, remarks=remarks)]
+
+
+def _text(value: object) -> str:
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
