@@ -162,11 +162,13 @@ class Spread:
         size = len(values)
         alike = cls(1.0, 0.0, 0.0, 1.0).covariance(when, when)
 
-        def cost(shares: Floats, near: Floats) -> tuple[float, float]:
-            K = shares[0] * alike + shares[1] * near + shares[2] * np.eye(size)
+        def costs(points: Floats, near: Floats) -> tuple[Floats, Floats]:
+            shares = np.exp(points)[:, :, None, None]
+            K = shares[:, 0] * alike + shares[:, 1] * near + np.eye(size)
             sign, log = np.linalg.slogdet(K)
-            scale = float(values @ np.linalg.solve(K, values)) / size
-            return (np.inf, 0.0) if sign <= 0 or scale <= 0 else (log + size * np.log(scale), scale)
+            scale = np.linalg.solve(K, values[:, None])[..., 0] @ values / size
+            good = (sign > 0) & (scale > 0)
+            return np.where(good, log + size * np.log(np.where(good, scale, 1.0)), np.inf), np.where(good, scale, 0.0)
 
         best = (np.inf, cls(0.0, 0.0, float(np.sqrt(np.mean(values**2))), _HOURS[0]))
         for hours in _HOURS:
@@ -174,18 +176,18 @@ class Spread:
             np.fill_diagonal(near, 1.0)
             for start in ((1.0, 1.0), (1.0, 0.01), (0.01, 1.0), (0.01, 0.01)):
                 point, step = np.log([*start]), 2.0
-                now = cost(np.append(np.exp(point), 1.0), near)
+                (least,), (scale,) = costs(point[None], near)
                 while step > 0.02:
-                    trials = [point + step * d for d in (*np.eye(2), *-np.eye(2))]
-                    costs = [cost(np.append(np.exp(np.clip(t, -14, 9)), 1.0), near) for t in trials]
-                    least = min(range(4), key=lambda i: costs[i][0])
-                    if costs[least][0] < now[0] - 1e-9:
-                        point, now = np.clip(trials[least], -14, 9), costs[least]
+                    trials = np.clip(point + step * np.array([(1, 0), (0, 1), (-1, 0), (0, -1)]), -14, 9)
+                    tried, scales = costs(trials, near)
+                    at = int(np.argmin(tried))
+                    if tried[at] < least - 1e-9:
+                        point, least, scale = trials[at], tried[at], scales[at]
                     else:
                         step /= 2
-                if now[0] < best[0] - 1e-6:
-                    session, hour = np.sqrt(now[1] * np.exp(point))
-                    best = now[0], cls(float(session), float(hour), float(np.sqrt(now[1])), hours)
+                if least < best[0] - 1e-6:
+                    session, hour = np.sqrt(scale * np.exp(point))
+                    best = least, cls(float(session), float(hour), float(np.sqrt(scale)), hours)
         return best[1]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -75,17 +76,17 @@ def fit_function(
         raise _undetermined(chosen, f"{target.size} conditions", I, f, A)
     weight = _weights(uncertainty, target)
     rates = _best_rates(chosen, I, f, A, target, weight)
-    columns = chosen.columns(I, f, A, rates)
-    if not _determined(columns):
+    columns = chosen.columns(I, f, A, rates) if rates else _fixed_columns(chosen, tuple(conditions))
+    if columns is None or (rates and not _determined(columns)):
         raise _undetermined(chosen, "they do not tell its terms apart", I, f, A)
-    coefficients = solve_linear(columns * weight[:, None], target * weight)
+    coefficients, left_out = _solved(columns, target, weight, len(rates))
     cost = float(np.sum((columns @ coefficients - target) ** 2))
     spread = float(np.sum((target - target.mean()) ** 2))
     function = ParameterFunction(chosen.name, tuple(coefficients.tolist()), tuple(float(r) for r in rates), log)
     return FunctionFit(
         function,
         r2=1.0 - cost / spread if spread > 0 else 1.0,
-        left_out=_left_out(columns, target, weight, len(rates)) / (np.sqrt(spread / target.size) or 1.0),
+        left_out=left_out / (np.sqrt(spread / target.size) or 1.0),
     )
 
 
@@ -143,7 +144,7 @@ def require_determined(form: str, conditions: Sequence[Condition]) -> None:
     I, f, A = features(conditions)
     if chosen.rate_bounds:
         raise IdentificationError(f"{form} has rates to search", mend="choose a form without")
-    if len(conditions) < len(chosen.terms) or not _determined(chosen.columns(I, f, A, ())):
+    if len(conditions) < len(chosen.terms) or _fixed_columns(chosen, tuple(conditions)) is None:
         raise _undetermined(chosen, f"{len(conditions)} conditions do not tell its terms apart", I, f, A)
 
 
@@ -171,15 +172,24 @@ def _best_rates(
     return tuple(np.exp(best.point).tolist())
 
 
-def _left_out(columns: Floats, target: Floats, weight: Floats, rates: int) -> float:
-    """Weighted RMS of leave-one-out errors, exact for the linear part through the hat matrix."""
-    weighted = columns * weight[:, None]
-    q, _ = np.linalg.qr(weighted / np.linalg.norm(weighted, axis=0))
-    leverage = np.sum(q**2, axis=1)
-    residual = target * weight - q @ (q.T @ (target * weight))
-    spare = np.maximum(1.0 - leverage, 1e-9)
-    penalty = target.size / (target.size - rates)
-    return float(np.sqrt(np.sum((residual / spare) ** 2) / np.sum(weight**2)) * penalty)
+@lru_cache(maxsize=128)
+def _fixed_columns(form: Form, conditions: tuple[Condition, ...]) -> Floats | None:
+    """Terms of a form without rates, the same for every parameter; None where they cannot be told apart."""
+    columns = form.columns(*features(conditions), ())
+    columns.flags.writeable = False
+    return columns if _determined(columns) else None
+
+
+def _solved(columns: Floats, target: Floats, weight: Floats, rates: int) -> tuple[Floats, float]:
+    """Coefficients, and weighted RMS of leave-one-out errors, exact for the linear part through the hat matrix."""
+    weighted, right = columns * weight[:, None], target * weight
+    scale = np.linalg.norm(weighted, axis=0)
+    q, triangle = np.linalg.qr(weighted / scale)
+    along = q.T @ right
+    spare = np.maximum(1.0 - np.sum(q**2, axis=1), 1e-9)
+    penalty = target.size / max(target.size - rates, 1)
+    left_out = float(np.sqrt(np.sum(((right - q @ along) / spare) ** 2) / np.sum(weight**2)) * penalty)
+    return np.linalg.solve(triangle, along) / scale, left_out
 
 
 def _weights(uncertainty: ArrayLike | None, target: Floats) -> Floats:
