@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.dampers import modified_damper
 
 from mrdamper.dampers import modified
 from mrdamper.dampers.base import Envelope
@@ -14,7 +15,7 @@ from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.data import Condition
 from mrdamper.errors import IdentificationError, InputError
 from mrdamper.functions.fitting import choose_function
-from mrdamper.functions.forms import ParameterFunction
+from mrdamper.functions.forms import FORMS, ParameterFunction
 from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
 
@@ -127,6 +128,51 @@ def test_certain_values_count_more_and_of_a_logarithm_relatively():
     assert told[0][1][[0, 3]] == pytest.approx([1.0, 1e3])
     assert told[1][1][[0, 3]] == pytest.approx([1e-6 / 1e-4, 1e-1 / 3e-4])
     assert np.isinf(told[2][1]).all()
+
+
+def test_the_equation_says_how_coordinates_stand_for_parameters():
+    model = modified_damper()
+    relations = [BoucWen.coordinates[name][1] for name in ("yield_force", "yield_displacement")]
+    assert model.equation == r",\quad ".join([BoucWen.equation, *relations])
+    assert damper().equation == Bingham.equation
+
+
+def test_a_joint_fit_is_made_of_forms_without_rates_but_for_the_shape(monkeypatch):
+    asked = {}
+    functions = {"yield_displacement": ParameterFunction("constant", (-7.0,), log=True),
+                 "c": ParameterFunction("constant", (1e3,))}  # fmt: skip
+    parameters = ParameterMap(BoucWen, functions)
+
+    class Data:
+        shape, conditions = "yield_displacement", tuple(CONDITIONS)
+
+        def only(self, rows):
+            asked.update(rows=rows)
+            return SimpleNamespace(conditions=tuple(CONDITIONS[i] for i in rows))
+
+    def chosen(data, candidates, groups, shapes):
+        asked.update(candidates=candidates, groups=groups, shapes=shapes)
+        return {"yield_displacement": "constant", "c": "constant"}, SimpleNamespace(
+            parameters=parameters, at_bounds=("c",)
+        )
+
+    monkeypatch.setattr(modified, "condense", lambda runs, cls: asked.update(runs=runs, cls=cls) or Data())
+    monkeypatch.setattr(modified, "choose_forms", chosen)
+    monkeypatch.setattr(modified, "fit_jointly", lambda part, forms, start: SimpleNamespace(parameters=parameters))
+    fit, refit = modified.fit_modified_jointly("runs", identified(by_the_papers_laws), {"a": "b"})
+    lengths = [by_the_papers_laws(c).yield_displacement for c in CONDITIONS]
+    assert (asked["runs"], asked["cls"]) == ("runs", BoucWen)
+    assert asked["shapes"] == pytest.approx(np.array(lengths))
+    for name, forms in BoucWen.map_forms().items():
+        rated = [form for form in forms if FORMS[form].rate_bounds]
+        kept = [form for form in asked["candidates"][name] if FORMS[form].rate_bounds]
+        assert kept == (rated if name == "yield_displacement" else [])
+        assert set(forms) - set(rated) <= set(asked["candidates"][name])
+    assert fit.values["c"] == pytest.approx([by_the_papers_laws(c).c for c in CONDITIONS])
+    assert (fit.conditions, fit.at_bounds) == (tuple(CONDITIONS), ("c",))
+    assert (fit.damper.rig, dict(fit.damper.provenance), set(fit.functions)) == ("bench", {"a": "b"}, set(functions))
+    again = refit([0, 5])
+    assert (asked["rows"], again.envelope) == ([0, 5], Envelope.of([CONDITIONS[0], CONDITIONS[5]]))
 
 
 def test_identifications_of_two_models_or_rigs_are_refused():

@@ -1,5 +1,7 @@
 """Noise seeds: the same ways and claims once more, counted."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -41,6 +43,28 @@ def test_every_seed_is_asked_once_and_its_numbers_stay_its_own(monkeypatch):
     assert np.array_equal(errors["b"], [0.01, 0.02, 0.03])
     assert verdicts == {"phase": ("said 1", "said 2", "said 3")}
     assert over_seeds(VirtualRig(), Switches(), 0, HERE, lambda what, share: None) == ({}, {})
+
+
+@pytest.mark.parametrize("friction", ["dry", "filled"])
+def test_a_seed_is_judged_on_held_out_runs_and_with_its_own_friction_test(monkeypatch, friction):
+    asked = {}
+
+    def judged(study):
+        asked.update(study=study)
+        return [SimpleNamespace(key="phase", verdict="holds")]
+
+    def way(median):
+        scores = {name: SimpleNamespace(median=lambda value=value: value) for name, value in median.items()}
+        return SimpleNamespace(recipe=SimpleNamespace(title="one"), **scores)
+
+    monkeypatch.setattr(seeds, "CURRENTS", (0.0,))
+    monkeypatch.setattr(seeds, "judge_all", judged)
+    monkeypatch.setattr(seeds, "follow_all", lambda *_, **__: ([way({"train": 0.9, "held_out": 0.1})], {}))
+    monkeypatch.setattr(seeds, "friction_test", lambda rig, **more: asked.update(more) or "slow")
+    found = one_seed(VirtualRig(force_noise=7.0), Switches(friction_test=friction), 5, lambda what, share: None)
+    assert found == Seed({"one": 0.1}, {"phase": "holds"})
+    assert (asked["seed"], asked["filled"], asked["study"].friction) == (5, friction == "filled", "slow")
+    assert len(asked["study"].loops) == len(asked["study"].train) + len(asked["study"].held_out)
 
 
 def test_a_seed_gives_the_errors_and_the_verdicts_of_its_own_noise(monkeypatch):
