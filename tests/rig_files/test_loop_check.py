@@ -1,0 +1,189 @@
+"""The check of the loop on made forces whose share, sign and scatter are worked out by hand."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mrdamper.errors import QualityError
+from mrdamper.rig_files.quality import loop
+from mrdamper.rig_files.quality.loop import damping_share, dissipates, keeps_its_sign, repeatability, repeats
+from mrdamper.rig_files.quality.view import View
+from mrdamper.rig_files.record import Record
+
+POINTS, F, X = 200, 1.25, 0.02
+OMEGA = 2 * np.pi * F
+
+
+def view(force, cycles=4.0, lead=0.0):
+    """A sine, and a force as a function of the phase and of the number of the cycle."""
+    time = np.arange(int(cycles * POINTS) + 1) / (POINTS * F)
+    number = np.minimum((time * F + 1e-9).astype(int), int(np.ceil(cycles)) - 1)
+    return View(Record("made", time + 3.0, X * np.sin(OMEGA * time) + lead, force(OMEGA * time, number, time)))
+
+
+def viscous(phase, number, time):
+    return np.cos(phase)
+
+
+def test_the_share_is_that_of_the_force_in_phase_with_the_velocity():
+    found = damping_share(view(lambda p, n, t: 30 * np.cos(p) + 40 * np.sin(3 * p) + 7.0, lead=0.01))
+    assert found == pytest.approx(0.6, abs=2e-3)
+    assert damping_share(view(lambda p, n, t: -30 * np.cos(p) + 40 * np.sin(p) - 7.0)) == pytest.approx(-0.6, abs=2e-3)
+    # Whatever drifts with the record's time is no part of it, nor its clock's beginning.
+    drifting = damping_share(view(lambda p, n, t: np.cos(p) + 5 * t + 100))
+    spread = np.std(np.cos(OMEGA * np.arange(801) / 250) + 5 * np.arange(801) / 250)
+    assert drifting == pytest.approx(np.sqrt(0.5) / spread, rel=5e-3)
+
+
+def test_of_segments_that_hold_a_cycle_the_least_share_counts():
+    made = view(lambda p, n, t: np.where(n < 2, 1.0, -0.5) * np.cos(p))
+
+    def share(*segments):
+        made.run = SimpleNamespace(**{name: getattr(whole, name) for name in ("time", "force")}, segments=segments)
+        return damping_share(made)
+
+    whole = made.run
+    made.moving  # noqa: B018  the motion of all
+    middle = damping_share(made)
+    assert -0.2 < middle < 0.9
+    assert share((0, 400), (400, 801)) == pytest.approx(-1.0, abs=5e-3)
+    assert share((0, 801)) == pytest.approx(middle)
+    assert share((0, 640), (640, 801)) == pytest.approx(middle, abs=0.35)  # four fifths of a cycle says nothing
+    assert share((0, 640), (640, 801)) > -0.9
+    made.strokes = SimpleNamespace(period=None, steady=None)
+    assert share((0, 400), (400, 801)) == pytest.approx(middle, abs=0.02)
+
+
+@pytest.mark.parametrize(("share", "cycles", "refused"), [(-0.04, 2.0, False), (-0.06, 2.0, True), (-1.0, 0.9, False)])
+def test_a_loop_that_gives_energy_is_refused_from_a_twentieth_on(monkeypatch, share, cycles, refused):
+    monkeypatch.setattr(loop, "cycles_of", lambda view: cycles)
+    monkeypatch.setattr(loop, "damping_share", lambda view: share)
+    made = view(viscous)
+    if not refused:
+        return dissipates(made)
+    with pytest.raises(QualityError, match=r"\(6 % of the force pushes along.*count in opposite directions") as told:
+        dissipates(made)
+    assert told.value.code == "E_DISSIPATION_SIGN"
+    monkeypatch.setattr(loop, "_exchanged", lambda view: True)
+    with pytest.raises(QualityError, match="look exchanged"):
+        dissipates(made)
+
+
+def test_exchanged_channels_are_told_by_which_moves_like_a_sine():
+    def square(p, n, t):
+        return 50 * np.sign(np.cos(p)) + 3 * t
+
+    assert not loop._exchanged(view(square))
+    time = np.arange(801) / (POINTS * F)
+    swapped = View(Record("made", time, square(OMEGA * time, 0, time) * 1e-4, 900 * np.sin(OMEGA * time)))
+    assert loop._exchanged(swapped)
+    # Overtones of the displacement over its first: as large as 1.4 times those of the force they are the force's.
+    for ratio, exchanged in ((1.4, False), (1.6, True)):
+        x = 0.02 * (np.sin(OMEGA * time) + 0.03 * ratio * np.sin(2 * OMEGA * time)) + 1e-3 * time
+        made = View(Record("made", time, x, 10 * np.cos(OMEGA * time) + 0.3 * np.cos(2 * OMEGA * time) + time))
+        assert bool(loop._exchanged(made)) is exchanged
+    still = view(viscous)
+    still.motion, still.strokes = None, SimpleNamespace(steady=None, lengths=np.zeros(9))
+    for size in (0.03, 0.05):
+        still.run = SimpleNamespace(displacement=np.array([0.0, 0.04]), force=np.array([0.0, size]))
+        assert loop._exchanged(still) is (size < 0.04)
+
+
+def levels(turning, out, back, dip=0.0, share=0.0, count=1000):
+    """A force at three levels by the velocity, of which a share dips."""
+    velocity = np.cos(2 * np.pi * (np.arange(count) + 0.5) / count * 4)
+    force = np.select([np.abs(velocity) < 0.3, velocity > 0], [turning, out], back).astype(float)
+    force[: int(share * count)] = dip
+    return SimpleNamespace(run=SimpleNamespace(force=force), moving=SimpleNamespace(velocity=velocity))
+
+
+@pytest.mark.parametrize(
+    ("made", "rectified"),
+    [
+        (levels(0, 100, 90), True),
+        (levels(0, -100, -90), True),  # the other way up
+        (levels(0, 100, -90), False),
+        (levels(80, 100, 84), True),  # a fifth of the range below the weaker stroke
+        (levels(82, 100, 84.5), False),  # a seventh
+        (levels(0, 100, 90, -1.5, 0.02), True),  # little below zero
+        (levels(0, 100, 90, -3.0, 0.02), False),
+        (levels(0, 100, 90, -30.0, 0.002), True),  # a few samples do not count
+        (levels(0, 100, 90, count=90), False),  # too few at the reversals
+        (levels(0, 0, 0), False),
+    ],
+)
+def test_a_rectified_force_is_nearer_to_zero_at_the_reversals_than_in_either_stroke(made, rectified):
+    assert loop._is_rectified(made) is rectified
+
+
+def test_a_rectified_force_is_refused_by_its_name():
+    with pytest.raises(QualityError, match="absolute value") as told:
+        dissipates(view(lambda p, n, t: np.abs(np.cos(p))))
+    assert told.value.code == "E_RECTIFIED"
+
+
+@pytest.mark.parametrize(
+    ("force", "cycles", "told"),
+    [
+        (viscous, 4.0, None),
+        (lambda p, n, t: np.where(n == 2, -1.0, 1.0) * np.cos(p), 4.0, r"from 4.6 s on \(1 of 4 cycles\)"),
+        (lambda p, n, t: np.where(n >= 1, -1.0, 1.0) * np.cos(p), 4.0, r"from 3.8 s on \(3 of 4 cycles\)"),
+        (lambda p, n, t: np.where(n == 1, -1.0, 1.0) * np.cos(p), 2.0, r"from 3.8 s on \(1 of 2 cycles\)"),
+        (lambda p, n, t: np.where(n == 1, -1.0, 1.0) * np.cos(p), 1.9, None),
+        # A cycle that opposes clearly and one that pushes a little, or the other way round, are no flip.
+        (lambda p, n, t: np.where(n == 1, -0.25, 0.97) * np.cos(p) + np.where(n == 1, 0.97, 0.25) * np.cos(2 * p),
+         2.0, None),
+        (lambda p, n, t: np.where(n == 1, -0.35, 0.94) * np.cos(p) + np.where(n == 1, 0.94, 0.35) * np.cos(2 * p),
+         2.0, "1 of 2"),
+        (lambda p, n, t: np.where(n == 1, 0.25, -0.97) * np.cos(p) + np.where(n == 1, 0.97, 0.25) * np.cos(2 * p),
+         2.0, None),
+        # A tenth of one cycle, where the force is large; a twentieth may be timing.
+        (lambda p, n, t: np.where((n == 2) & (abs(p - 4 * np.pi - np.pi) < 0.1 * np.pi), -1, 1) * np.cos(p), 4.0,
+         r"from 4.9[56]\d* s on \(1 of 4 cycles\)"),
+        (lambda p, n, t: np.where((n == 2) & (abs(p - 4 * np.pi - np.pi) < 0.06 * np.pi), -1, 1) * np.cos(p), 4.0,
+         None),
+        (lambda p, n, t: np.where((n == 1) & (abs(p - 3 * np.pi) < 0.1 * np.pi), -1, 1) * np.cos(p), 2.0, None),
+    ],
+)  # fmt: skip
+def test_a_force_that_changes_its_sign_is_refused_from_where_it_does(force, cycles, told):
+    made = view(force, cycles)
+    if told is None:
+        return keeps_its_sign(made)
+    with pytest.raises(QualityError, match=told) as refused:
+        keeps_its_sign(made)
+    assert refused.value.code == "E_DISSIPATION_SIGN"
+    made.found.append(SimpleNamespace(code="W_FROZEN"))
+    keeps_its_sign(made)
+
+
+def test_scatter_is_the_spread_of_the_cycles_over_the_peak_to_peak_force():
+    gains = np.array([3.0, 0.9, 1.0, 1.2])
+
+    def scaled(p, n, t):
+        return 100 * gains[n] * np.cos(p) + 40
+
+    scatter, noise = repeatability(view(scaled))
+    last = gains[1:]  # the first of several may hold the way in from rest
+    assert scatter == pytest.approx(np.std(last, ddof=1) * np.sqrt(0.5) / (2 * last.mean()), rel=0.02)
+    assert noise < 1e-3
+    scatter, _ = repeatability(view(lambda p, n, t: scaled(p, n + 1, t), cycles=2.0))
+    assert scatter == pytest.approx(np.std([0.9, 1.0], ddof=1) * np.sqrt(0.5) / (2 * 0.95), rel=0.03)
+    assert repeatability(view(scaled, cycles=1.9)) is None
+    grain = np.random.default_rng(0).standard_normal(801)
+    _, noise = repeatability(view(lambda p, n, t: 100 * np.cos(p) + 5 * grain))
+    assert noise == pytest.approx(5 / 200, rel=0.15)
+    still = view(viscous)
+    still.motion = None
+    assert repeatability(still) is None
+
+
+@pytest.mark.parametrize(
+    ("found", "said"), [((0.06, 0.0), "6.0 %"), ((0.06, 0.04), None), ((0.05, 0.06), None), (None, None)]
+)
+def test_cycles_that_differ_by_more_than_noise_are_said(monkeypatch, found, said):
+    monkeypatch.setattr(loop, "repeatability", lambda view: found)
+    codes = (
+        [(finding.code, said in finding.text) for finding in repeats(view(viscous))] if said else list(repeats(None))
+    )
+    assert codes == ([("W_REPEATABILITY", True)] if said else [])
