@@ -10,8 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.dampers import joint_damper
 
+from mrdamper.dampers.base import UNTESTED
+from mrdamper.dampers.certainty import OwnNumber
 from mrdamper.dampers.coil import Coil
-from mrdamper.dampers.joint import JointDamper, JointFit, JointProblem
+from mrdamper.dampers.joint import FALL, RISE, JointDamper, JointFit, JointProblem, damper_of
 from mrdamper.dampers.strung import string
 from mrdamper.data import Condition, Run
 from mrdamper.errors import IdentificationError, RunError
@@ -164,6 +166,56 @@ def test_constants_of_other_dampers_count_among_the_numbers(problem, fit):
     assert (len(fit.damper.free), fit.damper.parameter_count) == (15, 16)
     freed = JointProblem(problem.runs, "play-bypass", free=("Ic",), parts=problem.parts)
     assert JointDamper("", fit.damper.model, freed.free, fit.damper.envelope).parameter_count == 16
+
+
+def test_own_numbers_are_those_the_tests_gave_with_their_units_and_scales(fit):
+    held = replace(fit.damper, free=("d", "h0"))
+    infos = {info.name: info for info in PlayBypass.parameters()}
+    assert dict(held.own_numbers) == {
+        "d": OwnNumber(fit.damper.model.d, infos["d"].bounds, True, "m"),
+        "h0": OwnNumber(fit.damper.model.h0, infos["h0"].bounds, False, "-"),
+    }
+    assert held.with_numbers({"d": 1e-3}).model == replace(fit.damper.model, d=1e-3)
+    bare = damper_of(TRUTH)
+    assert (bare.model, bare.rig, bare.free, bare.envelope) == (TRUTH, "", (), UNTESTED)
+    assert damper_of(held) is held
+
+
+def test_a_coil_is_looked_for_where_a_current_changes_or_taken_as_given(runs, problem):
+    changing = replace(runs[3], id="changing", current=np.linspace(0.1, 0.9, runs[3].time.size))
+    names = [axis.name for axis in problem.axes]
+    assert not {RISE, FALL} & set(names)
+    for coil, more in (("determined", [RISE, FALL]), (Coil(0.02, 0.03), []), (None, [])):
+        with_change = JointProblem([*runs[:3], changing], "play-bypass", coil=coil)
+        assert [axis.name for axis in with_change.axes] == [*names, *more]
+        at = with_change.coil_at(np.array([a.coordinate(a.grid[0]) for a in with_change.axes]))
+        wanted = Coil(8e-3, 8e-3) if more else coil
+        assert (at and (at.rise_s, at.fall_s)) == (wanted and pytest.approx((wanted.rise_s, wanted.fall_s)))
+        assert [(a.lower, a.upper, a.log) for a in with_change.axes[9:]] == [(1e-4, 0.2, True)] * len(more)
+
+
+def test_a_fit_begins_where_another_problem_ended(problem, fit):
+    free = JointProblem(problem.runs, "play-bypass", free=("Ic", "si"), parts=problem.parts)
+    point = dict(zip((a.name for a in free.axes), free.from_point(fit), strict=True))
+    own = dict(zip(fit.searched, fit.point, strict=True))
+    assert {name: point[name] for name in own} == pytest.approx(own)
+    for axis in free.axes:
+        if axis.name in ("Ic", "si"):
+            assert point[axis.name] == axis.coordinate(axis.grid[0])
+    held = problem.with_free((), {"d": 3e-4})
+    assert "d" not in [axis.name for axis in held.axes]
+    assert held.bare(held.from_point(fit)).d == 3e-4
+
+
+def test_errors_of_left_out_runs_are_those_of_a_prediction(runs, problem, fit):
+    found = problem.errors(fit, [2, 7])
+    for error, i in zip(found, (2, 7), strict=True):
+        run = runs[i]
+        missed = (fit.damper.predict_run(run).force - run.force)[run.in_window]
+        # On the samples that enter, a few hundred of the window.
+        assert error == pytest.approx(np.sqrt(np.mean(missed**2)) / np.ptp(run.force[run.in_window]), rel=0.1)
+    assert fit.error == pytest.approx(sum(fit.nrmse_pp) / len(runs))
+    assert problem.table(fit.nrmse_pp).solve(fit.point).nrmse_pp == pytest.approx(fit.nrmse_pp, rel=1e-6)
 
 
 def test_it_predicts_motions_it_was_never_shown(fit):

@@ -233,13 +233,25 @@ def test_rates_are_the_best_of_all_though_the_error_has_several_valleys(seed):
 
 
 def test_r2_of_small_values_and_errors_known_to_be_none():
-    small = fit_function("linear-current", CONDITIONS, 1e-3 * VALUES)
+    small = fit_function("linear-current", CONDITIONS, 1e-6 * VALUES)
     assert small.r2 == pytest.approx(fit_function("linear-current", CONDITIONS, VALUES).r2)
     assert small.r2 < 0.999
     # Where a quarter is without error nothing says what the others' are worth beside it.
     none = np.where(np.arange(CURRENT.size) % 3, 5.0, 0.0)
     assert fitting._weights(none, VALUES).tolist() == [1.0] * CURRENT.size
     assert fitting._weights(np.full(3, np.nan), VALUES[:3]).tolist() == [1.0] * 3
+
+
+def test_a_choice_hands_on_logarithm_and_uncertainty():
+    values, errors = np.exp(0.01 * VALUES), np.where(CURRENT > 1, 100.0, 1.0)
+    found = choose_function(("linear-current",), CONDITIONS, values, log=True, uncertainty=errors)
+    alone = fit_function("linear-current", CONDITIONS, values, log=True, uncertainty=errors)
+    assert found == alone
+    assert found.function.log
+    assert (
+        found.function.coefficients
+        != fit_function("linear-current", CONDITIONS, values, log=True).function.coefficients
+    )
 
 
 def test_functions_take_plain_lists():
@@ -254,3 +266,5 @@ def test_a_parameter_that_does_not_change_does_not_turn():
 def test_a_parabola_turns_where_its_slope_is_zero_within_half_more_than_was_tested(top, turn):
     found = ParameterFunction("quadratic-current", (-1.0, 3.0, 0.0)).turning_point(top, 1.0, 0.02)
     assert found is None if turn is None else found == pytest.approx(turn, abs=1.5 * top / 600)
+    early = ParameterFunction("quadratic-current", (-1.0, 0.4, 0.0)).turning_point(top, 1.0, 0.02)
+    assert early == pytest.approx(0.2, abs=1.5 * top / 600)

@@ -80,8 +80,8 @@ def test_exchanged_channels_are_told_by_which_moves_like_a_sine():
     assert loop._exchanged(swapped)
     # Overtones of the displacement over its first: as large as 1.4 times those of the force they are the force's.
     for ratio, exchanged in ((1.4, False), (1.6, True)):
-        x = 0.02 * (np.sin(OMEGA * time) + 0.03 * ratio * np.sin(2 * OMEGA * time)) + 1e-3 * time
-        made = View(Record("made", time, x, 10 * np.cos(OMEGA * time) + 0.3 * np.cos(2 * OMEGA * time) + time))
+        x = 0.02 * (np.sin(OMEGA * time) + 0.2 * ratio * np.sin(2 * OMEGA * time)) + 1e-3 * time
+        made = View(Record("made", time, x, 10 * np.cos(OMEGA * time) + 2 * np.cos(2 * OMEGA * time) + time))
         assert bool(loop._exchanged(made)) is exchanged
     still = view(viscous)
     still.motion, still.strokes = None, SimpleNamespace(steady=None, lengths=np.zeros(9))
