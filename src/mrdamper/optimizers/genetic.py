@@ -46,6 +46,12 @@ class GeneticMinimum:
     boxes: tuple[tuple[Floats, Floats], ...]
     ending: Ending
 
+    @property
+    def to_settle(self) -> int:
+        """Evaluations after which no better cost by over a hundredth was found."""
+        generations = int(np.argmax(self.history <= 1.01 * self.cost)) + 1
+        return generations * self.evaluations // self.history.size
+
 
 def genetic(
     cost: Cost,

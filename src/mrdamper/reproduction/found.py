@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from mrdamper.data import Condition, Dataset, Floats, Run
 from mrdamper.gas_spring import GasSpring
+from mrdamper.identification import Identification
 from mrdamper.identification.harmonic_balance import ForceReading
 from mrdamper.identification.loop_analysis import LoopAnalysis
 from mrdamper.optimizers.genetic import GeneticMinimum
@@ -48,6 +49,8 @@ class Ended:
         Parameter reached over that of the optimum.
     error : float
         RMSE reached over the lowest there is.
+    forces, to_settle : int
+        Computed in all, and until no error lower by over a hundredth was found.
     seconds : float
     """
 
@@ -56,6 +59,8 @@ class Ended:
     alpha: float
     beta: float
     error: float
+    forces: int
+    to_settle: int
     seconds: float
 
 
@@ -77,9 +82,13 @@ class Reproduction:
     contenders : tuple of Scored
         Their `recipe.title` tells them apart.
     switches : Switches
+    there : mapping of (str, str) to Identification or str
+        By title and run id: held-out runs identified the literal and the consistent way, or why not.
     genetic : tuple of GeneticCheck
     ended : tuple of Ended
         Genetic searches over all train runs, one seed each.
+    direct : tuple of int
+        Forces computed until the direct genetic searches settled.
     seed_errors : mapping of str to (S,) array
         Median nrmse_pp over the held-out runs, one a noise seed, by contender.
     seed_verdicts : mapping of str to tuple of str
@@ -101,8 +110,10 @@ class Reproduction:
     readings: tuple[ForceReading, ...]
     contenders: tuple[Scored, ...]
     switches: Switches
+    there: Mapping[tuple[str, str], Identification | str] = field(default_factory=dict)
     genetic: tuple[GeneticCheck, ...] = ()
     ended: tuple[Ended, ...] = ()
+    direct: tuple[int, ...] = ()
     seed_errors: Mapping[str, Floats] = field(default_factory=dict)
     seed_verdicts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     sensitivity: tuple[OneAtATime, ...] = ()

@@ -209,14 +209,9 @@ def parameter_rows(study: Reproduction) -> Rows:
                 continue
             rows.append(_parameter_row(study, contender.recipe.title, "by the functions", run.id, condition, model))
         for title in (LITERAL, CONSISTENT):
-            contender = study.contender(title)
-            if contender is None or contender.recipe.basis is None:
-                continue
-            try:
-                found = contender.recipe.basis.identify(run)
-            except InputError:
-                continue
-            rows.append(_parameter_row(study, title, "identified there", run.id, condition, found.model))
+            found = study.there.get((title, run.id), "")
+            if study.contender(title) is not None and not isinstance(found, str):
+                rows.append(_parameter_row(study, title, "identified there", run.id, condition, found.model))
     return rows
 
 

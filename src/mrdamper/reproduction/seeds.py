@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from mrdamper.reproduction.found import Reproduction
 from mrdamper.reproduction.switches import Switches
 from mrdamper.reproduction.virtual_rig import VirtualRig, friction_test, noisy_dataset, true_runs
 from mrdamper.reproduction.ways import HALF, JOINT, ways
-from mrdamper.study.parallel import Processes
 from mrdamper.study.recipe import Progress, Settled, follow_all
 
 CURRENTS = (0.0, 0.5, 1.0, 1.5, 2.0)
@@ -42,24 +41,19 @@ class Seed:
     verdicts: Mapping[str, str]
 
 
-def over_seeds(
-    rig: VirtualRig, switches: Switches, count: int, processes: Processes, progress: Progress
-) -> tuple[dict[str, Floats], dict[str, tuple[str, ...]]]:
-    """Errors by contender and verdicts by claim, one a noise seed, on every other current and two cycles a run."""
-    seeds = range(1, count + 1)
-    found = processes.map(partial(one_seed, rig, switches), seeds, progress) if count else []
+def by_seed(found: Sequence[Seed]) -> tuple[dict[str, Floats], dict[str, tuple[str, ...]]]:
+    """Errors by contender and verdicts by claim, one a noise seed."""
     errors = {title: np.array([seed.errors[title] for seed in found]) for title in (found[0].errors if found else ())}
-    keys = found[0].verdicts if found else ()
-    return errors, {key: tuple(seed.verdicts[key] for seed in found) for key in keys}
+    return errors, {key: tuple(seed.verdicts[key] for seed in found) for key in (found[0].verdicts if found else ())}
 
 
 def one_seed(rig: VirtualRig, switches: Switches, seed: int, progress: Progress) -> Seed:
-    """The quick ways and the claims they allow, on the virtual rig with one seed of noise."""
+    """The quick ways and the claims they allow, with one seed of noise, on every other current and two cycles a run."""
     progress(f"noise seed {seed}", 0.0)
     dataset = noisy_dataset(rig, _truth(rig), seed)
     train, held_out = list(dataset.split("train")), list(dataset.split("validate"))
     settled = Settled.of(train, rig.gas).preset(switches.fixed)
-    steps = [step for step in ways(train, held_out, settled, switches) if step[0].title not in _ONCE]
+    steps = [step for step in ways(train, held_out, settled, switches, explain=False) if step[0].title not in _ONCE]
     contenders, _ = follow_all(steps, held_out, leave_out=False)
     study = Reproduction(
         dataset=dataset,

@@ -43,10 +43,15 @@ ALI = "Ali-type (Spencer-based)"
 Steps = list[tuple[Recipe, Sequence[Run]]]
 
 
-def ways(train: Sequence[Run], held_out: Sequence[Run], settled: Settled, switches: Switches) -> Steps:
-    """Every way but the costly ones, and the train runs each needs; `way` says to which group it belongs."""
-    literal = Paper(search="optimum", bounds=switches.bounds)
-    half = replace(literal, force_amplitude="half-peak-to-peak")
+def ways(
+    train: Sequence[Run], held_out: Sequence[Run], settled: Settled, switches: Switches, *, explain: bool = True
+) -> Steps:
+    """Every way but the costly ones, and the train runs each needs; `way` says to which group it belongs.
+
+    `explain` has the literal way say of every run how much of its c is hysteretic.
+    """
+    literal = Paper(search="optimum", bounds=switches.bounds, explain=explain)
+    half = replace(literal, force_amplitude="half-peak-to-peak", explain=False)
     consistent = settled.basis(Balance())
     by_paper = partial(by_the_paper, mass_law=switches.mass_law)
     plain = Basis("bouc-wen", Balance(), fixed=switches.fixed)

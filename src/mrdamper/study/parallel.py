@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, as_completed
+from concurrent.futures import Executor, Future, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
@@ -14,13 +14,14 @@ import numpy as np
 
 from mrdamper.data import Run
 from mrdamper.errors import InputError
-from mrdamper.identification import Identification, conclude
+from mrdamper.identification import Identification, Method, Problem, conclude
 from mrdamper.identification.methods import method_named
 from mrdamper.identification.methods.direct_genetic import DirectGenetic
 from mrdamper.identification.methods.paper import Paper
 from mrdamper.identification.methods.projection import Projection
 from mrdamper.models import model_type
 from mrdamper.motion import analyse_motion
+from mrdamper.optimizers.linear import on_one_blas_thread
 from mrdamper.study.processes import processes
 from mrdamper.study.recipe import Basis, Found, Progress, Recipe, Scored, follow_all
 
@@ -41,21 +42,33 @@ class Processes:
     pool: Executor | None = None
 
     def map(
-        self, function: Callable[[T, Progress], R], items: Sequence[T], progress: Progress = lambda what, share: None
+        self,
+        function: Callable[[T, Progress], R],
+        items: Sequence[T],
+        progress: Progress = lambda what, share: None,
+        weights: Sequence[float] = (),
     ) -> list[R]:
-        """Results of a function for every item, in order; it is a function of a module.
+        """Results of a function of a module for every item, in order.
 
-        A process that starts has imports to do, so this one takes an item too, the last.
+        A process that starts has imports to do, so this one takes an item too, the last, and goes on from the
+        end with those that none has begun: the longest ought to stand first. Weights say how long each takes.
         """
-        *others, own = items
-        if self.pool is None:
-            return [function(item, _part(progress, n, len(items))) for n, item in enumerate(items)]
-        pending = [self.pool.submit(_quietly, function, item) for item in others]
-        last = function(own, lambda what, share: progress(what, 0.9 * share))
-        for done, future in enumerate(as_completed(pending), 1):
+        weight, last = list(weights or [1.0] * len(items)), len(items) - 1
+        pending = [self.pool.submit(_quietly, function, item) for item in items[:-1]] if self.pool else []
+        here: dict[int, R] = {}
+
+        def tell(what: str, within: float) -> None:
+            ended = (n in here or (n < len(pending) and _done(pending[n])) for n in range(len(items)))
+            done = sum(w for w, end in zip(weight, ended, strict=True) if end)
+            progress(what, (done + within) / sum(weight))
+
+        for n in reversed(range(len(items))) if pending else range(len(items)):
+            if not pending or n == last or pending[n].cancel():
+                here[n] = function(items[n], lambda what, share, n=n: tell(what, weight[n] * share))
+        for future in as_completed([future for future in pending if not future.cancelled()]):
             future.result()
-            progress(f"{done + 1} of {len(items)} done", 0.9 + 0.1 * done / len(pending))
-        return [*(future.result() for future in pending), last]
+            tell(f"{sum(map(_done, pending)) + len(here)} of {len(items)} done", 0.0)
+        return [here[n] if n in here else pending[n].result() for n in range(len(items))]
 
 
 HERE = Processes()
@@ -71,18 +84,12 @@ def several(count: int) -> Iterator[Processes]:
         yield Processes(pool)
 
 
-def _part(progress: Progress, number: int, count: int) -> Progress:
-    return lambda what, share: progress(what, (number + share) / count)
+def _done(future: Future[Any]) -> bool:
+    return future.done() and not future.cancelled()
 
 
 def _quietly(function: Callable[[T, Progress], R], item: T) -> R:
     return function(item, lambda what, share: None)
-
-
-def identify_all(tasks: Sequence[tuple[Basis, Run]], workers: int, progress: Progress) -> Found:
-    """Every basis from its run, in several processes."""
-    with crew([run for _, run in tasks], workers) as several_of_us:
-        return several_of_us.identify(tasks, progress)
 
 
 @contextmanager
@@ -161,19 +168,28 @@ def _packed(run: Run) -> dict[str, Any]:
 
 
 def _identify_one(basis: Basis, run_id: str) -> tuple[Identification | str, float]:
-    run = _RUNS[run_id]
+    return identify_quickly(basis, _RUNS[run_id])
+
+
+@on_one_blas_thread
+def identify_quickly(basis: Basis, run: Run) -> tuple[Identification | str, float]:
+    """One of many identifications, or why there is none, and its seconds: what is costly sees a few cycles."""
     begin = time.perf_counter()
     try:
-        method = method_named(basis.method) if isinstance(basis.method, str) else basis.method
-        if isinstance(method, Paper | DirectGenetic):
-            method = replace(method, genetic=replace(method.genetic, generations=GENERATIONS))
-        if model_type(basis.model).integrated:
-            method = Projection(refine_best=1)
-        seen = shortened(run) if basis.costly else run
-        solution = method.solve(basis.problem(seen))
-        return conclude(basis.problem(run), method, solution), time.perf_counter() - begin
+        method, seen = quickened(basis, run)
+        return conclude(basis.problem(run), method, method.solve(seen)), time.perf_counter() - begin
     except InputError as error:
         return str(error), time.perf_counter() - begin
+
+
+def quickened(basis: Basis, run: Run) -> tuple[Method, Problem]:
+    """The method where it is one of many, and what it sees of a run."""
+    method = method_named(basis.method) if isinstance(basis.method, str) else basis.method
+    if isinstance(method, Paper | DirectGenetic):
+        method = replace(method, genetic=replace(method.genetic, generations=GENERATIONS))
+    if model_type(basis.model).integrated:
+        method = Projection(refine_best=1)
+    return method, basis.problem(shortened(run) if basis.costly else run)
 
 
 def _follow_one(recipe: Recipe, runs: Sequence[str], held_out: Sequence[str], found: Found) -> Scored | str:

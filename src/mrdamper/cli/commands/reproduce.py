@@ -37,6 +37,7 @@ def register(app: typer.Typer) -> None:
     ) -> None:
         """Example: mrdamper reproduce --out result/"""
         import json
+        import os
 
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.errors import InputError
@@ -44,6 +45,7 @@ def register(app: typer.Typer) -> None:
         from mrdamper.files.dataset import load_dataset
         from mrdamper.reproduction.output import summary, write_reproduction
         from mrdamper.reproduction.study import reproduce as run_reproduction
+        from mrdamper.study.parallel import several
 
         require_writable(out)
         switches = _switches(preset, box, mass_law, friction)
@@ -55,14 +57,14 @@ def register(app: typer.Typer) -> None:
                 names = " or ".join(dataset.rigs)
                 raise InputError(f"the dataset holds {len(dataset.rigs)} rigs", mend=f"choose --rig {names}")
             dataset = dataset.rig(rig or next(iter(dataset.rigs)))
-        with progress_on_stderr() as progress:
+        with progress_on_stderr() as progress, several(jobs or os.cpu_count() or 1) as processes:
             study = run_reproduction(
                 dataset,
                 switches=switches,
                 with_comparators=comparators,
                 with_models=with_models,
                 seeds=seeds,
-                jobs=jobs,
+                processes=processes,
                 progress=lambda what, share: progress(what, 0.85 * share),
             )
             written = write_reproduction(study, out, lambda what, share: progress(what, 0.85 + 0.15 * share), png=png)

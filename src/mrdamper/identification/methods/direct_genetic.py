@@ -23,7 +23,7 @@ from mrdamper.identification.problem import Method, Problem, Solution
 from mrdamper.models import Scale
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.optimizers.generation import GeneticSettings
-from mrdamper.optimizers.genetic import genetic
+from mrdamper.optimizers.genetic import GeneticMinimum, genetic
 
 _SAMPLES = 200
 
@@ -56,21 +56,24 @@ class DirectGenetic(Method):
         ExcitationError
             If the motion is no sine.
         """
+        return self.solution(problem, self.genetic_search(problem))
+
+    def genetic_search(self, problem: Problem) -> GeneticMinimum:
+        """Run the search alone; arguments and errors as `solve`."""
         if not issubclass(problem.model_type, BoucWen) or problem.with_delay:
             raise IdentificationError(
                 f"method {self.name} identifies the Bouc–Wen model, without a delay",
                 mend="use model bouc-wen, or another method",
             )
         record = _thinned(SineRecord.of(problem.run))
-        box = {**_box(problem, record), **self.bounds}
-        names = list(box)
-        found = genetic(
-            _Errors(problem, record, box),
-            [box[name][0] for name in names],
-            [box[name][1] for name in names],
-            self.genetic,
-        )
-        end = dict(zip(names, found.point.tolist(), strict=True))
+        box = self._box(problem)
+        lower, upper = zip(*box.values(), strict=True)
+        return genetic(_Errors(problem, record, box), lower, upper, self.genetic)
+
+    def solution(self, problem: Problem, found: GeneticMinimum) -> Solution:
+        """What a search found of a problem."""
+        box = self._box(problem)
+        end = dict(zip(box, found.point.tolist(), strict=True))
         at_bounds = tuple(
             name
             for name, value in end.items()
@@ -79,6 +82,9 @@ class DirectGenetic(Method):
         model = BoucWen.build({**problem.fixed, **end})
         searched = {name: end[name] for name in ("yield_displacement", "asymmetry", "n") if name in end}
         return Solution(model, 0.0, at_bounds, {}, searched, found.evaluations, found.ending, self.genetic.seed)
+
+    def _box(self, problem: Problem) -> dict[str, tuple[float, float]]:
+        return {**_box(problem, _thinned(SineRecord.of(problem.run))), **self.bounds}
 
 
 def _thinned(record: SineRecord) -> SineRecord:
@@ -128,7 +134,7 @@ class _Errors:
     def __call__(self, points: Floats) -> Floats:
         """(P, D) points -> (P,) errors [N]."""
         rows = [tuple(row) for row in points[:, self.shape].tolist()]
-        for row in set(rows) - self.known.keys():
+        for row in [row for row in dict.fromkeys(rows) if row not in self.known]:
             self.known[row] = self._sums(row)
         sums = np.array([self.known[row] for row in rows])
         coefficients = points[:, self.linear]

@@ -85,11 +85,18 @@ class Paper(Method):
         ExcitationError
             If the motion is no sine.
         """
+        if self.search == "genetic":
+            return self.solution(problem, self.genetic_search(problem))
         _require_bouc_wen(problem)
-        record = SineRecord.of(problem.run)
-        known, notes = self._closed_forms(problem, record)
-        rest = _Rest.of(problem, record, known)
-        searched = self._by_genetic(rest) if self.search == "genetic" else self._by_optimum(rest)
+        return self._solution(problem, self._by_optimum(self._rest(problem)))
+
+    def solution(self, problem: Problem, found: GeneticMinimum) -> Solution:
+        """What a genetic search found of a problem."""
+        searched = _Searched(float(found.point[0]), float(found.point[1]), found.evaluations, found.ending)
+        return self._solution(problem, searched)
+
+    def _solution(self, problem: Problem, searched: _Searched) -> Solution:
+        known, notes = self._closed_forms(problem, SineRecord.of(problem.run))
         values = {"alpha": searched.alpha, "beta": searched.beta}
         return Solution(
             model=BoucWen.build({**known, **values}),
@@ -110,13 +117,16 @@ class Paper(Method):
     def genetic_search(self, problem: Problem) -> GeneticMinimum:
         """Run the genetic search alone: its history and its boxes."""
         _require_bouc_wen(problem)
-        record = SineRecord.of(problem.run)
-        return self._genetic(_Rest.of(problem, record, self._closed_forms(problem, record)[0]))
+        lower, upper = zip(*self.bounds, strict=True)
+        return genetic(self._rest(problem).thinned(_SEARCH_SAMPLES).costs, lower, upper, self.genetic)
 
     def cost(self, problem: Problem) -> Callable[[Floats], Floats]:
         """RMS error [N] over all samples of (P, 2) points (alpha, beta), once c, m and f0 are known [Eq. 21]."""
+        return self._rest(problem).costs
+
+    def _rest(self, problem: Problem) -> _Rest:
         record = SineRecord.of(problem.run)
-        return _Rest.of(problem, record, self._closed_forms(problem, record)[0]).costs
+        return _Rest.of(problem, record, self._closed_forms(problem, record)[0])
 
     def _closed_forms(self, problem: Problem, record: SineRecord) -> tuple[dict[str, float], tuple[str, ...]]:
         """Every parameter but alpha and beta."""
@@ -140,14 +150,6 @@ class Paper(Method):
             lift = known.get("k2", 0.0) * X**2 / 2 if self.offset == "mean" else 0.0
             known["f0"] = reading.offset - lift
         return known, notes
-
-    def _genetic(self, rest: _Rest) -> GeneticMinimum:
-        lower, upper = zip(*self.bounds, strict=True)
-        return genetic(rest.thinned(_SEARCH_SAMPLES).costs, lower, upper, self.genetic)
-
-    def _by_genetic(self, rest: _Rest) -> _Searched:
-        found = self._genetic(rest)
-        return _Searched(float(found.point[0]), float(found.point[1]), found.evaluations, found.ending)
 
     def _by_optimum(self, rest: _Rest) -> _Searched:
         """Grid over the yield displacement, then refinement; alpha is linear and solved for."""
