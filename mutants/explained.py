@@ -7,7 +7,7 @@ from __future__ import annotations
 
 EXPLAINED: dict[tuple[str, str, str], str] = {
     (
-        "reproduction.claims",
+        "reproduction.tested",
         "out = np.abs((phase - angle + 180) % 360 - 180) < 5",
         "Add → Sub",
     ): "half a turn forth or back is the same angle",

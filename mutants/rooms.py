@@ -39,7 +39,7 @@ ROOMS = (
     ),
     _room("functions.forms functions.fitting", "functions"),
     _room(
-        "reproduction.verdicts reproduction.claims reproduction.seeds",
+        "reproduction.verdicts reproduction.claims reproduction.tested reproduction.identified reproduction.seeds",
         "reproduction/test_verdicts.py reproduction/test_claims.py reproduction/test_measured.py"
         " reproduction/test_seeds.py",
     ),

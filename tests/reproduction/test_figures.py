@@ -6,7 +6,7 @@ import pytest
 from mrdamper.data import Condition
 from mrdamper.functions.fitting import fit_function
 from mrdamper.functions.forms import ParameterFunction, features
-from mrdamper.reproduction.figures import beside_current_law
+from mrdamper.reproduction.parameter_figures import beside_current_law
 
 CONDITIONS = [
     Condition(I, f, A) for f, A in ((1.0, 0.02), (2.0, 0.02), (0.5, 0.05), (1.5, 0.05)) for I in (0, 0.7, 2.0)

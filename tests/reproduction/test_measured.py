@@ -8,9 +8,12 @@ import pytest
 
 from mrdamper.data import Condition, Run
 from mrdamper.motion import measured_motion, sine, triangle
-from mrdamper.reproduction import claims
-from mrdamper.reproduction.claims import Measured, friction_along, judge_all, lost_length
-from mrdamper.reproduction.found import Ended
+from mrdamper.reproduction import claims, identified, tested
+from mrdamper.reproduction import found as found_module
+from mrdamper.reproduction.claims import judge_all
+from mrdamper.reproduction.found import Ended, function_of
+from mrdamper.reproduction.tested import friction_along, lost_length
+from mrdamper.reproduction.verdicts import Measured
 from mrdamper.reproduction.ways import ALI, CONSISTENT, DIRECT, LITERAL
 
 
@@ -89,67 +92,67 @@ def test_the_lost_length_ends_where_nine_tenths_of_the_force_beyond_the_viscous_
 def test_a_bulge_on_one_stroke_alone_is_seen_there():
     motion = sine(Condition(1.0, 1.0, 0.02), 4, 2000)
     run = Run("one", motion.time, motion.displacement, 300 * np.maximum(motion.velocity, 0) + 7.0, 1.0)
-    assert claims.bulge(run) == pytest.approx(1 / 0.6, rel=0.01)
+    assert tested.bulge(run) == pytest.approx(1 / 0.6, rel=0.01)
 
 
 def test_the_width_is_taken_at_one_place_of_both_strokes():
     motion = sine(Condition(1.0, 1.0, 0.02), 4, 2000)
     run = Run("one", motion.time, motion.displacement, (1 + motion.displacement / 0.02) * np.sign(motion.velocity), 1.0)
-    assert claims.bulge(run) == pytest.approx(2.0 / 3.6, rel=0.01)
+    assert tested.bulge(run) == pytest.approx(2.0 / 3.6, rel=0.01)
 
 
 def test_the_largest_spread_over_amplitudes_counts_and_three_motions_are_enough():
     conditions = [Condition(1.0, f, A) for f in (1.0, 2.0) for A in (0.01, 0.02)] + [Condition(0.5, 1.0, 0.03)]
-    assert claims.amplitude_spread(conditions, np.array([10.0, 12.0, 10.0, 17.0, 11.0])) == pytest.approx(7 / 12)
-    assert np.isnan(claims.amplitude_spread(conditions[-1:], np.array([10.0])))
+    assert identified.amplitude_spread(conditions, np.array([10.0, 12.0, 10.0, 17.0, 11.0])) == pytest.approx(7 / 12)
+    assert np.isnan(identified.amplitude_spread(conditions[-1:], np.array([10.0])))
     three = [Condition(I, f, 0.01) for I in (0.0, 1.0, 2.0) for f in (1.0, 2.0, 3.0)]
-    first, last = claims.scatter_over_motions(three, np.array([1.0, 2.0, 3.0, 0.0, 9.0, 0.0, 2.0, 4.0, 6.0]))
+    first, last = identified.scatter_over_motions(three, np.array([1.0, 2.0, 3.0, 0.0, 9.0, 0.0, 2.0, 4.0, 6.0]))
     assert last / first == pytest.approx(2.0)
-    assert np.isnan(claims.scatter_over_motions(three[:5], np.arange(5.0))[0])
+    assert np.isnan(identified.scatter_over_motions(three[:5], np.arange(5.0))[0])
     # A level with two motions does not count; two levels with three do.
-    found = claims.scatter_over_motions(three[1:], np.array([9.0, 0.0, 0.0, 9.0, 0.0, 2.0, 4.0, 6.0]))
+    found = identified.scatter_over_motions(three[1:], np.array([9.0, 0.0, 0.0, 9.0, 0.0, 2.0, 4.0, 6.0]))
     assert found == pytest.approx((np.std([0.0, 9.0, 0.0]), np.std([2.0, 4.0, 6.0])))
-    negative = claims.amplitude_spread(conditions, np.array([-10.0, -12.0, 10.0, 17.0, 11.0]))
+    negative = identified.amplitude_spread(conditions, np.array([-10.0, -12.0, 10.0, 17.0, 11.0]))
     assert negative == pytest.approx(7 / 12)
 
 
 def test_gas_and_friction_are_measured_where_they_were_tested():
     asked = []
     gas = SimpleNamespace(taylor_error=lambda X: asked.append(X) or 0.013)
-    found = claims._gas_series(study_of(gas=gas, loops=[loop(amplitude=A) for A in (0.02, 0.08, 0.05)]))
+    found = tested.gas_series(study_of(gas=gas, loops=[loop(amplitude=A) for A in (0.02, 0.08, 0.05)]))
     assert (asked, found.numbers) == ([0.08], {"error of the series over the gas force": 0.013})
     assert "±80 mm" in found.evidence
-    assert "not known" in claims._gas_series(study_of(gas=None)).evidence
+    assert "not known" in tested.gas_series(study_of(gas=None)).evidence
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(claims, "friction_along", lambda run: (None, np.array([30.0, 45.0, 90.0])))
+        patch.setattr(tested, "friction_along", lambda run: (None, np.array([30.0, 45.0, 90.0])))
         switches = SimpleNamespace(friction_test="filled")
-        found = claims._friction(study_of(friction=1, loops=[loop(peak=P) for P in (900.0, 550.0)], switches=switches))
+        found = tested.friction(study_of(friction=1, loops=[loop(peak=P) for P in (900.0, 550.0)], switches=switches))
     assert list(found.numbers.values()) == pytest.approx([30.0, 90.0, 55.0 / 550.0])
     assert found.evidence == "test with fluid"
-    assert claims._friction(study_of(friction=None)).numbers == {}
+    assert tested.friction(study_of(friction=None)).numbers == {}
 
 
 def test_shares_of_loops_and_of_steps_are_counted():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(claims, "bulge", lambda run: run)
-        found = claims._bulge(study_of(train=[0.9, 1.1, 1.2, 1.3]))
+        patch.setattr(tested, "bulge", lambda run: run)
+        found = tested.bulges(study_of(train=[0.9, 1.1, 1.2, 1.3]))
     assert found.numbers == {"share of loops wider at x = 0 than at 0.8 X": 0.75}
     assert found.evidence == "ratio of widths 0.90–1.30"
     energies = {(0.0, 1.0): 5.0, (1.0, 1.0): 9.0, (0.0, 2.0): 7.0, (1.0, 2.0): 9.5}
     loops = [loop(I, f, energy=E) for (I, f), E in energies.items()]
-    found = claims._energy(study_of(loops=loops))
+    found = tested.energy(study_of(loops=loops))
     assert list(found.numbers.values()) == [1.0, 1.0]
     assert found.evidence == "5–9.5 J a cycle"
-    falling = claims._energy(study_of(loops=[*loops, loop(2.0, 1.0, energy=1.0)][::-1]))
+    falling = tested.energy(study_of(loops=[*loops, loop(2.0, 1.0, energy=1.0)][::-1]))
     assert list(falling.numbers.values()) == pytest.approx([2 / 3, 1.0])
 
 
 def test_the_phase_counts_runs_in_the_band_and_the_motion_that_changes_most():
     conditions = [Condition(I, f, 0.02) for f in (1.0, 2.0) for I in (0.0, 1.0)] + [Condition(0.0, 0.5, 0.05)]
     readings = [SimpleNamespace(phase=p) for p in (1.41, 1.45, 1.45, 1.30, 1.2)]
-    above = claims._phase(study_of(conditions=conditions, readings=[*readings[:4], SimpleNamespace(phase=1.55)]))
+    above = tested.phase(study_of(conditions=conditions, readings=[*readings[:4], SimpleNamespace(phase=1.55)]))
     assert above.numbers["share of runs within 1.4–1.5 rad"] == 3 / 5
-    found = claims._phase(study_of(conditions=conditions, readings=readings))
+    found = tested.phase(study_of(conditions=conditions, readings=readings))
     assert list(found.numbers.values()) == pytest.approx([3 / 5, 0.15])
     assert found.evidence == f"1.200–1.450 rad; smallest sine {np.sin(1.2):.3f}"
 
@@ -161,9 +164,9 @@ def test_the_stroke_end_compares_the_fastest_with_the_slowest_motion_at_the_high
     consistent = SimpleNamespace(identifications=[SimpleNamespace(model=m) for m in models])
     lengths = {("slow", 100.0): 0.002, ("fast", 101.0): 0.005}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(claims, "lost_length", lambda run, c: lengths[run, c])
+        patch.setattr(tested, "lost_length", lambda run, c: lengths[run, c])
         study = study_of({CONSISTENT: consistent}, conditions=conditions, train=list(speeds))
-        found = claims._stroke_end(study)
+        found = tested.stroke_end(study)
     assert list(found.numbers.values()) == pytest.approx([2.5])
     assert found.evidence.startswith(
         "at 2 A 90 % of the force beyond the viscous one is back after 2.00 mm at 0.06 m/s"
@@ -171,7 +174,7 @@ def test_the_stroke_end_compares_the_fastest_with_the_slowest_motion_at_the_high
     assert found.evidence.endswith("after 5.00 mm at 0.25 m/s")
     alike = study_of({CONSISTENT: consistent}, conditions=[Condition(2.0, 1 + 0.05 * n, 0.02) for n in range(4)],
                      train=list(speeds))  # fmt: skip
-    assert claims._stroke_end(alike).evidence == "one speed at the highest current"
+    assert tested.stroke_end(alike).evidence == "one speed at the highest current"
 
 
 def test_a_claim_is_said_with_its_numbers_and_what_was_built_in_is_recovered():
@@ -201,11 +204,11 @@ def test_a_claim_is_said_with_its_numbers_and_what_was_built_in_is_recovered():
 
 
 def test_every_claim_points_to_a_figure_that_is_drawn_and_stands_once():
-    from mrdamper.reproduction.figures import _FIGURES
+    from mrdamper.reproduction.figures import FIGURES
 
     keys = [key for key, *_ in claims._CLAIMS]
     assert len(set(keys)) == len(keys) == 19
-    drawn = {name for name, *_ in _FIGURES} | {"", "sensitivity"}
+    drawn = {*FIGURES, ""}
     assert {figure for _, _, _, figure, *_ in claims._CLAIMS} <= drawn
     assert {key for key, _, _, _, built_in, _ in claims._CLAIMS if built_in} == {
         "gas series", "friction", "stroke end", "saturation",
@@ -214,8 +217,8 @@ def test_every_claim_points_to_a_figure_that_is_drawn_and_stands_once():
 
 def test_searches_are_judged_parameter_by_parameter_with_the_worst_beside():
     ends = ((2.0, 0.1, 1.0), (0.5, 8.0, 1.2), (3.0, 5.0, 1.1))
-    ended = [Ended(str(i), i, *end, 1.0) for i, end in enumerate(ends)]
-    found = claims._search(study_of(ended=ended))
+    ended = [Ended(str(i), i, *end, 9, 5, 1.0) for i, end in enumerate(ends)]
+    found = identified.search(study_of(ended=ended))
     assert found.numbers == pytest.approx(
         {"median factor by which α misses the optimum": 2.0, "median factor by which β misses the optimum": 8.0}
     )
@@ -225,11 +228,11 @@ def test_searches_are_judged_parameter_by_parameter_with_the_worst_beside():
 def test_what_cannot_be_measured_says_why():
     one = SimpleNamespace(identifications=(), held_out=SimpleNamespace(runs=()))
     for contenders in ({}, {LITERAL: one}, {ALI: one}, {LITERAL: one, ALI: one}):
-        assert "could not be followed" in claims._few_parameters(study_of(contenders)).evidence
+        assert "could not be followed" in identified.few_parameters(study_of(contenders)).evidence
     for contenders in ({}, {LITERAL: one}, {DIRECT: one}, {LITERAL: one, DIRECT: one}):
-        assert "no traditional" in claims._accuracy(study_of(contenders)).evidence
-        assert "no genetic searches" in claims._fast(study_of(contenders, ended=())).evidence
-    assert "could not be followed" in claims._generalisation(study_of({LITERAL: one})).evidence
+        assert "no traditional" in identified.accuracy(study_of(contenders)).evidence
+        assert "no genetic searches" in identified.fast(study_of(contenders, ended=(), direct=(7,))).evidence
+    assert "could not be followed" in identified.generalisation(study_of({LITERAL: one})).evidence
 
 
 @pytest.mark.parametrize("form", [None, "plane", "mass-power"])
@@ -237,18 +240,17 @@ def test_a_mass_that_was_held_or_has_another_function_is_not_judged(form):
     fit = form and SimpleNamespace(r2=0.95, function=SimpleNamespace(form=form))
     held = SimpleNamespace(identifications=[SimpleNamespace(model=SimpleNamespace(m=4.0))] * 2)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(claims, "_function", lambda study, name: fit)
-        found = claims._mass(study_of({LITERAL: held}, conditions=[Condition(0, 1, 1), Condition(0, 2, 1)]))
+        patch.setattr(identified, "function_of", lambda study, name: fit)
+        found = identified.mass(study_of({LITERAL: held}, conditions=[Condition(0, 1, 1), Condition(0, 2, 1)]))
     assert found.numbers == {}
     assert "m is held" in found.evidence
 
 
 def test_time_and_accuracy_are_ratios_of_ours_to_theirs():
-    ended = [Ended(name, 0, 1, 1, 1, seconds) for name, seconds in (("a", 1.0), ("b", 1.5), ("c", 6.5))]
-    direct = SimpleNamespace(identifications=(1, 2, 3, 4), seconds=6.0)
-    found = claims._fast(study_of({DIRECT: direct}, ended=ended))
+    ended = [Ended(name, 0, 1, 1, 1, 99, forces, 1.0) for name, forces in (("a", 10), ("b", 30), ("c", 90))]
+    found = identified.fast(study_of(ended=ended, direct=(10, 15, 90)))
     assert list(found.numbers.values()) == [2.0]
-    assert found.evidence.startswith("3.00 s against 1.50 s a run")
+    assert found.evidence.startswith("median 30 forces computed against 15")
     worst = {"scores": SimpleNamespace(nrmse_pp=0.174), "condition": Condition(2.0, 1.0, 0.08)}
     literal = SimpleNamespace(
         held_out=SimpleNamespace(runs=(1,), median=lambda: 0.156, worst=lambda: SimpleNamespace(**worst)), per_run=0.1
@@ -257,17 +259,17 @@ def test_time_and_accuracy_are_ratios_of_ours_to_theirs():
         held_out=SimpleNamespace(runs=(1,), median=lambda: 0.04, worst=lambda: SimpleNamespace(**worst)),
         numbers_per_run=8,
     )
-    found = claims._few_parameters(study_of({LITERAL: literal, ALI: ali}))
+    found = identified.few_parameters(study_of({LITERAL: literal, ALI: ali}))
     assert list(found.numbers.values()) == pytest.approx([3.9, 0.25])
     assert found.evidence.startswith("held out 15.6 % against 4.0 %; worst 17.4 % and 17.4 %; 2 searched against 8")
     ali.numbers_per_run = 1
-    assert claims._few_parameters(study_of({LITERAL: literal, ALI: ali})).numbers == pytest.approx(
+    assert identified.few_parameters(study_of({LITERAL: literal, ALI: ali})).numbers == pytest.approx(
         {"median held-out error over the Ali-type's": 3.9, "searched parameters a run over the Ali-type's": 2.0}
     )
     empty = SimpleNamespace(held_out=SimpleNamespace(runs=()))
     for pair in ({LITERAL: empty, ALI: ali}, {LITERAL: literal, ALI: empty}, {LITERAL: literal}, {ALI: ali}):
-        assert "no run is held out" in claims._few_parameters(study_of(pair)).evidence
-    found = claims._generalisation(study_of({LITERAL: literal}))
+        assert "no run is held out" in identified.few_parameters(study_of(pair)).evidence
+    found = identified.generalisation(study_of({LITERAL: literal}))
     assert list(found.numbers.values()) == pytest.approx([1.56, 0.174])
     assert found.evidence == "median 15.6 %, worst 17.4 % at 2 A, 1 Hz, 80 mm"
 
@@ -278,30 +280,30 @@ def test_slopes_of_the_saturation_are_in_newtons_an_ampere_and_motions_are_avera
         SimpleNamespace(amplitude=100 * c.frequency_Hz + 800 * min(c.current_A, 1.5) + 80 * max(c.current_A - 1.5, 0))
         for c in conditions
     ]
-    found = claims._saturation(study_of(conditions=conditions, readings=readings))
+    found = tested.saturation(study_of(conditions=conditions, readings=readings))
     assert list(found.numbers.values()) == pytest.approx([0.1])
     assert found.evidence == "F0 rises by 800 N/A up to 1 A and by 80 N/A above 1.5 A"
     some = [c for c in conditions if c.current_A <= 1.0]
-    assert "tested up to 1 A" in claims._saturation(study_of(conditions=some, readings=readings[:6])).evidence
+    assert "tested up to 1 A" in tested.saturation(study_of(conditions=some, readings=readings[:6])).evidence
 
 
 def test_two_currents_on_either_side_are_enough_for_the_saturation():
     conditions = [Condition(I, 1.0, 0.02) for I in (0.5, 1.0, 1.5, 2.0)]
     readings = [SimpleNamespace(amplitude=F) for F in (300.0, 700.0, 900.0, 980.0)]
-    found = claims._saturation(study_of(conditions=conditions, readings=readings))
+    found = tested.saturation(study_of(conditions=conditions, readings=readings))
     assert list(found.numbers.values()) == pytest.approx([0.2])
 
 
-def identified(**values):
+def made_of(**values):
     numbers = [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
     return SimpleNamespace(identifications=[SimpleNamespace(model=SimpleNamespace(**n), at_bounds=()) for n in numbers])
 
 
 def test_the_closed_form_is_compared_where_both_balances_were_followed():
-    both = {LITERAL: identified(c=[200.0, 300.0, 900.0]), CONSISTENT: identified(c=[100.0] * 3)}
-    assert list(claims._viscosity(study_of(both)).numbers.values()) == [3.0]
-    for pair in ({LITERAL: both[LITERAL], CONSISTENT: identified(c=[100.0])}, {CONSISTENT: both[CONSISTENT]}, {}):
-        assert "could not be followed" in claims._viscosity(study_of(pair)).evidence
+    both = {LITERAL: made_of(c=[200.0, 300.0, 900.0]), CONSISTENT: made_of(c=[100.0] * 3)}
+    assert list(identified.viscosity(study_of(both)).numbers.values()) == [3.0]
+    for pair in ({LITERAL: both[LITERAL], CONSISTENT: made_of(c=[100.0])}, {CONSISTENT: both[CONSISTENT]}, {}):
+        assert "could not be followed" in identified.viscosity(study_of(pair)).evidence
 
 
 def test_accuracy_is_compared_by_medians_of_the_runs_both_were_made_of():
@@ -313,31 +315,36 @@ def test_accuracy_is_compared_by_medians_of_the_runs_both_were_made_of():
         )
 
     pair = {LITERAL: errors(a=0.02, b=0.03, c=0.4, d=9.0), DIRECT: errors(c=0.3, b=0.01, a=0.02)}
-    assert claims._beside_direct(study_of(pair)) == pytest.approx((0.03, 0.02))
-    assert claims._beside_direct(study_of({LITERAL: errors(d=1.0), DIRECT: errors(a=1.0)})) is None
+    found = identified.accuracy(study_of(pair))
+    assert list(found.numbers.values()) == pytest.approx([1.5])
+    assert found.evidence.startswith("nrmse_pp 3.00 % against 2.00 %")
+    apart = {LITERAL: errors(d=1.0), DIRECT: errors(a=1.0)}
+    assert identified.accuracy(study_of(apart)).numbers == {}
 
 
 def test_functions_are_those_of_the_literal_recipe(monkeypatch):
     fit = SimpleNamespace(functions={"alpha": "its function"})
-    monkeypatch.setattr(claims, "ModifiedFit", SimpleNamespace)
-    assert claims._function(study_of({LITERAL: SimpleNamespace(fit=fit)}), "alpha") == "its function"
-    assert claims._function(study_of({LITERAL: SimpleNamespace(fit=fit)}), "beta") is None
-    assert claims._function(study_of({CONSISTENT: SimpleNamespace(fit=fit)}), "alpha") is None
-    assert claims._function(study_of({LITERAL: SimpleNamespace(fit=None)}), "alpha") is None
-    assert "too few motions" in claims._alpha(study_of()).evidence
-    assert "could not be followed" in claims._beta(study_of()).evidence
-    monkeypatch.setattr(claims, "_function", lambda study, name: SimpleNamespace(r2=0.9, function="any"))
-    assert "could not be followed" in claims._beta(study_of()).evidence
-    monkeypatch.setattr(claims, "_function", lambda study, name: SimpleNamespace(function=SimpleNamespace(form="tilt")))
-    assert "too few motions" in claims._alpha(study_of()).evidence
+    monkeypatch.setattr(found_module, "ModifiedFit", SimpleNamespace)
+    assert function_of(study_of({LITERAL: SimpleNamespace(fit=fit)}), "alpha") == "its function"
+    assert function_of(study_of({LITERAL: SimpleNamespace(fit=fit)}), "beta") is None
+    assert function_of(study_of({CONSISTENT: SimpleNamespace(fit=fit)}), "alpha") is None
+    assert function_of(study_of({LITERAL: SimpleNamespace(fit=None)}), "alpha") is None
+    assert "too few motions" in identified.alpha(study_of()).evidence
+    assert "could not be followed" in identified.beta(study_of()).evidence
+    monkeypatch.setattr(identified, "function_of", lambda study, name: SimpleNamespace(r2=0.9, function="any"))
+    assert "could not be followed" in identified.beta(study_of()).evidence
+    monkeypatch.setattr(
+        identified, "function_of", lambda study, name: SimpleNamespace(function=SimpleNamespace(form="tilt"))
+    )
+    assert "too few motions" in identified.alpha(study_of()).evidence
 
 
 def test_the_scatter_of_beta_is_that_of_its_logarithm(monkeypatch):
-    monkeypatch.setattr(claims, "_function", lambda study, name: SimpleNamespace(r2=0.9))
+    monkeypatch.setattr(identified, "function_of", lambda study, name: SimpleNamespace(r2=0.9))
     conditions = [Condition(I, f, 0.01) for I in (0.0, 1.0) for f in (1.0, 2.0, 3.0)]
     # Betas about one: the logarithm of one more would be another.
-    study = study_of({LITERAL: identified(beta=[0.1, 1.0, 10.0, 1.0, 2.0, 4.0])}, conditions=conditions)
-    found = claims._beta(study)
+    study = study_of({LITERAL: made_of(beta=[0.1, 1.0, 10.0, 1.0, 2.0, 4.0])}, conditions=conditions)
+    found = identified.beta(study)
     ratio = np.std(np.log([1.0, 2.0, 4.0])) / np.std(np.log([0.1, 1.0, 10.0]))
     assert list(found.numbers.values()) == pytest.approx([ratio, 0.9, 0.0])
 
@@ -345,7 +352,7 @@ def test_the_scatter_of_beta_is_that_of_its_logarithm(monkeypatch):
 def test_a_quadratic_needs_four_currents_at_a_motion():
     conditions = [Condition(I, 1.0, 0.02) for I in (0.0, 0.5, 1.0)] + [Condition(I, 3.0, 0.02) for I in (0.0, 1.0)]
     assert (
-        claims._motions_at(SimpleNamespace(conditions=conditions), 3)
+        tested._tested_at(SimpleNamespace(conditions=conditions), 3)
         == "1 of 2 motions were tested at 3 currents or more"
     )
-    assert claims._motions_at(SimpleNamespace(conditions=conditions), 4).startswith("0 of 2")
+    assert tested._tested_at(SimpleNamespace(conditions=conditions), 4).startswith("0 of 2")

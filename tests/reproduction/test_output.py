@@ -1,5 +1,6 @@
 """Tables of the reproduction by made results whose numbers are all different: each in its own column and row."""
 
+import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,8 +13,10 @@ from mrdamper.functions.forms import ParameterFunction
 from mrdamper.metrics import Scores
 from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
+from mrdamper.report.plots.style import Picture
 from mrdamper.reproduction import output
 from mrdamper.reproduction.claims import Claim
+from mrdamper.reproduction.figures import TIMES
 from mrdamper.reproduction.found import Ended, GeneticCheck
 from mrdamper.reproduction.output import verdicts
 from mrdamper.reproduction.sensitivity import OneAtATime, Sobol
@@ -42,7 +45,7 @@ def study(**more):
     given = dict(
         contenders=(contender("one", "paper", 0.1, 3.0), contender("two", "joint", 0.3, 5.0)),
         seed_errors={"two": np.array([0.31, 0.33, 0.38])}, seed_verdicts={}, loops=(), held_out=(), genetic=(),
-        ended=(),
+        ended=(), there={}, train=(), seconds=12.0,
         sensitivity=(), sobol=None, rig=None, switches=Switches(), conditions=(),
     )  # fmt: skip
     made = SimpleNamespace(**(given | more))
@@ -55,7 +58,7 @@ def test_table_5_holds_the_median_and_the_worst_of_the_held_out_runs():
     assert first == {
         "verdict": "paper (literal)", "method": "one", "numbers": 10, "nrmse_pp": pytest.approx(0.3),
         "worst_nrmse_pp": pytest.approx(0.6), "nrmse_std": pytest.approx(0.31), "wape": pytest.approx(0.32),
-        "mean_relative_error": pytest.approx(0.35), "per_run_nrmse_pp": pytest.approx(0.1 / 7), "seconds": 3.0,
+        "mean_relative_error": pytest.approx(0.35), "per_run_nrmse_pp": pytest.approx(0.1 / 7), "forces_a_run": None,
         "seeds": None, "seed_median_nrmse_pp": None, "seed_lowest_nrmse_pp": None, "seed_highest_nrmse_pp": None,
     }  # fmt: skip
     spread = [second[f"seed_{name}_nrmse_pp"] for name in ("lowest", "median", "highest")]
@@ -93,20 +96,20 @@ def test_table_4_holds_every_run_of_every_method_under_its_own_name():
 
 def test_everything_is_written_and_shown_in_its_place(monkeypatch, tmp_path):
     claim = Claim("phase", "text", "Eq. 1", "holds", "recovered", "1 rad", "limit", "fig12", "20 of 20")
-    page, saved = {}, {}
+    page, asked = {}, []
 
-    def save(figure, path, formats):
-        saved[path.name] = figure, formats
-        path.with_suffix(".svg").write_text("picture", encoding="utf-8")
-        return b"picture"
+    def drawn(study, also, names, progress):
+        asked.append((also, names))
+        return {name: "one motion" if name == "fig09" else Picture({"svg": name.encode()}) for name in names}
 
     def render(template, title, about, **given):
         page.update(given, template=template, about=about)
         return "<p>page</p>"
 
     monkeypatch.setattr(output, "judge_all", lambda study: (claim,))
-    monkeypatch.setattr(output, "figures", lambda study: ({"fig12": ("drawn", "the phase")}, {"fig09": "one motion"}))
-    monkeypatch.setattr(output, "save_figure", save)
+    figures = {"fig09": ("a loop", None), "fig12": ("the phase", None), TIMES: ("times", None)}
+    monkeypatch.setattr(output, "FIGURES", figures)
+    monkeypatch.setattr(output, "pictures", drawn)
     monkeypatch.setattr(output, "render_page", render)
     monkeypatch.setattr(output, "made_from", lambda dataset: f"from {dataset}")
     made = study(notes=("first",), seconds=12.4, dataset="rig 1", best="one")
@@ -116,20 +119,26 @@ def test_everything_is_written_and_shown_in_its_place(monkeypatch, tmp_path):
     assert written[0].read_text(encoding="utf-8") == "<p>page</p>"
     assert (tmp_path / "out" / "figures" / "fig12.svg").is_file()
     assert (tmp_path / "out" / "tables" / "claims.csv").read_text(encoding="utf-8").startswith("key,text,source")
-    assert saved == {"fig12": ("drawn", ())}
-    assert page["pictures"] == {"fig12": ("the phase", b"picture")}
+    assert (tmp_path / "out" / "figures" / f"{TIMES}.svg").is_file()
+    assert [also for also, _ in asked] == [(), ()]
+    assert sorted(name for _, names in asked for name in names) == sorted(figures)
+    assert page["pictures"] == {"fig12": ("the phase", b"fig12")}
     tables, absent = output._tables(made, (claim,))
     assert page["tables"] == tables
     assert page["claims"] == (claim,)
     missing = [f"{name} is not made: {why}" for name, why in absent.items()]
     assert page["notes"] == ("first", "fig09 is not drawn: one motion", *missing)
     assert (page["study"], page["best"], page["synthetic"]) == (made, "one", False)
-    assert page["about"].startswith("from rig 1; computed in 12 s.")
+    assert page["about"].startswith("from rig 1. Reference")
+    times = (tmp_path / "out" / "tables" / "table5_times.csv").read_text(encoding="utf-8").splitlines()
+    assert times[1:] == ["one,0,3.0,3.0", "two,0,5.0,5.0", "in all,0,12.4,"]
+    facts = json.loads((tmp_path / "out" / "made.json").read_text(encoding="utf-8"))
+    assert facts["seconds"] == {"in all": 12.4, "one": 3.0, "two": 5.0}
     assert told[-1] == ("written", 1.0)
     made.rig = VirtualRig()
     output.write_reproduction(made, tmp_path / "out", png=True)
     assert page["synthetic"]
-    assert saved["fig12"] == ("drawn", ("png",))
+    assert asked[-1][0] == ("png",)
 
 
 def test_tests_and_searches_stand_in_their_columns():
@@ -137,18 +146,18 @@ def test_tests_and_searches_stand_in_their_columns():
                            dissipated_energy=33.0)  # fmt: skip
     minimum = SimpleNamespace(evaluations=123, point=np.array([4e5, 7e6]))
     check = GeneticCheck(Condition(1.0, 1.5, 0.05), minimum, 21.0, 20.0, 8.0)
-    made, _ = tables(loops=(loop,), genetic=(check,), ended=(Ended("a", 3, 1.5, 0.2, 1.01, 0.7),))
+    made, _ = tables(loops=(loop,), genetic=(check,), ended=(Ended("a", 3, 1.5, 0.2, 1.01, 420, 90, 0.7),))
     assert made["table1_tests"] == [
         {"run_id": "a", "split": "train", "current_A": 0.5, "frequency_Hz": 2.0, "amplitude_m": 0.03,
          "peak_force_N": 900.0, "dissipated_energy_J": 33.0}
     ]  # fmt: skip
     assert made["genetic"] == [
         {"current_A": 1.0, "frequency_Hz": 1.5, "amplitude_m": 0.05, "reached_rmse_N": 21.0, "least_rmse_N": 20.0,
-         "evaluations": 123, "seconds": 8.0, "alpha": 4e5, "beta": 7e6}
+         "evaluations": 123, "alpha": 4e5, "beta": 7e6}
     ]  # fmt: skip
     assert made["genetic_runs"] == [
         {"run_id": "a", "seed": 3, "alpha_over_optimum": 1.5, "beta_over_optimum": 0.2, "error_over_least": 1.01,
-         "seconds": 0.7}
+         "forces": 420, "forces_to_settle": 90}
     ]  # fmt: skip
 
 
@@ -191,13 +200,13 @@ def test_parameters_at_the_held_out_condition_are_listed_way_by_way(monkeypatch)
     def refuses(_):
         raise ExcitationError("no sine")
 
+    there = {(LITERAL, "h0"): SimpleNamespace(model=identified), (CONSISTENT, "h0"): "no sine"}
     ways = [contender(LITERAL, "paper", 0.1, 1.0), contender("tanh", "literature", 0.2, 1.0)]
     ways += [contender(CONSISTENT, "consistent", 0.1, 1.0), contender("broken", "joint", 0.1, 1.0)]
     ways[0].damper.model_at, ways[1].damper.model_at = lambda at: predicted, lambda at: Bingham(fy=1.0, c=1.0, f0=0.0)
     ways[2].damper.model_at, ways[3].damper.model_at = lambda at: predicted, refuses
-    ways[0].recipe.basis = SimpleNamespace(identify=lambda run: SimpleNamespace(model=identified))
-    ways[2].recipe.basis = SimpleNamespace(identify=refuses)
-    rows = output.parameter_rows(study(contenders=ways, held_out=(SimpleNamespace(id="h0"),), switches=Switches(A=2.0)))
+    held = (SimpleNamespace(id="h0"),)
+    rows = output.parameter_rows(study(contenders=ways, held_out=held, switches=Switches(A=2.0), there=there))
     told = [(r["method"], r["values"], r["run_id"], r["current_A"], r["c [N s/m]"], r["alpha [N/m]"]) for r in rows]
     assert told == [
         (LITERAL, "by the functions", "h0", 1.5, 1000.0, 2e5),
@@ -205,12 +214,11 @@ def test_parameters_at_the_held_out_condition_are_listed_way_by_way(monkeypatch)
         (LITERAL, "identified there", "h0", 1.5, 900.0, 1.5e5),
     ]
     assert (rows[0]["beta [m^-n]"], rows[0]["A [-]"], rows[0]["amplitude_m"]) == (3e6, 2.0, 0.08)
-    ways[2].recipe.basis = SimpleNamespace(identify=lambda run: SimpleNamespace(model=predicted))
-    held = (SimpleNamespace(id="h0"),)
-    rows = output.parameter_rows(study(contenders=ways, held_out=held))
-    there = [(r["method"], r["c [N s/m]"]) for r in rows if r["values"] == "identified there"]
-    assert there == [(LITERAL, 900.0), (CONSISTENT, 1000.0)]
-    rows = output.parameter_rows(study(contenders=ways[:2], held_out=held))
+    there[CONSISTENT, "h0"] = SimpleNamespace(model=predicted)
+    rows = output.parameter_rows(study(contenders=ways, held_out=held, there=there))
+    shown = [(r["method"], r["c [N s/m]"]) for r in rows if r["values"] == "identified there"]
+    assert shown == [(LITERAL, 900.0), (CONSISTENT, 1000.0)]
+    rows = output.parameter_rows(study(contenders=ways[:2], held_out=held, there=there))
     assert [r["method"] for r in rows] == [LITERAL, LITERAL]
     _, absent = tables(contenders=ways[1:2], held_out=held)
     assert absent["table3_parameters"] == "the data allow no row of it"
@@ -225,7 +233,7 @@ def test_a_program_reads_verdicts_and_whether_the_data_are_synthetic(monkeypatch
         {"claim": "text", "verdict": "holds", "said": "recovered", "evidence": "1 rad", "threshold": "limit",
          "seeds": "20 of 20"}
     ]  # fmt: skip
-    assert (found["synthetic"], found["notes"], found["seconds"]) == (False, ["one"], 12.0)
+    assert (found["synthetic"], found["notes"], found["times"][-1]["seconds"]) == (False, ["one"], 12.0)
     assert found["verdicts"] == verdicts(made)
     made.rig = VirtualRig()
     assert output.summary(made)["synthetic"]

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from mrdamper.reproduction import seeds
-from mrdamper.reproduction.seeds import Seed, one_seed, over_seeds
+from mrdamper.reproduction.seeds import Seed, by_seed, one_seed
 from mrdamper.reproduction.switches import Switches
 from mrdamper.reproduction.verdicts import LIMITS, steadiness
 from mrdamper.reproduction.virtual_rig import VirtualRig
 from mrdamper.reproduction.ways import CONSISTENT, LITERAL
-from mrdamper.study.parallel import HERE
 
 
 @pytest.mark.parametrize(
@@ -29,20 +28,13 @@ def test_a_verdict_is_counted_beside_those_of_other_seeds(verdict, others, said)
     assert steadiness(verdict, others) == said
 
 
-def test_every_seed_is_asked_once_and_its_numbers_stay_its_own(monkeypatch):
-    asked = []
-
-    def one(rig, switches, seed, progress):
-        asked.append(seed)
-        return Seed({"a": seed / 10, "b": seed / 100}, {"phase": f"said {seed}"})
-
-    monkeypatch.setattr(seeds, "one_seed", one)
-    errors, verdicts = over_seeds(VirtualRig(), Switches(), 3, HERE, lambda what, share: None)
-    assert asked == [1, 2, 3]
+def test_every_seed_keeps_its_numbers():
+    found = [Seed({"a": n / 10, "b": n / 100}, {"phase": f"said {n}"}) for n in (1, 2, 3)]
+    errors, verdicts = by_seed(found)
     assert np.array_equal(errors["a"], [0.1, 0.2, 0.3])
     assert np.array_equal(errors["b"], [0.01, 0.02, 0.03])
     assert verdicts == {"phase": ("said 1", "said 2", "said 3")}
-    assert over_seeds(VirtualRig(), Switches(), 0, HERE, lambda what, share: None) == ({}, {})
+    assert by_seed([]) == ({}, {})
 
 
 @pytest.mark.parametrize("friction", ["dry", "filled"])

@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from mrdamper.data import Condition, Dataset, Floats, Run
+import numpy as np
+
+from mrdamper.dampers.modified import ModifiedFit
+from mrdamper.data import Condition, Dataset, Floats, Run, same_motion
+from mrdamper.functions.fitting import FunctionFit
 from mrdamper.gas_spring import GasSpring
 from mrdamper.identification import Identification
 from mrdamper.identification.harmonic_balance import ForceReading
@@ -14,7 +18,10 @@ from mrdamper.optimizers.genetic import GeneticMinimum
 from mrdamper.reproduction.sensitivity import OneAtATime, Sobol
 from mrdamper.reproduction.switches import Switches
 from mrdamper.reproduction.virtual_rig import VirtualRig
+from mrdamper.reproduction.ways import LITERAL
 from mrdamper.study.recipe import Scored
+
+SAME = 0.08  # relative tolerance within which two runs have one motion
 
 
 @dataclass(frozen=True)
@@ -130,8 +137,51 @@ class Reproduction:
         """The contender of that title, where the data allowed it."""
         return next((c for c in self.contenders if c.recipe.title == title), None)
 
+    def named(self, *titles: str) -> list[Scored]:
+        """The contenders of these titles, where the data allowed them."""
+        return [c for title in titles if (c := self.contender(title))]
+
     @property
     def best(self) -> Scored | None:
         """The contender that predicts the held-out runs best, where there are any."""
         judged = [c for c in self.contenders if c.held_out.runs]
         return min(judged, key=lambda c: c.held_out.median(), default=None)
+
+
+def motions(study: Reproduction) -> list[list[int]]:
+    """Indices of the train runs of every motion, by rising current."""
+    groups = same_motion(study.conditions, tolerance=SAME)
+    return [sorted(group, key=lambda i: study.conditions[i].current_A) for group in groups]
+
+
+def amplitudes(study: Reproduction) -> Floats:
+    """F0 of the train runs [N]."""
+    return np.array([r.amplitude for r in study.readings])
+
+
+def values(study: Reproduction, title: str, name: str) -> Floats:
+    """A parameter of a contender's identifications [SI]; empty where there are none."""
+    contender = study.contender(title)
+    return np.array([float(getattr(i.model, name)) for i in (contender.identifications if contender else ())])
+
+
+def function_of(study: Reproduction, name: str) -> FunctionFit | None:
+    """The function of a parameter by the literal recipe, if there is one."""
+    contender = study.contender(LITERAL)
+    fit = contender.fit if contender else None
+    return fit.functions.get(name) if isinstance(fit, ModifiedFit) else None
+
+
+def forces_a_run(study: Reproduction, way: Scored) -> float:
+    """Forces computed to identify from one run, median; the paper's own way by its genetic search."""
+    counts = [i.evaluations for i in way.identifications]
+    if way.recipe.title == LITERAL and study.ended:
+        counts = [end.forces for end in study.ended]
+    return float(np.median(counts)) if counts else float("nan")
+
+
+def seconds_a_run(study: Reproduction, way: Scored) -> float:
+    """Time of an identification with its share of the fit over conditions; the paper's own by its genetic search."""
+    if way.recipe.title == LITERAL and study.ended:
+        return float(np.mean([end.seconds for end in study.ended]))
+    return way.seconds / max(len(way.identifications), 1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +17,13 @@ from mrdamper.identification.harmonic_balance import SineRecord
 from mrdamper.models import Model
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.report.page import made_from, render_page
-from mrdamper.report.plots.style import save_figure
+from mrdamper.report.plots.style import Picture
 from mrdamper.report.tables import identification_rows
 from mrdamper.reproduction.claims import Claim, judge_all
-from mrdamper.reproduction.figures import figures
-from mrdamper.reproduction.found import Reproduction
+from mrdamper.reproduction.figures import FIGURES, TIMES, pictures
+from mrdamper.reproduction.found import Reproduction, forces_a_run, seconds_a_run
 from mrdamper.reproduction.ways import CONSISTENT, LITERAL
+from mrdamper.study.parallel import HERE, Processes
 from mrdamper.study.recipe import Progress
 
 _GROUPS = {
@@ -36,7 +37,12 @@ Rows = list[dict[str, Any]]
 
 
 def write_reproduction(
-    study: Reproduction, folder: str | Path, progress: Progress = lambda what, share: None, *, png: bool = False
+    study: Reproduction,
+    folder: str | Path,
+    progress: Progress = lambda what, share: None,
+    *,
+    png: bool = False,
+    processes: Processes = HERE,
 ) -> list[Path]:
     """Write reproduction.html, tables/ and figures/.
 
@@ -49,6 +55,8 @@ def write_reproduction(
         Told what is being done and the share done.
     png : bool
         Every figure as PNG beside the SVG.
+    processes : Processes
+        Where figures are drawn.
 
     Returns
     -------
@@ -60,26 +68,45 @@ def write_reproduction(
     OutputError
         If the folder cannot be written to.
     """
-    progress("claims", 0.0)
     claims = judge_all(study)
-    drawn, missing = figures(study)
-    notes = tuple(f"{name} is not drawn: {why}" for name, why in missing.items())
+    names, each = tuple(FIGURES), 2 * processes.count
+    drawn: dict[str, Picture | str] = {}
+    for part in processes.map(
+        partial(pictures, study, ("png",) if png else ()), [names[n::each] for n in range(each)], progress
+    ):
+        drawn |= part
     tables, absent = _tables(study, claims)
-    notes += tuple(f"{name} is not made: {why}" for name, why in absent.items())
+    notes = [f"{name} is not drawn: {drawn[name]}" for name in names if isinstance(drawn[name], str)]
+    notes += [f"{name} is not made: {why}" for name, why in absent.items()]
 
     def fill(work: Path) -> None:
         (work / "figures").mkdir()
         (work / "tables").mkdir()
-        pictures = {}
-        for number, (name, (figure, caption)) in enumerate(drawn.items()):
-            progress(f"figure {name}", 0.2 + 0.8 * number / len(drawn))
-            pictures[name] = caption, save_figure(figure, work / "figures" / name, ("png",) if png else ())
-        for name, rows in tables.items():
+        shown = {}
+        for name in names:
+            picture = drawn[name]
+            if isinstance(picture, Picture):
+                shown[name] = FIGURES[name][0], picture.save(work / "figures" / name)
+        shown.pop(TIMES, None)
+        for name, rows in (tables | {"table5_times": time_rows(study)}).items():
             (work / "tables" / f"{name}.csv").write_text(csv_text(rows), encoding="utf-8")
-        page = _page(study, claims, tables, pictures, (*study.notes, *notes))
+        page = render_page(
+            "reproduction.html.j2",
+            "The method of Qian et al. 2024, claim by claim",
+            f"{made_from(study.dataset)}. "
+            "Reference: Qian, Wang, Jiang, Zhang, Zhai, Wang (2024), Actuators 13(8), 297.",
+            study=study,
+            claims=claims,
+            tables=tables,
+            pictures=shown,
+            notes=(*study.notes, *notes),
+            best=study.best,
+            synthetic=study.rig is not None,
+        )
         (work / "reproduction.html").write_text(page, encoding="utf-8")
 
-    written = publish(folder, "reproduction.html", fill)
+    took = {contender.recipe.title: contender.seconds for contender in study.contenders}
+    written = publish(folder, "reproduction.html", fill, {"seconds": {"in all": study.seconds, **took}})
     progress("written", 1.0)
     return written
 
@@ -102,7 +129,7 @@ def summary(study: Reproduction) -> dict[str, Any]:
         "verdicts": verdicts(study),
         "claims": claims,
         "notes": list(study.notes),
-        "seconds": study.seconds,
+        "times": time_rows(study),
     }
 
 
@@ -124,7 +151,7 @@ def verdicts(study: Reproduction) -> Rows:
                 "wape": median("wape"),
                 "mean_relative_error": median("mean_relative_error"),
                 "per_run_nrmse_pp": contender.per_run,
-                "seconds": contender.seconds,
+                "forces_a_run": forces_a_run(study, contender) if contender.identifications else None,
                 "seeds": None if spread is None else spread.size,
                 "seed_median_nrmse_pp": None if spread is None else float(np.median(spread)),
                 "seed_lowest_nrmse_pp": None if spread is None else float(spread.min()),
@@ -132,6 +159,21 @@ def verdicts(study: Reproduction) -> Rows:
             }
         )
     return rows
+
+
+def time_rows(study: Reproduction) -> Rows:
+    """What the study took here, way by way and search by search: no other table differs from run to run."""
+    rows = [
+        {"what": c.recipe.title, "runs": len(c.identifications), "seconds": c.seconds,
+         "seconds_a_run": seconds_a_run(study, c)}
+        for c in study.contenders
+    ]  # fmt: skip
+    for number, check in enumerate(study.genetic, 1):
+        rows.append(
+            {"what": f"genetic search {number}, {check.condition}", "runs": 1, "seconds": check.seconds,
+             "seconds_a_run": check.seconds}
+        )  # fmt: skip
+    return [*rows, {"what": "in all", "runs": len(study.train), "seconds": study.seconds, "seconds_a_run": None}]
 
 
 def _tables(study: Reproduction, claims: tuple[Claim, ...]) -> tuple[dict[str, Rows], dict[str, str]]:
@@ -160,13 +202,13 @@ def _tables(study: Reproduction, claims: tuple[Claim, ...]) -> tuple[dict[str, R
         "sensitivity": _sensitivity_rows(study),
         "genetic": [
             {**_condition(g.condition), "reached_rmse_N": g.reached, "least_rmse_N": g.optimum,
-             "evaluations": g.minimum.evaluations, "seconds": g.seconds, "alpha": float(g.minimum.point[0]),
+             "evaluations": g.minimum.evaluations, "alpha": float(g.minimum.point[0]),
              "beta": float(g.minimum.point[1])}
             for g in study.genetic
         ],
         "genetic_runs": [
             {"run_id": e.run_id, "seed": e.seed, "alpha_over_optimum": e.alpha, "beta_over_optimum": e.beta,
-             "error_over_least": e.error, "seconds": e.seconds}
+             "error_over_least": e.error, "forces": e.forces, "forces_to_settle": e.to_settle}
             for e in study.ended
         ],
         "seeds": [
@@ -265,25 +307,3 @@ def _sensitivity_rows(study: Reproduction) -> Rows:
 
 def _condition(condition: Condition) -> dict[str, float]:
     return {name: float(getattr(condition, name)) for name in ("current_A", "frequency_Hz", "amplitude_m")}
-
-
-def _page(
-    study: Reproduction,
-    claims: tuple[Claim, ...],
-    tables: Mapping[str, Rows],
-    pictures: Mapping[str, tuple[str, bytes]],
-    notes: tuple[str, ...],
-) -> str:
-    return render_page(
-        "reproduction.html.j2",
-        "The method of Qian et al. 2024, claim by claim",
-        f"{made_from(study.dataset)}; computed in {study.seconds:.0f} s. "
-        "Reference: Qian, Wang, Jiang, Zhang, Zhai, Wang (2024), Actuators 13(8), 297.",
-        study=study,
-        claims=claims,
-        tables=tables,
-        pictures=pictures,
-        notes=notes,
-        best=study.best,
-        synthetic=study.rig is not None,
-    )

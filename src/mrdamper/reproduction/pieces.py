@@ -112,7 +112,7 @@ def followed(
     """`follow_all` from what is identified already, a recipe a piece; the joint fit takes longest."""
     order = sorted(steps, key=lambda step: step[0].title != JOINT)
     pieces = [
-        (recipe, runs, {key: found[key] for run in runs if (key := (recipe.basis, run.id)) in found})
+        (recipe, runs, {(b, run.id): found[b, run.id] for run in runs if (b := recipe.basis) and (b, run.id) in found})
         for recipe, runs in order
     ]
     done = processes.map(partial(_follow, held_out), pieces, progress)
@@ -136,12 +136,12 @@ def searches_of(train: Sequence[Run], settled: Settled, switches: Switches) -> d
     }
 
 
-def ended(searches: Mapping[str, Basis], optimum: Basis, made: FromRun) -> tuple[Ended, ...]:
+def ended(searches: Mapping[str, Basis], optimum: Basis | None, made: FromRun) -> tuple[Ended, ...]:
     """Where the searches ended, over the optimum of the same runs."""
     ends = []
     for run_id, basis in searches.items():
         one, seconds = made.found[basis, run_id]
-        best, _ = made.found.get((optimum, run_id), ("", 0.0))
+        best, _ = made.found[optimum, run_id] if optimum else ("", 0.0)
         if isinstance(one, str) or isinstance(best, str) or one.seed is None:
             continue
         a, b = (getattr(one.model, name) / getattr(best.model, name) for name in ("alpha", "beta"))

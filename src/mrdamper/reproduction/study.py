@@ -127,7 +127,10 @@ def reproduce(
         readings=tuple(read_force(SineRecord.of(run)) for run in train),
         contenders=tuple(contenders),
         there={
-            (title, run.id): made.found[bases[title], run.id][0] for title in (LITERAL, CONSISTENT) for run in held_out
+            (title, run.id): made.found[basis, run.id][0]
+            for title in (LITERAL, CONSISTENT)
+            for run in held_out
+            if (basis := bases[title])
         },
         genetic=tuple(one for one in done if isinstance(one, GeneticCheck)),
         ended=ended(searches, bases[LITERAL], made),

@@ -11,9 +11,11 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Literal
+
+import numpy as np
 
 from mrdamper.errors import UnknownNameError
 
@@ -115,13 +117,39 @@ LIMITS: Mapping[str, tuple[Limit, ...]] = MappingProxyType(
             _below("median held-out error over the Ali-type's", 1.1, 1.5),
             _below("searched parameters a run over the Ali-type's", 0.99),
         ),
-        "fast": (_below("time of an identification over that of the traditional Bouc–Wen", 0.99, 1.5),),
+        "fast": (_below("forces until within 1 % of the search's end, over the traditional Bouc–Wen's", 0.99, 1.5),),
         "generalisation": (
             _below("median held-out error over the median error of identification", 1.5, 2.5),
             _below("worst held-out error, nrmse_pp", 0.1, 0.2),
         ),
     }
 )
+
+
+@dataclass(frozen=True)
+class Measured:
+    """The numbers a claim rests on.
+
+    Attributes
+    ----------
+    numbers : mapping of str to float
+        By the words of the claim's limits; empty where it cannot be judged.
+    evidence : str
+        More of what was found, or why nothing could be.
+    """
+
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    evidence: str = ""
+
+
+def measured(key: str, *values: float | np.floating, evidence: str = "") -> Measured:
+    """The numbers of a claim in the order of its limits."""
+    return Measured({limit.number: float(v) for limit, v in zip(LIMITS[key], values, strict=True)}, evidence)
+
+
+def unknown(why: str) -> Measured:
+    """No numbers, and the reason."""
+    return Measured(evidence=why)
 
 
 def judge(key: str, numbers: Mapping[str, float]) -> Verdict:

@@ -40,6 +40,7 @@ class Processes:
     """Where independent pieces of work are done: here, and in a pool beside it if there is one. `several` makes one."""
 
     pool: Executor | None = None
+    count: int = 1
 
     def map(
         self,
@@ -81,7 +82,7 @@ def several(count: int) -> Iterator[Processes]:
         yield HERE
         return
     with processes(count - 1) as pool:
-        yield Processes(pool)
+        yield Processes(pool, count)
 
 
 def _done(future: Future[Any]) -> bool:

@@ -67,7 +67,9 @@ def register(app: typer.Typer) -> None:
                 processes=processes,
                 progress=lambda what, share: progress(what, 0.85 * share),
             )
-            written = write_reproduction(study, out, lambda what, share: progress(what, 0.85 + 0.15 * share), png=png)
+            written = write_reproduction(
+                study, out, lambda what, share: progress(what, 0.85 + 0.15 * share), png=png, processes=processes
+            )
         found = summary(study)
         if as_json:
             print(json.dumps(found | {"files": [str(p) for p in written]}, indent=1))
@@ -75,10 +77,10 @@ def register(app: typer.Typer) -> None:
         if study.rig is not None:
             print("virtual rig: every number is synthetic")
         print(f"  {'held out, nrmse_pp':52}{'median':>9}{'worst':>9}{'s':>8}")
-        for row in found["verdicts"]:
+        for row, took in zip(found["verdicts"], found["times"], strict=False):
             errors = (row["nrmse_pp"], row["worst_nrmse_pp"])
             shown = "".join(f"{'–':>9}" if error is None else f"{100 * error:7.2f} %" for error in errors)
-            print(f"  {row['method']:52}{shown}{row['seconds']:8.1f}")
+            print(f"  {row['method']:52}{shown}{took['seconds']:8.1f}")
         for claim in found["claims"]:
             print(f"  {claim['said']:20} {claim['claim']}")
         print(f"page: {written[0]}")
