@@ -40,12 +40,15 @@ COMMANDS = {
     "compare": ("m", "compare ../data{n} --models bingham --models biviscous --out m"),
     "certainty": ("sure", "certainty ../study{n}/model.json ../data{n} --out sure"),
     "report": ("r", "report ../data{n} --out r"),
-    "plan": ("plan", "plan --limits ../limits.toml --hours {n} --out plan"),
+    "plan": ("plan", "plan --limits ../limits.toml --hours 0.{n} --out plan"),
     "simulate": (
         "ride",
-        "simulate quarter-car --input bump --damper ../model{n}.json --current 0.5 --step 0.01 --out ride",
+        "simulate quarter-car --input bump --damper ../model.json --current 0.{n} --step 0.002 --out ride",
     ),
-    "law": ("law", "simulate quarter-car --input bump --damper ../model{n}.json --step 0.01 --control skyhook --c law"),
+    "law": (
+        "law",
+        "simulate quarter-car --input bump --damper ../model.json --current 0.{n} --step 0.002 --control skyhook --c law",
+    ),
     "reproduce": ("claims", "reproduce --data ../data{n} --no-comparators --jobs 1 --out claims"),
 }
 _CHANGE = ("add", "split")  # what they find there: a copy of the first dataset

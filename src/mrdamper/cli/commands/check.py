@@ -108,7 +108,7 @@ def _require_format(figure: Path) -> None:
 def _draw(verdicts: Sequence[Quality], path: Path) -> None:
     from mrdamper.files.atomic import write_file
     from mrdamper.report.plots.quality import LoopPanel, quality_figure
-    from mrdamper.report.plots.style import house_style
+    from mrdamper.report.plots.style import HOW_SAVED, house_style
     from mrdamper.rig_files.quality.flat import flagged_samples
     from mrdamper.rig_files.quality.view import View
 
@@ -124,4 +124,4 @@ def _draw(verdicts: Sequence[Quality], path: Path) -> None:
         for verdict in verdicts
     ]
     with house_style(), write_file(path) as target:
-        quality_figure(panels).savefig(target)
+        quality_figure(panels).savefig(target, **HOW_SAVED[path.suffix.lower()[1:]])
