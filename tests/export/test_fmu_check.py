@@ -51,8 +51,14 @@ def in_function(name, code):
     return change
 
 
-@pytest.mark.parametrize("fmi", FMIS)
-@pytest.mark.parametrize("name", [n if n in FEW else pytest.param(n, marks=pytest.mark.slow) for n in DAMPERS])
+@pytest.mark.parametrize(
+    ("name", "fmi"),
+    [
+        (n, fmi) if (fmi == 3 and n in FEW) or n == "joint" else pytest.param(n, fmi, marks=pytest.mark.slow)
+        for n in DAMPERS
+        for fmi in FMIS
+    ],
+)
 def test_a_sound_fmu_passes(check, name, fmi):
     assert check(fmu_bytes(name, fmi)) == (set(), "")
 
@@ -94,7 +100,7 @@ def test_a_missing_symbol_is_caught(check, fmi, symbol):
     assert f"lacks {name.decode()}" in text
 
 
-@pytest.mark.parametrize("garbage", [b"", b"\x7fELF", b"MZ" + bytes(4000), bytes(range(256)) * 40])
+@pytest.mark.parametrize("garbage", [b"", b"MZ" + bytes(4000)])
 def test_a_garbage_binary_is_caught(check, garbage):
     files = unpacked(fmu_bytes("joint", 3))
     codes, text = check({**files, binary_of(files): garbage})
@@ -102,11 +108,10 @@ def test_a_garbage_binary_is_caught(check, garbage):
     assert "cannot be loaded" in text
 
 
-@pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
-def test_a_binary_cut_short_is_caught(check, share):
+def test_a_binary_cut_short_is_caught(check):
     files = unpacked(fmu_bytes("joint", 3))
     whole = files[binary_of(files)]
-    codes, _ = check({**files, binary_of(files): whole[: int(share * len(whole))]})
+    codes, _ = check({**files, binary_of(files): whole[: len(whole) // 2]})
     assert codes == {"E_FMU_BINARY"}
 
 
@@ -158,7 +163,6 @@ def test_a_changed_reference_is_caught_even_with_a_new_token(check, which):
         (None, "cannot be read"),
         (b"time,force\n0,1\n", "do not fit"),
         (b"time,force\n0,x\n", "cannot be read"),
-        (b"\xff\xfe", "cannot be read"),
     ],
 )
 def test_a_reference_that_is_none_is_caught(check, content, found):

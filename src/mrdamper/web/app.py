@@ -31,6 +31,7 @@ from mrdamper.web.sessions import Sessions
 from mrdamper.web.work import refusal
 
 _SWEEP_SECONDS = 60.0
+_TWO_ARENAS = (-8, 2)  # M_ARENA_MAX
 _STATUS = {"E_SESSION": 410, "E_DROP_SIZE": 413}
 
 
@@ -64,6 +65,7 @@ def create_app(
 
     @asynccontextmanager
     async def life(app: FastAPI) -> AsyncIterator[None]:
+        _of_the_allocator("mallopt", *_TWO_ARENAS)  # one a thread would keep what each has once held
         sweeper = asyncio.create_task(_sweep(sessions))
         yield
         sweeper.cancel()
@@ -120,9 +122,14 @@ async def _sweep(sessions: Sessions) -> None:
 def _give_memory_back() -> None:
     """What ended sessions held goes back to the system: the allocator would keep it."""
     gc.collect()
+    _of_the_allocator("malloc_trim", 0)
+
+
+def _of_the_allocator(name: str, *arguments: int) -> None:
+    """Call one of its functions, where this system's C library has it."""
     if sys.platform == "linux":
-        with contextlib.suppress(OSError, AttributeError):  # a C library that knows no trim
-            ctypes.CDLL(None).malloc_trim(0)
+        with contextlib.suppress(OSError, AttributeError):
+            getattr(ctypes.CDLL(None), name)(*arguments)
 
 
 def _refuse(request: Request, error: Exception) -> JSONResponse:

@@ -35,7 +35,8 @@ def frame(head: Mapping[str, Any], arrays: Mapping[str, Floats]) -> Response:
     index = [[name, int(values.size)] for name, values in arrays.items()]
     text = json.dumps({**head, "arrays": index}, ensure_ascii=False, allow_nan=False).encode()
     text += b" " * (-len(text) % _STEP)
-    body = b"".join(np.ascontiguousarray(values, dtype="<f4").tobytes() for values in arrays.values())
+    with np.errstate(over="ignore"):  # of single precision: drawn as infinite, which is no point
+        body = b"".join(np.ascontiguousarray(values, dtype="<f4").tobytes() for values in arrays.values())
     return Response(struct.pack("<I", len(text)) + text + body, media_type="application/octet-stream")
 
 
