@@ -6,6 +6,7 @@ import io
 import numpy as np
 import pytest
 from pypdf import PdfReader
+from support.browser import LOGO
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
@@ -136,9 +137,11 @@ def test_the_report_has_page_print_and_tables(folder, dataset, tmp_path):
         ('logo = "absent.png"', "logo absent.png"),
         ('logo = "large.png"', "kB"),
         ('logo = "about.toml"', "neither PNG nor JPEG"),
+        ('logo = "damaged.png"', "is damaged"),
     ],
 )
 def test_a_head_that_cannot_be_used_is_refused(tmp_path, text, said):
+    (tmp_path / "damaged.png").write_bytes(LOGO[:40])
     (tmp_path / "large.png").write_bytes(b"\x89PNG" + bytes(20_000_000))
     (tmp_path / "about.toml").write_text(text)
     with pytest.raises(AboutError) as error:

@@ -1,5 +1,6 @@
 """The report of the bundled study as a reader sees it: page, print and figures are looked at, not read."""
 
+import base64
 import csv
 import io
 import re
@@ -8,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pypdf import PdfReader
-from support.browser import AUDIT
+from support.browser import AUDIT, LOGO
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
-from mrdamper.report.about import About
+from mrdamper.report.about import About, logo_of
 from mrdamper.report.study import write_study
 from mrdamper.study.comparison import compare
 
@@ -24,7 +25,8 @@ WIDE = 'A "maker" & <b>sons</b>, of a name as long as a name can be without bein
 def written(bundled_study, tmp_path_factory):
     """The report with everything in it, made once."""
     folder = tmp_path_factory.mktemp("report") / "out"
-    write_study(bundled_study, folder, about=About(title="A report", maker=WIDE, notes="Notes. " * 60), also=("pdf",))
+    about = About(title="A report", maker=WIDE, notes="Notes. " * 60, logo=logo_of(base64.b64encode(LOGO).decode()))
+    write_study(bundled_study, folder, about=about, also=("pdf",))
     return folder
 
 

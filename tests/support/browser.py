@@ -1,11 +1,16 @@
 """A browser to look at pages with, and what holds for any picture of them."""
 
+import base64
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 CHROMIUM = Path("/usr/bin/chromium")
+# One red point as PNG.
+LOGO = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
+)
 AUDIT = (Path(__file__).parent / "audit.js").read_text(encoding="utf-8")
 
 

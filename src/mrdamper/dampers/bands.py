@@ -103,6 +103,8 @@ def band(
 
 def no_band(damper: Damper) -> str:
     """Why there is no band, in words."""
+    if not damper.own_numbers:
+        return "no band: how sure a model of this kind is cannot be worked out"
     if damper.certainty is None:
         return "no band: the model was saved without its covariance"
     return "no band: all its runs are of one session, and how far another one lies cannot be known; test on another day"

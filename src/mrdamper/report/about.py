@@ -6,6 +6,7 @@ Both come from small TOML files a user writes. Nothing is required and nothing i
 from __future__ import annotations
 
 import base64
+import io
 import math
 import tomllib
 from collections.abc import Mapping
@@ -20,6 +21,7 @@ from mrdamper.rig_files.strict_toml import read_toml
 _LARGEST_LOGO = 500_000  # bytes; it stands in every page
 _LARGEST_FILE = 100_000  # bytes of a TOML file
 _LONGEST = 5_000  # letters of a field
+_LONGEST_SIDE = 5_000  # points of a logo
 _PICTURES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg"}
 
 
@@ -119,14 +121,18 @@ def about_of(table: Mapping[str, Any], where: str) -> About:
     return About(**{name: str(value).strip() for name, value in table.items()})
 
 
-def logo_of(data: bytes) -> str:
-    """A picture as the data address a page holds.
+def logo_of(text: str) -> str:
+    """A picture, given as base64, as the data address a page holds.
 
     Raises
     ------
     AboutError
-        If it is no PNG or JPEG, or too large.
+        If it is no base64, no PNG or JPEG, or too large.
     """
+    try:
+        data = base64.b64decode(text, validate=True)
+    except ValueError as error:
+        raise AboutError("is no base64", where="logo", mend="choose the picture again") from error
     return _picture(data, "logo")
 
 
@@ -189,12 +195,23 @@ def _logo_file(path: Path) -> tuple[bytes, str]:
 
 
 def _picture(data: bytes, where: str) -> str:
+    from PIL import Image
+
     if len(data) > _LARGEST_LOGO:
         limit = _LARGEST_LOGO // 1000
         raise AboutError(f"is over {limit} kB", where=where, mend=f"give a picture under {limit} kB")
     kind = next((kind for start, kind in _PICTURES.items() if data.startswith(start)), None)
     if kind is None:
         raise AboutError("neither PNG nor JPEG", where=where, mend="save it as PNG")
+    try:
+        with Image.open(io.BytesIO(data)) as picture:
+            size = picture.size
+            if max(size) <= _LONGEST_SIDE:
+                picture.load()
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        raise AboutError("is damaged", where=where, mend="save it as PNG again") from error
+    if max(size) > _LONGEST_SIDE:
+        raise AboutError(f"has {size[0]} x {size[1]} points", where=where, mend=f"make it {_LONGEST_SIDE} at most")
     return f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"
 
 

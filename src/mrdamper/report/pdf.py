@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import logging
+from base64 import b64decode
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -17,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from fpdf import FPDF, FontFace
-from fpdf.enums import TableBordersLayout, TextEmphasis
+from fpdf.enums import Align, TableBordersLayout, TextEmphasis
 from fpdf.outline import OutlineSection
 
 _MARGIN = 18.0  # mm
@@ -26,6 +27,7 @@ _SIZES = {"h1": 18.0, "h2": 14.0, "h3": 11.0, "p": 9.5, "table": 8.0, "caption":
 _SMALLEST = 6.0  # pt, below which a table turns its page instead
 _PADDING = 3.8  # mm beside a cell's text
 _NARROWEST = 28.0  # mm of a column whose text runs over lines
+_LOGO = (50.0, 14.0)  # mm, the room of a logo
 _KEEP = 42.0  # mm a heading wants below itself, so that it never ends a page
 _VOID = frozenset({"br", "img", "meta", "link", "hr", "input"})
 _INLINE = frozenset({"b", "strong", "code", "a", "span", "br", "em", "i", "sup", "sub"})
@@ -146,6 +148,7 @@ class _Writer:
             return
         known = {"h1": self.heading, "h2": self.heading, "h3": self.heading, "table": self.table}
         known |= {"figure": self.figure, "li": self.item, "p": self.paragraph, "summary": self.folded}
+        known |= {"img": self.logo}
         if element.tag in known:
             if self.turned and element.tag != "table":
                 self.paper.add_page(orientation="P")
@@ -172,6 +175,13 @@ class _Writer:
             return False
         rows = _cells(table)
         return bool(rows) and self._fitted([[cell.text for cell in row] for row in rows], rows)[0] < _SMALLEST
+
+    def logo(self, element: _Element) -> None:
+        """A picture that stands in the page itself, at the right margin."""
+        picture = b64decode((element.attributes.get("src") or "").partition("base64,")[2])
+        top = self.paper.get_y()
+        self.paper.image(picture, Align.R, top, _LOGO[0], _LOGO[1], keep_aspect_ratio=True, alt_text="logo")
+        self.paper.set_y(top + _LOGO[1] + 2)
 
     def heading(self, element: _Element) -> None:
         """A heading, with room below it for what it heads."""
