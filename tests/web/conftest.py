@@ -1,5 +1,6 @@
 """A bench to ask, and a browser to look at it."""
 
+import os
 import threading
 import time
 from contextlib import contextmanager
@@ -14,11 +15,12 @@ pytest.importorskip("plotly", reason="the web extra is not installed")
 
 from support.browser import AUDIT
 
-from mrdamper.web import create_app
+from mrdamper.web.app import create_app
 
 HOST = "bench.test:1"
 ORIGIN = f"http://{HOST}"
 SCREENSHOTS = Path(__file__).parents[2] / "artefacts"
+WINDOW = {"width": 1366, "height": 768}
 
 
 @pytest.fixture
@@ -77,13 +79,19 @@ def served():
     listener.close()
 
 
-@pytest.fixture
-def page(browser, address):
-    """A page on the bench; anything on its console but notes fails the test."""
-    context = browser.new_context(viewport={"width": 1366, "height": 768}, accept_downloads=True)
-    page = context.new_page()
-    page.set_default_timeout(120_000)  # a condition is waited for, on a busy machine too
-    complaints = []
+@pytest.fixture(scope="module")
+def profile(browser):
+    """One profile for the pages of a module: the chart library is fetched and compiled once."""
+    context = browser.new_context(viewport=WINDOW, accept_downloads=True)
+    context.set_default_timeout(1000 * float(os.environ.get("PAGE_SECONDS", "300")))  # for a busy machine
+    yield context
+    context.close()
+
+
+@contextmanager
+def watched_page(profile, address):
+    """A page on the bench; anything on its console but notes is a complaint, and fails the test."""
+    page, complaints = profile.new_page(), []
     page.on("console", lambda m: complaints.append(m.text) if m.type in ("error", "warning") else None)
     page.on("pageerror", lambda error: complaints.append(str(error)))
     page.on("dialog", lambda dialog: complaints.append(f"a script ran: {dialog.message}"))
@@ -91,17 +99,26 @@ def page(browser, address):
     page.goto(address)
     page.locator("html[data-ready]").wait_for()
     yield page
-    context.close()
+    page.evaluate("localStorage.clear()")
+    page.close()
     assert not complaints, complaints
 
 
 @pytest.fixture
+def page(profile, address):
+    """A page nothing was done on."""
+    with watched_page(profile, address) as page:
+        yield page
+
+
+@pytest.fixture(scope="session")
 def shoot():
-    """Keep a picture of the page, in a folder that git ignores, and check what holds for any picture."""
+    """Check what holds for any picture of the page; keep it, in a folder that git ignores, where PICTURES is set."""
 
     def shoot(page, name):
-        SCREENSHOTS.mkdir(exist_ok=True)
-        page.screenshot(path=SCREENSHOTS / f"{name}.png")
+        if os.environ.get("PICTURES"):
+            SCREENSHOTS.mkdir(exist_ok=True)
+            page.screenshot(path=SCREENSHOTS / f"{name}.png")
         assert page.evaluate(AUDIT) == []
 
     return shoot

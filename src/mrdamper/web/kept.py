@@ -6,6 +6,7 @@ the names written here are read, each up to a size, and every part passes the ch
 
 from __future__ import annotations
 
+import base64
 import io
 import shutil
 import zipfile
@@ -22,11 +23,12 @@ from mrdamper.errors import InputError
 from mrdamper.files.dataset import SAMPLE_FILES, load_dataset, save_dataset
 from mrdamper.files.model_file import dump_model, parse_model
 from mrdamper.files.strict_json import parse_json
+from mrdamper.report.about import logo_of
 from mrdamper.web.drops import FILE_LIMIT, Intake
 from mrdamper.web.intake import bundled
 from mrdamper.web.sessions import MOST_DAMPERS, Session
 
-LIST, STATE, DATA = "bench.json", "bench-state.json", "dataset"
+LIST, STATE, LOGO, DATA = "bench.json", "bench-state.json", "logo", "dataset"
 _PART_LIMIT = 100_000_000  # bytes of one part, unpacked
 _SMALL_LIMIT = 5_000_000  # of a part that is text
 
@@ -51,12 +53,15 @@ class Kept:
         The damper under the sliders.
     state : str
         What the page showed, which the page checks.
+    logo : str
+        Of the report's head, as base64; empty where there is none.
     """
 
     intake: Intake | None
     dampers: list[tuple[Damper, str, str]]
     current: int | None
     state: str
+    logo: str
 
 
 class _Damper(BaseModel):
@@ -78,14 +83,17 @@ class _List(BaseModel):
     current: int | None = Field(default=None, ge=0)
 
 
-def keep(session: Session, state: str, shown: str | None) -> bytes:
+def keep(session: Session, state: str, shown: str | None, logo: str = "") -> bytes:
     """A session as such a file.
 
     Raises
     ------
     KeptError
         If it would be too large to be dropped on a bench again.
+    AboutError
+        If the logo is no picture.
     """
+    picture = _picture(logo)
     intake, dampers = session.intake, list(session.dampers.values())
     files = [f"dampers/{i}.json" for i in range(len(dampers))]
     about = _List(
@@ -102,6 +110,8 @@ def keep(session: Session, state: str, shown: str | None) -> bytes:
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as made:
         made.writestr(LIST, about.model_dump_json(indent=1))  # first: the page knows the file by it
         made.writestr(STATE, state)
+        if picture:
+            made.writestr(LOGO, picture)
         for name, bench in zip(files, dampers, strict=True):
             made.writestr(name, dump_model(bench.damper))
         if intake and intake.source != "bundled":
@@ -146,7 +156,7 @@ def _read(archive: zipfile.ZipFile, place: Path) -> Kept:
     except ValueError as error:
         raise KeptError("is none of this version", where=LIST, mend="update mrdamper, or save it again") from error
     data = [f"{DATA}/{name}" for name in ("runs.csv", *SAMPLE_FILES)]
-    known = {LIST, STATE, *(d.file for d in about.dampers), *data}
+    known = {LIST, STATE, LOGO, *(d.file for d in about.dampers), *data}
     if len(set(names)) != len(names) or not set(names) <= known:
         odd = next((n for n in names if n not in known), "one name twice")
         raise KeptError(f"holds {PurePosixPath(odd).name!r:.60}", where="the kept bench", mend="save it again")
@@ -161,7 +171,17 @@ def _read(archive: zipfile.ZipFile, place: Path) -> Kept:
         parse_json(state)
     except ValueError as error:
         raise KeptError(str(error), where=STATE, mend="save it again") from error
-    return Kept(_data(archive, about, [n for n in data if n in names], place), dampers, about.current, state)
+    logo = base64.b64encode(_part(archive, LOGO)).decode("ascii") if LOGO in names else ""
+    _picture(logo)
+    intake = _data(archive, about, [n for n in data if n in names], place)
+    return Kept(intake, dampers, about.current, state, logo)
+
+
+def _picture(logo: str) -> bytes:
+    """The bytes of a logo that a report can show; none where there is none."""
+    if logo:
+        logo_of(logo)
+    return base64.b64decode(logo)
 
 
 def _data(archive: zipfile.ZipFile, about: _List, parts: list[str], place: Path) -> Intake | None:

@@ -12,16 +12,19 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import Depends, Request
 
 from mrdamper.dampers.base import Damper
+from mrdamper.dampers.covariance import certain
 from mrdamper.data import Dataset
 from mrdamper.data.temporary import temporary_folder
 from mrdamper.errors import InputError, UnknownNameError
+from mrdamper.study.recipe import Scored
 from mrdamper.web.drops import Drop, Intake
 from mrdamper.web.rig_table import RigTable, rig_table
 from mrdamper.web.work import Job
@@ -46,12 +49,15 @@ class Bench:
         How it came: "study", "identification", "comparison", "file".
     note : str
         One line on how good it is, or where it came from.
+    learn : callable or None
+        Gives the damper with its covariance, where it has none yet and its runs are known.
     """
 
     key: str
     damper: Damper
     origin: str
     note: str = ""
+    learn: Callable[[], Damper] | None = None
 
 
 @dataclass(eq=False)
@@ -109,19 +115,31 @@ class Session:
             return None
         return rig_table(self.dataset, rig)
 
-    def add(self, damper: Damper, origin: str, note: str = "") -> Bench:
+    def add(self, damper: Damper, origin: str, note: str = "", learn: Callable[[], Damper] | None = None) -> Bench:
         """Put a damper on the bench; the oldest go where there are too many."""
-        bench = Bench(self.key("damper"), damper, origin, note)
+        bench = Bench(self.key("damper"), damper, origin, note, learn)
         self.dampers[bench.key] = bench
         while len(self.dampers) > MOST_DAMPERS:
             del self.dampers[next(iter(self.dampers))]
         return bench
 
-    def damper(self, key: str) -> Bench:
-        """A damper on the bench by its key."""
+    def scored(self, found: Scored, origin: str, note: str) -> Bench:
+        """Put a damper on the bench that learns its covariance from its runs when that is first asked for."""
+        if found.damper.certainty is not None:
+            return self.add(found.damper, origin, note)
+        runs = [self.dataset[run.run_id] for run in found.train.runs]
+        return self.add(
+            found.damper, origin, note, partial(certain, found.damper, runs, [r.scores for r in found.left_out.runs])
+        )
+
+    def damper(self, key: str, sure: bool = False) -> Bench:
+        """A damper on the bench by its key, with its covariance where that is asked for and can be known."""
         if key not in self.dampers:
             raise UnknownNameError("that damper is no longer on the bench", mend="choose another on the Model page")
-        return self.dampers[key]
+        bench = self.dampers[key]
+        if sure and bench.learn is not None:
+            bench = self.dampers[key] = replace(bench, damper=bench.learn(), learn=None)
+        return bench
 
     def start(
         self,

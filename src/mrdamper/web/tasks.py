@@ -1,4 +1,7 @@
-"""What runs in worker processes: each task calls the package and reports on the way."""
+"""What runs in worker processes: each task calls the package and reports on the way.
+
+A worker imports what its task takes and no more: it starts sooner.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +9,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.covariance import certain
 from mrdamper.data import Dataset
 from mrdamper.errors import IdentificationError, InputError
-from mrdamper.export import exporter
-from mrdamper.export.base import identifier, write_export
 from mrdamper.identification import Identification
-from mrdamper.report.about import About
-from mrdamper.report.comparison import write_comparison
-from mrdamper.report.study import write_study
-from mrdamper.study.comparison import Comparison, compare
 from mrdamper.study.recipe import (
     JOINTLY,
     Basis,
@@ -31,6 +29,10 @@ from mrdamper.study.recipe import (
 )
 from mrdamper.study.workflow import Study, run_study, usable_sines
 
+if TYPE_CHECKING:
+    from mrdamper.report.about import About
+    from mrdamper.study.comparison import Comparison
+
 Tell = Callable[[str, float], None]
 ALL_AT_ONCE = "joint"
 RUN_BY_RUN = "functions"
@@ -38,6 +40,8 @@ RUN_BY_RUN = "functions"
 
 def study(tell: Tell, dataset: Dataset, folder: Path, about: About | None = None) -> tuple[Study, list[Path]]:
     """The whole method, and its report, models, tables and figures in a folder."""
+    from mrdamper.report.study import write_study
+
     result = run_study(dataset, lambda what, share: tell(what, 0.6 * share))
     told = lambda what, share: tell(what, 0.6 + 0.4 * share)  # noqa: E731
     return result, write_study(result, folder, told, about=about, also=("pdf",))
@@ -104,11 +108,15 @@ def identify_rig(
 
 def compare_models(tell: Tell, dataset: Dataset, names: Sequence[str], jobs: int) -> Comparison:
     """Models on the same runs."""
+    from mrdamper.study.comparison import compare
+
     return compare(dataset, names, jobs=jobs, progress=tell)
 
 
 def write_compared(tell: Tell, comparison: Comparison, folder: Path) -> list[Path]:
     """A comparison as page, tables, figures and models in a folder."""
+    from mrdamper.report.comparison import write_comparison
+
     return write_comparison(comparison, folder, tell)
 
 
@@ -122,6 +130,9 @@ class Exported:
 
 def export_damper(tell: Tell, damper: Damper, form: str, folder: Path) -> Exported:
     """A damper in an export format, as files in a folder."""
+    from mrdamper.export import exporter
+    from mrdamper.export.base import write_export
+
     tell(f"making {form}", 0.1)
     kind, name = exporter(form), export_name(damper.rig)
     written = kind().export(damper, name)
@@ -132,6 +143,8 @@ def export_damper(tell: Tell, damper: Damper, form: str, folder: Path) -> Export
 
 def export_name(rig: str) -> str:
     """A name for files and symbols: of the rig, where its letters make one."""
+    from mrdamper.export.base import identifier
+
     try:
         return identifier(rig)
     except InputError:

@@ -26,7 +26,7 @@ def register(app: typer.Typer) -> None:
         missing = [name for name in _NEEDS if importlib.util.find_spec(name) is None]
         if missing:
             raise MissingExtraError(f"the live bench needs {', '.join(missing)}", mend="pip install 'mrdamper[web]'")
-        from mrdamper.web import serve as run
+        from mrdamper.web.server import serve as run
 
         ended_by = run(port, browser)
         sys.stdout.flush()

@@ -126,7 +126,7 @@ def _conclude(session: Session, choice: Choice, found: Comparison) -> dict[str, 
     entries = []
     for entry in rig.entries:
         note = f"left out {100 * entry.left_out.median():.1f} %"
-        entries.append(_entry(rig, entry, session.add(entry.damper, "comparison", note).key, keys))
+        entries.append(_entry(rig, entry, session.scored(entry, "comparison", note).key, keys))
     return {
         "rig": rig.rig,
         "number": choice.rig,

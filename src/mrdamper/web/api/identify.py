@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from base64 import b64decode
 from dataclasses import replace
 from inspect import signature
 from typing import Any
@@ -17,7 +16,7 @@ from mrdamper.dampers.joint import JointFit
 from mrdamper.errors import InputError
 from mrdamper.identification import Identification, all_methods, identify
 from mrdamper.models import all_models
-from mrdamper.report.about import About, AboutError, about_of, logo_of
+from mrdamper.report.about import About, about_of, logo_of
 from mrdamper.study.recipe import JOINTLY, Scored
 from mrdamper.study.workflow import Study
 from mrdamper.validation import Validation
@@ -56,11 +55,7 @@ class Head(BaseModel):
     def given(self) -> About:
         """Checked, as the report takes it."""
         about = about_of(self.about, "head of the report")
-        try:
-            logo = b64decode(self.logo, validate=True)
-        except ValueError as error:
-            raise AboutError("is no base64", where="logo", mend="choose the picture again") from error
-        return replace(about, logo=logo_of(logo)) if logo else about
+        return replace(about, logo=logo_of(self.logo)) if self.logo else about
 
 
 @router.get("/choices")
@@ -144,8 +139,7 @@ def _conclude_study(session: Session, found: Study, written: list[Any]) -> dict[
         for candidate in rig.candidates:
             errors = {"left out": candidate.left_out, "held out": candidate.held_out}
             note = ", ".join(f"{name} {_percent(scores)}" for name, scores in errors.items() if scores.runs)
-            bench = session.add(candidate.damper, "study", note)
-            listed.append(_candidate(candidate, bench.key))
+            listed.append(_candidate(candidate, session.scored(candidate, "study", note).key))
         rigs.append({"rig": rig.rig, "chosen": listed[0]["damper"], "candidates": listed})
     return {"rigs": rigs, "seconds": round(found.seconds, 1)}
 

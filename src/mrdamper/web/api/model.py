@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from threading import Lock
+from time import thread_time
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from fastapi import APIRouter
 from fastapi.responses import Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from mrdamper.dampers.bands import band
+from mrdamper.dampers.bands import band, no_band
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Condition
 from mrdamper.metrics import dissipated_power, peak_force
@@ -23,6 +24,7 @@ from mrdamper.web.sessions import Bench, Current, Session
 router = APIRouter(prefix="/sessions/{session}/dampers")
 _FAMILY = 10  # loops of a family over current, at most
 _LEVEL = 0.9  # of the band around a loop
+_OF_HAND = "no band: of a parameter held by hand the tests say nothing"
 _TURN = Lock()  # answers in turn: small NumPy calls of many threads at once take the interpreter from each other
 _BEYOND = 1.25  # sliders and curves reach past the tested conditions, where the answer is flagged
 
@@ -84,8 +86,8 @@ def damper(key: str, session: Current) -> dict[str, Any]:
 
 @router.post("/{key}/predict")
 def predict(key: str, ask: Ask, session: Current) -> Response:
-    """Loops at a condition, the curves over current, and what was measured nearest."""
-    found = session.damper(key).damper
+    """Loops at a condition with a band or why there is none, the curves over current, what was measured nearest."""
+    found = session.damper(key, sure=ask.band and not ask.held).damper
     with _TURN:
         return _predicted(found, ask, session)
 
@@ -93,9 +95,11 @@ def predict(key: str, ask: Ask, session: Current) -> Response:
 def _predicted(found: Damper, ask: Ask, session: Session) -> Response:
     arrays: dict[str, Any] = {}
     loops = []
-    table = session.table_of(found.rig)
+    table, paces = session.table_of(found.rig), []
     for name, condition in _loops(found, ask, table):
+        began = thread_time()  # of this damper's work alone, however busy the machine is
         prediction = predict_held(found, condition, ask.held)
+        paces.append(1e3 * (thread_time() - began))
         cycle = predicted_cycle(prediction)
         arrays |= {f"{name}.{axis}": values for axis, values in cycle.items()}
         loops.append({"name": name, "current_A": condition.current_A, **_figures(prediction)})
@@ -103,11 +107,14 @@ def _predicted(found: Damper, ask: Ask, session: Session) -> Response:
             for end, force in (("low", around.low), ("high", around.high)):
                 arrays |= {f"{end}.{axis}": v for axis, v in on_screen(prediction.motion, force).items()}
             loops[-1] |= {"peak_from_N": around.peak[0], "peak_to_N": around.peak[1], "level": _LEVEL}
+        elif name == "now" and ask.band:
+            loops[-1]["no_band"] = _OF_HAND if ask.held else no_band(found)
     if ask.currents:
         arrays |= _over_current(found, ask)
     model = held_model(found, ask.condition, ask.held)
     head = {
         "loops": loops,
+        "pace_ms": min(paces),
         "peak_velocity_m_s": ask.condition.peak_velocity,
         "extrapolation": found.envelope.flags(ask.condition),
         "tested_A": found.envelope.current_A,

@@ -115,18 +115,19 @@ def exported(key: str, session: Current) -> Response:
 
 
 class State(BaseModel):
-    """What the page shows, and the damper under its sliders."""
+    """What the page shows, the damper under its sliders, and the logo of the report as base64."""
 
     model_config = ConfigDict(extra="forbid")
 
     state: str = Field(max_length=2_000_000)
     damper: str | None = Field(default=None, max_length=40)
+    logo: str = Field(default="", max_length=1_000_000)
 
 
 @router.post("/bench.zip")
 def keep_bench(shown: State, session: Current) -> Response:
-    """Data, dampers and state of this bench in one file."""
-    return download(keep(session, shown.state, shown.damper), "mrdamper-bench.zip", "application/zip")
+    """Data, dampers, logo and state of this bench in one file."""
+    return download(keep(session, shown.state, shown.damper, shown.logo), "mrdamper-bench.zip", "application/zip")
 
 
 @router.post("/drops/{key}/open")
@@ -142,6 +143,7 @@ def open_bench(key: str, session: Current) -> dict[str, Any]:
     return {
         "data": kept.intake is not None,
         "state": kept.state,
+        "logo": kept.logo,
         "damper": keys[kept.current] if kept.current is not None else None,
     }
 

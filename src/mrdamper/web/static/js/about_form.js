@@ -12,11 +12,12 @@ export class AboutForm {
     this.bench = bench;
     this.inputs = new Map(Object.keys(FIELDS).map((name) => [name, this.input(name)]));
     this.logo = h("input", { type: "file", accept: "image/png,image/jpeg", id: "about-logo", onchange: () => this.take() });
-    this.said = h("span", { class: "small faint", role: "status" });
+    this.said = h("div", { class: "row small faint", role: "status" });
     const field = (name, control) => [h("label", { for: control.id }, name), control];
     this.element = h("details", { class: "about-head" }, h("summary", {}, "Head of the report"),
       h("div", { class: "about-fields" }, Object.entries(FIELDS).map(([name, title]) => field(title, this.inputs.get(name))), field("Logo (PNG, JPEG)", this.logo), h("span", {}), this.said));
     bench.store.onChange((state, before) => state.about !== before.about && this.set(state.about));
+    document.addEventListener("bench:logo", () => this.show());
   }
 
   input(name) {
@@ -37,17 +38,22 @@ export class AboutForm {
 
   async take() {
     const [file] = this.logo.files;
-    this.bench.logo = "";
-    put(this.said);
-    if (!file) return;
-    if (file.size > 500_000) {
-      this.logo.value = "";
+    if (file && file.size > 500_000) {
+      this.bench.logo = "";
       put(this.said, `${file.name} is over 500 kB: give a smaller picture.`);
       return;
     }
-    const bytes = new Uint8Array(await file.arrayBuffer());
-    let text = "";
-    for (const byte of bytes) text += String.fromCharCode(byte);
-    this.bench.logo = btoa(text);
+    const bytes = file ? new Uint8Array(await file.arrayBuffer()) : [];
+    this.bench.logo = btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(""));
+  }
+
+  /** The logo that is taken: chosen here, or come with a kept bench. */
+  show() {
+    const { logo } = this.bench;
+    if (!logo) this.logo.value = "";
+    put(this.said, logo ? [
+      h("img", { class: "logo", alt: "The logo", src: `data:image/png;base64,${logo}` }), // browsers tell JPEG from PNG themselves
+      h("button", { class: "quiet", onclick: () => (this.bench.logo = "") }, "Take the logo out"),
+    ] : null);
   }
 }

@@ -15,13 +15,22 @@ export class Bench {
     this.busy = ""; // what is being done to bring others
     this.dampers = [];
     this.tables = new Map(); // rig number to its runs and matrix
-    this.logo = ""; // of the report's head, as base64; too large for a link
+    this.picture = ""; // the logo of the report's head, as base64; too large for a link
     this.undocumented = null; // the damper last seen that no file holds
     this.loops = new Map(); // measured loops and verdicts, fetched once
   }
 
   get state() {
     return this.store.state;
+  }
+
+  get logo() {
+    return this.picture;
+  }
+
+  set logo(picture) {
+    this.picture = picture;
+    this.announce("logo");
   }
 
   /** What the reader wrote for the head of a report. */
@@ -106,8 +115,7 @@ export class Bench {
       const { text } = await this.api.post(`/dampers/${damper}/document`, { held: {} });
       if (this.state.damper === damper) this.store.settle({ document: JSON.stringify(JSON.parse(text)) });
     } catch (error) {
-      this.logo = ""; // of the report's head, as base64; too large for a link
-    this.undocumented = damper;
+      this.undocumented = damper;
       if (error.status !== 422) return this.fail(error);
       this.say(note("warn", "This kind of damper has no file format yet: a link brings back the data, not the model."), 6000);
     }

@@ -58,13 +58,6 @@ export function table(columns, rows, { pick, chosen, caption } = {}) {
   );
 }
 
-/** A bit of line in the colour and dash of a curve. */
-export function swatch(look) {
-  const dash = { dash: "5 3", dot: "2 2", dashdot: "5 2 2 2", longdash: "8 3" }[look.dash] ?? null;
-  return svg("svg", { class: "swatch", viewBox: "0 0 24 10", "aria-hidden": "true" },
-    svg("line", { x1: "0", x2: "24", y1: "5", y2: "5", stroke: look.color, "stroke-width": "3", "stroke-dasharray": dash }));
-}
-
 /** What went wrong, where, and how to mend it. */
 export function problem(error) {
   const said = error.said ?? { text: String(error.message ?? error) };

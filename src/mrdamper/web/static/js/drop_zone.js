@@ -124,6 +124,7 @@ export class DropZone {
       return found.data ? bench.api.get("/data") : bench.overview;
     }, "Opening the kept bench");
     put(this.said);
+    bench.logo = found.logo;
     await bench.refreshDampers();
     await bench.restore({ ...imported(JSON.parse(found.state)), damper: found.damper });
   }

@@ -1,7 +1,7 @@
 // Model: a damper under the sliders. The loops follow while a slider is dragged.
 
 import { Latest } from "../api.js";
-import { empty, h, note, put } from "../dom.js";
+import { capital, empty, h, note, put } from "../dom.js";
 import { condition, figures } from "../format.js";
 import { ModelCharts } from "../model_charts.js";
 import { ModelPanel } from "../model_panel.js";
@@ -12,10 +12,9 @@ export const label = "Model";
 const MM = 1000;
 const SETTLE = 300; // milliseconds after a drag until the axes fit again
 const LATE = 250; // milliseconds after which a picture that is not answered yet is dimmed
-const SLOW = 60; // milliseconds a loop, from which on the curves over current come point by point
+const SLOW = 60; // milliseconds a loop, from which on the curves over current come point by point, and no band
+const QUICK = 6; // milliseconds a loop, up to which the band comes while a slider is dragged: it takes six loops or so
 const [COARSE, FINE] = [11, 31]; // points of the curves over current, while dragged and at rest; one lies where tests end
-
-const BAND = 20; // loops a band costs: about one a number
 const NO_CURVE = { current: [], peak: [], energy: [] };
 
 export function create(bench) {
@@ -36,7 +35,7 @@ class ModelView {
     this.spoken = ""; // what a screen reader was told last
     this.damper = null; // as the bench describes it
     this.moved = null; // when the slider was moved that the next question is about
-    this.pace = Infinity; // milliseconds a loop of this damper takes; not known at first
+    this.pace = Infinity; // milliseconds of work a loop of this damper takes; not known at first
     this.latest = new Latest(
       (question) => this.timed(question),
       (found, question) => this.draw(found, question),
@@ -111,17 +110,17 @@ class ModelView {
     const { damper, condition, held, family } = this.bench.state;
     if (this.damper?.key !== damper) return;
     const currents = this.pace > SLOW ? 0 : this.charts.held ? COARSE : FINE;
-    this.latest.want({ key: damper, moved: this.moved, ask: { ...(condition ?? this.damper.start), held, family, currents, band: !this.charts.held && this.pace <= SLOW } });
+    const band = this.pace <= (this.charts.held ? QUICK : SLOW);
+    this.latest.want({ key: damper, moved: this.moved, ask: { ...(condition ?? this.damper.start), held, family, currents, band } });
     this.moved = null;
   }
 
   /** Ask, and dim the picture of before where the answer takes its time. */
   async timed({ key, ask }) {
-    const began = performance.now();
     const waiting = setTimeout(() => this.late(true), LATE);
     try {
       const found = await this.bench.api.frame(`/dampers/${key}/predict`, ask);
-      if (key === this.damper?.key) this.pace = (performance.now() - began) / (found.head.loops.length + ask.currents + (ask.band ? BAND : 0));
+      if (key === this.damper?.key) this.pace = found.head.pace_ms;
       return found;
     } finally {
       clearTimeout(waiting);
@@ -160,6 +159,8 @@ class ModelView {
       const at = low + (i / (COARSE - 1)) * (high - low);
       const found = await this.bench.api.frame(`/dampers/${key}/predict`, { ...ask, current_A: at, family: false, band: false });
       if (!current()) return;
+      this.pace = Math.min(this.pace, found.head.pace_ms);
+      if (this.pace <= SLOW) return this.ask(); // the first loop of a damper takes longer
       const [loop] = found.head.loops;
       curve.current.push(at);
       curve.peak.push(loop.peak_N);
@@ -200,7 +201,8 @@ class ModelView {
     if (this.spoken !== said) this.bench.speak(said); // when it changes, not at every move
     this.spoken = said;
     const between = now.level ? ` (${Math.round(100 * now.level)} % of unseen sessions: ${figures(now.peak_from_N, 3)} to ${figures(now.peak_to_N, 3)} N)` : "";
-    const amounts = `Predicted: peak force ${figures(now.peak_N)} N${between}, energy ${figures(now.energy_J)} J a cycle. ${nearest(head.nearest[0])}`;
+    const none = now.level ? "" : ` ${capital(now.no_band ?? (this.pace > SLOW ? "no band: this model takes too long for one" : "the band follows at rest"))}.`;
+    const amounts = `Predicted: peak force ${figures(now.peak_N)} N${between}, energy ${figures(now.energy_J)} J a cycle.${none} ${nearest(head.nearest[0])}`;
     put(this.verdict, flags.length
       ? note("warn", h("div", {}, h("b", {}, "Extrapolation: "), `${flags.map((f) => f.join(" ")).join("; ")}. The loop is dashed.`), h("div", {}, amounts))
       : note("", h("div", {}, h("b", {}, "Inside the tested conditions.")), h("div", {}, amounts)));

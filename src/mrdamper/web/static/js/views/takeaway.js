@@ -135,11 +135,11 @@ class TakeAwayView {
     };
     const keepState = async () => save(new Blob([await shown()], { type: "application/json" }), "bench-state.json");
     const keepAll = async () => {
-      const { blob, name } = await this.bench.api.file("/bench.zip", { state: await shown(), damper: this.bench.state.damper });
+      const { blob, name } = await this.bench.api.file("/bench.zip", { state: await shown(), damper: this.bench.state.damper, logo: this.bench.logo });
       save(blob, name);
     };
     return h("div", { class: "body" },
-      h("p", {}, "A kept bench holds the data, every damper and every slider in one file: drop it on any bench. A state file holds what you see without the data."),
+      h("p", {}, "A kept bench holds the data, every damper, every slider and the logo in one file: drop it on any bench. A state file holds what you see without the data."),
       h("div", { class: "row" },
         h("button", { class: "primary", onclick: () => this.safely(keepAll()) }, "Keep this bench"),
         h("button", { onclick: () => this.safely(keepState()) }, "Save the state")),
