@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from support.browser import LOGO
@@ -76,7 +76,7 @@ def put_on(client, bench, damper):
         max_size=4,
     )
 )
-@settings(max_examples=25)
+@settings(max_examples=25, suppress_health_check=[HealthCheck.too_slow])
 def test_frames_keep_every_array(named):
     head, found = opened(frame({"a": "β"}, named).body)
     assert head["a"] == "β"
