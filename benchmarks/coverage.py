@@ -223,10 +223,10 @@ def _share(job: tuple[str, int, int]) -> tuple[str, Covered, Floats]:
     return title, *jointly(title, repeats, seed)
 
 
-def table(repeats: int, workers: int = 1) -> str:
-    """The whole table as text."""
+def table(repeats: int, workers: int = 1, only: Sequence[str] = ()) -> str:
+    """The table as text, of all cases or some."""
     begin = time.perf_counter()
-    titles = [*CASES, *load_dataset().rigs]
+    titles = only or [*CASES, *load_dataset().rigs]
     jobs = [(title, repeats // workers, seed) for title in titles for seed in range(workers)]
     with ProcessPoolExecutor(workers) as pool:
         found = list(pool.map(_share, jobs)) if workers > 1 else list(map(_share, jobs))
@@ -259,8 +259,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeats", type=int, default=500)
     parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--only", action="append", default=[], help="a case or a rig; may be repeated")
     chosen = parser.parse_args()
-    print(table(chosen.repeats, chosen.processes))
+    print(table(chosen.repeats, chosen.processes, chosen.only))
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 import csv
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,15 +13,18 @@ from typer.testing import CliRunner
 
 from mrdamper.cli import application
 from mrdamper.dampers.covariance import certain
-from mrdamper.errors import InputError
+from mrdamper.data import Condition
+from mrdamper.errors import ConditionError, InputError
 from mrdamper.files.model_file import save_model
 from mrdamper.files.motion import load_motion
-from mrdamper.study.plan import Limits, first_matrix, plan_tests, read_limits
+from mrdamper.study.first_matrix import first_matrix
+from mrdamper.study.limits import Limits
+from mrdamper.study.plan import Reckoning, plan_tests
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
-from benchmarks.planning import designs
+from benchmarks.planning import designs, reckoned
 
-LIMITS = Limits((0.0, 1.0), (0.5, 4.0), (2.0, 20.0), velocity_m_s=0.2, force_N=1500.0)
+LIMITS = Limits((0.0, 1.0), (0.5, 4.0), (2.0, 20.0), velocity_m_s=0.2, force_N=1500.0, session_minutes=5.0)
 
 
 @pytest.fixture(scope="module")
@@ -28,23 +32,75 @@ def damper():
     return certain(joint_damper(), session_runs(joint_damper()))
 
 
-def test_every_record_is_allowed_and_shrinks_the_doubt(damper):
-    made = plan_tests(damper, LIMITS, 0.5)
+@pytest.fixture(scope="module")
+def reckoning(damper):
+    return Reckoning.of(damper, LIMITS, LIMITS.candidates(0.5))
+
+
+def test_every_record_is_allowed_and_shrinks_the_doubt(reckoning):
+    made = reckoning.proposals(reckoning.chosen(0.5))
     assert made
-    assert sum(item.minutes for item in made) <= 30
-    assert {item.session for item in made} == {1, 2}
+    sessions = {item.session for item in made}
+    # A pause between records falls into setting a session up.
+    assert sum(item.minutes for item in made) + len(sessions) * (5.0 - 3.0) <= 30
+    assert sessions == set(range(1, len(sessions) + 1))
+    assert [item.session for item in made] == sorted(item.session for item in made)
     for item in made:
         assert item.condition.peak_velocity <= 0.2 * (1 + 1e-9)
         assert item.after < item.before
-    steps = [item.before for item in made] + [made[-1].after]
-    assert np.all(np.diff(steps) < 0)
+    assert [item.before for item in made[1:]] == [item.after for item in made[:-1]]
+    assert "90 % band of the force over the envelope" in reckoning.said(made)
+
+
+def test_sessions_are_taken_where_they_pay(reckoning):
+    few, many = (len(reckoning.chosen(hours)) for hours in (0.5, 1.5))
+    assert 1 < few < many <= LIMITS.sessions
+    alike = replace(reckoning, session=np.array([1e12, 1e12]))
+    assert len(alike.chosen(1.0)) == 1  # where sessions do not differ, the second has nothing to say
+    assert len(replace(reckoning, limits=replace(LIMITS, sessions=2)).chosen(1.5)) == 2
+
+
+def test_a_sessions_records_tell_what_its_own_gain_leaves(reckoning):
+    size = len(reckoning.names)
+    table = np.linalg.cholesky(reckoning.grams[5, 0] + 1e-9 * np.eye(size + 2)).T
+    # By elimination: the gain and the offset are two more numbers, with their spread as what is known of them.
+    whole = table.T @ table + np.diag([*np.zeros(size), *reckoning.session])
+    expected = np.linalg.inv(np.linalg.inv(whole)[:size, :size])
+    assert reckoning.information(reckoning.grams[5, :1]) == pytest.approx(expected, rel=1e-3, abs=1e-3)
+    assert reckoning.spread([[5], [5]]) < reckoning.spread([[5, 5]]) < reckoning.spread([[5]])
+
+
+def test_a_doubt_can_be_chosen(damper, reckoning):
+    made, about = plan_tests(damper, LIMITS, 0.3, "c1")
+    i = about.names.index("c1")
+    error = np.sqrt(damper.certainty.covariance[i, i]) / damper.own_numbers["c1"].value
+    assert made[0].before == pytest.approx(error, rel=1e-3)
+    assert "standard error of c1" in about.said(made)
+    whole = reckoning.chosen(0.3)
+    assert made[-1].after < about.spread(whole)
+    _, at = plan_tests(damper, LIMITS, 0.3, Condition(1.0, 0.5, 0.02))
+    assert "at 1 A" in at.about
+    assert at.spread(at.chosen(0.3)) <= at.spread(whole)
+    with pytest.raises(InputError, match="number to plan for"):
+        plan_tests(damper, LIMITS, 0.3, "x")
+
+
+def test_what_no_run_could_tell_is_planned_for():
+    known = certain(joint_damper(), [run for run in session_runs(joint_damper()) if run.current_A == 0.5])
+    assert "c1" in known.certainty.unknown
+    made, _ = plan_tests(known, LIMITS, 0.3)
+    assert len({item.condition.current_A for item in made}) > 1
+    assert made[-1].after < 0.2 * made[0].before
 
 
 def test_a_first_matrix_has_a_reason_for_every_row():
     made = first_matrix(LIMITS, 1.0)
     assert len({item.reason for item in made}) == len(made) > 8
     assert all(item.condition.peak_velocity <= 0.2 * (1 + 1e-9) for item in made)
+    assert sum(item.minutes for item in made) + 2 * 2.0 <= 60
+    assert [item.session for item in made] == [1] * (len(made) - 1) + [2]
     assert len(first_matrix(LIMITS, 0.1)) < len(made)
+    assert {item.session for item in first_matrix(replace(LIMITS, sessions=1), 1.0)} == {1}
 
 
 @pytest.mark.parametrize(
@@ -56,6 +112,8 @@ def test_a_first_matrix_has_a_reason_for_every_row():
         ("current_A = [0, 1]\nfrequency_Hz = [1, 2]", "amplitude_mm"),
         ("current_A = [0, 1]\nfrequency_Hz = [1, 2]\namplitude_mm = [2000, 20000]", "µm"),
         ("current_A = [0, 1]\nfrequency_Hz = [1, 2]\namplitude_mm = [10, 20]\nvelocity_m_s = 0.001", "slowest"),
+        ("current_A = [0, 1]\nfrequency_Hz = [1, 2]\namplitude_mm = [10, 20]\nsessions = 1.5", "whole"),
+        ("current_A = [0, 1]\nfrequency_Hz = [1, 2]\namplitude_mm = [10, 20]\ncycles = [5]", "one number"),
         ("current_A = [0, nan]\nfrequency_Hz = [1, 2]\namplitude_mm = [10, 20]", "current_A"),
         ("current_A = ", "E_LIMITS"),
     ],
@@ -64,13 +122,13 @@ def test_limits_that_are_none_are_refused(tmp_path, text, says):
     path = tmp_path / "limits.toml"
     path.write_text(text)
     with pytest.raises(InputError) as caught:
-        read_limits(path)
+        Limits.read(path)
     assert "E_LIMITS" in str(caught.value)
     assert says in str(caught.value)
 
 
 def test_hours_that_hold_no_record_and_models_that_know_nothing_are_refused(damper):
-    for hours in (0.001, float("nan"), -1.0):
+    for hours in (0.001, 5.0 / 60, float("nan"), -1.0):
         with pytest.raises(InputError, match="E_LIMITS"):
             plan_tests(damper, LIMITS, hours)
     with pytest.raises(InputError, match="E_CERTAINTY"):
@@ -79,10 +137,11 @@ def test_hours_that_hold_no_record_and_models_that_know_nothing_are_refused(damp
 
 def test_the_records_are_read_back(damper, tmp_path):
     save_model(damper, tmp_path / "m.json")
-    asked = ["plan", str(tmp_path / "m.json"), "--hours", "0.2", "--out", str(tmp_path / "next")]
+    asked = ["plan", str(tmp_path / "m.json"), "--hours", "0.25", "--about", "0.5,2,8", "--out", str(tmp_path / "next")]
     got = CliRunner().invoke(application(), asked)
     assert got.exit_code == 0, got.output
     assert "existing runs that taught least: r" in got.stdout
+    assert "band of the force at 0.5 A, 2 Hz, 8 mm" in got.stdout.replace("2.00", "2").replace("8.00", "8")
     with (tmp_path / "next" / "plan.csv").open() as file:
         listed = list(csv.DictReader(file))
     for row in listed:
@@ -94,10 +153,12 @@ def test_the_records_are_read_back(damper, tmp_path):
         ["import", *(str(tmp_path / "next" / row["file"]) for row in listed), "--out", str(tmp_path / "d")],
     )
     assert read.exit_code == 0, read.output
+    none = CliRunner().invoke(application(), [*asked[:4], "--about", "1,2", "--out", str(tmp_path / "none")])
+    assert isinstance(none.exception, ConditionError)
 
 
-def test_a_plan_of_little_rig_time_beats_chance_and_the_factorial_grid():
-    found = designs(0.2, seeds=9)
-    assert found["plan"] < 0.7 * found["random records (median)"]
-    assert found["plan"] < 0.7 * found["factorial grid"]
-    assert found["plan"] < found["plan that ignores drift"] < found["before"]
+def test_a_plan_beats_chance_and_the_factorial_grid_by_choosing_its_sessions():
+    found = [designs(reckoned(seed), 2.0, seed) for seed in range(3)]
+    for other in ("random records, one session", "factorial grid, one session", "plan that ignores drift"):
+        assert np.median([each["plan"] / each[other] for each in found]) < 0.7, other
+    assert np.median([each["plan"] / each["random records, sessions as the plan"] for each in found]) < 0.9

@@ -16,40 +16,70 @@ def register(app: typer.Typer) -> None:
         limits: Path | None = typer.Option(
             None, "--limits", help="TOML: current_A, frequency_Hz, amplitude_mm = [lowest, highest], velocity_m_s, ..."
         ),
-        hours: float = typer.Option(..., "--hours", help="Rig time [h]."),
+        hours: float = typer.Option(..., "--hours", help="Rig time [h], sessions set up in it."),
+        about: str | None = typer.Option(
+            None, "--about", help="The doubt to shrink: a number of the model, or A,Hz,mm; default: the whole envelope."
+        ),
         out: Path = typer.Option(..., "--out", help="Folder for plan.csv and the records to play."),
     ) -> None:
-        """Propose the records that shrink the doubt about a damper most, or a first test matrix."""
+        """Propose the records that shrink a doubt about a damper most, or a first test matrix."""
         import numpy as np
 
         from mrdamper.errors import InputError
-        from mrdamper.files.atomic import write_into
+        from mrdamper.files.atomic import require_writable, write_into
         from mrdamper.files.encoding import csv_text
         from mrdamper.files.model_file import load_model
-        from mrdamper.study.plan import first_matrix, limits_of, plan_tests, read_limits, record_of, rows, taught_least
+        from mrdamper.study.first_matrix import first_matrix
+        from mrdamper.study.limits import Limits
+        from mrdamper.study.plan import plan_tests, taught_least
+        from mrdamper.study.proposal import rows
 
+        require_writable(out)
         damper = load_model(model) if model else None
         if limits is None and damper is None:
             raise InputError("neither a model nor limits", mend="give --limits limits.toml", code="E_LIMITS")
-        allowed = read_limits(limits) if limits else limits_of(damper)  # type: ignore[arg-type]
-        chosen = plan_tests(damper, allowed, hours) if damper else first_matrix(allowed, hours)
+        if about is not None and damper is None:
+            raise InputError("--about without a model", mend="give a model.json")
+        allowed = Limits.read(limits) if limits else Limits.of(damper)  # type: ignore[arg-type]
+        if damper:
+            chosen, reckoning = plan_tests(damper, allowed, hours, _doubt(about))
+        else:
+            chosen, reckoning = first_matrix(allowed, hours), None
         names = []
         with write_into(out) as folder:
             for number, item in enumerate(chosen, start=1):
                 c = item.condition
                 name = f"plan_{number:02d}_{c.current_A:.3g}A_{c.frequency_Hz:.3g}Hz_{1e3 * c.amplitude_m:.3g}mm.csv"
-                motion, force = record_of(item, allowed, damper)
+                motion, force = item.record(allowed, damper)
                 table = np.column_stack([motion.time, motion.displacement, force, motion.current])
                 text = "time_s,displacement_m,force_N,current_A\n"
                 text += "".join(",".join(f"{v:.9g}" for v in row) + "\n" for row in table.tolist())
                 (folder / name).write_text(text, encoding="utf-8")
                 names.append(name)
             (folder / "plan.csv").write_text(csv_text(rows(chosen, names)), encoding="utf-8")
-        minutes = sum(item.minutes for item in chosen)
-        said = f"{len(chosen)} records, {minutes:.0f} of {60 * hours:.0f} minutes, force_N in them is what to expect"
-        if damper and chosen:
-            said += f"; standard deviation of the force {100 * chosen[0].before:.2f} -> {100 * chosen[-1].after:.2f} %"
-        typer.echo(f"{out / 'plan.csv'}\n{said}")
-        if damper and (least := taught_least(damper)):
+        sessions = len({item.session for item in chosen})
+        minutes = sessions * allowed.opening + sum(item.minutes for item in chosen)
+        typer.echo(
+            f"{out / 'plan.csv'}\n{len(chosen)} records in {sessions} sessions, {minutes:.0f} of {60 * hours:.0f} "
+            "minutes; force_N in them is what to expect"
+        )
+        if damper is None or reckoning is None:
+            return
+        typer.echo(reckoning.said(chosen))
+        if least := taught_least(damper):
             runs = ", ".join(f"{name} ({100 * share:.1f} %)" for name, share in least)
             typer.echo(f"existing runs that taught least: {runs} of what is known")
+
+
+def _doubt(about: str | None):
+    """A condition where three numbers stand, else the name of a number."""
+    from mrdamper.data import Condition
+    from mrdamper.errors import ConditionError
+
+    if about is None or "," not in about:
+        return about
+    try:
+        current, frequency, amplitude = (float(part) for part in about.split(","))
+        return Condition(current, frequency, 1e-3 * amplitude)
+    except ValueError:
+        raise ConditionError(f"--about {about}", mend="give A,Hz,mm, as 0.5,2,10") from None

@@ -1,0 +1,59 @@
+"""The first tests of a damper nobody has tested, a reason for every row."""
+
+from __future__ import annotations
+
+import math
+
+from mrdamper.data import Condition
+from mrdamper.study.limits import Limits
+from mrdamper.study.proposal import Proposal
+
+_SESSIONS = 2  # so that a repeat tells how much they differ
+
+
+def first_matrix(limits: Limits, hours: float) -> list[Proposal]:
+    """A first test matrix, the most telling rows first.
+
+    Raises
+    ------
+    InputError
+        E_LIMITS if the hours hold no record, or nothing is allowed.
+    """
+    limits.candidates(hours)
+    (i_low, i_high), (f_low, f_high), (a_low, a_high) = limits.current_A, limits.frequency_Hz, limits.amplitude_mm
+    f_mid, a_mid, i_mid = math.sqrt(f_low * f_high), math.sqrt(a_low * a_high), (i_low + i_high) / 2
+    wanted = [
+        (i_low, f_mid, a_mid, "passive: viscous damping, friction and gas without the field"),
+        (i_high, f_mid, a_mid, "full field at the same motion: the range of the yield force"),
+        (i_low, f_low, a_mid, "slow and passive: offset, gas spring and friction, hardly any viscous force"),
+        (i_high, f_high, a_low, "short strokes, full field: play, seat and knee before the yield"),
+        (i_mid, f_mid, a_mid, "half the field: whether the yield force saturates"),
+        (i_low, f_high, a_mid, "fast and passive: viscous damping and whether it thins"),
+        (i_high, f_low, a_high, "long and slow, full field: the plateau of the yield force"),
+        (i_high, f_high, a_mid, "fast, full field: damping that grows with current, and lag"),
+        (i_low + 0.25 * (i_high - i_low), f_mid, a_mid, "a quarter of the field: where the yield force begins"),
+        (i_mid, f_low, a_low, "slow and short: rate dependence of the knee, apart from amplitude"),
+        (i_mid, f_high, a_low, "fast and short at half the field: frequency and amplitude apart"),
+    ]
+    repeat = (i_high, f_mid, a_mid, "a repeat in another session: how much sessions differ")
+
+    def proposed(row: tuple[float, float, float, str], session: int) -> Proposal | None:
+        current, frequency, amplitude, reason = row
+        top = limits.velocity_m_s / (2 * math.pi * amplitude * 1e-3)
+        if top < f_low:
+            return None  # no frequency of the rig is slow enough for this stroke
+        condition = Condition(current, min(frequency, top), amplitude * 1e-3)
+        return Proposal(session, condition, limits.minutes(condition), reason)
+
+    made, left = [], hours * 60 - limits.opening
+    again = proposed(repeat, _SESSIONS) if limits.sessions >= _SESSIONS else None
+    reserved = limits.opening + again.minutes if again else 0.0
+    first = proposed(wanted[1], 1)
+    if again is None or first is None or left < reserved + 2 * first.minutes:
+        again, reserved = None, 0.0  # a repeat takes time that the first rows need
+    left -= reserved
+    for item in filter(None, (proposed(row, 1) for row in wanted)):
+        if item.minutes <= left:
+            made.append(item)
+            left -= item.minutes
+    return [*made, again] if again else made

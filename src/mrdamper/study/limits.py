@@ -1,0 +1,156 @@
+"""What a rig can do, and what a test on it costs."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import tomllib
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from mrdamper.dampers.base import Damper
+from mrdamper.data import Condition
+from mrdamper.errors import InputError
+from mrdamper.rig_files.strict_toml import read_toml
+
+_RANGES = ("current_A", "frequency_Hz", "amplitude_mm")
+_LEVELS = 4  # of each of them on the grid of candidates
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a rig can do, and what a test costs.
+
+    Attributes
+    ----------
+    current_A, frequency_Hz, amplitude_mm : (float, float)
+        Lowest and highest.
+    velocity_m_s : float
+        Highest peak velocity.
+    force_N : float
+        Rated force of the damper; only a plan without a model needs it.
+    cycles : float
+        Of a record.
+    sample_rate_Hz : float
+    minutes_between : float
+        From the end of a record to the start of the next: set-up and cooling.
+    session_minutes : float
+        To begin a session, another hour or day: pin the damper, zero the load cell, warm it up.
+    sessions : int
+        At most; a plan takes as many as pay.
+
+    Raises
+    ------
+    InputError
+        E_LIMITS if they allow nothing, or look like another unit.
+    """
+
+    current_A: tuple[float, float]
+    frequency_Hz: tuple[float, float]
+    amplitude_mm: tuple[float, float]
+    velocity_m_s: float = math.inf
+    force_N: float = 0.0
+    cycles: float = 6.0
+    sample_rate_Hz: float = 500.0
+    minutes_between: float = 3.0
+    session_minutes: float = 10.0
+    sessions: int = 12
+
+    def __post_init__(self) -> None:
+        for name in _RANGES:
+            low, high = getattr(self, name)
+            least = 0.0 if name == "current_A" else 1e-6
+            if not least <= low <= high < math.inf:
+                raise bad_limits(
+                    f"{name} = [{low:g}, {high:g}]", "give the lowest and the highest, positive and in order"
+                )
+        for name in ("velocity_m_s", "cycles", "sample_rate_Hz", "sessions"):
+            if not getattr(self, name) > 0:
+                raise bad_limits(f"{name} = {getattr(self, name):g}", "give a number above zero")
+        if self.sessions != int(self.sessions):
+            raise bad_limits(f"sessions = {self.sessions:g}", "give a whole number")
+        if min(self.minutes_between, self.session_minutes, self.force_N) < 0:
+            raise bad_limits("a negative time or force", "give zero or more")
+        if self.amplitude_mm[0] > 1000:
+            raise bad_limits(f"amplitudes from {self.amplitude_mm[0]:g} mm", "is that in µm? amplitude_mm is in mm")
+        slowest = Condition(0.0, self.frequency_Hz[0], 1e-3 * self.amplitude_mm[0]).peak_velocity
+        if slowest > self.velocity_m_s:
+            raise bad_limits(
+                f"the slowest motion has {slowest:.3g} m/s, the limit is {self.velocity_m_s:g} m/s",
+                "allow a lower frequency or amplitude; velocity_m_s is in m/s",
+            )
+
+    @classmethod
+    def read(cls, path: Path) -> Limits:
+        """From a TOML file whose keys are the attributes, units in their names.
+
+        Raises
+        ------
+        InputError
+            E_LIMITS if the file cannot be read, or a key is unknown, missing, or no number.
+        """
+        try:
+            given = read_toml(path.read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+            found = str(error).splitlines()[0]
+            raise InputError(found, where=str(path), mend="give a TOML file of limits", code="E_LIMITS") from error
+        known = [field.name for field in fields(cls)]
+        for name, value in given.items():
+            if name not in known:
+                near = [other for other in known if other.split("_")[0] == name.split("_")[0]]
+                mend = f"write {near[0]}: the unit is part of the name" if near else f"known: {', '.join(known)}"
+                raise bad_limits(f"key {name}", mend)
+            numbers = value if isinstance(value, list) else [value]
+            plain = all(isinstance(n, int | float) and not isinstance(n, bool) and math.isfinite(n) for n in numbers)
+            if not plain or isinstance(value, list) != (name in _RANGES) or len(numbers) != 1 + (name in _RANGES):
+                raise bad_limits(
+                    f"{name} = {value!r}", "give [lowest, highest]" if name in _RANGES else "give one number"
+                )
+        if missing := [name for name in _RANGES if name not in given]:
+            raise bad_limits(f"no {', '.join(missing)}", "give [lowest, highest] of each")
+        return cls(**{name: tuple(map(float, v)) if isinstance(v, list) else v for name, v in given.items()})
+
+    @classmethod
+    def of(cls, damper: Damper) -> Limits:
+        """The ranges a damper was tested over."""
+        e = damper.envelope
+        amplitudes = 1e3 * e.amplitude_m[0], 1e3 * e.amplitude_m[1]
+        return cls(e.current_A, e.frequency_Hz, amplitudes, velocity_m_s=e.peak_velocity_m_s[1])
+
+    @property
+    def opening(self) -> float:
+        """Minutes a session costs beside its records: one pause between records falls into setting it up."""
+        return max(self.session_minutes - self.minutes_between, 0.0)
+
+    def minutes(self, condition: Condition) -> float:
+        """Rig time of a record and the pause before it."""
+        return self.cycles / condition.frequency_Hz / 60 + self.minutes_between
+
+    def candidates(self, hours: float) -> list[Condition]:
+        """Conditions on a grid inside the limits.
+
+        Raises
+        ------
+        InputError
+            E_LIMITS if nothing is allowed, or the hours do not hold one record.
+        """
+        current = np.unique(np.linspace(*self.current_A, _LEVELS))
+        frequency, amplitude = (
+            np.unique(np.geomspace(*ends, _LEVELS)) for ends in (self.frequency_Hz, self.amplitude_mm)
+        )
+        made = [
+            Condition(float(i), float(f), 1e-3 * float(a))
+            for i, f, a in itertools.product(current, frequency, amplitude)
+        ]
+        allowed = [c for c in made if c.peak_velocity <= self.velocity_m_s * (1 + 1e-9)]
+        least = self.opening + min(self.minutes(c) for c in allowed)
+        if not (math.isfinite(hours) and hours * 60 >= least):
+            raise bad_limits(f"{hours:g} hours", f"a session set up with its shortest record takes {least:.1f} minutes")
+        return allowed
+
+
+def bad_limits(found: str, mend: str) -> InputError:
+    """The refusal of limits."""
+    return InputError(found, where="limits", mend=mend, code="E_LIMITS")

@@ -1,0 +1,74 @@
+"""Records proposed to a rig: what to play, in which session, and why."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from mrdamper.dampers.base import Damper
+from mrdamper.data import Condition, Floats
+from mrdamper.motion import Excitation, sine
+from mrdamper.study.limits import Limits
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A record to play.
+
+    Attributes
+    ----------
+    session : int
+        From 1.
+    condition : Condition
+    minutes : float
+        Of rig time, setting the session up not counted.
+    reason : str
+    before, after : float
+        The doubt that is to shrink, without this record and with it, those before it being played; NaN
+        without a model.
+    """
+
+    session: int
+    condition: Condition
+    minutes: float
+    reason: str
+    before: float = math.nan
+    after: float = math.nan
+
+    def record(self, limits: Limits, damper: Damper | None) -> tuple[Excitation, Floats]:
+        """The motion to play, eased in and out over a cycle, and the force to expect [N] for the load cell's range."""
+        condition = self.condition
+        per_cycle = max(20, round(limits.sample_rate_Hz / condition.frequency_Hz))
+        motion = sine(condition, math.ceil(limits.cycles) + 2, per_cycle)
+        ease = np.clip(np.minimum(motion.time, motion.time[-1] - motion.time) * condition.frequency_Hz, 0, 1)
+        displacement = motion.displacement * ease**2 * (3 - 2 * ease)
+        velocity = np.gradient(displacement, motion.time)
+        acceleration = np.gradient(velocity, motion.time)
+        eased = replace(motion, displacement=displacement, velocity=velocity, acceleration=acceleration)
+        if damper is not None:
+            return eased, damper.force_along(eased, condition)
+        share = 0.2 + 0.8 * condition.current_A / max(limits.current_A[1], 1e-9)  # of the rated force; a guess
+        return eased, limits.force_N * share * np.tanh(velocity / (0.05 * condition.peak_velocity))
+
+
+def rows(proposals: Sequence[Proposal], files: Sequence[str]) -> list[dict[str, Any]]:
+    """Columns of plan.csv."""
+    return [
+        {
+            "order": number,
+            "session": item.session,
+            "file": name,
+            "current_A": item.condition.current_A,
+            "frequency_Hz": item.condition.frequency_Hz,
+            "amplitude_mm": 1e3 * item.condition.amplitude_m,
+            "minutes": round(item.minutes, 2),
+            "band_before": "" if math.isnan(item.before) else item.before,
+            "band_after": "" if math.isnan(item.after) else item.after,
+            "reason": item.reason,
+        }
+        for number, (item, name) in enumerate(zip(proposals, files, strict=True), start=1)
+    ]
