@@ -14,9 +14,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.dampers import joint_damper
+
+from mrdamper.files.model_file import save_model
 
 HERE, ROOT = Path(__file__).parent, Path(__file__).parents[2]
 DROPPED = [path.relative_to(HERE) for path in HERE.rglob("*.py") if path != Path(__file__)]
+EACH = """
+import json, sys
+from support.command import mrdamper
+print(json.dumps([vars(mrdamper(*words)) for words in json.load(sys.stdin)]))
+"""
 
 
 @pytest.fixture(scope="module")
@@ -32,86 +40,84 @@ def house(tmp_path_factory):
     return copy
 
 
-def run(house, *arguments):
-    environment = {**os.environ, "PYTHONPATH": str(house / "src")}
+def run(house, *arguments, given=None):
+    environment = {**os.environ, "PYTHONPATH": f"{house / 'src'}{os.pathsep}{house / 'tests'}"}
     done = subprocess.run(
-        [sys.executable, "-m", *map(str, arguments)],
-        cwd=house, env=environment, capture_output=True, text=True, check=False,
+        [sys.executable, *arguments],
+        cwd=house, env=environment, input=given, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
-    return done
+    return done.stdout
 
 
-def mrdamper(house, *arguments):
-    return run(house, "mrdamper.cli", *arguments)
+@pytest.fixture(scope="module")
+def said(house, tmp_path_factory):
+    """What the commands of that house say, by name: one process, as starting one costs more than most of them."""
+    place = tmp_path_factory.mktemp("place")
+    save_model(joint_damper(), place / "model.json")
+    t = np.arange(3001) / 500
+    x, v = 0.01 * np.sin(2 * np.pi * t), 0.02 * np.pi * np.cos(2 * np.pi * t)
+    (place / "1A.rigx").write_bytes(b"RIGX" + np.column_stack([t, x, 900 * v + 300 * np.tanh(v / 0.01)]).tobytes())
+    identify = ("identify", "--run", "utf_5mm4Hz_1A", "--json", "--model")
+    simulate = ("simulate", "quarter-car", "--input", "kerb:height_m=0.02", "--damper", place / "model.json", "--json")
+    simulate = (*simulate, "--step", "0.001")  # few steps: nothing is compiled
+    commands = {
+        "help": ("--help",),
+        "rigs": ("rigs",),
+        "models": ("models",),
+        "model": (*identify, "rounded-coulomb"),
+        "whole": (*identify, "bingham", "--method", "projection"),
+        "half": (*identify, "bingham", "--method", "scaled", "--set", "share=0.5"),
+        "import": ("import", place / "1A.rigx", "--out", place / "rig"),
+        "check": ("check", place / "rig", "--json"),
+        "export": ("export", place / "model.json", "--to", "peaks", "--out", place / "peaks.csv"),
+        "soft": simulate,
+        "firm": (*simulate, "--control", "firm-inwards"),
+    }
+    words = json.dumps([[str(word) for word in command] for command in commands.values()])
+    found = dict(zip(commands, json.loads(run(house, "-c", EACH, given=words)), strict=True))
+    for name, done in found.items():
+        assert done["returncode"] == 0, f"{name}: {done}"
+    return {name: done["stdout"] + (done["stderr"] if name == "import" else "") for name, done in found.items()}, place
 
 
-def test_a_model_is_listed_identified_and_kept_by_the_laws(house):
-    assert "rounded-coulomb" in mrdamper(house, "models").stdout
-    (row,) = json.loads(
-        mrdamper(house, "identify", "--run", "utf_5mm4Hz_1A", "--model", "rounded-coulomb", "--json").stdout
-    )
+def test_a_model_is_listed_identified_and_kept_by_the_laws(house, said):
+    told, _ = said
+    assert "rounded-coulomb" in told["models"]
+    (row,) = json.loads(told["model"])
     assert row["fy [N]"] > 100
     assert row["nrmse_pp"] < 0.1
     laws = run(
-        house,
-        "pytest",
-        "-q",
-        "-p",
-        "no:cacheprovider",
-        "tests/models",
-        "tests/test_streaming.py",
-        "-k",
-        "rounded-coulomb",
-    )
-    assert " passed" in laws.stdout or "." in laws.stdout.split()[0]
+        house, "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests/models", "tests/test_streaming.py",
+        "-k", "rounded-coulomb",
+    )  # fmt: skip
+    assert " passed" in laws or "." in laws.split()[0]
 
 
-def test_a_method_is_found_with_its_settings(house):
-    chosen = ("identify", "--run", "utf_5mm4Hz_1A", "--model", "bingham", "--json", "--method")
-    (whole,) = json.loads(mrdamper(house, *chosen, "projection").stdout)
-    (half,) = json.loads(mrdamper(house, *chosen, "scaled", "--set", "share=0.5").stdout)
+def test_a_method_is_found_with_its_settings(said):
+    (whole,), (half,) = (json.loads(said[0][name]) for name in ("whole", "half"))
     assert half["c [N s/m]"] == pytest.approx(0.5 * whole["c [N s/m]"])
 
 
-def test_a_reader_and_a_quality_check_take_part_in_the_import(house, tmp_path):
-    t = np.arange(3001) / 500
-    x = 0.01 * np.sin(2 * np.pi * t)
-    v = 0.02 * np.pi * np.cos(2 * np.pi * t)
-    (tmp_path / "1A.rigx").write_bytes(b"RIGX" + np.column_stack([t, x, 900 * v + 300 * np.tanh(v / 0.01)]).tobytes())
-    done = mrdamper(house, "import", tmp_path / "1A.rigx", "--out", tmp_path / "rig")
-    assert "W_ODD_COUNT" in done.stdout + done.stderr
-    with (tmp_path / "rig/runs.csv").open(encoding="utf-8") as file:
-        (run_,) = csv.DictReader(file)
-    assert float(run_["current_A"]) == 1.0
-    assert "W_ODD_COUNT" in mrdamper(house, "check", tmp_path / "rig", "--json").stdout
+def test_a_reader_and_a_quality_check_take_part_in_the_import(said):
+    told, place = said
+    assert "W_ODD_COUNT" in told["import"]
+    with (place / "rig/runs.csv").open(encoding="utf-8") as file:
+        (row,) = csv.DictReader(file)
+    assert float(row["current_A"]) == 1.0
+    assert "W_ODD_COUNT" in told["check"]
 
 
-def test_an_export_format_is_offered_and_writes(house, tmp_path):
-    script = (
-        "from support.dampers import joint_damper\nfrom mrdamper.files.model_file import save_model\n"
-        f"save_model(joint_damper(), {str(tmp_path / 'model.json')!r})"
-    )
-    environment = {**os.environ, "PYTHONPATH": f"{house / 'src'}{os.pathsep}{house / 'tests'}"}
-    subprocess.run([sys.executable, "-c", script], env=environment, check=True, cwd=house / "tests")
-    mrdamper(house, "export", tmp_path / "model.json", "--to", "peaks", "--out", tmp_path / "peaks.csv")
-    assert (tmp_path / "peaks.csv").read_text().startswith("current_A,force_N\n")
+def test_an_export_format_is_offered_and_writes(said):
+    assert (said[1] / "peaks.csv").read_text().startswith("current_A,force_N\n")
 
 
-def test_a_command_has_its_help_and_runs(house):
-    assert "List the rigs of a dataset" in mrdamper(house, "--help").stdout
-    assert mrdamper(house, "rigs").stdout.split() == ["labcontrol", "utfsm"]
+def test_a_command_has_its_help_and_runs(said):
+    assert "List the rigs of a dataset" in said[0]["help"]
+    assert said[0]["rigs"].split() == ["labcontrol", "utfsm"]
 
 
-def test_a_control_law_and_an_input_take_part_in_a_simulation(house, tmp_path):
-    script = (
-        "from support.dampers import joint_damper\nfrom mrdamper.files.model_file import save_model\n"
-        f"save_model(joint_damper(), {str(tmp_path / 'model.json')!r})"
-    )
-    environment = {**os.environ, "PYTHONPATH": f"{house / 'src'}{os.pathsep}{house / 'tests'}"}
-    subprocess.run([sys.executable, "-c", script], env=environment, check=True, cwd=house / "tests")
-    chosen = ("simulate", "quarter-car", "--input", "kerb:height_m=0.02", "--damper", tmp_path / "model.json", "--json")
-    soft = json.loads(mrdamper(house, *chosen).stdout)
-    found = json.loads(mrdamper(house, *chosen, "--control", "firm-inwards").stdout)
-    assert found["controller"] == "firm-inwards"
-    assert found["peak_force_N"] > soft["peak_force_N"]
+def test_a_control_law_and_an_input_take_part_in_a_simulation(said):
+    soft, firm = (json.loads(said[0][name]) for name in ("soft", "firm"))
+    assert firm["controller"] == "firm-inwards"
+    assert firm["peak_force_N"] > soft["peak_force_N"]

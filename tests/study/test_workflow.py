@@ -8,7 +8,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from mrdamper.data import Dataset, Run
+from mrdamper.data import Dataset
 from mrdamper.errors import IdentificationError, OutputError
 from mrdamper.files.model_file import dump_model, load_model
 from mrdamper.identification.loop_analysis import analyse_loop, dynamic_ranges
@@ -24,12 +24,16 @@ def study(bundled_study):
     return bundled_study
 
 
+HOSTILE = "<script>alert(1)</script>=cmd"
+
+
 @pytest.fixture(scope="module")
 def few(bundled):
-    """Eight runs of a real damper: enough for every recipe, quick to study."""
+    """Some runs of a real damper: enough for every recipe, quick to study; their names are an attack on pages."""
     sines = [run for run in bundled.rig("utfsm") if run.excitation == "sine"]
     train, held_out = ([run for run in sines if run.split == split] for split in ("train", "validate"))
-    return Dataset((*train[::2][:6], held_out[0]), "few")
+    runs = (*train[::2][:5], held_out[0])
+    return Dataset(tuple(replace(run, rig="rig", id=f"{HOSTILE}{i}") for i, run in enumerate(runs)), HOSTILE)
 
 
 @pytest.fixture(scope="module")
@@ -151,29 +155,24 @@ def test_report_is_one_file_without_scripts_or_links_outside(folder):
     assert len(text) < 6_000_000
 
 
-def dumps(rig):
-    return [dump_model(c.damper) for c in rig.candidates], [r.scores for r in rig.chosen.left_out.runs]
+def numbers(rig):
+    return [c.damper.own_numbers for c in rig.candidates], [r.scores for r in rig.chosen.left_out.runs]
 
 
 def test_a_study_is_the_same_twice_and_in_another_process(small, few, tmp_path):
-    beside = Dataset(tuple(replace(run, id=f"other {run.id}", rig="other") for run in few.runs[:5]))
-    both = Dataset((*beside.runs, *few.runs), "both")
+    beside = tuple(replace(run, id=f"other {run.id}", rig="other") for run in few)
     with several(2) as processes:
-        again = run_study(both, processes=processes)
+        again = run_study(Dataset((*beside, *few.runs), "both"), processes=processes)
         write_study(again, tmp_path / "out", also=("png",), processes=processes)
-    assert dumps(again.rig("utfsm")) == dumps(small.rigs[0])
-    assert dumps(again.rig("other")) == dumps(run_study(beside).rigs[0])
+    for name in ("rig", "other"):  # one was studied in this process
+        assert numbers(again.rig(name)) == numbers(small.rigs[0])
+    assert dump_model(again.rig("rig").damper) == dump_model(small.model)
     drawn = sorted(p.suffix for p in (tmp_path / "out" / "figures").iterdir())
     assert drawn.count(".png") == drawn.count(".svg") == 22
 
 
-def test_hostile_names_are_text_in_the_report(tmp_path, few):
-    name = "<script>alert(1)</script>=cmd"
-    renamed = []
-    for number, run in enumerate(few):
-        fields = {f: getattr(run, f) for f in run.__dataclass_fields__}
-        renamed.append(Run(**{**fields, "rig": "rig", "id": f"{name}{number}"}))
-    write_study(run_study(Dataset(tuple(renamed), name)), tmp_path / "out")
+def test_hostile_names_are_text_in_the_report(small, tmp_path):
+    write_study(small, tmp_path / "out")
     assert "<script>" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     document = json.loads((tmp_path / "out" / "model.json").read_text(encoding="utf-8"))
     assert document["rig"] == "rig"
@@ -186,6 +185,7 @@ def test_one_train_run_is_not_enough(bundled):
 
 
 def test_a_failed_report_leaves_nothing(small, tmp_path, monkeypatch):
+    monkeypatch.setattr("mrdamper.report.study._draw", lambda *a, **k: {})
     monkeypatch.setattr("mrdamper.report.study.save_model", lambda *a: (_ for _ in ()).throw(RuntimeError("halt")))
     with pytest.raises(RuntimeError, match="halt"):
         write_study(small, tmp_path / "out")
