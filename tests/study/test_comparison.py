@@ -227,7 +227,10 @@ def test_a_condition_dependent_damper_is_saved_whole(conditioned, name):
     back = parse_model(dump_model(damper))
     assert dump_model(back) == dump_model(damper)
     condition = Condition(0.5, 1.0, 0.01)
-    assert (back.predict(condition).force == damper.predict(condition).force).all()
+    if name == "ali-type":  # its loop is stepped for seconds
+        assert back.model_at(condition) == damper.model_at(condition)
+    else:
+        assert (back.predict(condition).force == damper.predict(condition).force).all()
 
 
 @pytest.mark.parametrize("name", sorted(set(all_published()) - {"kernel"}))

@@ -5,16 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+
 from mrdamper.systems.controllers.base import Controller, Sight
 
 
 @dataclass(frozen=True)
 class FirmInwards(Controller):
-    """I high where the stroke shortens."""
+    """The current rises with the speed at which the stroke shortens; it does not switch, so coarse steps do."""
 
     name: ClassVar[str] = "firm-inwards"
     title: ClassVar[str] = "firm in compression"
     source: ClassVar[str] = "tests"
 
     def law(self, see: Sight) -> Any:
-        return see.on_off(see.stroke_rate < 0)
+        return 2.0 * abs(np.minimum(see.stroke_rate, 0.0))
