@@ -145,6 +145,7 @@ def test_median_and_worst_count_magnitudes_and_refused_runs_stay_apart():
     assert found.worst_error("energy_error") == pytest.approx(1.0)
     assert replace(found, runs=found.runs[2:]).worst_error("energy_error") == pytest.approx(0.2)
     assert np.isnan(Validation("none", ()).worst_error())
+    assert replace(found, runs=found.runs[1:]).worst("energy_error").run_id == "1.25"  # −0.2 beside +0.11
     assert found.only({"1.25"}).runs[0].run_id == "1.25"
     assert Validation("none", ()).only({"x"}).runs == ()
     assert isinstance(found.runs[0], RunScore)
