@@ -1,0 +1,202 @@
+"""Bands, intervals and what sessions tell, each beside the sums written out."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import t as students_t
+
+from mrdamper.dampers import bands
+from mrdamper.dampers.bands import band, no_band, portable_band
+from mrdamper.dampers.base import Prediction
+from mrdamper.dampers.certainty import Certainty, unsure
+from mrdamper.dampers.joint import JointDamper
+from mrdamper.dampers.sessions import Expected, Sessions, Spread, When
+from mrdamper.data import Condition
+from mrdamper.errors import InputError
+from mrdamper.models.bingham import Bingham
+from mrdamper.motion import sine
+
+CONDITION = Condition(1.0, 2.0, 0.01)
+MOTION = sine(CONDITION, 1, 80)
+FORCE = 300 * np.cos(2 * np.pi * 2.0 * MOTION.time) + 60 * np.sin(2 * np.pi * 2.0 * MOTION.time) + 25
+SLOPES = np.column_stack([MOTION.velocity, np.sign(MOTION.velocity + 1e-9)])
+COVARIANCE = np.array([[90.0, -4.0], [-4.0, 30.0]])
+KNOWN = Certainty(
+    ("c", "fy"), (False, False), COVARIANCE, np.array([12.0, 5.0]), gain=0.03, offset=4.0, session_dof=3.0,
+    force=0.02, peak=0.015, energy=0.05, left_out=9,
+)  # fmt: skip
+
+
+def damper(known=KNOWN):
+    model = Bingham(c=2000.0, fy=100.0, f0=25.0)
+    envelope = SimpleNamespace()
+    return JointDamper("rig", model, ("c", "fy"), envelope, certainty=known)  # type: ignore[arg-type]
+
+
+PREDICTION = Prediction(MOTION, FORCE, CONDITION, ())
+
+
+@pytest.fixture(autouse=True)
+def _slopes(monkeypatch):
+    monkeypatch.setattr(bands, "force_slopes", lambda damper, prediction, names: SLOPES)
+
+
+def reach(level, *parts):
+    """Half a band: Student's t with degrees of freedom by Welch and Satterthwaite."""
+    whole = sum(parts)
+    dof = whole**2 / sum(part**2 / d for part, d in zip(parts, (5.0, 3.0, 8.0), strict=True))
+    return students_t.ppf((1 + level) / 2, dof) * np.sqrt(whole)
+
+
+@pytest.mark.parametrize("level", [0.5, 0.9, 0.99])
+@pytest.mark.parametrize("shown", [None, MOTION.time > 0.1])
+def test_a_band_adds_numbers_sessions_and_form(level, shown):
+    at = slice(None) if shown is None else shown
+    found, force, slopes = band(damper(), PREDICTION, level, shown), FORCE[at], SLOPES[at]
+    half = (force.max() - force.min()) / 2
+    own = np.array([s @ COVARIANCE @ s for s in slopes])
+    session, form = (0.03 * force) ** 2 + 16.0, (0.02 * half) ** 2
+    assert found.parameter == pytest.approx(np.sqrt(own))
+    assert found.session == pytest.approx(np.sqrt(session))
+    assert found.model == pytest.approx(np.full(force.size, 0.02 * half))
+    whole = own + session + form
+    t = reach(level, own.mean(), session.mean(), form) / np.sqrt(whole.mean())
+    assert found.high - force == pytest.approx(t * np.sqrt(whole))
+    assert force - found.low == pytest.approx(t * np.sqrt(whole))
+    swing = (slopes[force.argmax()] - slopes[force.argmin()]) / 2
+    parts = swing @ COVARIANCE @ swing, (0.03 * half) ** 2, (0.015 * half) ** 2
+    unseen, seen = reach(level, *parts), reach(level, parts[0], 0.0, parts[2])
+    assert found.peak == pytest.approx((half - unseen, half + unseen))
+    assert found.known_session == pytest.approx((half - seen, half + seen))
+    time, v = MOTION.time[at], MOTION.velocity[at]
+    power, *turned = (np.trapezoid(f * v, time) for f in (force, slopes[:, 0], slopes[:, 1]))
+    share = np.array(turned) / power
+    loss = reach(level, share @ COVARIANCE @ share, 0.03**2, 0.05**2)
+    assert found.energy == pytest.approx((-loss, loss))
+
+
+def test_where_nothing_is_known_there_is_no_band_and_its_reason():
+    assert band(damper(None), PREDICTION) is None
+    assert band(damper(replace(KNOWN, session_dof=0.4)), PREDICTION) is None
+    assert band(damper(replace(KNOWN, session_dof=0.6)), PREDICTION) is not None
+    assert "without its covariance" in no_band(damper(None))
+    assert "one session" in no_band(damper())
+    for level in (0.0, 1.0):
+        with pytest.raises(InputError, match="level"):
+            band(damper(None), PREDICTION, level)
+    # Not below nothing, however unsure; one run of each kind has one degree of freedom.
+    wild = replace(KNOWN, gain=9.0, session_dof=0.6, left_out=1, dof=np.array([1.0, 1.0]))
+    assert band(damper(wild), PREDICTION).peak[0] == 0.0
+
+
+def test_a_band_in_three_numbers_is_that_of_loops_at_three_currents(monkeypatch):
+    asked, widths = [], {0.0: 30.0, 1.0: 60.0, 2.0: 90.0}
+    made = damper()
+
+    def predict(self, condition):
+        asked.append(condition)
+        return Prediction(MOTION, (100 + 50 * condition.current_A) * np.array([1.0, -1.0]), condition, ())
+
+    def found(damper, prediction, level):
+        ones, width = np.ones(2), widths[prediction.condition.current_A]
+        assert level == 0.8
+        return SimpleNamespace(parameter=3 * ones, session=4 * ones, model=12 * ones, high=prediction.force + width)
+
+    monkeypatch.setattr(JointDamper, "predict", predict)
+    monkeypatch.setattr(bands, "band", found)
+    tested = SimpleNamespace(tested=True, middle=CONDITION, current_A=(0.0, 2.0), peak_velocity_m_s=(0.0, 0.9))
+    portable = portable_band(replace(made, envelope=tested), 0.8)
+    t = np.mean([30.0, 60.0, 90.0]) / 13
+    own = np.mean([9 / (100 + 50 * I) ** 2 for I in widths])
+    assert (portable.level, portable.gain, portable.offset_N) == (0.8, pytest.approx(0.03 * t), pytest.approx(4 * t))
+    assert portable.of_peak == pytest.approx(t * np.sqrt(0.02**2 + own))
+    assert asked == [replace(CONDITION, current_A=I) for I in widths]
+    slow = SimpleNamespace(**(vars(tested) | {"peak_velocity_m_s": (0.0, 0.05)}))  # slower than the middle of all
+    portable_band(replace(made, envelope=slow), 0.8)
+    assert asked[-1].peak_velocity == pytest.approx(0.05)
+    monkeypatch.setattr(bands, "band", lambda *_: None)
+    assert portable_band(replace(made, envelope=slow), 0.8) is None
+    assert portable_band(replace(made, envelope=SimpleNamespace(tested=False))) is None
+
+
+def test_an_interval_is_as_wide_as_its_level_says():
+    for level in (0.5, 0.95):
+        low, high = KNOWN.interval(damper(), "c", level)
+        assert (low + high) / 2 == pytest.approx(2000)
+        assert (high - low) / 2 == pytest.approx(students_t.ppf((1 + level) / 2, 12.0) * np.sqrt(90.0))
+    low, high = replace(KNOWN, logs=(False, True), covariance=np.diag([90.0, 0.04])).interval(damper(), "fy")
+    assert (low * high, high / low) == pytest.approx((1e4, np.exp(2 * 0.2 * students_t.ppf(0.975, 5.0))))
+    with pytest.raises(InputError, match="fy is held by a bound"):
+        replace(KNOWN, names=("c",), one_sided=("fy",)).interval(damper(), "fy")
+    assert replace(KNOWN, unknown=("c",)).ends(damper(), "c") is None
+
+
+def test_what_is_known_badly_is_told_number_by_number():
+    def said(**more):
+        return " ".join(unsure(damper(replace(KNOWN, **more))))
+
+    assert "sessions" not in said()
+    assert "too few sessions" in said(session_dof=1.9)
+    assert "of one session" in said(session_dof=0.4)
+    errors = np.diag([1001.0**2, 49.0**2])
+    assert "c cannot be told from zero" in said(covariance=errors)
+    assert "fy cannot" not in said(covariance=errors)
+    logs = np.diag([0.49**2, 0.7**2])
+    assert "fy is known to a factor of 2.0 only" in said(covariance=logs, logs=(True, True))
+    assert "c is known" not in said(covariance=logs, logs=(True, True))
+    assert "fy is not known at all" in said(covariance=np.diag([0.1, 3.1**2]), logs=(True, True))
+    assert "c ended at" in said(names=("fy",), logs=(False,), covariance=np.eye(1), dof=np.ones(1), one_sided=("c",))
+
+
+SPREAD = Spread(0.03, 0.02, 0.01, 2.0)
+DAY = [When("a", 10.0), When("a", 11.0), When("b", 34.0), When("a")]
+
+
+def test_what_runs_share_falls_with_the_hours_between_them_within_a_session():
+    assert SPREAD.total == pytest.approx(np.sqrt(9e-4 + 4e-4 + 1e-4))
+    found = SPREAD.covariance(DAY, DAY[:3])
+    near = 4e-4 * np.exp(-0.5)
+    expected = [[13e-4, 9e-4 + near, 0], [9e-4 + near, 13e-4, 0], [0, 0, 13e-4], [9e-4, 9e-4, 0]]
+    assert found == pytest.approx(np.array(expected))
+
+
+def test_the_mean_given_others_is_that_of_the_joint_normal():
+    values = np.array([0.05, 0.01, -0.2])
+    mean, left = SPREAD.given(When("a", 12.0), DAY[:3], values)
+    both = [*DAY[:3], When("a", 12.0)]
+    K = SPREAD.covariance(both, both) + 1e-4 * np.eye(4)
+    # A run has at least a fifth of the spread of its own: here a quarter of it, so 1e-4 it is.
+    solved = np.linalg.solve(K[:3, :3], np.column_stack([values, K[:3, 3]]))
+    assert mean == pytest.approx(K[3, :3] @ solved[:, 0])
+    assert left == pytest.approx(np.sqrt(K[3, 3] - K[3, :3] @ solved[:, 1]))
+    assert SPREAD.given(When("a", 12.0), [], np.zeros(0)) == (0.0, SPREAD.total)
+    assert Spread(0.0, 0.0, 0.0, 1.0).given(DAY[0], DAY, np.ones(4)) == (0.0, 0.0)
+    firm = Spread(0.1, 0.0, 0.0, 1.0)  # no run of its own: a fifth of the spread is left all the same
+    assert firm.given(When("b"), [When("b")] * 50, np.full(50, 0.1))[1] == pytest.approx(0.02, rel=0.02)
+
+
+def test_gains_are_expected_of_other_runs_of_the_session_and_bands_follow():
+    sessions = Sessions(SPREAD, Spread(4.0, 0.0, 3.0, 1.0), ("x", "y", "z"), tuple(DAY[:3]), (1.1, 1.2, 0.5),
+                        (6.0, 8.0, 90.0))  # fmt: skip
+    at = When("a", 12.0)
+    found = sessions.expected(at, without="y")
+    gain = SPREAD.given(at, [DAY[0], DAY[2]], np.array([0.1, -0.5]))
+    offset = sessions.offset.given(at, [DAY[0], DAY[2]], np.array([6.0, 90.0]))
+    assert (found.gain, found.gain_spread) == pytest.approx((1 + gain[0], gain[1]))
+    assert (found.offset, found.offset_spread) == pytest.approx(offset)
+    assert sessions.expected(When("c", 60.0)) is None
+    assert sessions.expected(When("b", 35.0), without="z") is None
+    with pytest.raises(InputError, match="lists differ in length"):
+        replace(sessions, gains=(1.0,))
+    known = Expected(1.2, 0.01, 5.0, 2.0)
+    assert known.corrected(PREDICTION).force == pytest.approx(1.2 * FORCE + 5)
+    plain = band(damper(replace(KNOWN, gain=0.01, offset=2.0)), PREDICTION, 0.8)
+    moved = known.band(damper(), PREDICTION, 0.8)
+    assert moved.low == pytest.approx(1.2 * plain.low + 5)
+    assert moved.high == pytest.approx(1.2 * plain.high + 5)
+    assert moved.peak == pytest.approx(tuple(1.2 * end for end in plain.peak))
+    assert moved.known_session == pytest.approx(tuple(1.2 * end for end in plain.known_session))
+    assert moved.energy == plain.energy
+    assert known.band(damper(None), PREDICTION, 0.8) is None
