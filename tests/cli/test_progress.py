@@ -1,12 +1,13 @@
 """What long commands say while they work."""
 
-import time
+from contextlib import contextmanager
+from threading import Event
 from types import SimpleNamespace
 
 import pytest
 
 from mrdamper.cli import progress
-from mrdamper.cli.progress import progress_on_stderr, time_left, watched
+from mrdamper.cli.progress import progress_on_stderr, progress_soon, time_left, watched
 
 
 @pytest.mark.parametrize(
@@ -34,11 +35,23 @@ def test_what_is_being_done_and_the_time_left_are_shown(capsys, monkeypatch):
     assert "about 20 s left" in shown
 
 
-def test_quick_work_is_quiet_and_slow_work_counted(capsys, monkeypatch):
+def test_quick_work_is_quiet(capsys):
     assert list(watched([1, 2, 3], "run")) == [1, 2, 3]
     assert capsys.readouterr().err == ""
-    began = time.monotonic()
-    times = iter([began, began, *[began + 5.0] * 50])
-    monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: next(times)))
-    assert list(watched([1, 2, 3], "run")) == [1, 2, 3]
-    assert "run" in capsys.readouterr().err
+
+
+def test_slow_work_is_shown_even_while_it_tells_nothing(monkeypatch):
+    said, shown = [], Event()
+
+    @contextmanager
+    def bar(quiet=False, began=None):
+        yield lambda what, share: (said.append((what, share)), shown.set())
+
+    monkeypatch.setattr(progress, "progress_on_stderr", bar)
+    monkeypatch.setattr(progress, "_QUICK", 0.0)
+    with progress_soon("planning") as tell:
+        assert shown.wait(20)  # nothing was told
+        tell("choosing", 0.9)
+    tell("too late", 1.0)
+    assert said[0] == ("planning", 0.0)
+    assert said[1] == ("choosing", 0.9)

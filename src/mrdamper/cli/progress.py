@@ -5,15 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from threading import Lock, Timer
 from typing import TypeVar
 
 Item = TypeVar("Item")
 Progress = Callable[[str, float], None]
+_QUICK = 1.0  # seconds in which nothing needs to be said
 _SOON = 2.0  # seconds before which the time left is a guess nobody needs
 
 
 @contextmanager
-def progress_on_stderr(quiet: bool = False) -> Iterator[Progress]:
+def progress_on_stderr(quiet: bool = False, began: float | None = None) -> Iterator[Progress]:
     """Give a function (what is being done, share done 0...1) that shows progress and the time left on stderr."""
     if quiet:
         yield lambda what, share: None
@@ -22,7 +24,7 @@ def progress_on_stderr(quiet: bool = False) -> Iterator[Progress]:
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("{task.fields[left]}"))
-    began = time.monotonic()
+    began = time.monotonic() if began is None else began
     with Progress(*columns, console=Console(stderr=True), transient=False) as bar:
         task = bar.add_task("", total=1.0, left="")
 
@@ -32,19 +34,45 @@ def progress_on_stderr(quiet: bool = False) -> Iterator[Progress]:
         yield tell
 
 
+@contextmanager
+def progress_soon(what: str) -> Iterator[Progress]:
+    """The same from the second second on: also while nobody tells anything, what is done and for how long."""
+    began, lock, told = time.monotonic(), Lock(), (what, 0.0)
+    bar: Progress | None = None
+    with ExitStack() as stack:
+
+        def show() -> None:
+            nonlocal bar
+            with lock:
+                if not over:
+                    bar = stack.enter_context(progress_on_stderr(began=began))
+                    bar(*told)
+
+        def tell(what: str, share: float) -> None:
+            nonlocal told
+            with lock:
+                told = what, share
+                if bar is not None:
+                    bar(what, share)
+
+        over, timer = False, Timer(_QUICK, show)
+        timer.daemon = True
+        timer.start()
+        try:
+            yield tell
+        finally:
+            timer.cancel()
+            with lock:
+                over = True
+
+
 def watched(items: Sequence[Item], what: str) -> Iterator[Item]:
     """Items one after the other, with progress from the second second on."""
-    began = time.monotonic()
-    with ExitStack() as stack:
-        tell = None
+    with progress_soon(what) as tell:
         for number, item in enumerate(items):
-            if tell is None and time.monotonic() - began > 1.0:
-                tell = stack.enter_context(progress_on_stderr())
-            if tell is not None:
-                tell(f"{what} {number + 1} of {len(items)}", number / len(items))
+            tell(f"{what} {number + 1} of {len(items)}", number / len(items))
             yield item
-        if tell is not None:
-            tell(f"{len(items)} {what}s", 1.0)
+        tell(f"{len(items)} {what}s", 1.0)
 
 
 def time_left(seconds: float, share: float) -> str:

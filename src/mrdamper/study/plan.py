@@ -25,6 +25,7 @@ from mrdamper.identification.intervals import student
 from mrdamper.motion import sine
 from mrdamper.study.limits import Limits
 from mrdamper.study.proposal import Proposal
+from mrdamper.study.recipe import Progress
 
 _SAMPLES = 24  # of a cycle that count; model error leaves fewer independent ones than a rig records
 _DRAWS = 2  # of the parameters, beside the estimate
@@ -36,7 +37,11 @@ _SEED = 20240813
 
 
 def plan_tests(
-    damper: Damper, limits: Limits, hours: float, about: str | Condition | None = None
+    damper: Damper,
+    limits: Limits,
+    hours: float,
+    about: str | Condition | None = None,
+    progress: Progress = lambda what, share: None,
 ) -> tuple[list[Proposal], Reckoning]:
     """Records that shrink a doubt most, in the order to play them, and how they were chosen.
 
@@ -49,6 +54,8 @@ def plan_tests(
         Of rig time, sessions set up in it.
     about : str, Condition or None
         The doubt: a number of the damper, the force at a condition, or over the whole of the limits.
+    progress : callable
+        Told what is being done and the share done, 0...1.
 
     Raises
     ------
@@ -57,7 +64,9 @@ def plan_tests(
     UnknownNameError
         If the damper has no such number.
     """
-    reckoning = Reckoning.of(damper, limits, limits.candidates(hours), about)
+    conditions = limits.candidates(hours)
+    reckoning = Reckoning.of(damper, limits, conditions, about, progress)
+    progress("choosing records", 0.9)
     return reckoning.proposals(reckoning.chosen(hours)), reckoning
 
 
@@ -100,7 +109,12 @@ class Reckoning:
 
     @classmethod
     def of(
-        cls, damper: Damper, limits: Limits, conditions: Sequence[Condition], about: str | Condition | None = None
+        cls,
+        damper: Damper,
+        limits: Limits,
+        conditions: Sequence[Condition],
+        about: str | Condition | None = None,
+        progress: Progress = lambda what, share: None,
     ) -> Reckoning:
         """Of a damper with its covariance; raises as `plan_tests`."""
         known: Certainty | None = damper.certainty
@@ -110,7 +124,11 @@ class Reckoning:
         # What no run could tell is planned for too: anything within a factor, or what moves the force by all of it.
         unknown = [n for n in damper.own_numbers if n not in known.names and n not in known.one_sided]
         names = (*known.names, *unknown)
-        seen = np.array([_slopes(damper, known, names, condition) for condition in conditions])  # (C, D, K, P + 2)
+        told = []
+        for number, condition in enumerate(conditions):
+            progress(f"what test {number + 1} of {len(conditions)} would tell", 0.9 * number / len(conditions))
+            told.append(_slopes(damper, known, names, condition))
+        seen = np.array(told)  # (C, D, K, P + 2)
         doubt = seen if not isinstance(about, Condition) else np.array([_slopes(damper, known, names, about)])
         by_number = doubt[..., : len(names)]
         goal = np.einsum("cdkp,cdkq->pq", by_number, by_number) / np.prod(doubt.shape[:3])

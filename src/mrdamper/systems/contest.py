@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from mrdamper.dampers.base import Damper
@@ -42,6 +42,7 @@ def contest(
     controllers: Sequence[Controller],
     step: float | None = None,
     highest: float | None = None,
+    progress: Callable[[str, float], None] = lambda what, share: None,
 ) -> Contest:
     """Run controllers one after the other, all at the step that the first one settles at.
 
@@ -51,13 +52,17 @@ def contest(
         As `simulate_system`.
     controllers : sequence of Controller
         Beside no current, the highest current, and the preview.
+    progress : callable
+        Told what is being done and the share done, 0...1.
     """
     if highest is None:
         highest = max(damper.envelope.current_A[1] for damper in dampers.values())
     first = simulate_system(system, source, dampers, Passive(), step, highest)
     runs = {"no current": first}
     between = {f"{highest:.3g} A": Passive(highest), **{_title(c): c for c in controllers}}
-    for title, controller in {**between, Preview.title: Preview()}.items():
+    several = {**between, Preview.title: Preview()}
+    for number, (title, controller) in enumerate(several.items()):
+        progress(title, number / len(several))
         runs[title] = Loop(system, source, dampers, controller, highest).run(first.step)
     return Contest(runs)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -134,7 +134,12 @@ def _student(rng: np.random.Generator, dof: float, count: int) -> Floats:
     return np.sqrt(dof / rng.chisquare(dof, (count, 1)))
 
 
-def monte_carlo(loop: Loop, draws: Sequence[Mapping[str, Draw]], mean: Simulation) -> Bands:
+def monte_carlo(
+    loop: Loop,
+    draws: Sequence[Mapping[str, Draw]],
+    mean: Simulation,
+    progress: Callable[[str, float], None] = lambda what, share: None,
+) -> Bands:
     """Run a loop again with other numbers of its dampers; it is traced and compiled once.
 
     Parameters
@@ -146,6 +151,8 @@ def monte_carlo(loop: Loop, draws: Sequence[Mapping[str, Draw]], mean: Simulatio
     mean : Simulation
         Of the dampers themselves. Draws take twice its step, or half the loop's first one if that is
         longer: the last halvings for a peak after a switch are worth less than more draws.
+    progress : callable
+        Told what is being done and the share done, 0...1.
 
     Raises
     ------
@@ -155,7 +162,8 @@ def monte_carlo(loop: Loop, draws: Sequence[Mapping[str, Draw]], mean: Simulatio
     machine = (len(draws) > 5 or None) and loop.can_compile
     step = max(2 * mean.step, loop.first_step / 2)
     peaks, found, lost = [], [], 0
-    for one in draws:
+    for number, one in enumerate(draws):
+        progress(f"draw {number + 1} of {len(draws)}", number / len(draws))
         try:
             done = loop.run(step, machine=machine, numbers=_numbers(loop, one))
         except (StepError, InputError):  # numbers that make no damper, or a motion nobody can follow

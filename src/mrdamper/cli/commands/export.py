@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
+
+if TYPE_CHECKING:
+    from mrdamper.dampers.base import Damper
+    from mrdamper.export.base import Exporter
 
 
 def register(app: typer.Typer) -> None:
@@ -20,11 +25,10 @@ def register(app: typer.Typer) -> None:
         fmi: int | None = typer.Option(None, "--fmi", help="For fmu: version of the standard, 2 (default) or 3."),
     ) -> None:
         """Export a saved model: C99 source, FMU, web page, LaTeX or Markdown equations, force–velocity tables."""
+        from mrdamper.cli.progress import progress_soon
         from mrdamper.errors import InputError
         from mrdamper.export import exporter
         from mrdamper.export.base import identifier, write_export
-        from mrdamper.export.fmu import FMUExporter
-        from mrdamper.export.fmu_program import write_program_fmu
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.model_file import load_model
 
@@ -36,26 +40,29 @@ def register(app: typer.Typer) -> None:
         require_writable(out)
         damper = load_model(model)
         called = identifier(name or damper.rig or "damper")
-        if inverse:
-            from mrdamper.systems.inverse import invert
-
-            turned, named = invert(damper), f"{called}_inverse"
-            notes: tuple[str, ...] = ()
-            if to == "c":
-                from mrdamper.export.c import write_program
-
-                paths = write_program(turned.program, named, turned.title, out)
-            elif isinstance(made, FMUExporter):
-                paths, notes = write_program_fmu(turned.program, named, turned.title, turned.units, out, exporter=made)
+        with progress_soon(f"making {to}{' and checking it' if to == 'fmu' else ''}"):
+            if inverse:
+                paths, notes = _inverse(damper, f"{called}_inverse", to, made, out)
             else:
-                raise InputError(f"--inverse with --to {to}", mend="export --to c or fmu", code="E_OPTION")
-            for path in paths:
-                typer.echo(path)
-            for note in notes:
-                typer.echo(f"note: {note}", err=True)
-            return
-        written = made.export(damper, called)
-        for path in write_export(written, out, kind.suffix):
+                written = made.export(damper, called)
+                paths, notes = write_export(written, out, kind.suffix), written.notes
+        for path in paths:
             typer.echo(path)
-        for note in written.notes:
+        for note in notes:
             typer.echo(f"note: {note}", err=True)
+
+
+def _inverse(damper: Damper, name: str, to: str, exporter: Exporter, out: Path) -> tuple[list[Path], tuple[str, ...]]:
+    """The current for a wanted force: files written, and what to know about them."""
+    from mrdamper.errors import InputError
+    from mrdamper.export.c import write_program
+    from mrdamper.export.fmu import FMUExporter
+    from mrdamper.export.fmu_program import write_program_fmu
+    from mrdamper.systems.inverse import invert
+
+    turned = invert(damper)
+    if to == "c":
+        return write_program(turned.program, name, turned.title, out), ()
+    if isinstance(exporter, FMUExporter):
+        return write_program_fmu(turned.program, name, turned.title, turned.units, out, exporter=exporter)
+    raise InputError(f"--inverse with --to {to}", mend="export --to c or fmu", code="E_OPTION")

@@ -25,6 +25,7 @@ def register(app: typer.Typer) -> None:
         """Propose the records that shrink a doubt about a damper most, or a first test matrix."""
         import numpy as np
 
+        from mrdamper.cli.progress import progress_soon
         from mrdamper.errors import InputError
         from mrdamper.files.atomic import require_writable, write_into
         from mrdamper.files.encoding import csv_text
@@ -41,12 +42,12 @@ def register(app: typer.Typer) -> None:
         if about is not None and damper is None:
             raise InputError("--about without a model", mend="give a model.json")
         allowed = Limits.read(limits) if limits else Limits.of(damper)  # type: ignore[arg-type]
-        if damper:
-            chosen, reckoning = plan_tests(damper, allowed, hours, _doubt(about))
-        else:
-            chosen, reckoning = first_matrix(allowed, hours), None
         names = []
-        with write_into(out) as folder:
+        with progress_soon("planning") as tell, write_into(out) as folder:
+            if damper:
+                chosen, reckoning = plan_tests(damper, allowed, hours, _doubt(about), tell)
+            else:
+                chosen, reckoning = first_matrix(allowed, hours), None
             for number, item in enumerate(chosen, start=1):
                 c = item.condition
                 name = f"plan_{number:02d}_{c.current_A:.3g}A_{c.frequency_Hz:.3g}Hz_{1e3 * c.amplitude_m:.3g}mm.csv"

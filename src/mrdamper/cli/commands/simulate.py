@@ -58,6 +58,7 @@ def register(app: typer.Typer) -> None:
         import json
 
         from mrdamper.cli.output import parse_named
+        from mrdamper.cli.progress import progress_soon
         from mrdamper.errors import InputError
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.model_file import load_model
@@ -99,18 +100,21 @@ def register(app: typer.Typer) -> None:
             if not dampers:
                 raise InputError("draws without a damper", mend="leave out --without-damper or --draws")
             drawn = draw(dampers, draws, seed)
-        done = simulate_system(found.system, shaken_by, dampers, controller, step, highest)
-        bands = None
-        if drawn is not None:
-            loop = Loop(found.system, shaken_by, dampers, controller, highest, free=True)
-            bands = monte_carlo(loop, drawn, done)
-        if out is not None:
-            from mrdamper.report.simulation import write_simulation
-            from mrdamper.systems.contest import contest
+        bands, paths = None, []
+        with progress_soon(f"{found.system.title}, finer until the peaks settle") as tell:
+            done = simulate_system(found.system, shaken_by, dampers, controller, step, highest)
+            if drawn is not None:
+                loop = Loop(found.system, shaken_by, dampers, controller, highest, free=True)
+                bands = monte_carlo(loop, drawn, done, tell)
+            if out is not None:
+                from mrdamper.report.simulation import write_simulation
+                from mrdamper.systems.contest import contest
 
-            table = contest(found.system, shaken_by, dampers, others, done.step, highest) if others else None
-            for path in write_simulation(done, out, table, bands):
-                typer.echo(f"{path}", err=True)
+                table = contest(found.system, shaken_by, dampers, others, done.step, highest, tell) if others else None
+                tell("writing", 1.0)
+                paths = write_simulation(done, out, table, bands)
+        for path in paths:
+            typer.echo(f"{path}", err=True)
         if as_json:
             print(json.dumps(_figures(done, dampers) | _banded(bands), indent=1))
         else:
