@@ -10,14 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.dampers import joint_damper
 
-from mrdamper.dampers.base import UNTESTED
+from mrdamper.dampers import joint
+from mrdamper.dampers.base import UNTESTED, Envelope
 from mrdamper.dampers.certainty import OwnNumber
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.joint import FALL, RISE, JointDamper, JointFit, JointProblem, damper_of
-from mrdamper.dampers.strung import string
+from mrdamper.dampers.strung import Part, string
 from mrdamper.data import Condition, Run
 from mrdamper.errors import IdentificationError, RunError
 from mrdamper.files.model_file import dump_model, parse_model
+from mrdamper.models import Scale
 from mrdamper.models.play_bypass import PlayBypass, play_position
 from mrdamper.motion import random_motion, sine, sweep
 from mrdamper.motion.lag import first_order_lag
@@ -194,6 +196,84 @@ def test_a_coil_is_looked_for_where_a_current_changes_or_taken_as_given(runs, pr
         assert [(a.lower, a.upper, a.log) for a in with_change.axes[9:]] == [(1e-4, 0.2, True)] * len(more)
 
 
+def test_problems_made_of_another_keep_what_it_was_given(runs, problem):
+    changing = replace(runs[3], id="changing", current=np.linspace(0.1, 0.9, runs[3].time.size))
+    one = JointProblem([*runs[:3], changing], "play-bypass", {"m": 5.0}, free=("leak",), coil=None)
+    again, cut = one.with_free(("si",), {"k": 9.0}), one.with_parts(one.parts[:2])
+    assert (again.given_coil, cut.given_coil) == (None, None)
+    assert (again.fixed, cut.fixed) == ({"m": 5.0, "k": 9.0}, {"m": 5.0})
+    assert ("si" in again.free, "leak" in again.free, "leak" in cut.free) == (True, False, True)
+    assert (len(again.parts), len(cut.parts)) == (4, 2)
+
+
+def test_lags_are_handed_on_and_found_at_their_own_places(runs, problem, fit):
+    changing = replace(runs[3], id="changing", current=np.linspace(0.1, 0.9, runs[3].time.size))
+    lagged = JointProblem([*runs[:3], changing], "play-bypass")
+    known = SimpleNamespace(damper=replace(fit.damper, coil=Coil(0.02, 0.05)), searched=fit.searched)
+    point = lagged.from_point(known)
+    found = lagged.coil_at(point)
+    assert (found.rise_s, found.fall_s) == pytest.approx((0.02, 0.05))
+    far = lagged.from_point(SimpleNamespace(damper=replace(fit.damper, coil=Coil(1e-9, 9.0)), searched=fit.searched))
+    assert (lagged.coil_at(far).rise_s, lagged.coil_at(far).fall_s) == pytest.approx((1e-4, 0.2))
+    names = [axis.name for axis in lagged.axes]
+    for low, told in (("d", ("d",)), ("seat_share", ("e",)), (RISE, (RISE,)), (None, ())):
+        at = point.copy()
+        if low:
+            at[names.index(low)] = lagged.box()[0][names.index(low)]
+        assert tuple(lagged._at_bounds(at)) == told
+    at = point.copy()
+    at[names.index("cb")] = lagged.box()[1][names.index("cb")]
+    assert lagged._at_bounds(at) == ["cb"]
+
+
+def test_scales_and_ranges_are_those_of_the_runs(runs, problem):
+    conditions = [Condition(0.2, 1.0, 0.01), Condition(0.4, 3.0, 0.02), Condition(0.1, 0.5, 0.09)]
+    made = [
+        SimpleNamespace(condition=c, scale=scale, motion=SimpleNamespace(current=np.array(current)))
+        for c, scale, current in zip(conditions, (300.0, 900.0, 500.0), ([0.1], [0.2, 0.3], [-0.8, 0.5]), strict=True)
+    ]
+    assert joint._scale(made) == Scale(0.02, sorted(c.peak_velocity for c in conditions)[1], 450.0, 0.8)
+    changing = replace(runs[3], id="changing", current=np.linspace(0.1, 0.9, runs[3].time.size))
+    sine_, other = problem.parts[0], Part.of(changing)
+    plain = Envelope.of([sine_.condition, other.condition])
+    extent = np.array([[other.lowest, other.highest]])
+    wider = plain.with_motion(other.motion.current, extent, other.motion.velocity)
+    assert joint._envelope([sine_, other]) == wider != plain
+    assert joint._envelope([sine_]) == Envelope.of([sine_.condition])
+    extent = np.array([[sine_.lowest, sine_.highest]])
+    rough = Envelope.of([sine_.condition]).with_motion(sine_.motion.current, extent, sine_.motion.velocity)
+    assert joint._envelope([replace(sine_, is_sine=False)]) == rough
+
+
+def test_starts_are_tried_on_six_runs_and_a_single_start_is_taken_as_it_is(runs, problem, monkeypatch):
+    assert len(problem._few.parts) == 6
+    few = problem.with_parts(problem.parts[:4])
+    assert len(few._few.parts) == 4
+    monkeypatch.setattr(JointProblem, "_downhill", lambda self, u: pytest.fail("one start needs no trial"))
+    held = problem.with_free((), {"d": 3e-4, "cb": 3e4})
+    (start,) = held._promising
+    assert start.tolist() == [axis.coordinate(axis.grid[0]) for axis in held.axes]
+
+
+def test_the_third_valley_is_not_looked_into(problem, monkeypatch):
+    made = [ended(0.03, 1e-3), ended(0.031, 2e-3), ended(0.01, 3e-3)]
+    other = JointProblem(problem.runs, "play-bypass", parts=problem.parts)
+    other.__dict__["_promising"] = [np.array([k]) for k in range(3)]
+    monkeypatch.setattr(JointProblem, "fit", lambda self, start, **how: made[int(start[0])])
+    assert other.search().error == pytest.approx(0.03)
+
+
+def test_a_linearisation_is_that_of_its_own_fit_and_made_once(problem, fit):
+    other = problem.fit(start=fit.point + 1e-3, rounds=1, most_steps=1)
+    residual, jacobian, owner = problem.linearised(fit)
+    assert problem.linearised(fit)[0] is residual
+    assert problem.linearised(other)[0] is not residual
+    errors = np.sqrt(np.bincount(owner, residual**2))
+    assert errors / errors[0] == pytest.approx(np.sqrt(fit.nrmse_pp / fit.nrmse_pp[0]), rel=0.05)  # weights: 1 / √error
+    assert jacobian.shape == (residual.size, len(problem.axes) + len(problem.linear))
+    assert fit.seconds < 600
+
+
 def test_a_fit_begins_where_another_problem_ended(problem, fit):
     free = JointProblem(problem.runs, "play-bypass", free=("Ic", "si"), parts=problem.parts)
     point = dict(zip((a.name for a in free.axes), free.from_point(fit), strict=True))
@@ -255,6 +335,8 @@ def test_a_fit_without_some_runs_ends_where_a_search_that_never_saw_them_does(ru
     rest = [i for i in range(len(runs)) if i not in (6, 7, 8)]
     again, anew = problem.refit(fit, rest), problem.fit(rest, fit.point)
     assert sum(again.nrmse_pp) == pytest.approx(sum(anew.nrmse_pp), rel=2e-3)
+    assert again.nrmse_pp == pytest.approx(problem.errors(again, rest), rel=1e-6)
+    assert again.nrmse_pp == pytest.approx(problem.refit(fit, rest[::-1]).nrmse_pp)
     moved = abs(anew.damper.model.fy1 - fit.damper.model.fy1)
     assert abs(again.damper.model.fy1 - anew.damper.model.fy1) < 0.1 * moved
     assert again.damper.provenance["runs"] == "9"

@@ -15,11 +15,16 @@ POINTS, F, X = 200, 1.25, 0.02
 OMEGA = 2 * np.pi * F
 
 
-def view(force, cycles=4.0, lead=0.0):
+def view(force, cycles=4.0, lead=0.0, points=POINTS, hole=()):
     """A sine, and a force as a function of the phase and of the number of the cycle."""
-    time = np.arange(int(cycles * POINTS) + 1) / (POINTS * F)
+    time = np.arange(int(cycles * points) + 1) / (points * F)
     number = np.minimum((time * F + 1e-9).astype(int), int(np.ceil(cycles)) - 1)
-    return View(Record("made", time + 3.0, X * np.sin(OMEGA * time) + lead, force(OMEGA * time, number, time)))
+    kept = np.setdiff1d(np.arange(time.size), hole)
+    values = (time + 3.0, X * np.sin(OMEGA * time) + lead, force(OMEGA * time, number, time))
+    made = View(Record("made", *(v[kept] for v in values)))
+    if hole:
+        made.segments = ((0, hole[0]), (hole[0], kept.size))
+    return made
 
 
 def viscous(phase, number, time):
@@ -51,6 +56,7 @@ def test_of_segments_that_hold_a_cycle_the_least_share_counts():
     assert share((0, 801)) == pytest.approx(middle)
     assert share((0, 640), (640, 801)) == pytest.approx(middle, abs=0.35)  # four fifths of a cycle says nothing
     assert share((0, 640), (640, 801)) > -0.9
+    assert share((0, 551), (551, 801)) == pytest.approx(-1.0, abs=5e-3)  # a second of 0.8 s cycles is one
     made.strokes = SimpleNamespace(period=None, steady=None)
     assert share((0, 400), (400, 801)) == pytest.approx(middle, abs=0.02)
 
@@ -80,14 +86,18 @@ def test_exchanged_channels_are_told_by_which_moves_like_a_sine():
     assert loop._exchanged(swapped)
     # Overtones of the displacement over its first: as large as 1.4 times those of the force they are the force's.
     for ratio, exchanged in ((1.4, False), (1.6, True)):
-        x = 0.02 * (np.sin(OMEGA * time) + 0.2 * ratio * np.sin(2 * OMEGA * time)) + 1e-3 * time
-        made = View(Record("made", time, x, 10 * np.cos(OMEGA * time) + 2 * np.cos(2 * OMEGA * time) + time))
+        x = 0.02 * (np.sin(OMEGA * time) + 0.2 * ratio * np.sin(2 * OMEGA * time)) + 4e-3 * time
+        made = View(Record("made", time + 3, x, 10 * np.cos(OMEGA * time) + 2 * np.cos(2 * OMEGA * time)))
         assert bool(loop._exchanged(made)) is exchanged
     still = view(viscous)
     still.motion, still.strokes = None, SimpleNamespace(steady=None, lengths=np.zeros(9))
     for size in (0.03, 0.05):
-        still.run = SimpleNamespace(displacement=np.array([0.0, 0.04]), force=np.array([0.0, size]))
-        assert loop._exchanged(still) is (size < 0.04)
+        for zero in (0.0, -0.03):
+            for other in (0.0, -0.03):
+                still.run = SimpleNamespace(
+                    displacement=np.array([zero, zero + 0.04]), force=np.array([other, other + size])
+                )
+                assert loop._exchanged(still) is (size < 0.04)
 
 
 def levels(turning, out, back, dip=0.0, share=0.0, count=1000):
@@ -117,6 +127,25 @@ def test_a_rectified_force_is_nearer_to_zero_at_the_reversals_than_in_either_str
     assert loop._is_rectified(made) is rectified
 
 
+@pytest.mark.parametrize("mirrored", [1.0, -1.0])
+def test_reversals_and_strokes_are_told_by_the_largest_speed_either_way(mirrored):
+    rng = np.random.default_rng(0)
+    # To 2 m/s one way, 1.2 the other: turning below 0.2, strokes above 1.0.
+    bands = ((0.0, 0.05, 30, 90.0), (0.05, 0.2, 100, 0.0), (0.2, 1.0, 200, 5.0), (1.0, 1.2, 60, 100.0))
+    parts = [(sign * rng.uniform(low, high, n), np.full(n, F)) for low, high, n, F in bands for sign in (1, -1)]
+    parts += [(-rng.uniform(1.2, 2.0, 10), np.full(10, 100.0)), (np.array([-2.0]), np.array([100.0]))]
+    v, force = (np.concatenate(each) for each in zip(*parts, strict=True))
+
+    def rectified(force):
+        run = SimpleNamespace(force=mirrored * np.asarray(force))
+        return loop._is_rectified(SimpleNamespace(run=run, moving=SimpleNamespace(velocity=mirrored * v)))
+
+    assert rectified(force)
+    half = np.where((np.abs(v) >= 1) & (np.arange(v.size) % 9 < 4), 0.0, force)  # four ninths of a stroke are missing
+    assert rectified(np.where((np.abs(v) < 0.2) & (np.abs(v) > 0.05), 50.0, half))
+    assert rectified(np.where(np.abs(v) < 1, 0.0, force) + 2 * rng.standard_normal(v.size))  # below zero by noise
+
+
 def test_a_rectified_force_is_refused_by_its_name():
     with pytest.raises(QualityError, match="absolute value") as told:
         dissipates(view(lambda p, n, t: np.abs(np.cos(p))))
@@ -144,6 +173,17 @@ def test_a_rectified_force_is_refused_by_its_name():
         (lambda p, n, t: np.where((n == 2) & (abs(p - 4 * np.pi - np.pi) < 0.06 * np.pi), -1, 1) * np.cos(p), 4.0,
          None),
         (lambda p, n, t: np.where((n == 1) & (abs(p - 3 * np.pi) < 0.1 * np.pi), -1, 1) * np.cos(p), 2.0, None),
+        (lambda p, n, t: np.where((n == 1) & (abs(p - 3 * np.pi) < 0.1 * np.pi), -1, 1) * np.cos(p), 3.0,
+         r"\(1 of 3 cycles\)"),
+        # Where the force is large and positive too, and a short stretch beside a long one.
+        (lambda p, n, t: np.where((n == 2) & (p < 4.2 * np.pi), -1, 1) * np.cos(p), 4.0, "1 of 4"),
+        (lambda p, n, t: np.where((n == 2) & ((p < 4.2 * np.pi) | (abs(p - 5 * np.pi) < 0.02)), -1, 1) * np.cos(p), 4.0,
+         "1 of 4"),
+        # Where the force is small either sign is near; a force that is weak for a while has not turned.
+        (lambda p, n, t: 100 * np.where((n == 2) & (abs(p - 4.5 * np.pi) < 0.29), -1, 1) * np.cos(p), 4.0, None),
+        (lambda p, n, t: np.where((n == 2) & (p < 4.2 * np.pi), 0.3, 1) * np.cos(p), 4.0, None),
+        # The rest of a record beyond its last whole cycle.
+        (lambda p, n, t: np.where(n == 2, -1.0, 1.0) * np.cos(p), 2.6, None),
     ],
 )  # fmt: skip
 def test_a_force_that_changes_its_sign_is_refused_from_where_it_does(force, cycles, told):
@@ -155,6 +195,18 @@ def test_a_force_that_changes_its_sign_is_refused_from_where_it_does(force, cycl
     assert refused.value.code == "E_DISSIPATION_SIGN"
     made.found.append(SimpleNamespace(code="W_FROZEN"))
     keeps_its_sign(made)
+
+
+def test_cycles_with_a_hole_or_too_few_samples_are_not_judged():
+    def flipped(p, n, t):
+        return np.where(n == 2, -1.0, 1.0) * np.cos(p)
+
+    keeps_its_sign(view(flipped, hole=range(470, 500)))
+    with pytest.raises(QualityError, match="1 of 3"):
+        keeps_its_sign(view(flipped, hole=range(670, 700)))
+    keeps_its_sign(view(flipped, points=15))
+    with pytest.raises(QualityError, match="1 of 4"):
+        keeps_its_sign(view(flipped, points=24))
 
 
 def test_scatter_is_the_spread_of_the_cycles_over_the_peak_to_peak_force():
@@ -170,6 +222,10 @@ def test_scatter_is_the_spread_of_the_cycles_over_the_peak_to_peak_force():
     scatter, _ = repeatability(view(lambda p, n, t: scaled(p, n + 1, t), cycles=2.0))
     assert scatter == pytest.approx(np.std([0.9, 1.0], ddof=1) * np.sqrt(0.5) / (2 * 0.95), rel=0.03)
     assert repeatability(view(scaled, cycles=1.9)) is None
+    cubed, _ = repeatability(view(lambda p, n, t: 100 * gains[n] * np.cos(p) ** 3, cycles=3.0))
+    assert cubed == pytest.approx(np.std([0.9, 1.0], ddof=1) * np.sqrt(5 / 16) / (2 * 0.95), rel=0.03)
+    holed, _ = repeatability(view(scaled, hole=range(670, 700)))
+    assert holed == pytest.approx(np.std([0.9, 1.0], ddof=1) * np.sqrt(0.5) / (2 * 0.95), rel=0.03)
     grain = np.random.default_rng(0).standard_normal(801)
     _, noise = repeatability(view(lambda p, n, t: 100 * np.cos(p) + 5 * grain))
     assert noise == pytest.approx(5 / 200, rel=0.15)
@@ -179,7 +235,8 @@ def test_scatter_is_the_spread_of_the_cycles_over_the_peak_to_peak_force():
 
 
 @pytest.mark.parametrize(
-    ("found", "said"), [((0.06, 0.0), "6.0 %"), ((0.06, 0.04), None), ((0.05, 0.06), None), (None, None)]
+    ("found", "said"),
+    [((0.06, 0.0), "6.0 %"), ((0.06, 0.01), "6.0 %"), ((0.06, 0.04), None), ((0.05, 0.06), None), (None, None)],
 )
 def test_cycles_that_differ_by_more_than_noise_are_said(monkeypatch, found, said):
     monkeypatch.setattr(loop, "repeatability", lambda view: found)

@@ -471,11 +471,11 @@ class JointProblem:
         """Parameters whose search axis ended at a limit, under their own names."""
         own = {info.name for info in self.model_type.parameters()}
         found = []
+        middle = np.mean(self.box(), axis=0)
         for i, axis in enumerate(self.axes):
             if not axis.at_bound(float(point[i])):
                 continue
-            low, high = axis.coordinate(axis.lower), axis.coordinate(axis.upper)
-            inward = point + np.eye(len(point))[i] * 1e-3 * (low + high - 2 * point[i])
+            inward = np.where(np.arange(point.size) == i, middle, point)
             here, there = self.bare(point).values(), self.bare(inward).values()
             stands_for = [n for n in here if here[n] != there[n]]
             found += [axis.name] if axis.name in own or not stands_for else stands_for
