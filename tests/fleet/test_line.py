@@ -1,11 +1,13 @@
 """One command for the whole line: its table, its bits, its refusals."""
 
 import json
+import os
 import shutil
 import sqlite3
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 import polars as pl
@@ -14,13 +16,16 @@ from support.fleets import LINE, ROWS, planned, same_bits
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
+from mrdamper.data import Dataset
 from mrdamper.errors import InputError
 from mrdamper.files.dataset import load_dataset, save_dataset
 from mrdamper.fleet.generator import Line
-from mrdamper.fleet.items import find_items
+from mrdamper.fleet.items import digest_of, find_items
+from mrdamper.fleet.job import Settings, as_job, attempt, read
 from mrdamper.fleet.lake import lake_dataset
 from mrdamper.fleet.line import run_fleet
 from mrdamper.fleet.profile import FleetProfile
+from mrdamper.rig_files import sandbox
 
 
 def test_one_row_a_damper_and_session(identified):
@@ -123,6 +128,43 @@ def test_a_damper_that_cannot_be_used_is_named_and_the_others_go_on(identified, 
     assert len(found.troubled) == 6
 
 
+def test_a_reading_process_that_is_killed_is_no_fault_of_the_records(line, identified, monkeypatch):
+    watch, killed = sandbox._Sandbox._watch, []
+
+    def kill_once(child, patience):
+        if not killed:
+            killed.append(child._process.kill())
+        watch(child, patience)
+
+    monkeypatch.setattr(sandbox._Sandbox, "_watch", kill_once)
+    item = find_items(line, FleetProfile())[0]
+    row = attempt(as_job(item, digest_of(item), Settings(), identified.plan))
+    assert killed
+    assert (row["status"], row["reason"]) == ("done", "")
+
+
+def test_what_is_no_record_is_passed_by(line, tmp_path):
+    shutil.copytree(line / "D000001", tmp_path / "a\tb")
+    (tmp_path / "itself").symlink_to(tmp_path)
+    os.mkfifo(tmp_path / "pipe.csv")
+    out = tmp_path / "out"
+    out.mkdir()
+    pl.DataFrame({"serial": ["D1"]}).write_parquet(out / "dampers.parquet")
+    assert [item.name for item in find_items(tmp_path, FleetProfile(), out)] == ["D000001, session S001"]
+
+
+def test_one_dataset_of_many_sessions_is_a_damper_of_each(line, tmp_path):
+    dataset = load_dataset(line / "D000001")
+    runs = [replace(run, notes={"serial": "G1", "session": f"S{n // 2}"}) for n, run in enumerate(dataset)]
+    save_dataset(Dataset(tuple(runs), "all"), tmp_path / "all")
+    items = find_items(tmp_path, FleetProfile())
+    assert [item.name for item in items] == ["G1, session S0", "G1, session S1"]
+    assert [[run.id for run in read(item, Settings())[0]] for item in items] == [
+        [run.id for run in runs[:2]],
+        [run.id for run in runs[2:]],
+    ]
+
+
 def test_a_source_without_a_damper_is_refused(tmp_path):
     with pytest.raises(InputError) as refused:
         run_fleet(tmp_path, tmp_path / "out")
@@ -186,10 +228,13 @@ def test_the_command_says_what_came_and_who_is_in_trouble(line, identified, tmp_
 
 
 def test_the_fast_lane_ends_where_a_cold_search_does(line, identified, tmp_path):
-    found = run_fleet(line, planned(identified, tmp_path / "cold"), workers=1, cold=True)
-    fast, cold = pl.read_parquet(identified.table), pl.read_parquet(found.table)
-    assert set(fast["lane"]) == {"fast", "full"}
-    assert set(cold["lane"]) == {"cold", "full"}
+    source, names = tmp_path / "records", ["D000001", "D000004"]
+    for name in names:
+        shutil.copytree(line / name, source / name)
+    found = run_fleet(source, planned(identified, tmp_path / "cold"), workers=1, cold=True)
+    fast, cold = pl.read_parquet(identified.table).filter(pl.col("serial").is_in(names)), pl.read_parquet(found.table)
+    assert set(fast["lane"]) == {"fast"}
+    assert set(cold["lane"]) == {"cold"}
     assert fast["cost"].to_numpy() == pytest.approx(cold["cost"].to_numpy(), rel=1e-6)
     for name in ("p_fy1", "p_c0", "p_cb", "p_T"):
         assert fast[name].to_numpy() == pytest.approx(cold[name].to_numpy(), rel=3e-4), name

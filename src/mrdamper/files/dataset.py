@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -109,7 +109,7 @@ def store_split(folder: str | Path, held_out: Collection[str]) -> None:
         If runs.csv is missing or cannot be read.
     """
     folder = Path(folder)
-    rows = _runs_table(folder)
+    rows = runs_table(folder)
     for row in rows:
         row["split"] = "validate" if row["run_id"] in held_out else "train"
     with write_file(folder / "runs.csv") as path:
@@ -117,7 +117,7 @@ def store_split(folder: str | Path, held_out: Collection[str]) -> None:
 
 
 def _load(folder: Path, name: str, *, trusted: bool = False) -> Dataset:
-    table = _runs_table(folder)
+    table = runs_table(folder)
     samples = read_samples(folder, trusted=trusted)
     missing = [row["run_id"] for row in table if row["run_id"] not in samples]
     if missing:
@@ -133,10 +133,18 @@ def _load(folder: Path, name: str, *, trusted: bool = False) -> Dataset:
             where=str(folder),
             mend="add a row to runs.csv, or correct the run_id",
         )
-    return Dataset(tuple(_run(row, samples[row["run_id"]], folder) for row in table), name)
+    path = folder / "runs.csv"
+    return Dataset(tuple(run_of(row, samples[row["run_id"]], path) for row in table), name)
 
 
-def _runs_table(folder: Path) -> list[dict[str, Any]]:
+def runs_table(folder: Path) -> list[dict[str, Any]]:
+    """Rows of a dataset's runs.csv by column; empty cells are None.
+
+    Raises
+    ------
+    DatasetError, ColumnError
+        If it is missing, cannot be read, or holds no run.
+    """
     if folder.is_file():
         mend = "give the folder that holds runs.csv; files of a rig become one with mrdamper import"
         raise DatasetError("a file, no dataset folder", where=str(folder), mend=mend)
@@ -194,8 +202,17 @@ def _holds_rig_files(folder: Path) -> bool:
     return any(p.is_file() and p.name not in SAMPLE_FILES for p in folder.iterdir())
 
 
-def _run(row: dict[str, Any], samples: Channels, folder: Path) -> Run:
-    where = f"{folder / 'runs.csv'}, run {row['run_id']}"
+def run_of(row: Mapping[str, str | None], samples: Channels, path: Path) -> Run:
+    """A run from a row of a table and its channels.
+
+    Raises
+    ------
+    ColumnError
+        If a cell is no number, or nothing tells the current; `path` is where.
+    RunError, TimeOrderError, NonFiniteError
+        If the channels do not fit together.
+    """
+    where = f"{path}, run {row['run_id']}"
 
     def number(column: str) -> float | None:
         text = (row.get(column) or "").strip()
@@ -219,7 +236,7 @@ def _run(row: dict[str, Any], samples: Channels, folder: Path) -> Run:
     if frequency is not None and amplitude is not None:
         nominal = Condition(float(np.mean(current)), frequency, amplitude)
     return Run(
-        id=row["run_id"],
+        id=row["run_id"] or "",
         time=channels["time_s"],
         displacement=channels["displacement_m"],
         force=channels["force_N"],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import json
 from collections.abc import Iterator, Sequence
@@ -11,7 +10,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 
-from mrdamper.errors import InputError
+from mrdamper.errors import InputError, printable
+from mrdamper.files.dataset import runs_table
 from mrdamper.files.samples import SAMPLE_FILES
 from mrdamper.fleet.profile import FACTS, FleetProfile
 
@@ -41,8 +41,8 @@ class Item:
         The dataset folder, the rig files, or the lake's files.
     rows : tuple of (int, int)
         Of a lake: first row and number of rows in each file.
-    column : str
-        Column that holds the serial number, where one table holds several dampers.
+    picks : tuple of (str, str)
+        Column and cell of the rows that are its own, where one table holds several dampers.
     error : InputError, optional
         Why it cannot be used, known before it is read.
     """
@@ -55,13 +55,13 @@ class Item:
     kind: Kind = "dataset"
     paths: tuple[str, ...] = ()
     rows: tuple[tuple[int, int], ...] = ()
-    column: str = ""
+    picks: tuple[tuple[str, str], ...] = ()
     error: InputError | None = None
 
     @property
     def name(self) -> str:
-        """Serial number, and the session where one is stated."""
-        return f"{self.serial}, session {self.session}" if self.session else self.serial
+        """Serial number, and the session where one is stated, as a terminal may show them."""
+        return printable(f"{self.serial}, session {self.session}" if self.session else self.serial)
 
     @property
     def facts(self) -> dict[str, Any]:
@@ -69,7 +69,7 @@ class Item:
         return {name: getattr(self, name) for name in FACTS}
 
 
-def find_items(source: str | Path, profile: FleetProfile) -> list[Item]:
+def find_items(source: str | Path, profile: FleetProfile, out: Path | None = None) -> list[Item]:
     """The dampers of a source, sorted by serial number and session.
 
     Parameters
@@ -78,6 +78,8 @@ def find_items(source: str | Path, profile: FleetProfile) -> list[Item]:
         A folder of dataset folders, of folders of rig files or of rig files, a dataset folder, or
         a Parquet lake (a file, or a folder of such files) with a column for the serial number.
     profile : FleetProfile
+    out : path, optional
+        Folder of results, that may lie in the source.
 
     Raises
     ------
@@ -90,11 +92,12 @@ def find_items(source: str | Path, profile: FleetProfile) -> list[Item]:
     from mrdamper.fleet.lake import is_lake, lake_items
 
     lake = sorted(source.rglob("*.parquet")) if source.is_dir() else [source]
-    lake = [path for path in lake if path.name not in SAMPLE_FILES]
+    ours = None if out is None else out.resolve() / "dampers.parquet"
+    lake = [p for p in lake if p.name not in SAMPLE_FILES and p.is_file() and p.resolve() != ours]
     if lake and is_lake(lake, profile):
         found = lake_items(lake, profile)
     elif source.is_dir():
-        found = list(_in_folder(source, profile))
+        found = list(_in_folder(source, profile, out))
     else:
         raise FleetError(
             "neither a folder nor a Parquet file with a serial number", where=str(source), mend="give a folder",
@@ -112,7 +115,7 @@ def digest_of(item: Item) -> str:
     """Hash of the bytes of an item's files, and of what names the damper in them."""
     seen = [(path, path.stat()) for path in _files(item)]
     contents = [(path.name, _content(path, about.st_size, about.st_mtime_ns)) for path, about in seen]
-    return hash_of(contents, sorted(item.facts.items()), item.rows, item.column)
+    return hash_of(contents, sorted(item.facts.items()), item.rows, item.picks)
 
 
 @lru_cache  # a file of a lake holds many dampers
@@ -133,7 +136,7 @@ def _files(item: Item) -> list[Path]:
     return [Path(path) for path in item.paths]
 
 
-def _in_folder(folder: Path, profile: FleetProfile) -> Iterator[Item]:
+def _in_folder(folder: Path, profile: FleetProfile, out: Path | None) -> Iterator[Item]:
     from mrdamper.rig_files.readers import suffixes
 
     if (folder / "runs.csv").is_file():
@@ -142,14 +145,15 @@ def _in_folder(folder: Path, profile: FleetProfile) -> Iterator[Item]:
     known = suffixes()
     loose: list[Path] = []
     for path in sorted(folder.iterdir()):
-        if path.name.startswith("."):
-            continue
+        here = path.resolve()
+        if path.name.startswith(".") or folder.resolve().is_relative_to(here) or (out and here == out.resolve()):
+            continue  # hidden, a link to where it lies, or our own results
         if path.is_dir() and (path / "runs.csv").is_file():
             yield from _of_dataset(path, profile)
         elif path.is_dir():
             inside = [p for p in sorted(path.rglob("*")) if p.is_file() and p.suffix.lower() in known]
             yield _named(path.name, profile, "rig files", tuple(map(str, inside)), path)
-        elif path.suffix.lower() in known:
+        elif path.suffix.lower() in known and path.is_file():  # a pipe would be waited for
             loose.append(path)
     yield from _of_loose_files(loose, profile)
 
@@ -184,33 +188,24 @@ def _named(name: str, profile: FleetProfile, kind: Kind, paths: tuple[str, ...],
 
 
 def _of_dataset(folder: Path, profile: FleetProfile) -> Iterator[Item]:
-    """The dampers of a dataset folder: one, unless a column names several."""
+    """The dampers of a dataset folder: one, unless columns name several serial numbers or sessions."""
     named = _named(folder.name, profile, "dataset", (str(folder),), folder)
     try:
-        with (folder / "runs.csv").open(encoding="utf-8-sig", newline="") as file:
-            rows = [profile.of_columns(row) for row in csv.DictReader(file)]
-    except (OSError, UnicodeDecodeError, csv.Error):
-        rows = []  # the study of this damper says what is wrong with the file
-    serials = {row["serial"] for row in rows if "serial" in row}
-    if not serials and named.error is not None:
+        table = runs_table(folder)
+    except InputError:
+        table = []  # the job of this damper says what is wrong with it
+    groups: dict[tuple[str, str], dict[str, str]] = {}
+    for row in map(profile.of_columns, table):
+        key = row.get("serial", ""), row.get("session", "")
+        groups[key] = {**row, **groups.get(key, {})}
+    if named.error is not None and not any(serial for serial, _ in groups):
         yield named
         return
-    known = profile.of_name(folder.name) or {}
-    for serial in sorted(serials) or [named.serial]:
-        facts = dict(known)
-        for row in reversed([row for row in rows if row.get("serial", serial) == serial]):
-            facts.update(row)
-        column = _serial_column(folder, profile) if len(serials) > 1 else ""
-        yield make_item({**facts, "serial": serial}, profile, paths=(str(folder),), column=column)
-
-
-def _serial_column(folder: Path, profile: FleetProfile) -> str:
-    from mrdamper.fleet.profile import COLUMNS
-
-    with (folder / "runs.csv").open(encoding="utf-8-sig", newline="") as file:
-        names = next(csv.reader(file))
-    wanted = (profile.columns["serial"],) if "serial" in profile.columns else COLUMNS["serial"]
-    return next(name for name in wanted if name in names)
+    known = {"serial": folder.name, **(profile.of_name(folder.name) or {})}
+    columns = [profile.column_of(fact, table[0] if table else ()) for fact in ("serial", "session")]
+    for key, facts in (groups or {("", ""): {}}).items():
+        picks = [(c, cell) for c, cell in zip(columns, key, strict=True) if c] if len(groups) > 1 else []
+        yield make_item({**known, **facts}, profile, paths=(str(folder),), picks=tuple(picks))
 
 
 def make_item(facts: dict[str, str], profile: FleetProfile, **where: Any) -> Item:

@@ -34,6 +34,8 @@ from mrdamper.study.workflow import believed, study_rig, usable
 
 VERSION = version("mrdamper")  # asked once: the answer takes a millisecond
 OTHER_RIG = "W_OTHER_RIG"  # tested on another rig than most of the line: compared with them all the same
+_KILLED, _TRIES = "E_READER_KILLED", 8  # of a job whose reading process somebody killed
+_PASSING = ("E_EXTRA", "E_FLEET_CHANGED", "E_CLUSTER_VERSION", _KILLED)
 _ROUNDS, _STEPS, _SETTLED = 1, 40, 1e-8  # one least squares without reweighting, searched to its end: the optimum
 # is then the same to 1e-6 whatever near start it was found from
 _TOGETHER = 4  # samples that are averaged for the standard errors
@@ -93,17 +95,22 @@ def measure(job: dict[str, Any]) -> dict[str, Any]:
 
 
 def attempt(job: dict[str, Any]) -> dict[str, Any]:
-    """`measure`, with what is wrong with the records as a row too."""
-    try:
-        return {"status": "done", "code": "", "reason": "", **measure(job)}
-    except InputError as error:
-        return refused(error)
+    """`measure`, with what is wrong with the records as a row too; if the process that reads is killed, once more."""
+    row: dict[str, Any] = {}
+    for _ in range(_TRIES):
+        try:
+            return {"status": "done", "code": "", "reason": "", **measure(job)}
+        except InputError as error:
+            row = refused(error)
+        if row["code"] != _KILLED:
+            break
+    return row
 
 
 def refused(error: InputError) -> dict[str, Any]:
     """The row of a damper that cannot be used, or whose job failed."""
     # Neither says anything about the records that would be true the next time.
-    passing = error.code.startswith("E_JOB") or error.code in ("E_EXTRA", "E_FLEET_CHANGED", "E_CLUSTER_VERSION")
+    passing = error.code.startswith("E_JOB") or error.code in _PASSING
     return {"status": "failed" if passing else "refused", "code": error.code, "reason": str(error)}
 
 
@@ -124,16 +131,17 @@ def read(item: Item, settings: Settings) -> tuple[Dataset, tuple[str, ...]]:
         from mrdamper.files.dataset import load_dataset
 
         dataset = load_dataset(item.paths[0])
-        if item.column:
-            dataset = dataset.only([r for r in dataset if r.notes.get(item.column, "").strip() == item.serial])
+        if item.picks:
+            dataset = dataset.only([r for r in dataset if all(r.notes.get(c, "").strip() == x for c, x in item.picks)])
     else:
         from mrdamper.rig_files.profile import parse_profile
         from mrdamper.rig_files.rig_import import import_files, to_dataset
 
         result = import_files(item.paths, parse_profile(settings.rig_profile))
         findings += [refusal.error.code for refusal in result.refusals]
-        if not result.records:
-            raise result.refusals[0].error
+        for refusal in result.refusals:
+            if refusal.error.code == _KILLED or not result.records:
+                raise refusal.error
         dataset = to_dataset(result.records, item.serial)
     if len(dataset.rigs) > 1:
         raise FleetError(
@@ -310,5 +318,6 @@ def as_job(item: Item, digest: str, settings: Settings, plan: Plan | None) -> di
 
 def item_of(job: dict[str, Any]) -> Item:
     """The item of a job that came as JSON."""
-    fields: dict[str, Any] = dict(job["item"])
-    return Item(**{**fields, "paths": tuple(fields["paths"]), "rows": tuple((a, b) for a, b in fields["rows"])})
+    fields: dict[str, Any] = {**job["item"], "paths": tuple(job["item"]["paths"])}
+    fields |= {name: tuple(map(tuple, fields[name])) for name in ("rows", "picks")}
+    return Item(**fields)

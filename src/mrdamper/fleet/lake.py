@@ -12,13 +12,13 @@ import numpy as np
 
 from mrdamper.data import Dataset, Run
 from mrdamper.errors import ColumnError, InputError, UnitError
+from mrdamper.files.dataset import run_of
+from mrdamper.files.samples import OPTIONAL, REQUIRED
 from mrdamper.fleet.items import FleetError, Item, make_item
-from mrdamper.fleet.profile import COLUMNS, FACTS, FleetProfile
+from mrdamper.fleet.profile import FACTS, FleetProfile
 
 if TYPE_CHECKING:
     import polars as pl
-
-_NEEDED = ("run_id", "time_s", "displacement_m", "force_N", "current_A")
 
 
 def is_lake(paths: Sequence[Path], profile: FleetProfile) -> bool:
@@ -26,7 +26,7 @@ def is_lake(paths: Sequence[Path], profile: FleetProfile) -> bool:
     for path in paths:
         names = _columns(path)
         if names is not None:
-            return _column_of("serial", names, profile) is not None
+            return profile.column_of("serial", names) is not None
     return False
 
 
@@ -45,7 +45,7 @@ def lake_items(paths: Sequence[Path], profile: FleetProfile) -> list[Item]:
         if names is None or error is not None:
             refused.append(Item(path.stem, kind="lake", paths=(str(path),), error=error))
             continue
-        columns = {fact: c for fact in FACTS if (c := _column_of(fact, names, profile)) is not None}
+        columns = {fact: c for fact in FACTS if (c := profile.column_of(fact, names))}
         keys = [pl.col(column).cast(pl.String).alias(fact) for fact, column in columns.items()]
         table = pl.scan_parquet(path, hive_partitioning=False).select(keys).with_row_index("row")
         table = table.group_by(list(columns)).agg(pl.min("row").alias("first"), pl.max("row").alias("last"))
@@ -63,7 +63,8 @@ def lake_items(paths: Sequence[Path], profile: FleetProfile) -> list[Item]:
                 )
                 refused.append(Item(path.stem, kind="lake", paths=(str(path),), error=error))
                 continue
-            item = make_item(row, profile, kind="lake", column=columns["serial"])
+            picks = tuple((columns[f], row[f] or "") for f in ("serial", "session", "date") if f in columns)
+            item = make_item(row, profile, kind="lake", picks=picks)
             found.setdefault(item, []).append((str(path), (int(first), int(last - first + 1))))
     items = []
     for item, places in found.items():
@@ -85,44 +86,22 @@ def lake_dataset(item: Item) -> Dataset:
     for path, (first, count) in zip(item.paths, item.rows, strict=True):
         with _refusing_damage(Path(path)):
             part = pl.scan_parquet(path, hive_partitioning=False).slice(first, count)
-            wanted = pl.col(item.column).cast(pl.String) == item.serial
-            for fact in ("session", "date"):  # a golden damper comes again
-                column = next((c for c in COLUMNS[fact] if c in part.collect_schema().names()), None)
-                if column is not None and getattr(item, fact):
-                    wanted &= pl.col(column).cast(pl.String) == getattr(item, fact)
-            parts.append(part.filter(wanted).collect())
+            own = [pl.col(column).cast(pl.String).fill_null("") == cell for column, cell in item.picks]
+            parts.append(part.filter(own).collect())
     table = pl.concat(parts, how="diagonal_relaxed")
-    runs = [_run(rows) for rows in table.partition_by("run_id", maintain_order=True)]
+    runs = [_run(rows, Path(item.paths[0])) for rows in table.partition_by("run_id", maintain_order=True)]
     return Dataset(tuple(runs), item.serial)
 
 
-def _run(rows: pl.DataFrame) -> Run:
-    first = rows.row(0, named=True)
-    where = f"run {first['run_id']}"
+def _run(rows: pl.DataFrame, path: Path) -> Run:
     channels = {}
-    for name in (*_NEEDED[1:], "velocity_m_s"):
-        if name in rows.columns and (name in _NEEDED[:-1] or rows[name].null_count() < rows.height):
-            if not rows[name].dtype.is_numeric():
-                raise ColumnError(f"column {name} holds text", where=where, mend="write plain numbers")
-            channels[name] = np.array(rows[name].cast(float).fill_null(float("nan")).to_numpy())
-    if "current_A" not in channels:
-        raise ColumnError("no current_A", where=where, mend="fill in the column current_A")
-    start, end = first.get("steady_t0_s"), first.get("steady_t1_s")
-    for name, value in (("steady_t0_s", start), ("steady_t1_s", end)):
-        if not isinstance(value, int | float | None):
-            raise ColumnError(f"{name} is {value!r}", where=where, mend="give a number or leave the cell empty")
-    return Run(
-        id=str(first["run_id"]),
-        time=channels["time_s"],
-        displacement=channels["displacement_m"],
-        force=channels["force_N"],
-        current=channels["current_A"],
-        velocity=channels.get("velocity_m_s"),
-        rig=str(first.get("rig") or ""),
-        excitation=str(first.get("excitation") or "sine"),
-        split=str(first.get("split") or "train"),  # type: ignore[arg-type]
-        window=None if start is None or end is None else (float(start), float(end)),
-    )
+    for name in {*REQUIRED, *OPTIONAL} & set(rows.columns):
+        if not rows[name].dtype.is_numeric():
+            where = f"{path}, run {rows['run_id'][0]}"
+            raise ColumnError(f"column {name} holds text", where=where, mend="write plain numbers")
+        channels[name] = np.array(rows[name].cast(float).fill_null(float("nan")).to_numpy())
+    facts = {name: None if cell is None else str(cell) for name, cell in rows.row(0, named=True).items()}
+    return run_of({name: cell for name, cell in facts.items() if name not in channels}, channels, path)
 
 
 @contextmanager
@@ -149,17 +128,12 @@ def _columns(path: Path) -> list[str] | None:
         return None
 
 
-def _column_of(fact: str, names: Sequence[str], profile: FleetProfile) -> str | None:
-    wanted = (profile.columns[fact],) if fact in profile.columns else COLUMNS[fact]
-    return next((name for name in wanted if name in names), None)
-
-
 def _refusal(path: Path, names: Sequence[str] | None, profile: FleetProfile) -> FleetError | ColumnError | None:
     if names is None:
         return FleetError("no Parquet file", where=str(path), mend="write it again", code="E_FORMAT")
-    if _column_of("serial", names, profile) is None:
+    if profile.column_of("serial", names) is None:
         return ColumnError("no column for the serial number", where=str(path), mend="add a column serial")
-    missing = [name for name in _NEEDED if name not in names]
+    missing = [name for name in ("run_id", *REQUIRED, "current_A") if name not in names]
     if not missing:
         return None
     quantity = missing[0].split("_")[0]

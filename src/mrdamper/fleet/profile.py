@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Collection
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
@@ -93,13 +94,13 @@ class FleetProfile(_Table):
 
     def of_columns(self, row: dict[str, Any]) -> dict[str, str]:
         """The facts a row of a table states; empty cells state nothing."""
-        found = {}
-        for fact in FACTS:
-            for column in (self.columns[fact],) if fact in self.columns else COLUMNS[fact]:
-                if str(row.get(column) if row.get(column) is not None else "").strip():
-                    found[fact] = str(row[column]).strip()
-                    break
-        return found
+        cells = {column: str(cell).strip() for column, cell in row.items() if cell is not None and str(cell).strip()}
+        return {fact: cells[column] for fact in FACTS if (column := self.column_of(fact, cells))}
+
+    def column_of(self, fact: str, columns: Collection[str]) -> str | None:
+        """Which of a table's columns states a fact."""
+        wanted = (self.columns[fact],) if fact in self.columns else COLUMNS[fact]
+        return next((name for name in wanted if name in columns), None)
 
     def is_golden(self, facts: dict[str, str]) -> bool:
         """Whether a damper is one that watches the rig."""

@@ -12,6 +12,7 @@ import contextlib
 import json
 import os
 import select
+import signal
 import subprocess
 import sys
 import tempfile
@@ -62,7 +63,8 @@ def guarded_tables(source: Source, reader: Reader, form: FileForm) -> Iterator[l
     Raises
     ------
     RigFileError
-        What the reader raises; E_FORMAT if its library crashes, hangs or takes too much memory.
+        What the reader raises; E_FORMAT if its library crashes, hangs or takes too much memory,
+        E_READER_KILLED if somebody else ends it.
     MissingExtraError
         If the library is not installed.
     """
@@ -88,6 +90,12 @@ class _Asked:
 
     def __call__(self, request: dict[str, Any]) -> dict[str, Any]:
         answer = self._sandbox.ask(request, self._patience)
+        if answer is None and self._sandbox.slain:
+            raise self._source.refuse(
+                "E_READER_KILLED",
+                "the process that reads it was killed from outside, or by a system short of memory",
+                mend="run the same command again",
+            )
         if answer is None:
             raise self._source.refuse(
                 "E_FORMAT",
@@ -122,6 +130,9 @@ class _Asked:
 class _Sandbox:
     """The child process."""
 
+    slain = False  # by somebody else than us
+    _ended = False  # by us
+
     def __init__(self) -> None:
         environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "POLARS_MAX_THREADS": "2"}
         self._process = subprocess.Popen(
@@ -145,6 +156,8 @@ class _Sandbox:
         except OSError:
             answer = b""
         if not answer.endswith(b"\n"):
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self.slain = not self._ended and self._process.wait(_GLANCE) == -getattr(signal, "SIGKILL", 0)
             self.close()
             return None
         return json.loads(answer)
@@ -156,6 +169,7 @@ class _Sandbox:
         while os.name == "posix" and not select.select([self._process.stdout], [], [], _GLANCE)[0]:
             asleep = asleep + 1 if _sleeps(self._process.pid) else 0
             if asleep >= _GLANCES or time.monotonic() - begin > patience:
+                self._ended = True
                 self._process.kill()
                 return
 
