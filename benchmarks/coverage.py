@@ -127,7 +127,7 @@ class Rig:
         runs = [_slower(run) for run in sines]
         problem = JointProblem(runs, "play-bypass")
         fit = problem.fit()
-        lower, upper = problem._box()
+        lower, upper = problem.box()
         point = np.clip(fit.point, lower + _INSIDE * (upper - lower), upper - _INSIDE * (upper - lower))
         linear = {info.name: getattr(fit.damper.model, info.name) for info in problem.linear}
         truth = replace(fit.damper, model=replace(problem.bare(point), **linear))

@@ -12,7 +12,7 @@ from mrdamper.errors import InputError
 
 _ALIKE = 0.98  # correlation from which two parameters are known together only
 _SAME = 0.03  # frequencies and amplitudes this close are one
-_WIDEST = math.log(1e4) / 2  # half an interval of a logarithm over which it says nothing
+_WIDEST = math.log(1e3) / 2  # half an interval of a logarithm over which it says nothing
 CANNOT_BE_KNOWN = "cannot be known from these runs"
 _LOPSIDED = 0.1  # of an interval's half width: shifted by less, it is written with ±
 
@@ -35,7 +35,7 @@ def student(level: float, dof: float) -> float:
 def interval_about(value: float, error: float, dof: float, level: float, log: bool) -> tuple[float, float] | None:
     """Ends of an interval; of a logarithm where `log`, then `error` is that of the logarithm.
 
-    None where nothing is known: from an error that is not finite, or over more than four decades.
+    None where nothing is known: from an error that is not finite, or over more than three decades.
     """
     half = student(level, dof) * error
     if not math.isfinite(half) or (log and half > _WIDEST):
