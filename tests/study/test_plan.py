@@ -112,6 +112,9 @@ def test_a_first_matrix_has_a_reason_for_every_row():
         ("current_A = [0, 1]\nfrequency_Hz = [1, 2]", "amplitude_mm"),
         ("current_A = [0, 1]\nfrequency_Hz = [1, 2]\namplitude_mm = [2000, 20000]", "µm"),
         ("current_A = [0, 1]\nfrequency_Hz = [1, 2]\namplitude_mm = [10, 20]\nvelocity_m_s = 0.001", "slowest"),
+        ("current_A = [0, 1]\nfrequency_Hz = [1, 2]\namplitude_mm = [0.01, 0.02]", "in m?"),
+        ("current_A = [0, 1000]\nfrequency_Hz = [1, 2]\namplitude_mm = [10, 20]", "mA"),
+        ("current_A = [0, 1]\nfrequency_Hz = [1, 2]\namplitude_mm = [10, 20]\nvelocity_m_s = 200", "mm/s"),
         ("current_A = [0, 1]\nfrequency_Hz = [1, 2]\namplitude_mm = [10, 20]\nsessions = 1.5", "whole"),
         ("current_A = [0, 1]\nfrequency_Hz = [1, 2]\namplitude_mm = [10, 20]\ncycles = [5]", "one number"),
         ("current_A = [0, nan]\nfrequency_Hz = [1, 2]\namplitude_mm = [10, 20]", "current_A"),
@@ -148,6 +151,7 @@ def test_the_records_are_read_back(damper, tmp_path):
         run = load_motion(tmp_path / "next" / row["file"])
         assert np.ptp(run.displacement) / 2 == pytest.approx(1e-3 * float(row["amplitude_mm"]), rel=0.02)
         assert run.current_A == pytest.approx(float(row["current_A"]))
+        assert float(row["minutes"]) > 3
     read = CliRunner().invoke(
         application(),
         ["import", *(str(tmp_path / "next" / row["file"]) for row in listed), "--out", str(tmp_path / "d")],

@@ -73,8 +73,15 @@ class Limits:
             raise bad_limits(f"sessions = {self.sessions:g}", "give a whole number")
         if min(self.minutes_between, self.session_minutes, self.force_N) < 0:
             raise bad_limits("a negative time or force", "give zero or more")
-        if self.amplitude_mm[0] > 1000:
-            raise bad_limits(f"amplitudes from {self.amplitude_mm[0]:g} mm", "is that in µm? amplitude_mm is in mm")
+        for name, wrong, other in (
+            ("amplitude_mm", self.amplitude_mm[0] > 1000, "µm"),
+            ("amplitude_mm", self.amplitude_mm[1] < 0.1, "m"),
+            ("current_A", self.current_A[1] > 100, "mA"),
+            ("frequency_Hz", self.frequency_Hz[1] > 1000, "mHz"),
+            ("velocity_m_s", math.inf > self.velocity_m_s > 50, "mm/s"),
+        ):
+            if wrong:
+                raise bad_limits(f"{name} = {getattr(self, name)}", f"is that in {other}? The unit is part of the name")
         slowest = Condition(0.0, self.frequency_Hz[0], 1e-3 * self.amplitude_mm[0]).peak_velocity
         if slowest > self.velocity_m_s:
             raise bad_limits(

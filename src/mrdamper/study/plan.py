@@ -223,7 +223,7 @@ class Reckoning:
                 then = np.sqrt(np.diag(np.linalg.inv(precision))) / today
                 best, after = int(np.argmin(then)), math.sqrt(self.variance(precision))
                 reason = f"{self.names[best]} is then known to {100 * then[best]:.0f} % of today's error"
-                made.append(Proposal(session + 1, self.conditions[i], self.minutes[i], reason, before, after))
+                made.append(Proposal(session + 1, self.conditions[i], float(self.minutes[i]), reason, before, after))
                 before = after
         return made
 

@@ -56,12 +56,14 @@ def register(app: typer.Typer) -> None:
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.encoding import csv_text
         from mrdamper.files.model_file import load_model
+        from mrdamper.identification.intervals import student
         from mrdamper.files.motion import load_motion
         from mrdamper.report.tables import prediction_rows
 
         for name, value in (("--current", current), ("--frequency", frequency), ("--amplitude", amplitude)):
             if value is not None and not 0 <= value < math.inf:
                 raise ConditionError(f"{name} {value:g}", mend="give zero or more; a field does not know a sign")
+        student(level, 1.0)  # refuses a level that is none
         if out is not None:
             require_writable(out)
         damper = load_model(model)

@@ -35,12 +35,14 @@ def register(app: typer.Typer) -> None:
         from mrdamper.files.dataset import load_dataset
         from mrdamper.files.encoding import csv_text
         from mrdamper.files.model_file import load_model
+        from mrdamper.identification.intervals import student
         from mrdamper.report.tables import score_row
         from mrdamper.validation import peak_band
         from mrdamper.validation import validate as score
 
         if split not in (None, "train", "validate"):
             raise UnknownNameError.of("split", str(split), ("train", "validate"))
+        student(level, 1.0)  # refuses a level that is none
         if out is not None:
             require_writable(out)
         damper = load_model(model)
