@@ -56,8 +56,8 @@ def register(app: typer.Typer) -> None:
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.encoding import csv_text
         from mrdamper.files.model_file import load_model
-        from mrdamper.identification.intervals import student
         from mrdamper.files.motion import load_motion
+        from mrdamper.identification.intervals import student
         from mrdamper.report.tables import prediction_rows
 
         for name, value in (("--current", current), ("--frequency", frequency), ("--amplitude", amplitude)):
