@@ -163,10 +163,9 @@ def test_no_cell_of_a_printed_table_is_cut_inside_a_number(texts):
 def test_one_number_stands_everywhere(bundled, bundled_study, written, tmp_path, monkeypatch):
     """Terminal, table, page, comparison and bench say the same of the same model on the same runs."""
     from mrdamper.report.study import _validation_table
-    from mrdamper.study import workflow
     from mrdamper.web.api.identify import _candidate
 
-    monkeypatch.setattr(workflow, "run_study", lambda *args, **options: bundled_study)
+    monkeypatch.setattr("mrdamper.report.study.study_and_draw", lambda *args, **options: (bundled_study, []))
     monkeypatch.setattr("mrdamper.report.study.write_study", lambda *args, **options: [written / "report.html"])
     terminal = CliRunner().invoke(application(), ["study", "--out", str(tmp_path / "out")]).stdout
     page = (written / "report.html").read_text(encoding="utf-8")

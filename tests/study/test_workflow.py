@@ -12,7 +12,7 @@ from mrdamper.data import Dataset
 from mrdamper.errors import IdentificationError, OutputError
 from mrdamper.files.model_file import dump_model, load_model
 from mrdamper.identification.loop_analysis import analyse_loop, dynamic_ranges
-from mrdamper.report.study import write_study
+from mrdamper.report.study import study_and_draw, write_study
 from mrdamper.study import workflow
 from mrdamper.study.parallel import several
 from mrdamper.study.workflow import run_study
@@ -162,8 +162,8 @@ def numbers(rig):
 def test_a_study_is_the_same_twice_and_in_another_process(small, few, tmp_path):
     beside = tuple(replace(run, id=f"other {run.id}", rig="other") for run in few)
     with several(2) as processes:
-        again = run_study(Dataset((*beside, *few.runs), "both"), processes=processes)
-        write_study(again, tmp_path / "out", also=("png",), processes=processes)
+        again, drawn = study_and_draw(Dataset((*beside, *few.runs), "both"), also=("png",), processes=processes)
+    write_study(again, tmp_path / "out", drawn=drawn)
     for name in ("rig", "other"):  # one was studied in this process
         assert numbers(again.rig(name)) == numbers(small.rigs[0])
     assert dump_model(again.rig("rig").damper) == dump_model(small.model)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -13,6 +14,7 @@ from matplotlib.figure import Figure
 from mrdamper.dampers.certainty import table
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
+from mrdamper.data import Dataset
 from mrdamper.errors import IdentificationError
 from mrdamper.files.atomic import publish
 from mrdamper.files.encoding import csv_text, file_names
@@ -32,7 +34,7 @@ from mrdamper.report.plots.style import Picture
 from mrdamper.report.tables import identification_rows, score_row
 from mrdamper.study.parallel import HERE, Processes
 from mrdamper.study.recipe import Progress, Scored
-from mrdamper.study.workflow import RigStudy, Study
+from mrdamper.study.workflow import RigStudy, Study, study_rig
 from mrdamper.validation import session_drift
 
 _LOOPS_SHOWN = 6
@@ -47,7 +49,7 @@ def write_study(
     about: About | None = None,
     limits: Sequence[Limit] = (),
     also: Sequence[str] = (),
-    processes: Processes = HERE,
+    drawn: Sequence[Mapping[str, Picture]] = (),
 ) -> list[Path]:
     """Write report.html, model files, identifications.csv, parameters.csv, validation.csv, forces.csv and figures/.
 
@@ -64,8 +66,8 @@ def write_study(
         Bands the measured damping force must lie in; a verdict is given only against these.
     also : sequence of str
         "png" and "pdf": every figure in that format too; with "pdf" comes report.pdf.
-    processes : Processes
-        Where figures are drawn, rig by rig.
+    drawn : sequence of mapping, optional
+        The figures of each rig, as `study_and_draw` gives them.
 
     Returns
     -------
@@ -77,7 +79,7 @@ def write_study(
     OutputError
         If the folder cannot be written to.
     """
-    drawn = processes.map(partial(_draw, also=tuple(also)), study.rigs, progress)
+    drawn = drawn or HERE.map(partial(_draw, also=tuple(also)), study.rigs, progress)
 
     def fill(work: Path) -> None:
         (work / "figures").mkdir()
@@ -115,6 +117,30 @@ def write_study(
     written = publish(folder, "report.html", fill, {"seconds": {"in all": study.seconds, **took}})
     progress("written", 1.0)
     return written
+
+
+def study_and_draw(
+    dataset: Dataset,
+    progress: Progress = lambda what, share: None,
+    *,
+    model: str | None = None,
+    also: Sequence[str] = (),
+    processes: Processes = HERE,
+) -> tuple[Study, list[dict[str, Picture]]]:
+    """As `run_study`, and the figures of each rig, drawn where it was studied: no rig waits for another."""
+    begin = time.perf_counter()
+    done = processes.map(
+        partial(_studied_and_drawn, model=model, also=tuple(also)), [dataset.rig(n) for n in dataset.rigs], progress
+    )
+    study = Study(dataset, tuple(rig for rig, _ in done), time.perf_counter() - begin)
+    return study, [pictures for _, pictures in done]
+
+
+def _studied_and_drawn(
+    dataset: Dataset, progress: Progress, *, model: str | None, also: tuple[str, ...]
+) -> tuple[RigStudy, dict[str, Picture]]:
+    rig = study_rig(dataset, lambda what, share: progress(what, 0.85 * share), model=model)
+    return rig, _draw(rig, lambda what, share: progress(what, 0.85 + 0.15 * share), also=also)
 
 
 def _draw(rig: RigStudy, progress: Progress, *, also: tuple[str, ...]) -> dict[str, Picture]:

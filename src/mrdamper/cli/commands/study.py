@@ -33,9 +33,8 @@ def register(app: typer.Typer) -> None:
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.dataset import load_dataset
         from mrdamper.report.about import load_about, load_limits
-        from mrdamper.report.study import write_study
+        from mrdamper.report.study import study_and_draw, write_study
         from mrdamper.study.parallel import several
-        from mrdamper.study.workflow import run_study
 
         head, bands = load_about(about) if about else None, load_limits(limits) if limits else ()
         also = [kind for kind, wanted in (("pdf", pdf or about is not None), ("png", png)) if wanted]
@@ -49,17 +48,17 @@ def register(app: typer.Typer) -> None:
             )
         workers = min(os.cpu_count() or 1, len(dataset.rigs))
         with progress_on_stderr() as progress, several(workers) as processes:
-            result = run_study(
-                dataset, lambda what, share: progress(what, 0.85 * share), model=model, processes=processes
+            result, drawn = study_and_draw(
+                dataset, lambda what, share: progress(what, 0.97 * share), model=model, also=also, processes=processes
             )
             written = write_study(
                 result,
                 out,
-                lambda what, share: progress(what, 0.85 + 0.15 * share),
+                lambda what, share: progress(what, 0.97 + 0.03 * share),
                 about=head,
                 limits=bands,
                 also=also,
-                processes=processes,
+                drawn=drawn,
             )
         for rig in result.rigs:
             for name, why in rig.not_identified.items():
