@@ -17,7 +17,7 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from mutants.explained import EXPLAINED
+from mutants.explained import reason
 from mutants.faults import SOURCE, Fault, faults_of
 from mutants.fork import in_fork
 from mutants.rooms import ROOMS, Room
@@ -62,7 +62,7 @@ def main() -> int:
     for module, count in counts.items():
         print(f"{module:45} {count:4} planted {count - died[module]:4} survive")
     for fault in survivors:
-        why = EXPLAINED.get((fault.module.removeprefix("mrdamper."), fault.text, fault.change), "")
+        why = reason(fault)
         print(f"survives: {fault.module}:{fault.line}: {fault.change}: {fault.text}{why and f'  [{why}]'}")
     total = sum(counts.values())
     print(f"{time.perf_counter() - begin:.0f} s")

@@ -219,3 +219,134 @@ def test_three_samples_of_a_thousand_become_one(monkeypatch):
     assert found.effective == pytest.approx(np.minimum(35 * of_all / np.diag(expected.covariance), 35))
     none = spread(J[:19], residual[:19])  # less than two of ten
     assert none.covariance == pytest.approx(np.linalg.inv(J[:19].T @ J[:19]))
+
+
+def spectrum(model, omega):
+    response = 1 + sum(a * np.exp(-1j * omega * k) for k, a in enumerate(model[1:], 1))
+    return model[0] / abs(response) ** 2
+
+
+def repeated_by_hand(J, r, time, f, inverse):
+    """What repeats, wave by wave: rest, Jᵀ Σ J, relative variances; None twice where nothing does."""
+    N, step = r.size, float(np.median(np.diff(time)))
+    most = int(min(24, 0.4 / (step * f), N // 8))
+    if most < 4:
+        return r, None, None
+    waves = [g(2 * np.pi * f * k * (time - time[0])) for k in range(1, most + 1) for g in (np.cos, np.sin)]
+    W = np.column_stack(waves)
+    a = np.linalg.lstsq(W, r - r.mean(), rcond=None)[0]
+    rest = r - W @ a
+    model = burg(rest.tolist())
+    left = [
+        np.mean([1 - (J.T @ w) @ inverse @ (J.T @ w) / (w @ w) for w in waves[2 * k : 2 * k + 2]]) for k in range(most)
+    ]
+    power = [(a[2 * k] ** 2 + a[2 * k + 1] ** 2) / 2 for k in range(most)]
+    expected = [2 * spectrum(model, 2 * np.pi * f * step * k) / (N - 2 * most) for k in range(1, most + 1)]
+    left, power, expected = (np.array(v) for v in (left, power, expected))
+    if power.sum() < (1 + 3 / np.sqrt(left.sum())) * (expected @ left):
+        return r, None, None
+    level, relative = covariance._power_law(np.arange(1.0, most + 1), power, expected, left)
+    lines = sum(level[k // 2] * np.outer(J.T @ w, J.T @ w) for k, w in enumerate(waves))
+    pull = np.array([inverse @ (J.T @ w) for w in waves]).T
+    shares = level * (pull[:, ::2] ** 2 + pull[:, 1::2] ** 2)
+    weights = shares / shares.sum(axis=1, keepdims=True)
+    doubt = np.array([w @ relative @ w for w in weights])
+    return (r if (time[-1] - time[0]) * f < 1.9 else rest), lines, doubt
+
+
+@pytest.mark.parametrize(
+    ("f", "cycles", "points"),
+    [
+        (1.7, 5.0, 90),
+        (0.4, 3.3, 60),
+        (2.0, 6.0, 16),
+        (2.0, 6.0, 8),
+        (1.3, 1.85, 200),
+        (1.3, 1.95, 200),
+        (3.0, 12.0, 100),
+    ],
+)
+@pytest.mark.parametrize("noise", [0.02, 0.7])
+def test_what_repeats_is_found_wave_by_wave(f, cycles, points, noise):
+    N = int(cycles * points)
+    time = 5.0 + np.arange(N) / (points * f)
+    phase = 2 * np.pi * f * time
+    rng = np.random.default_rng(N)
+    coloured = np.convolve(rng.standard_normal(N + 3), [1.0, 0.7, 0.3, 0.1], "valid")
+    r = 2.0 + sum(np.cos(k * phase + k) / k**1.5 for k in range(1, 12)) + noise * coloured
+    J = np.column_stack([np.cos(phase), np.sin(2 * phase + 0.3), np.linspace(-1, 1, N) ** 3])
+    inverse = np.linalg.inv(J.T @ J)
+    rest, lines, doubt = repeated_by_hand(J, r, time, f, inverse)
+    found, parts = covariance._repeated(J, r, time, f, inverse)
+    assert found == pytest.approx(rest, abs=1e-9)
+    assert len(parts) == (lines is not None)
+    if parts:
+        assert parts[0][0] == pytest.approx(lines, rel=1e-6, abs=1e-9 * np.abs(lines).max())
+        assert parts[0][1] == pytest.approx(doubt)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_surplus_that_chance_explains_does_not_repeat(seed):
+    f, N = 1.7, 360
+    time = np.arange(N) / (60 * f)
+    noise = np.random.default_rng(seed).standard_normal(N)
+    J = np.column_stack([np.cos(2 * np.pi * f * time), np.ones(N)])
+    inverse = np.linalg.inv(J.T @ J)
+
+    def by_hand(size):
+        return repeated_by_hand(J, noise + size * np.cos(6 * np.pi * f * time), time, f, inverse)[1] is not None
+
+    low, high = 0.0, 1.0
+    if by_hand(low) or not by_hand(high):
+        pytest.fail("not between")
+    while high - low > 1e-4:
+        low, high = (low, (low + high) / 2) if by_hand((low + high) / 2) else ((low + high) / 2, high)
+    for size, repeats in ((low - 1e-3, False), (high + 1e-3, True)):
+        _, parts = covariance._repeated(J, noise + size * np.cos(6 * np.pi * f * time), time, f, inverse)
+        assert bool(parts) is repeats
+
+
+def test_orders_are_chosen_as_by_the_criterion_in_short_and_white_records():
+    for seed in range(60):
+        series = np.random.default_rng(seed).standard_normal(31 + seed % 5)
+        assert covariance._autoregression(series) == pytest.approx(np.array(burg(series.tolist()))), seed
+
+
+def test_doubt_of_two_coefficients_is_that_of_their_joint_spread(monkeypatch):
+    N, model = 80, np.array([1.7, -0.9, 0.4])
+    monkeypatch.setattr(covariance, "_autoregression", lambda residual: model)
+    J = np.random.default_rng(1).standard_normal((N, 3)).cumsum(axis=0)
+    inverse = np.linalg.inv(J.T @ J)
+    circle = 2 * np.pi * np.arange(4096) / 4096
+
+    def memory(a):
+        return np.array([np.mean(np.cos(k * circle) * spectrum([1.7, *a], circle)) for k in range(N)])
+
+    def variances(a):
+        return np.diag(inverse @ J.T @ memory(a)[np.abs(np.subtract.outer(np.arange(N), np.arange(N)))] @ J @ inverse)
+
+    g = memory(model[1:])
+    spread_of = 1.7 / N * np.linalg.inv([[g[0], g[1]], [g[1], g[0]]])
+    step = 1e-5 * np.eye(2)
+    bent = np.array([(variances(model[1:] + s) - variances(model[1:] - s)) / 2e-5 for s in step]) / variances(model[1:])
+    (_, relative), length = covariance._noise(J, np.ones(N), inverse)
+    assert relative == pytest.approx(2 / N + np.einsum("kp,kl,lp->p", bent, spread_of, bent), rel=1e-3)
+    assert length == pytest.approx(spectrum(model, 0.0) / g[0])
+
+
+@pytest.mark.parametrize(("cycles", "asked"), [(0.94, False), (0.96, True)])
+def test_a_motion_repeats_from_nearly_a_cycle_on(monkeypatch, cycles, asked):
+    seen = []
+    monkeypatch.setattr(covariance, "_repeated", lambda *given: seen.append(given) or (given[1], []))
+    J = RNG.standard_normal((60, 2))
+    time = 9.0 + np.linspace(0, cycles / 3.0, 60)
+    covariance.score_covariance(J, RNG.standard_normal(60), time, 3.0, np.linalg.inv(J.T @ J))
+    assert bool(seen) is asked
+
+
+def test_errors_are_those_of_the_spread_and_powers_are_powers():
+    J, residual, time = RNG.standard_normal((90, 2)), RNG.standard_normal(90), np.arange(90) / 30
+    errors = covariance.standard_errors(J, residual, time, 1.3)
+    assert errors == pytest.approx(spread(J, residual, time, 1.3).errors)
+    base = np.exp(1j * np.array([0.1, 2.0]))
+    assert covariance._powers(base, 3) == pytest.approx(np.array([base, base**2, base**3]))

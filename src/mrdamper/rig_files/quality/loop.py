@@ -74,7 +74,7 @@ def _is_rectified(view: View) -> bool:
 def keeps_its_sign(view: View) -> None:
     """Refuse a force that changes its sign within the record: cycle against cycle, or stretches of one."""
     motion = view.motion
-    if motion is None or motion.cycles < 2 - 0.05 or view.noticed("W_FROZEN"):
+    if motion is None or view.noticed("W_FROZEN"):
         return  # a force that stands still opposes its own other half cycle
     period = 1 / motion.condition.frequency_Hz
     time = view.run.time
