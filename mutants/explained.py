@@ -24,22 +24,18 @@ _ALIKE = "what is exchanged is the same"
 _SCALE = "a factor that drops out"
 EXPLAINED = (
     Explained(
-        "reproduction.claims", "% 360", "", "an angle that is more by whole turns, or by half turns twice, is the same"
+        "reproduction.", "% 360", "", "an angle that is more by whole turns, or by half turns twice, is the same"
     ),
-    Explained("reproduction.claims", "< 5", "5 → 6", _BUDGET),
-    Explained("reproduction.claims", "keys = [", "items", _ORDER),
-    Explained("reproduction.claims", "sorted(set(keys))", "sorted backwards", _ORDER),
-    Explained("reproduction.claims", "order.size // 60", "", _BUDGET),
-    Explained("reproduction.claims", "reshape(-1, width)", "1 → 2", _ALIKE),
-    Explained("reproduction.claims", "back[0]", "0 → 1", _BUDGET),
-    Explained("reproduction.claims", "range(1, path.stroke[-1])", "1 → 2", "the last two samples lie in one stroke"),
-    Explained(
-        "reproduction.claims", "np.mean(steady.force)", "mean → median", "a loop's force has its mean in its middle"
-    ),
-    Explained(
-        "reproduction.claims", "np.mean(record.force", "mean → median", "samples within five degrees have one force"
-    ),
-    Explained("reproduction.claims", "< 1e-3", "0.001 → 0.01", "levels lie further apart"),
+    Explained("reproduction.", "< 5", "5 → 6", _BUDGET),
+    Explained("reproduction.", "keys = [", "items", _ORDER),
+    Explained("reproduction.", "sorted(set(keys))", "sorted backwards", _ORDER),
+    Explained("reproduction.", "order.size // 60", "", _BUDGET),
+    Explained("reproduction.", "reshape(-1, width)", "1 → 2", _ALIKE),
+    Explained("reproduction.", "back[0]", "0 → 1", _BUDGET),
+    Explained("reproduction.", "range(1, path.stroke[-1])", "1 → 2", "the last two samples lie in one stroke"),
+    Explained("reproduction.", "np.mean(steady.force)", "mean → median", "a loop's force has its mean in its middle"),
+    Explained("reproduction.", "np.mean(record.force", "mean → median", "samples within five degrees have one force"),
+    Explained("reproduction.", "< 1e-3", "0.001 → 0.01", "levels lie further apart"),
     Explained("reproduction.seeds", "found[0]", "0 → 1", "every seed has the same keys"),
     Explained("reproduction.virtual_rig", "default_rng((seed,", "", "another draw of the same noise"),
     Explained("reproduction.virtual_rig", "path.direction * np.where", "Mult → Div", _SIGN),

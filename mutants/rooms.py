@@ -44,7 +44,12 @@ ROOMS = (
         " reproduction/test_seeds.py",
     ),
     _room("reproduction.output", "reproduction/test_output.py"),
-    _room("reproduction.sensitivity", "reproduction/test_sensitivity.py"),
+    _room(
+        "reproduction.sensitivity",
+        "reproduction/test_sensitivity.py",
+        "rank_like_single_changes add_up_and_follow",
+    ),
+    _room("dampers.bands dampers.sessions dampers.certainty", "dampers/test_bands_by_hand.py dampers/test_sessions.py"),
     _room("reproduction.virtual_rig", "reproduction/test_virtual_rig.py"),
     _room("report.tables study.recipe", "report/test_tables.py study/test_recipe.py"),
     _room("dampers.paper dampers.modified", "dampers/test_modified.py dampers/test_gram.py study/test_recipe.py"),
