@@ -157,6 +157,7 @@ def test_the_yield_force_builds_up_over_the_knee_and_the_seal_breaks_away_over_i
 def test_currents_magnetise_either_way():
     rig = VirtualRig()
     assert rig.magnetisation(-1.2) == rig.magnetisation(1.2) > 0
+    assert replace(rig, saturation_current=1.0).magnetisation(-9.0) == pytest.approx(1.0, rel=1e-3)
 
 
 def test_the_stroke_before_is_the_one_before():

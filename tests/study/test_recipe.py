@@ -307,13 +307,14 @@ def test_stretches_are_scored_as_the_record_they_were_cut_from():
     assert astuple(whole.runs[0].scores) == pytest.approx((rms, 2 * rms, 3 * 3.5, 4 * 3.5, 5 * 3.5, 6 * 3.5))
     assert whole.runs[0].extrapolation == ("current", "amplitude")
     assert astuple(whole.runs[1].scores) == astuple(scores[2].scores)
-    rests = zip(scores[:2], (3.0, None), strict=True)
+    rests = zip(scores[:2], (3.0, 12.0), strict=True)
     three = [replace(s, rest=rest) for s, rest in rests] + [score("long 1", 11.0, ())]
     three[2] = replace(three[2], condition=Condition(2, 1, 1), rest=4.0)
     joined = recipes._joined("long", three)
     rms = np.sqrt((3.0**2 + 4.0**2 + 11.0**2) / 3)
     assert astuple(joined.scores) == pytest.approx((rms, 2 * rms, 3 * 6, 4 * 6, 5 * 6, 6 * 6))
-    assert (joined.rest, joined.condition) == (pytest.approx(np.sqrt(12.5)), Condition(0, 1, 1))
+    assert (joined.rest, joined.condition) == (pytest.approx(13 / np.sqrt(3)), Condition(0, 1, 1))
+    assert recipes._joined("long", [replace(three[0], rest=None), three[1]]).rest == 12.0
     (alone,) = recipes._whole_again(Validation("x", scores[:1]), pieces).runs
     assert (alone.run_id, astuple(alone.scores)) == ("long", pytest.approx(astuple(scores[0].scores)))
     assert recipes._joined("long 1", [scores[0]]) is scores[0]
@@ -353,6 +354,7 @@ def test_every_recipe_says_what_it_is():
     assert (ours.basis, ours.make, ours.way, ours.title, ours.source) == (
         None, recipes.one_set, "joint", "play and bypass", model_type("play-bypass").source,
     )  # fmt: skip
+    assert (ali.make.func, ali.make.args) == (recipes.by_its_laws, (all_published()["ali-type"],))
     paper = recipes.literal(Settled(None))
     assert (paper.name, paper.make, paper.way, paper.pure) == ("bouc-wen:literal", by_the_paper, "paper, literal", True)
     assert known["kernel"].basis is None
