@@ -6,11 +6,14 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from benchmarks.numbers import Sentence, Table, differences, of_study, write
+from benchmarks.numbers import Sentence, Table, differences, of_both, of_study, write
 
 
 def test_what_the_documents_say_of_the_bundled_study_is_what_comes_out(bundled_study):
     assert differences(of_study(bundled_study)) == [], "put them right with python -m benchmarks.numbers --write"
+    shared = of_both(bundled_study)
+    assert [len(table.rows) for table in shared] == [4, 4]
+    assert differences(shared) == [], "put them right with python -m benchmarks.numbers --compare DIR --write"
 
 
 PAGE = """# Title
@@ -61,6 +64,16 @@ def test_what_is_off_is_named_and_can_be_put_right(tmp_path, rows, values, off):
     assert all(row in text for row in rows)
     assert f"Gains of {values[0]}–{values[1]} % were seen." in text
     assert text.startswith(PAGE[:60])
+
+
+def test_some_rows_of_a_table_are_compared_by_name_and_left_as_they_are(tmp_path):
+    (tmp_path / "page.md").write_text(PAGE, encoding="utf-8")
+    for row, off in (("| plain | 4.9 (9.3) | 6 / 9 |", 0), ("| plain | | 6 / 9 |", 0), ("| plain | 4.0 (9.0) | |", 1),
+                     ("| new | 1.0 (2.0) | 3 |", 1)):  # fmt: skip
+        some = [Table("page.md", "| model | errors", (row,), "### here", whole=False)]
+        assert len(differences(some, tmp_path)) == off, row
+        write(some, tmp_path)
+    assert (tmp_path / "page.md").read_text(encoding="utf-8") == PAGE
 
 
 def test_a_sentence_that_is_gone_is_missed(tmp_path):
