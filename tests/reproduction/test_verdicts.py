@@ -62,7 +62,8 @@ def test_one_number_that_misses_makes_a_claim_hold_in_part(key, place):
     if limit.near != limit.holds:
         assert judge(key, {**good, limit.number: beyond(limit, limit.holds)}) == "holds in part"
     far = judge(key, {**good, limit.number: beyond(limit, limit.near)})
-    assert far == ("holds in part" if len(LIMITS[key]) > 1 else "does not hold")
+    others = any(x.alone for x in LIMITS[key] if x is not limit)
+    assert far == ("holds in part" if others else "does not hold")
     missing = {name: value for name, value in good.items() if name != limit.number}
     assert judge(key, missing) == "cannot be judged"
 
@@ -78,6 +79,19 @@ def test_unknown_claims_and_numbers_are_refused():
         judge("weather", {})
     with pytest.raises(UnknownNameError):
         judge("quadratic", {"R squared": 1.0})
+
+
+def test_how_well_a_function_fits_says_nothing_by_itself():
+    quiet = {(key, x.number) for key, limits in LIMITS.items() for x in limits if not x.alone}
+    assert quiet == {
+        ("mass", "R² of m over current and frequency"), ("alpha", "R²"), ("beta", "R² of ln β"),
+        ("beta", "share of runs at the limit of the box"),
+    }  # fmt: skip
+    for key in ("mass", "alpha", "beta"):
+        fits = numbers(key, lambda x: beyond(x, x.near) if x.alone else x.holds)
+        assert judge(key, fits) == "does not hold"
+        misfits = numbers(key, lambda x: x.holds if x.alone else beyond(x, x.near))
+        assert judge(key, misfits) == "holds in part"
 
 
 def test_a_limit_without_a_wider_one_is_its_own():

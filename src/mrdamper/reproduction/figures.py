@@ -137,8 +137,8 @@ FIGURES: Figures = {
     "errors": ("Error of every held-out run.", errors_figure),
     "seeds": ("Median held-out error over noise seeds.", seeds_figure),
     "sensitivity": (
-        "Change of the force when one coordinate changes by a tenth: the others held (bars), identified anew (marks; "
-        "what is less stands at 1e-8). Right: total Sobol indices with 95 % intervals.",
+        "Change of the force when one coordinate changes by a tenth: the others held (bars), or identified anew "
+        "(marks; what is less stands at 1e-8). Right: total Sobol indices with 95 % intervals.",
         sensitivity_figure,
     ),
 }

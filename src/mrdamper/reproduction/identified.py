@@ -41,7 +41,7 @@ def alpha(study: Reproduction) -> Measured:
     if fit is None or fit.function.form != "plane":
         return unknown("too few motions for a plane over frequency and amplitude")
     _, _, e1, e2, _ = fit.function.coefficients
-    evidence = f"{e1:+.3g} N/m per Hz, {1e-3 * e2:+.3g} N/m per mm"
+    evidence = f"{1e-3 * e1:+.3g} kN/m per Hz, {1e-6 * e2:+.3g} kN/m per mm"
     return measured("alpha", np.sign(e1), np.sign(e2), fit.r2, evidence=evidence)
 
 

@@ -40,7 +40,6 @@ def times(study: Reproduction) -> Made:
     with house_style():
         figure, axes = new_figure(1, 1, 0.8 + 0.26 * len(ways), left=2.4)
         axes[0].barh(_rows_of(axes, ways), [seconds_a_run(study, c) for c in ways], color=PALETTE[3])
-        _decades(axes[0])
         label(axes[0], "Identification (s a run)", "")
         return figure
 
@@ -61,7 +60,8 @@ def genetic_figure(study: Reproduction) -> Made:
         for start in range(per_box, first.history.size, per_box):
             axes.axvline(start, color=PALETTE[0], lw=0.8, ls=":")
         label(axes, "Generation (dotted: a narrower box begins)", "Error above the least (–)")
-        axes.legend()
+        axes.grid(visible=False, axis="x")
+        axes.legend(frameon=True, framealpha=1.0, edgecolor="none")
         return figure
 
 
@@ -119,7 +119,7 @@ def sensitivity_figure(study: Reproduction) -> Made:
         rows = np.arange(len(single))
         axes[0].barh(rows, [s.effect for s in single], color=PALETTE[6], label="others held")
         left = [max(s.left, 1e-8) for s in single]
-        axes[0].plot(left, rows, "o", ms=4, color=PALETTE[2], label="others identified anew")
+        axes[0].plot(left, rows, "o", ms=4, color=PALETTE[2], label="others anew")
         _decades(axes[0])
         axes[0].set_yticks(rows, [s.name.replace("_", " ") for s in single])
         _key_above(axes[0])

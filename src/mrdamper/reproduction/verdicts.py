@@ -1,7 +1,8 @@
 """Verdicts as pure functions of a few numbers, and every threshold in one table.
 
 A claim holds where each of its numbers meets its limit, holds in part where some do or come
-within the wider limit, and does not hold where none comes near. A claim without all of its
+within the wider limit, and does not hold where none comes near. How well a function fits must
+be good enough for a claim to hold, but says nothing for it by itself. A claim without all of its
 numbers cannot be judged. What a virtual rig was built with cannot be confirmed by it: such a
 property is recovered, in part, or not.
 """
@@ -38,12 +39,15 @@ class Limit:
         The number must be on this side of it, the limit itself included.
     near : float
         Wider limit, within which the claim holds in part; the same where there is none.
+    alone : bool
+        Whether it speaks for the claim even where no other number does.
     """
 
     number: str
     sense: Literal["below", "above"]
     holds: float
     near: float
+    alone: bool = True
 
     def grade(self, value: float) -> int:
         """2 within the limit, 1 within the wider one, 0 beyond both."""
@@ -56,6 +60,10 @@ class Limit:
         sign = "≤" if self.sense == "below" else "≥"
         wider = "" if self.near == self.holds else f" (in part: {sign} {self.near:g})"
         return f"{self.number} {sign} {self.holds:g}{wider}"
+
+
+def _fitted(number: str, holds: float, near: float) -> Limit:
+    return Limit(number, "above", holds, near, alone=False)
 
 
 def _below(number: str, holds: float, near: float | None = None) -> Limit:
@@ -89,19 +97,19 @@ LIMITS: Mapping[str, tuple[Limit, ...]] = MappingProxyType(
         "saturation": (_below("slope above 1.5 A over slope below 1 A", 0.4, 0.7),),
         "viscosity": (_below("median of closed form over consistent c", 1.1, 1.5),),
         "mass": (
-            _above("R² of m over current and frequency", 0.9, 0.6),
+            _fitted("R² of m over current and frequency", 0.9, 0.6),
             _below("largest spread of m over amplitudes, over its mean", 0.2, 0.5),
             _above("least m, kg", 0.0),
         ),
         "alpha": (
             _above("sign of the slope over frequency", 1.0),
             _below("sign of the slope over amplitude", -1.0),
-            _above("R²", 0.9, 0.6),
+            _fitted("R²", 0.9, 0.6),
         ),
         "beta": (
             _below("scatter of ln β at the highest current over that at the lowest", 0.5, 0.8),
-            _above("R² of ln β", 0.9, 0.6),
-            _below("share of runs at the limit of the box", 0.1, 0.3),
+            _fitted("R² of ln β", 0.9, 0.6),
+            Limit("share of runs at the limit of the box", "below", 0.1, 0.3, alone=False),
         ),
         "presets": (
             _below("error left by a wrong n, others identified anew", 0.02, 0.05),
@@ -179,7 +187,8 @@ def judge(key: str, numbers: Mapping[str, float]) -> Verdict:
     grades = [limit.grade(value) for limit, value in zip(limits, values, strict=True)]
     if min(grades) == 2:
         return "holds"
-    return "does not hold" if max(grades) == 0 else "holds in part"
+    speaking = [grade for limit, grade in zip(limits, grades, strict=True) if limit.alone]
+    return "does not hold" if max(speaking) == 0 else "holds in part"
 
 
 def thresholds(key: str) -> str:

@@ -17,6 +17,7 @@ from mrdamper.report.plots.style import (
     KN,
     MM,
     MOST_NAMED,
+    WIDTH,
     current_colours,
     house_style,
     label,
@@ -62,6 +63,8 @@ def test_matrix(loops: Sequence[LoopAnalysis]) -> Figure:
                     label=name,
                 )
         label(axes, "Frequency (Hz)", "Amplitude (mm)")
+        wide, beside = axes.get_position().width * WIDTH, (len(colours) / 2 + 1) * _BESIDE
+        axes.margins(x=beside / (wide - 2 * beside))
         axes.autoscale_view()
         axes.set_ylim(bottom=0)
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
