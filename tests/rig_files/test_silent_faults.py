@@ -6,10 +6,11 @@ import zipfile
 
 import numpy as np
 import pytest
-from support.rig_files import channels, tdms_bytes, text, write
+from support.rig_files import channels, mat_bytes, tdms_bytes, text, write, xlsx_bytes
 from support.rig_records import clean_record, codes_of, random_record, with_channel
 
 from mrdamper.errors import InputError
+from mrdamper.rig_files.conditions import currents_in
 from mrdamper.rig_files.rig_import import guess_profile, read_run
 from mrdamper.rig_files.rig_record import thousands_in
 
@@ -56,6 +57,9 @@ BIG = 20 * F
         "a sign that flips for a quarter cycle": (
             {**NAMES, "force [N]": np.where((T > 2.25) & (T < 2.5), -F, F)}, ",", {"E_DISSIPATION_SIGN"}),
         "a spike of 100 mm": ({**NAMES, "disp [mm]": X + 100 * (np.arange(T.size) == 222)}, ",", {"E_SPIKE"}),
+        "a range that is changed over": ({**NAMES, "force [N]": np.where(T < 2, F, 4.448 * F)}, ",", {"E_UNRELATED"}),
+        "a unit that changes": ({**NAMES, "disp [mm]": np.where(T < 2, X, 1e-3 * X)}, ",", {"E_UNRELATED"}),
+        "a folded force": ({**NAMES, "force [N]": np.abs(F)}, ",", {"E_RECTIFIED", "E_NO_ENERGY"}),
         "a spike of force": ({**NAMES, "force [N]": F + 2e4 * (np.arange(T.size) == 222)}, ",", {"E_SPIKE"}),
     }.values(),
 )  # fmt: skip
@@ -192,3 +196,35 @@ def test_a_number_in_a_pattern_with_another_unit_is_refused(tmp_path):
         read_run(bare, parse_profile('[current]\npattern = "run_{current}_*"\n'))
     with pytest.raises(InputError, match="no coil current of a damper"):
         read_run(bare, parse_profile('[current]\npattern = "run_{current}_*"\nunit = "A"\n'))
+
+
+@pytest.mark.parametrize(
+    ("columns", "noticed"),
+    [
+        ({"disp [mm]": 1e-3 * X}, "W_RANGE"),
+        ({"force [N]": 1e-3 * F}, "W_RANGE"),
+        ({"time [s]": 1e3 * T}, "W_RANGE"),
+        ({"force [N]": 300 * np.round(F / 300)}, "W_COARSE"),
+        ({"disp [mm]": np.where(T < 2, X, X / 25.4)}, "W_DRIFT"),
+    ],
+)
+def test_what_may_be_a_slip_of_the_unit_is_said(columns, noticed, tmp_path):
+    record = read_run(write(tmp_path, "a_0.5A.csv", table({**NAMES, **columns}, ",").replace(".000000,", ".0,")))
+    assert noticed in {finding.code for finding in record.findings}
+
+
+@pytest.mark.parametrize("name", ["2A_fuse_1", "supply 5A max", "run_04A", "specimen1A", "0.5A_1.0A", "0A8"])
+def test_a_name_that_may_mean_another_current_states_none(name):
+    assert len(currents_in(name)) != 1
+
+
+def test_whole_numbers_beside_their_scale_are_refused(tmp_path):
+    counts = np.round(10 * F).astype(np.int16)
+    path = write(tmp_path, "a_0.5A.mat", mat_bytes({"time_s": T, "disp_mm": X, "force_N": counts, "force_scale": 0.1}))
+    assert code(path) == "E_AMBIGUOUS"
+
+
+def test_a_filtered_sheet_beside_the_measured_one_is_left_out_and_said(tmp_path):
+    rows = [["time [s]", "disp [mm]", "force [N]"], *np.column_stack([T, X, F]).tolist()]
+    record = read_run(write(tmp_path, "a_0.5A.xlsx", xlsx_bytes(rows, {"Filtered": rows})))
+    assert "W_TABLE" in {finding.code for finding in record.findings}

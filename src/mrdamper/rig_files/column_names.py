@@ -158,6 +158,11 @@ def names_compression(name: str) -> bool:
     return any(word.casefold().startswith(_COMPRESSION) for word in words if word)
 
 
+def names_made(name: str) -> bool:
+    """Whether a name says that something is filtered, averaged or computed."""
+    return any(word.casefold() in _MADE for word in re.split(r"[^\w]+|_|(?<=[a-zà-ÿ])(?=[A-Z])", name[:_LONGEST_NAME]))
+
+
 def names_condition(key: str, role: str) -> bool:
     """Whether a line's or an attribute's name stands for a channel's value in the whole test, set or measured."""
     words = [w for w in re.split(r"[^\w]+|_|(?<=[a-zà-ÿ])(?=[A-Z])", key[:_LONGEST_NAME]) if w]

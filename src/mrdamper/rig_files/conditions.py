@@ -24,10 +24,15 @@ _LINE = re.compile(
     r"[\s;,\t\"]*[\[(]?(?P<unit>[A-Za-zµ/]{0,9})[\])]?[\s;,\t\"]*$"
 )
 _LONGEST_LINE, _MOST_PARTS = 300, 20
+_OTHER_TIMES = r"previous|vorher|\blast\b|\bnext\b|before|after|\bnach\b|instead|statt"
+_OTHER_TIME = re.compile(_OTHER_TIMES, re.IGNORECASE)
 _RATING = re.compile(
     r"max|min|limit|range|rated|suppl|amplif|sensor|full|scale|fuse|bereich|grenz|messverst|nenn|speis|probe|clamp|zange|"
-    r"previous|vorher|\blast\b|\bnext\b|before|after|\bnach\b|instead|statt",
+    + _OTHER_TIMES,
     re.IGNORECASE,
+)
+_LABELLED_RATING = re.compile(
+    r"fuse|suppl|amplif|rated|range|probe|clamp|(?<![a-z])(?:max|limit)(?![a-z])", re.IGNORECASE
 )
 _RATE = re.compile(
     r"sampl|abtast|messrate|^rate$|scan|acquisition|échantillon|muestreo|campion|^fs$|^f_s$", re.IGNORECASE
@@ -52,10 +57,11 @@ class Statement:
 def currents_in(text: str) -> tuple[float, ...]:
     """Coil currents [A] in a title, a sheet's or a file's name: every distinct one.
 
-    `1200mA`, `1.2 A`, `0p4A`, `0x25A`, `-0.3A-`; 0_5A may be five or half an ampere and states none.
+    `1200mA`, `1.2 A`, `0p4A`, `0x25A`, `-0.3A-`, `I0.4A`; 0_5A may be five or half an ampere and states
+    none, nor does what stands beside a fuse, a supply or a limit.
     """
     text = text[:255]
-    if re.search(r"(?<![0-9])[0-9]_[0-9]+ ?m?A(?![A-Za-z0-9])", text):
+    if re.search(r"(?<![0-9])[0-9]_[0-9]+ ?m?A(?![A-Za-z0-9])", text) or _LABELLED_RATING.search(text):
         return ()
     # 04A may be four or 0.4 amperes; 0400mA is padded.
     stated = [match for match in _IN_NAME.finditer(text) if match[2] or not re.fullmatch("0[1-9]+", match[1])]
@@ -81,7 +87,7 @@ def stated_by_lines(lines: Iterable[str], decimal: str | None = None) -> list[St
     found = []
     for line in lines:
         for key, value, known in _quantities(line, decimal):
-            if known.dimension == "current" and names_condition(key, "current"):
+            if known.dimension == "current" and names_condition(key, "current") and not _OTHER_TIME.search(key):
                 found.append(Statement(value, f"the line {line.strip()[:60]!r}"))
     return found
 

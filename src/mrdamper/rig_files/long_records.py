@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -13,9 +15,12 @@ from mrdamper.rig_files.quality.current import change_of
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED, Finding, Record
 
 PART = 2**19  # samples: a minute of a test at 10 kHz, some megabytes a channel
+_AT_ONCE = 2  # parts: their checks are sums and sorts of long arrays, which need no turn of the interpreter
 _MAY_REST = ("E_NO_EXCITATION",)  # a long test may pause; it may not be one long pause
 _OF_THE_WHOLE = ("W_SHORT", "W_DRIFT")
 _ONCE = ("W_CURRENT_VARIES",)  # judged over the whole record: parts may each hold another current
+
+_Verdict = tuple[tuple[Finding, ...], tuple[tuple[int, int], ...], InputError | None]
 
 
 def judge_long(record: Record, judge: Callable[[Record], Record]) -> Record:
@@ -38,24 +43,43 @@ def judge_long(record: Record, judge: Callable[[Record], Record]) -> Record:
     found: dict[str, tuple[Finding, int]] = {}
     segments: list[tuple[int, int]] = []
     moving, resting, count = 0, None, 0
-    for start, part in _parts(record):
+    for start, (noticed, ranges, error) in _judged_parts(record, judge):
         count += 1
-        try:
-            judged = judge(part)
-            moving += 1
-        except InputError as error:
-            if error.code not in _MAY_REST:
-                raise
-            resting, judged = resting or error, replace(part, segments=((0, part.time.size),))
-        for finding in judged.findings:
+        moving += error is None
+        resting = resting or error
+        for finding in noticed:
             first, times = found.get(finding.code, (finding, 0))
             found[finding.code] = first, times + 1
-        _extend(segments, judged.segments, start)
+        _extend(segments, ranges, start)
     if resting is not None and not moving:
         raise resting
     whole = [] if record.current is None else change_of(record, None)
     findings = (*record.findings, *_summed(found, count, moving), *whole)
     return replace(record, findings=findings, segments=tuple(segments))
+
+
+def _judged_parts(record: Record, judge: Callable[[Record], Record]) -> Iterator[tuple[int, _Verdict]]:
+    """Start of every part and what came of it, in order, two judged at once."""
+
+    def one(part: Record) -> _Verdict:
+        try:
+            with np.errstate(all="ignore"):  # each thread has its own
+                judged = judge(part)
+            return judged.findings, judged.segments, None
+        except InputError as error:
+            if error.code not in _MAY_REST:
+                raise
+            return (), ((0, part.time.size),), error
+
+    waiting: deque[tuple[int, Future[_Verdict]]] = deque()
+    with ThreadPoolExecutor(_AT_ONCE) as pool:
+        for start, part in _parts(record):
+            waiting.append((start, pool.submit(one, part)))
+            if len(waiting) >= _AT_ONCE:
+                at, done = waiting.popleft()
+                yield at, done.result()
+        for at, done in waiting:
+            yield at, done.result()
 
 
 def _parts(record: Record) -> Iterator[tuple[int, Record]]:

@@ -14,14 +14,14 @@ import numpy as np
 from mrdamper.data import Dataset
 from mrdamper.errors import ColumnError, CombinedError, InputError
 from mrdamper.rig_files.coil_current import as_data, held_current_of
-from mrdamper.rig_files.column_names import names_compression
+from mrdamper.rig_files.column_names import names_compression, names_made
 from mrdamper.rig_files.columns import assign, propose, rate_of
 from mrdamper.rig_files.long_records import judge_long
 from mrdamper.rig_files.packed_folder import is_packed_folder, unpacked
 from mrdamper.rig_files.parts import tests_of
 from mrdamper.rig_files.profile import Channel, Profile, current_pattern, load_profile, profile_hash
 from mrdamper.rig_files.readers import NoTableError, RawTable, RigFileError, raw_tables, suffixes
-from mrdamper.rig_files.record import Record
+from mrdamper.rig_files.record import Finding, Record
 from mrdamper.rig_files.rig_record import joined, records_of
 from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests
@@ -349,7 +349,7 @@ def _profile(profile: Profile | str | Path | None) -> Profile:
 
 def _unjudged(path: Path, profile: Profile) -> list[Record]:
     with raw_tables(path, profile.file) as tables:
-        tables = _tables_with_channels(_parts(tables, profile), profile)
+        tables, made = _without_made(_tables_with_channels(_parts(tables, profile), profile))
         records: list[Record] = []
         problems: list[InputError] = []
         for table in tables:
@@ -364,6 +364,8 @@ def _unjudged(path: Path, profile: Profile) -> list[Record]:
     if profile != Profile():
         remarks["profile_sha256"] = profile_hash(profile)
     records = [replace(record, provenance={**remarks, **record.provenance}) for record in records]
+    if made:
+        records[0] = records[0].noticed(Finding("W_TABLE", f"left out as made from the others: {', '.join(made)}"))
     if len({record.id for record in records}) < len(records):
         records = [replace(record, id=f"{record.id}_{i}") for i, record in enumerate(records, 1)]
     return records
@@ -391,6 +393,14 @@ def _tables_with_channels(tables: list[RawTable], profile: Profile) -> list[RawT
         if fitting:
             return fitting
     raise first or RigFileError("E_NO_DATA", "no table in this file")
+
+
+def _without_made(tables: list[RawTable]) -> tuple[list[RawTable], list[str]]:
+    """Leave out tables that by their name are filtered or computed, beside one that is not; and their names."""
+    measured = [table for table in tables if not names_made(table.label)]
+    if not measured or len(measured) == len(tables):
+        return tables, []
+    return measured, [table.label for table in tables if names_made(table.label)]
 
 
 def _column(table: RawTable, column: int) -> str | int:

@@ -14,7 +14,7 @@ from mrdamper.data.pieces import pieces
 from mrdamper.errors import ColumnError, InputError
 from mrdamper.motion.measured import smooth
 from mrdamper.rig_files.coil_current import as_data, constant, current_of, without_gaps
-from mrdamper.rig_files.column_names import split_name
+from mrdamper.rig_files.column_names import role_of, split_name
 from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, left_out, rate_of
 from mrdamper.rig_files.parts import stretches_of_time
 from mrdamper.rig_files.profile import Correction, Profile
@@ -24,6 +24,8 @@ from mrdamper.rig_files.text.spool import rescale
 from mrdamper.rig_files.units import Unit, parse_unit
 
 _KEPT = {"temperature": "C", "pressure": "Pa", "voltage": "V", "acceleration": "m_s2", "length": "m", "force": "N"}
+_SCALES = frozenset(("scale", "scaling", "gain", "factor", "sensitivity", "slope", "calibration", "lsb", "faktor"))
+_SAMPLE = 10_000  # samples looked at
 _MOST_FURTHER = 12  # channels
 _LEFT_OUT = "the current channel is left out"
 _LENIENT = ("acceleration", "voltage", "temperature", "pressure")  # a damaged cell there costs the channel, not the run
@@ -89,6 +91,7 @@ def _read(table: RawTable, found: dict[str, Assigned]):
                 "points of thousands?", file=table.source.name, column=column + 1,
                 mend="export it without separators of thousands",
             )  # fmt: skip
+    _refuse_unscaled(table, found, raw)
     findings = list(content.findings)
     for name in [name for name in found if name in _LENIENT]:
         try:
@@ -101,6 +104,23 @@ def _read(table: RawTable, found: dict[str, Assigned]):
         findings.append(Finding("W_COLUMN", f"the {name} channel is left out: its column is empty"))
         del found[name]
     return raw, findings, content.lines
+
+
+def _refuse_unscaled(table: RawTable, found: dict[str, Assigned], raw: dict[int, Floats]) -> None:
+    """Refuse whole numbers beside which their scale stands: nobody says whether they were multiplied by it."""
+    for key, value in table.constants.items():
+        words = [word for word in re.split(r"[^A-Za-z]+", key.casefold()) if word]
+        rest = " ".join(word for word in words if word not in _SCALES)
+        role = role_of(rest) if len(rest.split()) < len(words) else None
+        role = role if role in found else next((r for r, e in found.items() if e.name.casefold() in rest), None)
+        if role is None or len(rest.split()) == len(words) or value in (0.0, 1.0):
+            continue
+        some = raw.get(found[role].column, np.empty(0))[:_SAMPLE]
+        if some.size and np.array_equal(some, np.round(some), equal_nan=True):
+            raise RigFileError(
+                "E_AMBIGUOUS", f"{role} is whole numbers, and {key} is {value:g}: are they scaled?",
+                file=table.source.name, mend=f"say [channels.{role}] unit and scale in a profile",
+            )  # fmt: skip
 
 
 def _holds_any(values: Floats) -> bool:

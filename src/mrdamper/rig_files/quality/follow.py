@@ -15,6 +15,8 @@ from mrdamper.rig_files.quality.view import View
 _NOISE = 0.7  # of a channel's standard deviation: white noise has 1, a noisy load cell 0.1
 _LEAP, _LEAPS = 0.4, 0.4  # a step of such a share of the range, and the part of the path in such steps
 _NO_ENERGY = 0.002  # share of the force that opposes the velocity: a spring's
+_STILL, _GOES_ON = 0.01, 0.5  # of the steady stroke and of the steady force, peak to peak
+_FEWEST = 5  # samples
 _UNLIKE = 0.25  # scatter from cycle to cycle over the peak-to-peak force; beyond, it is no answer to the motion
 
 
@@ -50,6 +52,7 @@ def force_follows(view: View) -> None:
             mend="check the load cell, and that the damper is mounted",
             code="E_NO_ENERGY",
         )
+    _force_rests_with_the_motion(view)
     found = repeatability(view)
     if found is None or found[0] < _UNLIKE or view.noticed("W_FROZEN") or _current_changes(view):
         return
@@ -60,6 +63,28 @@ def force_follows(view: View) -> None:
         mend="check that force and displacement are of the same test, and that the load cell does not drift",
         code="E_UNRELATED",
     )
+
+
+def _force_rests_with_the_motion(view: View) -> None:
+    """Refuse a force that goes on through cycles in which the displacement stands still."""
+    steady, period = view.strokes.steady, view.strokes.period
+    if steady is None or period is None or view.noticed("W_FROZEN"):
+        return
+    time, run = view.run.time, view.run
+    stroke, swing = (float(np.ptp(values[slice(*steady)])) for values in (run.displacement, run.force))
+    for start, stop in ((0, steady[0]), (steady[1], time.size)):
+        if stop - start < _FEWEST:
+            continue
+        # The force may relax for half a cycle after the motion has stopped.
+        rest = slice(int(np.searchsorted(time, time[start] + 0.5 * period)) if start else 0, stop)
+        if stop - rest.start < _FEWEST or time[stop - 1] - time[rest.start] < 0.4 * period:
+            continue
+        still = float(np.ptp(run.displacement[rest])) < _STILL * stroke
+        if still and float(np.ptp(run.force[rest])) > _GOES_ON * swing:
+            raise QualityError(
+                f"the force goes on from {time[rest.start]:.4g} s on while the displacement rests",
+                where=view.where, mend="check the displacement channel there, or cut the record", code="E_UNRELATED",
+            )  # fmt: skip
 
 
 def _current_changes(view: View) -> bool:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from mrdamper.data import Floats
 from mrdamper.errors import QualityError
 from mrdamper.motion.harmonics import fit_harmonics
 from mrdamper.rig_files.quality.motion import LEAST_CYCLES, cycles_of
@@ -16,8 +17,11 @@ from mrdamper.rig_files.record import Finding
 
 _SLOW, _FAST = 0.1, 0.5  # of the largest velocity: samples near the reversals, and away from them
 _BELOW = 0.15  # of the range: so far below both strokes is a rectified force at the reversals
+_LOW, _ALIKE = 0.2, 0.25  # of a folded force's largest: near zero, and strokes that do not differ
 GIVING = -0.05  # share of the force in phase with the velocity, below which the loop gives energy
 _CLEARLY = 0.3  # share of the force that opposes, or pushes, in a cycle that surely does
+_GAIN, _EVEN = 0.3, 0.08  # natural logarithms: a leap of the force's size, and what it varies by before and after
+_SAME_CURRENT = 0.1  # [A]
 _FEWEST = 20  # samples of a cycle
 _LONG = 0.08  # of a cycle: a stretch of the other sign that no timing makes
 POOR_REPEATABILITY = 0.05  # of the peak-to-peak force; good rigs have 0.2 to 1.5 %
@@ -68,7 +72,18 @@ def _is_rectified(view: View) -> bool:
     if np.quantile(force, 0.01) < -3 * sample_noise(force) - 0.02 * span or min(map(len, parts)) < _FEWEST:
         return False
     turning, *strokes = (float(np.median(part)) for part in parts)
-    return turning < min(strokes) - _BELOW * span
+    return turning < min(strokes) - _BELOW * span or _is_folded(view, force, *strokes)
+
+
+def _is_folded(view: View, force: Floats, out: float, back: float) -> bool:
+    """Whether a force is as large in one direction as in the other and goes down to zero on either side of the middle.
+
+    A damper's strokes differ by most of its range, whatever gas or a spring adds.
+    """
+    top = float(np.max(force))
+    low = view.run.displacement[force < _LOW * top] - float(np.median(view.run.displacement))
+    sides = min(np.count_nonzero(low > 0), np.count_nonzero(low < 0))
+    return abs(out - back) < _ALIKE * top and min(out, back) > 0.5 * top and sides > 0.2 * low.size > 1
 
 
 def keeps_its_sign(view: View) -> None:
@@ -91,6 +106,7 @@ def keeps_its_sign(view: View) -> None:
         return
     phase = np.linspace(0.0, period, _POINTS, endpoint=False)
     folded = np.array([np.interp(start + phase, time, view.run.force) for start in starts])
+    _keeps_its_scale(view, starts, folded)
     usual = np.median(folded, axis=0)
     counts = np.abs(usual) > 0.3 * np.max(np.abs(usual))
     against = counts & (np.abs(folded + usual) < 0.3 * np.abs(folded - usual))
@@ -98,6 +114,22 @@ def keeps_its_sign(view: View) -> None:
         begins, ends = runs_of(row)
         if begins.size and np.max(ends - begins) > _LONG * _POINTS:
             raise _flip(view, start + phase[begins[np.argmax(ends - begins)]], 1, len(cycles))
+
+
+def _keeps_its_scale(view: View, starts: Floats, folded: Floats) -> None:
+    """Refuse a force that from some cycle on is the same times another number."""
+    if view.record.current is not None and np.ptp(view.run.current) > _SAME_CURRENT:
+        return
+    sizes = np.log(np.mean(np.abs(folded - np.mean(folded, axis=1, keepdims=True)), axis=1))
+    for at in range(2, len(starts)):
+        for after in (at, at + 1):  # the change may lie within a cycle
+            old, new = sizes[:at], sizes[after:]
+            if new.size and max(np.ptp(old), np.ptp(new)) < _EVEN and abs(np.mean(new) - np.mean(old)) > _GAIN:
+                times = float(np.exp(np.mean(new) - np.mean(old)))
+                raise QualityError(
+                    f"the force is {times:.3g} times as large from about {starts[at]:.4g} s on: a range or a unit was "
+                    "changed over", where=view.where, mend="cut the record there", code="E_UNRELATED",
+                )  # fmt: skip
 
 
 def _flip(view: View, time: float, count: int, cycles: int) -> QualityError:

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from mrdamper.errors import QualityError
 from mrdamper.rig_files.quality.view import View
+from mrdamper.rig_files.record import Finding
 
 LONGEST_STROKE = 3.0  # [m] peak to peak; the longest test rigs have about 1.5 m
 LARGEST_FORCE = 2e7  # [N]; the largest seismic test machines
 SMALLEST_FORCE = 0.5  # [N] peak to peak; a load cell of a damper rig resolves about 1 N
 LARGEST_CURRENT = 200.0  # [A]
 FASTEST = 30.0  # [m/s]
+SHORT_STROKE, LONG_STROKE = 0.15e-3, 0.9  # [m] peak to peak: beyond, a slip of the unit is likelier than a test
+SMALL_FORCE, LARGE_FORCE = 8.0, 1.5e6  # [N] peak to peak
+SLOW = 300.0  # [s] of a cycle
+FEWEST_LEVELS, _MANY = 16, 8  # values of a channel, and samples for each
 
 
 def exchanged_or_out_of_range(view: View) -> None:
@@ -47,6 +54,26 @@ def exchanged_or_out_of_range(view: View) -> None:
         if speed > FASTEST:
             raise _refused(
                 view, f"the mean speed of the strokes is {speed:.4g} m/s", "check the units of time and displacement"
+            )
+
+
+def unusual(view: View) -> Iterator[Finding]:
+    """Say what a damper test hardly ever has: sizes of a slipped unit, and channels of a few levels."""
+    record, period = view.record, view.strokes.period
+    stroke, force = _peak_to_peak(record.displacement), _peak_to_peak(record.force)
+    sizes = (
+        (stroke < SHORT_STROKE or stroke > LONG_STROKE, f"displacement moves {1e3 * stroke:.3g} mm peak to peak"),
+        (force < SMALL_FORCE or force > LARGE_FORCE, f"force changes by {force:.3g} N in all"),
+        (period is not None and period > SLOW, f"a cycle takes {period or 0:.3g} s"),
+    )
+    for odd, text in sizes:
+        if odd:
+            yield Finding("W_RANGE", f"{text}: is its unit right?")
+    for name in ("displacement", "force"):
+        levels = np.unique(getattr(view.run, name)).size
+        if levels < FEWEST_LEVELS and view.run.time.size > _MANY * levels:
+            yield Finding(
+                "W_COARSE", f"{name} has {levels} different values only: a sensor of so few steps hides the loop"
             )
 
 

@@ -264,6 +264,9 @@ def _columns(dataset: Any, name: str, path: str, found: _Found) -> list[tuple]:
     if kind.names:
         return [(field, "", dataset, field) for field in kind.names]
     stated = [dataset.attrs[name] for name in _UNIT_NAMES if name in dataset.attrs]
+    for key in dataset.attrs if kind.kind in "iu" else ():
+        if np.asarray(dataset.attrs[key]).dtype.kind in "iuf" and np.size(dataset.attrs[key]) == 1:
+            found.constants.setdefault(path, {})[f"{name}_{key}"] = float(np.reshape(dataset.attrs[key], -1)[0])
     unit = next((_text(value) for value in stated if np.asarray(value).dtype.kind in "SUO"), "")
     unit = unit.partition(" since ")[0]  # netCDF counts time from a date
     shape = dataset.shape[::-1] if "MATLAB_class" in dataset.attrs else dataset.shape
