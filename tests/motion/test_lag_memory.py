@@ -1,0 +1,45 @@
+"""What is remembered along times and paths is what would be computed anew, and lives no longer than they do."""
+
+import gc
+
+import numpy as np
+
+from mrdamper.motion import lag
+from mrdamper.motion.lag import first_order_lag
+from mrdamper.motion.path import last_along
+
+
+def test_another_signal_or_constant_along_known_times_is_lagged_as_along_new_ones():
+    rng = np.random.default_rng(3)
+    time = np.cumsum(rng.uniform(1e-4, 5e-3, 500))
+    for constant in (4e-3, 9e-3, 4e-3):
+        signal = rng.standard_normal(time.size)
+        np.testing.assert_array_equal(
+            first_order_lag(time, signal, constant), first_order_lag(time.copy(), signal, constant)
+        )
+
+
+def test_long_records_are_lagged_alike(monkeypatch):
+    time, signal = np.arange(2000) / 500, np.sin(np.arange(2000) / 7)
+    short = first_order_lag(time, signal, 0.01)
+    monkeypatch.setattr(lag, "_LONG", 1000)
+    np.testing.assert_array_equal(first_order_lag(time.copy(), signal, 0.01), short)
+
+
+def test_only_the_last_is_remembered_and_nothing_outlives_what_it_belongs_to():
+    made = []
+
+    @last_along
+    def scaled(time, factor):
+        made.append(factor)
+        return factor * time
+
+    time = np.arange(4.0)
+    assert scaled(time, 2.0) is scaled(time, 2.0)
+    scaled(time, 3.0)
+    scaled(time, 2.0)
+    assert made == [2.0, 3.0, 2.0]
+    del time
+    gc.collect()
+    (known,) = (cell.cell_contents for cell in scaled.__closure__ if isinstance(cell.cell_contents, dict))
+    assert known == {}
