@@ -160,7 +160,7 @@ def _repeated(
     power = (amplitudes**2).reshape(most, 2).mean(axis=1)
     model = _autoregression(rest)
     lags = _powers(np.exp(-2j * np.pi * frequency * step * orders), model.size - 1)
-    expected = 2 * model[0] / np.abs(1 + model[1:] @ lags) ** 2 / max(size - 2 * most, 1)
+    expected = 2 * model[0] / np.abs(1 + model[1:] @ lags) ** 2 / (size - 2 * most)
     # Noise alone has power at these frequencies too; only a surplus that chance does not explain repeats.
     if np.sum(power) < (1 + 3 / np.sqrt(left.sum())) * np.sum(expected * left):
         return residual, []
@@ -247,7 +247,7 @@ def _autoregression(residual: Floats) -> Floats:
         variance *= 1 - reflection**2
         if variance <= 0:
             break
-        criterion = size * np.log(variance) + 2 * (order + 1) * size / max(size - order - 2, 1)
+        criterion = size * np.log(variance) + 2 * (order + 1) * size / (size - order - 2)
         if criterion < least:
             best, least = np.concatenate([[variance], coefficients]), criterion
     return best
