@@ -49,7 +49,7 @@ ROOMS = (
         "reproduction/test_sensitivity.py",
         "rank_like_single_changes add_up_and_follow",
     ),
-    _room("dampers.bands dampers.sessions dampers.certainty", "dampers/test_bands_by_hand.py dampers/test_sessions.py"),
+    _room("dampers.bands", "dampers/test_bands_by_hand.py"),
     _room("reproduction.virtual_rig", "reproduction/test_virtual_rig.py"),
     _room("report.tables study.recipe", "report/test_tables.py study/test_recipe.py"),
     _room("dampers.paper dampers.modified", "dampers/test_modified.py dampers/test_gram.py study/test_recipe.py"),

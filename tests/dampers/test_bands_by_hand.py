@@ -92,7 +92,7 @@ def test_where_nothing_is_known_there_is_no_band_and_its_reason():
 
 
 def test_a_band_in_three_numbers_is_that_of_loops_at_three_currents(monkeypatch):
-    asked, widths = [], {0.0: 30.0, 1.0: 60.0, 2.0: 90.0}
+    asked, widths = [], {0.0: 30.0, 1.0: 60.0, 2.0: 130.0}
     made = damper()
 
     def predict(self, condition):
@@ -108,7 +108,7 @@ def test_a_band_in_three_numbers_is_that_of_loops_at_three_currents(monkeypatch)
     monkeypatch.setattr(bands, "band", found)
     tested = SimpleNamespace(tested=True, middle=CONDITION, current_A=(0.0, 2.0), peak_velocity_m_s=(0.0, 0.9))
     portable = portable_band(replace(made, envelope=tested), 0.8)
-    t = np.mean([30.0, 60.0, 90.0]) / 13
+    t = np.mean([30.0, 60.0, 130.0]) / 13
     own = np.mean([9 / (100 + 50 * I) ** 2 for I in widths])
     assert (portable.level, portable.gain, portable.offset_N) == (0.8, pytest.approx(0.03 * t), pytest.approx(4 * t))
     assert portable.of_peak == pytest.approx(t * np.sqrt(0.02**2 + own))
@@ -160,6 +160,15 @@ def test_what_runs_share_falls_with_the_hours_between_them_within_a_session():
     near = 4e-4 * np.exp(-0.5)
     expected = [[13e-4, 9e-4 + near, 0], [9e-4 + near, 13e-4, 0], [0, 0, 13e-4], [9e-4, 9e-4, 0]]
     assert found == pytest.approx(np.array(expected))
+
+
+def test_hours_are_counted_from_1970_where_a_clock_is_stated():
+    def when(**notes):
+        return When.of(SimpleNamespace(id="r7", notes=notes))
+
+    assert when(recorded_at="1970-01-02T02:30:00") == When("1970-01-02", 26.5)
+    assert when(recorded_at="1970-01-02", session="morning") == When("morning", None)
+    assert (when(), when(session="b")) == (When("run r7"), When("b"))
 
 
 def test_the_mean_given_others_is_that_of_the_joint_normal():
