@@ -269,7 +269,7 @@ def import_files(
             left_out += [Path(note.file) for note in notes]
         else:
             refusals = notes
-        return ImportResult(_with_unique_ids(records), tuple(refusals), tuple(path.name for path in left_out))
+        return ImportResult(with_unique_ids(records), tuple(refusals), tuple(path.name for path in left_out))
 
 
 def found_tests(
@@ -308,7 +308,7 @@ def _read_judged(
             judged = record
             for step in (
                 lambda record: applied(record, table.of(path, record.id), table) if table is not None else record,
-                _with_current_known,
+                _with_current,
                 lambda record: judge_long(record, judge),
             ):
                 try:
@@ -321,11 +321,6 @@ def _read_judged(
     return good, refusals, [record.id for record in records]
 
 
-def _with_current_known(record: Record) -> Record:
-    _require_current([record], Path(record.provenance.get("file", record.id)))
-    return record
-
-
 def to_dataset(records: Sequence[Record], name: str = "dataset") -> Dataset:
     """The runs of judged records, with their provenance as notes.
 
@@ -336,9 +331,7 @@ def to_dataset(records: Sequence[Record], name: str = "dataset") -> Dataset:
     """
     from mrdamper.rig_files.to_run import to_run
 
-    for record in records:
-        _require_current([record], Path(record.provenance.get("file", record.id)))
-    return Dataset(tuple(to_run(record) for record in records), name)
+    return Dataset(tuple(to_run(_with_current(record)) for record in records), name)
 
 
 def _profile(profile: Profile | str | Path | None) -> Profile:
@@ -449,25 +442,32 @@ def _is_table(path: Path) -> bool:
         return False
 
 
-def _require_current(records: Sequence[Record], path: Path) -> None:
-    if any(record.current is None for record in records):
-        why = [f.text for record in records for f in record.findings if f.text.startswith("the current channel")]
-        raise ColumnError(
-            why[0] if why else "no coil current in a column or in the file name",
-            where=path.name,
-            mend='say [current] value = 0.5, [current] pattern = "*_{current}A_*" or [channels.current] column = "..." '
-            "in a profile, or write it into tests.csv (--write-tests)",
-            code="E_CURRENT_MISSING",
-        )
+def _with_current(record: Record) -> Record:
+    """The record, if it has a current.
+
+    Raises
+    ------
+    ColumnError
+        E_CURRENT_MISSING.
+    """
+    if record.current is not None:
+        return record
+    why = [f.text for f in record.findings if f.text.startswith("the current channel")]
+    raise ColumnError(
+        why[0] if why else "no coil current in a column or in the file name",
+        where=Path(record.provenance.get("file", record.id)).name,
+        mend='say [current] value = 0.5, [current] pattern = "*_{current}A_*" or [channels.current] column = "..." '
+        "in a profile, or write it into tests.csv (--write-tests)",
+        code="E_CURRENT_MISSING",
+    )
 
 
-def _with_unique_ids(records: Sequence[Record]) -> tuple[Record, ...]:
-    taken: set[str] = set()
-    unique = []
+def with_unique_ids(records: Iterable[Record]) -> tuple[Record, ...]:
+    """Records told apart by their names: files of different folders may share one."""
+    found: dict[str, Record] = {}
     for record in records:
-        name, i = record.id, 2
-        while name in taken:
-            name, i = f"{record.id}_{i}", i + 1
-        taken.add(name)
-        unique.append(record if name == record.id else replace(record, id=name))
-    return tuple(unique)
+        name, count = record.id, 2
+        while name in found:
+            name, count = f"{record.id}_{count}", count + 1
+        found[name] = record if name == record.id else replace(record, id=name)
+    return tuple(found.values())

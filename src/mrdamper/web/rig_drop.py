@@ -13,7 +13,6 @@ from pathlib import Path, PurePosixPath
 from mrdamper.data import Dataset
 from mrdamper.errors import InputError
 from mrdamper.rig_files.profile import Profile
-from mrdamper.rig_files.record import Record
 from mrdamper.rig_files.rig_import import ImportResult, Refusal
 from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import Row, TestsTable, load_tests
@@ -33,7 +32,7 @@ def read_rig_files(drop: Drop, toml: str, refused_only: bool, only: Path | None 
         If every file is refused.
     """
     from mrdamper.rig_files.profile import parse_profile
-    from mrdamper.rig_files.rig_import import import_files, to_dataset
+    from mrdamper.rig_files.rig_import import import_files, to_dataset, with_unique_ids
 
     profile = parse_profile(toml) if toml.strip() else None
     files = [path for path in drop.names if PurePosixPath(drop.names[path]).name != TESTS]
@@ -52,7 +51,7 @@ def read_rig_files(drop: Drop, toml: str, refused_only: bool, only: Path | None 
         count = len(drop.refused)
         text = "the file was refused" if count == 1 else f"all {count} files were refused"
         raise NothingTakenError(text, verdicts, shown)
-    records = _with_own_ids(record for path in _by_name(drop) for record in drop.taken.get(path, ()))
+    records = with_unique_ids(record for path in _by_name(drop) for record in drop.taken.get(path, ()))
     dataset = to_dataset(records, _name(drop, len(records)))
     return Intake(split_again(dataset, drop.held_out), "drop", verdicts, shown)
 
@@ -119,17 +118,6 @@ def _reason(error: InputError, path: Path) -> str:
     place = error.where.replace(str(path), "").removeprefix(path.name).strip(" :,")
     text = f"{place}: {error.found}" if place else error.found
     return f"{text}; {error.mend}" if error.mend else text
-
-
-def _with_own_ids(records: Iterable[Record]) -> tuple[Record, ...]:
-    """Files of different folders may share a name; their runs may not."""
-    found: dict[str, Record] = {}
-    for record in records:
-        name, count = record.id, 2
-        while name in found:
-            name, count = f"{record.id}_{count}", count + 1
-        found[name] = record if name == record.id else replace(record, id=name)
-    return tuple(found.values())
 
 
 def _name(drop: Drop, count: int) -> str:
