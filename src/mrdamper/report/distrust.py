@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,21 +16,35 @@ from mrdamper.identification.loop_analysis import LoopAnalysis
 from mrdamper.study.recipe import Scored
 from mrdamper.validation import Validation
 
+_WORDS = frozenset({"a", "A", "I"})  # names that are words of a sentence too
 _SEARCHED = {"seat_share": "elastic displacement of the seat, as a share of the play"}
 _WEAK_FUNCTION = 0.9  # left-out error over spread from which a function hardly beats the mean
 
 
 def doubts(found: Scored, loops: Sequence[LoopAnalysis]) -> list[str]:
     """Sentences on where the model and its data deserve distrust, most consequential first."""
-    return [
+    sentences = [
         *_outside(found.damper),
         *(unsure(found.damper) if found.damper.certainty else ()),
         *_runs(found.left_out, found.held_out),
         *(_functions(found.fit) if isinstance(found.fit, ModifiedFit) else ()),
         *(_joint(found.fit) if isinstance(found.fit, JointFit) else ()),
         *_identifications(found.identifications),
-        *_tests(loops),
     ]
+    return [*_explained(sentences, found.damper), *_tests(loops)]
+
+
+def _explained(sentences: Sequence[str], damper: Damper) -> list[str]:
+    """The same, each parameter with its meaning where it is first named."""
+    parameters = damper.model_at(damper.envelope.middle).parameters()
+    meanings = {info.name: info.meaning for info in parameters if info.name not in _WORDS} | _SEARCHED
+    found = list(sentences)
+    for name, meaning in meanings.items():
+        named = re.compile(rf"(?<![\w.^])(?<!\d ){re.escape(name)}(\.\d+)?(?![\w^])")
+        first = next((i for i, sentence in enumerate(found) if named.search(sentence)), None)
+        if first is not None:
+            found[first] = named.sub(lambda match, said=meaning: f"{match[0]} ({said})", found[first], count=1)
+    return found
 
 
 def _outside(damper: Damper) -> list[str]:
@@ -86,10 +101,7 @@ def _functions(fit: ModifiedFit) -> list[str]:
 def _joint(fit: JointFit) -> list[str]:
     sentences = []
     if fit.at_bounds:
-        words = {info.name: f"{info.name} ({info.meaning})" for info in fit.damper.model.parameters()}
-        words |= {axis: f"{axis} ({about})" for axis, about in _SEARCHED.items()}
-        named = ", ".join(words.get(name, name) for name in fit.at_bounds)
-        sentences.append(f"At a limit of what is looked for, known from one side only: {named}.")
+        sentences.append(f"At a limit of what is looked for, known from one side only: {', '.join(fit.at_bounds)}.")
     if not fit.ending.converged:
         sentences.append(f"The search for one set of parameters {fit.ending}.")
     if (other := fit.second) is not None:

@@ -276,10 +276,15 @@ def _joint_table(chosen: Scored, model: Model) -> list[dict[str, Any]]:
     """Parameters with their intervals and their spread as conditions are left out; those that were held have none."""
     known = {row["name"]: row["written"] for row in table(chosen.damper)}
     return [
-        {"name": info.name, "written": known.get(info.name, f"{getattr(model, info.name):.4g} {info.unit}")}
+        {"name": info.name, "written": known.get(info.name) or _held(getattr(model, info.name), info.unit)}
         | {"spread": _range(chosen.spread.get(info.name), info.unit), "meaning": info.meaning}
         for info in model.parameters()
     ]
+
+
+def _held(value: float, unit: str) -> str:
+    """A parameter that was not determined: a term that is zero is no part of the model."""
+    return f"{written(value, None, unit)} (held)" if value else "– (not part of this model)"
 
 
 def _range(ends: tuple[float, float] | None, unit: str) -> str:
