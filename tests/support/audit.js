@@ -3,7 +3,7 @@
 () => {
   const wrong = [];
   const named = (e) => e.getAttribute("aria-label") || e.labels?.length || e.textContent.trim() || e.title;
-  for (const e of document.querySelectorAll("button, input, select, textarea, a[href], summary, [role=img], [role=progressbar]")) {
+  for (const e of document.querySelectorAll("button, input, select, textarea, a[href], summary, [role=img], .plot, [role=progressbar]")) {
     if (e.checkVisibility() && !named(e)) wrong.push(`no name: ${e.outerHTML.slice(0, 80)}`);
   }
   const ids = [...document.querySelectorAll("[id]")].map((e) => e.id);

@@ -456,6 +456,13 @@ def test_the_keyboard_reaches_everything(on_model):
     assert page.locator(".cell[tabindex='0']").count() == 1
 
 
+def test_every_view_passes_axe(on_model):
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    for tab in ("Model", "Data", "Identify", "Compare", "Take away"):
+        open_tab(on_model, tab)
+        assert axe.run(on_model).response["violations"] == [], tab
+
+
 def test_opening_says_at_once_what_is_being_done(page, shoot):
     held = []
     page.route("**/bundled", lambda route: held.append(route))

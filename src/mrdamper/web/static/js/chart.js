@@ -33,7 +33,7 @@ export class Chart {
     Object.assign(this, { title, x, y, name, zero, more: layout, ranges: null, revision: 0 });
     this.held = false; // while something is dragged: the axes stay, and grow where they must
     this.plot = h("div", { class: "plot" });
-    this.plot.setAttribute("role", "img");
+    this.plot.setAttribute("role", "group"); // no picture: its tool bar takes the focus
     this.keys = keys ? h("div", { class: "keys-place" }) : null;
     const save = h("button", { class: "quiet save", "aria-label": `Save “${title}” as an image`, title: "Save as an image", onclick: () => this.save() }, "PNG");
     this.frame = h("div", { class: "frame" }, this.plot);
