@@ -7,6 +7,7 @@ import math
 import tomllib
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -117,7 +118,8 @@ class Limits:
                 )
         if missing := [name for name in _RANGES if name not in given]:
             raise bad_limits(f"no {', '.join(missing)}", "give [lowest, highest] of each")
-        return cls(**{name: tuple(map(float, v)) if isinstance(v, list) else v for name, v in given.items()})
+        values: dict[str, Any] = {n: tuple(map(float, v)) if isinstance(v, list) else v for n, v in given.items()}
+        return cls(**values)
 
     @classmethod
     def of(cls, damper: Damper) -> Limits:
