@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Collection
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from mrdamper.errors import InputError
 from mrdamper.rig_files.profile import ProfileError
-from mrdamper.rig_files.strict_toml import read_toml
+from mrdamper.rig_files.strict_toml import load_toml
 
 FACTS = ("serial", "session", "batch", "date", "golden")
 COLUMNS: dict[str, tuple[str, ...]] = {
@@ -24,7 +23,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "golden": ("golden",),
 }
 _TRUE = ("true", "yes", "1")
-T = TypeVar("T", bound=BaseModel)
+_HELP = "correct it; docs/how-to/fleet.md shows every key"
 
 
 class LimitsError(InputError):
@@ -136,7 +135,7 @@ def load_fleet_profile(path: str | Path | None) -> FleetProfile:
     """
     if path is None:
         return FleetProfile()
-    profile = _read(Path(path), FleetProfile, ProfileError)
+    profile = load_toml(Path(path), FleetProfile, ProfileError, _HELP)
     if profile.rig is None:
         return profile
     return profile.model_copy(update={"rig": str(Path(path).absolute().parent / profile.rig)})
@@ -150,19 +149,4 @@ def load_limits(path: str | Path) -> dict[str, Limit]:
     LimitsError
         If it is no TOML, a key is not known, or a lower limit is not below the upper.
     """
-    return _read(Path(path), _Limits, LimitsError).limits
-
-
-def _read(path: Path, kind: type[T], refuse: type[InputError]) -> T:
-    try:
-        return kind.model_validate(read_toml(path.read_text(encoding="utf-8-sig")))
-    except OSError as error:
-        raise refuse(error.strerror or str(error), where=str(path), mend="give a TOML file") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise refuse(str(error), where=path.name, mend="correct the TOML") from error
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_context=False)[0]
-        place = ".".join(str(part) for part in first["loc"])
-        unknown = first["type"] == "extra_forbidden"
-        found = f"unknown key {place}" if unknown else f"{place}: {first['msg'].removeprefix('Value error, ')}"
-        raise refuse(found, where=path.name, mend="correct it; docs/how-to/fleet.md shows every key") from error
+    return load_toml(Path(path), _Limits, LimitsError, _HELP).limits

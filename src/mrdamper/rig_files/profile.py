@@ -8,20 +8,19 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from mrdamper.errors import InputError
 from mrdamper.rig_files.conditions import amperes, currents_in
 from mrdamper.rig_files.file_form import NAME, FileForm, Table
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED
-from mrdamper.rig_files.strict_toml import read_toml
+from mrdamper.rig_files.strict_toml import load_toml, parse_toml
 from mrdamper.rig_files.units import DIMENSION, parse_unit
 
-_LARGEST = 64 * 1024  # bytes; a profile is a page
+_HELP = "mrdamper import FILE --write-profile - shows a profile with its keys"
 
 
 class ProfileError(InputError):
@@ -162,15 +161,7 @@ def load_profile(path: str | Path) -> Profile:
     ProfileError
         If it is no TOML, or a key or value is not known.
     """
-    path = Path(path)
-    try:
-        if path.stat().st_size > _LARGEST:
-            raise ProfileError("over 64 KiB", where=path.name, mend="is this a rig profile?")
-        return parse_profile(path.read_bytes().decode("utf-8-sig"), path.name)
-    except OSError as error:
-        raise ProfileError(error.strerror or str(error), where=str(path), mend="give a TOML file") from error
-    except UnicodeDecodeError as error:
-        raise ProfileError("is no UTF-8 text", where=path.name, mend="save it as UTF-8") from error
+    return load_toml(Path(path), Profile, ProfileError, _HELP)
 
 
 def parse_profile(text: str, where: str = "profile") -> Profile:
@@ -181,19 +172,7 @@ def parse_profile(text: str, where: str = "profile") -> Profile:
     ProfileError
         If it is no TOML, or a key or value is not known.
     """
-    try:
-        return Profile.model_validate(read_toml(text))
-    except tomllib.TOMLDecodeError as error:
-        raise ProfileError(str(error) or "nested too deeply", where=where, mend="correct the TOML") from error
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_context=False)[0]
-        place = ".".join(str(part) for part in first["loc"])
-        more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
-        unknown = first["type"] == "extra_forbidden"
-        found = f"unknown key {place}" if unknown else f"{place}: {first['msg'].removeprefix('Value error, ')}"
-        raise ProfileError(
-            found + more, where=where, mend="mrdamper import FILE --write-profile - shows a profile with its keys"
-        ) from error
+    return parse_toml(text, Profile, ProfileError, _HELP, where)
 
 
 def profile_text(profile: Profile) -> str:

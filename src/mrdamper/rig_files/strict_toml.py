@@ -4,10 +4,57 @@ from __future__ import annotations
 
 import re
 import tomllib
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from mrdamper.errors import InputError
 
 _LONGEST = 200_000  # characters; the profiles of the documentation have under 3,000
 _DOTTED = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++\s*+\.\s*+){17}""")  # ours have two parts
+
+T = TypeVar("T", bound=BaseModel)
+
+
+def load_toml(path: Path, kind: type[T], refuse: type[InputError], help: str, largest: int = 2**16) -> T:
+    """What a TOML file says, by its schema.
+
+    Parameters
+    ----------
+    path : Path
+    kind : type of BaseModel
+    refuse : type of InputError
+        Raised if it cannot be read, is no TOML, or holds a key or value that is not known.
+    help : str
+        Where its keys are shown.
+    largest : int
+        Bytes; a profile is a page.
+    """
+    try:
+        if path.stat().st_size > largest:
+            raise refuse(f"over {largest // 1024} KiB", where=path.name, mend=f"is this the file? {help}")
+        text = path.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        raise refuse(error.strerror or str(error), where=str(path), mend="give a TOML file") from error
+    except UnicodeDecodeError as error:
+        raise refuse("is no UTF-8 text", where=path.name, mend="save it as UTF-8") from error
+    return parse_toml(text, kind, refuse, help, path.name)
+
+
+def parse_toml(text: str, kind: type[T], refuse: type[InputError], help: str, where: str) -> T:
+    """What a TOML text says, by its schema; arguments as `load_toml`, `where` the text is from."""
+    try:
+        return kind.model_validate(read_toml(text))
+    except tomllib.TOMLDecodeError as error:
+        raise refuse(str(error) or "nested too deeply", where=where, mend="correct the TOML") from error
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False)[0]
+        place = ".".join(str(part) for part in first["loc"])
+        more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
+        unknown = first["type"] == "extra_forbidden"
+        found = f"unknown key {place}" if unknown else f"{place}: {first['msg'].removeprefix('Value error, ')}"
+        raise refuse(found + more, where=where, mend=help) from error
 
 
 def read_toml(text: str) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
@@ -10,13 +9,13 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Floats
 from mrdamper.errors import StructureError, UnknownNameError
 from mrdamper.files.model_file import load_model
-from mrdamper.rig_files.strict_toml import read_toml
+from mrdamper.rig_files.strict_toml import load_toml
 from mrdamper.systems.structure import Link, System, building, half_car, quarter_car, shear_building
 
 Positive = Annotated[float, Field(gt=0)]
@@ -150,17 +149,7 @@ def load_system(name: str | Path) -> SystemFile:
         if path.suffix == ".toml":
             raise StructureError("no such file", where=str(path), mend="give a system TOML file")
         raise UnknownNameError.of("system", str(name), known)
-    try:
-        raw = read_toml(path.read_text(encoding="utf-8"))
-        document = _Document.model_validate(raw)
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise StructureError(
-            f"not a TOML file: {error}", where=str(path), mend="see docs/how-to/simulate.md"
-        ) from error
-    except ValidationError as error:
-        first = error.errors()[0]
-        field = ".".join(str(part) for part in first["loc"])
-        raise StructureError(f"{field}: {first['msg']}", where=str(path), mend="see docs/how-to/simulate.md") from error
+    document = load_toml(path, _Document, StructureError, "see docs/how-to/simulate.md", 2**20)
     system = _build(document, path)
     models = {d.name: d.model for d in document.damper if d.model is not None}
     return SystemFile(system, {link: load_model(path.parent / model) for link, model in models.items()})
