@@ -18,7 +18,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 from fuzz.bench_soak import attack_bench
 from fuzz.hostile_input import attack_calls, attack_datasets, attack_models
 from fuzz.hostile_names import attack_exports, attack_names
-from fuzz.stops import attack_kills, attack_limits
+from fuzz.stops import COMMANDS, attack_kills, attack_limits
 
 KINDS = {
     "names": attack_names,
@@ -38,6 +38,7 @@ def main() -> None:
     arguments = argparse.ArgumentParser(prog="python -m fuzz.attack", description=__doc__)
     arguments.add_argument("kinds", nargs="*", help=f"of {', '.join(KINDS)}; default: all")
     arguments.add_argument("--share", type=float, default=1.0, help="of the usual number")
+    arguments.add_argument("--of", nargs="+", default=[], help=f"commands that are stopped, of {', '.join(COMMANDS)}")
     chosen = arguments.parse_args()
     kinds = chosen.kinds or list(KINDS)
     if len(kinds) > 1:  # each in a process of its own: one kind's threads and memory are not the next one's
@@ -47,7 +48,7 @@ def main() -> None:
             codes = list(pool.map(lambda kind: subprocess.run([*one, kind], check=False).returncode, aside))
         codes += [subprocess.run([*one, kind], check=False).returncode for kind in kinds if kind == TIMED]
         sys.exit(max(codes))
-    counts = KINDS[kinds[0]](chosen.share)
+    counts = KINDS[kinds[0]](chosen.share, *([chosen.of] if chosen.of else []))
     for count in counts:
         print(count, flush=True)
     sys.exit(1 if any(count.broke for count in counts) else 0)

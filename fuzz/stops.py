@@ -19,7 +19,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from fuzz.counting import Count, bench_damper
@@ -65,15 +65,15 @@ _TIMES = "made.json"  # holds when a result was made
 _GONE_S = 2.0  # in which children of a killed command must be gone
 
 
-def attack_kills(share: float) -> list[Count]:
+def attack_kills(share: float, only: Sequence[str] = ()) -> list[Count]:
     """SIGKILL at every rename and at random: nothing half-written or mixed, no orphan, no litter after the next run."""
     if os.name != "posix":
         return []
     rng, counts = random.Random(6), {what: Count(f"SIGKILL: {what}") for what in ("old or new", "orphans", "litter")}
     with _workplace() as root:
         _adopt_orphans()
-        for name, (out, line) in COMMANDS.items():
-            folder = root / name
+        for name, (out, line) in _chosen(only):
+            folder, broken = root / name, sum(len(count.broke) for count in counts.values())
             folder.mkdir()
             said, span, wholes = [], 0.0, []
             for n in (1, 2):
@@ -111,6 +111,10 @@ def attack_kills(share: float) -> list[Count]:
                 flush=True,
             )
     return list(counts.values())
+
+
+def _chosen(only: Sequence[str]) -> list[tuple[str, tuple[str, str]]]:
+    return [(name, how) for name, how in COMMANDS.items() if name in (only or COMMANDS)]
 
 
 def _begin_anew(folder: Path, n: int, empty: bool = False) -> None:
@@ -174,13 +178,13 @@ def _at_steps(folder: Path, tell: Callable[[], object]) -> None:
     sys.addaudithook(lambda event, arguments: hook(event, arguments) if os.getpid() == process else None)
 
 
-def attack_limits(share: float) -> list[Count]:
+def attack_limits(share: float, only: Sequence[str] = ()) -> list[Count]:
     """Full disks, limits of file size, of memory and of open files: done, or a code, and nothing half-written."""
     if os.name != "posix":
         return []
     counts = {what: Count(f"starved of {what}") for what in ("disk", "file size", "memory", "files")}
     with _workplace() as root:
-        for name, (out, line) in COMMANDS.items():
+        for name, (out, line) in _chosen(only):
             folder = root / name
             folder.mkdir()
             _begin_anew(folder, 1)

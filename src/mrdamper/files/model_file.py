@@ -190,9 +190,11 @@ def load_model(path: str | Path) -> Damper:
     """
     path = path_of(path)
     try:
-        if path.is_file() and path.stat().st_size > _LARGEST:
+        with path.open("rb") as file:
+            content = file.read(_LARGEST + 1)
+        if len(content) > _LARGEST:
             raise ModelFileError(f"over {_LARGEST // 10**6} MB", where=str(path), mend="is this a model.json?")
-        text = path.read_text(encoding="utf-8")
+        text = content.decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
         raise ModelFileError(reason, where=str(path), mend="give a model.json written by mrdamper") from error

@@ -9,6 +9,9 @@ import numpy as np
 
 from mrdamper.data import Floats, Run
 from mrdamper.errors import ColumnError, DatasetError, RunError, UnitError
+from mrdamper.files.samples import first_line
+from mrdamper.rig_files.readers.archive import opened
+from mrdamper.rig_files.readers.base import RigFileError
 
 if TYPE_CHECKING:
     import polars as pl
@@ -32,9 +35,7 @@ def load_motion(path: str | Path, current: float | None = None) -> Run:
         If the file cannot be read, lacks a column, or its samples do not make a motion.
     """
     path = Path(path)
-    if not path.is_file():
-        raise DatasetError("no such file", where=str(path), mend="give a CSV with time_s and displacement_m")
-    table = _table(path)
+    table = read_table(path, "give a CSV with time_s and displacement_m")
     wanted = [*_NAMES, *(["current_A"] if current is None and "current_A" in table.columns else [])]
     columns = {name: _numbers(table, name, path) for name in wanted}
     if current is None and "current_A" not in columns:
@@ -50,15 +51,23 @@ def load_motion(path: str | Path, current: float | None = None) -> Run:
     )
 
 
-def _table(path: Path) -> pl.DataFrame:
+def read_table(path: Path, mend: str) -> pl.DataFrame:
+    """A small table from CSV, packed or not, within the bounds of a rig's file.
+
+    Raises
+    ------
+    DatasetError
+        If it is no such table.
+    """
     import polars as pl
 
     try:
-        return pl.read_csv(path, infer_schema_length=10_000)
+        with opened(path) as source:
+            return pl.read_csv(source.file, infer_schema_length=10_000)
+    except RigFileError as error:
+        raise DatasetError(error.found, where=str(path), mend=error.mend if path.is_file() else mend) from error
     except (pl.exceptions.PolarsError, OSError) as error:
-        raise DatasetError(
-            str(error).splitlines()[0], where=str(path), mend="write it as comma-separated UTF-8"
-        ) from error
+        raise DatasetError(first_line(error), where=str(path), mend="write it as comma-separated UTF-8") from error
 
 
 def _numbers(table: pl.DataFrame, name: str, path: Path) -> Floats:

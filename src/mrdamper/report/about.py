@@ -16,10 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from mrdamper.errors import InputError
-from mrdamper.rig_files.strict_toml import read_toml
+from mrdamper.rig_files.strict_toml import read_toml_file
 
 _LARGEST_LOGO = 500_000  # bytes; it stands in every page
-_LARGEST_FILE = 100_000  # bytes of a TOML file
 _LONGEST = 5_000  # letters of a field
 _LONGEST_SIDE = 5_000  # points of a logo
 _PICTURES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg"}
@@ -173,12 +172,10 @@ def _limit(entry: Any, where: str) -> Limit:
 
 def _toml(path: Path) -> Mapping[str, Any]:
     try:
-        if path.stat().st_size > _LARGEST_FILE:
-            raise AboutError(f"{path.stat().st_size:,} bytes", where=str(path), mend="a few lines of TOML are expected")
-        return read_toml(path.read_text(encoding="utf-8"))
+        return read_toml_file(path)
     except OSError as error:
         raise AboutError(error.strerror or str(error), where=str(path), mend="give a TOML file that exists") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except tomllib.TOMLDecodeError as error:
         mend = 'write one `name = "text"` a line, in UTF-8'
         raise AboutError(f"is no TOML: {str(error).splitlines()[0]}", where=str(path), mend=mend) from error
 

@@ -32,9 +32,11 @@ def load_toml(path: Path, kind: type[T], refuse: type[InputError], help: str, la
         Bytes; a profile is a page.
     """
     try:
-        if path.stat().st_size > largest:
+        with path.open("rb") as file:
+            content = file.read(largest + 1)  # no more, whatever it is
+        if len(content) > largest:
             raise refuse(f"over {largest // 1024} KiB", where=path.name, mend=f"is this the file? {help}")
-        text = path.read_bytes().decode("utf-8-sig")
+        text = content.decode("utf-8-sig")
     except OSError as error:
         raise refuse(error.strerror or str(error), where=str(path), mend="give a TOML file") from error
     except UnicodeDecodeError as error:
@@ -55,6 +57,24 @@ def parse_toml(text: str, kind: type[T], refuse: type[InputError], help: str, wh
         unknown = first["type"] == "extra_forbidden"
         found = f"unknown key {place}" if unknown else f"{place}: {first['msg'].removeprefix('Value error, ')}"
         raise refuse(found + more, where=where, mend=help) from error
+
+
+def read_toml_file(path: Path) -> dict[str, Any]:
+    """A TOML file without a schema; no more of it is read than one may hold, whatever it is.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
+    tomllib.TOMLDecodeError
+        Also if it is no UTF-8.
+    """
+    with path.open("rb") as file:
+        content = file.read(4 * _LONGEST + 1)
+    try:
+        return read_toml(content.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise tomllib.TOMLDecodeError("no UTF-8 text") from error
 
 
 def read_toml(text: str) -> dict[str, Any]:

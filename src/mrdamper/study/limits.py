@@ -14,7 +14,7 @@ import numpy as np
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Condition
 from mrdamper.errors import InputError
-from mrdamper.rig_files.strict_toml import read_toml
+from mrdamper.rig_files.strict_toml import read_toml_file
 
 _RANGES = ("current_A", "frequency_Hz", "amplitude_mm")
 _LEVELS = 4  # of each of them on the grid of candidates
@@ -100,8 +100,8 @@ class Limits:
             E_LIMITS if the file cannot be read, or a key is unknown, missing, or no number.
         """
         try:
-            given = read_toml(path.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+            given = read_toml_file(path)
+        except (OSError, tomllib.TOMLDecodeError) as error:
             found = str(error).splitlines()[0]
             raise InputError(found, where=str(path), mend="give a TOML file of limits", code="E_LIMITS") from error
         known = [field.name for field in fields(cls)]

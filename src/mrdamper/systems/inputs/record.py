@@ -9,7 +9,8 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.errors import ColumnError, DatasetError, RecordError, UnitError
+from mrdamper.errors import ColumnError, RecordError, UnitError
+from mrdamper.files.motion import read_table
 from mrdamper.systems.inputs.base import Input
 
 STANDARD_GRAVITY = 9.81  # m/s² in a g of the records that come with the package; the figure published tables used
@@ -68,17 +69,8 @@ def load_record(path: str | Path, time_scale: float = 1.0) -> Record:
     DatasetError, ColumnError, UnitError, RecordError
         If the file cannot be read, says no unit, or has steps that differ.
     """
-    import polars as pl
-
     path = Path(path)
-    if not path.is_file():
-        raise DatasetError("no such file", where=str(path), mend="give a CSV with time_s and acceleration_m_s2")
-    try:
-        table = pl.read_csv(path, infer_schema_length=10_000)
-    except (pl.exceptions.PolarsError, OSError) as error:
-        raise DatasetError(
-            str(error).splitlines()[0], where=str(path), mend="write it as comma-separated UTF-8"
-        ) from error
+    table = read_table(path, "give a CSV with time_s and acceleration_m_s2")
     table = table.rename({column: column.strip().lstrip("\ufeff") for column in table.columns})
     found = [name for name in _COLUMNS if name in table.columns]
     if len(found) > 1:
