@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.models import EXAMPLES
 from support.synthetic import TRUTH, synthetic_run
 
 from mrdamper.data import Condition, Dataset, Run
@@ -9,10 +10,13 @@ from mrdamper.errors import IdentificationError, RunError, UnknownNameError
 from mrdamper.gas_spring import GasSpring
 from mrdamper.identification import identify
 from mrdamper.identification.covariance import spread, standard_errors
-from mrdamper.identification.methods import all_methods
+from mrdamper.identification.methods import all_methods, projection
 from mrdamper.models.bouc_wen import BoucWen
+from mrdamper.models.spencer import Spencer
+from mrdamper.motion import sine
 from mrdamper.optimizers.levenberg_marquardt import least_squares
 from mrdamper.optimizers.linear import solve_bounded
+from mrdamper.simulation import simulate
 from mrdamper.study.workflow import usable_sines
 
 
@@ -155,3 +159,17 @@ def test_a_dataset_in_place_of_a_run_is_told_what_to_call(bundled):
     with pytest.raises(IdentificationError) as error:
         identify(bundled)
     assert "run_study(dataset)" in error.value.mend
+
+
+def test_a_long_record_of_a_stepped_model_is_searched_on_its_end_first(monkeypatch):
+    """Where the whole leads, at fewer forces along all of it."""
+    motion = sine(Condition(1.0, 1.0, 0.01), 12, 400)
+    force = simulate(Spencer(**EXAMPLES["spencer"]), motion).force
+    run = Run("long", motion.time, motion.displacement, force + np.sin(40 * motion.time), 1.0)
+    held = {name: EXAMPLES["spencer"][name] for name in ("k0_rate", "yield_displacement")}
+    whole = identify(run, "spencer", fixed=held)
+    monkeypatch.setattr(projection, "_LONG", 3000)
+    rehearsed = identify(run, "spencer", fixed=held)
+    for name in ("c1", "c0_ratio", "creep"):
+        assert getattr(rehearsed.model, name) == pytest.approx(getattr(whole.model, name), rel=1e-4)
+    assert rehearsed.scores.nrmse_pp == pytest.approx(whole.scores.nrmse_pp, rel=1e-6)

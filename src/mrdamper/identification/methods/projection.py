@@ -32,6 +32,8 @@ from mrdamper.optimizers.one_number import least_squares_in_one
 
 _GRID_SAMPLES = 1500  # the grid only has to find the valley
 _GRID_SAMPLES_A_CYCLE, _GRID_CYCLES = 100, 3  # where all shapes are tried at once
+_LONG = 40_000  # samples from which the search of a model that is stepped is rehearsed on a piece
+_PIECE_CYCLES, _PIECE_SAMPLES_A_CYCLE = 5, 500
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,12 @@ class Projection(Method):
             projected = _project(problem, {})
             return Solution(projected.model, 0.0, projected.at_bounds, {}, {}, 1, Ending.SOLVED)
         elimination = Elimination.of(problem, axes)
-        starts, evaluated = _best_of_grid(problem, axes, elimination, self.refine_best if len(axes) > 1 else 1)
+        if problem.model_type.integrated and problem.force.size > _LONG:
+            piece = self.solve(_last_cycles(problem))
+            starts = [np.array([axis.coordinate(piece.end[axis.name]) for axis in axes])]
+            evaluated = piece.evaluations
+        else:
+            starts, evaluated = _best_of_grid(problem, axes, elimination, self.refine_best if len(axes) > 1 else 1)
         found = [(start, _refined(problem, axes, elimination, start)) for start in starts]
         start, best = min(found, key=lambda pair: pair[1].cost)
         end = _point(axes, best.point)
@@ -182,6 +189,20 @@ def _few_cycles(problem: Problem) -> tuple[Path, NDArray[np.intp]]:
     )
     rows = picked[picked >= size - scored] - (size - problem.force.size)
     return path, rows
+
+
+def _last_cycles(problem: Problem) -> Problem:
+    """The same problem on the thinned end of the record: following all of a long one costs a second a force."""
+    run, cycle = problem.run, 1.0 / problem.analysis.condition.frequency_Hz
+    last = int(np.flatnonzero(run.in_window)[-1]) + 1
+    size = max(8, math.ceil(cycle * (run.time.size - 1) / float(np.ptp(run.time))))
+    piece = run.part(max(0, last - _PIECE_CYCLES * size), last)
+    thin = slice(None, None, max(1, size // _PIECE_SAMPLES_A_CYCLE))
+    channels = {name: getattr(piece, name)[thin] for name in ("time", "displacement", "force", "current")}
+    window = (float(piece.time[0]) + cycle, float(piece.time[-1]))
+    velocity = None if piece.velocity is None else piece.velocity[thin]
+    short = replace(piece, **channels, velocity=velocity, further={}, segments=(), window=window)
+    return replace(problem, run=short)
 
 
 def _point(axes: tuple[SearchAxis, ...], u: Floats) -> dict[str, float]:
