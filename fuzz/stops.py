@@ -40,7 +40,7 @@ COMMANDS = {
     "compare": ("m", "compare ../data{n} --models bingham --models biviscous --out m"),
     "certainty": ("sure", "certainty ../study{n}/model.json ../data{n} --out sure"),
     "report": ("r", "report ../data{n} --out r"),
-    "plan": ("plan", "plan --limits ../limits.toml --hours 0.{n} --out plan"),
+    "plan": ("plan", "plan --limits ../limits.toml --hours 0.{n}9 --out plan"),
     "simulate": (
         "ride",
         "simulate quarter-car --input bump --damper ../model.json --current 0.{n} --step 0.002 --out ride",

@@ -9,6 +9,7 @@ import sys
 import textwrap
 
 import pytest
+from support.command import mrdamper
 
 from mrdamper.errors import InputError, OutputError, ResourceError, resource_error
 from mrdamper.files import atomic
@@ -41,7 +42,7 @@ def test_a_result_takes_the_place_of_the_earlier_one_and_files_of_others_stay(tm
     listed = publish(out, "page", result(["page", "model.json", "figures/b.svg"], "new"), {"seconds": 1.5})
     assert [p.relative_to(out).as_posix() for p in listed] == ["page", "model.json", "figures/b.svg"]
     found = files(out)
-    assert json.loads(found.pop(MADE)) == {"files": ["page", "model.json", "figures/b.svg"], "seconds": 1.5}
+    assert json.loads(found.pop(MADE)) == {"files": ["figures/b.svg", "model.json", "page"], "seconds": 1.5}
     new = dict.fromkeys(["page", "model.json", "figures/b.svg"], "new")
     assert found == new | dict.fromkeys(["mine.txt", "figures/mine.svg"], "mine")
     assert os.listdir(tmp_path) == ["out"]  # noqa: PTH208  hidden ones too
@@ -190,3 +191,14 @@ def test_without_a_descriptor_to_look_into_folders_the_scratch_folder_still_goes
     with pytest.raises(ResourceError), write_file(tmp_path / "a.csv"):
         raise OSError(errno.EMFILE, "Too many open files")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_shorter_plan_leaves_no_record_of_the_longer_one(tmp_path):
+    (tmp_path / "limits.toml").write_text("current_A = [0, 1]\nfrequency_Hz = [0.5, 4]\namplitude_mm = [4, 20]\n")
+    for time in ("0.6", "0.2"):
+        done = mrdamper("plan", "--limits", tmp_path / "limits.toml", "--hours", time, "--out", tmp_path / "plan")
+        assert done.returncode == 0, done.stderr
+    named = (tmp_path / "plan" / "plan.csv").read_text()
+    records = [path.name for path in (tmp_path / "plan").glob("plan_*.csv")]
+    assert records
+    assert all(name in named for name in records)

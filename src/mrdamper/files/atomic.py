@@ -85,10 +85,9 @@ def write_into(folder: str | Path) -> Iterator[Path]:
         _put(work, final, frozenset())
 
 
-def publish(
-    folder: str | Path, first: str, fill: Callable[[Path], None], facts: Mapping[str, Any] | None = None
-) -> list[Path]:
-    """Have `fill` write a result that takes the place of an earlier one in one step.
+@contextmanager
+def write_result(folder: str | Path, facts: Mapping[str, Any] | None = None) -> Iterator[Path]:
+    """Give a temporary folder whose files take the place of an earlier result in one step when the block ends.
 
     Files of the earlier result that this one does not have are gone afterwards; files of others
     stay. `made.json` says which are the result's, and holds `facts`.
@@ -96,17 +95,8 @@ def publish(
     Parameters
     ----------
     folder : path
-    first : str
-        Name of the page that comes first in the list.
-    fill : callable
-        Writes into the temporary folder it is given.
     facts : mapping, optional
         What differs from run to run, such as times: it stands nowhere else.
-
-    Returns
-    -------
-    list of Path
-        What was written.
 
     Raises
     ------
@@ -115,16 +105,24 @@ def publish(
     """
     final = Path(folder)
     with _beside(final) as work:
-        fill(work)
-        written = sorted(
-            (p.relative_to(work) for p in work.rglob("*") if p.is_file()),
-            key=lambda p: (p.name != first, len(p.parts), str(p)),
-        )
-        made = {"files": [p.as_posix() for p in written], **(facts or {})}
+        yield work
+        made = {
+            "files": sorted(p.relative_to(work).as_posix() for p in work.rglob("*") if p.is_file()),
+            **(facts or {}),
+        }
         (work / MADE).write_text(json.dumps(made, indent=1) + "\n", encoding="utf-8")
         _sync(work)
         _put(work, final, _earlier(final))
-    return [Path(folder) / p for p in written]
+
+
+def publish(
+    folder: str | Path, first: str, fill: Callable[[Path], None], facts: Mapping[str, Any] | None = None
+) -> list[Path]:
+    """Have `fill` write a result as `write_result` does; what was written, the page `first` before the others."""
+    with write_result(folder, facts) as work:
+        fill(work)
+        written = [p.relative_to(work) for p in work.rglob("*") if p.is_file()]
+    return [Path(folder) / p for p in sorted(written, key=lambda p: (p.name != first, len(p.parts), str(p)))]
 
 
 @contextmanager

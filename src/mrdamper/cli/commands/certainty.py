@@ -26,7 +26,7 @@ def register(app: typer.Typer) -> None:
         from mrdamper.dampers.certainty import table, unsure
         from mrdamper.dampers.covariance import certain
         from mrdamper.errors import InputError
-        from mrdamper.files.atomic import require_writable, write_into
+        from mrdamper.files.atomic import require_writable, write_result
         from mrdamper.files.dataset import load_dataset
         from mrdamper.files.encoding import csv_text
         from mrdamper.files.model_file import load_model
@@ -72,7 +72,7 @@ def register(app: typer.Typer) -> None:
         from mrdamper.report.plots.certainty import corner, profile_curves, quantiles
         from mrdamper.report.plots.style import save_figure
 
-        with write_into(out) as folder:
+        with write_result(out) as folder:
             (folder / "numbers.csv").write_text(csv_text(rows), encoding="utf-8")
             if found:
                 save_figure(profile_curves(found), folder / "profile")

@@ -27,7 +27,7 @@ def register(app: typer.Typer) -> None:
 
         from mrdamper.cli.progress import progress_soon
         from mrdamper.errors import InputError
-        from mrdamper.files.atomic import require_writable, write_into
+        from mrdamper.files.atomic import require_writable, write_result
         from mrdamper.files.encoding import csv_text
         from mrdamper.files.model_file import load_model
         from mrdamper.study.first_matrix import first_matrix
@@ -43,7 +43,7 @@ def register(app: typer.Typer) -> None:
             raise InputError("--about without a model", mend="give a model.json")
         allowed = Limits.read(limits) if limits else Limits.of(damper)  # type: ignore[arg-type]
         names = []
-        with progress_soon("planning") as tell, write_into(out) as folder:
+        with progress_soon("planning") as tell, write_result(out) as folder:
             if damper:
                 chosen, reckoning = plan_tests(damper, allowed, hours, _doubt(about), tell)
             else:
