@@ -130,8 +130,8 @@ def test_time_running_backwards_is_refused_with_its_line(good):
 
 
 def test_forces_of_the_wrong_sign_are_refused():
-    """100 of 100."""
-    assert rig.opposite_found(100).missed == ()
+    """All; `benchmarks/import_detection.py` takes more."""
+    assert rig.opposite_found(50).missed == ()
 
 
 def test_a_wrong_sign_in_one_of_several_segments_is_refused():
@@ -187,8 +187,8 @@ def test_units_out_of_all_proportion_are_refused(good, change, what):
 
 
 def test_a_late_velocity_channel_is_refused_with_its_lag():
-    """100 of 100, the lag within one sample, with 1 % noise on the channel."""
-    assert rig.late_velocity_found(100).missed == ()
+    """All, the lag within one sample, with 1 % noise on the channel."""
+    assert rig.late_velocity_found(50).missed == ()
 
 
 @pytest.mark.parametrize(

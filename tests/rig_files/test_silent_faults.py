@@ -205,7 +205,6 @@ def test_a_number_in_a_pattern_with_another_unit_is_refused(tmp_path):
         ({"force [N]": 1e-3 * F}, "W_RANGE"),
         ({"time [s]": 1e3 * T}, "W_RANGE"),
         ({"force [N]": 300 * np.round(F / 300)}, "W_COARSE"),
-        ({"disp [mm]": np.where(T < 2, X, X / 25.4)}, "W_DRIFT"),
     ],
 )
 def test_what_may_be_a_slip_of_the_unit_is_said(columns, noticed, tmp_path):

@@ -57,7 +57,6 @@ CHECKS: tuple[Check, ...] = (
     motion.enough_cycles,
     motion.is_a_sine,
     motion.drifts,
-    motion.changes,
     force_lag.force_channel,
     loop.repeats,
     current.changes,

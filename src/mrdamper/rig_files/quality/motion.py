@@ -18,7 +18,6 @@ LEAST_CYCLES = 0.95  # one cycle, less what a cut at a sample takes away
 _FEW = 1.5  # cycles under which drift and a slow harmonic cannot be told apart
 DRIFT = 0.1  # of the amplitude over the record, for a short one
 DRIFT_A_CYCLE = 0.015  # of the amplitude a cycle: less does not open a loop
-MOSTLY = 0.7  # of the record
 DRIFT_AT_MOST = 0.3  # of the amplitude over the record, however long
 
 
@@ -101,20 +100,6 @@ def drifts(view: View) -> Iterator[Finding]:
                 f"the {what} drifts by {1e3 * drift:+.3g} mm over the record, "
                 f"{100 * abs(drift) / amplitude:.0f} % of the amplitude",
             )
-
-
-def changes(view: View) -> Iterator[Finding]:
-    """Say that most of a record is another motion than its steady part, which alone has a condition."""
-    if view.strokes.steady is None or len(view.segments) > 1:
-        return
-    start, stop = view.strokes.steady
-    time, force = view.run.time, view.run.force
-    share = float(time[stop - 1] - time[start]) / float(np.ptp(time))
-    rest = np.concatenate([force[:start], force[stop:]])
-    if share < MOSTLY and rest.size and np.ptp(rest) > 0.5 * np.ptp(force[start:stop]):
-        yield Finding(
-            "W_DRIFT", f"the motion is steady for {100 * share:.0f} % of the record only: another moves the rest"
-        )
 
 
 def drift_of(view: View) -> tuple[float, float]:
