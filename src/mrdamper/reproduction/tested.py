@@ -184,7 +184,7 @@ def _share(steps: Sequence[bool]) -> float:
 def bulge(run: Run) -> float:
     """Width of the force–displacement loop [N] at x = 0 over that at 0.8 X."""
     record = SineRecord.of(run)
-    phase = np.degrees(record.theta) % 360
+    phase = np.degrees(record.theta)
     width = []
     for angle in (0.0, float(np.degrees(np.arcsin(0.8)))):
         out = np.abs((phase - angle + 180) % 360 - 180) < 5

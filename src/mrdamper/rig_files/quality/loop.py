@@ -65,7 +65,7 @@ def _is_rectified(view: View) -> bool:
     """
     force, velocity = view.run.force, view.moving.velocity
     span = float(np.ptp(force))
-    force = force * (np.sign(np.median(force)) or 1.0)
+    force = -force if np.median(force) < 0 else force
     fastest = float(np.max(np.abs(velocity)))
     parts = [force[np.abs(velocity) < _SLOW * fastest], force[velocity > _FAST * fastest]]
     parts += [force[velocity < -_FAST * fastest]]
