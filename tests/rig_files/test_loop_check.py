@@ -105,7 +105,10 @@ def levels(turning, out, back, dip=0.0, share=0.0, count=1000):
     velocity = np.cos(2 * np.pi * (np.arange(count) + 0.5) / count * 4)
     force = np.select([np.abs(velocity) < 0.3, velocity > 0], [turning, out], back).astype(float)
     force[: int(share * count)] = dip
-    return SimpleNamespace(run=SimpleNamespace(force=force), moving=SimpleNamespace(velocity=velocity))
+    displacement = np.sin(2 * np.pi * (np.arange(count) + 0.5) / count * 4)
+    return SimpleNamespace(
+        run=SimpleNamespace(force=force, displacement=displacement), moving=SimpleNamespace(velocity=velocity)
+    )
 
 
 @pytest.mark.parametrize(
@@ -124,7 +127,7 @@ def levels(turning, out, back, dip=0.0, share=0.0, count=1000):
     ],
 )
 def test_a_rectified_force_is_nearer_to_zero_at_the_reversals_than_in_either_stroke(made, rectified):
-    assert loop._is_rectified(made) is rectified
+    assert bool(loop._is_rectified(made)) is rectified
 
 
 @pytest.mark.parametrize("mirrored", [1.0, -1.0])
@@ -137,7 +140,7 @@ def test_reversals_and_strokes_are_told_by_the_largest_speed_either_way(mirrored
     v, force = (np.concatenate(each) for each in zip(*parts, strict=True))
 
     def rectified(force):
-        run = SimpleNamespace(force=mirrored * np.asarray(force))
+        run = SimpleNamespace(force=mirrored * np.asarray(force), displacement=np.linspace(-1, 1, v.size))
         return loop._is_rectified(SimpleNamespace(run=run, moving=SimpleNamespace(velocity=mirrored * v)))
 
     assert rectified(force)
