@@ -64,5 +64,5 @@ ROOMS = (
         "identification.methods.paper identification.harmonic_balance",
         "identification/test_harmonic_balance.py dampers/test_paper.py",
     ),
-    _room("rig_files.quality.loop", "rig_files/test_loop_check.py"),
+    _room("rig_files.quality.loop", "rig_files/test_loop_check.py rig_files/test_silent_faults.py"),
 )
