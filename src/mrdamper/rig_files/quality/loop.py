@@ -83,7 +83,7 @@ def _is_folded(view: View, force: Floats, out: float, back: float) -> bool:
     top = float(np.max(force))
     low = view.run.displacement[force < _LOW * top] - float(np.median(view.run.displacement))
     sides = min(np.count_nonzero(low > 0), np.count_nonzero(low < 0))
-    return abs(out - back) < _ALIKE * top and min(out, back) > 0.5 * top and sides > 0.2 * low.size > 1
+    return bool(abs(out - back) < _ALIKE * top and min(out, back) > 0.5 * top and sides > 0.2 * low.size > 1)
 
 
 def keeps_its_sign(view: View) -> None:
