@@ -149,8 +149,9 @@ def test_what_is_no_record_is_passed_by(line, tmp_path):
     os.mkfifo(tmp_path / "pipe.csv")
     out = tmp_path / "out"
     out.mkdir()
+    (out / "journal.lock").touch()
     pl.DataFrame({"serial": ["D1"]}).write_parquet(out / "dampers.parquet")
-    assert [item.name for item in find_items(tmp_path, FleetProfile(), out)] == ["D000001, session S001"]
+    assert [item.name for item in find_items(tmp_path, FleetProfile())] == ["D000001, session S001"]
 
 
 def test_one_dataset_of_many_sessions_is_a_damper_of_each(line, tmp_path):

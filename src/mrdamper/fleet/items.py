@@ -69,7 +69,7 @@ class Item:
         return {name: getattr(self, name) for name in FACTS}
 
 
-def find_items(source: str | Path, profile: FleetProfile, out: Path | None = None) -> list[Item]:
+def find_items(source: str | Path, profile: FleetProfile) -> list[Item]:
     """The dampers of a source, sorted by serial number and session.
 
     Parameters
@@ -78,8 +78,6 @@ def find_items(source: str | Path, profile: FleetProfile, out: Path | None = Non
         A folder of dataset folders, of folders of rig files or of rig files, a dataset folder, or
         a Parquet lake (a file, or a folder of such files) with a column for the serial number.
     profile : FleetProfile
-    out : path, optional
-        Folder of results, that may lie in the source.
 
     Raises
     ------
@@ -92,12 +90,12 @@ def find_items(source: str | Path, profile: FleetProfile, out: Path | None = Non
     from mrdamper.fleet.lake import is_lake, lake_items
 
     lake = sorted(source.rglob("*.parquet")) if source.is_dir() else [source]
-    ours = None if out is None else out.resolve() / "dampers.parquet"
-    lake = [p for p in lake if p.name not in SAMPLE_FILES and p.is_file() and p.resolve() != ours]
+    results = [p for p in lake if p.name == "dampers.parquet" and _holds_results(p.parent)]
+    lake = [p for p in lake if p.name not in SAMPLE_FILES and p.is_file() and p not in results]
     if lake and is_lake(lake, profile):
         found = lake_items(lake, profile)
     elif source.is_dir():
-        found = list(_in_folder(source, profile, out))
+        found = list(_in_folder(source, profile))
     else:
         raise FleetError(
             "neither a folder nor a Parquet file with a serial number", where=str(source), mend="give a folder",
@@ -136,7 +134,12 @@ def _files(item: Item) -> list[Path]:
     return [Path(path) for path in item.paths]
 
 
-def _in_folder(folder: Path, profile: FleetProfile, out: Path | None) -> Iterator[Item]:
+def _holds_results(folder: Path) -> bool:
+    """Whether a folder is an earlier `--out`."""
+    return (folder / "journal.lock").is_file()
+
+
+def _in_folder(folder: Path, profile: FleetProfile) -> Iterator[Item]:
     from mrdamper.rig_files.readers import suffixes
 
     if (folder / "runs.csv").is_file():
@@ -145,8 +148,7 @@ def _in_folder(folder: Path, profile: FleetProfile, out: Path | None) -> Iterato
     known = suffixes()
     loose: list[Path] = []
     for path in sorted(folder.iterdir()):
-        here = path.resolve()
-        if path.name.startswith(".") or folder.resolve().is_relative_to(here) or (out and here == out.resolve()):
+        if path.name.startswith(".") or folder.resolve().is_relative_to(path.resolve()) or _holds_results(path):
             continue  # hidden, a link to where it lies, or our own results
         if path.is_dir() and (path / "runs.csv").is_file():
             yield from _of_dataset(path, profile)

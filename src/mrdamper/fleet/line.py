@@ -109,7 +109,7 @@ def run_fleet(
     parameters = [info.name for info in model_type(model).parameters()]
     require_writable(out)
     profile = profile or FleetProfile()
-    items = [_absolute(item) for item in find_items(source, profile, out)]
+    items = [_absolute(item) for item in find_items(source, profile)]
     settings = Settings(model, _rig_profile(profile), cold)
     journal = Journal(out)
     try:
