@@ -356,3 +356,7 @@ def test_a_quadratic_needs_four_currents_at_a_motion():
         == "1 of 2 motions were tested at 3 currents or more"
     )
     assert tested._tested_at(SimpleNamespace(conditions=conditions), 4).startswith("0 of 2")
+    readings = [SimpleNamespace(amplitude=100.0 + 50 * n) for n in range(5)]
+    three = tested.quadratic(study_of(conditions=conditions, readings=readings))
+    assert three.numbers == {}
+    assert "prove nothing" in three.evidence

@@ -86,6 +86,7 @@ def test_how_well_a_function_fits_says_nothing_by_itself():
     assert quiet == {
         ("mass", "R² of m over current and frequency"), ("alpha", "R²"), ("beta", "R² of ln β"),
         ("beta", "share of runs at the limit of the box"),
+        ("generalisation", "median held-out error over the median error of identification"),
     }  # fmt: skip
     for key in ("mass", "alpha", "beta"):
         fits = numbers(key, lambda x: beyond(x, x.near) if x.alone else x.holds)

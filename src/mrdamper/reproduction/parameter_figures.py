@@ -103,7 +103,9 @@ def _fits(study: Reproduction, values: Floats, form: str, *, log: bool = False) 
         curve = partial(_along, found.function, conditions[0], 1.0)
         # A mean explains nothing: its value says more than an R² of zero.
         level = float(np.ravel(curve(np.zeros(1)))[0])
-        fits[group[0]] = curve, f"{level:.4g}" if form == "constant" else f"R² {found.r2:.3f}"
+        exact = len(found.function.coefficients) + len(found.function.rates) >= len(group)
+        said = "through its points" if exact else f"R² {found.r2:.3f}"
+        fits[group[0]] = curve, f"{level:.4g}" if form == "constant" else said
     return fits
 
 

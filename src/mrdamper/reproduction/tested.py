@@ -88,7 +88,9 @@ def quadratic(study: Reproduction) -> Measured:
     """The motion on which a quadratic of the current says least of F0."""
     F0, fits = amplitudes(study), []
     for group in motions(study):
-        with suppress(IdentificationError):  # too few currents to determine it
+        if len({round(study.conditions[i].current_A, 3) for i in group}) < 4:
+            continue
+        with suppress(IdentificationError):  # currents too near each other to determine it
             fits.append(fit_function("quadratic-current", [study.conditions[i] for i in group], F0[group]).r2)
     if not fits:
         return unknown(f"{_tested_at(study, 4)}: a quadratic through three of them would prove nothing")

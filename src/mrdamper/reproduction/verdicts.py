@@ -127,7 +127,7 @@ LIMITS: Mapping[str, tuple[Limit, ...]] = MappingProxyType(
         ),
         "fast": (_below("forces until within 1 % of the search's end, over the traditional Bouc–Wen's", 0.99, 1.5),),
         "generalisation": (
-            _below("median held-out error over the median error of identification", 1.5, 2.5),
+            Limit("median held-out error over the median error of identification", "below", 1.5, 2.5, alone=False),
             _below("worst held-out error, nrmse_pp", 0.1, 0.2),
         ),
     }
