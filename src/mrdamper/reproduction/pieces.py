@@ -144,7 +144,9 @@ def ended(searches: Mapping[str, Basis], optimum: Basis | None, made: FromRun) -
         best, _ = made.found[optimum, run_id] if optimum else ("", 0.0)
         if isinstance(one, str) or isinstance(best, str) or one.seed is None:
             continue
-        if min(best.model.alpha, best.model.beta) <= 0:  # the box ends the optimum itself: nothing to be over
+        if (
+            min(getattr(best.model, name) for name in ("alpha", "beta")) <= 0
+        ):  # the box ends the optimum itself: nothing to be over
             continue
         a, b = (getattr(one.model, name) / getattr(best.model, name) for name in ("alpha", "beta"))
         error = one.scores.nrmse_pp / best.scores.nrmse_pp
