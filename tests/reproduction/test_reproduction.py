@@ -145,8 +145,9 @@ def test_boxes_that_hold_no_optimum_leave_searches_unjudged(quick, undrawn, tmp_
     few = virtual_dataset(currents=(0.0, 2.0), cycles=2)
     chosen = few.only([*list(few.split("train"))[:4], next(iter(few.split("validate")))])
     found = reproduce(chosen, switches=Switches(alpha_box=(0.0, 1.0), beta_box=(0.0, 1.0)))
-    claims = {c.key: c for c in judge_all(found)}
-    assert claims["generalisation"].verdict == "does not hold"
+    assert all(np.isfinite([end.alpha, end.beta]).all() for end in found.ended)
+    assert len(found.ended) < len(found.train)
+    assert all(c.evidence for c in judge_all(found))
     write_reproduction(found, tmp_path / "out")
     for path in (tmp_path / "out" / "tables").glob("*.csv"):
         assert ",inf" not in path.read_text(encoding="utf-8"), path.name
