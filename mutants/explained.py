@@ -1,4 +1,4 @@
-"""Survivors that are no gap in the tests, and why. They count among the survivors all the same."""
+"""Changes that change nothing a test could see, and why. They are not planted, and their number is told."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from mutants.faults import Fault
 
 
 class Explained(NamedTuple):
-    """Changes to lines of a module that change nothing a test could see; an empty change stands for any."""
+    """Lines of a module, by a part of them, and a part of the change; an empty one stands for any."""
 
     module: str
     line: str
@@ -123,7 +123,7 @@ EXPLAINED = (
 
 
 def reason(fault: Fault) -> str:
-    """Why a fault may survive; empty where nothing is said."""
+    """Why a change changes nothing; empty where it is a fault."""
     for module, line, change, why in EXPLAINED:
         if module in fault.module and line in fault.text and change in fault.change:
             return why

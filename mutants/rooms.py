@@ -44,11 +44,7 @@ ROOMS = (
         " reproduction/test_seeds.py",
     ),
     _room("reproduction.output", "reproduction/test_output.py"),
-    _room(
-        "reproduction.sensitivity",
-        "reproduction/test_sensitivity.py",
-        "rank_like_single_changes add_up_and_follow",
-    ),
+    _room("reproduction.sensitivity", "reproduction/test_sensitivity.py"),
     _room("dampers.bands", "dampers/test_bands_by_hand.py"),
     _room("reproduction.virtual_rig", "reproduction/test_virtual_rig.py"),
     _room("report.tables study.recipe", "report/test_tables.py study/test_recipe.py"),
