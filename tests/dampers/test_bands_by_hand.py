@@ -97,7 +97,7 @@ def test_a_band_in_three_numbers_is_that_of_loops_at_three_currents(monkeypatch)
 
     def predict(self, condition):
         asked.append(condition)
-        return Prediction(MOTION, (100 + 50 * condition.current_A) * np.array([1.0, -1.0]), condition, ())
+        return Prediction(MOTION, (100 + 50 * condition.current_A) * np.array([1.5, -0.5]), condition, ())
 
     def found(damper, prediction, level):
         ones, width = np.ones(2), widths[prediction.condition.current_A]

@@ -256,12 +256,16 @@ def test_time_and_accuracy_are_ratios_of_ours_to_theirs():
         held_out=SimpleNamespace(runs=(1,), median=lambda: 0.156, worst=lambda: SimpleNamespace(**worst)), per_run=0.1
     )
     ali = SimpleNamespace(
-        held_out=SimpleNamespace(runs=(1,), median=lambda: 0.04, worst=lambda: SimpleNamespace(**worst)),
+        held_out=SimpleNamespace(
+            runs=(1,),
+            median=lambda: 0.04,
+            worst=lambda: SimpleNamespace(**{**worst, "scores": SimpleNamespace(nrmse_pp=0.099)}),
+        ),
         numbers_per_run=8,
     )
     found = identified.few_parameters(study_of({LITERAL: literal, ALI: ali}))
     assert list(found.numbers.values()) == pytest.approx([3.9, 0.25])
-    assert found.evidence.startswith("held out 15.6 % against 4.0 %; worst 17.4 % and 17.4 %; 2 searched against 8")
+    assert found.evidence.startswith("held out 15.6 % against 4.0 %; worst 17.4 % and 9.9 %; 2 searched against 8")
     ali.numbers_per_run = 1
     assert identified.few_parameters(study_of({LITERAL: literal, ALI: ali})).numbers == pytest.approx(
         {"median held-out error over the Ali-type's": 3.9, "searched parameters a run over the Ali-type's": 2.0}
