@@ -12,17 +12,17 @@ from web.processes import alive
 from mrdamper.errors import ResourceError
 from mrdamper.study.processes import processes
 
+# A script as people write it, without a guard: the processes must not run it again.
 PARENT = """
 import os, time
 from mrdamper.study.processes import processes
-if __name__ == "__main__":
-    with processes(2) as pool:
-        tasks = [pool.submit(os.getpid), pool.submit(os.getpid), *(pool.submit(time.sleep, 60) for _ in range(6))]
-        tasks[1].result()
-        print(*pool._processes, flush=True)
-        if {fault}:
-            raise KeyError("a fault")
-        tasks[-1].result()
+with processes(2) as pool:
+    tasks = [pool.submit(os.getpid), pool.submit(os.getpid), *(pool.submit(time.sleep, 60) for _ in range(6))]
+    tasks[1].result()
+    print(*pool._processes, flush=True)
+    if {fault}:
+        raise KeyError("a fault")
+    tasks[-1].result()
 """
 
 

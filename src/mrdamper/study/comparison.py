@@ -74,8 +74,7 @@ def compare(
     genetic : bool
         Include identification by genetic algorithm.
     jobs : int, optional
-        Processes; default one a core. Any number gives the same bits. A script that calls this
-        needs `if __name__ == "__main__":`, because the processes import it anew.
+        Processes; default one a core. Any number gives the same bits.
     progress : callable
 
     Raises

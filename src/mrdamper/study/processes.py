@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import active_children, get_context, parent_process
+from multiprocessing import active_children, parent_process
+from multiprocessing.context import SpawnContext, SpawnProcess
+from types import ModuleType
 from typing import Any
 
 from mrdamper.errors import ResourceError
@@ -32,8 +35,7 @@ def processes(
     ResourceError
         E_WORKER if a process was ended from outside, as systems do that run short of memory.
     """
-    # Spawned, not forked: a fork of a process whose libraries run threads can hang.
-    pool = ProcessPoolExecutor(count, get_context("spawn"), initializer=_begin, initargs=(begin, arguments))
+    pool = ProcessPoolExecutor(count, _Context(), initializer=_begin, initargs=(begin, arguments))
     try:
         yield pool
         pool.shutdown()
@@ -48,6 +50,30 @@ def processes(
                 code="E_WORKER",
             ) from error
         raise
+
+
+class _Process(SpawnProcess):
+    """Spawned, not forked: a fork of a process whose libraries run threads can hang.
+
+    A spawned process imports the script that was started, and a script without a guard would begin its work again
+    in each. All that is sent to these stands in modules of their own, so no script is told to them.
+    """
+
+    _lock = threading.Lock()
+
+    @staticmethod
+    def _Popen(process_obj: Any) -> Any:
+        with _Process._lock:
+            script = sys.modules["__main__"]
+            sys.modules["__main__"] = ModuleType("__main__")
+            try:
+                return SpawnProcess._Popen(process_obj)  # pyright: ignore[reportAttributeAccessIssue]
+            finally:
+                sys.modules["__main__"] = script
+
+
+class _Context(SpawnContext):
+    Process = _Process
 
 
 def _begin(begin: Callable[..., None] | None, arguments: tuple[Any, ...]) -> None:
