@@ -224,6 +224,9 @@ def test_what_harmonic_balance_cannot_use_is_refused():
     force = 1e3 * np.sign(np.gradient(saw))
     with pytest.raises(ExcitationError, match=r"the motion is no sine.*method projection"):
         SineRecord.of(Run("saw", time, fast_back, force, 0.0))  # type: ignore[arg-type]
+    two = 0.02 * np.sin(2 * np.pi * time) + 0.01 * np.sin(2 * np.pi * 1.618 * time)
+    with pytest.raises(ExcitationError, match=r"at other frequencies [34]\d %"):
+        SineRecord.of(Run("two tones", time, two, force, 0.0))  # type: ignore[arg-type]
     part = Run("part", time[:600], 0.02 * np.sin(2 * np.pi * time[:600]), force[:600], 0.0)  # type: ignore[arg-type]
     with pytest.raises(ExcitationError, match=r"0\.60 cycles.*at least one full cycle"):
         SineRecord.of(part)

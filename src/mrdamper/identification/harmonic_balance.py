@@ -18,7 +18,7 @@ import numpy as np
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import ExcitationError, IdentificationError
 from mrdamper.hysteresis import Shape, loop_harmonics
-from mrdamper.motion import SINE_DISTORTION_LIMIT, Excitation, analyse_motion
+from mrdamper.motion import SINE_DISTORTION_LIMIT, STRAY_LIMIT, Excitation, analyse_motion
 from mrdamper.motion.harmonics import fit_harmonics
 from mrdamper.optimizers.linear import solve_linear
 
@@ -61,7 +61,8 @@ class SineRecord:
         if not found.is_sine:
             raise ExcitationError(
                 f"the motion is no sine: distortion {100 * found.distortion:.1f} %, "
-                f"harmonic balance takes up to {100 * SINE_DISTORTION_LIMIT:g} %",
+                f"motion at other frequencies {100 * found.stray:.0f} %; "
+                f"harmonic balance takes up to {100 * SINE_DISTORTION_LIMIT:g} and {100 * STRAY_LIMIT:g} %",
                 where=f"run {run.id}",
                 mend="identify with method projection, which follows any motion",
             )

@@ -6,6 +6,7 @@ from mrdamper.motion.measured import measured_motion, smooth
 from mrdamper.motion.path import Path
 from mrdamper.motion.sines import (
     SINE_DISTORTION_LIMIT,
+    STRAY_LIMIT,
     EquivalentSine,
     MotionAnalysis,
     analyse_motion,
@@ -15,6 +16,7 @@ from mrdamper.motion.sines import (
 
 __all__ = [
     "SINE_DISTORTION_LIMIT",
+    "STRAY_LIMIT",
     "EquivalentSine",
     "Excitation",
     "MotionAnalysis",

@@ -13,6 +13,7 @@ from mrdamper.motion.harmonics import HarmonicSeries, fit_harmonics, fundamental
 from mrdamper.motion.measured import measured_motion
 
 SINE_DISTORTION_LIMIT = 0.05  # above it a motion is no sine for harmonic balance
+STRAY_LIMIT = 0.3  # of the RMS displacement; what no harmonic explains: above it another motion runs beside the sine
 _ORDERS = 7  # harmonics a measured motion is described by
 _STILL = 1e-9  # a displacement that moves less does not move [m]
 
@@ -35,6 +36,8 @@ class MotionAnalysis:
         Slow movement of the mean position [m/s].
     residual : float
         RMS of what the series does not explain [m].
+    stray : float
+        That RMS over the RMS displacement: a second tone, a random part, a sweep.
     """
 
     condition: Condition
@@ -43,11 +46,12 @@ class MotionAnalysis:
     distortion: float
     drift: float
     residual: float
+    stray: float
 
     @property
     def is_sine(self) -> bool:
         """Whether harmonic balance may treat the motion as a sine."""
-        return self.distortion <= SINE_DISTORTION_LIMIT
+        return self.distortion <= SINE_DISTORTION_LIMIT and self.stray < STRAY_LIMIT
 
 
 @once_per_run
@@ -77,13 +81,15 @@ def analyse_motion(run: Run) -> MotionAnalysis:
             mend="record at least one full cycle",
         )
     power = series.sine**2 + series.cosine**2
+    residual = float(np.std(run.displacement - series(run.time)))
     return MotionAnalysis(
         condition=Condition(run.mean_current, series.frequency, series.half_peak_to_peak()),
         series=series,
         cycles=cycles,
         distortion=float(np.sqrt(power[1:].sum() / power[0])),
         drift=series.drift,
-        residual=float(np.std(run.displacement - series(run.time))),
+        residual=residual,
+        stray=residual / float(np.std(run.displacement)),
     )
 
 
@@ -124,7 +130,7 @@ def equivalent_sine(run: Run) -> EquivalentSine:
         analysis = None
     # A ramp leaves no residual either: its drift explains it all, and the swing is nothing.
     spread = float(np.std(centred))
-    if analysis is not None and analysis.residual < 0.3 * spread and analysis.condition.amplitude_m > 0.5 * spread:
+    if analysis is not None and analysis.stray < STRAY_LIMIT and analysis.condition.amplitude_m > 0.5 * spread:
         return EquivalentSine(analysis.condition, analysis.series.mean, True)
     motion = measured_motion(run)
     rms_x, rms_v = float(np.std(motion.displacement)), float(np.std(motion.velocity))
