@@ -1,5 +1,6 @@
 """The check of the loop on made forces whose share, sign and scatter are worked out by hand."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -153,6 +154,66 @@ def test_a_rectified_force_is_refused_by_its_name():
     with pytest.raises(QualityError, match="absolute value") as told:
         dissipates(view(lambda p, n, t: np.abs(np.cos(p))))
     assert told.value.code == "E_RECTIFIED"
+
+
+def folded(back=1.0, lag=0.6, steep=4.0):
+    """The absolute value of a hysteretic force: zero on either side of the middle, as large both ways."""
+    return lambda p, n, t: np.abs(np.tanh(steep * np.cos(p - lag))) * np.where(np.cos(p - lag) > 0, 1.0, back)
+
+
+@pytest.mark.parametrize(
+    ("force", "refused"),
+    [
+        (folded(), True),
+        (folded(back=0.8), True),
+        (folded(back=0.7), False),  # strokes that differ by a third of the larger are two forces
+        (lambda p, n, t: -folded()(p, n, t), True),
+        (lambda p, n, t: np.tanh(4 * np.cos(p - 0.6)), False),
+        # Down to zero on one side only: a spring stop, a hole, or play at one end.
+        (lambda p, n, t: 1 - 0.97 * np.exp(-((np.mod(p, 2 * np.pi) - 2.2) ** 2) / 0.05), False),
+        # On either side, but never near zero.
+        (lambda p, n, t: 0.6 + 0.4 * folded()(p, n, t), False),
+    ],
+)
+def test_a_folded_force_has_zeros_on_either_side_and_strokes_alike(force, refused):
+    made = view(lambda p, n, t: force(p, n, t) + 0.02 * np.cos(p))  # dissipative by a little
+    if not refused:
+        return dissipates(made)
+    with pytest.raises(QualityError) as told:
+        dissipates(made)
+    assert told.value.code == "E_RECTIFIED"
+
+
+@pytest.mark.parametrize(
+    ("times", "told"),
+    [
+        ([1, 1, 1, 1.4, 1.4, 1.4], r"1\.4 times as large from about 5\.4 s on"),
+        ([1, 1, 1, 1, 1, 0.225], r"0\.225 times as large from about 7 s on"),
+        ([1, 1, 1.2, 1.4, 1.4, 1.4], r"1\.4 times as large from about 4\.6 s on"),  # within a cycle
+        ([1, 1, 1, 1.32, 1.32, 1.32], None),  # exp(0.3) is 1.35
+        ([1, 1.4, 1.4, 1.4, 1.4, 1.4], None),  # the first cycle may be a way in from rest
+        ([1, 1.1, 1, 1.5, 1.5, 1.5], None),  # a force that varies before
+        ([1, 1, 1, 1.5, 1.65, 1.5], None),  # or after
+        ([1, 1.05, 1, 1.5, 1.55, 1.5], "times as large"),  # a little does not matter
+        ([1, 1.15, 1.3, 1.45, 1.6, 1.75], None),  # it grows
+    ],
+)
+def test_a_force_that_is_from_somewhere_on_times_another_number_is_refused(times, told):
+    made = view(lambda p, n, t: 7.0 + np.asarray(times)[n] * np.cos(p), 6.0)
+    if told is None:
+        return keeps_its_sign(made)
+    with pytest.raises(QualityError, match=told) as refused:
+        keeps_its_sign(made)
+    assert refused.value.code == "E_UNRELATED"
+    for step, right in ((0.05, False), (0.2, True)):  # a current that changes is a reason
+        current = step * (made.record.time > 5.4)
+        made.record = replace(made.record, current=current)
+        made.run = SimpleNamespace(time=made.run.time, force=made.run.force, current=current)
+        if right:
+            keeps_its_sign(made)
+        else:
+            with pytest.raises(QualityError):
+                keeps_its_sign(made)
 
 
 @pytest.mark.parametrize(

@@ -121,15 +121,18 @@ def _keeps_its_scale(view: View, starts: Floats, folded: Floats) -> None:
     if view.record.current is not None and np.ptp(view.run.current) > _SAME_CURRENT:
         return
     sizes = np.log(np.mean(np.abs(folded - np.mean(folded, axis=1, keepdims=True)), axis=1))
-    for at in range(2, len(starts)):
-        for after in (at, at + 1):  # the change may lie within a cycle
-            old, new = sizes[:at], sizes[after:]
-            if new.size and max(np.ptp(old), np.ptp(new)) < _EVEN and abs(np.mean(new) - np.mean(old)) > _GAIN:
-                times = float(np.exp(np.mean(new) - np.mean(old)))
+    for within in (0, 1):  # between two cycles, or within one
+        for at in range(2, len(starts) - within):
+            old, new = sizes[:at], sizes[at + within :]
+            leap = float(np.mean(new) - np.mean(old))
+            if max(np.ptp(old), np.ptp(new)) < _EVEN and abs(leap) > _GAIN:
                 raise QualityError(
-                    f"the force is {times:.3g} times as large from about {starts[at]:.4g} s on: a range or a unit was "
-                    "changed over", where=view.where, mend="cut the record there", code="E_UNRELATED",
-                )  # fmt: skip
+                    f"the force is {np.exp(leap):.3g} times as large from about {starts[at]:.4g} s on: a range, a unit "
+                    "or the current was changed over",
+                    where=view.where,
+                    mend="cut the record there, or name the channel of the current",
+                    code="E_UNRELATED",
+                )
 
 
 def _flip(view: View, time: float, count: int, cycles: int) -> QualityError:
