@@ -99,4 +99,9 @@ def test_the_command_says_and_draws(few, tmp_path):
     got = CliRunner().invoke(application(), [*asked, "--out", str(tmp_path / "out")])
     assert got.exit_code == 0, got.output
     assert "profile of f0: bounded" in got.stdout
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"numbers.csv", "profile.svg", "profile.csv"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "made.json",
+        "numbers.csv",
+        "profile.csv",
+        "profile.svg",
+    }

@@ -42,13 +42,13 @@ def test_it_starts_answers_and_stops_cleanly(tmp_path, name):
     with pytest.raises(urllib.error.HTTPError, match="403"):
         post(address, "", "a guess")
     workers = workers_of_a_study(process.pid, address, token) if name != "SIGHUP" else []
-    assert list(tmp_path.glob("mrdamper-bench-*"))
+    assert list(tmp_path.glob("mrdamper-*.scratch"))
     process.send_signal(stop)
     out, err = process.communicate(timeout=20)
     assert process.returncode == (0 if stop == signal.SIGINT else 128 + stop)
     assert out.endswith("stopped\n")
     assert "Traceback" not in out + err
-    assert not list(tmp_path.glob("mrdamper-bench-*"))
+    assert not list(tmp_path.glob("mrdamper-*.scratch"))
     deadline = time.monotonic() + 10
     while any(map(alive, workers)) and time.monotonic() < deadline:
         time.sleep(0.02)
