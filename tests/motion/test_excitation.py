@@ -8,6 +8,7 @@ from mrdamper.errors import ExcitationError
 from mrdamper.motion import (
     analyse_motion,
     equivalent_sine,
+    measured,
     measured_motion,
     random_motion,
     sine,
@@ -136,3 +137,23 @@ def test_bundled_sines_are_measured_as_their_authors_measured_them(bundled):
         # The authors' figures: 0.1 % in frequency; amplitude to 3 %, because position drifts.
         assert found.frequency_Hz == pytest.approx(float(run.notes["measured_frequency_Hz"]), rel=2e-3)
         assert found.amplitude_m == pytest.approx(float(run.notes["measured_amplitude_m"]), rel=0.03)
+
+
+@pytest.mark.parametrize("cycles", [20, 2000])
+@pytest.mark.parametrize("noise", [0.0, 5e-5])
+def test_the_velocity_of_a_record_of_any_length_is_that_of_the_motion(cycles, noise):
+    time = np.arange(cycles * 100) / 200
+    rng = np.random.default_rng(3)
+    slope = smooth(time, 0.01 * np.sin(4 * np.pi * time) + rng.normal(0, noise, time.size))[1]
+    error = slope - 0.04 * np.pi * np.cos(4 * np.pi * time)
+    assert np.sqrt(np.mean(error**2)) < (0.06 if noise else 3e-3) * 0.04 * np.pi
+
+
+@pytest.mark.parametrize("uneven", [0.0, 1e-4])
+def test_windows_taken_in_blocks_are_the_windows_of_all(monkeypatch, uneven):
+    time = np.linspace(0, 2, 900) + uneven * np.sin(np.arange(900))
+    signal = np.sin(7 * time) + 0.01 * np.cos(300 * time)
+    whole = smooth(time, signal)
+    monkeypatch.setattr(measured, "_CELLS", 1000)
+    for one, other in zip(smooth(time, signal), whole, strict=True):
+        assert one == pytest.approx(other, rel=1e-9, abs=1e-9)

@@ -5,12 +5,15 @@ Everything is computed from the motion that was measured, never from the one tha
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from mrdamper.data import Floats, Run, once_per_run
 from mrdamper.motion.excitation import Excitation
 
 _UNIFORM = 1e-8  # spread of the sampling interval, relative, up to which it counts as one
+_CELLS = 4_000_000  # numbers of all windows that are held at a time
 
 
 @once_per_run
@@ -50,15 +53,22 @@ def smooth(time: Floats, signal: Floats, span: float | None = None) -> tuple[Flo
     width = min(2 * half + 1, size)
     if width == 2 * half + 1 and np.ptp(np.diff(time)) < _UNIFORM * spacing:
         return _smooth_uniform(signal, half, spacing)
-    start = np.clip(np.arange(size) - half, 0, size - width)
     windows = np.lib.stride_tricks.sliding_window_view
-    tau = (windows(time, width)[start] - time[:, None]) / spacing
-    values = windows(signal, width)[start] - signal[:, None]
-    moments = [np.ones_like(tau), tau, tau * tau]
-    normal = np.stack([[np.sum(p * q, axis=1) for q in moments] for p in moments])
-    right = np.stack([np.sum(p * values, axis=1) for p in moments])
-    c0, c1, c2 = np.linalg.solve(normal.transpose(2, 0, 1), right.T[..., None])[..., 0].T
-    return signal + c0, c1 / spacing, 2 * c2 / spacing**2
+    c = np.empty((size, 3))
+    for rows in _blocks(size, width):
+        start = np.clip(np.arange(size)[rows] - half, 0, size - width)
+        tau = (windows(time, width)[start] - time[rows, None]) / spacing
+        values = windows(signal, width)[start] - signal[rows, None]
+        moments = [np.ones_like(tau), tau, tau * tau]
+        normal = np.stack([[np.sum(p * q, axis=1) for q in moments] for p in moments])
+        right = np.stack([np.sum(p * values, axis=1) for p in moments])
+        c[rows] = np.linalg.solve(normal.transpose(2, 0, 1), right.T[..., None])[..., 0]
+    return signal + c[:, 0], c[:, 1] / spacing, 2 * c[:, 2] / spacing**2
+
+
+def _blocks(size: int, width: int) -> Iterator[slice]:
+    step = max(1, _CELLS // width)
+    return (slice(begin, min(begin + step, size)) for begin in range(0, size, step))
 
 
 def whole_clock(time: Floats) -> Floats:
@@ -84,12 +94,13 @@ def _smooth_uniform(signal: Floats, half: int, spacing: float) -> tuple[Floats, 
     tau = np.arange(-half, half + 1.0)
     fit = np.linalg.pinv(np.column_stack([np.ones_like(tau), tau, tau**2])).T  # (width, 3)
     windows = np.lib.stride_tricks.sliding_window_view(signal, tau.size)
-    middle = windows[:, half : half + 1]
-    after, before = windows[:, half + 1 :] - middle, windows[:, half - 1 :: -1] - middle
     c = np.empty((signal.size, 3))
-    inside = slice(half, signal.size - half)
-    c[inside, 0::2] = (after + before) @ fit[half + 1 :, 0::2]
-    c[inside, 1] = (after - before) @ fit[half + 1 :, 1]
+    inside = c[half : signal.size - half]
+    for rows in _blocks(len(windows), tau.size):
+        middle = windows[rows, half : half + 1]
+        after, before = windows[rows, half + 1 :] - middle, windows[rows, half - 1 :: -1] - middle
+        inside[rows, 0::2] = (after + before) @ fit[half + 1 :, 0::2]
+        inside[rows, 1] = (after - before) @ fit[half + 1 :, 1]
     for window, away in ((windows[0], slice(0, half)), (windows[-1], slice(signal.size - half, None))):
         d0, d1, d2 = ((window - signal[away, None]) @ fit).T  # seen away from the middle of the window
         at = tau[:half] if away.start == 0 else tau[half + 1 :]
@@ -98,9 +109,18 @@ def _smooth_uniform(signal: Floats, half: int, spacing: float) -> tuple[Floats, 
 
 
 def _characteristic_period(time: Floats, signal: Floats) -> float:
+    spacing = float(time[-1] - time[0]) / (time.size - 1)
+
+    def period(step: int) -> float:
+        t, s = time[::step], signal[::step]
+        slope = np.diff(s) / np.diff(t)
+        moving = np.sqrt(np.mean(slope**2))
+        return float(2 * np.pi * np.std(s) / moving) if moving > 0 else 0.0
+
     # Slopes over about 1/200 of the record keep sample noise out of the estimate.
     step = max(1, time.size // 2000)
-    t, s = time[::step], signal[::step]
-    slope = np.diff(s) / np.diff(t)
-    moving = np.sqrt(np.mean(slope**2))
-    return float(2 * np.pi * np.std(s) / moving) if moving > 0 else 0.0
+    # Of hundreds of cycles that is no part of one: seen from single samples up, noise ends before the motion does.
+    fine = 1
+    while fine < step and fine * spacing < period(fine) / 40:
+        fine *= 2
+    return period(fine if step * spacing > period(fine) / 4 else step)
