@@ -57,6 +57,41 @@ class InputError(ValueError):
         return printable(f"{text} [{self.code}]")
 
 
+def require(value: object, kind: type | tuple[type, ...], wanted: str, mend: str = "") -> None:
+    """Refuse an argument of another kind at the door of a public function.
+
+    Raises
+    ------
+    InputError
+        E_ARGUMENT, naming what came and what is wanted.
+    """
+    if not isinstance(value, kind):
+        raise InputError(f"a {type(value).__name__} in place of {wanted}", mend=mend, code="E_ARGUMENT")
+
+
+def numbers(*values: object) -> tuple[float, ...]:
+    """Values of one sample as floats.
+
+    Raises
+    ------
+    InputError
+        E_ARGUMENT if one is no number.
+    """
+    try:
+        return tuple(map(float, values))  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError) as error:
+        what = f"a sample of {', '.join(map(shown, values))}"
+        raise InputError(what, mend="give a number for each", code="E_ARGUMENT") from error
+
+
+def shown(value: object) -> str:
+    """Whatever a user gave, in a few characters; a number of thousands of digits has no text."""
+    try:
+        return f"{value!r:.60}"
+    except ValueError:
+        return "a number of thousands of digits"
+
+
 class CombinedError(InputError):
     """Several things wrong with one input; its code is that of the first.
 

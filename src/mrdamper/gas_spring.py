@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mrdamper.data import Floats
-from mrdamper.errors import ParameterError
+from mrdamper.errors import ParameterError, shown
 
 Direction = Literal["compression", "extension"]
 AIR = 1.4  # polytropic exponent of a fast change of air or nitrogen
@@ -110,5 +110,5 @@ class GasSpring:
 
 
 def _require_positive(name: str, value: object) -> None:
-    if not (isinstance(value, numbers.Real) and not isinstance(value, bool) and 0 < float(value) < math.inf):
-        raise ParameterError(f"gas {name} is {value!r:.60}", mend="give a positive SI value")
+    if not (isinstance(value, numbers.Real) and not isinstance(value, bool) and 0 < value < math.inf):  # type: ignore[operator]
+        raise ParameterError(f"gas {name} is {shown(value)}", mend="give a positive SI value")

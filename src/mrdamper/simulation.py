@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from mrdamper.data import Condition, Floats
-from mrdamper.errors import ExcitationError
+from mrdamper.errors import ExcitationError, require
 from mrdamper.motion import Excitation, sine
 from mrdamper.parameters import ParameterInfo
 
@@ -16,6 +16,7 @@ _CLOSURE = 1e-9  # relative gap at which a loop counts as closed
 _MOST_CYCLES = 512
 
 
+@runtime_checkable
 class ForceLaw(Protocol):
     """What a `Model` is to those that only ask for its force."""
 
@@ -82,6 +83,8 @@ def simulate(model: ForceLaw, excitation: Excitation) -> Response:
     >>> round(float(response.force.max()))  # 300 N + 1000 N s/m · 0.0628 m/s
     363
     """
+    require(excitation, Excitation, "a motion", "mrdamper.motion makes them: sine, sweep, triangle, random_motion")
+    require(model, ForceLaw, "a model")
     state = model.state(excitation)
     return Response(excitation, model.force(excitation, state), state)
 

@@ -19,7 +19,7 @@ from mrdamper.dampers.base import Damper, Envelope
 from mrdamper.dampers.causal import trace
 from mrdamper.dampers.joint import damper_of
 from mrdamper.data import Floats
-from mrdamper.errors import ExcitationError, ParameterError, UnknownNameError
+from mrdamper.errors import ExcitationError, ParameterError, UnknownNameError, numbers
 from mrdamper.models import Model
 from mrdamper.tracing import Program, Tape, program
 from mrdamper.tracing.python import python_functions, python_source
@@ -207,7 +207,7 @@ class Stepper:
         ExcitationError
             If a value is not finite, dt is not positive, or the model has no answer there.
         """
-        inputs = (float(displacement), float(velocity), float(acceleration), float(current), float(dt))
+        inputs = numbers(displacement, velocity, acceleration, current, dt)
         self._check(inputs)
         try:
             status, (force, flags), memory = self._advance(self._given, self._derived, self._memory, inputs)
@@ -223,8 +223,9 @@ class Stepper:
         return force
 
     def _driven(self, drive: str, value: float, current: float, dt: float) -> float:
-        inputs = (float(value), float(dt))
-        self._check((*inputs, float(current)), dt=inputs[1])
+        given = numbers(value, dt, current)
+        self._check(given, dt=given[1])
+        inputs = given[:2]
         _, (x, v, a), memory = self._drives[drive]((), (), self._drive_memory[drive], inputs)
         force = self.step_motion(x, v, a, current, dt)
         self._drive_memory[drive] = memory

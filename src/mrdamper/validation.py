@@ -12,7 +12,7 @@ from mrdamper.dampers.bands import band
 from mrdamper.dampers.base import Damper, Prediction
 from mrdamper.dampers.sessions import KNOWN, UNKNOWN, Expected, Reading, Sessions, When
 from mrdamper.data import Condition, Run, Shown, same_condition
-from mrdamper.errors import InputError, RunError
+from mrdamper.errors import InputError, RunError, require
 from mrdamper.metrics import Scores, dissipated_power, peak_force, score
 
 
@@ -134,8 +134,11 @@ def validate(
     >>> bool(scores.median("nrmse_pp") < 0.2)  # RMS error over the peak-to-peak force
     True
     """
+    require(damper, Damper, "a damper", "load_model(file) gives one")
+    require(runs, Iterable, "runs", "give a dataset or a list of runs")
     scored, refused = [], {}
     for run in runs:
+        require(run, Run, "a run")
         try:
             scored.append(score_run(damper, run, known))
         except InputError as error:

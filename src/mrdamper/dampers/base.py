@@ -19,7 +19,7 @@ from mrdamper.dampers.causal import SLACK, causal_force
 from mrdamper.dampers.certainty import Certainty, OwnNumber, table
 from mrdamper.dampers.coil import Coil
 from mrdamper.data import Condition, Floats, Run, Shown
-from mrdamper.errors import InputError
+from mrdamper.errors import InputError, require
 from mrdamper.functions.forms import ParameterFunction
 from mrdamper.models import Model
 from mrdamper.motion import Excitation, equivalent_sine, measured_motion
@@ -347,6 +347,7 @@ class Damper(Shown):
 
     def predict(self, condition: Condition) -> Prediction:
         """Steady loop at a condition, with its flags."""
+        require(condition, Condition, "a condition", "give Condition(current_A=…, frequency_Hz=…, amplitude_m=…)")
         response = self.loop(condition)
         return Prediction(response.excitation, response.force, condition, self.envelope.flags(condition), steady=True)
 
@@ -357,6 +358,7 @@ class Damper(Shown):
         of one current. Otherwise they follow the sine that the motion has resembled so far: an
         approximation, flagged as such, and the force that a stream of the damper gives.
         """
+        require(run, Run, "a run")
         found = equivalent_sine(run)
         motion = measured_motion(run).about(found.centre)
         if found.is_sine and not run.current_changes:

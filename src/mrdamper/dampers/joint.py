@@ -24,7 +24,7 @@ from mrdamper.dampers.certainty import Certainty, OwnNumber
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.strung import Part, Table, beside
 from mrdamper.data import Condition, Floats, Run
-from mrdamper.errors import IdentificationError, ParameterError
+from mrdamper.errors import IdentificationError, ParameterError, require
 from mrdamper.models import Model, Scale, SearchAxis, model_type
 from mrdamper.optimizers.ending import Ending
 from mrdamper.optimizers.levenberg_marquardt import Minimum, least_squares
@@ -141,6 +141,7 @@ def damper_of(given: Damper | Model) -> Damper:
     """A damper as it is; a bare model as a damper of no rig, tested nowhere."""
     if isinstance(given, Model):
         return JointDamper("", given, (), UNTESTED)
+    require(given, Damper, "a damper or a model", "load_model(file) gives one")
     return given
 
 

@@ -8,7 +8,7 @@ code further up trusts it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
 from numbers import Real
@@ -20,7 +20,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from mrdamper.data.pieces import pieces, taken
 from mrdamper.data.shown import Shown
-from mrdamper.errors import ConditionError, NonFiniteError, RunError, TimeOrderError, UnknownNameError, printable
+from mrdamper.errors import (
+    ConditionError,
+    NonFiniteError,
+    RunError,
+    TimeOrderError,
+    UnknownNameError,
+    printable,
+    require,
+    shown,
+)
 
 Floats = NDArray[np.float64]
 T = TypeVar("T")
@@ -28,6 +37,9 @@ Split = Literal["train", "validate"]
 _LONGEST_NAME = 255
 _LONGEST = 2.0  # amplitude of a damper [m]; more is a slip of the unit
 _SAME = 0.03  # frequencies and amplitudes this close are one condition of the test matrix
+
+
+_NO_NUMBERS = (type(None), str, bytes, complex, list, tuple, dict, set)
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -65,10 +77,11 @@ class Condition:
         # A traced model is asked at symbols in place of numbers; these have no size.
         given = (("current", self.current_A, -math.inf), ("frequency", self.frequency_Hz, 0.0))
         for name, value, least in (*given, ("amplitude", self.amplitude_m, 0.0)):
-            if isinstance(value, Real) and not (least < value < math.inf or value == 0.0):
-                raise ConditionError(f"{name} is {value}", mend="give a number, zero or more")
+            no_number = isinstance(value, _NO_NUMBERS) or (isinstance(value, np.ndarray) and value.ndim > 0)
+            if no_number or (isinstance(value, Real) and not (least < value < math.inf or value == 0.0)):
+                raise ConditionError(f"{name} is {shown(value)}", mend="give a number, zero or more")
         if isinstance(self.amplitude_m, Real) and self.amplitude_m > _LONGEST:
-            raise ConditionError(f"amplitude is {self.amplitude_m} m", mend="give metres: 10 mm are 0.01")
+            raise ConditionError(f"amplitude is {shown(self.amplitude_m)} m", mend="give metres: 10 mm are 0.01")
 
     @property
     def peak_velocity(self) -> float:
@@ -359,7 +372,7 @@ def require_name(what: str, name: object) -> None:
     """
     if not isinstance(name, str) or len(name) > _LONGEST_NAME or printable(name) != name:
         raise RunError(
-            f"the {what} is {name!r:.60}",
+            f"the {what} is {shown(name)}",
             mend=f"name it in printable text on one line, at most {_LONGEST_NAME} characters",
         )
 
@@ -474,7 +487,10 @@ class Dataset(Shown):
     name: str = "dataset"
 
     def __post_init__(self) -> None:
+        require(self.runs, Iterable, "runs", "give Dataset([run, ...], name)")
         object.__setattr__(self, "runs", tuple(self.runs))
+        for run in self.runs:
+            require(run, Run, "a run of a dataset")
         if not self.runs:
             raise RunError("no runs", where=f"dataset {self.name}", mend="give at least one")
         seen: set[str] = set()
@@ -512,6 +528,7 @@ class Dataset(Shown):
         return len(self.runs)
 
     def __getitem__(self, run_id: str) -> Run:
+        require(run_id, str, "the name of a run")
         for run in self.runs:
             if run.id == run_id:
                 return run
@@ -524,6 +541,7 @@ class Dataset(Shown):
 
     def rig(self, name: str) -> Dataset:
         """The runs of one rig."""
+        require(name, str, "the name of a rig")
         if name not in self.rigs:
             raise UnknownNameError.of("rig", name, self.rigs)
         return self.only([run for run in self.runs if run.rig == name], name=name or self.name)

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from mrdamper.data.temporary import temporary_folder
-from mrdamper.errors import OutputError, resource_error
+from mrdamper.errors import OutputError, resource_error, shown
 
 MADE = "made.json"  # which files of a folder are a result's, and what differs from run to run: times
 _FEW = 200  # foreign files of a folder that are carried over into its successor
@@ -38,7 +38,7 @@ def path_of(path: object) -> Path:
     """
     if isinstance(path, str | os.PathLike) and "\0" not in os.fspath(path):
         return Path(path)
-    raise OutputError(f"{path!r:.60} is no path", mend="give the name of a file or folder", code="E_PATH")
+    raise OutputError(f"{shown(path)} is no path", mend="give the name of a file or folder", code="E_PATH")
 
 
 @contextmanager

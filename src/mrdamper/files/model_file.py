@@ -21,7 +21,7 @@ from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.coil import Coil, Driver
 from mrdamper.dampers.sessions import Sessions
 from mrdamper.data import require_name
-from mrdamper.errors import InputError, ModelFileError
+from mrdamper.errors import InputError, ModelFileError, require
 from mrdamper.files.atomic import path_of, write_file
 from mrdamper.files.strict_json import parse_json
 
@@ -146,12 +146,13 @@ def save_model(damper: Damper, path: str | Path) -> None:
     >>> load_model(path).title
     'modified Bingham'
     """
-    with write_file(path) as target:
+    with write_file(path_of(path)) as target:
         target.write_text(dump_model(damper), encoding="utf-8")
 
 
 def dump_model(damper: Damper) -> str:
     """The JSON document of a damper."""
+    require(damper, Damper, "a damper")
     document = _Document(
         format=FORMAT,
         version=f"{MAJOR}.{MINOR}",

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from mrdamper.data import Run
-from mrdamper.errors import IdentificationError
+from mrdamper.errors import IdentificationError, require
 from mrdamper.gas_spring import GasSpring
 from mrdamper.identification.certainty import certainty_of_run
 from mrdamper.identification.methods import all_methods, method_named
@@ -82,6 +82,8 @@ def identify(
     if not isinstance(run, Run):
         mend = 'identify one run, identify(dataset["ID"]); run_study(dataset) identifies them all'
         raise IdentificationError(f"a {type(run).__name__} in place of a run", mend=mend)
+    require(model, (str, type), "a model", "give its name, `mrdamper models` lists them, or its class")
+    require(method, (str, Method), "a method", "give its name or its settings")
     refuse_clipped(run, clipped)
     chosen_model = model_type(model) if isinstance(model, str) else model
     chosen_method = method_named(method) if isinstance(method, str) else method

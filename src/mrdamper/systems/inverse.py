@@ -19,7 +19,7 @@ import numpy as np
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.coil import Coil, field_step
 from mrdamper.data import Floats
-from mrdamper.errors import ParameterError
+from mrdamper.errors import ParameterError, numbers, require
 from mrdamper.streaming import stream
 from mrdamper.tracing import Program, Tape, program
 from mrdamper.tracing.graft import Graft
@@ -184,10 +184,13 @@ class Inverse:
         ParameterError
             If a value is not finite, dt is not positive, or the damper has no answer there.
         """
-        sample = (float(displacement), float(velocity), float(acceleration), float(wanted), float(dt))
-        if not (all(map(math.isfinite, sample)) and dt > 0):
+        sample = numbers(displacement, velocity, acceleration, wanted, dt)
+        if not (all(map(math.isfinite, sample)) and sample[-1] > 0):
             raise ParameterError(f"sample {sample}", where=self.title, mend="finite numbers, a positive time step")
-        status, found, memory = self._advance((), self._derived, self._memory, sample)
+        try:
+            status, found, memory = self._advance((), self._derived, self._memory, sample)
+        except (ValueError, ArithmeticError):
+            status, found, memory = 1, (), self._memory
         if status:
             raise ParameterError(f"no force at {sample}", where=self.title, mend="come nearer to the last sample")
         self._memory = memory
@@ -240,6 +243,7 @@ def invert(damper: Damper, highest: float | None = None) -> Inverse:
     >>> 0.0 < asked[-1].current < 0.75  # [A]
     True
     """
+    require(damper, Damper, "a damper", "load_model(file) gives one")
     width = check_monotone(damper, highest)
     tape = Tape()
     names = ("displacement", "velocity", "acceleration", "wanted", "dt")

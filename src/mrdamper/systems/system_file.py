@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Floats
 from mrdamper.errors import StructureError, UnknownNameError
+from mrdamper.files.atomic import path_of
 from mrdamper.files.model_file import load_model
 from mrdamper.rig_files.strict_toml import load_toml
 from mrdamper.systems.structure import Link, System, building, half_car, quarter_car, shear_building
@@ -144,7 +145,8 @@ def load_system(name: str | Path) -> SystemFile:
     ['mr']
     """
     known = bundled_systems()
-    path = known.get(str(name), Path(name))
+    given = path_of(name)
+    path = known.get(str(name), given)
     if not path.is_file():
         if path.suffix == ".toml":
             raise StructureError("no such file", where=str(path), mend="give a system TOML file")

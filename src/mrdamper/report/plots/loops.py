@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from mrdamper.dampers.base import Prediction
 from mrdamper.data import Floats, Run
-from mrdamper.errors import UnknownNameError
+from mrdamper.errors import UnknownNameError, require
 from mrdamper.motion import measured_motion
 from mrdamper.report.plots.style import KN, MM, house_style, label
 
@@ -49,6 +49,8 @@ def plot_loop(
     >>> axes.get_xlabel()
     'Velocity (mm/s)'
     """
+    require(what, (Run, Prediction), "a run or a prediction")
+    require(over, str, "a way to draw a loop")
     if over not in _OVER:
         raise UnknownNameError.of("way to draw a loop", over, _OVER)
     steady = what.steady() if isinstance(what, Run) else what
@@ -79,6 +81,7 @@ def plot_force(what: Run | Prediction, axes: Axes | None = None, **line: Any) ->
     >>> plot_force(load_dataset()["utf_5mm4Hz_1A"]).get_ylabel()
     'Force (kN)'
     """
+    require(what, (Run, Prediction), "a run or a prediction")
     time = what.time if isinstance(what, Run) else what.motion.time
     return _drawn(axes, time, what.force, "Time (s)", line)
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from mrdamper.discovery import named, subclasses_in
 from mrdamper.errors import RecordError, UnknownNameError
+from mrdamper.files.atomic import path_of
 from mrdamper.parameters import parameters_of, with_values
 from mrdamper.systems.inputs.base import Input
 
@@ -63,6 +64,7 @@ def load_input(name: str | Path, values: Mapping[str, float] | None = None, time
     """
     from mrdamper.systems.inputs.record import load_record
 
+    path_of(name)
     made = made_inputs()
     if str(name) in made:
         if time_scale != 1.0:
