@@ -16,7 +16,7 @@ import numpy as np
 
 from mrdamper.data import Condition, Dataset, Floats, Run
 from mrdamper.data.pieces import pieces, release
-from mrdamper.errors import ColumnError, DatasetError, require
+from mrdamper.errors import ColumnError, DatasetError
 from mrdamper.files.atomic import path_of, write_file, write_folder
 from mrdamper.files.encoding import csv_text, csv_value
 from mrdamper.files.samples import OPTIONAL, REQUIRED, SAMPLE_FILES, Channels, missing_column, read_samples
@@ -93,7 +93,7 @@ def save_dataset(
     >>> len(load_dataset(folder))
     34
     """
-    require(dataset, Dataset, "a dataset")
+    dataset = dataset if isinstance(dataset, Dataset) else Dataset(dataset)
     with write_folder(folder, replace=replace) as target:
         (target / "runs.csv").write_text(csv_text([_row(run) for run in dataset]), encoding="utf-8")
         _write_samples(dataset, target)
