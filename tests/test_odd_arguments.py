@@ -42,6 +42,7 @@ def doors():
             lambda o: stepped.step_motion(0.0, o, 0.0, 0.5, 1e-3),
         ],
         "invert": [mrdamper.invert, lambda o: inverse.step(o, 0.01, 0.0, 200.0, 1e-3)],
+        "a model": [lambda o: Bingham(c=o, fy=300.0)],
         "simulate": [lambda o: mrdamper.simulate(o, motion), lambda o: mrdamper.simulate(Bingham(c=1e3, fy=300.0), o)],
         "simulate_system": [
             lambda o: mrdamper.simulate_system(o, quake, {}), lambda o: mrdamper.simulate_system(frame, o, {}),

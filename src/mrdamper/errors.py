@@ -70,7 +70,7 @@ def require(value: object, kind: type | tuple[type, ...], wanted: str, mend: str
 
 
 def numbers(*values: object) -> tuple[float, ...]:
-    """Values of one sample as floats.
+    """Values as floats.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def numbers(*values: object) -> tuple[float, ...]:
     try:
         return tuple(map(float, values))  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError) as error:
-        what = f"a sample of {', '.join(map(shown, values))}"
+        what = f"not all numbers: {', '.join(map(shown, values))}"
         raise InputError(what, mend="give a number for each", code="E_ARGUMENT") from error
 
 

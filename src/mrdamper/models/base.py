@@ -18,7 +18,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.errors import ParameterError
+from mrdamper.errors import ParameterError, shown
 from mrdamper.hysteresis import Shape
 from mrdamper.motion import Excitation
 from mrdamper.parameters import ParameterInfo, is_number, parameters_of
@@ -130,8 +130,9 @@ class Model(ABC):
             low, high = info.bounds
             if type(value) is float and low <= value <= high and -math.inf < value < math.inf:
                 continue  # searches make models by the thousand
-            if not is_number(value):
-                raise ParameterError(f"{info.name} = {value!r:.60}", where=self.title, mend="give a number")
+            no_float = isinstance(value, int) and value.bit_length() > 1023
+            if no_float or not is_number(value):
+                raise ParameterError(f"{info.name} = {shown(value)}", where=self.title, mend="give a number")
             if not (low <= value <= high and -math.inf < value < math.inf):
                 raise ParameterError(
                     f"{info.name} = {value:g} {info.unit}",
