@@ -246,9 +246,9 @@ def test_scales_and_ranges_are_those_of_the_runs(runs, problem):
 
 
 def test_starts_are_tried_on_six_runs_and_a_single_start_is_taken_as_it_is(runs, problem, monkeypatch):
-    assert len(problem._few.parts) == 6
+    assert len(problem._few.strung.parts) == 6
     few = problem.with_parts(problem.parts[:4])
-    assert len(few._few.parts) == 4
+    assert len(few._few.strung.parts) == 4
     monkeypatch.setattr(JointProblem, "_downhill", lambda self, u: pytest.fail("one start needs no trial"))
     held = problem.with_free((), {"d": 3e-4, "cb": 3e4})
     (start,) = held._promising
@@ -265,10 +265,10 @@ def test_the_third_valley_is_not_looked_into(problem, monkeypatch):
 
 def test_a_linearisation_is_that_of_its_own_fit_and_made_once(problem, fit):
     other = problem.fit(start=fit.point + 1e-3, rounds=1, most_steps=1)
-    residual, jacobian, owner = problem.linearised(fit)
+    residual, jacobian, table = problem.linearised(fit)
     assert problem.linearised(fit)[0] is residual
     assert problem.linearised(other)[0] is not residual
-    errors = np.sqrt(np.bincount(owner, residual**2))
+    errors = np.sqrt(np.bincount(table.owner, residual**2))
     assert errors / errors[0] == pytest.approx(np.sqrt(fit.nrmse_pp / fit.nrmse_pp[0]), rel=0.05)  # weights: 1 / √error
     assert jacobian.shape == (residual.size, len(problem.axes) + len(problem.linear))
     assert fit.seconds < 600
@@ -295,7 +295,7 @@ def test_errors_of_left_out_runs_are_those_of_a_prediction(runs, problem, fit):
         # On the samples that enter, a few hundred of the window.
         assert error == pytest.approx(np.sqrt(np.mean(missed**2)) / np.ptp(run.force[run.in_window]), rel=0.1)
     assert fit.error == pytest.approx(sum(fit.nrmse_pp) / len(runs))
-    assert problem.table(fit.nrmse_pp).solve(fit.point).nrmse_pp == pytest.approx(fit.nrmse_pp, rel=1e-6)
+    assert problem.linearised(fit)[2].solve(fit.point).nrmse_pp == pytest.approx(fit.nrmse_pp, rel=1e-6)
 
 
 def test_it_predicts_motions_it_was_never_shown(fit):

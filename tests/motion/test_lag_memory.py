@@ -6,7 +6,7 @@ import numpy as np
 
 from mrdamper.motion import lag
 from mrdamper.motion.lag import first_order_lag
-from mrdamper.motion.path import last_along
+from mrdamper.motion.path import lately_along
 
 
 def test_another_signal_or_constant_along_known_times_is_lagged_as_along_new_ones():
@@ -22,23 +22,25 @@ def test_another_signal_or_constant_along_known_times_is_lagged_as_along_new_one
 def test_long_records_are_lagged_alike(monkeypatch):
     time, signal = np.arange(2000) / 500, np.sin(np.arange(2000) / 7)
     short = first_order_lag(time, signal, 0.01)
-    monkeypatch.setattr(lag, "_LONG", 1000)
+    monkeypatch.setattr(lag, "LONG", 1000)
     np.testing.assert_array_equal(first_order_lag(time.copy(), signal, 0.01), short)
 
 
-def test_only_the_last_is_remembered_and_nothing_outlives_what_it_belongs_to():
+def test_only_the_last_two_are_remembered_and_nothing_outlives_what_it_belongs_to():
     made = []
 
-    @last_along
+    @lately_along
     def scaled(time, factor):
         made.append(factor)
         return factor * time
 
     time = np.arange(4.0)
     assert scaled(time, 2.0) is scaled(time, 2.0)
-    scaled(time, 3.0)
+    scaled(time, 3.0)  # a search moves to and fro
     scaled(time, 2.0)
-    assert made == [2.0, 3.0, 2.0]
+    scaled(time, 4.0)
+    scaled(time, 3.0)
+    assert made == [2.0, 3.0, 4.0, 3.0]
     del time
     gc.collect()
     (known,) = (cell.cell_contents for cell in scaled.__closure__ if isinstance(cell.cell_contents, dict))

@@ -285,8 +285,8 @@ class Evidence:
     @classmethod
     def of(cls, problem: JointProblem, fit: JointFit, by: Grouping | None = None) -> Evidence:
         """Linearise a problem where a fit of it ended; by default conditions are left out."""
-        table = problem.table(fit.nrmse_pp)
-        residual, jacobian, owner = table.linearise(fit.point, fit.damper.model)
+        residual, jacobian, table = problem.linearised(fit)
+        owner = table.owner
         names = [*(a.name for a in problem.axes), *(i.name for i in problem.linear)]
         values = np.array([*fit.point, *(getattr(fit.damper.model, i.name) for i in problem.linear)])
         neutral = values.copy()

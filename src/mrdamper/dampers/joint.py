@@ -17,7 +17,6 @@ from itertools import product
 from typing import ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mrdamper.dampers.base import UNTESTED, Damper, Envelope, Saved
 from mrdamper.dampers.certainty import Certainty, OwnNumber
@@ -361,13 +360,14 @@ class JointProblem:
             Relative gain of a step at which the search ends; below the default its curvature is learnt too.
         """
         begin = time.perf_counter()
-        table = Table(self, self.parts if rows is None else [self.parts[i] for i in rows])
-        point = self.start if start is None else start
-        return self._search(table, point, [table.slopes] * rounds, most_steps, settled, begin)
+        parts = self.parts if rows is None else [self.parts[i] for i in rows]
+        table, point = Table(self, parts), self.start if start is None else start
+        return self._search(table, parts, point, [table.slopes] * rounds, most_steps, settled, begin)
 
     def _search(
         self,
         table: Table,
+        parts: Sequence[Part],
         point: Floats,
         rounds: Sequence[Callable[[Floats], Floats]],
         most_steps: int,
@@ -388,7 +388,7 @@ class JointProblem:
             table.weigh(table.solve(point).nrmse_pp)
         solved = table.solve(point)
         return JointFit(
-            self._damper(solved.model, point, table.parts),
+            self._damper(solved.model, point, parts),
             solved.nrmse_pp,
             (*self._at_bounds(point), *solved.held),
             point,
@@ -415,9 +415,9 @@ class JointProblem:
             Relative gain of a step at which the search ends.
         """
         begin, rows = time.perf_counter(), sorted(rows)
-        _, jacobian, owner = self.linearised(fit)
-        jacobian = jacobian[np.isin(owner, rows)]
-        table = Table(self, [self.parts[i] for i in rows])
+        _, jacobian, whole = self.linearised(fit)
+        jacobian = jacobian[np.isin(whole.owner, rows)]
+        table = whole.only(rows)
         table.weigh(fit.nrmse_pp[rows])
         known = table.weights
 
@@ -426,10 +426,12 @@ class JointProblem:
             own, linear = np.split(weighted, [len(self.axes)], axis=1)
             return beside(own, linear)
 
-        return self._search(table, fit.point, (known_slopes, known_slopes, table.slopes), _AGAIN_STEPS, settled, begin)
+        parts = [self.parts[i] for i in rows]
+        rounds = (known_slopes, known_slopes, table.slopes)
+        return self._search(table, parts, fit.point, rounds, _AGAIN_STEPS, settled, begin)
 
-    def linearised(self, fit: JointFit) -> tuple[Floats, Floats, NDArray[np.intp]]:
-        """Residual at a fit, its derivatives, and whose rows they are.
+    def linearised(self, fit: JointFit) -> tuple[Floats, Floats, Table]:
+        """Residual at a fit, its derivatives, and the table they are of; remembered for the last fit.
 
         Returns
         -------
@@ -437,20 +439,16 @@ class JointProblem:
             Weighted: its squares sum to the fit's cost.
         jacobian : (N, D + L) array
             By the search axes, then the linear parameters.
-        owner : (N,) int array
-            Index of the run of each row.
+        table : Table
+            All runs, weighted by the errors the fit left.
         """
         if self._linearisation is None or self._linearisation[0] is not fit:
-            self._linearisation = (fit, *self.table(fit.nrmse_pp).linearise(fit.point, fit.damper.model))
+            table = Table(self, self.parts)
+            table.weigh(fit.nrmse_pp)
+            self._linearisation = (fit, *table.linearise(fit.point, fit.damper.model), table)
         return self._linearisation[1:]
 
-    def table(self, errors: Floats) -> Table:
-        """All runs, weighted as after a fit that left these errors."""
-        table = Table(self, self.parts)
-        table.weigh(errors)
-        return table
-
-    _linearisation: tuple[JointFit, Floats, Floats, NDArray[np.intp]] | None = None
+    _linearisation: tuple[JointFit, Floats, Floats, Table] | None = None
 
     def _damper(self, model: Model, point: Floats, parts: Sequence[Part]) -> JointDamper:
         about = {"runs": str(len(parts)), "fit": "joint, all runs at once"}

@@ -7,8 +7,8 @@ follows the next, and one long array is followed faster than many short ones.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -179,14 +179,34 @@ class Solved:
     columns: Floats
 
 
+class Strung:
+    """Motions of some runs, one after the other in one motion."""
+
+    def __init__(self, parts: Sequence[Part]):
+        self.parts = parts
+        self.begins = np.cumsum([0, *(len(part.motion) for part in parts)])[:-1]
+        self.measured = string(part.motion for part in parts)
+        self.measured.path  # noqa: B018  cut into strokes once, for every current that is laid along
+        self._felt: tuple[Coil | None, Excitation] = None, self.measured.with_current(np.abs(self.measured.current))
+
+    def felt(self, coil: Coil | None) -> Excitation:
+        """The motion with the current that the field feels; remembered while the coil stays."""
+        if self._felt[0] != coil:
+            current = np.abs(self.measured.current)
+            for part, begin in zip(self.parts, self.begins, strict=True):
+                if coil is not None and part.changes:
+                    current[begin : begin + len(part.motion)] = coil.along(part.motion.time, part.motion.current)
+            self._felt = coil, self.measured.with_current(current)
+        return self._felt[1]
+
+
 class Table:
-    """Some runs strung together, with the weight of each."""
+    """Samples of some runs that were strung together, with the weight of each run."""
 
     def __init__(self, problem: JointProblem, parts: Sequence[Part]):
-        self.problem, self.parts = problem, parts
-        self.motion = string(part.motion for part in parts)
-        self.offsets = np.cumsum([0, *(len(part.motion) for part in parts)])
-        self.picked = np.concatenate([part.picked + at for part, at in zip(parts, self.offsets[:-1], strict=True)])
+        self.problem, self.strung = problem, Strung(parts)
+        begins = self.strung.begins
+        self.picked = np.concatenate([part.picked + at for part, at in zip(parts, begins, strict=True)])
         self.target = np.concatenate([part.target for part in parts])
         self.owner = np.repeat(np.arange(len(parts)), [part.target.size for part in parts])
         # Multiplies residuals so that their squares sum to each run's nrmse_pp².
@@ -194,47 +214,65 @@ class Table:
         self.unit = np.sqrt(self.share) / np.repeat([part.scale for part in parts], [p.target.size for p in parts])
         self.information = np.sqrt([part.information for part in parts])
         self.weights = self.information
-        self.solved: tuple[Floats, Solved | None] = np.zeros(0), None  # the last point
-        self.felt(problem.coil)
+        self._seen: tuple[Excitation, Excitation] | None = None
+        self._laid: tuple[Floats, Model, Floats, Floats] | None = None
+        self._solved: tuple[Floats, Solved] | None = None
+
+    def only(self, runs: Sequence[int]) -> Table:
+        """The samples of some of the runs, in order; the others are followed all the same, and not looked at."""
+        kept, table = np.isin(self.owner, runs), copy(self)
+        for name in ("picked", "target", "share", "unit"):
+            setattr(table, name, getattr(self, name)[kept])
+        table.owner = np.searchsorted(runs, self.owner[kept])
+        table.information = self.information[list(runs)]
+        table.weights, table._seen, table._solved = table.information, None, None
+        if self._laid is not None:
+            point, bare, base, columns = self._laid
+            table._laid = point, bare, base[kept], columns[kept]
+        return table
 
     def weigh(self, errors: Floats) -> None:
         """Robust weights: the sum of the errors counts, not of their squares; long records by their information."""
         self.weights = self.information * robust_weights(errors, _BEST)
-        self.solved = np.zeros(0), None
+        self._solved = None
 
-    def felt(self, coil: Coil | None) -> None:
-        """Lay the current that the field feels along the motion, and remember it."""
-        if getattr(self, "seen", None) is not None and coil == self.coil:
-            return
-        self.coil = coil
-        current = np.abs(self.motion_current)
-        if coil is not None:
-            for part, begin, end in zip(self.parts, self.offsets[:-1], self.offsets[1:], strict=True):
-                if part.changes:
-                    current[begin:end] = coil.along(part.motion.time, part.motion.current)
-        self.motion = self.motion.with_current(current)
-        self.seen = self.motion.part(self.picked)
+    @property
+    def factor(self) -> Floats:
+        """(N,) what residuals [N] are multiplied by."""
+        return self.weights[self.owner] * self.unit
 
-    @cached_property
-    def motion_current(self) -> Floats:
-        """The measured current along the strung motion [A]."""
-        return np.concatenate([part.motion.current for part in self.parts])
+    def _followed(self, model: Model, point: Floats) -> tuple[Excitation, Floats]:
+        """Motion and state of a model at the samples."""
+        motion = self.strung.felt(self.problem.coil_at(point))
+        if self._seen is None or self._seen[0] is not motion:
+            self._seen = motion, motion.part(self.picked)
+        return self._seen[1], model.state(motion)[self.picked]
+
+    def laid(self, point: Floats) -> tuple[Model, Floats, Floats]:
+        """Model at a point without its linear parameters, its force [N], and what one unit of each adds.
+
+        Remembered for the last point: weights do not touch it.
+        """
+        if self._laid is None or not np.array_equal(self._laid[0], point):
+            bare = self.problem.bare(point)
+            seen, state = self._followed(bare, point)
+            self._laid = point, bare, *linear_table(bare, self.problem.linear, seen, state)
+        return self._laid[1:]
 
     def solve(self, point: Floats) -> Solved:
-        """Linear parameters of least weighted squares at a point of the search axes."""
-        linear = self.problem.linear
-        bare = self.problem.bare(point)
-        self.felt(self.problem.coil_at(point))
-        base, columns = linear_table(bare, linear, self.seen, bare.state(self.motion)[self.picked])
-        factor = self.weights[self.owner] * self.unit
+        """Linear parameters of least weighted squares at a point of the search axes; remembered for the last."""
+        if self._solved is not None and np.array_equal(self._solved[0], point):
+            return self._solved[1]
+        linear, factor = self.problem.linear, self.factor
+        bare, base, columns = self.laid(point)
         columns, right = columns * factor[:, None], (self.target - base) * factor
         solution, held = solve_bounded(columns, right, *bounds_of(linear))
         residual = columns @ solution - right
         errors = np.sqrt(np.bincount(self.owner, residual**2)) / self.weights
         model = replace(bare, **{i.name: float(s) for i, s in zip(linear, solution, strict=True)})
         stopped = tuple(i.name for i, h in zip(linear, held, strict=True) if h)
-        self.solved = point, Solved(model, residual, errors, stopped, columns[:, ~held])
-        return self.solved[1]
+        self._solved = point, Solved(model, residual, errors, stopped, columns[:, ~held])
+        return self._solved[1]
 
     def solved_residual(self, point: Floats) -> Floats:
         """(N,) weighted residual at a point of the search axes, the linear parameters solved for."""
@@ -246,35 +284,24 @@ class Table:
         They follow to first order: the gradient is exact, and an axis costs one force instead of a
         least squares of its own [Kaufman 1975, BIT 15, 49].
         """
-        known, solved = self.solved
-        if solved is None or not np.array_equal(known, point):
-            solved = self.solve(point)
-        factor, model = self.weights[self.owner], solved.model
-        moved = forward_differences(
-            lambda u: self.residual(u, model) * factor, point, solved.residual, *self.problem.box()
-        )
-        return beside(moved, solved.columns)
+        solved = self.solve(point)
+        return beside(self._moved(point, solved.model, solved.residual), solved.columns)
+
+    def _moved(self, point: Floats, model: Model, residual: Floats) -> Floats:
+        """(N, D) derivatives of the weighted residual by the search axes, the linear parameters held."""
+        weights = self.weights[self.owner]
+        return forward_differences(lambda u: self.residual(u, model) * weights, point, residual, *self.problem.box())
 
     def residual(self, point: Floats, model: Model) -> Floats:
         """(N,) of the linear parameters of a model at a point; its squares sum to each run's nrmse_pp²."""
         moved = replace(self.problem.bare(point), **{i.name: getattr(model, i.name) for i in self.problem.linear})
-        self.felt(self.problem.coil_at(point))
-        return (moved.force(self.seen, moved.state(self.motion)[self.picked]) - self.target) * self.unit
+        return (moved.force(*self._followed(moved, point)) - self.target) * self.unit
 
-    def linearise(self, point: Floats, model: Model) -> tuple[Floats, Floats, NDArray[np.intp]]:
-        """Weighted residual of a model, derivatives by search axes and linear parameters, owners."""
-        factor = self.weights[self.owner] * self.unit
-
-        def residual(u: Floats) -> Floats:
-            return self.residual(u, model) * self.weights[self.owner]
-
-        r = residual(point)
-        slopes = forward_differences(residual, point, r, *self.problem.box())
-        bare = self.problem.bare(point)
-        self.felt(self.problem.coil_at(point))
-        state = bare.state(self.motion)[self.picked]
-        columns = linear_table(bare, self.problem.linear, self.seen, state)[1] * factor[:, None]
-        return r, np.column_stack([slopes, columns]), self.owner
+    def linearise(self, point: Floats, model: Model) -> tuple[Floats, Floats]:
+        """Weighted residual of a model, and its derivatives by search axes and linear parameters."""
+        residual = self.residual(point, model) * self.weights[self.owner]
+        columns = self.laid(point)[2] * self.factor[:, None]
+        return residual, np.column_stack([self._moved(point, model, residual), columns])
 
 
 def beside(slopes: Floats, columns: Floats) -> Floats:

@@ -18,7 +18,7 @@ from mrdamper.data import Floats
 from mrdamper.models.base import Model, Scale, SearchAxis
 from mrdamper.motion import Excitation, Path
 from mrdamper.motion.lag import first_order_lag, leaking_load
-from mrdamper.motion.path import last_along
+from mrdamper.motion.path import lately_along
 from mrdamper.parameters import param
 from mrdamper.tracing import Tape, streamed
 
@@ -125,29 +125,25 @@ class PlayBypass(Model):
 
     def yield_force(self, current: Floats) -> Floats:
         """fy(I) [N]."""
-        size = np.abs(current)
-        return self.fy0 + self.fy1 * current * (1 - np.exp(-size / self.Ic)) / (1 + self.si * size)
+        return _level_law(current, self.fy0, self.fy1, self.Ic, self.si)
 
     def state(self, motion: Excitation) -> Floats:
         """S (N,), the lagged share of the yield force."""
-        v, speed = motion.velocity, np.abs(motion.velocity)
-        play = play_position(motion.path, self.d)
-        seat = np.minimum(self.e, self.d)
-        loaded = np.sign(play) * np.maximum(0.0, np.abs(play) - (self.d - seat)) / seat
-        along = np.maximum(0.0, loaded * np.sign(v))
-        ratio = (self.cb * (1 + self.qb * np.sign(v))) * speed / self.yield_force(motion.current)
-        bypass = ratio / np.sqrt(1 + ratio**2)
-        fading = np.clip(self.h0 + self.h1 * motion.current, 0.0, 1.0)
-        seated = fading * speed / (speed + self.vh) * along
+        v, seat = motion.velocity, np.minimum(self.e, self.d)
+        loaded = _loaded(motion.path, self.d, seat)
+        along = _along(v, loaded)
+        bypass = _bypass(v, self.cb, self.qb, self.yield_force(motion.current))
+        fading = _fading(motion.current, self.h0, self.h1)
+        seated = _seated(v, self.vh, fading, along)
         held = (1 - fading) * loaded * leaking_load(motion.time, motion.path, seat, self.leak)
-        share = held + np.sign(v) * (seated + (1 - along) * bypass)
+        share = held + _sign(v) * (seated + (1 - along) * bypass)
         return first_order_lag(motion.time, share, self.T)
 
     def force(self, motion: Excitation, state: Floats) -> Floats:
         x, v, a, current = motion.displacement, motion.velocity, motion.acceleration, motion.current
         viscous = (self.c0 + self.c1 * current) * v
         yielded = self.yield_force(current) * (state + self.asymmetry * np.abs(state))
-        return self.f0 + self.k * x * (1 - state) + viscous + self.cq * np.abs(v) + yielded + self.m * a
+        return self.f0 + self.k * x * (1 - state) + viscous + self.cq * _speed(v) + yielded + self.m * a
 
     @classmethod
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
@@ -181,6 +177,59 @@ class PlayBypass(Model):
         )
 
 
+# What of the state and the force one parameter leads to is remembered while the search moves another.
+
+
+@lately_along
+def _speed(velocity: Floats) -> Floats:
+    return np.abs(velocity)
+
+
+@lately_along
+def _sign(velocity: Floats) -> Floats:
+    return np.sign(velocity)
+
+
+@lately_along
+def _level_law(current: Floats, fy0: float, fy1: float, Ic: float, si: float) -> Floats:
+    """fy(I) [N]."""
+    size = np.abs(current)
+    return fy0 + fy1 * current * (1 - np.exp(-size / Ic)) / (1 + si * size)
+
+
+@lately_along
+def _loaded(path: Path, d: float, seat: float) -> Floats:
+    """φ, how far the seat is loaded."""
+    play = play_position(path, d)
+    return np.sign(play) * np.maximum(0.0, np.abs(play) - (d - seat)) / seat
+
+
+@lately_along
+def _along(velocity: Floats, loaded: Floats) -> Floats:
+    """η, the loading along the motion."""
+    return np.maximum(0.0, loaded * _sign(velocity))
+
+
+@lately_along
+def _bypass(velocity: Floats, cb: float, qb: float, yield_force: Floats) -> Floats:
+    """b, what the bypass carries of the yield force."""
+    ratio = (cb * (1 + qb * _sign(velocity))) * _speed(velocity) / yield_force
+    return ratio / np.sqrt(1 + ratio**2)
+
+
+@lately_along
+def _fading(current: Floats, h0: float, h1: float) -> Floats:
+    """Share h that fades, within 0 and 1."""
+    return np.clip(h0 + h1 * current, 0.0, 1.0)
+
+
+@lately_along
+def _seated(velocity: Floats, vh: float, fading: Floats, along: Floats) -> Floats:
+    """What of the seated force builds up with velocity, h |v|/(|v| + vh) η."""
+    speed = _speed(velocity)
+    return fading * speed / (speed + vh) * along
+
+
 def play_step(tape: Tape, path: Any, limit: Any, start: float = 0.0) -> Any:
     """`play_position` for one sample."""
     held = tape.remember("play", start)
@@ -199,7 +248,7 @@ def play_position(path: Path, limit: float, start: float = 0.0) -> Floats:
     return _stopped(path, limit, start)
 
 
-@last_along
+@lately_along
 def _stopped(path: Path, limit: float, start: float) -> Floats:
     turned = path.first_direction * np.where(np.arange(len(path.lengths)) % 2, -1.0, 1.0) * path.lengths
     at_start = np.concatenate([[start], _clipped_sums(turned, limit, start)])

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.motion.path import Path, last_along
+from mrdamper.motion.path import LONG, Path, lately_along
 from mrdamper.tracing import Tape, choose, streamed
 
 _SHORT = 1e-4  # step over time constant below which a series loses fewer digits
 _FORGOTTEN = 1e-18  # share of the past below which it is rounding
-_LONG = 200_000  # samples from which weights are not worth their memory
 
 
 def lag_step(tape: Tape, time: Any, signal: Any, time_constant: Any) -> Any:
@@ -47,7 +46,7 @@ def first_order_lag(time: Floats, signal: Floats, time_constant: float) -> Float
     """
     if time_constant <= 0:
         return signal.copy()
-    rows = iter(_known_weights(time, time_constant) if time.size < _LONG else _weights(time, time_constant))
+    rows = iter(_known_weights(time, time_constant) if time.size <= LONG else _weights(time, time_constant))
     value = np.zeros(signal.size)
     value[1:] = next(rows)[1:] * signal[:-1]
     value[1:] += next(rows)[1:] * signal[1:]
@@ -65,7 +64,7 @@ def _weights(time: Floats, time_constant: float) -> Iterator[Floats]:
     yield from _spans(keep)
 
 
-@last_along
+@lately_along
 def _known_weights(time: Floats, time_constant: float) -> Floats:
     """The same as rows of a table, for the next signal along these times."""
     return np.stack(list(_weights(time, time_constant)))
@@ -116,7 +115,7 @@ def leaking_load(time: Floats, path: Path, length: float, leak: float) -> Floats
     return np.ones(time.size) if leak <= 0 else _loaded(path, time, length, leak)
 
 
-@last_along
+@lately_along
 def _loaded(path: Path, time: Floats, length: float, leak: float) -> Floats:
     built, leaked = np.diff(path.travel) / length, leak * np.diff(time)
     both = np.maximum(built + leaked, np.finfo(float).tiny)

@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike
 from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError
 
+LONG = 200_000  # samples from which what could be remembered is not worth its memory
+
 
 @dataclass(frozen=True, eq=False)
 class Path:
@@ -95,24 +97,29 @@ class Path:
         return np.cumsum([0.0, *self.lengths])[self.stroke] + self.distance
 
 
-def last_along(function: Callable[..., Floats]) -> Callable[..., Floats]:
-    """Remember what a function of a path or of times, and of some numbers, gave last, as long as the first lives.
+def lately_along(function: Callable[..., Floats]) -> Callable[..., Floats]:
+    """Remember what a function of a path or of samples, and of some numbers, gave the last two times.
 
-    A search moves one parameter at a time; what the others lead to stays.
+    A search moves one parameter at a time, to and fro: what the others lead to stays. It is forgotten
+    with the path. Symbols, and records whose numbers are not worth their memory, are computed every time.
     """
-    known: dict[int, tuple[ref[Any], tuple[Any, ...], Floats]] = {}
+    known: dict[int, tuple[ref[Any], list[tuple[tuple[Any, ...], Floats]]]] = {}
 
     @wraps(function)
     def remembered(first: Any, *given: Any) -> Floats:
-        before = known.get(id(first))
-        if before is None or any(
-            a is not b and (isinstance(a, np.ndarray) or a != b) for a, b in zip(before[1], given, strict=True)
-        ):
-            made = function(first, *given)
-            made.flags.writeable = False
-            alive = ref(first, lambda _, key=id(first): known.pop(key, None))
-            before = known[id(first)] = (alive, given, made)
-        return before[2]
+        if not isinstance(first, np.ndarray | Path) or len(first) > LONG:
+            return function(first, *given)
+        if id(first) not in known:
+            known[id(first)] = ref(first, lambda _, key=id(first): known.pop(key, None)), []
+        _, last = known[id(first)]
+        for place, (before, made) in enumerate(last):
+            if all(a is b or not (isinstance(a, np.ndarray) or a != b) for a, b in zip(before, given, strict=True)):
+                last.insert(0, last.pop(place))
+                return made
+        made = function(first, *given)
+        made.flags.writeable = False
+        last[:] = (given, made), *last[:1]
+        return made
 
     return remembered
 
