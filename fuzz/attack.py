@@ -1,21 +1,27 @@
 """`make attack`: hostile names, models, tables and calls, killed and starved commands; counts a kind, tried and held.
 
-Each kind is bounded, so that all end within ten minutes; `--share 0.1` takes a tenth. What did
-not hold is printed with what it came from, and the exit status is 1.
+All kinds together take a share of their numbers, and end within ten minutes whatever the machine;
+one kind by itself is tried in full: `python -m fuzz.attack kills` (200 of them), `limits` (20
+points of each command; `--of study compare` for some), `soak` (ten minutes), `names` (10,000).
+`--share 0.1` takes a tenth. What did not hold is printed with what it came from, and the exit
+status is 1.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import subprocess
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
-from fuzz.bench_soak import attack_bench
+from fuzz import counting
+from fuzz.bench_soak import SECONDS, attack_bench
 from fuzz.hostile_input import attack_calls, attack_datasets, attack_models
 from fuzz.hostile_names import attack_exports, attack_names
 from fuzz.stops import COMMANDS, attack_kills, attack_limits
@@ -30,7 +36,9 @@ KINDS = {
     "limits": attack_limits,
     "soak": attack_bench,
 }
+SHARES = {"kills": 0.5, "limits": 0.4, "soak": 0.15}  # of their numbers, where all are tried
 TIMED = "soak"  # by itself, at the end
+_ALL_S = 9.5 * 60  # seconds for all kinds
 
 
 def main() -> None:
@@ -38,20 +46,39 @@ def main() -> None:
     arguments = argparse.ArgumentParser(prog="python -m fuzz.attack", description=__doc__)
     arguments.add_argument("kinds", nargs="*", help=f"of {', '.join(KINDS)}; default: all")
     arguments.add_argument("--share", type=float, default=1.0, help="of the usual number")
+    arguments.add_argument("--seconds", type=float, default=math.inf, help="after which no further one is tried")
     arguments.add_argument("--of", nargs="+", default=[], help=f"commands that are stopped, of {', '.join(COMMANDS)}")
     chosen = arguments.parse_args()
-    kinds = chosen.kinds or list(KINDS)
-    if len(kinds) > 1:  # each in a process of its own: one kind's threads and memory are not the next one's
-        one = [sys.executable, "-m", "fuzz.attack", "--share", str(chosen.share)]
-        with ThreadPoolExecutor(2) as pool:
-            aside = [kind for kind in kinds if kind != TIMED]
-            codes = list(pool.map(lambda kind: subprocess.run([*one, kind], check=False).returncode, aside))
-        codes += [subprocess.run([*one, kind], check=False).returncode for kind in kinds if kind == TIMED]
-        sys.exit(max(codes))
-    counts = KINDS[kinds[0]](chosen.share, *([chosen.of] if chosen.of else []))
+    if len(chosen.kinds) == 1:
+        sys.exit(attack_one(chosen.kinds[0], chosen.share, chosen.seconds, chosen.of))
+    sys.exit(attack_all(chosen.kinds or list(KINDS), chosen.share))
+
+
+def attack_one(kind: str, share: float, seconds: float, of: list[str]) -> int:
+    """One kind, in this process."""
+    counting.CLOCK.stop_at = time.monotonic() + seconds
+    counts = KINDS[kind](share, *([of] if of else []))
     for count in counts:
         print(count, flush=True)
-    sys.exit(1 if any(count.broke for count in counts) else 0)
+    if counting.CLOCK.stopped:
+        print(f"    {kind}: the time was up before all were tried", flush=True)
+    return 1 if any(count.broke for count in counts) else 0
+
+
+def attack_all(kinds: list[str], share: float) -> int:
+    """Each in a process of its own: one kind's threads and memory are not the next one's."""
+    aside = [kind for kind in sorted(kinds, key=lambda kind: kind not in SHARES) if kind != TIMED]
+    timed_s = SECONDS * SHARES[TIMED] * share if TIMED in kinds else 0.0
+    until = time.monotonic() + _ALL_S - timed_s - 20
+
+    def attack(kind: str) -> int:
+        seconds = max(1.0, until - time.monotonic()) if kind != TIMED else math.inf
+        command = [sys.executable, "-m", "fuzz.attack", kind, "--seconds", str(seconds)]
+        return subprocess.run([*command, "--share", str(share * SHARES.get(kind, 1.0))], check=False).returncode
+
+    with ThreadPoolExecutor(2) as pool:
+        codes = list(pool.map(attack, aside))
+    return max(codes + [attack(kind) for kind in kinds if kind == TIMED])
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ from urllib.parse import quote
 
 from fuzz.counting import NASTY, ODD, Count
 
-SESSIONS, SECONDS = 20, 120.0  # ten minutes: --share 5
+SESSIONS, SECONDS = 20, 600.0
 _THINK = 0.25  # seconds a user looks at an answer
 _LATE = 0.2  # answers: p95 below it [s]
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import random
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
+
+Item = TypeVar("Item")
 
 NASTY = (
     "*/", "*\\/", "*\\/ int canary(void){return 1;} /*", "/*", "//", "??/", "\\", "\n", "\r", "\x00", "\x1b[2J",
@@ -43,6 +46,26 @@ class Count:
         seconds = time.monotonic() - self.began
         lines = [f"{self.kind:34}{self.tried:8} tried{self.tried - len(self.broke):8} held{seconds:8.0f} s"]
         return "\n".join(lines + [f"    broke: {text}" for text in self.broke[:5]])
+
+
+@dataclass
+class Clock:
+    """When attacks end, whatever is left of them."""
+
+    stop_at: float = math.inf
+    stopped: bool = False
+
+
+CLOCK = Clock()
+
+
+def within(items: Iterable[Item]) -> Iterator[Item]:
+    """Items as long as there is time."""
+    for item in items:
+        if time.monotonic() > CLOCK.stop_at:
+            CLOCK.stopped = True
+            return
+        yield item
 
 
 def names(count: int, rng: random.Random) -> Iterator[str]:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from fuzz.counting import NASTY, ODD, Count, typed
+from fuzz.counting import NASTY, ODD, Count, typed, within
 
 
 def _places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
@@ -57,13 +57,13 @@ def attack_models(share: float) -> list[Count]:
 
     count, rng = Count("saved model, changed anywhere"), random.Random(3)
     documents = [json.loads(dump_model(d)) for d in (conditioned_damper(), joint_damper(), modified_damper())]
-    for _ in range(max(60, int(6000 * share))):
+    for _ in within(range(max(60, int(6000 * share)))):
         document, changes = _mutated(rng.choice(documents), rng)
         damper = typed(count, changes, lambda d=document: parse_model(json.dumps(d)))
         if damper is not None:
             typed(count, changes, lambda d=damper: d.predict(Condition(0.5, 1.0, 0.01)))
     text = json.dumps(documents[1])
-    for _ in range(max(60, int(4000 * share))):
+    for _ in within(range(max(60, int(4000 * share)))):
         broken = bytearray(text.encode())
         for _ in range(rng.randint(1, 4)):
             at = rng.randrange(len(broken))
@@ -81,7 +81,7 @@ def attack_datasets(share: float) -> list[Count]:
     folder = Path(tempfile.mkdtemp())
     t = np.arange(200) / 100
     cells = [*map(str, (0, -1, 1e-300, 1e300, 1e298, "1_0", "nan", "inf", "٣", "0x10", "9" * 5000, "1,5"))]
-    for _ in range(max(20, int(400 * share))):
+    for _ in within(range(max(20, int(400 * share)))):
         rows = [
             {"run_id": f"r{i}", "rig": "a", "current_A": str(i), "excitation": "sine", "split": "train"}
             | {"steady_t0_s": "0", "steady_t1_s": "1.9", "nominal_frequency_Hz": "1", "nominal_amplitude_m": "0.01"}
@@ -135,7 +135,7 @@ def _damaged(share: float) -> Count:
         save_dataset(bundled.only(list(bundled)[:2]), Path(folder) / "set")
         samples = Path(folder) / "set" / "samples.parquet"
         whole = samples.read_bytes()
-        for _ in range(max(20, int(500 * share))):
+        for _ in within(range(max(20, int(500 * share)))):
             content = bytearray(whole)
             for _ in range(rng.randint(1, 4)):
                 at = rng.randrange(len(whole)) if rng.random() < 0.3 else rng.randrange(len(whole) - 2000, len(whole))
@@ -164,7 +164,7 @@ def attack_calls(share: float) -> list[Count]:
         {1, 2},
     ]
     t = np.arange(300) / 100
-    for _ in range(max(60, int(3000 * share))):
+    for _ in within(range(max(60, int(3000 * share)))):
         one, two, three = (rng.choice(odd) for _ in range(3))
         what = f"{one!r:.40} {two!r:.40} {three!r:.40}"
         name = rng.choice(sorted(all_models()))

@@ -13,7 +13,7 @@ import tempfile
 from pathlib import Path
 from xml.etree import ElementTree
 
-from fuzz.counting import NASTY, Count, bench_damper, names
+from fuzz.counting import NASTY, Count, bench_damper, names, within
 
 
 def attack_names(share: float) -> list[Count]:
@@ -30,7 +30,7 @@ def attack_names(share: float) -> list[Count]:
     rng, comments = random.Random(1), []
     markup = MarkdownIt("commonmark").enable("table")
     folder = Path(tempfile.mkdtemp())
-    for name in names(max(len(NASTY), int(10_000 * share)), rng):
+    for name in within(names(max(len(NASTY), int(10_000 * share)), rng)):
         comments.append(
             f'/* {encoding.c_comment(name)}.\n * Made from a model of rig "{encoding.c_comment(name)}". */\n'
         )
@@ -108,7 +108,7 @@ def attack_exports(share: float) -> list[Count]:
     damper = bench_damper()
     count, rng = Count("whole export of a named rig"), random.Random(2)
     folder = Path(tempfile.mkdtemp())
-    for rig in list(names(len(NASTY), rng))[: max(4, int(len(NASTY) * share))]:
+    for rig in within(list(names(len(NASTY), rng))[: max(4, int(len(NASTY) * share))]):
         named = replace(damper, rig=rig)
         for form, kind in all_exporters().items():
             exporter = kind(platforms=()) if form == "fmu" else kind()

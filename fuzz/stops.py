@@ -22,7 +22,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from fuzz.counting import Count, bench_damper
+from fuzz.counting import Count, bench_damper, within
 
 # What each writes, and how it is asked; {n} is 1 or 2: the second replaces what the first wrote.
 COMMANDS = {
@@ -61,6 +61,7 @@ _LOADED = (
     "mrdamper.systems.simulate", "mrdamper.study.plan", "mrdamper.reproduction.output",
 )  # fmt: skip
 _STEPS = ("os.rename", "os.link", "os.remove", "os.rmdir", "os.mkdir", "ctypes.dlsym")  # the last: before an exchange
+_POINTS = {"disk": 20, "memory": 20, "file size": 10, "files": 4, "temporary folder": 1}  # of each command
 _TIMES = "made.json"  # holds when a result was made
 _GONE_S = 2.0  # in which children of a killed command must be gone
 
@@ -72,7 +73,7 @@ def attack_kills(share: float, only: Sequence[str] = ()) -> list[Count]:
     rng, counts = random.Random(6), {what: Count(f"SIGKILL: {what}") for what in ("old or new", "orphans", "litter")}
     with _workplace() as root:
         _adopt_orphans()
-        for name, (out, line) in _chosen(only):
+        for name, (out, line) in within(_chosen(only)):
             folder, broken = root / name, sum(len(count.broke) for count in counts.values())
             folder.mkdir()
             said, span, wholes = [], 0.0, []
@@ -91,7 +92,8 @@ def attack_kills(share: float, only: Sequence[str] = ()) -> list[Count]:
                 n, step = 1 + i % 2, wanted[i] if i < len(wanted) else None
                 _begin_anew(folder, n, empty=step is None and rng.random() < 0.5)
                 before = _content(folder / out.format(n=n))
-                pid = _begin(folder, line.format(n=n), _kill_at(folder, step) if step is not None else None)
+                limit = _kill_at(folder, step) if step is not None else None
+                pid = _begin(folder, line.format(n=n), limit)
                 if step is None:
                     time.sleep(rng.uniform(0, 1.05) * span)
                     with contextlib.suppress(ProcessLookupError):
@@ -149,7 +151,7 @@ def _steps(folder: Path, line: str) -> int:
     _begin_anew(folder, 1)
     seen = folder.parent / "steps"
     seen.write_bytes(b"")
-    _wait(_begin(folder, line, lambda: _at_steps(folder, lambda: _add_to(seen))))
+    _run(folder, line, lambda: _at_steps(folder, lambda: _add_to(seen)))
     return seen.stat().st_size
 
 
@@ -178,30 +180,23 @@ def _at_steps(folder: Path, tell: Callable[[], object]) -> None:
 
 
 def attack_limits(share: float, only: Sequence[str] = ()) -> list[Count]:
-    """Full disks, limits of file size, of memory and of open files: done, or a code, and nothing half-written."""
+    """Full disks, limits of memory, file size and open files, no temporary folder: done, or a code, nothing half-written."""
     if os.name != "posix":
         return []
-    counts = {what: Count(f"starved of {what}") for what in ("disk", "file size", "memory", "files")}
+    counts = {kind: Count(f"starved of {kind}") for kind in _POINTS}
     with _workplace() as root:
-        for name, (out, line) in _chosen(only):
-            folder = root / name
+        for name, (out, line) in within(_chosen(only)):
+            folder, before_it = root / name, [len(count.broke) for count in counts.values()]
             folder.mkdir()
             _begin_anew(folder, 1)
             _run(folder, line.format(n=1))
-            size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
-            tries: list[tuple[str, float]] = []
-            for kind, most, points in (("disk", 1.2 * size, 8), ("file size", 1.1 * size, 5), ("memory", 3e9, 5)):
-                count = max(1, round(points * share * _DEAR.get(name, 1.0)))
-                tries += [(kind, most * ((i + 1) / count) ** 2) for i in range(count)]
-            tries += [("files", value) for value in (6, 12)[: max(1, round(2 * share))]]
+            tries = list(_amounts(folder, share * _DEAR.get(name, 1.0)))
             for kind, value in tries:
                 with _starved(folder, kind, value) as (where, limit):
-                    if where is None:
+                    if where is None or (where != folder and name in _CHANGE):  # no room for the dataset to be changed
                         continue
                     if where == folder:
                         _begin_anew(folder, 2)
-                    elif name in _CHANGE:
-                        continue  # the dataset to be changed has no room there
                     before = _content(where / out.format(n=2))
                     said = _run(where, line.format(n=2), limit)
                     whole = said is None or _content(where / out.format(n=2)) == before
@@ -209,7 +204,18 @@ def attack_limits(share: float, only: Sequence[str] = ()) -> list[Count]:
                     typed = said is None or re.search(r"\[E_\w+\]\s*$", said) is not None
                     counts[kind].check(typed and whole and not left, (name, f"{value:.3g}", said, left))
             shutil.rmtree(folder)
+            broke = [len(count.broke) - n for count, n in zip(counts.values(), before_it, strict=True)]
+            print(f"    {name:12}{len(tries):4} starved; {sum(broke)} broke", flush=True)
     return list(counts.values())
+
+
+def _amounts(folder: Path, share: float) -> Iterator[tuple[str, float]]:
+    """What a command is left with: most points where there is little."""
+    size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+    most = {"disk": 1.2 * size, "memory": 4 * 2**30, "file size": 1.1 * size, "files": 16, "temporary folder": 0}
+    for kind, points in _POINTS.items():
+        count = max(1, round(points * share))
+        yield from ((kind, most[kind] * ((i + 1) / count) ** 2) for i in range(count))
 
 
 @contextlib.contextmanager
@@ -221,7 +227,7 @@ def _workplace() -> Iterator[Path]:
         root = Path(folder)
         (root / "tmp").mkdir()
         os.environ["TMPDIR"] = str(root / "tmp")
-        _wait(_fork(lambda: _prepare(root), root / "said"))
+        _wait(_fork(lambda: _prepare(root), 2))
         for n in (1, 2):
             _run(root / "data1", f"study ../data{n} --out ../study{n}")
         yield root
@@ -247,16 +253,16 @@ def _prepare(root: Path) -> None:
     (root / "limits.toml").write_text(limits)
 
 
-def _fork(work: Callable[[], object], said: Path) -> int:
+def _fork(work: Callable[[], object], errors: int | None) -> int:
     pid = os.fork()
     if pid:
         return pid
     status = 1
     try:
         os.setsid()
-        errors = os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
-        os.dup2(errors, 2)
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 1)
+        os.dup2(nowhere if errors is None else errors, 2)
         work()
         status = 0
     except SystemExit as end:
@@ -265,7 +271,7 @@ def _fork(work: Callable[[], object], said: Path) -> int:
         os._exit(status)
 
 
-def _begin(folder: Path, line: str, limit: Callable[[], None] | None = None) -> int:
+def _begin(folder: Path, line: str, limit: Callable[[], None] | None = None, errors: int | None = None) -> int:
     def work() -> None:
         os.chdir(folder)
         sys.argv = ["mrdamper", *line.split()]
@@ -275,7 +281,7 @@ def _begin(folder: Path, line: str, limit: Callable[[], None] | None = None) -> 
 
         main()
 
-    return _fork(work, folder.parent / "said")
+    return _fork(work, errors)
 
 
 def _wait(pid: int) -> int:
@@ -284,8 +290,14 @@ def _wait(pid: int) -> int:
 
 def _run(folder: Path, line: str, limit: Callable[[], None] | None = None) -> str | None:
     """What a command said that did not end well; None if it did."""
-    status = _wait(_begin(folder, line, limit))
-    said = (folder.parent / "said").read_text(errors="replace").strip().splitlines()
+    reading, writing = os.pipe()  # no file: a limit of the size of files would hold for it too
+    status = _wait(_begin(folder, line, limit, writing))
+    os.set_blocking(reading, False)
+    with contextlib.suppress(BlockingIOError):  # nothing said, or by somebody who still lives
+        os.write(writing, b"\n")
+    said = os.read(reading, 2**16).decode(errors="replace").strip().splitlines()
+    os.close(writing)
+    os.close(reading)
     if status == 0:
         return None
     return said[-1] if status == 2 and said else f"status {status}: {' / '.join(said[-3:])}"
@@ -299,18 +311,25 @@ def _starved(folder: Path, kind: str, value: float) -> Iterator[tuple[Path | Non
     def limited(what: int, most: int) -> Callable[[], None]:
         return lambda: resource.setrlimit(what, (most, resource.getrlimit(what)[1]))
 
-    if kind != "disk":
+    if kind == "temporary folder":
+        yield folder, lambda: setattr(tempfile, "_candidate_tempdir_list", lambda: ["/proc/none"])
+    elif kind != "disk":
         what = {"file size": resource.RLIMIT_FSIZE, "memory": resource.RLIMIT_AS, "files": resource.RLIMIT_NOFILE}[kind]
         yield folder, limited(what, int(value))
-        return
-    where = folder.parent / "small disk"
+    else:
+        with _small_disk(folder.parent / "small disk", value) as where:
+            yield where, None
+
+
+@contextlib.contextmanager
+def _small_disk(where: Path, size: float) -> Iterator[Path | None]:
     where.mkdir(exist_ok=True)
-    mount = ["mount", "-t", "tmpfs", "-o", f"size={max(4096, int(value))}", "tmpfs", str(where)]
+    mount = ["mount", "-t", "tmpfs", "-o", f"size={max(4096, int(size))}", "tmpfs", str(where)]
     if shutil.which("mount") is None or subprocess.run(mount, capture_output=True, check=False).returncode:
-        yield None, None  # only the administrator may
+        yield None  # only the administrator may
         return
     try:
-        yield where, None
+        yield where
     finally:
         subprocess.run(["umount", "-l", str(where)], check=True)
 
@@ -329,10 +348,3 @@ def _descendants(process: int) -> list[int]:
     from mrdamper.fleet.guard import descendants
 
     return descendants(process)
-
-
-def _alive(process: int) -> bool:
-    try:
-        return Path(f"/proc/{process}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()[0] != "Z"
-    except OSError:
-        return False

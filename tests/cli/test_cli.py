@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -48,6 +49,15 @@ def test_a_process_ends_with_the_same_status_and_line():
     assert done.returncode == 2
     assert done.stderr == mrdamper("identify", "--fix", "n").stderr
     assert done.stderr.count("\n") == 1
+
+
+def test_a_process_says_its_version_and_survives_that_nobody_can_hear():
+    command = [sys.executable, "-m", "mrdamper.cli"]
+    said = subprocess.run([*command, "--version"], capture_output=True, text=True, check=True).stdout
+    assert said.startswith("mrdamper ")
+    if Path("/dev/full").exists():
+        with Path("/dev/full").open("w") as full:  # the last line does not reach the disk
+            assert subprocess.run([*command, "models"], stdout=full, stderr=full, check=False).returncode == 2
 
 
 def test_predict_at_a_condition(model, tmp_path):

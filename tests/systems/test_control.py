@@ -130,16 +130,17 @@ def test_out_of_reach_is_clipped_and_said():
         inverse.step(float("nan"), 0, 0, 0, 1e-3)
 
 
-def test_a_damper_that_turns_back_with_current_is_refused():
+def test_a_damper_whose_force_does_not_rise_with_current_is_refused():
     falling = modified_damper()
     functions = {
         **falling.parameters.functions,
         "yield_force": ParameterFunction("quadratic-current-linear-speed", (-1500.0, 1500.0, 400.0, 0.0)),
     }
     turned = replace(falling, parameters=replace(falling.parameters, functions=functions))
-    with pytest.raises(InputError) as refused:
-        invert(turned)
-    assert refused.value.code == "E_NOT_MONOTONE"
+    for damper in (turned, joint_damper("bouc-wen")):  # the second does not follow the current at all
+        with pytest.raises(InputError) as refused:
+            invert(damper)
+        assert refused.value.code == "E_NOT_MONOTONE"
 
 
 def test_every_law_says_where_it_comes_from():

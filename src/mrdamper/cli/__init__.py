@@ -14,7 +14,7 @@ import sys
 import threading
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any, NoReturn
 
@@ -99,7 +99,8 @@ def _ended_by_signals() -> Iterator[None]:
 
 
 def _say(text: str) -> None:
-    print(f"mrdamper: {text}", file=sys.stderr)
+    with suppress(OSError):  # the disk that is full may be the one this goes to
+        print(f"mrdamper: {text}", file=sys.stderr)
 
 
 def application() -> typer.Typer:
@@ -112,17 +113,23 @@ def application() -> typer.Typer:
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
     )
-    app.callback()(_version)
+    app.callback()(_root)
     for module in sorted(pkgutil.iter_modules(commands.__path__), key=lambda m: m.name):
         importlib.import_module(f"{commands.__name__}.{module.name}").register(app)
     return app
 
 
-def _version(
-    version: bool = typer.Option(False, "--version", help="Show the version and stop.", is_eager=True),
-) -> None:
-    if version:
-        from importlib.metadata import version as installed
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
 
-        print(f"mrdamper {installed('mrdamper')}")
+        print(f"mrdamper {version('mrdamper')}")
         raise typer.Exit()
+
+
+def _root(
+    version: bool = typer.Option(
+        False, "--version", help="Show the version and stop.", is_eager=True, callback=_show_version
+    ),
+) -> None:
+    pass

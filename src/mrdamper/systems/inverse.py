@@ -77,13 +77,17 @@ def check_monotone(damper: Damper, highest: float | None = None) -> float:
         memory = step(given, derived, memory, (*sample, float(grid[_GRID // 2]), dt))[2]
     table = np.array(forces[_MOTION // 2 :])
     width = np.ptp(table, axis=1)
-    wide = width > 0.2 * width.max()
-    back = np.diff(table[wide], axis=1) * -np.sign(table[wide, -1] - table[wide, 0])[:, None]
-    worst = float((back / width[wide][:, None]).max())
-    if not width.max() > 0 or worst > _TURNS_BACK:
-        at = grid[int(np.argmax((back / width[wide][:, None]).max(axis=0)))] if width.max() > 0 else 0.0
+    if not 0 < width.max() < math.inf:
         raise ParameterError(
-            f"the force falls back by {100 * worst:.2g} % of its range above {at:.3g} A",
+            "the force does not follow the current", where=damper.title,
+            mend="identify it from tests at several currents", code="E_NOT_MONOTONE",
+        )  # fmt: skip
+    wide = width > 0.2 * width.max()
+    back = np.diff(table[wide], axis=1) * -np.sign(table[wide, -1] - table[wide, 0])[:, None] / width[wide][:, None]
+    if back.max() > _TURNS_BACK:
+        at = grid[back.max(axis=0).argmax()]
+        raise ParameterError(
+            f"the force falls back by {100 * back.max():.2g} % of its range above {at:.3g} A",
             where=damper.title,
             mend="cap the current there, or identify with forms that rise with current",
             code="E_NOT_MONOTONE",
