@@ -16,7 +16,7 @@ serve: $(VENV)/.web  ## set up and open the live bench
 	$(BIN)/mrdamper serve
 
 test: $(VENV)/.dev  ## set up and run the tests
-	$(BIN)/python -m pytest -m "not slow" -n 2 --dist loadgroup
+	$(BIN)/python -m pytest -m "not slow" -n 2
 
 test-all: $(VENV)/.dev  ## the tests, slow ones too
 	$(BIN)/python -m pytest

@@ -2,11 +2,16 @@
 
 import json
 import os
+import sys
 from pathlib import Path
 
 # Small matrices, few cores: threads of the linear algebra would wait for each other.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
+
+# Two processes read the same test files and start many commands: what one has compiled the others load.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 import pytest
 from support.browser import launched
@@ -14,12 +19,41 @@ from support.browser import launched
 from mrdamper.data import Condition
 from mrdamper.files.dataset import load_dataset
 
+# One process of several runs the files of a group, as they share what is dear to make; every other file is a group
+# of its own. The marks of pytest-xdist do not reach its scheduler under pytest 9.
+GROUPS = {
+    "study": (
+        "dampers/test_joint.py", "report/test_pictures.py", "study/test_workflow.py", "test_docs.py",
+        "test_examples.py", "test_numbers.py",
+    ),
+    "fleet": ("fleet/",),
+    "fmu": ("export/test_fmu",),
+}  # fmt: skip
+
+
+def group_of(nodeid):
+    file = nodeid.partition("::")[0].removeprefix("tests/")
+    return next((name for name, files in GROUPS.items() if file.startswith(files)), file)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Whole groups go to a process, whatever --dist says."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class ByGroup(LoadScopeScheduling):
+        def _split_scope(self, nodeid):
+            return group_of(nodeid)
+
+    return ByGroup(config, log)
+
 
 def pytest_collection_modifyitems(items):
-    """The study is computed by one process of several, which runs all that look at it."""
-    for item in items:
-        if "bundled_study" in getattr(item, "fixturenames", ()):
-            item.add_marker(pytest.mark.xdist_group("study"))
+    """The study of the bundled data is computed once: what looks at it is of that group."""
+    looking = {item.nodeid for item in items if "bundled_study" in getattr(item, "fixturenames", ())}
+    strange = sorted(nodeid for nodeid in looking if group_of(nodeid) != "study")
+    if strange:
+        raise pytest.UsageError(f"look at the study outside its group in tests/conftest.py: {strange}")
 
 
 @pytest.fixture(scope="session")

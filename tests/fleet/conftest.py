@@ -7,13 +7,6 @@ from mrdamper.fleet.generator import write_fleet
 from mrdamper.fleet.line import run_fleet
 
 
-def pytest_collection_modifyitems(items):
-    """All in one process, which identifies the line once."""
-    for item in items:
-        if "/fleet/" in item.nodeid:
-            item.add_marker(pytest.mark.xdist_group("fleet"))
-
-
 @pytest.fixture(scope="session")
 def line(tmp_path_factory):
     folder = tmp_path_factory.mktemp("line") / "records"
