@@ -32,6 +32,7 @@ from mrdamper.errors import (
 )
 
 Floats = NDArray[np.float64]
+K = TypeVar("K")
 T = TypeVar("T")
 Split = Literal["train", "validate"]
 _LONGEST_NAME = 255
@@ -377,16 +378,16 @@ def require_name(what: str, name: object) -> None:
         )
 
 
-def once_per_run(function: Callable[[Run], T]) -> Callable[[Run], T]:
-    """Remember what a function of a run found for as long as the run lives.
+def once_per_run(function: Callable[[K], T]) -> Callable[[K], T]:
+    """Remember what a function of a run, or of a view of one, found for as long as that lives.
 
     A study asks for the same run's motion dozens of times; runs are frozen, so the answer
     cannot change.
     """
-    known: WeakKeyDictionary[Run, T] = WeakKeyDictionary()
+    known: WeakKeyDictionary[K, T] = WeakKeyDictionary()
 
     @wraps(function)
-    def remembered(run: Run) -> T:
+    def remembered(run: K) -> T:
         if run not in known:
             known[run] = function(run)
         return known[run]

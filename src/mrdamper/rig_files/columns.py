@@ -20,7 +20,7 @@ from mrdamper.rig_files.column_names import (
     unknown_unit,
 )
 from mrdamper.rig_files.conditions import stated_rate
-from mrdamper.rig_files.readers.base import RawTable, RigFileError
+from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED
 from mrdamper.rig_files.units import DIMENSION, Unit, parse_unit
 
@@ -33,28 +33,14 @@ _INDEX = frozenset(("sample", "samples", "sample no", "sample number", "index", 
 
 @dataclass(frozen=True, slots=True)
 class Assigned:
-    """Where a channel comes from and how its numbers become SI.
+    """Where a channel comes from and how its numbers become SI: factor * number + offset."""
 
-    Attributes
-    ----------
-    column : int
-        Position in the table.
-    name : str
-        As the file has it, without the unit.
-    unit : str
-        As the file or the profile has it.
-    factor, offset : float
-        SI value = factor * number + offset.
-    delay : float
-        How late the channel is [s].
-    """
-
-    column: int
-    name: str
-    unit: str
+    column: int  # position in the table
+    name: str  # as the file has it, without the unit
+    unit: str  # as the file or the profile has it
     factor: float
     offset: float = 0.0
-    delay: float = 0.0
+    delay: float = 0.0  # how late the channel is [s]
 
 
 def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
@@ -140,7 +126,7 @@ def rate_of(table: RawTable, profile: Profile) -> float | None:
         return stated_rate(table.remarks, table.constants, decimal if isinstance(decimal, str) else None)
     except ValueError as error:
         raise table.source.refuse(
-            "E_AMBIGUOUS", f"two sampling rates: {error}", mend="say [file] sample_rate_Hz = ... in a profile"
+            "E_AMBIGUOUS", f"two sampling rates: {error}", "say [file] sample_rate_Hz = ... in a profile"
         ) from error
 
 
@@ -274,10 +260,12 @@ def _missing(
 
 def _ambiguous(table: RawTable, role: str, names: Sequence[str]) -> Exception:
     shown = " and ".join(repr(name) for name in names[:3])
-    return RigFileError(
-        "E_AMBIGUOUS", f"{shown} may both be the {role}", file=table.source.name, line=table.line,
-        mend=f'say [channels.{role}] column = "..." in a profile',
-    )  # fmt: skip
+    return table.source.refuse(
+        "E_AMBIGUOUS",
+        f"{shown} may both be the {role}",
+        f'say [channels.{role}] column = "..." in a profile',
+        line=table.line,
+    )
 
 
 def _convert(
@@ -341,11 +329,13 @@ def _refuse_two_units(table: RawTable, role: str, column: int, unit: str) -> Non
     one, other = parse_unit(inner) if inner else None, parse_unit(unit)
     if one is None or other is None or one == other or one.dimension != DIMENSION[role]:
         return
-    raise RigFileError(
-        "E_AMBIGUOUS", f"column {table.names[column]!r} is in {inner} by its name and in {unit} by its row of units",
-        file=table.source.name, line=table.line, column=column + 1,
-        mend=f'say which: [channels.{role}] unit = "..." in a profile',
-    )  # fmt: skip
+    raise table.source.refuse(
+        "E_AMBIGUOUS",
+        f"column {table.names[column]!r} is in {inner} by its name and in {unit} by its row of units",
+        f'say which: [channels.{role}] unit = "..." in a profile',
+        line=table.line,
+        column=column + 1,
+    )
 
 
 def _refuse_two_values(table: RawTable, headers: Sequence[tuple[str, str]], column: int) -> None:
@@ -364,11 +354,13 @@ def _refuse_two_values(table: RawTable, headers: Sequence[tuple[str, str]], colu
     except InputError:
         differ = True
     if differ:
-        raise RigFileError(
-            "E_DUPLICATE_COLUMN", f"{len(same)} columns are called {name!r} and differ",
-            file=table.source.name, line=table.line, column=same[1] + 1,
-            mend="rename one, or say which by its number: column = 2 in a profile",
-        )  # fmt: skip
+        raise table.source.refuse(
+            "E_DUPLICATE_COLUMN",
+            f"{len(same)} columns are called {name!r} and differ",
+            "rename one, or say which by its number: column = 2 in a profile",
+            line=table.line,
+            column=same[1] + 1,
+        )
 
 
 def _second_clock(table: RawTable, headers: Sequence[tuple[str, str]], time: Assigned) -> list[InputError]:

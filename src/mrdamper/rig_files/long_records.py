@@ -12,7 +12,7 @@ import numpy as np
 from mrdamper.data.pieces import release
 from mrdamper.errors import InputError
 from mrdamper.rig_files.quality.current import change_of
-from mrdamper.rig_files.record import OPTIONAL, REQUIRED, Finding, Record
+from mrdamper.rig_files.record import Finding, Record
 
 PART = 2**19  # samples: a minute of a test at 10 kHz, some megabytes a channel
 _AT_ONCE = 2  # parts: their checks are sums and sorts of long arrays, which need no turn of the interpreter
@@ -53,8 +53,7 @@ def judge_long(record: Record, judge: Callable[[Record], Record]) -> Record:
         _extend(segments, ranges, start)
     if resting is not None and not moving:
         raise resting
-    whole = [] if record.current is None else change_of(record, None)
-    findings = (*record.findings, *_summed(found, count, moving), *whole)
+    findings = (*record.findings, *_summed(found, count, moving), *change_of(record, None))
     return replace(record, findings=findings, segments=tuple(segments))
 
 
@@ -84,9 +83,7 @@ def _judged_parts(record: Record, judge: Callable[[Record], Record]) -> Iterator
 
 def _parts(record: Record) -> Iterator[tuple[int, Record]]:
     """Parts that share one sample, so that steps of time between them are seen."""
-    named = {name: getattr(record, name) for name in (*REQUIRED, *OPTIONAL)}
-    named = {name: values for name, values in named.items() if values is not None}
-    size = record.time.size
+    named, size = record.channels, record.time.size
     for at in range(0, size - 1, PART):
         inside = slice(at, min(at + PART, size - 1) + 1)
         channels = {name: np.array(values[inside]) for name, values in named.items()}

@@ -95,7 +95,7 @@ def _unzip(source: Source, top: Path) -> None:
             members = _members(everything)
             check_sizes(source, members)
             if any(member.flag_bits & 1 for member in members):
-                raise source.refuse("E_ARCHIVE", "a member is encrypted", mend="unpack it first")
+                raise source.refuse("E_ARCHIVE", "a member is encrypted", "unpack it first")
             room = _Room(source, top)
             for member in members:
                 with archive.open(member) as stream:
@@ -103,7 +103,7 @@ def _unzip(source: Source, top: Path) -> None:
     except RigFileError:
         raise
     except (*UNREADABLE_ZIP, RuntimeError, EOFError, zlib.error) as error:
-        raise source.refuse("E_ARCHIVE", f"damaged or unusual archive ({error})", mend="pack it again") from error
+        raise source.refuse("E_ARCHIVE", f"damaged or unusual archive ({error})", "pack it again") from error
 
 
 def _untar(source: Source, top: Path) -> None:
@@ -119,7 +119,7 @@ def _untar(source: Source, top: Path) -> None:
         raise
     except (tarfile.TarError, OSError, ValueError, EOFError) as error:
         code = "E_TRUNCATED" if "unexpected end" in str(error) else "E_ARCHIVE"
-        raise source.refuse(code, f"damaged archive ({error})", mend="copy or pack it again") from error
+        raise source.refuse(code, f"damaged archive ({error})", "copy or pack it again") from error
 
 
 class _Room:
@@ -135,14 +135,14 @@ class _Room:
         """Store one member."""
         self._count += 1
         if self._count > _MOST_MEMBERS:
-            raise self._source.refuse("E_ARCHIVE", f"over {_MOST_MEMBERS} members", mend="unpack it first")
+            raise self._source.refuse("E_ARCHIVE", f"over {_MOST_MEMBERS} members", "unpack it first")
         if name.lower().endswith(_NESTED):
-            raise self._source.refuse("E_ARCHIVE", f"an archive inside an archive ({name!a})", mend="unpack it first")
+            raise self._source.refuse("E_ARCHIVE", f"an archive inside an archive ({name!a})", "unpack it first")
         target = self._top.joinpath(*PurePosixPath(name).parts)
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
             if target.exists():
-                raise self._source.refuse("E_ARCHIVE", f"two members are called {name!a}", mend="pack it again")
+                raise self._source.refuse("E_ARCHIVE", f"two members are called {name!a}", "pack it again")
             with target.open("xb") as file:
                 while piece := stream.read(_PIECE):
                     self._left -= len(piece)
@@ -152,6 +152,4 @@ class _Room:
         except OSError as error:
             if shutil.disk_usage(self._top).free < _PIECE:
                 raise
-            raise self._source.refuse(
-                "E_ARCHIVE", f"member {name!a}: {error.strerror}", mend="pack it again"
-            ) from error
+            raise self._source.refuse("E_ARCHIVE", f"member {name!a}: {error.strerror}", "pack it again") from error

@@ -57,7 +57,7 @@ def _run_column(table: RawTable, form: FileForm) -> int | None:
     if not found:
         shown = ", ".join(name for name in table.names if name)
         raise table.source.refuse(
-            "E_COLUMN", f"no column {wanted!r} of runs (found {shown})", mend="correct run_column under [file]"
+            "E_COLUMN", f"no column {wanted!r} of runs (found {shown})", "correct run_column under [file]"
         )
     return found[0]
 
@@ -81,7 +81,7 @@ def _by_run(table: RawTable, column: int, *, stated: bool) -> list[RawTable]:
         return []
     if len(runs) > MOST_RUNS:
         raise table.source.refuse(
-            "E_BLOCKS", f"{len(runs)} runs in column {table.names[column]!r}", mend=f"at most {MOST_RUNS} a file"
+            "E_BLOCKS", f"{len(runs)} runs in column {table.names[column]!r}", f"at most {MOST_RUNS} a file"
         )
     read = _remembered(table)
     others = [i for i in range(len(table.names)) if i != column]
@@ -220,7 +220,7 @@ def _filled(
         values = read(both).values
         there = np.flatnonzero(np.isfinite(values[both[0]]) | np.isfinite(values[both[1]]))
         if not there.size:
-            raise table.source.refuse("E_NO_DATA", f"no numbers in the columns of {label!r}", mend="leave them out")
+            raise table.source.refuse("E_NO_DATA", f"no numbers in the columns of {label!r}", "leave them out")
         return int(there[-1]) + 1
 
     def part(wanted: Sequence[int]) -> Content:

@@ -41,21 +41,11 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class LineNumbers:
-    """Line of every sample in its file, kept as the few places where lines were skipped.
+    """Line of every sample in its file, kept as the few places where lines were skipped."""
 
-    Attributes
-    ----------
-    size : int
-        Samples.
-    starts : tuple of int
-        First sample of every stretch of adjacent lines, increasing from 0.
-    lines : tuple of int
-        Line of that sample, counted from one.
-    """
-
-    size: int
-    starts: tuple[int, ...]
-    lines: tuple[int, ...]
+    size: int  # samples
+    starts: tuple[int, ...]  # first sample of every stretch of adjacent lines, increasing from 0
+    lines: tuple[int, ...]  # line of that sample, counted from one
 
     def __len__(self) -> int:
         return self.size
@@ -132,6 +122,12 @@ class Record:
     segments: tuple[tuple[int, int], ...] = ()
     lines: LineNumbers | None = None
     window: tuple[float, float] | None = None
+
+    @property
+    def channels(self) -> dict[str, Floats]:
+        """The channels there are, by name."""
+        named = {name: getattr(self, name) for name in (*REQUIRED, *OPTIONAL)}
+        return {name: values for name, values in named.items() if values is not None}
 
     @property
     def present(self) -> np.ndarray:

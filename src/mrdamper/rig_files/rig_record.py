@@ -18,7 +18,7 @@ from mrdamper.rig_files.column_names import role_of, split_name
 from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, left_out, rate_of
 from mrdamper.rig_files.parts import stretches_of_time
 from mrdamper.rig_files.profile import Correction, Profile
-from mrdamper.rig_files.readers import RawTable, RigFileError, suffixes
+from mrdamper.rig_files.readers import RawTable, suffixes
 from mrdamper.rig_files.record import OPTIONAL, Finding, Record
 from mrdamper.rig_files.text.spool import rescale
 from mrdamper.rig_files.units import Unit, parse_unit
@@ -85,12 +85,13 @@ def _read(table: RawTable, found: dict[str, Assigned]):
     raw = dict(content.values)
     for column, values in raw.items():
         if content.lines is not None and thousands_in(values):
-            raise RigFileError(
+            raise table.source.refuse(
                 "E_AMBIGUOUS",
                 f"column {table.names[column] or column + 1!r} goes from hundreds to ones with three decimals: "
-                "points of thousands?", file=table.source.name, column=column + 1,
-                mend="export it without separators of thousands",
-            )  # fmt: skip
+                "points of thousands?",
+                "export it without separators of thousands",
+                column=column + 1,
+            )
     _refuse_unscaled(table, found, raw)
     findings = list(content.findings)
     for name in [name for name in found if name in _LENIENT]:
@@ -117,10 +118,11 @@ def _refuse_unscaled(table: RawTable, found: dict[str, Assigned], raw: dict[int,
             continue
         some = raw.get(found[role].column, np.empty(0))[:_SAMPLE]
         if some.size and np.array_equal(some, np.round(some), equal_nan=True):
-            raise RigFileError(
-                "E_AMBIGUOUS", f"{role} is whole numbers, and {key} is {value:g}: are they scaled?",
-                file=table.source.name, mend=f"say [channels.{role}] unit and scale in a profile",
-            )  # fmt: skip
+            raise table.source.refuse(
+                "E_AMBIGUOUS",
+                f"{role} is whole numbers, and {key} is {value:g}: are they scaled?",
+                f"say [channels.{role}] unit and scale in a profile",
+            )
 
 
 def _holds_any(values: Floats) -> bool:

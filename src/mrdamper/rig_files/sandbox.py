@@ -94,13 +94,13 @@ class _Asked:
             raise self._source.refuse(
                 "E_READER_KILLED",
                 "the process that reads it was killed from outside, or by a system short of memory",
-                mend="run the same command again",
+                "run the same command again",
             )
         if answer is None:
             raise self._source.refuse(
                 "E_FORMAT",
                 f"damaged {self._title}: reading it crashes, or takes far more time or memory than its size warrants",
-                mend="copy or export the file again",
+                "copy or export the file again",
             )
         if "missing" in answer:
             raise MissingExtraError(answer["missing"], where=self._source.name, mend=answer["mend"])

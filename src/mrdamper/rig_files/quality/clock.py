@@ -8,8 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.errors import QualityError
-from mrdamper.rig_files.quality.view import View, place
+from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding
 
 GAP = 5.5  # steps this many times the usual one are a gap: up to 4 samples lost are none
@@ -23,20 +22,18 @@ def order_of_time(view: View) -> None:
     if not wrong:
         return
     sample, before, after = wrong[0]
-    where = place(view.record, sample)
+    where = view.place(sample)
     more = f" ({len(wrong)} such places)" if len(wrong) > 1 else ""
     if before == after:
-        raise QualityError(
+        raise view.refused(
+            "E_TIME_DUPLICATE",
             f"time stamp {before:.9g} s is repeated {where}{more}",
-            where=view.where,
-            mend="write time with more decimals, or drop the repeated rows",
-            code="E_TIME_DUPLICATE",
+            "write time with more decimals, or drop the repeated rows",
         )
-    raise QualityError(
+    raise view.refused(
+        "E_TIME_ORDER",
         f"time runs backwards {where}, from {before:.9g} s to {after:.9g} s{more}",
-        where=view.where,
-        mend=_turning_back(before - after),
-        code="E_TIME_ORDER",
+        _turning_back(before - after),
     )
 
 

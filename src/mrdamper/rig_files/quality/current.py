@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mrdamper.data import Floats, held_current
+from mrdamper.data import held_current
 from mrdamper.data.pieces import taken
 from mrdamper.rig_files.quality.motion import steady_window
 from mrdamper.rig_files.quality.view import View
@@ -17,14 +17,12 @@ _MOST = 1_000_000  # samples looked at
 
 def changes(view: View) -> Iterator[Finding]:
     """Say that the current changes within the steady motion."""
-    if view.record.current is not None:
-        yield from change_of(view.record, steady_window(view))
+    yield from change_of(view.record, steady_window(view))
 
 
 def change_of(record: Record, window: tuple[float, float] | None) -> Iterator[Finding]:
     """The finding that a record's current changes within a window of time."""
-    current = current_in(record, window)
-    change = held_current(current)[1] if current.size >= 3 else ""
+    change = held_in(record, window)[1]
     if change:
         yield Finding(
             "W_CURRENT_VARIES",
@@ -32,12 +30,14 @@ def change_of(record: Record, window: tuple[float, float] | None) -> Iterator[Fi
         )
 
 
-def current_in(record: Record, window: tuple[float, float] | None) -> Floats:
-    """The current's samples that are there within a window of time, thinned where they are many."""
-    assert record.current is not None
+def held_in(record: Record, window: tuple[float, float] | None) -> tuple[float, str]:
+    """Mean of a record's current within a window of time [A], NaN without three samples, and how it changes there."""
+    if record.current is None:
+        return np.nan, ""
     thinned = np.arange(0, record.time.size, max(1, record.time.size // _MOST))
     time, current = taken(record.time, thinned), taken(record.current, thinned)
     there = np.isfinite(current)
     if window is not None:
         there &= (time >= window[0]) & (time <= window[1])
-    return current[there]
+    current = current[there]
+    return held_current(current) if current.size >= 3 else (np.nan, "")

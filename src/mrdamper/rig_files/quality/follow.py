@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mrdamper.data import held_current
-from mrdamper.errors import QualityError
-from mrdamper.rig_files.quality.current import current_in
+from mrdamper.rig_files.quality.current import held_in
 from mrdamper.rig_files.quality.loop import damping_share, repeatability
 from mrdamper.rig_files.quality.motion import LEAST_CYCLES, cycles_of, steady_window
 from mrdamper.rig_files.quality.noise import sample_noise
@@ -25,43 +23,39 @@ def motion_is_told(view: View) -> None:
     for name in ("displacement", "force"):
         values = view.channels[name]
         if sample_noise(values) > _NOISE * float(np.nanstd(values)):
-            raise QualityError(
+            raise view.refused(
+                "E_NOISE",
                 f"the {name} is noise: it does not go on from sample to sample",
-                where=view.where,
-                mend="check the sensor's cable and amplifier, and that the record has enough samples a cycle",
-                code="E_NOISE",
+                "check the sensor's cable and amplifier, and that the record has enough samples a cycle",
             )
     x = view.channels["displacement"]
     steps = np.abs(np.diff(x[np.isfinite(x)]))
     leaps = float(np.sum(steps[steps > _LEAP * float(np.nanmax(x) - np.nanmin(x))]))
     if leaps > _LEAPS * float(np.sum(steps)):
-        raise QualityError(
+        raise view.refused(
+            "E_UNRESOLVED",
             "the displacement leaps from sample to sample: no speed can be told",
-            where=view.where,
-            mend="record at least eight samples a cycle, and a motion that the drive can follow",
-            code="E_UNRESOLVED",
+            "record at least eight samples a cycle, and a motion that the drive can follow",
         )
 
 
 def force_follows(view: View) -> None:
     """Refuse a force that takes no energy, or that differs from cycle to cycle of the same motion and current."""
     if cycles_of(view) >= LEAST_CYCLES and abs(damping_share(view)) < _NO_ENERGY:
-        raise QualityError(
+        raise view.refused(
+            "E_NO_ENERGY",
             "the force takes no energy out of the motion: that of a spring, or of no damper",
-            where=view.where,
-            mend="check the load cell, and that the damper is mounted",
-            code="E_NO_ENERGY",
+            "check the load cell, and that the damper is mounted",
         )
     _force_rests_with_the_motion(view)
     found = repeatability(view)
-    if found is None or found[0] < _UNLIKE or view.noticed("W_FROZEN") or _current_changes(view):
+    if found is None or found[0] < _UNLIKE or view.noticed("W_FROZEN") or held_in(view.record, steady_window(view))[1]:
         return
-    raise QualityError(
+    raise view.refused(
+        "E_UNRELATED",
         f"the force differs from cycle to cycle by {100 * found[0]:.0f} % of its peak-to-peak value: it does not "
         "follow the motion",
-        where=view.where,
-        mend="check that force and displacement are of the same test, and that the load cell does not drift",
-        code="E_UNRELATED",
+        "check that force and displacement are of the same test, and that the load cell does not drift",
     )
 
 
@@ -81,13 +75,8 @@ def _force_rests_with_the_motion(view: View) -> None:
             continue
         still = float(np.ptp(run.displacement[rest])) < _STILL * stroke
         if still and float(np.ptp(run.force[rest])) > _GOES_ON * swing:
-            raise QualityError(
+            raise view.refused(
+                "E_UNRELATED",
                 f"the force goes on from {time[rest.start]:.4g} s on while the displacement rests",
-                where=view.where, mend="check the displacement channel there, or cut the record", code="E_UNRELATED",
-            )  # fmt: skip
-
-
-def _current_changes(view: View) -> bool:
-    if view.record.current is None:
-        return False
-    return bool(held_current(current_in(view.record, steady_window(view)))[1])
+                "check the displacement channel there, or cut the record",
+            )

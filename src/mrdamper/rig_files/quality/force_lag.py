@@ -16,7 +16,7 @@ limits below stand where hysteresis that builds up smoothly begins to be accused
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,22 +39,12 @@ _ROWS = 800
 _FREE = 6  # of the elements, powers of x and v, may have either sign
 
 
-@dataclass(frozen=True)
-class ForceLag:
-    """Delay of the force that explains it best.
+class ForceLag(NamedTuple):
+    """Delay of the force that explains it best; a misfit is what is left beyond sample noise, RMS over the force's."""
 
-    Attributes
-    ----------
-    share : float
-        Of the period.
-    misfit, without : float
-        RMS of what is left beyond the noise from sample to sample, over that of the force, at
-        this delay and without delay.
-    """
-
-    share: float
-    misfit: float
-    without: float
+    share: float  # of the period
+    misfit: float  # at this delay
+    without: float  # without delay
 
 
 def force_channel(view: View) -> Iterator[Finding]:
@@ -79,7 +69,7 @@ def force_lag(view: View) -> ForceLag | None:
     first = view.run.time[view.strokes.reversals[0]] if view.strokes.reversals.size else run.time[0]
     late = run.time >= first  # before its first reversal the damper may come from rest
     if view.noticed("W_CLIPPED", "W_FROZEN"):  # flat stretches look late
-        if flat_tops(view.channels["displacement"], smooth=True):
+        if flat_tops(view, "displacement"):
             return None
         start = (view.strokes.steady or (0,))[0]
         late &= ~flagged_samples(view)[view.index[start : start + late.size]]

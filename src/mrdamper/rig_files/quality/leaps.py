@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.errors import QualityError
-from mrdamper.rig_files.quality.view import View, place
+from mrdamper.rig_files.quality.view import View
 
 _OF_RANGE = {"displacement": 0.3, "force": 0.5}  # of the channel's range: a leap that stays
 OFF_BY = {"displacement": 0.3, "force": 1.0}  # of the range without it: a sample that stands alone
@@ -23,11 +22,12 @@ def spikes(view: View) -> None:
         values = view.channels[name][:_CHUNK]
         found = spikes_in(values, OFF_BY[name])
         if found.size:
-            raise QualityError(
+            raise view.refused(
+                "E_SPIKE",
                 f"{name} has {found.size} sample{'s' * (found.size > 1)} far off between ordinary ones, "
-                f"first {place(view.record, int(found[0]))}: a glitch of the logger",
-                where=view.where, mend="leave these cells empty: up to 2 % are taken", code="E_SPIKE",
-            )  # fmt: skip
+                f"first {view.place(int(found[0]))}: a glitch of the logger",
+                "leave these cells empty: up to 2 % are taken",
+            )
 
 
 def spikes_in(values: Floats, off_by: float) -> np.ndarray:
@@ -68,11 +68,12 @@ def wraps(view: View) -> None:
         if leaps:
             size = abs(float(values[leaps[0] + 1] - values[leaps[0]]))
             unit, scale = ("mm", 1e3) if name == "displacement" else ("N", 1.0)
-            raise QualityError(
-                f"{name} leaps by {scale * size:.4g} {unit} {place(view.record, int(leaps[0]) + 1)}: a counter that "
+            raise view.refused(
+                "E_LEAP",
+                f"{name} leaps by {scale * size:.4g} {unit} {view.place(int(leaps[0]) + 1)}: a counter that "
                 "wraps, or a channel set to zero while it was recorded",
-                where=view.where, mend="export it with a wider number format, or cut the record there", code="E_LEAP",
-            )  # fmt: skip
+                "export it with a wider number format, or cut the record there",
+            )
 
 
 def leaps_in(values: Floats, of_range: float, *, against: bool) -> np.ndarray:

@@ -38,10 +38,11 @@ def dissipates(view: View) -> None:
         return
     share = damping_share(view)
     if _is_rectified(view):
-        raise QualityError(
+        raise view.refused(
+            "E_RECTIFIED",
             "the force has the size of a damper's but one sign in both directions: an absolute value",
-            where=view.where, mend="export the channel with its sign", code="E_RECTIFIED",
-        )  # fmt: skip
+            "export the channel with its sign",
+        )
     if share < GIVING:
         if _exchanged(view):
             what = "displacement and force look exchanged"
@@ -49,12 +50,11 @@ def dissipates(view: View) -> None:
         else:
             what = "force and displacement count in opposite directions"
             mend = "say [channels.force] sign = -1 in a profile"
-        raise QualityError(
+        raise view.refused(
+            "E_DISSIPATION_SIGN",
             f"the loop gives energy instead of taking it ({-100 * share:.0f} % of the force pushes along with the "
             f"motion): {what}",
-            where=view.where,
-            mend=mend,
-            code="E_DISSIPATION_SIGN",
+            mend,
         )
 
 
@@ -126,21 +126,21 @@ def _keeps_its_scale(view: View, starts: Floats, folded: Floats) -> None:
             old, new = sizes[:at], sizes[at + within :]
             leap = float(np.mean(new) - np.mean(old))
             if max(np.ptp(old), np.ptp(new)) < _EVEN and abs(leap) > _GAIN:
-                raise QualityError(
+                raise view.refused(
+                    "E_UNRELATED",
                     f"the force is {np.exp(leap):.3g} times as large from about {starts[at]:.4g} s on: a range, a unit "
                     "or the current was changed over",
-                    where=view.where,
-                    mend="cut the record there, or name the channel of the current",
-                    code="E_UNRELATED",
+                    "cut the record there, or name the channel of the current",
                 )
 
 
 def _flip(view: View, time: float, count: int, cycles: int) -> QualityError:
-    return QualityError(
+    return view.refused(
+        "E_DISSIPATION_SIGN",
         f"the force changes its sign within the record, from {time:.4g} s on ({count} of {cycles} cycles): the load "
         "cell or its amplifier was changed over",
-        where=view.where, mend="cut the record there", code="E_DISSIPATION_SIGN",
-    )  # fmt: skip
+        "cut the record there",
+    )
 
 
 def damping_share(view: View) -> float:

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.errors import QualityError
 from mrdamper.motion import SINE_DISTORTION_LIMIT
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding
@@ -25,21 +24,15 @@ def moves(view: View) -> None:
     """Refuse a record without motion."""
     x = view.run.displacement
     if x.size < 3:
-        raise QualityError(
-            f"{x.size} samples without gaps",
-            where=view.where,
-            mend="record again: a cycle or more",
-            code="E_NO_EXCITATION",
-        )
+        raise view.refused("E_NO_EXCITATION", f"{x.size} samples without gaps", "record again: a cycle or more")
     span = float(np.ptp(x))
     # Von Neumann's ratio: one for white noise, near zero for any motion sampled finely enough.
     noise = span < NOISE_MOTION and np.mean(np.diff(x) ** 2) > np.var(x)
     if span < LEAST_MOTION or noise:
-        raise QualityError(
+        raise view.refused(
+            "E_NO_EXCITATION",
             f"the displacement moves {1e3 * span:.3g} mm" + (", which is noise" if noise else ""),
-            where=view.where,
-            mend="check the channel, its unit and the drive",
-            code="E_NO_EXCITATION",
+            "check the channel, its unit and the drive",
         )
 
 

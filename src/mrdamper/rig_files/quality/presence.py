@@ -6,8 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mrdamper.errors import QualityError
-from mrdamper.rig_files.quality.view import View, place
+from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding
 
 MOST_MISSING = 0.02  # share of the samples
@@ -21,9 +20,7 @@ def long_enough(view: View) -> None:
     """Refuse a record of a few samples."""
     size = view.record.time.size
     if size < _FEWEST:
-        raise QualityError(
-            f"{size} samples", where=view.where, mend="export the whole record: a cycle or more", code="E_NO_DATA"
-        )
+        raise view.refused("E_NO_DATA", f"{size} samples", "export the whole record: a cycle or more")
 
 
 def finite(view: View) -> Iterator[Finding]:
@@ -33,10 +30,10 @@ def finite(view: View) -> Iterator[Finding]:
         if infinite.any():
             at = int(np.argmax(infinite))
             count = int(np.count_nonzero(infinite))
-            text = f"{name} is infinite in {count} sample{'s' * (count > 1)}, first {place(view.record, at)}"
+            text = f"{name} is infinite in {count} sample{'s' * (count > 1)}, first {view.place(at)}"
             if name in USED:
                 mend = "export the channel again with a wider number format"
-                raise QualityError(text, where=view.where, mend=mend, code="E_NONFINITE")
+                raise view.refused("E_NONFINITE", text, mend)
             yield Finding("W_MISSING", f"{text}; the channel is not used")
 
 
@@ -51,20 +48,18 @@ def missing(view: View) -> Iterator[Finding]:
         share = count / absent.size
         text = f"{name}: {count} of {absent.size} samples missing ({100 * share:.3g} %), {longest} in a row at most"
         if name in USED and (share > MOST_MISSING or longest > MOST_IN_A_ROW):
-            raise QualityError(
-                f"{text}, {place(view.record, start)}",
-                where=view.where,
-                mend=f"record again, or cut the record; up to 2 % and {MOST_IN_A_ROW} in a row are taken",
-                code="E_MISSING",
+            raise view.refused(
+                "E_MISSING",
+                f"{text}, {view.place(start)}",
+                f"record again, or cut the record; up to 2 % and {MOST_IN_A_ROW} in a row are taken",
             )
         yield Finding("W_MISSING", f"{text}; they are left out, not filled")
     longest, start = longest_run(~view.record.present)
     if longest > MOST_IN_A_ROW:
-        raise QualityError(
-            f"{longest} samples in a row of which one channel or another is missing, {place(view.record, start)}",
-            where=view.where,
-            mend=f"record again, or cut the record; up to {MOST_IN_A_ROW} in a row are taken",
-            code="E_MISSING",
+        raise view.refused(
+            "E_MISSING",
+            f"{longest} samples in a row of which one channel or another is missing, {view.place(start)}",
+            f"record again, or cut the record; up to {MOST_IN_A_ROW} in a row are taken",
         )
 
 

@@ -82,4 +82,4 @@ def _peak_to_peak(values: np.ndarray) -> float:
 
 
 def _refused(view: View, found: str, mend: str) -> QualityError:
-    return QualityError(found, where=view.where, mend=mend, code="E_RANGE")
+    return view.refused("E_RANGE", found, mend)

@@ -7,9 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.errors import QualityError
 from mrdamper.rig_files.quality.presence import USED, runs_of
-from mrdamper.rig_files.quality.view import UNITS, View, place
+from mrdamper.rig_files.quality.view import UNITS, View
 from mrdamper.rig_files.record import Finding
 
 # Leading digits of the codes in use: 999, 9999, ..., 999.25, 9.91e37, and the ends of 16-, 24- and 32-bit counts.
@@ -40,10 +39,10 @@ def missing_value_codes(view: View) -> Iterator[Finding]:
             at = np.flatnonzero(values == code)
             text = (
                 f"{name} is {code:g} {UNITS[name]} in {at.size} sample{'s' * (at.size > 1)} among others it does not "
-                f"fit, first {place(view.record, int(at[0]))}: it reads like a logger's code for a missing value"
+                f"fit, first {view.place(int(at[0]))}: it reads like a logger's code for a missing value"
             )
             if name in USED:
-                raise QualityError(text, where=view.where, mend="leave these cells empty", code="E_SENTINEL")
+                raise view.refused("E_SENTINEL", text, "leave these cells empty")
             yield Finding("W_MISSING", f"{text}; the channel is not used")
 
 

@@ -16,25 +16,13 @@ _SHARE = 0.5  # of the strokes must be steady for a motion to be called periodic
 
 @dataclass(frozen=True, eq=False)
 class Strokes:
-    """Monotone motions between reversals.
+    """Monotone motions between reversals."""
 
-    Attributes
-    ----------
-    reversals : (K,) int array
-        Samples of the reversals.
-    lengths, durations : (K−1,) arrays
-        Of the strokes between them [m], [s].
-    steady : (int, int) or None
-        Half-open sample range of regular strokes, where most strokes are.
-    period : float or None
-        Twice the median duration of a stroke [s]; None without two reversals.
-    """
-
-    reversals: np.ndarray
-    lengths: Floats
-    durations: Floats
-    steady: tuple[int, int] | None
-    period: float | None
+    reversals: np.ndarray  # (K,) int, samples
+    lengths: Floats  # (K−1,) of the strokes between them [m]
+    durations: Floats  # (K−1,) [s]
+    steady: tuple[int, int] | None  # half-open sample range of regular strokes, where most strokes are
+    period: float | None  # twice the median duration of a stroke [s]; None without two reversals
 
 
 def find_strokes(time: Floats, displacement: Floats) -> Strokes:

@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from mrdamper.data import Condition, Run, held_current, once_per_run
+from mrdamper.data import Condition, Run, once_per_run
 from mrdamper.errors import QualityError
 from mrdamper.rig_files.quality import judge
-from mrdamper.rig_files.quality.current import current_in
+from mrdamper.rig_files.quality.current import held_in
 from mrdamper.rig_files.quality.follow import force_follows
 from mrdamper.rig_files.quality.force_lag import force_channel
 from mrdamper.rig_files.quality.loop import repeatability
 from mrdamper.rig_files.quality.motion import cycles_of, drift_of, steady_window
 from mrdamper.rig_files.quality.view import View
-from mrdamper.rig_files.record import Finding, Record
+from mrdamper.rig_files.record import FURTHER, Finding, Record
 
 NOT_IDENTIFIED = ("W_CLIPPED", "W_SHORT", "W_CURRENT_VARIES")  # what identification refuses by default
 
@@ -95,21 +95,10 @@ def quality_table(records: Iterable[Record]) -> tuple[Quality, ...]:
 
 def record_of(run: Run) -> Record:
     """A stored run as a record to be judged again."""
-    return Record(
-        id=run.id,
-        time=run.time,
-        displacement=run.displacement,
-        force=run.force,
-        velocity=run.velocity,
-        temperature=run.further.get("temperature_C"),
-        pressure=run.further.get("pressure_Pa"),
-        current=run.current,
-        provenance=run.notes,
-        rig=run.rig,
-        excitation=run.excitation,
-        split=run.split,
-        window=run.window,
-    )
+    own = ("id", "time", "displacement", "force", "velocity", "current", "rig", "excitation", "split", "window")
+    fields: dict[str, Any] = {name: getattr(run, name) for name in own}
+    fields |= {name: run.further.get(f"{name}_{FURTHER[name]}") for name in ("temperature", "pressure")}
+    return Record(**fields, provenance=run.notes)
 
 
 @once_per_run
@@ -155,7 +144,7 @@ def _quality(record: Record) -> Quality:
         return Quality(record, refusal=refusal)
     view = View(replace(judged, findings=()))
     motion, scatter = view.motion, repeatability(view)
-    cycles = cycles_of(view)
+    current, change = held_in(judged, steady_window(view))
     steady = view.steady
     whole = slice(None)
     if motion is not None:
@@ -164,8 +153,8 @@ def _quality(record: Record) -> Quality:
     return Quality(
         judged,
         condition=None if motion is None else motion.condition,
-        current=_current(view),
-        cycles=cycles,
+        current=np.nan if change else current,
+        cycles=cycles_of(view),
         sample_rate_Hz=1 / view.step,
         repeatability=np.nan if scatter is None else scatter[0],
         offset_force=float(np.mean(steady.force[whole])),
@@ -173,13 +162,6 @@ def _quality(record: Record) -> Quality:
         drift=drift_of(view)[0],
         distortion=np.nan if motion is None else motion.distortion,
     )
-
-
-def _current(view: View) -> float:
-    if view.record.current is None:
-        return np.nan
-    mean, change = held_current(current_in(view.record, steady_window(view)))
-    return np.nan if change else mean
 
 
 def _rounded(value: float, digits: int) -> float | None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.errors import QualityError
 from mrdamper.rig_files.quality.view import View
 
 SAMPLES = 1.5  # a velocity formed by backward differences and one filter step is this late
@@ -17,22 +16,12 @@ UNLIKE = 0.5  # more of the channel left unexplained, and it is another quantity
 _ROWS = 4_000  # samples compared at most
 
 
-@dataclass(frozen=True)
-class Delay:
-    """One signal against another, as offset + gain · reference(t − delay).
+class Delay(NamedTuple):
+    """One signal against another, as offset + gain · reference(t − delay)."""
 
-    Attributes
-    ----------
-    delay : float
-        [s], positive where the signal is late.
-    gain : float
-    unexplained : float
-        Share of the signal's variance.
-    """
-
-    delay: float
+    delay: float  # [s], positive where the signal is late
     gain: float
-    unexplained: float
+    unexplained: float  # share of the signal's variance
 
 
 def velocity_channel(view: View) -> None:
@@ -59,16 +48,15 @@ def velocity_channel(view: View) -> None:
         what = f"is {found.gain:.3g} times the derivative of displacement"
     else:
         return
-    raise QualityError(
+    raise view.refused(
+        "E_CHANNEL_LAG",
         f"velocity {what}",
-        where=view.where,
-        mend=(
+        (
             f"say [channels.velocity] delay_ms = {1e3 * found.delay:.4g} in a profile"
             if late and found.gain > 0 and found.unexplained <= UNLIKE
             else "correct its unit or sign in a profile"
         )
         + ", or leave the column out",
-        code="E_CHANNEL_LAG",
     )
 
 

@@ -14,10 +14,10 @@ import numpy as np
 
 from mrdamper.data import Floats, Run
 from mrdamper.data.pieces import taken
-from mrdamper.errors import ExcitationError
+from mrdamper.errors import ExcitationError, QualityError
 from mrdamper.motion import Excitation, MotionAnalysis, analyse_motion, measured_motion
 from mrdamper.rig_files.quality.strokes import Strokes, find_strokes
-from mrdamper.rig_files.record import OPTIONAL, REQUIRED, Finding, Record
+from mrdamper.rig_files.record import Finding, Record
 
 MOST_SAMPLES = 40_000
 SHORTEST = 5  # samples of a segment; a slope needs as many
@@ -51,11 +51,19 @@ class View:
         """How messages name the record."""
         return self.record.provenance.get("file", "") or f"run {self.record.id}"
 
+    def refused(self, code: str, found: str, mend: str) -> QualityError:
+        """The refusal of the record."""
+        return QualityError(found, where=self.where, mend=mend, code=code)
+
+    def place(self, sample: int) -> str:
+        """Where a sample stands in its file: its line, or its number."""
+        lines = self.record.lines
+        return f"at sample {sample}" if lines is None else f"in line {int(lines[sample])}"
+
     @cached_property
     def channels(self) -> dict[str, Floats]:
         """The channels there are, by name."""
-        named = {name: getattr(self.record, name) for name in (*REQUIRED, *OPTIONAL)}
-        return {name: values for name, values in named.items() if values is not None}
+        return self.record.channels
 
     def noticed(self, *codes: str) -> bool:
         """Whether one of these findings was made."""
@@ -158,9 +166,3 @@ UNITS = {
     "time": "s", "displacement": "m", "force": "N", "velocity": "m/s", "acceleration": "m/s²", "current": "A",
     "voltage": "V", "temperature": "°C", "pressure": "Pa",
 }  # fmt: skip
-
-
-def place(record: Record, sample: int) -> str:
-    """Where a sample stands in its file: its line, or its number."""
-    lines = getattr(record, "lines", None)
-    return f"at sample {sample}" if lines is None else f"in line {int(lines[sample])}"

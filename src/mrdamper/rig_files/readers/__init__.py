@@ -99,9 +99,7 @@ def reader_of(source: Source) -> Reader:
     """
     head = source.head()
     if head.startswith(_PICKLE) and (len(head) < 11 or head[2:3] in b"\x95(]}cX\x8c" or b"\n" not in head[:2]):
-        raise source.refuse(
-            "E_UNSAFE", "pickled Python objects, which run code when loaded", mend="export plain numbers"
-        )
+        raise source.refuse("E_UNSAFE", "pickled Python objects, which run code when loaded", "export plain numbers")
     readers = all_readers()
     named = next((r for r in readers.values() if source.suffix in r.suffixes), None)
     found = next((r for r in readers.values() if r.binary and r().recognises(source)), None)
@@ -122,7 +120,7 @@ def reader_of(source: Source) -> Reader:
         raise source.refuse(
             "E_FORMAT",
             f"the name says {named.title if named else source.suffix or 'nothing'}, the content is {is_now}",
-            mend=mend,
+            mend,
         )
     return found()
 

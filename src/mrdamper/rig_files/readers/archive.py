@@ -9,10 +9,9 @@ import zipfile
 import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import BinaryIO
+from typing import IO
 
-from mrdamper.rig_files.readers.base import MOST_RATIO, MOST_UNPACKED, RigFileError, Source
-from mrdamper.rig_files.readers.scratch import Scratch
+from mrdamper.rig_files.readers.base import MOST_RATIO, MOST_UNPACKED, RigFileError, Source, scratch
 
 _PIECE = 2**20
 _GZIP, _ZIP = b"\x1f\x8b", b"PK\x03\x04"
@@ -37,14 +36,15 @@ def opened(path: Path, *, folder: bool = False) -> Iterator[Source]:
         stack.enter_context(file)
         source = Source(path, name, path.suffix.lower(), file, size, stack)
         if size == 0:
-            raise source.refuse("E_EMPTY", "0 bytes", mend="copy or export the file again")
+            raise source.refuse("E_EMPTY", "0 bytes", "copy or export the file again")
         head = source.head()
         packed = head.startswith(_GZIP) or is_plain_zip(source)
         if source.suffix in (".gz", ".zip") and not packed:
             raise source.refuse(
-                "E_TRUNCATED" if size < 4 else "E_FORMAT", f"the content is no {source.suffix[1:]} archive",
-                mend="copy the file again, or correct its name",
-            )  # fmt: skip
+                "E_TRUNCATED" if size < 4 else "E_FORMAT",
+                f"the content is no {source.suffix[1:]} archive",
+                "copy the file again, or correct its name",
+            )
         if folder:
             yield _gunzip(source) if head.startswith(_GZIP) else source
             return
@@ -52,7 +52,7 @@ def opened(path: Path, *, folder: bool = False) -> Iterator[Source]:
             mend = (
                 "an FMU is a model: mrdamper check reads it" if source.suffix == ".fmu" else "rename it to .zip or .gz"
             )
-            raise source.refuse("E_FORMAT", f"the name says {source.suffix}, the content is a packed file", mend=mend)
+            raise source.refuse("E_FORMAT", f"the name says {source.suffix}, the content is a packed file", mend)
         if packed:
             source = _unzip(source) if head.startswith(b"PK") else _gunzip(source)
             _refuse_nested(source)
@@ -68,7 +68,7 @@ def opened_zip(path: Path) -> Iterator[Source]:
         yield Source(path, path.name, path.suffix.lower(), file, size, stack)
 
 
-def _at(path: Path) -> tuple[int, BinaryIO]:
+def _at(path: Path) -> tuple[int, IO[bytes]]:
     """Size of a file, and the file opened."""
     try:
         found = "is a folder" if path.is_dir() else "" if path.is_file() else "no such file"
@@ -131,7 +131,7 @@ def bomb(source: Source) -> RigFileError:
     return source.refuse(
         "E_ARCHIVE_RATIO",
         f"unpacks to over {MOST_RATIO} times its size, or over {MOST_UNPACKED // 10**9} GB",
-        mend="give the unpacked file",
+        "give the unpacked file",
     )
 
 
@@ -150,7 +150,7 @@ def _unzip(source: Source) -> Source:
         whole = isinstance(error, zipfile.BadZipFile) and _has_directory(source)
         if isinstance(error, zipfile.BadZipFile) and not whole:
             raise _cut(source) from error
-        raise source.refuse("E_ARCHIVE", f"damaged or unusual archive ({error})", mend="pack it again") from error
+        raise source.refuse("E_ARCHIVE", f"damaged or unusual archive ({error})", "pack it again") from error
     inner = member.filename
     return Source(source.path, f"{source.name}:{inner}", PurePosixPath(inner).suffix.lower(), file, size, source.keep)
 
@@ -161,10 +161,10 @@ def _one_member(source: Source, members: list[zipfile.ZipInfo]) -> zipfile.ZipIn
     files = [member for member in members if not member.is_dir()]
     if len(files) != 1:
         raise source.refuse(
-            "E_ARCHIVE", f"{len(files)} members", mend="read it as a folder: mrdamper import, or unpack it first"
+            "E_ARCHIVE", f"{len(files)} members", "read it as a folder: mrdamper import, or unpack it first"
         )
     if files[0].flag_bits & 1:
-        raise source.refuse("E_ARCHIVE", "the member is encrypted", mend="unpack it first")
+        raise source.refuse("E_ARCHIVE", "the member is encrypted", "unpack it first")
     return files[0]
 
 
@@ -177,12 +177,12 @@ def check_member(source: Source, name: str, *, link: bool) -> None:
         E_ARCHIVE, E_ARCHIVE_PATH.
     """
     if not name:
-        raise source.refuse("E_ARCHIVE", "a member without a name", mend="pack it again")
+        raise source.refuse("E_ARCHIVE", "a member without a name", "pack it again")
     parts = [*PurePosixPath(name).parts, *PureWindowsPath(name).parts]
     if ".." in parts or name.startswith(("/", "\\")) or PureWindowsPath(name).drive or "\0" in name:
-        raise source.refuse("E_ARCHIVE_PATH", f"member {name!a} leads out of the archive", mend="pack it again")
+        raise source.refuse("E_ARCHIVE_PATH", f"member {name!a} leads out of the archive", "pack it again")
     if link:
-        raise source.refuse("E_ARCHIVE", f"member {name!a} is a link", mend="pack the file itself")
+        raise source.refuse("E_ARCHIVE", f"member {name!a} is a link", "pack the file itself")
 
 
 def _gunzip(source: Source) -> Source:
@@ -191,7 +191,7 @@ def _gunzip(source: Source) -> Source:
     except EOFError as error:
         raise _cut(source) from error
     except zlib.error as error:
-        raise source.refuse("E_ARCHIVE", f"damaged archive ({error})", mend="pack it again") from error
+        raise source.refuse("E_ARCHIVE", f"damaged archive ({error})", "pack it again") from error
     inner = source.path.stem if source.suffix in (".gz", ".gzip") else source.path.name
     return Source(source.path, source.name, Path(inner).suffix.lower(), file, size, source.keep)
 
@@ -207,29 +207,30 @@ def _inflated(source: Source) -> Iterator[bytes]:
     rest = (decoder.unused_data + source.file.read(_PIECE)).lstrip(b"\0")
     if rest:
         found = "more than one member" if rest.startswith(_GZIP) else "bytes behind the archive's end"
-        raise source.refuse("E_ARCHIVE", found, mend="unpack it first")
+        raise source.refuse("E_ARCHIVE", found, "unpack it first")
 
 
-def _unpacked(source: Source, pieces: Iterable[bytes], packed: int) -> tuple[BinaryIO, int]:
-    target = Scratch(source.keep)
+def _unpacked(source: Source, pieces: Iterable[bytes], packed: int) -> tuple[IO[bytes], int]:
+    target, size = scratch(source.keep), 0
     for piece in pieces:
-        if target.size + len(piece) > min(MOST_UNPACKED, MOST_RATIO * packed):
+        size += len(piece)
+        if size > min(MOST_UNPACKED, MOST_RATIO * packed):
             raise bomb(source)
         target.write(piece)
-    target.file.seek(0)
-    return target.file, target.size
+    target.seek(0)
+    return target, size
 
 
 def _refuse_nested(source: Source) -> None:
     if source.size == 0:
-        raise source.refuse("E_EMPTY", "0 bytes", mend="copy or export the file again")
+        raise source.refuse("E_EMPTY", "0 bytes", "copy or export the file again")
     head = source.head()
     if head.startswith(_PACKED) or head[_TAR] == b"ustar" or is_plain_zip(source):
-        raise source.refuse("E_ARCHIVE", "an archive inside an archive", mend="unpack it first")
+        raise source.refuse("E_ARCHIVE", "an archive inside an archive", "unpack it first")
 
 
 def _cut(source: Source) -> RigFileError:
-    return source.refuse("E_TRUNCATED", "the archive ends early", mend="copy the file again")
+    return source.refuse("E_TRUNCATED", "the archive ends early", "copy the file again")
 
 
 def _has_directory(source: Source) -> bool:

@@ -58,7 +58,7 @@ def array_table(
         E_TOO_MANY_COLUMNS.
     """
     if len(names) > MOST_COLUMNS:
-        raise source.refuse("E_TOO_MANY_COLUMNS", f"{len(names)} columns", mend="export only the channels needed")
+        raise source.refuse("E_TOO_MANY_COLUMNS", f"{len(names)} columns", "export only the channels needed")
 
     def read(columns: Sequence[int]) -> Content:
         values = {}
@@ -69,9 +69,9 @@ def array_table(
         sizes = {v.size for v in values.values()}
         if len(sizes) > 1:
             shown = ", ".join(f"{names[c]}: {v.size}" for c, v in values.items())
-            raise source.refuse("E_FIELD_COUNT", f"columns differ in length ({shown})", mend="export them together")
+            raise source.refuse("E_FIELD_COUNT", f"columns differ in length ({shown})", "export them together")
         if not sizes or not max(sizes):
-            raise source.refuse("E_NO_DATA", "columns without samples", mend="export the file again")
+            raise source.refuse("E_NO_DATA", "columns without samples", "export the file again")
         return Content(values)
 
     def words(column: int) -> Words:
@@ -177,7 +177,7 @@ def check_unpacked(source: Source, size: int) -> None:
         raise source.refuse(
             "E_ARCHIVE_RATIO",
             f"{size / 1e6:.0f} MB of numbers in a file of {source.size / 1e6:.3g} MB",
-            mend="export only the channels and the time needed",
+            "export only the channels and the time needed",
         )
 
 
@@ -222,9 +222,7 @@ def refusing_damage(source: Source, title: str) -> Iterator[None]:
 
 def twice(source: Source, name: str) -> RigFileError:
     """The refusal of a file that holds two things of one name, of which a library gives either."""
-    return source.refuse(
-        "E_DUPLICATE_COLUMN", f"{name!r} is stored twice", mend="save the file again, with one of them"
-    )
+    return source.refuse("E_DUPLICATE_COLUMN", f"{name!r} is stored twice", "save the file again, with one of them")
 
 
 def damaged(source: Source, title: str, why: str) -> RigFileError:
@@ -233,7 +231,7 @@ def damaged(source: Source, title: str, why: str) -> RigFileError:
     why = re.sub(r"'?<[^<>]*>'?( is)? ?", "", why)  # objects of the library's own
     reason = "".join(c if c.isprintable() else " " for c in (why.strip().splitlines() or ["unreadable"])[0])[:120]
     return source.refuse(
-        "E_TRUNCATED" if early else "E_FORMAT", f"damaged {title} ({reason})", mend="copy or export the file again"
+        "E_TRUNCATED" if early else "E_FORMAT", f"damaged {title} ({reason})", "copy or export the file again"
     )
 
 

@@ -6,12 +6,13 @@ own, and gives named columns without deciding what they mean.
 
 from __future__ import annotations
 
+import tempfile
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import BinaryIO, ClassVar
+from typing import IO, ClassVar
 
 import numpy as np
 
@@ -24,6 +25,14 @@ MOST_COLUMNS = 1000
 MOST_UNPACKED = 10**9  # bytes
 MOST_RATIO = 100  # unpacked over packed
 RATIO_MATTERS_FROM = 24 * 2**20  # bytes a column of numbers may always unpack to: three copies fit a small file's share
+
+
+_IN_MEMORY = 32 * 2**20  # bytes
+
+
+def scratch(keep: ExitStack) -> IO[bytes]:
+    """Room for bytes that are unpacked or rewritten: in memory, and in an unnamed file once they are many."""
+    return keep.enter_context(tempfile.SpooledTemporaryFile(_IN_MEMORY, prefix="mrdamper-"))
 
 
 class RigFileError(InputError):
@@ -61,30 +70,14 @@ class NoTableError(RigFileError):
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """An opened file, unpacked where it was packed.
+    """An opened file, unpacked where it was packed."""
 
-    Attributes
-    ----------
-    path : Path
-        As the user gave it.
-    name : str
-        Shown in messages; names the member of an archive too.
-    suffix : str
-        Lower case, of the unpacked file.
-    file : binary file
-        Seekable, at its start.
-    size : int
-        Bytes after unpacking.
-    keep : ExitStack
-        Closes what readers opened when the file is closed.
-    """
-
-    path: Path
-    name: str
-    suffix: str
-    file: BinaryIO
-    size: int
-    keep: ExitStack = field(default_factory=ExitStack)
+    path: Path  # as the user gave it
+    name: str  # shown in messages; names the member of an archive too
+    suffix: str  # lower case, of the unpacked file
+    file: IO[bytes]  # seekable, at its start
+    size: int  # bytes after unpacking
+    keep: ExitStack = field(default_factory=ExitStack)  # closes what readers opened when the file is closed
 
     def head(self, size: int = 4096) -> bytes:
         """The first bytes; the file stands at its start afterwards."""
@@ -94,7 +87,7 @@ class Source:
         return start
 
     def refuse(
-        self, code: str, found: str, *, line: int | None = None, column: int | None = None, mend: str = ""
+        self, code: str, found: str, mend: str = "", *, line: int | None = None, column: int | None = None
     ) -> RigFileError:
         """A refusal that names this file."""
         return RigFileError(code, found, file=self.name, line=line, column=column, mend=mend)
@@ -102,84 +95,38 @@ class Source:
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """Columns that were asked for.
+    """Columns that were asked for."""
 
-    Attributes
-    ----------
-    values : mapping of int to (N,) array
-        By position of the column, NaN where a cell is missing.
-    lines : LineNumbers or None
-        For text.
-    findings : tuple of Finding
-    """
-
-    values: Mapping[int, Floats]
-    lines: LineNumbers | None = None
+    values: Mapping[int, Floats]  # (N,) by position of the column, NaN where a cell is missing
+    lines: LineNumbers | None = None  # for text
     findings: tuple[Finding, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Words:
-    """A column of words, each distinct one kept once.
+    """A column of words, each distinct one kept once."""
 
-    Attributes
-    ----------
-    codes : (N,) int array
-        Position in `labels` of every row's word.
-    labels : tuple of str
-        In the order they appear.
-    """
-
-    codes: np.ndarray
-    labels: tuple[str, ...]
+    codes: np.ndarray  # (N,) int, position in `labels` of every row's word
+    labels: tuple[str, ...]  # in the order they appear
 
 
 @dataclass(frozen=True, eq=False)
 class RawTable:
-    """Named columns of a file, read when they are asked for.
-
-    Attributes
-    ----------
-    source : Source
-    names : tuple of str
-        As the file has them; empty strings where it has none.
-    units : tuple of str
-        From a row or property of their own; empty where there is none.
-    read : callable
-        Takes the positions of columns, returns their `Content`.
-    line : int or None
-        Of the header.
-    label : str
-        Tells apart several tables of one file.
-    form : mapping
-        What was sniffed, in the words of `FileForm`.
-    fallback : bool
-        Looked at only if no other table of the file holds a test.
-    constants : mapping of str to float
-        Single numbers by name that the file holds beside the columns.
-    odd : tuple of str
-        One a column where it is known: what stands in it instead of numbers, else empty.
-    remarks : tuple of str
-        What the file says beside the columns: the lines above them, attributes, properties.
-    over : tuple of str
-        One a column where a row of titles stands above the names of columns.
-    words : callable, optional
-        Takes the position of a column, returns its `Words`.
-    """
+    """Named columns of a file, read when they are asked for; tuples hold one entry a column."""
 
     source: Source
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    read: Callable[[Sequence[int]], Content]
-    line: int | None = None
-    label: str = ""
-    form: Mapping[str, str | int] = field(default_factory=dict)
-    fallback: bool = False
-    constants: Mapping[str, float] = field(default_factory=dict)
-    odd: tuple[str, ...] = ()
-    remarks: tuple[str, ...] = ()
-    over: tuple[str, ...] = ()
-    words: Callable[[int], Words] | None = None
+    names: tuple[str, ...]  # as the file has them; empty strings where it has none
+    units: tuple[str, ...]  # from a row or property of their own; empty where there is none
+    read: Callable[[Sequence[int]], Content]  # takes the positions of columns
+    line: int | None = None  # of the header
+    label: str = ""  # tells apart several tables of one file
+    form: Mapping[str, str | int] = field(default_factory=dict)  # what was sniffed, in the words of `FileForm`
+    fallback: bool = False  # looked at only if no other table of the file holds a test
+    constants: Mapping[str, float] = field(default_factory=dict)  # single numbers the file holds beside the columns
+    odd: tuple[str, ...] = ()  # where it is known, what stands in a column instead of numbers, else empty
+    remarks: tuple[str, ...] = ()  # what the file says beside the columns: lines above them, attributes, properties
+    over: tuple[str, ...] = ()  # where a row of titles stands above the names of columns
+    words: Callable[[int], Words] | None = None  # takes the position of a column
 
 
 class Reader(ABC):

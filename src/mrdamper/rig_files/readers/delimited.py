@@ -132,7 +132,7 @@ def _read(stream: TextStream, layout: Layout, block: Block, columns: tuple[int, 
         line += chunk.count(b"\n")
     form.refuse_wrong()
     if not size:
-        raise stream.source.refuse("E_NO_DATA", "a header without data", mend="export the file again")
+        raise stream.source.refuse("E_NO_DATA", "a header without data", "export the file again")
     damaged = any(_ODD.search(name) for i, name in enumerate(layout.names) if i not in columns)
     if odd or damaged:
         text = f"bytes that are no {'UTF-8' if stream.encoding == 'utf-8' else 'ASCII'} in columns that are not needed"
@@ -204,7 +204,7 @@ def _without_cut_row(form: Form, block: Block) -> tuple[Block, tuple[Finding, ..
         cells = split(text, form.layout.separator)
     except csv.Error as error:
         raise stream.source.refuse(
-            "E_QUOTE", "a quote is not closed", line=line, mend="copy or export the file again"
+            "E_QUOTE", "a quote is not closed", "copy or export the file again", line=line
         ) from error
     if len(cells) < width or (len(cells) == width and not cells[-1]):
         raise field_count(form, len([c for c in cells if c]), line, True)

@@ -90,7 +90,7 @@ def hdf5_tables(source: Source, title: str) -> list[RawTable]:
         tables.append(_table(source, every, title, "", found.constants.get("", {}), fallback=True))
     if not tables:
         code, found = ("E_UNSAFE", f"only objects ({objects[0]})") if objects else ("E_NO_DATA", "no array of numbers")
-        raise source.refuse(code, found, mend="save the channels as arrays of numbers")
+        raise source.refuse(code, found, "save the channels as arrays of numbers")
     return tables
 
 
@@ -157,7 +157,7 @@ def _walk(group: Any, path: str, found: _Found) -> None:
             raise found.source.refuse(
                 "E_TOO_MANY_COLUMNS",
                 f"over {_MOST_OBJECTS} objects, or groups within groups without end",
-                mend="export fewer channels",
+                "export fewer channels",
             )
         link = group.get(name, getlink=True)
         if isinstance(link, (h5py.ExternalLink, h5py.SoftLink)):  # leads elsewhere, and is not followed
@@ -194,7 +194,7 @@ def _follow(references: Any, name: str, path: str, found: _Found) -> None:
         found.seen += 1
         item = references.file[reference] if reference else None
         if found.seen > _MOST_OBJECTS:
-            raise found.source.refuse("E_TOO_MANY_COLUMNS", f"over {_MOST_OBJECTS} objects", mend="export fewer")
+            raise found.source.refuse("E_TOO_MANY_COLUMNS", f"over {_MOST_OBJECTS} objects", "export fewer")
         inner = f"{path}_{number}" if cells > 1 and not cell else path
         if isinstance(item, h5py.Group):
             _walk(item, f"{inner}/{name}_{number}" if cell else f"{inner}/{name}", found)
@@ -250,7 +250,7 @@ def _attributes(item: Any) -> list[str]:
 def _columns(dataset: Any, name: str, path: str, found: _Found) -> list[tuple]:
     kind, source = dataset.dtype, found.source
     if dataset.external or dataset.is_virtual:
-        raise source.refuse("E_UNSAFE", f"{name!r} lies in another file", mend="export one whole file")
+        raise source.refuse("E_UNSAFE", f"{name!r} lies in another file", "export one whole file")
     if kind.hasobject:
         found.objects.append(name)
         return [(name, "", dataset, None)] if dataset.size > 1 else []

@@ -68,7 +68,7 @@ class Matlab(Reader):
         others = [name for name, _, kind in variables if kind in _OBJECTS]
         if not found.columns:
             code, what = ("E_UNSAFE", f"only objects ({others[0]})") if others else ("E_NO_DATA", "no array of numbers")
-            raise source.refuse(code, what, mend="save the channels as arrays of numbers")
+            raise source.refuse(code, what, "save the channels as arrays of numbers")
         for name in others:
             found.columns.setdefault("", {})[name] = np.empty(2, dtype=object)  # refused if it is asked for
         return [_table(source, columns, label, self.title, found) for label, columns in found.columns.items()]

@@ -28,7 +28,7 @@ class Mdf(Reader):
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """The groups as tables."""
         if source.head(8) == b"UnFinMF ":
-            raise source.refuse("E_TRUNCATED", "the measurement was not closed", mend="close it with its own program")
+            raise source.refuse("E_TRUNCATED", "the measurement was not closed", "close it with its own program")
         asammdf = load("asammdf", self.title)
         with refusing_damage(source, self.title):
             file = asammdf.MDF(source.path)
@@ -42,7 +42,7 @@ class Mdf(Reader):
             every = [place for group in places for place in group if place not in masters]
             tables.append(_table(source, file, every, self.title, fallback=True))
         if not tables:
-            raise source.refuse("E_NO_DATA", "no channels", mend="export the file again")
+            raise source.refuse("E_NO_DATA", "no channels", "export the file again")
         return tables
 
 
@@ -67,9 +67,10 @@ def _table(source: Source, file: Any, places: list, title: str, *, fallback: boo
         signal = file.get(name, group=group, index=index, ignore_invalidation_bits=True)
         if stamps and not any(np.array_equal(signal.timestamps, known) for known in stamps.values()):
             raise source.refuse(
-                "E_RASTER", f"channel {name!r} is recorded at other times than the others",
-                mend="export the channels with one raster",
-            )  # fmt: skip
+                "E_RASTER",
+                f"channel {name!r} is recorded at other times than the others",
+                "export the channels with one raster",
+            )
         stamps[group] = signal.timestamps
         samples = np.asarray(signal.samples)
         invalid = getattr(signal, "invalidation_bits", None)

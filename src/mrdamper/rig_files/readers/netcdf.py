@@ -38,7 +38,7 @@ class NetCdf(Reader):
             }
             remarks = [f"{name}: {_text(value)}"[:200] for name, value in file._attributes.items()]
         if not found:
-            raise source.refuse("E_NO_DATA", "no array of numbers", mend="export the file again")
+            raise source.refuse("E_NO_DATA", "no array of numbers", "export the file again")
         variables = list(found.values())
 
         def column_of(column: int) -> np.ndarray:

@@ -94,9 +94,10 @@ def _columns(source: Source) -> tuple[list[_Column], list[str], list[str]]:
                 shape, _, dtype = read(stream)
             if dtype.hasobject:
                 raise source.refuse(
-                    "E_UNSAFE", f"array {name!r} holds pickled objects, which run code when loaded",
-                    mend="save plain arrays of numbers",
-                )  # fmt: skip
+                    "E_UNSAFE",
+                    f"array {name!r} holds pickled objects, which run code when loaded",
+                    "save plain arrays of numbers",
+                )
             if int(np.prod(shape, dtype=object)) * dtype.itemsize > member.file_size:
                 raise damaged(source, Npz.title, f"array {name!r} is incomplete")
             if (
@@ -113,5 +114,5 @@ def _columns(source: Source) -> tuple[list[_Column], list[str], list[str]]:
             elif dtype.kind in "iuf" and np.prod(shape, dtype=object) == 1:
                 single.append(name)
     if not found:
-        raise source.refuse("E_NO_DATA", "no array of numbers", mend="save the channels as arrays")
+        raise source.refuse("E_NO_DATA", "no array of numbers", "save the channels as arrays")
     return found, single, worded

@@ -1,10 +1,12 @@
-"""Parquet."""
+"""Parquet, Feather and Arrow, by polars."""
 
 from __future__ import annotations
 
 import io
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cache
+from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -16,53 +18,78 @@ from mrdamper.rig_files.readers.base import RawTable, Reader, Source, Words
 if TYPE_CHECKING:
     import polars as pl
 
-_MAGIC = b"PAR1"
+_CALLS = (("read", "_schema"), ("scan", ""), ("read", ""))
 
 
-class Parquet(Reader):
-    """Tables of columns as polars, pandas, Spark and others write them."""
+class _Frame:
+    """A file of polars: one table of typed columns, between two marks."""
 
-    name = "parquet"
-    title = "Parquet"
-    suffixes = (".parquet", ".pq")
     library = "polars"
-    _warm: ClassVar[bool] = False
+    title: ClassVar[str]
+    short: ClassVar[str]  # what polars calls it
+    magic: ClassVar[bytes]
+    least: ClassVar[int]  # bytes of a whole file
+    given: ClassVar[type[bytes | io.BytesIO]]  # how polars is given the content
+    options: ClassVar[Mapping[str, bool]] = MappingProxyType({})
 
     def warm_up(self) -> None:
         """Start the threads and their allocators."""
-        import polars as pl
-
-        if not self._warm:
-            content = io.BytesIO()
-            pl.DataFrame({"x": [0.0]}).write_parquet(content)
-            pl.scan_parquet(content.getvalue()).select(pl.len()).collect()
-            pl.read_parquet(content.getvalue())
-            Parquet._warm = True
+        _warm()
 
     def recognises(self, source: Source) -> bool:
         """By the mark at the start."""
-        return source.head(4) == _MAGIC
+        return source.head(len(self.magic)) == self.magic
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """The one table."""
         import polars as pl
 
-        source.file.seek(max(0, source.size - 4))
-        if source.size < 12 or source.file.read(4) != _MAGIC:
+        source.file.seek(max(0, source.size - len(self.magic)))
+        if source.size < self.least or source.file.read(len(self.magic)) != self.magic:
             raise damaged(source, self.title, "the file ends early, truncated")
         source.file.seek(0)
         content = source.file.read()
+        schema_of, scan, read = (getattr(pl, f"{do}_{self.short}{what}") for do, what in _CALLS)
         with refusing_damage(source, self.title):
-            schema = pl.read_parquet_schema(content)
-            rows = pl.scan_parquet(content).select(pl.len()).collect().item() if len(schema) else 0
+            schema = schema_of(self.given(content))
+            rows = scan(self.given(content)).select(pl.len()).collect().item() if len(schema) else 0
 
         def loaded(name: str) -> pl.Series:
-            return pl.read_parquet(content, columns=[name], use_statistics=False).to_series()
+            return read(self.given(content), columns=[name], **self.options)[name]
 
-        return [frame_table(source, self.title, schema, rows, loaded)]
+        return [_table(source, self.title, schema, rows, loaded)]
 
 
-def frame_table(
+class Parquet(_Frame, Reader):
+    """Tables of columns as polars, pandas, Spark and others write them."""
+
+    name = short = "parquet"
+    title = "Parquet"
+    suffixes = (".parquet", ".pq")
+    magic, least, given = b"PAR1", 12, bytes
+    options = MappingProxyType({"use_statistics": False})
+
+
+class Feather(_Frame, Reader):
+    """Feather and Arrow files: tables of columns as pandas, R and others hand them on."""
+
+    name, short = "feather", "ipc"
+    title = "Feather"
+    suffixes = (".feather", ".arrow", ".ipc")
+    magic, least, given = b"ARROW1", 24, io.BytesIO
+
+
+@cache
+def _warm() -> None:
+    import polars as pl
+
+    content = io.BytesIO()
+    pl.DataFrame({"x": [0.0]}).write_parquet(content)
+    pl.scan_parquet(content.getvalue()).select(pl.len()).collect()
+    pl.read_parquet(content.getvalue())
+
+
+def _table(
     source: Source, title: str, schema: Mapping[str, pl.DataType], rows: int, loaded: Callable[[str], pl.Series]
 ) -> RawTable:
     """A table of typed columns, each loaded by its name when it is asked for.
@@ -75,7 +102,7 @@ def frame_table(
     import polars as pl
 
     if not rows:
-        raise source.refuse("E_NO_DATA", "no rows", mend="export the file again")
+        raise source.refuse("E_NO_DATA", "no rows", "export the file again")
     names = list(schema)
     check_unpacked(source, 8 * rows)
 

@@ -48,7 +48,7 @@ class Tdms(Reader):
             if group.channels()
         ]
         if not tables:
-            raise source.refuse("E_NO_DATA", "no channels", mend="export the file again")
+            raise source.refuse("E_NO_DATA", "no channels", "export the file again")
         return tables
 
 
@@ -63,9 +63,10 @@ def _table(source: Source, group: Any, properties: dict[str, Any], title: str) -
     if not timed and (len(steps) > 1 or len(begins) > 1):
         what = "steps" if len(steps) > 1 else "starts"
         raise source.refuse(
-            "E_RASTER", f"the channels of group {group.name!r} have different {what} of time",
-            mend="export them with one clock",
-        )  # fmt: skip
+            "E_RASTER",
+            f"the channels of group {group.name!r} have different {what} of time",
+            "export them with one clock",
+        )
     step = next(iter(steps), None)
     wave = step is not None and len(sizes) == 1 and not timed
     if wave:

@@ -12,9 +12,8 @@ from mrdamper.errors import InputError
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.archive import UNREADABLE_ZIP, check_sizes, is_workbook, zipped_names
 from mrdamper.rig_files.readers.arrays import damaged, load, refusing_damage
-from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
+from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source, scratch
 from mrdamper.rig_files.readers.delimited import DelimitedText
-from mrdamper.rig_files.readers.scratch import Scratch
 
 _COMPOUND = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"  # Excel up to 2003
 _FEWEST = 2  # columns of a test: a displacement and a force
@@ -65,7 +64,7 @@ class Workbook(Reader):
             found += [_labelled(table, name) for table in tables]
             beside += () if tables else sheet.head(_NOTES).decode("utf-8", "replace").splitlines()
         if not found:
-            raise first or source.refuse("E_NO_DATA", "no sheet holds data", mend="export the file again")
+            raise first or source.refuse("E_NO_DATA", "no sheet holds data", "export the file again")
         found = [replace(table, remarks=(*table.remarks, *beside)) for table in found]
         return found if len(found) > 1 else [replace(found[0], label="")]
 
@@ -81,9 +80,7 @@ def _sheets(source: Source, form: FileForm) -> list[tuple[str, Source]]:
     names = [sheet.name for sheet in book.sheets_metadata if sheet.typ == calamine.SheetTypeEnum.WorkSheet]
     if form.sheet is not None and form.sheet not in names:
         raise source.refuse(
-            "E_COLUMN",
-            f"no sheet {form.sheet!r} (found {', '.join(names)})",
-            mend="correct [file] sheet of the profile",
+            "E_COLUMN", f"no sheet {form.sheet!r} (found {', '.join(names)})", "correct [file] sheet of the profile"
         )
     texts = []
     for name in names if form.sheet is None else [form.sheet]:
@@ -91,19 +88,19 @@ def _sheets(source: Source, form: FileForm) -> list[tuple[str, Source]]:
         if text.size:
             texts.append((name, text))
     if not texts:
-        raise source.refuse("E_NO_DATA", "the sheets are empty", mend="export the file again")
+        raise source.refuse("E_NO_DATA", "the sheets are empty", "export the file again")
     return texts
 
 
 def _as_text(source: Source, title: str, rows: Iterable[list]) -> Source:
-    ragged = Scratch(source.keep)
+    ragged = scratch(source.keep)
     width, blank = 0, 0
     for number, row in enumerate(rows, 1):
         cells = [_shown(cell) for cell in row]
         while cells and not cells[-1]:
             cells.pop()
         if len(cells) > MOST_COLUMNS:
-            raise source.refuse("E_TOO_MANY_COLUMNS", f"{len(cells)} columns", line=number, mend="export fewer")
+            raise source.refuse("E_TOO_MANY_COLUMNS", f"{len(cells)} columns", "export fewer", line=number)
         if not cells:
             blank += 1
             continue
@@ -111,12 +108,12 @@ def _as_text(source: Source, title: str, rows: Iterable[list]) -> Source:
         ragged.write(b"\n" * blank)
         blank = 0
         ragged.write(("\t".join(cells) + "\n").encode("utf-8", "replace"))
-    file = Scratch(source.keep)
-    ragged.file.seek(0)
-    for line in ragged.file:  # trailing empty cells are not stored in a sheet: rows differ in width
+    file = scratch(source.keep)
+    ragged.seek(0)
+    for line in ragged:  # trailing empty cells are not stored in a sheet: rows differ in width
         cells = line.count(b"\t") + 1 if line.strip() else width
         file.write(line[:-1] + b"\t" * (width - cells) + b"\n")
-    return Source(source.path, f"{source.name}, sheet {title}", ".txt", file.file, file.size, source.keep)
+    return Source(source.path, f"{source.name}, sheet {title}", ".txt", file, file.tell(), source.keep)
 
 
 def _shown(cell: object) -> str:

@@ -75,8 +75,8 @@ def _units_below(stream: TextStream, layout: Layout, start: int, header_line: in
             raise stream.source.refuse(
                 "E_AMBIGUOUS",
                 f"the block from here on is in {', '.join(units)}, the first is in {', '.join(layout.units)}",
+                "split the file here, or export all blocks in one set of units",
                 line=header_line,
-                mend="split the file here, or export all blocks in one set of units",
             )
         size, lines = size + len(raw), lines + 1
     return size, lines

@@ -30,21 +30,11 @@ class Clock:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Rows:
-    """Cells of adjacent rows as numbers.
+    """Cells of adjacent rows as numbers."""
 
-    Attributes
-    ----------
-    values : dict of int to (N,) array
-        By column.
-    lines : (N,) array
-        Line of every row.
-    odd : bool
-        Whether a cell that was not asked for holds bytes that are not in the text's encoding.
-    """
-
-    values: dict[int, Floats]
-    lines: np.ndarray
-    odd: bool = False
+    values: dict[int, Floats]  # by column
+    lines: np.ndarray  # (N,), of every row
+    odd: bool = False  # a cell that was not asked for holds bytes that are not in the text's encoding
 
 
 @dataclass(eq=False, slots=True)
@@ -74,9 +64,7 @@ class Form:
         """
         errors = [self.wrong[place] for place in sorted(self.wrong, key=lambda place: (place[0] or 0, place[1] or 0))]
         if self.more:
-            errors.append(
-                self.stream.source.refuse(errors[-1].code, f"{self.more} more like these", mend=errors[-1].mend)
-            )
+            errors.append(self.stream.source.refuse(errors[-1].code, f"{self.more} more like these", errors[-1].mend))
         CombinedError.raise_from(errors)
 
 
@@ -130,17 +118,17 @@ def field_count(form: Form, found: int, line: int, final: bool) -> RigFileError:
         return form.stream.source.refuse(
             "E_TRUNCATED",
             f"the file ends inside a row: {found} of {width} fields",
+            "copy or export the file again, or remove the last line",
             line=line,
-            mend="copy or export the file again, or remove the last line",
         )
     comma = found > width and form.layout.separator == ","
     return form.stream.source.refuse(
         "E_FIELD_COUNT",
         f"{found} fields where the other rows have {width}",
-        line=line,
-        mend="correct this line; numbers with decimal commas need semicolons between the fields"
+        "correct this line; numbers with decimal commas need semicolons between the fields"
         if comma
         else "correct or remove this line",
+        line=line,
     )
 
 
@@ -166,7 +154,7 @@ def split_rows(texts: Sequence[str], line: int, form: Form, final: bool) -> tupl
             cells = split(text.rstrip("\r"), separator)
         except csv.Error as error:
             raise form.stream.source.refuse(
-                "E_QUOTE", "a quote is not closed, or text follows it", line=at, mend="close it or remove it"
+                "E_QUOTE", "a quote is not closed, or text follows it", "close it or remove it", line=at
             ) from error
         if len(cells) != width and (len(cells) != form.layout.width):
             wrong.append((at, len(cells)))
@@ -191,10 +179,15 @@ def _numbers(cells: Sequence[str], column: int, lines: Sequence[int], form: Form
         if value is None:
             form.note(_no_number(cell, column, lines[i], form))
         elif math.isinf(value):
-            form.note(form.stream.source.refuse(
-                "E_NONFINITE", f"{_shown(cell)} in {_named(form, column)} is beyond every number", line=lines[i],
-                column=column + 1, mend="export the channel again: an amplifier in overload is no measurement",
-            ))  # fmt: skip
+            form.note(
+                form.stream.source.refuse(
+                    "E_NONFINITE",
+                    f"{_shown(cell)} in {_named(form, column)} is beyond every number",
+                    "export the channel again: an amplifier in overload is no measurement",
+                    line=lines[i],
+                    column=column + 1,
+                )
+            )
         values[i] = math.nan if value is None else value
     return values
 
@@ -217,9 +210,9 @@ def _stamps(cells: Sequence[str], column: int, lines: Sequence[int], form: Form)
             raise form.stream.source.refuse(
                 "E_AMBIGUOUS",
                 "time stamps with and without a time zone",
+                "export all stamps with their offset, or none",
                 line=lines[i],
                 column=column + 1,
-                mend="export all stamps with their offset, or none",
             )
         values[i] = (read[0] - clock.first) / 1e9
     return values
@@ -232,10 +225,10 @@ def _no_number(cell: str, column: int, line: int, form: Form) -> RigFileError:
     return form.stream.source.refuse(
         "E_ENCODING" if strange else "E_NUMBER",
         f"{_shown(cell)} in {_named(form, column)} is no number",
+        f"write digits with a decimal {'comma' if form.layout.decimal == ',' else 'point'}, "
+        "without separators of thousands",
         line=line,
         column=column + 1,
-        mend=f"write digits with a decimal {'comma' if form.layout.decimal == ',' else 'point'}, "
-        "without separators of thousands",
     )
 
 

@@ -38,49 +38,25 @@ _GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """How a delimited text is laid out; lines count from one.
+    """How a delimited text is laid out; lines count from one, tuples hold one entry a column."""
 
-    Attributes
-    ----------
-    separator, decimal : str
-        A space stands for any run of spaces.
-    names, units : tuple of str
-        One a column; empty where there is none.
-    kinds : tuple of {"number", "stamp", "text"}
-        What the sampled cells look like.
-    header_line, units_line : int or None
-    data_line : int
-    trailing : bool
-        Whether every row ends with a separator.
-    header : str
-        The line of names as it stands, to find it again where it is repeated.
-    odd : tuple of str
-        One a column: a sampled cell of a column of kind "text", else empty.
-    remarks : tuple of str
-        The lines above the names of columns.
-    over : tuple of str
-        One a column where the line above the names holds titles of groups of columns.
-    writes : tuple of (str, str)
-        Signs that the file uses throughout and what they stand for: D for the E of exponents, a typographic minus.
-    behind : tuple of str
-        One a column where its numbers have a unit behind them: 12.3 mm.
-    """
-
-    separator: str
+    separator: str  # a space stands for any run of spaces
     decimal: str
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # empty where there is none, like units
     units: tuple[str, ...]
-    kinds: tuple[Kind, ...]
+    kinds: tuple[Kind, ...]  # what the sampled cells look like
     header_line: int | None
     units_line: int | None
     data_line: int
-    trailing: bool
-    header: str = ""
-    odd: tuple[str, ...] = ()
-    remarks: tuple[str, ...] = ()
-    over: tuple[str, ...] = ()
-    writes: tuple[tuple[str, str], ...] = ()
-    behind: tuple[str, ...] = ()
+    trailing: bool  # every row ends with a separator
+    header: str = ""  # the line of names as it stands, to find it again where it is repeated
+    odd: tuple[str, ...] = ()  # a sampled cell of a column of kind "text", else empty
+    remarks: tuple[str, ...] = ()  # the lines above the names of columns
+    over: tuple[str, ...] = ()  # where the line above the names holds titles of groups of columns
+    writes: tuple[
+        tuple[str, str], ...
+    ] = ()  # signs used throughout and what they stand for: D for E, a typographic minus
+    behind: tuple[str, ...] = ()  # where its numbers have a unit behind them: 12.3 mm
 
     @property
     def width(self) -> int:
@@ -115,7 +91,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         if again:
             first, width, trailing = _first_row(content, again, separator, source)
     if width > MOST_COLUMNS:
-        raise source.refuse("E_TOO_MANY_COLUMNS", f"{width} columns", line=first + 1, mend="is one sample one line?")
+        raise source.refuse("E_TOO_MANY_COLUMNS", f"{width} columns", "is one sample one line?", line=first + 1)
     rows = _rows(lines[first:], separator, width, trailing)
     decimal = form.decimal or _decimal(rows, separator, source, first)
     header, unit_row = _header_lines(lines, first, separator, width, source, form)
@@ -277,7 +253,7 @@ def _separator(lines: Sequence[str], content: Sequence[tuple[int, str]], source:
     last = [line for _, line in content[-_SAMPLE:]]
     if not last:
         raise source.refuse(
-            "E_NO_DATA", f"only remarks in the first {len(lines)} lines", mend="remove them, or export the data again"
+            "E_NO_DATA", f"only remarks in the first {len(lines)} lines", "remove them, or export the data again"
         )
     best, most = "", 0.0
     for separator in _SEPARATORS:
@@ -355,15 +331,15 @@ def _decimal(rows: Sequence[Sequence[str]], separator: str, source: Source, firs
         raise source.refuse(
             "E_AMBIGUOUS",
             f"{dots[0]!r} beside {commas[0]!r}: point or comma for decimals?",
+            "write one decimal mark throughout, without separators of thousands",
             line=first + 1,
-            mend="write one decimal mark throughout, without separators of thousands",
         )
     if commas and all(_GROUPED.fullmatch(c) for c in commas):
         raise source.refuse(
             "E_AMBIGUOUS",
             f"{commas[0]!r} may be a decimal comma or thousands",
+            'say decimal = "," or decimal = "." under [file] of a profile',
             line=first + 1,
-            mend='say decimal = "," or decimal = "." under [file] of a profile',
         )
     return "," if commas else "."
 
@@ -377,7 +353,7 @@ def _header_lines(
         units = form.units_line - 1 if form.units_line else None
         for index in (header, units):
             if index is not None and not 0 <= index < len(lines):
-                raise source.refuse("E_PROFILE", f"there is no line {index + 1}", mend="correct [file] of the profile")
+                raise source.refuse("E_PROFILE", f"there is no line {index + 1}", "correct [file] of the profile")
         return header, units
     plain = [i for i, line in enumerate(lines[:first]) if line.strip() and not is_comment(line)]
     marked = [i for i, line in enumerate(lines[:first]) if is_comment(line)]
@@ -412,7 +388,7 @@ def _refuse_open_quote(lines: Sequence[str], header: int | None, separator: str,
     try:
         split(lines[header], separator)
     except csv.Error as error:
-        raise source.refuse("E_QUOTE", "a quote is not closed", line=header + 1, mend="close or remove it") from error
+        raise source.refuse("E_QUOTE", "a quote is not closed", "close or remove it", line=header + 1) from error
 
 
 def _names_columns(line: str, separator: str) -> bool:
@@ -464,13 +440,13 @@ def _mismatch(
 ) -> RigFileError:
     if fields < names and not any(line.strip() for line in lines[first + 1 :]):
         found = f"the file ends inside its first row: {fields} of {names} fields"
-        return source.refuse("E_TRUNCATED", found, line=first + 1, mend="copy or export the file again")
+        return source.refuse("E_TRUNCATED", found, "copy or export the file again", line=first + 1)
     comma = separator == "," and fields > names
     return source.refuse(
         "E_AMBIGUOUS" if comma and fields % names == 0 else "E_FIELD_COUNT",
         f"{fields} fields under {names} names",
-        line=first + 1,
-        mend="decimal commas between commas cannot be told apart: export with semicolons or decimal points"
+        "decimal commas between commas cannot be told apart: export with semicolons or decimal points"
         if comma
         else "export the file again with one name a column",
+        line=first + 1,
     )

@@ -6,12 +6,11 @@ import codecs
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import BinaryIO
+from typing import IO
 
 from mrdamper.rig_files.column_names import role_of
 from mrdamper.rig_files.file_form import FileForm
-from mrdamper.rig_files.readers.base import RigFileError, Source
-from mrdamper.rig_files.readers.scratch import Scratch
+from mrdamper.rig_files.readers.base import RigFileError, Source, scratch
 
 LONGEST_LINE = 64 * 1024
 CHUNK = 8 * 2**20
@@ -32,27 +31,14 @@ _CTRL_Z = b"\x1a"
 
 @dataclass(frozen=True, eq=False)
 class TextStream:
-    """A text whose lines end with a line feed and whose separators are ASCII.
-
-    Attributes
-    ----------
-    source : Source
-    file : binary file
-        UTF-8 or a single-byte encoding.
-    encoding : str
-        To decode a line with.
-    start, stop : int
-        Bytes between which the text lies: no byte order mark, no end-of-file mark.
-    original_encoding : str
-        What the file itself is in.
-    """
+    """A text whose lines end with a line feed and whose separators are ASCII."""
 
     source: Source
-    file: BinaryIO
-    encoding: str
-    start: int
+    file: IO[bytes]  # UTF-8 or a single-byte encoding
+    encoding: str  # to decode a line with
+    start: int  # bytes between which the text lies: no byte order mark, no end-of-file mark
     stop: int
-    original_encoding: str
+    original_encoding: str  # what the file itself is in
 
     def decode(self, line: bytes) -> str:
         """A line as text; bytes that are no text become lone surrogates, which no number holds."""
@@ -111,14 +97,11 @@ class TextStream:
             raise self.source.refuse(
                 "E_NUL",
                 "zero bytes in the text",
+                "export the file again: it was damaged while it was written or copied",
                 line=line + block.count(b"\n", at, block.index(0)),
-                mend="export the file again: it was damaged while it was written or copied",
             )
         raise self.source.refuse(
-            "E_ENCODING",
-            f"byte 0x{strange[0]:02X}, which no text holds",
-            line=line,
-            mend="export the file again as text",
+            "E_ENCODING", f"byte 0x{strange[0]:02X}, which no text holds", "export the file again as text", line=line
         )
 
 
@@ -132,7 +115,7 @@ def open_text(source: Source, form: FileForm) -> TextStream:
     """
     head = source.head(_HEAD)
     if not head.strip(b" \t\r\n"):
-        raise source.refuse("E_EMPTY", "the file is empty", mend="export it again")
+        raise source.refuse("E_EMPTY", "the file is empty", "export it again")
     encoding, mark = _encoding(source, head, form)
     file, size, start = source.file, source.size, mark
     several = encoding.startswith(("utf-16", "utf-32")) or encoding in _MULTIBYTE
@@ -143,7 +126,7 @@ def open_text(source: Source, form: FileForm) -> TextStream:
         inner = encoding
     stop = _without_end_mark(file, size)
     if stop <= start:
-        raise source.refuse("E_EMPTY", "the file is empty", mend="export it again")
+        raise source.refuse("E_EMPTY", "the file is empty", "export it again")
     return TextStream(source, file, inner, start, stop, encoding)
 
 
@@ -152,8 +135,8 @@ def too_long(source: Source, line: int | None) -> RigFileError:
     return source.refuse(
         "E_LINE_TOO_LONG",
         f"a line over {LONGEST_LINE // 1024} KiB",
+        "write one sample a line; is this a text file?",
         line=line,
-        mend="write one sample a line; is this a text file?",
     )
 
 
@@ -167,7 +150,7 @@ def _encoding(source: Source, head: bytes, form: FileForm) -> tuple[str, int]:
             return codecs.lookup(form.encoding).name, 0
         except LookupError as error:
             raise source.refuse(
-                "E_PROFILE", f"no encoding is called {form.encoding!r}", mend="use utf-8, utf-16 or cp1252"
+                "E_PROFILE", f"no encoding is called {form.encoding!r}", "use utf-8, utf-16 or cp1252"
             ) from error
     start = head[:2048]
     if len(start) >= 8:
@@ -205,11 +188,11 @@ def _telling_words(text: bytes, encoding: str) -> int:
     return sum(not word.isascii() and role_of(word) is not None for word in words)
 
 
-def _as_utf8(source: Source, encoding: str, mark: int) -> tuple[BinaryIO, int]:
+def _as_utf8(source: Source, encoding: str, mark: int) -> tuple[IO[bytes], int]:
     """The text in UTF-8 with line feeds, in memory or, if large, in a temporary file."""
     source.file.seek(mark)
     decoder = codecs.getincrementaldecoder(encoding)()
-    target = Scratch(source.keep)
+    target = scratch(source.keep)
     line, carry = 1, ""
     while True:
         block = source.file.read(CHUNK)
@@ -219,18 +202,18 @@ def _as_utf8(source: Source, encoding: str, mark: int) -> tuple[BinaryIO, int]:
             raise source.refuse(
                 "E_ENCODING",
                 f"bytes that are no {encoding} ({error.reason})",
+                "export the file again, as UTF-8 if you can choose",
                 line=line,
-                mend="export the file again, as UTF-8 if you can choose",
             ) from error
         carry = "\r" if block and text.endswith("\r") else ""
         text = text[: len(text) - len(carry)].replace("\r\n", "\n").replace("\r", "\n")
         line += text.count("\n")
         target.write(text.encode("utf-8"))
         if not block:
-            return target.file, target.size
+            return target, target.tell()
 
 
-def _without_end_mark(file: BinaryIO, size: int) -> int:
+def _without_end_mark(file: IO[bytes], size: int) -> int:
     """Where the text ends: old programs close it with Ctrl-Z."""
     tail = max(0, size - 64)
     file.seek(tail)
