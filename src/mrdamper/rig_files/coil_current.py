@@ -9,12 +9,11 @@ import numpy as np
 from mrdamper.data import Floats, held_current
 from mrdamper.data.pieces import pieces
 from mrdamper.errors import ColumnError, InputError, printable
-from mrdamper.rig_files.column_names import names_condition, role_of, split_name
+from mrdamper.rig_files.column_names import names_condition, split_name
 from mrdamper.rig_files.conditions import Statement, agreed, contradicts, currents_in, stated_by_lines, stated_in_titles
 from mrdamper.rig_files.profile import Profile, current_in_name
 from mrdamper.rig_files.readers import RawTable
 from mrdamper.rig_files.record import Finding
-from mrdamper.rig_files.units import parse_unit
 
 _FEWEST_SLOW = 5  # samples of a current that is recorded more rarely than the force
 _FOLDERS = 3  # above a file, whose names may state its current
@@ -78,10 +77,9 @@ def _statements(table: RawTable, path: Path) -> list[Statement]:
 
 def _set_points(table: RawTable, rows: slice) -> list[Statement]:
     """What a column of the current that was asked for states, where it is one number."""
-    for column, (name, unit) in enumerate(zip(table.names, table.units, strict=True)):
-        bare, stated = split_name(name, unit)
-        known = parse_unit(stated) if stated else None
-        if known is None or known.dimension != "current" or not names_condition(bare, "current"):
+    for column, header in enumerate(table.headers):
+        known = header.known
+        if known is None or known.dimension != "current" or not names_condition(header.name, "current"):
             continue
         try:
             values = table.read([column]).values[column][rows]
@@ -89,7 +87,7 @@ def _set_points(table: RawTable, rows: slice) -> list[Statement]:
             continue
         low, high = np.nanmin(values), np.nanmax(values)
         if low == high:
-            return [Statement(known.factor * float(low), f"the column {name!r}")]
+            return [Statement(known.factor * float(low), f"the column {table.names[column]!r}")]
     return []
 
 
@@ -112,10 +110,9 @@ def held_current_of(table: RawTable) -> float | None:
     """Coil current [A] that a file holds as one number beside its columns, `current_A = 0.5`; None if it does not."""
     held = set()
     for name, value in table.constants.items():
-        name, unit = split_name(name)
-        known = parse_unit(unit) if unit else None
-        if known is not None and known.dimension == "current" and role_of(name) == "current" and np.isfinite(value):
-            held.add(known.factor * value)
+        header = split_name(name)
+        if header.known and header.dimension == header.role == "current" and np.isfinite(value):
+            held.add(header.known.factor * value)
     return held.pop() if len(held) == 1 else None
 
 

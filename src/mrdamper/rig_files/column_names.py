@@ -7,8 +7,9 @@ import unicodedata
 from collections.abc import Mapping
 from functools import lru_cache
 from types import MappingProxyType
+from typing import NamedTuple
 
-from mrdamper.rig_files.units import is_unit, parse_unit
+from mrdamper.rig_files.units import Unit, is_unit, parse_unit
 
 # Words of channel names in the languages rigs are operated in; the last that fits wins.
 WORDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
@@ -93,28 +94,55 @@ _LONGEST_NAME = 200  # beyond, it is no name, and matching it could take long
 _FUSED = re.compile(r"[ _.:-]+")
 
 
-def split_name(header: str, unit: str = "") -> tuple[str, str]:
+class Header(NamedTuple):
+    """What the header of a column says."""
+
+    name: str  # without the unit
+    unit: str
+
+    @property
+    def known(self) -> Unit | None:
+        """The unit, if it is known."""
+        return parse_unit(self.unit)
+
+    @property
+    def dimension(self) -> str | None:
+        """Of the unit, if it is known."""
+        return self.known.dimension if self.known else None
+
+    @property
+    def role(self) -> str | None:
+        """The channel the name stands for."""
+        return role_of(self.name)
+
+
+def split_name(header: str, unit: str = "") -> Header:
     """Name and unit of a column whose header may hold both: `force_N`, `Force [kN]`, `Kraft in kN`."""
     if len(header) > _LONGEST_NAME:
-        return header, unit
+        return Header(header, unit)
     text = unicodedata.normalize("NFKC", header).strip()
     if unit:
         match = _BRACKETED.match(text)
-        return (match["name"] if match and parse_unit(match["unit"]) else text), unit
+        return Header(match["name"] if match and parse_unit(match["unit"]) else text, unit)
     for pattern in (_BRACKETED, _SLASHED):
         match = pattern.match(text)
         if match and parse_unit(match["unit"].strip()):
-            return match["name"].strip(), match["unit"].strip()
+            return Header(match["name"].strip(), match["unit"].strip())
     # The longest tail that is a unit: velocity_m_s before velocity_m and s.
     for place in _FUSED.finditer(text):
         tail = text[place.end() :]
         if place.start() and is_unit(tail):
-            return text[: place.start()].strip(), tail
+            return Header(text[: place.start()].strip(), tail)
     name, slash, tail = text.partition("/")
     if slash and name and is_unit(tail) and not is_unit(text):
-        return name.strip(), tail.strip()
+        return Header(name.strip(), tail.strip())
     match = _BRACKETED.match(text)
-    return (match["name"].strip() or text if match else text), ""
+    return Header(match["name"].strip() or text if match else text, "")
+
+
+def words_of(name: str) -> list[str]:
+    """The words a name is made of: coil_current, coilCurrent, Coil current."""
+    return [word for word in re.split(r"[^\w]+|_|(?<=[a-zà-ÿ])(?=[A-Z])", name[:_LONGEST_NAME]) if word]
 
 
 @lru_cache(maxsize=4096)
@@ -122,7 +150,7 @@ def role_of(name: str) -> str | None:
     """The channel a name stands for, None if it says nothing or names a command."""
     if len(name) > _LONGEST_NAME:
         return None
-    words = [w for w in re.split(r"[^\w]+|_|(?<=[a-zà-ÿ])(?=[A-Z])", name) if w]
+    words = words_of(name)
     lower = [w.casefold().rstrip("0123456789") or w for w in words]
     if any(word in _NOT_MEASURED or word in _MADE or word in _ELSEWHERE for word in lower) or _FACTOR.search(name):
         return None
@@ -149,24 +177,22 @@ def _role_of_word(word: str) -> str | None:
 
 def names_coil(name: str) -> bool:
     """Whether a name says that a current is the coil's."""
-    return any(word.casefold() in _COIL for word in re.split(r"[^\w]+|_|(?<=[a-zà-ÿ])(?=[A-Z])", name[:_LONGEST_NAME]))
+    return any(word.casefold() in _COIL for word in words_of(name))
 
 
 def names_compression(name: str) -> bool:
     """Whether a name speaks of compression, which most rigs that do count positive."""
-    words = re.split(r"[^\w]+|_|(?<=[a-zà-ÿ])(?=[A-Z])", name[:_LONGEST_NAME])
-    return any(word.casefold().startswith(_COMPRESSION) for word in words if word)
+    return any(word.casefold().startswith(_COMPRESSION) for word in words_of(name))
 
 
 def names_made(name: str) -> bool:
     """Whether a name says that something is filtered, averaged or computed."""
-    return any(word.casefold() in _MADE for word in re.split(r"[^\w]+|_|(?<=[a-zà-ÿ])(?=[A-Z])", name[:_LONGEST_NAME]))
+    return any(word.casefold() in _MADE for word in words_of(name))
 
 
 def names_condition(key: str, role: str) -> bool:
     """Whether a line's or an attribute's name stands for a channel's value in the whole test, set or measured."""
-    words = [w for w in re.split(r"[^\w]+|_|(?<=[a-zà-ÿ])(?=[A-Z])", key[:_LONGEST_NAME]) if w]
-    kept = [word for word in words if word.casefold() not in _SET]
+    kept = [word for word in words_of(key) if word.casefold() not in _SET]
     return bool(kept) and role_of(" ".join(kept)) == role
 
 

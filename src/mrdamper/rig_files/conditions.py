@@ -112,10 +112,9 @@ def stated_rate(lines: Iterable[str], numbers: Mapping[str, float], decimal: str
     """
     stated = [(key, value, known) for line in lines for key, value, known in _quantities(line, decimal)]
     for name, number in numbers.items():
-        key, unit = split_name(name)
-        known = parse_unit(unit) if unit else None
-        if known is not None:
-            stated.append((key, known.factor * number, known))
+        header = split_name(name)
+        if header.known is not None:
+            stated.append((header.name, header.known.factor * number, header.known))
     rates = []
     for key, value, known in stated:
         if value > 0 and known.dimension == "frequency" and _RATE.search(key):
@@ -138,7 +137,7 @@ def _quantities(line: str, decimal: str | None) -> Iterator[tuple[str, float, Un
             continue
         key, unit = split_name(match["key"].strip().strip('"'))
         unit = match["unit"] or unit
-        known = parse_unit(unit) if unit else None
+        known = parse_unit(unit)
         value = _value(match["number"], decimal)
         if known is not None and value is not None:
             yield key, known.factor * value, known

@@ -11,12 +11,12 @@ from itertools import pairwise
 import numpy as np
 
 from mrdamper.data.pieces import pieces
-from mrdamper.rig_files.column_names import role_of, split_name
+from mrdamper.rig_files.column_names import role_of, words_of
 from mrdamper.rig_files.conditions import currents_in
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import Content, RawTable
 from mrdamper.rig_files.record import LineNumbers
-from mrdamper.rig_files.units import DIMENSION, parse_unit
+from mrdamper.rig_files.units import DIMENSION
 
 MOST_RUNS = 2000
 _FEWEST_ROWS = 5  # of a test, on average
@@ -63,8 +63,7 @@ def _run_column(table: RawTable, form: FileForm) -> int | None:
 
 
 def _names_runs(name: str) -> bool:
-    words = [w.casefold() for w in re.split(r"[^\w]+|_|(?<=[a-zà-ÿ])(?=[A-Z])", name[:60]) if w]
-    words = [word.rstrip("0123456789") for word in words]
+    words = [word.casefold().rstrip("0123456789") for word in words_of(name[:60])]
     return any(w in _RUN_WORDS for w in words) and all(w in _RUN_WORDS or w in _NUMBER_WORDS for w in words)
 
 
@@ -157,12 +156,10 @@ def _groups(table: RawTable, form: FileForm) -> list[RawTable]:
 def _members(table: RawTable) -> dict[str, dict[str, int]]:
     """By group its columns by channel, where displacement and force come as often as each other."""
     by_role: dict[str, list[tuple[int, str]]] = {}
-    for i, (name, unit) in enumerate(zip(table.names, table.units, strict=True)):
-        bare, unit = split_name(name, unit)
-        role = role_of(bare)
-        known = parse_unit(unit) if unit else None
-        if role is not None and (known is None or known.dimension == DIMENSION[role]):
-            by_role.setdefault(role, []).append((i, _key(bare, role)))
+    for i, header in enumerate(table.headers):
+        role = header.role
+        if role is not None and header.dimension in (None, DIMENSION[role]):
+            by_role.setdefault(role, []).append((i, _key(header.name, role)))
     moved, loads = by_role.get("displacement", []), by_role.get("force", [])
     if len(moved) < 2 or len(moved) != len(loads):
         return {}
@@ -199,7 +196,7 @@ def _shared(table: RawTable, members: dict[str, dict[str, int]]) -> list[int]:
     grouped = {i for roles in members.values() for i in roles.values()}
     shared = []
     for role in ("time", "current"):
-        columns = [i for i, name in enumerate(table.names) if role_of(split_name(name, table.units[i])[0]) == role]
+        columns = [i for i, header in enumerate(table.headers) if header.role == role]
         if len(columns) == 1 and columns[0] not in grouped:
             shared.append(columns[0])
     return shared

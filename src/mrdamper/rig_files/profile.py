@@ -142,15 +142,14 @@ class Profile(Table):
         for name, channel in channels.items():
             if name not in known:
                 raise ValueError(f"no channel is called {name!r}; known: {', '.join(known)}")
-            unit = parse_unit(channel.unit) if channel.unit else None
+            unit = parse_unit(channel.unit or "")
             if channel.unit and (unit is None or unit.dimension != DIMENSION[name]):
                 raise ValueError(f"{channel.unit!r} is no unit of {DIMENSION[name]} ({name})")
         return channels
 
-    @property
-    def current_is_given(self) -> bool:
-        """Whether the current comes from here rather than from a column."""
-        return self.current is not None
+    def channel(self, name: str) -> Channel:
+        """What is said of a channel."""
+        return self.channels.get(name, Channel())
 
 
 def load_profile(path: str | Path) -> Profile:

@@ -205,8 +205,7 @@ def _guess_channels(tables: list[RawTable], profile: Profile) -> tuple[RawTable,
         says = {"column": None if column is None else _column(table, column), "unit": unit or None}
         if name in ("displacement", "force") and column is not None and names_compression(table.names[column]):
             says = {"sign": -1, **says}
-        known = profile.channels.get(name)
-        stated = known.model_dump(exclude_unset=True, exclude_none=True) if known is not None else {}
+        stated = profile.channel(name).model_dump(exclude_unset=True, exclude_none=True)
         channels[name] = Channel(**{**says, **stated})
     return table, channels
 

@@ -14,14 +14,14 @@ from mrdamper.data.pieces import pieces
 from mrdamper.errors import ColumnError, InputError
 from mrdamper.motion.measured import smooth
 from mrdamper.rig_files.coil_current import as_data, constant, current_of, without_gaps
-from mrdamper.rig_files.column_names import role_of, split_name
+from mrdamper.rig_files.column_names import role_of
 from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, left_out, rate_of
 from mrdamper.rig_files.parts import stretches_of_time
 from mrdamper.rig_files.profile import Correction, Profile
 from mrdamper.rig_files.readers import RawTable, suffixes
 from mrdamper.rig_files.record import OPTIONAL, Finding, Record
 from mrdamper.rig_files.text.spool import rescale
-from mrdamper.rig_files.units import Unit, parse_unit
+from mrdamper.rig_files.units import Unit
 
 _KEPT = {"temperature": "C", "pressure": "Pa", "voltage": "V", "acceleration": "m_s2", "length": "m", "force": "N"}
 _SCALES = frozenset(("scale", "scaling", "gain", "factor", "sensitivity", "slope", "calibration", "lsb", "faktor"))
@@ -165,13 +165,12 @@ def _further(table: RawTable, found: dict[str, Assigned], size: int) -> dict[str
     """Second sensors of a kind, in SI, by their name and unit: kept, never identified from."""
     used = {entry.column for entry in found.values()}
     wanted: dict[str, tuple[int, Unit]] = {}
-    for column, (name, unit) in enumerate(zip(table.names, table.units, strict=True)):
-        bare, stated = split_name(name, unit)
-        known = parse_unit(stated) if stated else None
+    for column, header in enumerate(table.headers):
+        known = header.known
         if column in used or known is None or known.dimension not in _KEPT or len(wanted) >= _MOST_FURTHER:
             continue
-        key = f"{re.sub(r'[^A-Za-z0-9]+', '_', bare).strip('_')[:40].lower() or 'column'}_{_KEPT[known.dimension]}"
-        wanted.setdefault(key, (column, known))
+        bare = re.sub(r"[^A-Za-z0-9]+", "_", header.name).strip("_")[:40].lower() or "column"
+        wanted.setdefault(f"{bare}_{_KEPT[known.dimension]}", (column, known))
     values = _at_once(table, [column for column, _ in wanted.values()])
     return {
         key: rescale(values[column], unit.factor, unit.offset)
@@ -237,17 +236,10 @@ def _aligned(channels: dict[str, Floats], found: dict[str, Assigned], lines):
     return cut, None if lines is None else lines.part(inside.start, inside.stop)
 
 
-def _is_kept(name: str, unit: str) -> bool:
-    stated = split_name(name, unit)[1]
-    known = parse_unit(stated) if stated else None
-    return known is not None and known.dimension in _KEPT
-
-
 def _remarks(table: RawTable, found: dict[str, Assigned]) -> dict[str, str]:
     used = {entry.column for entry in found.values()}
-    ignored = [
-        name for i, name in enumerate(table.names) if i not in used and name and not _is_kept(name, table.units[i])
-    ]
+    known = [i for i, header in enumerate(table.headers) if header.dimension in _KEPT]
+    ignored = [name for i, name in enumerate(table.names) if name and i not in used and i not in known]
     taken = [f"{role} = {table.names[e.column] or f'column {e.column + 1}'} in {e.unit}" for role, e in found.items()]
     remarks = {"columns": ", ".join(taken)}
     if ignored:

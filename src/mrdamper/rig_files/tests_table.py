@@ -11,7 +11,7 @@ from pathlib import Path, PurePath
 
 from mrdamper.data import held_current
 from mrdamper.errors import CombinedError, InputError
-from mrdamper.rig_files.column_names import role_of, split_name
+from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.conditions import LARGEST_STATED, contradicts
 from mrdamper.rig_files.record import Record
 from mrdamper.rig_files.units import parse_unit
@@ -216,13 +216,13 @@ def _decoded(content: bytes) -> str:
 
 
 def _key(name: str) -> str:
-    bare = split_name(name)[0].casefold()
+    header = split_name(name)
+    bare = header.name.casefold()
     if bare in _FILE:
         return "file"
     if bare in _RUN:
         return "run"
-    role = role_of(split_name(name)[0])
-    return role if role in ("current", "temperature") else bare
+    return header.role if header.role in ("current", "temperature") else bare
 
 
 def _row(path: Path, line: int, cells: list[str], names: list[str], keys: list[str], problems: list[InputError]) -> Row:
@@ -252,8 +252,8 @@ def _row(path: Path, line: int, cells: list[str], names: list[str], keys: list[s
 
 def _quantity(path: Path, line: int, key: str, name: str, cell: str, problems: list[InputError]) -> float | None:
     match = _NUMBER.fullmatch(cell)
-    unit = (match[2] if match else "") or split_name(name)[1]
-    known = parse_unit(unit) if unit else None
+    unit = (match[2] if match else "") or split_name(name).unit
+    known = parse_unit(unit)
     if match is None:
         problems.append(_wrong(path, line, f"{name} is {cell!r}", "write a number"))
     elif known is None or known.dimension != key:

@@ -14,7 +14,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import InputError, MissingExtraError
-from mrdamper.rig_files.column_names import role_of, split_name
+from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.readers.base import (
     MOST_COLUMNS,
     MOST_RATIO,
@@ -146,7 +146,7 @@ def pick(array: np.ndarray, part: int | None) -> np.ndarray:
 def titles_of(width: int, texts: Iterable[Sequence[str]]) -> tuple[Sequence[str], Sequence[str]] | None:
     """Names and units of a matrix's columns, where lists of words beside it hold one a column; else None."""
     fitting = [words for words in texts if len(words) == width]
-    names = [words for words in fitting if sum(role_of(split_name(word)[0]) is not None for word in words) >= _TELLING]
+    names = [words for words in fitting if sum(split_name(word).role is not None for word in words) >= _TELLING]
     units = [words for words in fitting if 2 * sum(map(is_unit, words)) >= width and words not in names]
     if not names or any(other != names[0] for other in names):
         return None

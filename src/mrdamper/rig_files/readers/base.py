@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import IO, ClassVar
 
@@ -18,6 +19,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import InputError, printable
+from mrdamper.rig_files.column_names import Header, split_name
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.record import Finding, LineNumbers
 
@@ -127,6 +129,11 @@ class RawTable:
     remarks: tuple[str, ...] = ()  # what the file says beside the columns: lines above them, attributes, properties
     over: tuple[str, ...] = ()  # where a row of titles stands above the names of columns
     words: Callable[[int], Words] | None = None  # takes the position of a column
+
+    @cached_property
+    def headers(self) -> tuple[Header, ...]:
+        """What the header of every column says."""
+        return tuple(split_name(name, unit) for name, unit in zip(self.names, self.units, strict=True))
 
 
 class Reader(ABC):

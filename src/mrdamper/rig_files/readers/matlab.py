@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mrdamper.rig_files.column_names import role_of, split_name
+from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.arrays import (
     array_table,
@@ -130,7 +130,7 @@ def _gather(value: Any, name: str, label: str, found: _Found, depth: int = 0) ->
     elif kind == "O" and size and depth < _DEEPEST and all(np.asarray(item).dtype.names for item in array.flat):
         for number, item in enumerate(array.reshape(-1)[:MOST_STRUCTS], 1):
             _gather(item, f"{name}_{number}", label, found, depth + 1)
-    elif size > 1 and role_of(split_name(name)[0]) is None and (words := _words(array)):
+    elif size > 1 and split_name(name).role is None and (words := _words(array)):
         found.lists.setdefault(label, []).append(words)
     elif kind in "iufcO" and size > 1:
         found.columns.setdefault(label, {})[name] = array  # objects and complex numbers are refused if asked for

@@ -7,7 +7,7 @@ from itertools import groupby
 
 import numpy as np
 
-from mrdamper.rig_files.column_names import role_of, split_name
+from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.archive import UNREADABLE_ZIP, check_sizes, is_arrays, zipped_names
 from mrdamper.rig_files.readers.arrays import array_table, damaged, expand, pick, refusing_damage, titles_of, twice
@@ -100,11 +100,7 @@ def _columns(source: Source) -> tuple[list[_Column], list[str], list[str]]:
                 )
             if int(np.prod(shape, dtype=object)) * dtype.itemsize > member.file_size:
                 raise damaged(source, Npz.title, f"array {name!r} is incomplete")
-            if (
-                dtype.kind == "U"
-                and role_of(split_name(name)[0]) is None
-                and 1 < np.prod(shape, dtype=object) <= MOST_COLUMNS
-            ):
+            if dtype.kind == "U" and split_name(name).role is None and 1 < np.prod(shape, dtype=object) <= MOST_COLUMNS:
                 worded.append(name)
             elif dtype.names:
                 found += [(field, "", (name, field)) for field in dtype.names]

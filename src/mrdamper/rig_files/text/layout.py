@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
-from mrdamper.rig_files.column_names import role_of, split_name
+from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RigFileError, Source
 from mrdamper.rig_files.text.tokens import FORTRAN, MISSING, looks_numeric, stamp
@@ -177,7 +177,7 @@ def _below_preamble(lines: Sequence[str], first: int, separator: str) -> int:
 
 def _roles(cells: Sequence[str]) -> set[str | None]:
     """The channels that cells name."""
-    return {role_of(split_name(cell.strip('"'))[0]) for cell in cells[:MOST_COLUMNS] if cell} - {None}
+    return {split_name(cell.strip('"')).role for cell in cells[:MOST_COLUMNS] if cell} - {None}
 
 
 def _notes_beside(rows: Sequence[Sequence[str]]) -> tuple[str, ...]:
