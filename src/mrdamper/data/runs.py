@@ -347,9 +347,7 @@ class Run(Shown):
             raise RunError(f"{name} has {array.ndim} dimensions", where=self._where, mend="pass 1-D arrays")
         if size is not None and array.size != size:
             raise RunError(
-                f"{name} has {array.size} samples, time has {size}",
-                where=self._where,
-                mend="trim or resample the run",
+                f"{name} has {array.size} samples, time has {size}", where=self._where, mend="trim or resample the run"
             )
         bad = [at + i for at, piece in pieces(array) for i in np.flatnonzero(~np.isfinite(piece))]
         if bad:

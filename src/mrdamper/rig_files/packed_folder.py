@@ -13,14 +13,7 @@ from pathlib import Path, PurePosixPath
 from typing import IO
 
 from mrdamper.data.temporary import temporary_folder
-from mrdamper.rig_files.readers.archive import (
-    UNREADABLE_ZIP,
-    bomb,
-    check_member,
-    check_sizes,
-    opened,
-    opened_zip,
-)
+from mrdamper.rig_files.readers.archive import UNREADABLE_ZIP, bomb, check_member, check_sizes, opened, opened_zip
 from mrdamper.rig_files.readers.base import MOST_RATIO, MOST_UNPACKED, RigFileError, Source
 
 SUFFIXES = (".tar", ".tgz")
