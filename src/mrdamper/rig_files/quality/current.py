@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mrdamper.data import held_current
+from mrdamper.data import Floats, held_current
 from mrdamper.data.pieces import taken
 from mrdamper.rig_files.quality.motion import steady_window
 from mrdamper.rig_files.quality.view import View
@@ -32,12 +32,16 @@ def change_of(record: Record, window: tuple[float, float] | None) -> Iterator[Fi
 
 def held_in(record: Record, window: tuple[float, float] | None) -> tuple[float, str]:
     """Mean of a record's current within a window of time [A], NaN without three samples, and how it changes there."""
-    if record.current is None:
-        return np.nan, ""
+    current = np.empty(0) if record.current is None else current_in(record, window)
+    return held_current(current) if current.size >= 3 else (np.nan, "")
+
+
+def current_in(record: Record, window: tuple[float, float] | None) -> Floats:
+    """The current's samples that are there within a window of time, thinned where they are many."""
+    assert record.current is not None
     thinned = np.arange(0, record.time.size, max(1, record.time.size // _MOST))
     time, current = taken(record.time, thinned), taken(record.current, thinned)
     there = np.isfinite(current)
     if window is not None:
         there &= (time >= window[0]) & (time <= window[1])
-    current = current[there]
-    return held_current(current) if current.size >= 3 else (np.nan, "")
+    return current[there]
