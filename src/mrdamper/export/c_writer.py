@@ -8,11 +8,7 @@ from typing import ClassVar
 from mrdamper.tracing import Expression, Program
 from mrdamper.tracing.expression import PARAMETER, SAMPLE
 from mrdamper.tracing.program import Branch, Let, Repeat, Statement
-from mrdamper.tracing.text import Writer
-
-_FUNCTIONS = {"power": "pow", "absolute": "fabs", "arctan": "atan", "arctanh": "atanh"} | {
-    name: name for name in ("sqrt", "exp", "expm1", "log", "log1p", "tan", "tanh")
-}
+from mrdamper.tracing.text import FUNCTIONS, Writer
 
 
 class CWriter(Writer):
@@ -35,26 +31,11 @@ class CWriter(Writer):
     variable: ClassVar[str] = "real"
     counter: ClassVar[str] = "int"
     formats: ClassVar[Mapping[str, str]] = {
-        "add": "({} + {})",
-        "subtract": "({} - {})",
-        "multiply": "({} * {})",
-        "divide": "({} / {})",
-        "negative": "(-{})",
-        "sign": "signum({})",
-        "minimum": "lesser({}, {})",
-        "maximum": "greater({}, {})",
-        "less": "({} < {})",
-        "less_equal": "({} <= {})",
-        "greater": "({} > {})",
-        "greater_equal": "({} >= {})",
-        "equal": "({} == {})",
-        "not_equal": "({} != {})",
-        "logical_and": "({} && {})",
-        "logical_or": "({} || {})",
-        "logical_not": "(!{})",
-        "isfinite": "(isfinite({}) != 0)",
-        **{op: f"M({function})({{}})" for op, function in _FUNCTIONS.items()},
-        "power": "M(pow)({}, {})",
+        **Writer.formats,
+        **{op: f"M({function})({{}})" for op, function in FUNCTIONS.items()},
+        **{"power": "M(pow)({}, {})", "absolute": "M(fabs)({})", "isfinite": "(isfinite({}) != 0)"},
+        **{"sign": "signum({})", "minimum": "lesser({}, {})", "maximum": "greater({}, {})"},
+        **{"logical_and": "({} && {})", "logical_or": "({} || {})", "logical_not": "(!{})"},
     }
 
     def number(self, value: float) -> str:
@@ -114,22 +95,18 @@ class CWriter(Writer):
         return f"{self.answer if expression.logical else self.constant} {name}"
 
     def _branch(self, statement: Branch, indent: int) -> list[str]:
-        pad = "    " * indent
+        pad, text = "    " * indent, self.text
         condition, then, otherwise = statement.select.args
         name = self.name(statement.select)
-        lines = [] if self.member in name else [f"{pad}{self.variable} {name};"]
+        local = self.member not in name
         if not (statement.then or statement.otherwise):
-            lines.clear()
-            kind = "" if self.member in name else f"{self.constant} "
-            return [f"{pad}{kind}{name} = {self.text(condition)} ? {self.text(then)} : {self.text(otherwise)};"]
-        lines.append(f"{pad}if ({self.text(condition)}) {{")
-        lines += [*self._lines(statement.then, indent + 1), f"{pad}    {name} = {self.text(then)};", f"{pad}}} else {{"]
-        lines += [
-            *self._lines(statement.otherwise, indent + 1),
-            f"{pad}    {name} = {self.text(otherwise)};",
-            f"{pad}}}",
-        ]
-        return lines
+            kind = f"{self.constant} " if local else ""
+            return [f"{pad}{kind}{name} = {text(condition)} ? {text(then)} : {text(otherwise)};"]
+        lines = [f"{pad}{self.variable} {name};"] if local else []
+        lines.append(f"{pad}if ({text(condition)}) {{")
+        lines += [*self._lines(statement.then, indent + 1), f"{pad}    {name} = {text(then)};", f"{pad}}} else {{"]
+        lines += [*self._lines(statement.otherwise, indent + 1), f"{pad}    {name} = {text(otherwise)};"]
+        return [*lines, f"{pad}}}"]
 
     def _repeat(self, statement: Repeat, indent: int) -> list[str]:
         pad, loop = "    " * indent, statement.loop
@@ -137,14 +114,12 @@ class CWriter(Writer):
         counter = f"{carried[0]}_count"
         lines = [f"{pad}{self.counter} {counter};"]
         lines += [
-            f"{pad}{self.variable} {name} = {self.text(value)};"
-            for name, value in zip(carried, loop.start, strict=True)
+            f"{pad}{self.variable} {n} = {self.text(value)};" for n, value in zip(carried, loop.start, strict=True)
         ]
         lines.append(f"{pad}for ({counter} = 0; {counter} < {loop.most}; {counter}++) {{")
         lines += self._lines(statement.body, indent + 1)
-        lines.append(f"{pad}    {self.answer} going = {self.text(loop.going)};")
-        for name, value in zip(carried, loop.updates, strict=True):
-            lines.append(f"{pad}    {self.constant} next_{name} = {self.text(value)};")
-        lines += [f"{pad}    {name} = next_{name};" for name in carried]
-        lines += [f"{pad}    if (!going) {{", f"{pad}        break;", f"{pad}    }}", f"{pad}}}"]
-        return lines
+        inside = [f"{self.answer} going = {self.text(loop.going)};"]
+        inside += [f"{self.constant} next_{n} = {self.text(v)};" for n, v in zip(carried, loop.updates, strict=True)]
+        inside += [f"{name} = next_{name};" for name in carried]
+        inside += ["if (!going) {", "    break;", "}"]
+        return [*lines, *(f"{pad}    {line}" for line in inside), f"{pad}}}"]

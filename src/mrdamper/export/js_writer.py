@@ -6,9 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from mrdamper.export.c_writer import CWriter
-
-_SAME = ("sqrt", "exp", "expm1", "log", "log1p", "tan", "tanh")
-_FUNCTIONS = {**{name: name for name in _SAME}, "absolute": "abs", "arctan": "atan", "arctanh": "atanh"}
+from mrdamper.tracing.text import FUNCTIONS
 
 
 class JavaScriptWriter(CWriter):
@@ -21,8 +19,8 @@ class JavaScriptWriter(CWriter):
     counter: ClassVar[str] = "let"
     formats: ClassVar[Mapping[str, str]] = {
         **CWriter.formats,
-        **{op: f"Math.{function}({{}})" for op, function in _FUNCTIONS.items()},
-        "power": "Math.pow({}, {})",
+        **{op: f"Math.{function}({{}})" for op, function in FUNCTIONS.items()},
+        **{"power": "Math.pow({}, {})", "absolute": "Math.abs({})"},
         "equal": "({} === {})",
         "not_equal": "({} !== {})",
         "isfinite": "Number.isFinite({})",

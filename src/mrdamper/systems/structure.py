@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -88,56 +88,32 @@ class System:
         n = len(self.coordinates)
         for letter in "MCK":
             matrix = np.array(getattr(self, letter), dtype=float)
-            if matrix.shape != (n, n) or not np.isfinite(matrix).all():
-                raise StructureError(
-                    f"{letter} of shape {matrix.shape} for {n} coordinates, or not finite",
-                    where=self.name,
-                    mend="give one row and one column a coordinate",
-                )
-            if not np.allclose(matrix, matrix.T, rtol=0, atol=_SYMMETRY * max(np.abs(matrix).max(), 1e-300)):
-                raise StructureError(
-                    f"{letter} is not symmetric",
-                    where=self.name,
-                    mend="forces between two points are equal",
-                    code=f"E_{_CODES[letter]}",
-                )
+            found = f"{letter} of shape {matrix.shape} for {n} coordinates, or not finite"
+            fits = matrix.shape == (n, n) and bool(np.isfinite(matrix).all())
+            self._require(fits, found, "give one row and one column a coordinate", StructureError.code)
+            equal = np.allclose(matrix, matrix.T, rtol=0, atol=_SYMMETRY * max(np.abs(matrix).max(), 1e-300))
+            self._require(equal, f"{letter} is not symmetric", "forces between two points are equal", _CODES[letter])
             object.__setattr__(self, letter, matrix)
-        if np.linalg.eigvalsh(self.M).min() <= 0:
-            raise StructureError(
-                "M is not positive definite", where=self.name, mend="every coordinate needs a mass", code="E_MASS"
-            )
+        lowest = np.linalg.eigvalsh(self.M).min()
+        self._require(lowest > 0, "M is not positive definite", "every coordinate needs a mass", _CODES["M"])
         for letter in "CK":
             matrix = getattr(self, letter)
-            if np.linalg.eigvalsh(matrix).min() < -_SYMMETRY * max(np.abs(matrix).max(), 1e-300):
-                raise StructureError(
-                    f"{letter} has a negative eigenvalue: it gives energy away",
-                    where=self.name,
-                    mend="check the signs off the diagonal",
-                    code=f"E_{_CODES[letter]}",
-                )
-        if not (highest := float(self.frequencies_Hz().max(initial=0.0))) < _FASTEST:
-            raise StructureError(
-                f"a natural frequency of {highest:.3g} Hz",
-                where=self.name,
-                mend="check the units of masses and stiffnesses",
-                code="E_STIFFNESS",
-            )
+            keeps = np.linalg.eigvalsh(matrix).min() >= -_SYMMETRY * max(np.abs(matrix).max(), 1e-300)
+            found = f"{letter} has a negative eigenvalue: it gives energy away"
+            self._require(keeps, found, "check the signs off the diagonal", _CODES[letter])
+        highest = float(self.frequencies_Hz().max(initial=0.0))
+        found = f"a natural frequency of {highest:.3g} Hz"
+        self._require(highest < _FASTEST, found, "check the units of masses and stiffnesses", _CODES["K"])
         for link in self.links:
             for end in (link.above, link.below):
-                if end not in self.known:
-                    raise StructureError(
-                        f"{link.role} {link.name} hangs on {end!r}, which does not exist",
-                        where=self.name,
-                        mend=f"known: {', '.join(self.known)}",
-                        code="E_POINT",
-                    )
-            if link.above == link.below:
-                raise StructureError(
-                    f"{link.role} {link.name} hangs on {link.above!r} twice",
-                    where=self.name,
-                    mend="give two points",
-                    code="E_POINT",
-                )
+                found = f"{link.role} {link.name} hangs on {end!r}, which does not exist"
+                self._require(end in self.known, found, f"known: {', '.join(self.known)}", "E_POINT")
+            found = f"{link.role} {link.name} hangs on {link.above!r} twice"
+            self._require(link.above != link.below, found, "give two points", "E_POINT")
+
+    def _require(self, good: Any, found: str, mend: str, code: str) -> None:
+        if not good:
+            raise StructureError(found, where=self.name, mend=mend, code=code)
 
     @property
     def known(self) -> tuple[str, ...]:
@@ -174,7 +150,7 @@ class System:
         return np.sqrt(np.maximum(eigh(self.K, self.M, eigvals_only=True), 0.0)) / (2 * np.pi)
 
 
-_CODES = {"M": "MASS", "C": "DAMPING", "K": "STIFFNESS"}
+_CODES = {"M": "E_MASS", "C": "E_DAMPING", "K": "E_STIFFNESS"}
 
 
 def shear_building(
@@ -239,27 +215,9 @@ def quarter_car(
     stop : (float, float), optional
         Free travel either way [m] and stiffness [N/m] of bump stops.
     """
+    axle = _Axle("", "body", "wheel", "road", wheel, spring, damping, tyre, body)
     M = np.diag([body, wheel])
-    C, K = (np.array([[s, -s], [-s, s + t]]) for s, t in ((damping, tyre_damping), (spring, tyre)))
-    links = [Link("damper", "body", "wheel")]
-    if stop is not None:
-        links.append(Link("stop", "body", "wheel", "stop", stop[1], 0.0, stop[0]))
-    links.append(Link("tyre", "wheel", "road", "tyre", tyre, tyre_damping, (body + wheel) * gravity / tyre))
-    push = (np.array([[0.0], [tyre]]), np.array([[0.0], [tyre_damping]]))
-    spans = {"travel": ("body", "wheel"), "tyre": ("wheel", "road")}
-    return System(
-        name,
-        title or "quarter car",
-        ("body", "wheel"),
-        M,
-        C,
-        K,
-        ("road",),
-        None,
-        push,
-        links=tuple(links),
-        spans=spans,
-    )
+    return _car(name, title or "quarter car", M, ("body", "wheel"), {}, [axle], tyre_damping, stop, gravity)
 
 
 def half_car(
@@ -287,40 +245,63 @@ def half_car(
     wheels, springs, tyres : (float, float)
         Front and rear [kg], [N/m], [N/m].
     """
-    coordinates = ("body", "pitch", "wheel_front", "wheel_rear")
     corners = {"body_front": np.array([1.0, -front_arm, 0, 0]), "body_rear": np.array([1.0, rear_arm, 0, 0])}
-    M = np.diag([body, inertia, *wheels])
-    K, C = np.diag([0.0, 0.0, *tyres]), np.diag([0.0, 0.0, tyre_damping, tyre_damping])
+    length = front_arm + rear_arm
+    axles = [
+        _Axle("_front", "body_front", "wheel_front", "front", wheels[0], springs[0], 0.0, tyres[0],
+              rear_arm / length * body),
+        _Axle("_rear", "body_rear", "wheel_rear", "rear", wheels[1], springs[1], 0.0, tyres[1],
+              front_arm / length * body, behind=length),
+    ]  # fmt: skip
+    coordinates, M = ("body", "pitch", "wheel_front", "wheel_rear"), np.diag([body, inertia, *wheels])
+    return _car(name, title or "half car", M, coordinates, corners, axles, tyre_damping, stop, gravity)
+
+
+@dataclass(frozen=True)
+class _Axle:
+    """A wheel with what is above and below it; `load` of the body on it [kg], other units SI."""
+
+    suffix: str  # of the names of its links and spans
+    above: str
+    wheel: str
+    road: str
+    mass: float
+    spring: float
+    damping: float
+    tyre: float
+    load: float
+    behind: float = 0.0
+
+
+def _car(
+    name: str,
+    title: str,
+    M: Floats,
+    coordinates: tuple[str, ...],
+    corners: Mapping[str, Floats],
+    axles: Sequence[_Axle],
+    tyre_damping: float,
+    stop: tuple[float, float] | None,
+    gravity: float,
+) -> System:
+    n, q = len(coordinates), len(axles)
+    C, K, push = np.zeros((n, n)), np.zeros((n, n)), (np.zeros((n, q)), np.zeros((n, q)))
     links, spans = [], {}
-    push = (np.zeros((4, 2)), np.zeros((4, 2)))
-    share = (rear_arm / (front_arm + rear_arm), front_arm / (front_arm + rear_arm))
-    for i, end in enumerate(("front", "rear")):
-        travel = corners[f"body_{end}"].copy()
-        travel[2 + i] = -1.0
-        K += springs[i] * np.outer(travel, travel)
-        push[0][2 + i, i], push[1][2 + i, i] = tyres[i], tyre_damping
-        ends = (f"body_{end}", f"wheel_{end}")
-        links.append(Link(f"damper_{end}", *ends))
+    for i, axle in enumerate(axles):
+        at, ends, ground = n - q + i, (axle.above, axle.wheel), (axle.wheel, axle.road)
+        travel = np.array(corners.get(axle.above, np.eye(n)[0]))
+        travel[at] = -1.0
+        C[at, at], K[at, at] = C[at, at] + tyre_damping, K[at, at] + axle.tyre
+        C, K = C + axle.damping * np.outer(travel, travel), K + axle.spring * np.outer(travel, travel)
+        push[0][at, i], push[1][at, i] = axle.tyre, tyre_damping
+        links.append(Link(f"damper{axle.suffix}", *ends))
         if stop is not None:
-            links.append(Link(f"stop_{end}", *ends, "stop", stop[1], 0.0, stop[0]))
-        load = (share[i] * body + wheels[i]) * gravity
-        links.append(Link(f"tyre_{end}", ends[1], end, "tyre", tyres[i], tyre_damping, load / tyres[i]))
-        spans |= {f"travel_{end}": ends, f"tyre_{end}": (ends[1], end)}
-    return System(
-        name,
-        title or "half car",
-        coordinates,
-        M,
-        C,
-        K,
-        ("front", "rear"),
-        None,
-        push,
-        (0.0, front_arm + rear_arm),
-        tuple(links),
-        corners,
-        spans,
-    )
+            links.append(Link(f"stop{axle.suffix}", *ends, "stop", stop[1], 0.0, stop[0]))
+        sunk = (axle.load + axle.mass) * gravity / axle.tyre
+        links.append(Link(f"tyre{axle.suffix}", *ground, "tyre", axle.tyre, tyre_damping, sunk))
+        spans |= {f"travel{axle.suffix}": ends, f"tyre{axle.suffix}": ground}
+    channels, behind = tuple(axle.road for axle in axles), tuple(axle.behind for axle in axles)
+    return System(name, title, coordinates, M, C, K, channels, None, push, behind, tuple(links), corners, spans)
 
 
 def _chain(values: Sequence[float]) -> Floats:

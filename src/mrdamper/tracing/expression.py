@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.lib.mixins import NDArrayOperatorsMixin
 
 if TYPE_CHECKING:
     from mrdamper.tracing.tape import Tape
@@ -80,8 +81,8 @@ OPERATIONS: dict[str, Operation] = {
 _ALIASES = {"true_divide": "divide", "bitwise_and": "logical_and", "bitwise_or": "logical_or", "invert": "logical_not"}
 
 
-class Expression(Traced):
-    """One number at one sample; made by a `Tape`, never by hand.
+class Expression(NDArrayOperatorsMixin, Traced):
+    """One number at one sample; made by a `Tape`, never by hand. Its operators are NumPy's functions.
 
     Attributes
     ----------
@@ -119,71 +120,7 @@ class Expression(Traced):
     def __float__(self) -> float:
         raise TraceError(f"{self!r} is turned into a plain number; use NumPy's functions, not math's")
 
-    def __add__(self, other: Any) -> Any:
-        return self.tape.apply("add", self, other)
-
-    def __radd__(self, other: Any) -> Any:
-        return self.tape.apply("add", other, self)
-
-    def __sub__(self, other: Any) -> Any:
-        return self.tape.apply("subtract", self, other)
-
-    def __rsub__(self, other: Any) -> Any:
-        return self.tape.apply("subtract", other, self)
-
-    def __mul__(self, other: Any) -> Any:
-        return self.tape.apply("multiply", self, other)
-
-    def __rmul__(self, other: Any) -> Any:
-        return self.tape.apply("multiply", other, self)
-
-    def __truediv__(self, other: Any) -> Any:
-        return self.tape.apply("divide", self, other)
-
-    def __rtruediv__(self, other: Any) -> Any:
-        return self.tape.apply("divide", other, self)
-
-    def __pow__(self, other: Any) -> Any:
-        return self.tape.apply("power", self, other)
-
-    def __rpow__(self, other: Any) -> Any:
-        return self.tape.apply("power", other, self)
-
-    def __neg__(self) -> Any:
-        return self.tape.apply("negative", self)
-
-    def __abs__(self) -> Any:
-        return self.tape.apply("absolute", self)
-
-    def __lt__(self, other: Any) -> Any:
-        return self.tape.apply("less", self, other)
-
-    def __le__(self, other: Any) -> Any:
-        return self.tape.apply("less_equal", self, other)
-
-    def __gt__(self, other: Any) -> Any:
-        return self.tape.apply("greater", self, other)
-
-    def __ge__(self, other: Any) -> Any:
-        return self.tape.apply("greater_equal", self, other)
-
-    def __eq__(self, other: Any) -> Any:
-        return self.tape.apply("equal", self, other)
-
-    def __ne__(self, other: Any) -> Any:
-        return self.tape.apply("not_equal", self, other)
-
-    __hash__ = object.__hash__
-
-    def __and__(self, other: Any) -> Any:
-        return self.tape.apply("logical_and", self, other)
-
-    __rand__ = __and__
-
-    def __or__(self, other: Any) -> Any:
-        return self.tape.apply("logical_or", self, other)
-
-    __ror__ = __or__
+    __hash__ = object.__hash__  # type: ignore[assignment]
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
         name = _ALIASES.get(ufunc.__name__, ufunc.__name__)

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from mrdamper.tracing.expression import PARAMETER, SAMPLE, sign
 from mrdamper.tracing.program import Branch, Let, Program, Repeat, Statement
-from mrdamper.tracing.text import Writer
+from mrdamper.tracing.text import FUNCTIONS, Writer
 
 DONE, OUTSIDE = 0, 1  # outside: a question the trace settled has another answer here
 
@@ -17,35 +17,11 @@ class PythonWriter(Writer):
     """Python's words."""
 
     formats: ClassVar[Mapping[str, str]] = {
-        "add": "({} + {})",
-        "subtract": "({} - {})",
-        "multiply": "({} * {})",
-        "divide": "({} / {})",
-        "power": "math.pow({}, {})",
-        "negative": "(-{})",
-        "absolute": "abs({})",
-        "sign": "sign({})",
-        "sqrt": "math.sqrt({})",
-        "exp": "math.exp({})",
-        "expm1": "math.expm1({})",
-        "log": "math.log({})",
-        "log1p": "math.log1p({})",
-        "tan": "math.tan({})",
-        "arctan": "math.atan({})",
-        "tanh": "math.tanh({})",
-        "arctanh": "math.atanh({})",
-        "minimum": "min({}, {})",
-        "maximum": "max({}, {})",
-        "less": "({} < {})",
-        "less_equal": "({} <= {})",
-        "greater": "({} > {})",
-        "greater_equal": "({} >= {})",
-        "equal": "({} == {})",
-        "not_equal": "({} != {})",
-        "logical_and": "({} and {})",
-        "logical_or": "({} or {})",
-        "logical_not": "(not {})",
-        "isfinite": "math.isfinite({})",
+        **Writer.formats,
+        **{op: f"math.{function}({{}})" for op, function in FUNCTIONS.items()},
+        **{"power": "math.pow({}, {})", "absolute": "abs({})", "sign": "sign({})", "isfinite": "math.isfinite({})"},
+        **{"minimum": "min({}, {})", "maximum": "max({}, {})"},
+        **{"logical_and": "({} and {})", "logical_or": "({} or {})", "logical_not": "(not {})"},
     }
 
     def number(self, value: float) -> str:

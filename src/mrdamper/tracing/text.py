@@ -10,11 +10,19 @@ from mrdamper.tracing.expression import Expression
 from mrdamper.tracing.program import Program
 from mrdamper.tracing.tape import Loop
 
+FUNCTIONS = {name: name for name in ("sqrt", "exp", "expm1", "log", "log1p", "tan", "tanh")}
+FUNCTIONS |= {"arctan": "atan", "arctanh": "atanh"}  # as C, JavaScript and Python call them
+_MARKS = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}
+_MARKS |= {"less": "<", "less_equal": "<=", "greater": ">", "greater_equal": ">=", "equal": "==", "not_equal": "!="}
+
 
 class Writer(ABC):
     """Writes expressions of a program; a language says how operations and numbers look."""
 
-    formats: ClassVar[Mapping[str, str]]
+    formats: ClassVar[Mapping[str, str]] = {  # what C, JavaScript and Python write alike
+        **{op: f"({{}} {mark} {{}})" for op, mark in _MARKS.items()},
+        "negative": "(-{})",
+    }
 
     def __init__(self, program: Program):
         self.program = program

@@ -1,10 +1,12 @@
-"""Acceleration-driven damper: best for comfort above the body's resonance."""
+"""Acceleration-driven dampers: best for comfort above the body's resonance, mixed with skyhook for below."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from mrdamper.parameters import param
 from mrdamper.systems.controllers.base import Controller, Sight
 
 
@@ -25,3 +27,25 @@ class AccelerationDriven(Controller):
 
     def law(self, see: Sight) -> Any:
         return see.on_off(see("above", "acceleration") * see.stroke_rate > 0)
+
+
+@dataclass(frozen=True)
+class MixedSkyhookADD(Controller):
+    """Skyhook's rule where a² < α² v² of what stands on the damper, ADD's elsewhere; α = 2π f.
+
+    References
+    ----------
+    Savaresi and Spelta (2007), "Mixed sky-hook and ADD: approaching the filtering limits of a semi-active
+    suspension", ASME J. Dynamic Systems, Measurement and Control 129, 382–392.
+    """
+
+    name: ClassVar[str] = "sh-add"
+    title: ClassVar[str] = "mixed skyhook and ADD"
+    source: ClassVar[str] = "Savaresi and Spelta 2007"
+
+    crossover_Hz: float = param("Hz", "frequency at which the two rules change over", bounds=(0, math.inf), default=1.8)
+
+    def law(self, see: Sight) -> Any:
+        v, a = see("above", "velocity"), see("above", "acceleration")
+        slow = a * a <= (2 * math.pi * self.crossover_Hz) ** 2 * v * v
+        return see.on_off(see.tape.select(slow, v, a) * see.stroke_rate > 0)

@@ -24,6 +24,7 @@ class Input(ABC):
     title: ClassVar[str]
     kind: Literal["ground", "road"]
     speed_m_s: float = np.inf  # of travel along a road; without one every wheel meets it at once
+    length_s: float  # of a made input; a record has a `duration` of its own
 
     @classmethod
     def variants(cls) -> Mapping[str, Mapping[str, float]]:
@@ -31,9 +32,9 @@ class Input(ABC):
         return {}
 
     @property
-    @abstractmethod
     def duration(self) -> float:
         """Seconds it lasts."""
+        return self.length_s
 
     @property
     @abstractmethod

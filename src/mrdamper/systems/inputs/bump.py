@@ -29,10 +29,6 @@ class Bump(Input):
     length_s: float = param("s", "simulated", bounds=(0.1, 3600), default=4.0)
 
     @property
-    def duration(self) -> float:
-        return self.length_s
-
-    @property
     def step(self) -> float:
         return self.bump_m / self.speed_m_s / 40
 

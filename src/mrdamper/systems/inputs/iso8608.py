@@ -46,10 +46,6 @@ class Road(Input):
         return {f"iso8608-{letter}": {"roughness_m3": value} for letter, value in _CLASSES.items()}
 
     @property
-    def duration(self) -> float:
-        return self.length_s
-
-    @property
     def step(self) -> float:
         return 1 / (_POINTS_A_WAVE * HIGHEST * self.speed_m_s)
 

@@ -26,10 +26,6 @@ class Steps(Input):
     length_s: float = param("s", "simulated", bounds=(0.1, 3600), default=8.0)
 
     @property
-    def duration(self) -> float:
-        return self.length_s
-
-    @property
     def step(self) -> float:
         return self.rise_s / 20
 

@@ -31,10 +31,6 @@ class Sweep(Input):
     length_s: float = param("s", "of the sweep", bounds=(1, 3600), default=30.0)
 
     @property
-    def duration(self) -> float:
-        return self.length_s
-
-    @property
     def step(self) -> float:
         return 1 / (60 * max(self.lowest_Hz, self.highest_Hz))
 
