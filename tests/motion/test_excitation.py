@@ -69,6 +69,17 @@ def test_smoothing_returns_quadratics_exactly_even_on_uneven_samples():
     np.testing.assert_allclose(curvature, -10, atol=1e-5)
 
 
+def test_a_slope_made_of_rounding_is_zero():
+    """Its sign would be the machine's, and friction takes the sign of the velocity."""
+    t, half = np.arange(2400), 5
+    noise = np.random.default_rng(1).standard_normal(t.size)
+    counts = np.round(40 * np.sin(2 * np.pi * t / 201.3) + noise)  # a channel of 0.1 mm
+    exact = np.convolve(counts, np.arange(half, -half - 1, -1), "valid")  # in whole numbers
+    assert np.count_nonzero(exact == 0) >= 3
+    _, slope, _ = smooth(1e-3 * t, 1e-4 * counts, span=2 * half * 1e-3)
+    np.testing.assert_array_equal(np.sign(slope[half:-half]), np.sign(exact))
+
+
 def test_no_derivative_reaches_across_a_gap():
     t = np.concatenate([np.linspace(0, 1, 50), np.linspace(5, 6, 50)])
     x = np.concatenate([np.zeros(50), np.full(50, 0.01)])

@@ -13,6 +13,7 @@ from mrdamper.data import Floats, Run, once_per_run
 from mrdamper.motion.excitation import Excitation
 
 _UNIFORM = 1e-8  # spread of the sampling interval, relative, up to which it counts as one
+_ROUNDING = 4 * float(np.finfo(float).eps)  # of the largest value: a slope per sample below is made of rounding
 _CELLS = 4_000_000  # numbers of all windows that are held at a time
 
 
@@ -51,8 +52,16 @@ def smooth(time: Floats, signal: Floats, span: float | None = None) -> tuple[Flo
     spacing = float(time[-1] - time[0]) / (size - 1)
     half = int(np.clip(round(span / spacing / 2), 2, max((size - 1) // 2, 1)))
     width = min(2 * half + 1, size)
-    if width == 2 * half + 1 and np.ptp(np.diff(time)) < _UNIFORM * spacing:
-        return _smooth_uniform(signal, half, spacing)
+    uniform = width == 2 * half + 1 and np.ptp(np.diff(time)) < _UNIFORM * spacing
+    c = _fits_uniform(signal, half) if uniform else _fits(time, signal, half, width, spacing)
+    slope = c[:, 1]
+    slope[np.abs(slope) <= _ROUNDING * np.max(np.abs(signal), initial=0.0)] = 0.0  # else its sign is the machine's
+    return signal + c[:, 0], slope / spacing, 2 * c[:, 2] / spacing**2
+
+
+def _fits(time: Floats, signal: Floats, half: int, width: int, spacing: float) -> Floats:
+    """(N, 3) quadratics about each sample, in steps of the spacing, their values less the sample."""
+    size = signal.size
     windows = np.lib.stride_tricks.sliding_window_view
     c = np.empty((size, 3))
     for rows in _blocks(size, width):
@@ -63,7 +72,7 @@ def smooth(time: Floats, signal: Floats, span: float | None = None) -> tuple[Flo
         normal = np.stack([[np.sum(p * q, axis=1) for q in moments] for p in moments])
         right = np.stack([np.sum(p * values, axis=1) for p in moments])
         c[rows] = np.linalg.solve(normal.transpose(2, 0, 1), right.T[..., None])[..., 0]
-    return signal + c[:, 0], c[:, 1] / spacing, 2 * c[:, 2] / spacing**2
+    return c
 
 
 def _blocks(size: int, width: int) -> Iterator[slice]:
@@ -85,8 +94,8 @@ def whole_clock(time: Floats) -> Floats:
     return even if rounded else time
 
 
-def _smooth_uniform(signal: Floats, half: int, spacing: float) -> tuple[Floats, Floats, Floats]:
-    """The same fits where all windows are alike (Savitzky and Golay).
+def _fits_uniform(signal: Floats, half: int) -> Floats:
+    """The same where all windows are alike (Savitzky and Golay).
 
     Windows are taken relative to their sample and the two sides in pairs, so that a signal at rest, or
     one that turns symmetrically about a sample, has a slope of exactly zero there.
@@ -105,7 +114,7 @@ def _smooth_uniform(signal: Floats, half: int, spacing: float) -> tuple[Floats, 
         d0, d1, d2 = ((window - signal[away, None]) @ fit).T  # seen away from the middle of the window
         at = tau[:half] if away.start == 0 else tau[half + 1 :]
         c[away] = np.stack([d0 + at * (d1 + at * d2), d1 + 2 * at * d2, d2], axis=1)
-    return signal + c[:, 0], c[:, 1] / spacing, 2 * c[:, 2] / spacing**2
+    return c
 
 
 def _characteristic_period(time: Floats, signal: Floats) -> float:
