@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from hashlib import sha256
 from html import escape
 
@@ -93,9 +94,14 @@ def file_names(texts: Iterable[str]) -> dict[str, str]:
 def _csv_field(value: object) -> str:
     if value is None:
         return ""
-    if not isinstance(value, str):
-        return repr(value) if isinstance(value, float) else str(value)
-    text = csv_cell(value)
+    if isinstance(value, str):
+        return _csv_words(value)
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+@lru_cache(maxsize=256)  # names of rigs, runs and axes stand in every row
+def _csv_words(text: str) -> str:
+    text = csv_cell(text)
     return '"{}"'.format(text.replace('"', '""')) if re.search(r'[,"\n\r;\t]', text) else text
 
 

@@ -11,6 +11,7 @@ from mrdamper.report.plots.style import MM, PALETTE, house_style, label, new_fig
 from mrdamper.systems.result import Simulation
 
 _POINTS = 4000  # of a history that are drawn
+_LOOP_POINTS = 20_000  # of a loop, which crosses its chart more often
 
 
 def histories(runs: Mapping[str, Simulation]) -> Figure:
@@ -48,9 +49,10 @@ def spectra(runs: Mapping[str, Simulation]) -> Figure:
             f, density = welch(run.a[:, point], 1 / run.step, nperseg=size)
             inside = (f > 0) & (f < 60)
             left.loglog(f[inside], density[inside], color=colour, lw=0.9, label=title)
+            every = slice(None, None, -(-run.time.size // _LOOP_POINTS))
             for i, link in enumerate(run.links):
                 if link.role == "damper":
-                    right.plot(1e3 * run.stroke[:, i], run.force[:, i], color=colour, lw=0.5)
+                    right.plot(1e3 * run.stroke[every, i], run.force[every, i], color=colour, lw=0.5)
         left.legend(fontsize=6)
         label(left, "frequency (Hz)", "PSD of acceleration (m²/s³)", first.system.coordinates[point])
         label(right, "stroke (mm)", "force (N)", "damper")
