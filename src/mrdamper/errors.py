@@ -7,10 +7,23 @@ Anything that is not an `InputError` is our fault, not the user's.
 from __future__ import annotations
 
 import errno
+import inspect
+import math
 import re
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
+from contextlib import suppress
 from difflib import get_close_matches
+from functools import cache, wraps
+from numbers import Integral, Real
+from types import UnionType
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+Door = TypeVar("Door", bound=Callable[..., Any])
 
 
 def printable(text: str) -> str:
@@ -69,6 +82,95 @@ def require(value: object, kind: type | tuple[type, ...], wanted: str, mend: str
         raise InputError(f"a {type(value).__name__} in place of {wanted}", mend=mend, code="E_ARGUMENT")
 
 
+def checked(*but: str) -> Callable[[Door], Door]:
+    """Refuse at the door of a public function what its annotations do not allow: E_ARGUMENT.
+
+    Numbers have to be finite; sequences and mappings hold what they say; arrays, numbers. Of a
+    `Literal` only the kind is looked at.
+
+    Parameters
+    ----------
+    but : str
+        Arguments the function looks at itself.
+    """
+
+    def guard(function: Door) -> Door:
+        signature = inspect.signature(function)
+        kinds: dict[str, object] = {}
+
+        @wraps(function)
+        def call(*given: Any, **named: Any) -> Any:
+            if not kinds:  # names are known once all modules are read
+                kinds.update(get_type_hints(function))
+            for name, value in signature.bind(*given, **named).arguments.items():
+                if name in kinds and name not in but:
+                    _require_fit(name, value, kinds[name])
+            return function(*given, **named)
+
+        return cast("Door", call)
+
+    return guard
+
+
+def check_fields(owner: object, *names: str) -> None:
+    """Refuse fields of a dataclass, all or those named, that are not what it says they are; as `checked` does."""
+    kinds = _field_kinds(type(owner))
+    for name in names or kinds:
+        _require_fit(name, getattr(owner, name), kinds[name])
+
+
+@cache
+def _field_kinds(kind: type) -> dict[str, object]:
+    return get_type_hints(kind)
+
+
+def _require_fit(name: str, value: object, kind: object) -> None:
+    try:
+        fits = _fits(value, kind)
+    except (TypeError, ValueError, OverflowError):  # hostile objects, ragged arrays, numbers beyond all floats
+        fits = False
+    if not fits:
+        wanted = getattr(kind, "__name__", str(kind)).replace("typing.", "")
+        raise InputError(f"{name} is {shown(value)}", mend=f"give it as {wanted}", code="E_ARGUMENT")
+
+
+def _fits(value: Any, kind: Any) -> bool:
+    origin, inner = get_origin(kind), get_args(kind)
+    if "numpy._typing" in str(kind) or getattr(origin, "__module__", "") == "numpy":  # ArrayLike, NDArray
+        return is_series(value)
+    if origin in (Union, UnionType):
+        return any(_fits(value, one) for one in inner)
+    if kind is float:
+        return hasattr(value, "tape") or (isinstance(value, Real) and math.isfinite(value))
+    if kind is int:
+        return isinstance(value, Integral)
+    if origin is Literal:
+        return isinstance(value, str)
+    if origin is type:
+        return isinstance(value, type) and issubclass(value, inner)
+    if origin is None or not inner:
+        return not isinstance(kind, type) or isinstance(value, kind)
+    if not issubclass(origin, Iterable):  # a callable, or one of our own
+        return isinstance(value, origin)
+    if issubclass(origin, Mapping):
+        return isinstance(value, Mapping) and all(_fits(k, inner[0]) and _fits(v, inner[1]) for k, v in value.items())
+    wanted = Iterable if origin is Iterable else Collection
+    if isinstance(value, (str, bytes, Mapping)) or not isinstance(value, wanted):
+        return False
+    if not isinstance(value, Collection):
+        return True  # looked at while it is used up
+    each = inner[:1] * len(value) if origin is not tuple or inner[-1] is ... else inner
+    return len(each) == len(value) and all(map(_fits, value, each))
+
+
+def is_series(value: object) -> bool:
+    """Whether something is a number or an array of numbers, all finite."""
+    import numpy as np
+
+    array = np.asarray(value)
+    return array.dtype.kind in "biuf" and bool(np.isfinite(array).all())
+
+
 def numbers(*values: object) -> tuple[float, ...]:
     """Values as floats.
 
@@ -82,6 +184,28 @@ def numbers(*values: object) -> tuple[float, ...]:
     except (TypeError, ValueError, OverflowError) as error:
         what = f"not all numbers: {', '.join(map(shown, values))}"
         raise InputError(what, mend="give a number for each", code="E_ARGUMENT") from error
+
+
+def series(**given: Any) -> tuple[NDArray[np.float64], ...]:
+    """Arguments as (N,) arrays of finite numbers, all as long as the first; a single number holds throughout.
+
+    Raises
+    ------
+    InputError
+        E_ARGUMENT, naming the one that is none.
+    """
+    import numpy as np
+
+    found: list[NDArray[np.float64]] = []
+    for name, value in given.items():
+        with suppress(TypeError, ValueError, OverflowError):
+            if is_series(value) and np.ndim(value) <= 1:
+                size = found[0].shape if found else np.atleast_1d(value).shape
+                found.append(np.ascontiguousarray(np.broadcast_to(value, size), dtype=float))
+                continue
+        what = f"{name} is {shown(value)}"
+        raise InputError(what, mend="give finite numbers, as many as for the others", code="E_ARGUMENT")
+    return tuple(found)
 
 
 def shown(value: object) -> str:

@@ -19,7 +19,7 @@ from mrdamper.dampers.base import Damper, Envelope
 from mrdamper.dampers.causal import trace
 from mrdamper.dampers.joint import damper_of
 from mrdamper.data import Floats
-from mrdamper.errors import ExcitationError, ParameterError, UnknownNameError, numbers
+from mrdamper.errors import ExcitationError, ParameterError, UnknownNameError, numbers, require, series
 from mrdamper.models import Model
 from mrdamper.tracing import Program, Tape, program
 from mrdamper.tracing.python import python_functions, python_source
@@ -145,7 +145,7 @@ class Stepper:
         for name in values:
             if name not in self._parameters:
                 raise UnknownNameError.of("parameter", name, self._parameters)
-        wanted = {**self._parameters, **{name: float(value) for name, value in values.items()}}
+        wanted = {**self._parameters, **dict(zip(values, numbers(*values.values()), strict=True))}
         given = tuple(wanted.values())
         try:
             status, derived = self._prepare(given) if all(map(math.isfinite, given)) else (1, ())
@@ -169,14 +169,15 @@ class Stepper:
 
     @state.setter
     def state(self, values: Mapping[str, float]) -> None:
-        known = self.state
-        if values.keys() != known.keys() or not all(math.isfinite(v) for v in values.values()):
+        require(values, Mapping, "a state", "set what `state` gave")
+        known, found = self.state, dict(zip(values, numbers(*values.values()), strict=True))
+        if values.keys() != known.keys() or not all(map(math.isfinite, found.values())):
             raise ParameterError(
                 "a state of other names, or not finite", where=self.stream.title, mend="set what `state` gave"
             )
-        self._memory = tuple(float(values[name]) for name in self.stream.step.tape.memory)
+        self._memory = tuple(found[name] for name in self.stream.step.tape.memory)
         self._drive_memory = {
-            drive: tuple(float(values[f"{drive}.{name}"]) for name in made.tape.memory)
+            drive: tuple(found[f"{drive}.{name}"] for name in made.tape.memory)
             for drive, made in self.stream.drives.items()
         }
 
@@ -250,8 +251,10 @@ class Stepper:
         time, displacement, velocity, acceleration, current : (N,) arrays
             [s], [m], [m/s], [m/s²], [A].
         """
-        channels = [np.ascontiguousarray(c, dtype=float) for c in (displacement, velocity, acceleration, current)]
-        steps = np.diff(time, prepend=2 * time[0] - time[1])
+        t, *channels = series(
+            time=time, displacement=displacement, velocity=velocity, acceleration=acceleration, current=current
+        )
+        steps = steps_of(t)
         if self._compiled is None:
             rows = zip(*(channel.tolist() for channel in (*channels, steps)), strict=True)
             return np.array([self.step_motion(*row) for row in rows])
@@ -277,6 +280,20 @@ class Stepper:
     def source(self) -> str:
         """The program as Python."""
         return python_source(self.stream.step)
+
+
+def steps_of(time: Floats) -> Floats:
+    """(N,) steps [s] to each sample, the first as long as the second.
+
+    Raises
+    ------
+    ExcitationError
+        Unless time increases, over two samples at least.
+    """
+    steps = np.diff(time, prepend=2 * time[0] - time[1]) if time.size > 1 else np.zeros(1)
+    if not np.all(steps > 0):
+        raise ExcitationError("time does not increase", mend="sort the samples; two are the fewest")
+    return steps
 
 
 def stepper(damper: Damper | Model) -> Stepper:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from mrdamper.dampers.bands import band
 from mrdamper.dampers.base import Damper, Prediction
 from mrdamper.dampers.sessions import KNOWN, UNKNOWN, Expected, Reading, Sessions, When
 from mrdamper.data import Condition, Run, Shown, same_condition
-from mrdamper.errors import InputError, RunError, require
+from mrdamper.errors import InputError, RunError, UnknownNameError, checked, require
 from mrdamper.metrics import Scores, dissipated_power, peak_force, score
 
 
@@ -85,23 +85,37 @@ class Validation(Shown):
             "extrapolation": [" ".join(run.extrapolation) for run in self.runs],
         }
 
+    @checked()
     def median(self, name: str = "nrmse_pp") -> float:
         """Median of a score over the runs; signed errors count by magnitude."""
-        return float(np.median([abs(getattr(run.scores, name)) for run in self.runs])) if self.runs else float("nan")
+        return float(np.median(self._magnitudes(name))) if self.runs else float("nan")
 
+    @checked()
     def worst(self, name: str = "nrmse_pp") -> RunScore:
         """The run with the largest magnitude of a score."""
-        return max(self.runs, key=lambda run: abs(getattr(run.scores, name)))
+        magnitudes = self._magnitudes(name)
+        if not magnitudes:
+            raise RunError("no run was scored", where=self.title, mend="see `refused`")
+        return self.runs[int(np.argmax(magnitudes))]
 
+    @checked()
     def worst_error(self, name: str = "nrmse_pp") -> float:
         """Its magnitude in that run; NaN without runs."""
-        return abs(float(getattr(self.worst(name).scores, name))) if self.runs else float("nan")
+        return max(self._magnitudes(name), default=float("nan"))
 
+    def _magnitudes(self, name: str) -> list[float]:
+        known = [one.name for one in fields(Scores)]
+        if name not in known:
+            raise UnknownNameError.of("score", name, known)
+        return [abs(float(getattr(run.scores, name))) for run in self.runs]
+
+    @checked()
     def only(self, run_ids: Collection[str]) -> Validation:
         """The scores of some runs."""
         return replace(self, runs=tuple(run for run in self.runs if run.run_id in run_ids))
 
 
+@checked("damper")
 def validate(
     damper: Damper, runs: Iterable[Run], title: str | None = None, *, known: Sessions | None = None
 ) -> Validation:
@@ -136,7 +150,6 @@ def validate(
     """
     if not hasattr(damper, "predict_run"):
         require(damper, Damper, "a damper", "load_model(file) gives one")
-    require(runs, Iterable, "runs", "give a dataset or a list of runs")
     scored, refused = [], {}
     for run in runs:
         require(run, Run, "a run")

@@ -19,7 +19,7 @@ from mrdamper.dampers.causal import SLACK, causal_force
 from mrdamper.dampers.certainty import Certainty, OwnNumber, table
 from mrdamper.dampers.coil import Coil
 from mrdamper.data import Condition, Floats, Run, Shown
-from mrdamper.errors import InputError, require
+from mrdamper.errors import InputError, checked
 from mrdamper.functions.forms import ParameterFunction
 from mrdamper.models import Model
 from mrdamper.motion import Excitation, equivalent_sine, measured_motion
@@ -329,11 +329,13 @@ class Damper(Shown):
         """
         raise not_held(self, values)
 
+    @checked()
     def loop(self, condition: Condition) -> Response:
         """Steady loop at a condition, one closed cycle."""
         at = replace(condition, current_A=abs(condition.current_A))
         return steady_loop(self.model_at(at), at)
 
+    @checked()
     def force_along(self, motion: Excitation, condition: Condition) -> Floats:
         """Force [N] along a motion about mid-stroke that amounts to a condition."""
         at = replace(condition, current_A=abs(condition.current_A))
@@ -345,12 +347,13 @@ class Damper(Shown):
             return motion.with_current(np.abs(motion.current))
         return motion.with_current(self.coil.along(motion.time, motion.current))
 
+    @checked()
     def predict(self, condition: Condition) -> Prediction:
         """Steady loop at a condition, with its flags."""
-        require(condition, Condition, "a condition", "give Condition(current_A=…, frequency_Hz=…, amplitude_m=…)")
         response = self.loop(condition)
         return Prediction(response.excitation, response.force, condition, self.envelope.flags(condition), steady=True)
 
+    @checked()
     def predict_run(self, run: Run) -> Prediction:
         """Force along the measured motion of a run, with its flags. The measured force is not looked at.
 
@@ -358,7 +361,6 @@ class Damper(Shown):
         of one current. Otherwise they follow the sine that the motion has resembled so far: an
         approximation, flagged as such, and the force that a stream of the damper gives.
         """
-        require(run, Run, "a run")
         found = equivalent_sine(run)
         motion = measured_motion(run).about(found.centre)
         if found.is_sine and not run.current_changes:

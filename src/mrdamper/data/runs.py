@@ -26,6 +26,8 @@ from mrdamper.errors import (
     RunError,
     TimeOrderError,
     UnknownNameError,
+    check_fields,
+    checked,
     printable,
     require,
     shown,
@@ -206,6 +208,8 @@ class Run(Shown):
     notes: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        check_fields(self, "excitation", "nominal", "window", "repeatability", "segments", "notes")
+        require(self.further, Mapping, "further channels", 'give {"temperature_C": array, ...}')
         for what, name in (("id", self.id), ("rig", self.rig)):
             require_name(what, name)
         time = self._channel("time", self.time)
@@ -223,8 +227,7 @@ class Run(Shown):
                 mend="sort the samples or drop the repeated ones",
             )
         channels = {name: self._channel(name, getattr(self, name), size) for name in ("displacement", "force")}
-        current = np.full(size, self.current) if np.ndim(self.current) == 0 else self.current
-        channels["current"] = self._channel("current", current, size)
+        channels["current"] = self._channel("current", self.current, size)
         if self.velocity is not None:
             channels["velocity"] = self._channel("velocity", self.velocity, size)
         for name, value in {"time": time, **channels}.items():
@@ -236,8 +239,8 @@ class Run(Shown):
                     mend="trim or resample the run",
                 )  # fmt: skip
         object.__setattr__(self, "further", {name: np.asarray(v, dtype=float) for name, v in self.further.items()})
-        if self.split not in ("train", "validate"):
-            raise RunError(f"split is {self.split!r}", where=self._where, mend="use train or validate")
+        if not isinstance(self.split, str) or self.split not in ("train", "validate"):
+            raise RunError(f"split is {shown(self.split)}", where=self._where, mend="use train or validate")
         object.__setattr__(self, "segments", tuple(self.segments) or ((0, size),))
         object.__setattr__(self, "notes", dict(self.notes))
 
@@ -317,6 +320,7 @@ class Run(Shown):
             )
         return self.part(int(inside[0]), int(inside[-1]) + 1)
 
+    @checked()
     def part(self, start: int, stop: int) -> Run:
         """The samples start..stop-1 as a run of their own."""
         inner = [(max(a, start) - start, min(b, stop) - start) for a, b in self.segments]
@@ -341,6 +345,8 @@ class Run(Shown):
             if given.dtype.kind not in "biuf":
                 raise ValueError
             array = given.astype(np.float64, copy=False)
+            if name == "current" and given.ndim == 0 and size is not None:
+                array = np.full(size, array)
         except (TypeError, ValueError):
             raise RunError(f"{name} is no array of numbers", where=self._where, mend="pass 1-D arrays") from None
         if array.ndim != 1:
@@ -486,10 +492,8 @@ class Dataset(Shown):
     name: str = "dataset"
 
     def __post_init__(self) -> None:
-        require(self.runs, Iterable, "runs", "give Dataset([run, ...], name)")
-        object.__setattr__(self, "runs", tuple(self.runs))
-        for run in self.runs:
-            require(run, Run, "a run of a dataset")
+        object.__setattr__(self, "runs", tuple(self.runs) if np.iterable(self.runs) else self.runs)
+        check_fields(self, "runs", "name")
         if not self.runs:
             raise RunError("no runs", where=f"dataset {self.name}", mend="give at least one")
         seen: set[str] = set()
@@ -526,8 +530,8 @@ class Dataset(Shown):
     def __len__(self) -> int:
         return len(self.runs)
 
+    @checked()
     def __getitem__(self, run_id: str) -> Run:
-        require(run_id, str, "the name of a run")
         for run in self.runs:
             if run.id == run_id:
                 return run
@@ -538,17 +542,19 @@ class Dataset(Shown):
         """Names of the rigs, in order of appearance."""
         return tuple(dict.fromkeys(run.rig for run in self.runs))
 
+    @checked()
     def rig(self, name: str) -> Dataset:
         """The runs of one rig."""
-        require(name, str, "the name of a rig")
         if name not in self.rigs:
             raise UnknownNameError.of("rig", name, self.rigs)
         return self.only([run for run in self.runs if run.rig == name], name=name or self.name)
 
+    @checked()
     def split(self, split: Split) -> tuple[Run, ...]:
         """The runs of one split."""
         return tuple(run for run in self.runs if run.split == split)
 
-    def only(self, runs: Sequence[Run], name: str | None = None) -> Dataset:
+    @checked()
+    def only(self, runs: Iterable[Run], name: str | None = None) -> Dataset:
         """The same dataset with these runs only."""
         return Dataset(tuple(runs), name or self.name)

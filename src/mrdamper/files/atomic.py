@@ -24,6 +24,7 @@ from mrdamper.data.temporary import temporary_folder
 from mrdamper.errors import OutputError, resource_error, shown
 
 MADE = "made.json"  # which files of a folder are a result's, and what differs from run to run: times
+_LONGEST_NAME = 255  # bytes, of a file or folder
 _FEW = 200  # foreign files of a folder that are carried over into its successor
 _ELSEWHERE = "choose a folder you may write to"
 
@@ -36,8 +37,11 @@ def path_of(path: object) -> Path:
     OutputError
         E_PATH if it is none.
     """
-    if isinstance(path, str | os.PathLike) and "\0" not in os.fspath(path):
-        return Path(path)
+    if isinstance(path, str | os.PathLike):
+        with contextlib.suppress(UnicodeEncodeError):
+            parts = os.fsencode(path).split(os.sep.encode())
+            if b"\0" not in os.fsencode(path) and max(map(len, parts)) <= _LONGEST_NAME:
+                return Path(path)
     raise OutputError(f"{shown(path)} is no path", mend="give the name of a file or folder", code="E_PATH")
 
 
@@ -57,7 +61,7 @@ def write_folder(folder: str | Path, *, replace: bool = False) -> Iterator[Path]
         with write_into(folder) as work:
             yield work
         return
-    final = Path(folder)
+    final = path_of(folder)
     _require_absent(final)
     with _beside(final) as work:
         yield work
@@ -78,7 +82,7 @@ def write_into(folder: str | Path) -> Iterator[Path]:
     OutputError
         If the folder cannot be made or written to.
     """
-    final = Path(folder)
+    final = path_of(folder)
     with _beside(final) as work:
         yield work
         _sync(work)

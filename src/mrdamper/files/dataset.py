@@ -16,7 +16,7 @@ import numpy as np
 
 from mrdamper.data import Condition, Dataset, Floats, Run
 from mrdamper.data.pieces import pieces, release
-from mrdamper.errors import ColumnError, DatasetError
+from mrdamper.errors import ColumnError, DatasetError, OutputError, checked, shown
 from mrdamper.files.atomic import path_of, write_file, write_folder
 from mrdamper.files.encoding import csv_text, csv_value
 from mrdamper.files.samples import OPTIONAL, REQUIRED, SAMPLE_FILES, Channels, missing_column, read_samples
@@ -64,8 +64,9 @@ def load_dataset(folder: str | Path | None = None) -> Dataset:
     return _load(folder, folder.name or str(folder))
 
 
+@checked("dataset")
 def save_dataset(
-    dataset: Dataset, folder: str | Path, *, extra_files: dict[str, str] | None = None, replace: bool = False
+    dataset: Dataset, folder: str | Path, *, extra_files: Mapping[str, str] | None = None, replace: bool = False
 ) -> None:
     """Write a dataset folder, whole or not at all.
 
@@ -98,6 +99,8 @@ def save_dataset(
         (target / "runs.csv").write_text(csv_text([_row(run) for run in dataset]), encoding="utf-8")
         _write_samples(dataset, target)
         for name, text in (extra_files or {}).items():
+            if Path(name).name != name:
+                raise OutputError(f"{shown(name)} is no name of a file", mend="leave folders out", code="E_PATH")
             (target / name).write_text(text, encoding="utf-8")
 
 

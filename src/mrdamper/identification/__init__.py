@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from mrdamper.data import Run
-from mrdamper.errors import IdentificationError, require
+from mrdamper.errors import IdentificationError, checked
 from mrdamper.gas_spring import GasSpring
 from mrdamper.identification.certainty import certainty_of_run
 from mrdamper.identification.methods import all_methods, method_named
@@ -21,6 +21,7 @@ __all__ = ["Identification", "Method", "Problem", "Solution", "all_methods", "id
 
 
 @on_one_blas_thread
+@checked("run")
 def identify(
     run: Run,
     model: str | type[Model] = "bouc-wen",
@@ -82,8 +83,6 @@ def identify(
     if not isinstance(run, Run):
         mend = 'identify one run, identify(dataset["ID"]); run_study(dataset) identifies them all'
         raise IdentificationError(f"a {type(run).__name__} in place of a run", mend=mend)
-    require(model, (str, type), "a model", "give its name, `mrdamper models` lists them, or its class")
-    require(method, (str, Method), "a method", "give its name or its settings")
     refuse_clipped(run, clipped)
     chosen_model = model_type(model) if isinstance(model, str) else model
     chosen_method = method_named(method) if isinstance(method, str) else method

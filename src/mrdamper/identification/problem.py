@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mrdamper.data import Condition, Floats, Run, Shown
-from mrdamper.errors import IdentificationError, UnknownNameError
+from mrdamper.errors import IdentificationError, UnknownNameError, checked
 from mrdamper.gas_spring import GasSpring
 from mrdamper.identification.intervals import CANNOT_BE_KNOWN, interval_about, written
 from mrdamper.metrics import Scores
@@ -295,6 +295,7 @@ class Identification(Shown):
             return "at a bound: one-sided"
         return "determined" if self.interval(name) else CANNOT_BE_KNOWN
 
+    @checked()
     def interval(self, name: str, level: float = 0.95) -> tuple[float, float] | None:
         """Ends of a parameter's interval within the form of the model; None where none is known.
 

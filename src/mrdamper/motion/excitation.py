@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mrdamper.data import Floats
+from mrdamper.errors import ExcitationError, checked
 from mrdamper.motion.path import Path
 
 _STILL, _REST = 0.01, 0.1  # share of the peak speed below which a motion stands still, and for how long [s]
@@ -35,6 +36,8 @@ class Excitation:
         size = self.time.size
         for name in ("displacement", "velocity", "acceleration", "current"):
             array = np.asarray(getattr(self, name), dtype=float)
+            if array.shape not in ((), (1,), (size,)):
+                raise ExcitationError(f"{name} has {array.size} samples, time has {size}", mend="give one for each")
             object.__setattr__(self, name, array if array.shape == (size,) else np.broadcast_to(array, (size,)))
 
     def __len__(self) -> int:
@@ -61,6 +64,7 @@ class Excitation:
         pick = {name: getattr(self, name)[mask] for name in self.__dataclass_fields__}
         return Excitation(**pick)
 
+    @checked()
     def with_current(self, current: ArrayLike) -> Excitation:
         """The same motion at another current [A], a scalar or one value per sample."""
         made = replace(self, current=np.asarray(current, dtype=float))
@@ -68,10 +72,12 @@ class Excitation:
             made.__dict__["path"] = self.path  # the current does not bend it
         return made
 
+    @checked()
     def about(self, centre: float) -> Excitation:
         """The same motion with displacements counted from `centre` [m]."""
         return replace(self, displacement=self.displacement - centre)
 
+    @checked()
     def delayed(self, delay: float) -> Excitation:
         """The motion `delay` seconds later, to first order in the delay, for small delays."""
         return replace(

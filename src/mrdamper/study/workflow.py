@@ -20,7 +20,7 @@ from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.dampers.sessions import Sessions, known_errors
 from mrdamper.data import Dataset, Run, Shown
-from mrdamper.errors import IdentificationError, InputError, UnknownNameError, require
+from mrdamper.errors import IdentificationError, InputError, UnknownNameError, checked
 from mrdamper.identification import refuse_clipped
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, at_levels, dynamic_ranges
 from mrdamper.motion import analyse_motion, equivalent_sine
@@ -161,6 +161,7 @@ class Study(Shown):
         return next(r for r in self.rigs if r.rig == name)
 
 
+@checked()
 def run_study(
     dataset: Dataset,
     progress: Progress = lambda what, share: None,
@@ -198,7 +199,6 @@ def run_study(
     >>> bool(prediction.force.max() > 500)  # [N]
     True
     """
-    require(dataset, Dataset, "a dataset", "load_dataset(folder) gives one")
     begin = time.perf_counter()
     rigs = processes.map(partial(study_rig, model=model), [dataset.rig(name) for name in dataset.rigs], progress)
     progress("studied", 1.0)

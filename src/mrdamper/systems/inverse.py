@@ -19,8 +19,8 @@ import numpy as np
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.coil import Coil, field_step
 from mrdamper.data import Floats
-from mrdamper.errors import ParameterError, numbers, require
-from mrdamper.streaming import stream
+from mrdamper.errors import ParameterError, checked, numbers, series
+from mrdamper.streaming import steps_of, stream
 from mrdamper.tracing import Program, Tape, program
 from mrdamper.tracing.graft import Graft
 from mrdamper.tracing.python import python_functions
@@ -30,6 +30,7 @@ _BLUNT = 0.01  # of the widest reachable interval: below, the current is kept
 _QUICK = 0.1  # of the coil's lag in which the field is brought to where it should be
 _TURNS_BACK = 5e-3  # of the interval that a force may fall back with more current
 _GRID, _MOTION = 6, 960  # currents, samples of the motion they are tried on
+_LARGEST = 1e150  # force whose square is still a number [N]
 
 
 @dataclass(frozen=True)
@@ -62,24 +63,15 @@ def check_monotone(damper: Damper, highest: float | None = None) -> float:
         raise ParameterError(
             "no range of currents", where=damper.title, mend="tests at several currents", code="E_NOT_MONOTONE"
         )
-    made = stream(replace(damper, coil=None))  # type: ignore[type-var]
-    prepare, step = python_functions(made.step)
-    given = tuple(float(e.value) for e in made.step.tape.parameters.values())
-    derived, memory = prepare(given)[1], tuple(made.step.tape.starts.values())
-    amplitude = damper.envelope.amplitude_m[1]
-    omega = min(2 * math.pi * damper.envelope.frequency_Hz[1], damper.envelope.peak_velocity_m_s[1] / amplitude)
     grid = np.linspace(low, high, _GRID)
-    forces, dt = [], 2 * math.pi / omega / _MOTION * 2
-    for phase in omega * dt * np.arange(_MOTION):
-        x, v = amplitude * math.sin(phase), amplitude * omega * math.cos(phase)
-        sample = (x, v, -(omega**2) * x)
-        forces.append([step(given, derived, memory, (*sample, float(I), dt))[1][0] for I in grid])
-        memory = step(given, derived, memory, (*sample, float(grid[_GRID // 2]), dt))[2]
-    table = np.array(forces[_MOTION // 2 :])
+    try:
+        table = _forces(damper, grid)
+    except ArithmeticError as error:
+        raise ParameterError(f"no force at {high:g} A", where=damper.title, mend="stay within the tests") from error
     width = np.ptp(table, axis=1)
-    if not 0 < width.max() < math.inf:
+    if not 0 < width.max() < _LARGEST:
         raise ParameterError(
-            "the force does not follow the current", where=damper.title,
+            "the force does not follow the current, or runs away", where=damper.title,
             mend="identify it from tests at several currents", code="E_NOT_MONOTONE",
         )  # fmt: skip
     wide = width > 0.2 * width.max()
@@ -93,6 +85,23 @@ def check_monotone(damper: Damper, highest: float | None = None) -> float:
             code="E_NOT_MONOTONE",
         )
     return float(width.max())
+
+
+def _forces(damper: Damper, grid: Floats) -> Floats:
+    """(samples, currents) forces [N] along the second half of a tested sine."""
+    made = stream(replace(damper, coil=None))  # type: ignore[type-var]
+    prepare, step = python_functions(made.step)
+    given = tuple(float(e.value) for e in made.step.tape.parameters.values())
+    derived, memory = prepare(given)[1], tuple(made.step.tape.starts.values())
+    amplitude = damper.envelope.amplitude_m[1]
+    omega = min(2 * math.pi * damper.envelope.frequency_Hz[1], damper.envelope.peak_velocity_m_s[1] / amplitude)
+    forces, dt = [], 2 * math.pi / omega / _MOTION * 2
+    for phase in omega * dt * np.arange(_MOTION):
+        x, v = amplitude * math.sin(phase), amplitude * omega * math.cos(phase)
+        sample = (x, v, -(omega**2) * x)
+        forces.append([step(given, derived, memory, (*sample, float(I), dt))[1][0] for I in grid])
+        memory = step(given, derived, memory, (*sample, float(grid[_GRID // 2]), dt))[2]
+    return np.array(forces[_MOTION // 2 :])
 
 
 def invert_on(
@@ -204,8 +213,10 @@ class Inverse:
         self, time: Floats, displacement: Floats, velocity: Floats, acceleration: Floats, wanted: Floats
     ) -> tuple[Floats, Floats, Floats, Floats]:
         """Current [A], force and reachable interval [N] (N,) along a motion, from the state at hand."""
-        steps = np.diff(time, prepend=2 * time[0] - time[1])
-        channels = (displacement, velocity, acceleration, wanted, steps)
+        t, *motion = series(
+            time=time, displacement=displacement, velocity=velocity, acceleration=acceleration, wanted=wanted
+        )
+        channels = (*motion, steps_of(t))
         rows = [self.step(*sample) for sample in zip(*(c.tolist() for c in channels), strict=True)]
         table = np.array([[r.current, r.force, r.lowest, r.highest] for r in rows])
         return table[:, 0], table[:, 1], table[:, 2], table[:, 3]
@@ -223,6 +234,7 @@ class Inverse:
         return self._functions[0](())[1]
 
 
+@checked()
 def invert(damper: Damper, highest: float | None = None) -> Inverse:
     """The current for a wanted force.
 
@@ -247,7 +259,6 @@ def invert(damper: Damper, highest: float | None = None) -> Inverse:
     >>> 0.0 < asked[-1].current < 0.75  # [A]
     True
     """
-    require(damper, Damper, "a damper", "load_model(file) gives one")
     width = check_monotone(damper, highest)
     tape = Tape()
     names = ("displacement", "velocity", "acceleration", "wanted", "dt")

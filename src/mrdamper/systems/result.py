@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.data import Floats
+from mrdamper.errors import UnknownNameError, checked
 from mrdamper.streaming import FLAGS
 from mrdamper.systems.controllers import Controller
 from mrdamper.systems.structure import Link, System
@@ -106,11 +107,15 @@ class Simulation:
         )
         return dict(zip(self.PEAKS, found, strict=True))
 
+    @checked()
     def span(self, name: str) -> Floats:
         """(N,) relative displacement [m] of a span of the system."""
+        if name not in self.system.spans:
+            raise UnknownNameError.of("span", name, self.system.spans)
         row, road = self.system.span(*self.system.spans[name])
         return self.x @ row + self.road @ road
 
+    @checked()
     def acceleration_of(self, point: str) -> Floats:
         """(N,) absolute acceleration [m/s²] of a point that moves with the coordinates."""
         return self.a @ self.system.point(point)[0]

@@ -13,7 +13,7 @@ import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Floats
-from mrdamper.errors import ExcitationError, StepError, StructureError, require
+from mrdamper.errors import ExcitationError, StepError, StructureError, checked
 from mrdamper.systems.controllers import Controller
 from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.controllers.preview import Preview
@@ -34,6 +34,7 @@ _LINES_A_STEP = 60  # of the loop itself
 _MOST_STEPS = 20_000_000
 
 
+@checked()
 def simulate_system(
     system: System,
     source: Input,
@@ -78,9 +79,6 @@ def simulate_system(
     >>> bool(abs(damped.x[:, 2]).max() < 0.5 * abs(bare.x[:, 2]).max())  # [m], the top floor
     True
     """
-    require(system, System, "a system", "load_system(name).system gives one")
-    require(source, Input, "an input", "load_input(name) gives one")
-    require(dampers, Mapping, "dampers by place", 'give {"place": damper}, or {} for none')
     loop = Loop(system, source, dampers, controller or Passive(), highest)
     dt = loop.first_step if step is None else step
     coarse, first, first_step, last = loop.run(dt), None, dt, math.inf

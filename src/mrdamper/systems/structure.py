@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.errors import StructureError, UnknownNameError
+from mrdamper.errors import StructureError, UnknownNameError, check_fields, checked
 
 _FASTEST = 1e6  # Hz, of a natural frequency: beyond, a unit is wrong
 _SYMMETRY = 1e-9  # relative difference of K and K' that rounding may leave
@@ -42,6 +42,9 @@ class Link:
     stiffness: float = 0.0
     damping: float = 0.0
     gap: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +88,7 @@ class System:
     spans: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        check_fields(self)
         n = len(self.coordinates)
         for letter in "MCK":
             matrix = np.array(getattr(self, letter), dtype=float)
@@ -125,6 +129,7 @@ class System:
         """Links that are dampers."""
         return tuple(link for link in self.links if link.role == "damper")
 
+    @checked()
     def point(self, name: str) -> tuple[Floats, Floats]:
         """A point as a combination of the coordinates (n,) and of the channels' heights (q,)."""
         row, road = np.zeros(len(self.coordinates)), np.zeros(len(self.channels))

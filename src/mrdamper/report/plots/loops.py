@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from mrdamper.dampers.base import Prediction
 from mrdamper.data import Floats, Run
-from mrdamper.errors import UnknownNameError, require
+from mrdamper.errors import InputError, UnknownNameError, require, shown
 from mrdamper.motion import measured_motion
 from mrdamper.report.plots.style import KN, MM, house_style, label
 
@@ -92,6 +92,8 @@ def _drawn(axes: Axes | None, x: Floats, force: Floats, name: str, line: dict[st
             from matplotlib import pyplot
 
             axes = pyplot.subplots()[1]
+        elif not hasattr(axes, "plot"):
+            raise InputError(f"axes is {shown(axes)}", mend="give axes of matplotlib, or none", code="E_ARGUMENT")
         axes.plot(x, KN * force, **line)
         label(axes, name, "Force (kN)")
     return axes

@@ -7,7 +7,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from mrdamper.discovery import named, subclasses_in
-from mrdamper.errors import RecordError, UnknownNameError
+from mrdamper.errors import RecordError, UnknownNameError, checked
 from mrdamper.files.atomic import path_of
 from mrdamper.parameters import parameters_of, with_values
 from mrdamper.systems.inputs.base import Input
@@ -40,6 +40,7 @@ def made_inputs() -> dict[str, tuple[type[Input], Mapping[str, float]]]:
     return found
 
 
+@checked("name")
 def load_input(name: str | Path, values: Mapping[str, float] | None = None, time_scale: float = 1.0) -> Input:
     """An input by name: a record's file or the name of one that ships with the package, or a made one.
 
