@@ -107,13 +107,7 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
 
 
 def rate_of(table: RawTable, profile: Profile) -> float | None:
-    """Sampling rate [Hz] of a table without time stamps, by the profile or by what stands beside the columns.
-
-    Raises
-    ------
-    RigFileError
-        E_AMBIGUOUS if the file states two.
-    """
+    """Sampling rate [Hz] of a table without time stamps, by the profile or by what stands beside the columns."""
     if profile.file.sample_rate_Hz:
         return profile.file.sample_rate_Hz
     decimal = table.form.get("decimal")

@@ -78,11 +78,7 @@ def amperes(number: str, unit: str) -> float:
 def stated_by_lines(lines: Iterable[str], decimal: str | None = None) -> list[Statement]:
     """Currents that lines of the form "Spulenstrom:; 0,40 A", "Current [mA] = 400" state.
 
-    Parameters
-    ----------
-    lines : iterable of str
-    decimal : "." or ",", optional
-        The file's, where a number may have a decimal or a thousands mark.
+    With the file's decimal mark it is known which numbers have a thousands mark.
     """
     found = []
     for line in lines:
@@ -105,10 +101,7 @@ def stated_in_titles(lines: Iterable[str]) -> list[Statement]:
 def stated_rate(lines: Iterable[str], numbers: Mapping[str, float], decimal: str | None = None) -> float | None:
     """Sampling rate [Hz] that lines or numbers beside the columns state, as a rate or as a step; None if none does.
 
-    Raises
-    ------
-    ValueError
-        If two of them contradict each other.
+    Raises ValueError if two of them contradict each other.
     """
     stated = [(key, value, known) for line in lines for key, value, known in _quantities(line, decimal)]
     for name, number in numbers.items():
@@ -155,10 +148,7 @@ def _value(number: str, decimal: str | None) -> float | None:
 def agreed(statements: Sequence[Statement]) -> Statement | None:
     """The first of statements that agree; None if there is none.
 
-    Raises
-    ------
-    ValueError
-        With what was found, if two contradict each other or one is no coil current.
+    Raises ValueError with what was found, if two contradict each other or one is no coil current.
     """
     for statement in statements:
         if abs(statement.amperes) > LARGEST_STATED:

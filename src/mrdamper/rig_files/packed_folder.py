@@ -24,13 +24,7 @@ _NESTED = (".zip", ".gz", ".tgz", ".tar", ".bz2", ".xz", ".7z", ".rar")
 
 @contextlib.contextmanager
 def unpacked(paths: Iterable[str | Path]) -> Iterator[list[Path]]:
-    """The same paths, with a folder in the place of every archive of several files.
-
-    Raises
-    ------
-    RigFileError
-        E_ARCHIVE, E_ARCHIVE_PATH, E_ARCHIVE_RATIO, E_TRUNCATED, E_FORMAT.
-    """
+    """The same paths, with a folder in the place of every archive of several files; raises as `opened`."""
     with contextlib.ExitStack() as stack:
         found = []
         for path in map(Path, paths):

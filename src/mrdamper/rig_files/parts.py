@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache, lru_cache, partial
 from itertools import pairwise
 
 import numpy as np
@@ -28,13 +28,7 @@ _NUMBER_WORDS = frozenset(("no", "nr", "num", "number", "nummer", "id", "name", 
 
 
 def tests_of(table: RawTable, form: FileForm) -> list[RawTable]:
-    """The table of every test that a table holds; the table itself where it is one.
-
-    Raises
-    ------
-    RigFileError
-        E_COLUMN if the profile's column of runs is not there, E_BLOCKS if it holds too many.
-    """
+    """The table of every test that a table holds; the table itself where it is one."""
     if form.blocks == "join" and form.run_column is None:
         return [table]
     column = _run_column(table, form)
@@ -48,7 +42,8 @@ def tests_of(table: RawTable, form: FileForm) -> list[RawTable]:
 def _run_column(table: RawTable, form: FileForm) -> int | None:
     wanted = form.run_column
     if wanted is None:
-        named = [i for i, name in enumerate(table.names) if _names_runs(name)]
+        words = [[word.casefold().rstrip("0123456789") for word in words_of(name[:60])] for name in table.names]
+        named = [i for i, of in enumerate(words) if _RUN_WORDS & {*of} and {*of} <= _RUN_WORDS | _NUMBER_WORDS]
         return named[0] if named and table.words is not None else None
     if isinstance(wanted, int):
         found = [wanted - 1] if wanted <= len(table.names) else []
@@ -60,11 +55,6 @@ def _run_column(table: RawTable, form: FileForm) -> int | None:
             "E_COLUMN", f"no column {wanted!r} of runs (found {shown})", "correct run_column under [file]"
         )
     return found[0]
-
-
-def _names_runs(name: str) -> bool:
-    words = [word.casefold().rstrip("0123456789") for word in words_of(name[:60])]
-    return any(w in _RUN_WORDS for w in words) and all(w in _RUN_WORDS or w in _NUMBER_WORDS for w in words)
 
 
 def _by_run(table: RawTable, column: int, *, stated: bool) -> list[RawTable]:
@@ -84,11 +74,13 @@ def _by_run(table: RawTable, column: int, *, stated: bool) -> list[RawTable]:
         )
     read = _remembered(table)
     others = [i for i in range(len(table.names)) if i != column]
-    return [_rows(table, read, others, np.flatnonzero(codes == code), _tidy(labels[code])) for code in runs]
+    tidy = [re.sub(r"^([0-9]+)[.,]0+$", r"\1", label.strip()) or "unnamed" for label in labels]
+    return [_part(table, read, others, partial(_rows_of, codes, code), tidy[code]) for code in runs]
 
 
-def _tidy(label: str) -> str:
-    return re.sub(r"^([0-9]+)[.,]0+$", r"\1", label.strip()) or "unnamed"
+def _rows_of(codes: np.ndarray, code: int) -> slice | np.ndarray:
+    rows = np.flatnonzero(codes == code)
+    return slice(int(rows[0]), int(rows[-1]) + 1) if rows[-1] - rows[0] + 1 == rows.size else rows
 
 
 def _remembered(table: RawTable) -> Callable[[tuple[int, ...]], Content]:
@@ -96,17 +88,27 @@ def _remembered(table: RawTable) -> Callable[[tuple[int, ...]], Content]:
     return lru_cache(maxsize=2)(lambda columns: table.read(columns))
 
 
-def _rows(
-    table: RawTable, read: Callable[[tuple[int, ...]], Content], columns: Sequence[int], rows: np.ndarray, label: str
+def _part(
+    table: RawTable,
+    read: Callable[[tuple[int, ...]], Content],
+    columns: Sequence[int],
+    rows: Callable[[], slice | np.ndarray],
+    label: str,
 ) -> RawTable:
-    whole = slice(int(rows[0]), int(rows[-1]) + 1) if rows[-1] - rows[0] + 1 == rows.size else rows
+    """Some of a table's columns in the rows of one test, which are asked for when they are needed."""
 
     def part(wanted: Sequence[int]) -> Content:
-        content = read(tuple(columns[i] for i in wanted))
-        values = {i: np.array(content.values[columns[i]][whole]) for i in wanted}
-        return Content(values, _lines(content.lines, whole), content.findings)
+        content, inside = read(tuple(columns[i] for i in wanted)), rows()
+        values = {i: np.array(content.values[columns[i]][inside]) for i in wanted}
+        return Content(values, _lines(content.lines, inside), content.findings)
 
-    return _with_columns(table, columns, part, label)
+    def pick(values: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(values[i] for i in columns) if values else ()
+
+    return replace(
+        table, names=pick(table.names), units=pick(table.units), odd=pick(table.odd), over=(), read=part, words=None,
+        label="_".join(part for part in (table.label, label) if part),
+    )  # fmt: skip
 
 
 def _lines(lines: LineNumbers | None, rows: slice | np.ndarray) -> LineNumbers | None:
@@ -119,18 +121,6 @@ def _lines(lines: LineNumbers | None, rows: slice | np.ndarray) -> LineNumbers |
     return LineNumbers(at.size, tuple(map(int, starts)), tuple(int(at[i]) for i in starts))
 
 
-def _with_columns(
-    table: RawTable, columns: Sequence[int], read: Callable[[Sequence[int]], Content], label: str
-) -> RawTable:
-    def pick(values: tuple[str, ...]) -> tuple[str, ...]:
-        return tuple(values[i] for i in columns) if values else ()
-
-    return replace(
-        table, names=pick(table.names), units=pick(table.units), odd=pick(table.odd), over=(), read=read, words=None,
-        label="_".join(part for part in (table.label, label) if part),
-    )  # fmt: skip
-
-
 def _groups(table: RawTable, form: FileForm) -> list[RawTable]:
     """Groups of columns beside each other, each a test; empty if the table has none.
 
@@ -141,16 +131,22 @@ def _groups(table: RawTable, form: FileForm) -> list[RawTable]:
     if len(members) < 2:
         return []
     own_time = all("time" in roles for roles in members.values())
-    titles = {key: _title(table, key, roles) for key, roles in members.items()}
+    titles = {key: (table.over[min(roles.values())] if table.over else "") or key for key, roles in members.items()}
     stated = all(currents_in(title) for title in titles.values())
     if not (own_time or stated or form.blocks == "split"):
         return []
     shared = _shared(table, members)
     read = _remembered(table)
     return [
-        _filled(table, read, sorted({*roles.values(), *shared}), roles, titles[key])
+        _part(
+            table,
+            read,
+            sorted({*roles.values(), *shared}),
+            cache(partial(_filled, table, read, roles, titles[key])),
+            titles[key],
+        )
         for key, roles in members.items()
-    ]  # fmt: skip
+    ]
 
 
 def _members(table: RawTable) -> dict[str, dict[str, int]]:
@@ -186,11 +182,6 @@ def _key(name: str, role: str) -> str:
     return " ".join(rest).casefold()
 
 
-def _title(table: RawTable, key: str, roles: dict[str, int]) -> str:
-    over = table.over[min(roles.values())] if table.over else ""
-    return over or key
-
-
 def _shared(table: RawTable, members: dict[str, dict[str, int]]) -> list[int]:
     """The one time or current that belongs to every group."""
     grouped = {i for roles in members.values() for i in roles.values()}
@@ -202,31 +193,14 @@ def _shared(table: RawTable, members: dict[str, dict[str, int]]) -> list[int]:
     return shared
 
 
-def _filled(
-    table: RawTable,
-    read: Callable[[tuple[int, ...]], Content],
-    columns: Sequence[int],
-    roles: dict[str, int],
-    label: str,
-) -> RawTable:
-    """A group's columns down to its last row: shorter groups end in empty cells."""
-
-    @lru_cache(maxsize=1)
-    def size() -> int:
-        both = tuple(sorted((roles["displacement"], roles["force"])))
-        values = read(both).values
-        there = np.flatnonzero(np.isfinite(values[both[0]]) | np.isfinite(values[both[1]]))
-        if not there.size:
-            raise table.source.refuse("E_NO_DATA", f"no numbers in the columns of {label!r}", "leave them out")
-        return int(there[-1]) + 1
-
-    def part(wanted: Sequence[int]) -> Content:
-        content, stop = read(tuple(columns[i] for i in wanted)), size()
-        values = {i: np.array(content.values[columns[i]][:stop]) for i in wanted}
-        lines = None if content.lines is None else content.lines.part(0, stop)
-        return Content(values, lines, content.findings)
-
-    return _with_columns(table, columns, part, label)
+def _filled(table: RawTable, read: Callable[[tuple[int, ...]], Content], roles: dict[str, int], label: str) -> slice:
+    """The rows of a group, down to its last: shorter groups end in empty cells."""
+    both = tuple(sorted((roles["displacement"], roles["force"])))
+    values = read(both).values
+    there = np.flatnonzero(np.isfinite(values[both[0]]) | np.isfinite(values[both[1]]))
+    if not there.size:
+        raise table.source.refuse("E_NO_DATA", f"no numbers in the columns of {label!r}", "leave them out")
+    return slice(0, int(there[-1]) + 1)
 
 
 def stretches_of_time(time: np.ndarray) -> list[slice]:

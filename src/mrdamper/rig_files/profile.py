@@ -164,13 +164,7 @@ def load_profile(path: str | Path) -> Profile:
 
 
 def parse_profile(text: str, where: str = "profile") -> Profile:
-    """A profile from TOML text.
-
-    Raises
-    ------
-    ProfileError
-        If it is no TOML, or a key or value is not known.
-    """
+    """A profile from TOML text; raises as `load_profile`."""
     return parse_toml(text, Profile, ProfileError, _HELP, where)
 
 

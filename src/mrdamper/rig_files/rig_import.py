@@ -117,13 +117,7 @@ def read_run(path: str | Path, profile: Profile | str | Path | None = None) -> R
 
 
 def read_runs(path: str | Path, profile: Profile | str | Path | None = None) -> tuple[Record, ...]:
-    """Read every test of a rig's file and judge it: testing machines record several blocks.
-
-    Raises
-    ------
-    InputError
-        As `read_run`.
-    """
+    """Read every test of a rig's file and judge it: testing machines record several blocks; as `read_run`."""
     from mrdamper.rig_files.quality import judge
 
     with np.errstate(all="ignore"):  # numbers near the end of the range overflow in sums and are refused as such
@@ -442,13 +436,7 @@ def _is_table(path: Path) -> bool:
 
 
 def _with_current(record: Record) -> Record:
-    """The record, if it has a current.
-
-    Raises
-    ------
-    ColumnError
-        E_CURRENT_MISSING.
-    """
+    """The record, if it has a current."""
     if record.current is not None:
         return record
     why = [f.text for f in record.findings if f.text.startswith("the current channel")]

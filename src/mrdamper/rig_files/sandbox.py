@@ -120,11 +120,10 @@ class _Asked:
             answer = self({"table": index, "words": column})
             return Words(self._sandbox.receive(answer["size"]).astype(np.int32), tuple(answer["labels"]))
 
-        return RawTable(
-            self._source, tuple(table["names"]), tuple(table["units"]), read,
-            table["line"], table["label"], table["form"], table["fallback"], table["constants"], tuple(table["odd"]),
-            tuple(table["remarks"]), tuple(table["over"]), words,
-        )  # fmt: skip
+        says: dict[str, Any] = {
+            name: tuple(value) if isinstance(value, list) else value for name, value in table.items()
+        }
+        return RawTable(self._source, read=read, words=words, **says)
 
 
 class _Sandbox:
@@ -139,6 +138,9 @@ class _Sandbox:
             [sys.executable, "-c", _START, json.dumps([str(Path(p).absolute()) for p in sys.path]), str(os.getpid())],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment,
         )  # fmt: skip
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._requests, self._answers = self._process.stdin, self._process.stdout
 
     @property
     def alive(self) -> bool:
@@ -146,13 +148,10 @@ class _Sandbox:
 
     def ask(self, request: dict[str, Any], patience: float) -> dict[str, Any] | None:
         """The child's answer, None if it died over it."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
         try:
-            self._process.stdin.write(json.dumps(request).encode() + b"\n")
-            self._process.stdin.flush()
+            self._say(request)
             self._watch(patience)
-            answer = self._process.stdout.readline()
+            answer = self._answers.readline()
         except OSError:
             answer = b""
         if not answer.endswith(b"\n"):
@@ -164,9 +163,8 @@ class _Sandbox:
 
     def _watch(self, patience: float) -> None:
         """Wait for an answer; end a child that sleeps on a lock of its own, or takes forever."""
-        assert self._process.stdout is not None
         begin, asleep = time.monotonic(), 0
-        while os.name == "posix" and not select.select([self._process.stdout], [], [], _GLANCE)[0]:
+        while os.name == "posix" and not select.select([self._answers], [], [], _GLANCE)[0]:
             asleep = asleep + 1 if _sleeps(self._process.pid) else 0
             if asleep >= _GLANCES or time.monotonic() - begin > patience:
                 self._ended = True
@@ -175,19 +173,20 @@ class _Sandbox:
 
     def prepare(self, reader: str) -> None:
         """Load a reader's library while nobody waits."""
-        assert self._process.stdin is not None
         with contextlib.suppress(OSError):
-            self._process.stdin.write(json.dumps({"prepare": reader}).encode() + b"\n")
-            self._process.stdin.flush()
+            self._say({"prepare": reader})
+
+    def _say(self, request: dict[str, Any]) -> None:
+        self._requests.write(json.dumps(request).encode() + b"\n")
+        self._requests.flush()
 
     def receive(self, size: int) -> np.ndarray:
         """The numbers that follow an answer."""
-        assert self._process.stdout is not None
         values = np.empty(size)
         view = values.data.cast("B")
         at = 0
         while at < len(view):
-            count = self._process.stdout.readinto(view[at:])  # type: ignore[attr-defined]
+            count = self._answers.readinto(view[at:])  # type: ignore[attr-defined]
             if not count:
                 raise RigFileError("E_FORMAT", "the reading process ended early")
             at += count
@@ -195,9 +194,9 @@ class _Sandbox:
 
     def close(self) -> None:
         self._process.kill()
-        for pipe in (self._process.stdin, self._process.stdout):
+        for pipe in (self._requests, self._answers):
             with contextlib.suppress(OSError):
-                pipe.close()  # type: ignore[union-attr]
+                pipe.close()
         self._process.wait()
 
 

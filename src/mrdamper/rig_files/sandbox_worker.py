@@ -6,15 +6,19 @@ import json
 import os
 import signal
 import sys
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
-from mrdamper.errors import CombinedError, InputError, MissingExtraError
+from mrdamper.errors import CombinedError, MissingExtraError
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import RawTable, Reader, RigFileError, Source
+
+_SAYS = ("names", "units", "line", "label", "form", "fallback", "constants", "odd", "remarks", "over")
+_TOLD = ("code", "found", "line", "column", "mend")
 
 
 def serve() -> None:
@@ -31,7 +35,7 @@ def serve() -> None:
                 elif "reader" in request:
                     keep.close()
                     tables = _open(request, keep)
-                    _send(replies, {"tables": [_described(table) for table in tables]})
+                    _send(replies, {"tables": [{name: getattr(table, name) for name in _SAYS} for table in tables]})
                 elif "words" in request:
                     _send_words(replies, tables[request["table"]], request["words"])
                 else:
@@ -41,7 +45,14 @@ def serve() -> None:
                     continue
                 _send(replies, {"missing": error.found, "mend": error.mend})
             except (RigFileError, CombinedError) as error:
-                _send(replies, {"wrong": [_told(one) for one in getattr(error, "errors", (error,))]})
+                _send(
+                    replies,
+                    {
+                        "wrong": [
+                            {name: getattr(one, name) for name in _TOLD} for one in getattr(error, "errors", (error,))
+                        ]
+                    },
+                )
             except MemoryError:
                 os._exit(3)
 
@@ -64,8 +75,7 @@ def _open(request: dict[str, Any], keep: ExitStack) -> list[RawTable]:
     path = Path(request["path"])
     file = keep.enter_context(path.open("rb"))
     source = Source(path, request["name"], request["suffix"], file, path.stat().st_size, keep)
-    form = request["form"]
-    return reader.tables(source, FileForm.model_validate(form))
+    return reader.tables(source, FileForm.model_validate(request["form"]))
 
 
 def _limit(seconds: float | None, size: float = 0) -> None:
@@ -89,13 +99,11 @@ def _limit(seconds: float | None, size: float = 0) -> None:
     resource.setrlimit(resource.RLIMIT_DATA, (now + int(size), hard))
 
 
-def _send(replies: BinaryIO, answer: dict[str, Any]) -> None:
+def _send(replies: BinaryIO, answer: dict[str, Any], arrays: Sequence[np.ndarray] = ()) -> None:
     replies.write(json.dumps(answer).encode() + b"\n")
+    for array in arrays:
+        replies.write(np.ascontiguousarray(array).data)
     replies.flush()
-
-
-def _told(error: InputError) -> dict[str, Any]:
-    return {name: getattr(error, name) for name in ("code", "found", "line", "column", "mend")}
 
 
 def _send_columns(replies: BinaryIO, table: RawTable, columns: list[int]) -> None:
@@ -107,22 +115,10 @@ def _send_columns(replies: BinaryIO, table: RawTable, columns: list[int]) -> Non
         "lines": None if lines is None else [lines.size, lines.starts, lines.lines],
         "findings": [[finding.code, finding.text] for finding in content.findings],
     }
-    _send(replies, answer)
-    for array in values:
-        replies.write(np.ascontiguousarray(array).data)
-    replies.flush()
+    _send(replies, answer, values)
 
 
 def _send_words(replies: BinaryIO, table: RawTable, column: int) -> None:
     assert table.words is not None
     words = table.words(column)
-    _send(replies, {"size": words.codes.size, "labels": list(words.labels)})
-    replies.write(words.codes.astype(np.float64).data)
-    replies.flush()
-
-
-def _described(table: RawTable) -> dict[str, Any]:
-    return {
-        name: getattr(table, name)
-        for name in ("names", "units", "line", "label", "form", "fallback", "constants", "odd", "remarks", "over")
-    }
+    _send(replies, {"size": words.codes.size, "labels": words.labels}, [words.codes.astype(np.float64)])

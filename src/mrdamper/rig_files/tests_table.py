@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePath
 
@@ -21,6 +21,7 @@ COLUMNS = ("file", "run", "current_A", "temperature_C", "split", "session", "spe
 _LARGEST = 4 * 2**20  # bytes
 _FILE = frozenset(("file", "filename", "file name", "datei", "dateiname", "fichier", "archivo"))
 _RUN = frozenset(("run", "run_id", "test", "versuch", "essai"))
+_Wrong = Callable[[int, str, str], None]
 _NUMBER = re.compile(r"\s*([+-]?[0-9]+(?:[.,][0-9]+)?)\s*([A-Za-z°]{0,8})\s*")
 
 
@@ -109,18 +110,20 @@ def load_tests(path: str | Path) -> TestsTable:
     names = [name.strip() for name in rows[0][1]]
     keys = [_key(name) for name in names]
     problems: list[InputError] = []
+
+    def wrong(line: int, found: str, mend: str) -> None:
+        problems.append(TestsTableError(found, where=f"{path.name}, line {line}", mend=mend))
+
     if "file" not in keys and "run" not in keys:
-        problems.append(_wrong(path, 1, "neither a column file nor a column run", f"name one of {', '.join(COLUMNS)}"))
-    found = [_row(path, line, cells, names, keys, problems) for line, cells in rows[1:]]
+        wrong(1, "neither a column file nor a column run", f"name one of {', '.join(COLUMNS)}")
+    found = [_row(line, cells, names, keys, wrong) for line, cells in rows[1:]]
     seen: dict[tuple[str, str], int] = {}
     for row in found:
-        if not row.file and not row.run:
-            problems.append(_wrong(path, row.line, "names neither file nor run", "fill the cell or remove the row"))
+        what = " ".join(filter(None, (row.file, row.run)))
+        if not what:
+            wrong(row.line, "names neither file nor run", "fill the cell or remove the row")
         elif (row.file, row.run) in seen:
-            what = " ".join(filter(None, (row.file, row.run)))
-            problems.append(
-                _wrong(path, row.line, f"{what!r} stands in line {seen[row.file, row.run]} already", "remove one row")
-            )
+            wrong(row.line, f"{what!r} stands in line {seen[row.file, row.run]} already", "remove one row")
         seen.setdefault((row.file, row.run), row.line)
     CombinedError.raise_from(problems)
     return TestsTable(path, tuple(found))
@@ -225,9 +228,9 @@ def _key(name: str) -> str:
     return header.role if header.role in ("current", "temperature") else bare
 
 
-def _row(path: Path, line: int, cells: list[str], names: list[str], keys: list[str], problems: list[InputError]) -> Row:
+def _row(line: int, cells: list[str], names: list[str], keys: list[str], wrong: _Wrong) -> Row:
     if len(cells) > len(names) and any(cell.strip() for cell in cells[len(names) :]):
-        problems.append(_wrong(path, line, f"{len(cells)} cells under {len(names)} names", "quote cells with commas"))
+        wrong(line, f"{len(cells)} cells under {len(names)} names", "quote cells with commas")
     says = {}
     notes = {}
     for name, key, cell in zip(names, keys, cells, strict=False):
@@ -235,7 +238,7 @@ def _row(path: Path, line: int, cells: list[str], names: list[str], keys: list[s
         if not cell:
             continue
         if key in ("current", "temperature"):
-            value = _quantity(path, line, key, name, cell, problems)
+            value = _quantity(line, key, name, cell, wrong)
             if value is not None:
                 says[key] = value
         elif key in ("file", "run", "split", "rig"):
@@ -244,29 +247,23 @@ def _row(path: Path, line: int, cells: list[str], names: list[str], keys: list[s
             notes[name if name not in ("file", "sha256") else f"{name}_stated"] = cell
     split = says.get("split")
     if split not in (None, "train", "validate"):
-        problems.append(_wrong(path, line, f"split is {split!r}", "write train or validate"))
+        wrong(line, f"split is {split!r}", "write train or validate")
     if "temperature" in says:
         notes["temperature_C"] = f"{says['temperature']:g}"
     return Row(line, says.get("file", ""), says.get("run", ""), says.get("current"), split, says.get("rig"), notes)
 
 
-def _quantity(path: Path, line: int, key: str, name: str, cell: str, problems: list[InputError]) -> float | None:
+def _quantity(line: int, key: str, name: str, cell: str, wrong: _Wrong) -> float | None:
     match = _NUMBER.fullmatch(cell)
-    unit = (match[2] if match else "") or split_name(name).unit
-    known = parse_unit(unit)
+    known = parse_unit((match[2] if match else "") or split_name(name).unit)
     if match is None:
-        problems.append(_wrong(path, line, f"{name} is {cell!r}", "write a number"))
+        wrong(line, f"{name} is {cell!r}", "write a number")
     elif known is None or known.dimension != key:
         example = "current_A or current_mA" if key == "current" else "temperature_C"
-        problems.append(_wrong(path, line, f"{name} {cell} has no unit of {key}", f"name the column {example}"))
+        wrong(line, f"{name} {cell} has no unit of {key}", f"name the column {example}")
     else:
         value = known.factor * float(match[1].replace(",", ".")) + known.offset
-        if key == "current" and abs(value) > LARGEST_STATED:
-            problems.append(_wrong(path, line, f"{name} is {value:g} A", "no damper's coil takes that: mA?"))
-            return None
-        return value
+        if key != "current" or abs(value) <= LARGEST_STATED:
+            return value
+        wrong(line, f"{name} is {value:g} A", "no damper's coil takes that: mA?")
     return None
-
-
-def _wrong(path: Path, line: int, found: str, mend: str) -> TestsTableError:
-    return TestsTableError(found, where=f"{path.name}, line {line}", mend=mend)

@@ -44,13 +44,16 @@ def to_run(record: Record) -> Run:
         raise ColumnError("no current", where=f"run {record.id}", mend="name its column or value in the rig profile")
     keep = _kept(record)
     count = np.count_nonzero(keep)
-    segments = _segments(record, keep)
+    sizes = [int(np.count_nonzero(keep[start:stop])) for start, stop in record.segments]
+    bounds = np.cumsum([0, *(size for size in sizes if size)]).tolist()
     if count == keep.size:
         keep = slice(None)  # nothing is copied: a long record lies in a file
     if count < 3:
         raise RunError(f"{count} samples", where=f"run {record.id}", mend="a run needs at least 3")
     view = View(record)
     scatter = repeatability(view)
+    codes = " ".join(dict.fromkeys(finding.code for finding in record.findings))
+    further = {f"{name}_{unit}": getattr(record, name) for name, unit in FURTHER.items()} | dict(record.further)
     run = Run(
         id=record.id,
         time=record.time[keep],
@@ -58,24 +61,19 @@ def to_run(record: Record) -> Run:
         force=record.force[keep],
         current=record.current[keep],
         velocity=None if record.velocity is None else record.velocity[keep],
-        further=_further(record, keep),
+        further={name: values[keep] for name, values in further.items() if values is not None},
         rig=record.rig,
         excitation=record.excitation,
         split=record.split,  # type: ignore[arg-type]
         window=steady_window(view),
         repeatability=None if scatter is None else round(scatter[0], 6),
-        segments=segments,
-        notes=_notes(record),
+        segments=tuple(pairwise(bounds)),
+        notes={**record.provenance, **({"findings": codes} if codes else {})},
     )
     for values in (record.time, record.displacement, record.force, record.current):
         if values is not None:
             release(values)
     return run
-
-
-def _further(record: Record, keep: np.ndarray | slice) -> dict[str, np.ndarray]:
-    own = {f"{name}_{unit}": getattr(record, name) for name, unit in FURTHER.items()}
-    return {name: values[keep] for name, values in {**own, **record.further}.items() if values is not None}
 
 
 def _kept(record: Record) -> np.ndarray:
@@ -86,14 +84,3 @@ def _kept(record: Record) -> np.ndarray:
         if np.count_nonzero(keep[start:stop]) < SHORTEST:
             keep[start:stop] = False
     return keep
-
-
-def _segments(record: Record, keep: np.ndarray) -> tuple[tuple[int, int], ...]:
-    sizes = [int(np.count_nonzero(keep[start:stop])) for start, stop in record.segments]
-    bounds = np.concatenate([[0], np.cumsum([size for size in sizes if size])])
-    return tuple((int(a), int(b)) for a, b in pairwise(bounds))
-
-
-def _notes(record: Record) -> dict[str, str]:
-    codes = " ".join(dict.fromkeys(finding.code for finding in record.findings))
-    return {**record.provenance, **({"findings": codes} if codes else {})}

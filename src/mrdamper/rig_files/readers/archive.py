@@ -25,10 +25,7 @@ UNREADABLE_ZIP = (zipfile.BadZipFile, OSError, ValueError, NotImplementedError)
 def opened(path: Path, *, folder: bool = False) -> Iterator[Source]:
     """Open a file and unpack it if it is packed; of an archive of a folder, to the archive of its files.
 
-    Raises
-    ------
-    RigFileError
-        E_FILE, E_EMPTY, E_TRUNCATED, E_FORMAT, E_ARCHIVE, E_ARCHIVE_PATH, E_ARCHIVE_RATIO.
+    Raises `RigFileError`, its code E_FILE, E_EMPTY, E_TRUNCATED, E_FORMAT or E_ARCHIVE with or without an ending.
     """
     name = path.name
     size, file = _at(path)
@@ -113,13 +110,7 @@ def is_arrays(names: list[str]) -> bool:
 
 
 def check_sizes(source: Source, members: list[zipfile.ZipInfo]) -> None:
-    """Refuse what would unpack to far more than it is.
-
-    Raises
-    ------
-    RigFileError
-        E_ARCHIVE_RATIO.
-    """
+    """Refuse what would unpack to far more than it is: E_ARCHIVE_RATIO."""
     unpacked = sum(member.file_size for member in members)
     packed = max(1, sum(member.compress_size for member in members))
     if unpacked > MOST_UNPACKED or unpacked > MOST_RATIO * min(packed, source.size):
@@ -169,13 +160,7 @@ def _one_member(source: Source, members: list[zipfile.ZipInfo]) -> zipfile.ZipIn
 
 
 def check_member(source: Source, name: str, *, link: bool) -> None:
-    """Refuse a member without a name, one whose name leads out of the archive, and a link.
-
-    Raises
-    ------
-    RigFileError
-        E_ARCHIVE, E_ARCHIVE_PATH.
-    """
+    """Refuse a member without a name, one whose name leads out of the archive, and a link."""
     if not name:
         raise source.refuse("E_ARCHIVE", "a member without a name", "pack it again")
     parts = [*PurePosixPath(name).parts, *PureWindowsPath(name).parts]

@@ -50,13 +50,7 @@ def array_table(
     constants: Mapping[str, float] | None = None,
     remarks: Sequence[str] = (),
 ) -> RawTable:
-    """A table whose columns are loaded as arrays, one by one.
-
-    Raises
-    ------
-    RigFileError
-        E_TOO_MANY_COLUMNS.
-    """
+    """A table whose columns are loaded as arrays, one by one; E_TOO_MANY_COLUMNS beyond a thousand."""
     if len(names) > MOST_COLUMNS:
         raise source.refuse("E_TOO_MANY_COLUMNS", f"{len(names)} columns", "export only the channels needed")
 
@@ -101,10 +95,7 @@ def _word(item: object) -> str:
 def as_floats(source: Source, array: np.ndarray, name: str, column: int) -> Floats:
     """A loaded column as (N,) doubles; date and time as seconds after the first.
 
-    Raises
-    ------
-    RigFileError
-        E_UNSAFE for objects, E_NUMBER for what else is no number, E_COLUMN for tables.
+    Objects are refused as E_UNSAFE, what else is no number as E_NUMBER, tables as E_FIELD_COUNT.
     """
     array = np.asarray(array)
     kind = array.dtype.kind
@@ -166,13 +157,7 @@ def unpacked(says: Mapping[str, Any], values: np.ndarray) -> np.ndarray:
 
 
 def check_unpacked(source: Source, size: int) -> None:
-    """Refuse tables that are far larger than their file.
-
-    Raises
-    ------
-    RigFileError
-        E_ARCHIVE_RATIO.
-    """
+    """Refuse tables that are far larger than their file: E_ARCHIVE_RATIO."""
     if size > RATIO_MATTERS_FROM and (size > MOST_RATIO * source.size or size > 10 * MOST_UNPACKED):
         raise source.refuse(
             "E_ARCHIVE_RATIO",
@@ -182,13 +167,7 @@ def check_unpacked(source: Source, size: int) -> None:
 
 
 def load(library: str, title: str) -> ModuleType:
-    """Import a library that is an extra.
-
-    Raises
-    ------
-    MissingExtraError
-        If it is not installed.
-    """
+    """Import a library that is an extra; `MissingExtraError` if it is not installed."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -201,13 +180,7 @@ def load(library: str, title: str) -> ModuleType:
 
 @contextmanager
 def refusing_damage(source: Source, title: str) -> Iterator[None]:
-    """Turn whatever a library raises on a damaged file into a refusal; its warnings are not shown.
-
-    Raises
-    ------
-    RigFileError
-        E_TRUNCATED if the file ends early, else E_FORMAT.
-    """
+    """Turn whatever a library raises on a damaged file into a refusal; its warnings are not shown."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -52,34 +51,26 @@ class DelimitedText(Reader):
         whole = stream.start + len(head) >= stream.stop
         lines = [stream.decode(line).rstrip("\r") for line in (raw if whole else raw[:-1])[:_HEAD_LINES]]
         lines = _with_whole_quotes(lines)
-        if is_labview(lines):
-            layout = named(find_layout(lines, source, stated_form(lines, form)), lines)
-        else:
-            layout = find_layout(lines, source, form)
+        layout = find_layout(lines, source, stated_form(lines, form) if is_labview(lines) else form)
+        layout = named(layout, lines) if is_labview(lines) else layout
         start = stream.start + sum(len(line) + 1 for line in raw[: layout.data_line - 1])
         blocks = find_blocks(stream, layout, start, stream.stop)
         return [self._table(stream, layout, block, i, len(blocks)) for i, block in enumerate(blocks)]
 
     def _table(self, stream: TextStream, layout: Layout, block: Block, index: int, count: int) -> RawTable:
-        def read(columns: Sequence[int]) -> Content:
-            return _read(stream, layout, block, tuple(columns))
-
-        def words(column: int) -> Words:
-            return _words(stream, layout, block, column)
-
         units = tuple("s" if k == "stamp" else u for k, u in zip(layout.kinds, layout.units, strict=True))
         return RawTable(
             stream.source,
             layout.names,
             units,
-            read,
+            lambda columns: _read(stream, layout, block, tuple(columns)),
             layout.header_line,
             f"block {index + 1}" if count > 1 else "",
             _form(stream, layout),
             odd=layout.odd,
             remarks=block.remarks or layout.remarks,
             over=layout.over,
-            words=words,
+            words=lambda column: _words(stream, layout, block, column),
         )
 
 
@@ -193,7 +184,7 @@ def _without_cut_row(form: Form, block: Block) -> tuple[Block, tuple[Finding, ..
     if block.stop < stream.stop or not last.strip():
         return block, ()
     text = stream.decode(last)
-    line = block.line + _count_lines(stream, block.start, block.stop)
+    line = block.line + sum(chunk.count(b"\n") for chunk in stream.chunks(block.start, block.stop))
     if text.lstrip()[:1] in ("#", "%"):
         return block, ()
     stream.check(last, line)
@@ -212,7 +203,3 @@ def _without_cut_row(form: Form, block: Block) -> tuple[Block, tuple[Finding, ..
         raise field_count(form, len(cells), line, True)
     finding = Finding("W_NO_EOL", f"the last row (line {line}) has no line end and may be cut: left out")
     return replace(block, stop=block.stop - len(last)), (finding,)
-
-
-def _count_lines(stream: TextStream, start: int, stop: int) -> int:
-    return sum(chunk.count(b"\n") for chunk in stream.chunks(start, stop))

@@ -66,13 +66,7 @@ class Matlab73(Reader):
 
 
 def hdf5_tables(source: Source, title: str) -> list[RawTable]:
-    """The groups of an HDF5 file as tables.
-
-    Raises
-    ------
-    RigFileError
-        E_FORMAT, E_TRUNCATED, E_UNSAFE, E_ARCHIVE_RATIO, E_NO_DATA.
-    """
+    """The groups of an HDF5 file as tables."""
     h5py = load("h5py", title)
     with refusing_damage(source, title):
         file = h5py.File(source.path, "r")

@@ -92,13 +92,7 @@ def _warm() -> None:
 def _table(
     source: Source, title: str, schema: Mapping[str, pl.DataType], rows: int, loaded: Callable[[str], pl.Series]
 ) -> RawTable:
-    """A table of typed columns, each loaded by its name when it is asked for.
-
-    Raises
-    ------
-    RigFileError
-        E_NO_DATA, E_ARCHIVE_RATIO, E_TOO_MANY_COLUMNS.
-    """
+    """A table of typed columns, each loaded by its name when it is asked for."""
     import polars as pl
 
     if not rows:

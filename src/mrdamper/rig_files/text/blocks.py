@@ -28,7 +28,7 @@ def find_blocks(stream: TextStream, layout: Layout, start: int, stop: int) -> li
     """The blocks between two places of a text; one where the header is not repeated."""
     if not layout.header.strip():
         return [Block(start, stop, layout.data_line)]
-    header = layout.header.strip(" \t\r").encode("utf-8" if stream.encoding == "utf-8" else stream.encoding, "ignore")
+    header = layout.header.strip(" \t\r").encode(stream.encoding, "ignore")
     blocks: list[Block] = []
     at, line, begin, begin_line = start, layout.data_line, start, layout.data_line
     tail = b""
@@ -44,7 +44,8 @@ def find_blocks(stream: TextStream, layout: Layout, start: int, stop: int) -> li
                 before = (tail + chunk[:line_start])[-_LOOK_BACK:]
                 above = _remarks(before, stream, layout)
                 blocks.append(Block(begin, at + line_start - above, begin_line, remarks))
-                remarks = _lines(before[len(before) - above :], stream)
+                text = stream.decode(before[len(before) - above :]).replace("\r", "")
+                remarks = tuple(line for line in text.split("\n") if line.strip())
                 header_line = line + chunk.count(b"\n", 0, line_start)
                 size, skipped = _units_below(stream, layout, at + line_end, header_line)
                 begin, begin_line = at + line_end + size, header_line + 1 + skipped
@@ -57,13 +58,7 @@ def find_blocks(stream: TextStream, layout: Layout, start: int, stop: int) -> li
 
 
 def _units_below(stream: TextStream, layout: Layout, start: int, header_line: int) -> tuple[int, int]:
-    """Bytes and lines between a repeated header and its rows: those of units, which must be the file's.
-
-    Raises
-    ------
-    RigFileError
-        E_AMBIGUOUS if a later block is in other units.
-    """
+    """Bytes and lines between a repeated header and its rows: those of units, which must be the file's."""
     usual = layout.units_line - layout.header_line if layout.units_line and layout.header_line else 0
     size = lines = 0
     for raw in stream.lines_at(start, max(0, usual)):
@@ -90,10 +85,6 @@ def _remarks(before: bytes, stream: TextStream, layout: Layout) -> int:
             break
         size += len(raw) + 1
     return min(size, len(before))
-
-
-def _lines(text: bytes, stream: TextStream) -> tuple[str, ...]:
-    return tuple(line for line in stream.decode(text).replace("\r", "").split("\n") if line.strip())
 
 
 def _is_data(text: str, layout: Layout) -> bool:

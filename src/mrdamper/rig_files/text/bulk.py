@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from mrdamper.rig_files.text.cells import Form, Rows, read_row
-from mrdamper.rig_files.text.layout import SPACES, Layout
+from mrdamper.rig_files.text.layout import SPACES
 from mrdamper.rig_files.text.stream import LONGEST_LINE
 
 _MOST_STRAY = 0.05  # above this share, reading the whole block cell by cell is no slower
@@ -19,15 +19,10 @@ _COMMA_MARK = _ALLOWED.replace(b",", b"\0").replace(b".", b"\x01").replace(b"\0"
 
 
 def read_bulk(block: bytes, line: int, form: Form) -> Rows | None:
-    """Read a block of whole lines; None if it is not plain enough.
-
-    Raises
-    ------
-    RigFileError
-        If a cell is no number.
-    """
+    """Read a block of whole lines; None if it is not plain enough."""
     layout = form.layout
-    if layout.separator == SPACES or b'"' in block or any(_is_slow(layout, c) for c in form.wanted):
+    slow = any(layout.kinds[c] == "stamp" or (layout.behind and layout.behind[c]) for c in form.wanted)
+    if slow or layout.separator == SPACES or b'"' in block:
         return None
     ends = _even_lines(block, ord(layout.separator), layout.width - 1 + layout.trailing)
     if ends is None:
@@ -43,13 +38,9 @@ def read_bulk(block: bytes, line: int, form: Form) -> Rows | None:
             return None
         for value, cell in zip(values, cells, strict=True):
             value[row] = cell
-    odd = not block.isascii() and not _decodes(block, form)
-    return Rows(dict(zip(form.wanted, values, strict=True)), np.arange(line, line + ends.size), odd)
-
-
-def _is_slow(layout: Layout, column: int) -> bool:
-    """Whether a column needs more than numbers to be read."""
-    return layout.kinds[column] == "stamp" or (bool(layout.behind) and layout.behind[column] != "")
+    return Rows(
+        dict(zip(form.wanted, values, strict=True)), np.arange(line, line + ends.size), form.stream.is_odd(block)
+    )
 
 
 def _even_lines(block: bytes, separator: int, count: int) -> np.ndarray | None:
@@ -67,16 +58,6 @@ def _even_lines(block: bytes, separator: int, count: int) -> np.ndarray | None:
     places = places.reshape(ends.size, count)
     even = np.all(places[:, 0] >= starts) and np.all(places[:, -1] < ends)
     return ends if even else None
-
-
-def _decodes(block: bytes, form: Form) -> bool:
-    if form.stream.encoding != "utf-8":
-        return form.stream.original_encoding != "cp1252"
-    try:
-        block.decode("utf-8")
-    except UnicodeDecodeError:
-        return False
-    return True
 
 
 def _cleaned(block: bytes, form: Form) -> bytes:

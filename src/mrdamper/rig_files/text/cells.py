@@ -14,18 +14,10 @@ from mrdamper.errors import CombinedError
 from mrdamper.rig_files.readers.base import RigFileError
 from mrdamper.rig_files.text.layout import Layout, is_comment, split
 from mrdamper.rig_files.text.stream import LONGEST_LINE, TextStream, too_long
-from mrdamper.rig_files.text.tokens import NUMBER, number, stamp
+from mrdamper.rig_files.text.tokens import MISSING, NUMBER, number, stamp
 
 _MARKS = "#%/"
 _MOST_SHOWN = 10  # wrong cells and rows of a file
-
-
-@dataclass(slots=True)
-class Clock:
-    """The first time stamp of a record, from which the others count."""
-
-    first: int | None = None
-    zoned: bool | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -39,12 +31,12 @@ class Rows:
 
 @dataclass(eq=False, slots=True)
 class Form:
-    """What is needed to read a row: the text, its layout, the columns wanted, the clock; and what was wrong so far."""
+    """What is needed to read a row: the text, its layout, the columns wanted; and what was met so far."""
 
     stream: TextStream
     layout: Layout
     wanted: tuple[int, ...]
-    clock: Clock = field(default_factory=Clock)
+    first: tuple[int, bool] | None = None  # time stamp, from which the others count
     wrong: dict[tuple[int | None, int | None], RigFileError] = field(default_factory=dict)
     more: int = 0  # beyond those that are shown
 
@@ -56,12 +48,7 @@ class Form:
             self.more += 1
 
     def refuse_wrong(self) -> None:
-        """Raise what was kept.
-
-        Raises
-        ------
-        RigFileError, CombinedError
-        """
+        """Raise what was kept."""
         errors = [self.wrong[place] for place in sorted(self.wrong, key=lambda place: (place[0] or 0, place[1] or 0))]
         if self.more:
             errors.append(self.stream.source.refuse(errors[-1].code, f"{self.more} more like these", errors[-1].mend))
@@ -69,44 +56,24 @@ class Form:
 
 
 def read_cells(block: bytes, line: int, form: Form, *, final: bool = False) -> Rows:
-    """Read every row of a block of whole lines.
+    """Read every row of a block of whole lines, which starts at a line and may be the text's final one.
 
-    Parameters
-    ----------
-    block : bytes
-    line : int
-        Of the block's start.
-    form : Form
-    final : bool
-        Whether the text ends with this block.
-
-    Raises
-    ------
-    RigFileError
-        E_LINE_TOO_LONG, E_QUOTE, E_AMBIGUOUS. Wrong cells and rows are kept by the form.
+    Raises at E_LINE_TOO_LONG, E_QUOTE and E_AMBIGUOUS; wrong cells and rows are kept by the form.
     """
     raw = block.split(b"\n")
     if max(map(len, raw)) > LONGEST_LINE:
         raise too_long(form.stream.source, line + next(i for i, r in enumerate(raw) if len(r) > LONGEST_LINE))
-    plain = block.isascii()
-    texts = form.stream.decode(block).split("\n")
-    rows, lines = split_rows(texts, line, form, final)
+    rows, lines = split_rows(form.stream.decode(block).split("\n"), line, form, final)
     values = {}
     for column in form.wanted:
         cells = [row[column] for row in rows]
         read = _stamps if form.layout.kinds[column] == "stamp" else _numbers
         values[column] = read(cells, column, lines, form)
-    return Rows(values, np.array(lines, dtype=np.int64), not plain and _odd(block, form))
+    return Rows(values, np.array(lines, dtype=np.int64), form.stream.is_odd(block))
 
 
 def read_row(text: str, line: int, form: Form) -> list[float]:
-    """The wanted cells of one row.
-
-    Raises
-    ------
-    RigFileError
-        As `read_cells`.
-    """
+    """The wanted cells of one row; raises as `read_cells`."""
     rows, lines = split_rows([text], line, form, False)
     return [float(_numbers([row[c] for row in rows], c, lines, form)[0]) for row in rows for c in form.wanted]
 
@@ -135,10 +102,7 @@ def field_count(form: Form, found: int, line: int, final: bool) -> RigFileError:
 def split_rows(texts: Sequence[str], line: int, form: Form, final: bool) -> tuple[list[list[str]], list[int]]:
     """The cells of every row among lines of text, and the lines they stand in.
 
-    Raises
-    ------
-    RigFileError
-        E_QUOTE. Rows of another width are left out and kept by the form.
+    Raises at E_QUOTE; rows of another width are left out and kept by the form.
     """
     separator, width = form.layout.separator, form.layout.width + form.layout.trailing
     rows: list[list[str]] = []
@@ -193,20 +157,15 @@ def _numbers(cells: Sequence[str], column: int, lines: Sequence[int], form: Form
 
 
 def _stamps(cells: Sequence[str], column: int, lines: Sequence[int], form: Form) -> Floats:
-    clock = form.clock
-    values = np.empty(len(cells))
+    values = np.full(len(cells), math.nan)
     for i, cell in enumerate(cells):
         read = stamp(cell)
         if read is None:
-            if number(cell, ".") is not None and math.isnan(number(cell, ".") or 0.0):
-                values[i] = math.nan
-                continue
-            form.note(_no_number(cell, column, lines[i], form))
-            values[i] = math.nan
+            if cell.lower() not in MISSING:
+                form.note(_no_number(cell, column, lines[i], form))
             continue
-        if clock.first is None:
-            clock.first, clock.zoned = read
-        if read[1] != clock.zoned:
+        form.first = form.first or read
+        if read[1] != form.first[1]:
             raise form.stream.source.refuse(
                 "E_AMBIGUOUS",
                 "time stamps with and without a time zone",
@@ -214,14 +173,13 @@ def _stamps(cells: Sequence[str], column: int, lines: Sequence[int], form: Form)
                 line=lines[i],
                 column=column + 1,
             )
-        values[i] = (read[0] - clock.first) / 1e9
+        values[i] = (read[0] - form.first[0]) / 1e9
     return values
 
 
 def _no_number(cell: str, column: int, line: int, form: Form) -> RigFileError:
     strange = any("\udc80" <= c <= "\udcff" or c == "\ufffd" for c in cell)
-    if not cell.isascii() and form.stream.encoding != "utf-8":
-        strange = True
+    strange |= not cell.isascii() and form.stream.encoding != "utf-8"
     return form.stream.source.refuse(
         "E_ENCODING" if strange else "E_NUMBER",
         f"{_shown(cell)} in {_named(form, column)} is no number",
@@ -238,13 +196,3 @@ def _shown(cell: str) -> str:
 
 def _named(form: Form, column: int) -> str:
     return f"column {form.layout.names[column][:40]!r}" if form.layout.names[column] else f"column {column + 1}"
-
-
-def _odd(block: bytes, form: Form) -> bool:
-    if form.stream.encoding != "utf-8":
-        return form.stream.original_encoding == "cp1252"
-    try:
-        block.decode("utf-8")
-    except UnicodeDecodeError:
-        return True
-    return False

@@ -65,21 +65,9 @@ class Layout:
 
 
 def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
-    """Sniff the layout from the first lines of a text.
+    """Sniff the layout from the first lines of a text, without line ends; what the form says wins.
 
-    Parameters
-    ----------
-    lines : sequence of str
-        Without line ends.
-    source : Source
-        For messages.
-    form : FileForm
-        Wins over what is sniffed.
-
-    Raises
-    ------
-    RigFileError
-        E_NO_DATA, E_AMBIGUOUS, E_FIELD_COUNT, E_TOO_MANY_COLUMNS, E_QUOTE.
+    Raises `RigFileError`, its code E_NO_DATA, E_AMBIGUOUS, E_FIELD_COUNT, E_TOO_MANY_COLUMNS or E_QUOTE.
     """
     as_written, lines = lines, _without_units(lines)
     content = _content(lines)
@@ -210,13 +198,7 @@ def _titles(above: Sequence[str], separator: str, width: int) -> tuple[str, ...]
 
 
 def split(line: str, separator: str) -> list[str]:
-    """The stripped cells of a line.
-
-    Raises
-    ------
-    csv.Error
-        If a quote is not closed.
-    """
+    """The stripped cells of a line; csv.Error if a quote is not closed."""
     if separator == SPACES:
         return line.split()
     if '"' in line:

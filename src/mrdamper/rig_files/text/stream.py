@@ -46,6 +46,16 @@ class TextStream:
             return line.decode("utf-8", "surrogateescape")
         return line.decode(self.encoding, "replace")
 
+    def is_odd(self, block: bytes) -> bool:
+        """Whether there are bytes that are not in the text's encoding."""
+        if block.isascii() or self.encoding != "utf-8":
+            return not block.isascii() and self.original_encoding == "cp1252"
+        try:
+            block.decode("utf-8")
+        except UnicodeDecodeError:
+            return True
+        return False
+
     def head(self) -> bytes:
         """The start of the text, whole lines where there is more."""
         self.file.seek(self.start)
@@ -106,13 +116,7 @@ class TextStream:
 
 
 def open_text(source: Source, form: FileForm) -> TextStream:
-    """Find the encoding, and give the text as UTF-8 or as it is.
-
-    Raises
-    ------
-    RigFileError
-        E_EMPTY, E_NUL, E_ENCODING, E_LINE_TOO_LONG.
-    """
+    """Find the encoding, and give the text as UTF-8 or as it is."""
     head = source.head(_HEAD)
     if not head.strip(b" \t\r\n"):
         raise source.refuse("E_EMPTY", "the file is empty", "export it again")
