@@ -42,7 +42,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
     """
     found = assign(table, profile)
     raw, findings, lines = _read(table, found)
-    channels = {name: _si(raw[entry.column], entry) for name, entry in found.items()}
+    channels = {name: rescale(raw[of.column], of.factor, of.offset) for name, of in found.items()}
     size, rate = next(iter(raw.values())).size, ""
     if "time" not in channels:
         channels["time"], rate = _counted_time(table, profile, size)
@@ -101,7 +101,9 @@ def _read(table: RawTable, found: dict[str, Assigned]):
             code = "W_ENCODING" if error.code == "E_ENCODING" else "W_COLUMN"
             findings.append(Finding(code, f"the {name} channel is left out: {error.found}"))
             del found[name]
-    for name in [name for name in found if name in OPTIONAL and not _holds_any(raw[found[name].column])]:
+    for name in [name for name in found if name in OPTIONAL]:
+        if any(np.isfinite(piece).any() for _, piece in pieces(raw[found[name].column])):
+            continue
         findings.append(Finding("W_COLUMN", f"the {name} channel is left out: its column is empty"))
         del found[name]
     return raw, findings, content.lines
@@ -123,10 +125,6 @@ def _refuse_unscaled(table: RawTable, found: dict[str, Assigned], raw: dict[int,
                 f"{role} is whole numbers, and {key} is {value:g}: are they scaled?",
                 f"say [channels.{role}] unit and scale in a profile",
             )
-
-
-def _holds_any(values: Floats) -> bool:
-    return any(np.isfinite(piece).any() for _, piece in pieces(values))
 
 
 def _counted_time(table: RawTable, profile: Profile, size: int) -> tuple[Floats, str]:
@@ -209,10 +207,6 @@ def thousands_in(values: Floats) -> bool:
     falls = whole[:-1] & ~whole[1:] & (some[:-1] >= 100) & (some[1:] < 100) & (some[:-1] > 5 * some[1:])
     rises = whole[1:] & ~whole[:-1] & (some[1:] >= 100) & (some[:-1] < 100) & (some[1:] > 5 * some[:-1])
     return bool(np.any(falls | rises))
-
-
-def _si(values: Floats, entry: Assigned) -> Floats:
-    return rescale(values, entry.factor, entry.offset)
 
 
 def _aligned(channels: dict[str, Floats], found: dict[str, Assigned], lines):

@@ -138,8 +138,9 @@ def _unzip(source: Source) -> Source:
     except EOFError as error:
         raise _cut(source) from error
     except (*UNREADABLE_ZIP, zlib.error, RuntimeError, struct.error) as error:
-        whole = isinstance(error, zipfile.BadZipFile) and _has_directory(source)
-        if isinstance(error, zipfile.BadZipFile) and not whole:
+        source.file.seek(max(0, source.size - 70_000))
+        directory = b"PK\x05\x06"  # stands at the end of a zip
+        if isinstance(error, zipfile.BadZipFile) and directory not in source.file.read(70_000):
             raise _cut(source) from error
         raise source.refuse("E_ARCHIVE", f"damaged or unusual archive ({error})", "pack it again") from error
     inner = member.filename
@@ -216,9 +217,3 @@ def _refuse_nested(source: Source) -> None:
 
 def _cut(source: Source) -> RigFileError:
     return source.refuse("E_TRUNCATED", "the archive ends early", "copy the file again")
-
-
-def _has_directory(source: Source) -> bool:
-    """Whether the end of a zip, its directory, is there."""
-    source.file.seek(max(0, source.size - 70_000))
-    return b"PK\x05\x06" in source.file.read(70_000)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Any
@@ -78,7 +80,8 @@ def hdf5_tables(source: Source, title: str) -> list[RawTable]:
     tables = []
     for group, columns in groups.items():
         constants = {**found.constants.get("", {}), **found.constants.get(group, {})}
-        tables.append(_table(source, columns, title, group, constants, remarks=_above(found.remarks, group)))
+        above = [lines for path, lines in found.remarks.items() if f"{group}/".startswith(f"{path}/")]
+        tables.append(_table(source, columns, title, group, constants, [line for lines in above for line in lines]))
     if len(groups) > 1:
         every = [column for columns in groups.values() for column in columns]
         tables.append(_table(source, every, title, "", found.constants.get("", {}), fallback=True))
@@ -94,37 +97,24 @@ def _table(
     title: str,
     label: str,
     constants: dict[str, float],
+    remarks: Sequence[str] = (),
     *,
     fallback: bool = False,
-    remarks: list[str] | None = None,
 ) -> RawTable:
-    names = [name for name, _, _, _ in columns]
-    units = [unit for _, unit, _, _ in columns]
-
     def column_of(column: int) -> np.ndarray:
         _, _, dataset, part = columns[column]
         if dataset is None:
             return np.empty(2, dtype=object)  # a link, refused if it is asked for
         if isinstance(part, str):
             return dataset[part]
-        return unpacked(dataset.attrs, pick(_upright(dataset), part))
+        array = dataset[()]
+        turned = "MATLAB_class" in dataset.attrs and array.ndim == 2  # MATLAB stores its matrices so
+        return unpacked(dataset.attrs, pick(array.T if turned else array, part))
 
-    label = label.strip("/").replace("/", "_")
     return array_table(
-        source, names, units, column_of, label=label, title=title, fallback=fallback, constants=constants,
-        remarks=remarks or (),
+        source, [c[0] for c in columns], [c[1] for c in columns], column_of, label=label.strip("/").replace("/", "_"),
+        title=title, fallback=fallback, constants=constants, remarks=remarks,
     )  # fmt: skip
-
-
-def _above(remarks: dict[str, list[str]], group: str) -> list[str]:
-    """What the attributes of a group, and of the groups around it, say."""
-    return [line for path, lines in remarks.items() if f"{group}/".startswith(f"{path}/") for line in lines]
-
-
-def _upright(dataset: Any) -> np.ndarray:
-    """Samples down, as MATLAB stores its matrices turned."""
-    array = dataset[()]
-    return array.T if "MATLAB_class" in dataset.attrs and array.ndim == 2 else array
 
 
 @dataclass
@@ -132,11 +122,11 @@ class _Found:
     """What a walk through a file meets: by group its columns and single numbers; what is never loaded."""
 
     source: Source
-    groups: dict[str, list[tuple]] = field(default_factory=dict)
-    constants: dict[str, dict[str, float]] = field(default_factory=dict)
+    groups: dict[str, list[tuple]] = field(default_factory=lambda: defaultdict(list))
+    constants: dict[str, dict[str, float]] = field(default_factory=lambda: defaultdict(dict))
     objects: list[str] = field(default_factory=list)
-    remarks: dict[str, list[str]] = field(default_factory=dict)
-    lists: dict[str, list[list[str]]] = field(default_factory=dict)
+    remarks: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
+    lists: dict[str, list[list[str]]] = field(default_factory=lambda: defaultdict(list))
     seen: int = 0
     numbers: int = 0
 
@@ -156,7 +146,7 @@ def _walk(group: Any, path: str, found: _Found) -> None:
         link = group.get(name, getlink=True)
         if isinstance(link, (h5py.ExternalLink, h5py.SoftLink)):  # leads elsewhere, and is not followed
             found.objects.append(f"{name}: a link")
-            found.groups.setdefault(path, []).append((str(name), "", None, None))
+            found.groups[path].append((str(name), "", None, None))
             continue
         item = group.get(name)
         if isinstance(item, h5py.Group) and name != "#refs#" and name != "#subsystem#":
@@ -165,12 +155,11 @@ def _walk(group: Any, path: str, found: _Found) -> None:
             _follow(item, str(name), path, found)
         elif isinstance(item, h5py.Dataset):
             if _is_words(item):
-                found.lists.setdefault(path, []).append(_words(item[()]))
-            columns = _columns(item, str(name), path, found)
-            if columns:
-                found.groups.setdefault(path, []).extend(columns)
+                found.lists[path].append(_words(item[()]))
+            if columns := _columns(item, str(name), path, found):
+                found.groups[path] += columns
             if item.dtype.names:  # a table of records states its conditions itself
-                found.remarks[path] = [*found.remarks[path], *_attributes(item)]
+                found.remarks[path] += _attributes(item)
 
 
 def _follow(references: Any, name: str, path: str, found: _Found) -> None:
@@ -180,7 +169,7 @@ def _follow(references: Any, name: str, path: str, found: _Found) -> None:
     cells = references.size if references.size <= MOST_STRUCTS else 0
     if path.count("/") > _DEEPEST or not cells or "MATLAB_class" not in _file_marks(references):
         found.objects.append(name)
-        found.groups.setdefault(path, []).append((name, "", None, None))
+        found.groups[path].append((name, "", None, None))
         return
     cell = _text(references.attrs.get("MATLAB_class")) == "cell"  # else a field of an array of structs
     words: list[str] = []
@@ -195,24 +184,19 @@ def _follow(references: Any, name: str, path: str, found: _Found) -> None:
         elif isinstance(item, h5py.Dataset) and _text(item.attrs.get("MATLAB_class")) == "char":
             text = "".join(map(chr, np.reshape(item[()], -1)[:200].tolist())) if item.dtype.kind in "iu" else ""
             words.append(text)
-            found.remarks.setdefault(inner, []).append(f"{name}: {text}")
-        elif isinstance(item, h5py.Dataset) and not cell:
-            columns = _columns(item, name, inner, found)
-            if columns:
-                found.groups.setdefault(inner, []).extend(columns)
+            found.remarks[inner].append(f"{name}: {text}")
+        elif isinstance(item, h5py.Dataset) and not cell and (columns := _columns(item, name, inner, found)):
+            found.groups[inner] += columns
     if cell and len(words) == cells:
-        found.lists.setdefault(path, []).append(words)
+        found.lists[path].append(words)
 
 
 def _titled(columns: list[tuple], words: list[list[str]]) -> list[tuple]:
     """The columns with the names and units that lists of words give those of a matrix."""
     named = []
     for dataset, across in ((d, list(group)) for d, group in groupby(columns, key=lambda column: column[2])):
-        lists = (
-            words
-            if dataset is None
-            else [*words, *(_words(dataset.attrs[key]) for key in list(dataset.attrs)[:MOST_COLUMNS])]
-        )
+        says = {} if dataset is None else dataset.attrs
+        lists = [*words, *(_words(says[key]) for key in list(says)[:MOST_COLUMNS])]
         titles = titles_of(len(across), lists) if isinstance(across[0][3], int) else None
         units = [column[1] for column in across]
         if isinstance(across[0][3], str):  # fields of records
@@ -235,9 +219,8 @@ def _attributes(item: Any) -> list[str]:
     for name in list(item.attrs)[:MOST_COLUMNS]:
         value = np.asarray(item.attrs[name])
         if value.size == 1 and value.dtype.kind in "iufSUO":
-            lines.append(
-                f"{name}: {_text(item.attrs[name]) if value.dtype.kind in 'SUO' else value.reshape(-1)[0]}"[:200]
-            )
+            shown = _text(item.attrs[name]) if value.dtype.kind in "SUO" else value.reshape(-1)[0]
+            lines.append(f"{name}: {shown}"[:200])
     return lines
 
 
@@ -251,7 +234,7 @@ def _columns(dataset: Any, name: str, path: str, found: _Found) -> list[tuple]:
     characters = _text(dataset.attrs.get("MATLAB_class")) in ("char", "cell")
     if dataset.size == 1 and kind.kind in "iuf" and not characters and found.numbers < MOST_COLUMNS:
         found.numbers += 1
-        found.constants.setdefault(path, {})[name] = float(np.reshape(dataset[()], -1)[0])
+        found.constants[path][name] = float(np.reshape(dataset[()], -1)[0])
     if dataset.size < 2 or characters:
         return []
     check_unpacked(source, int(dataset.size) * max(8, kind.itemsize if not kind.names else 8))
@@ -260,7 +243,7 @@ def _columns(dataset: Any, name: str, path: str, found: _Found) -> list[tuple]:
     stated = [dataset.attrs[name] for name in _UNIT_NAMES if name in dataset.attrs]
     for key in dataset.attrs if kind.kind in "iu" else ():
         if np.asarray(dataset.attrs[key]).dtype.kind in "iuf" and np.size(dataset.attrs[key]) == 1:
-            found.constants.setdefault(path, {})[f"{name}_{key}"] = float(np.reshape(dataset.attrs[key], -1)[0])
+            found.constants[path][f"{name}_{key}"] = float(np.reshape(dataset.attrs[key], -1)[0])
     unit = next((_text(value) for value in stated if np.asarray(value).dtype.kind in "SUO"), "")
     unit = unit.partition(" since ")[0]  # netCDF counts time from a date
     shape = dataset.shape[::-1] if "MATLAB_class" in dataset.attrs else dataset.shape

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -70,7 +71,7 @@ class Matlab(Reader):
             code, what = ("E_UNSAFE", f"only objects ({others[0]})") if others else ("E_NO_DATA", "no array of numbers")
             raise source.refuse(code, what, "save the channels as arrays of numbers")
         for name in others:
-            found.columns.setdefault("", {})[name] = np.empty(2, dtype=object)  # refused if it is asked for
+            found.columns[""][name] = np.empty(2, dtype=object)  # refused if it is asked for
         return [_table(source, columns, label, self.title, found) for label, columns in found.columns.items()]
 
 
@@ -78,18 +79,14 @@ class Matlab(Reader):
 class _Found:
     """By the label of a table its columns, single numbers, texts, and lists of words."""
 
-    columns: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
-    single: dict[str, dict[str, float]] = field(default_factory=dict)
-    remarks: dict[str, list[str]] = field(default_factory=dict)
-    lists: dict[str, list[list[str]]] = field(default_factory=dict)
+    columns: dict[str, dict[str, np.ndarray]] = field(default_factory=lambda: defaultdict(dict))
+    single: dict[str, dict[str, float]] = field(default_factory=lambda: defaultdict(dict))
+    remarks: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
+    lists: dict[str, list[list[str]]] = field(default_factory=lambda: defaultdict(list))
 
     def above(self, label: str) -> Iterator[str]:
         """Labels of the structs a table lies in, from the file down to its own."""
-        return (known for known in ("", *self.single, *self.remarks) if label == known or _inside(label, known))
-
-
-def _inside(label: str, outer: str) -> bool:
-    return outer == "" or label.startswith(f"{outer}_")
+        return (at for at in ("", *self.single, *self.remarks) if at in ("", label) or label.startswith(f"{at}_"))
 
 
 def _table(source: Source, columns: dict[str, np.ndarray], label: str, title: str, found: _Found) -> RawTable:
@@ -131,13 +128,13 @@ def _gather(value: Any, name: str, label: str, found: _Found, depth: int = 0) ->
         for number, item in enumerate(array.reshape(-1)[:MOST_STRUCTS], 1):
             _gather(item, f"{name}_{number}", label, found, depth + 1)
     elif size > 1 and split_name(name).role is None and (words := _words(array)):
-        found.lists.setdefault(label, []).append(words)
+        found.lists[label].append(words)
     elif kind in "iufcO" and size > 1:
-        found.columns.setdefault(label, {})[name] = array  # objects and complex numbers are refused if asked for
-    elif kind in "iuf" and size == 1 and len(found.single.setdefault(label, {})) < MOST_COLUMNS:
+        found.columns[label][name] = array  # objects and complex numbers are refused if asked for
+    elif kind in "iuf" and size == 1 and len(found.single[label]) < MOST_COLUMNS:
         found.single[label][name] = float(array.reshape(-1)[0])
     elif kind in "US" and size == 1:
-        found.remarks.setdefault(label, []).append(f"{name}: {array.reshape(-1)[0]}"[:200])
+        found.remarks[label].append(f"{name}: {array.reshape(-1)[0]}"[:200])
 
 
 def _named(item: np.void, label: str, found: _Found) -> bool:
@@ -148,7 +145,7 @@ def _named(item: np.void, label: str, found: _Found) -> bool:
         return False
     title = str(name.reshape(-1)[0]).rpartition("/")[2]  # of a path in a model
     stated = str(unit.reshape(-1)[0]) if unit.dtype.kind == "U" and unit.size == 1 else ""
-    found.columns.setdefault(label, {})[f"{title} [{stated}]" if is_unit(stated) else title] = data
+    found.columns[label][f"{title} [{stated}]" if is_unit(stated) else title] = data
     return True
 
 

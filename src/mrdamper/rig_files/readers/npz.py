@@ -36,8 +36,11 @@ class Npz(Reader):
         """The arrays as columns; a matrix gives numbered ones, a structured array its fields."""
         with refusing_damage(source, self.title):
             columns, single, worded = _columns(source)
-            constants = _numbers(source, single[:MOST_COLUMNS])
-            columns = _titled(source, columns, worded)
+            source.file.seek(0)
+            with np.load(source.file, allow_pickle=False) as archive:
+                constants = {name: float(archive[name].reshape(-1)[0]) for name in single[:MOST_COLUMNS]}
+                lists = [[str(word).strip() for word in archive[name].reshape(-1)] for name in worded]
+            columns = _titled(columns, lists) if lists else columns
         names, units, places = [c[0] for c in columns], [c[1] for c in columns], [c[2] for c in columns]
 
         def load(column: int) -> np.ndarray:
@@ -50,19 +53,8 @@ class Npz(Reader):
         return [array_table(source, names, units, load, title=self.title, constants=constants)]
 
 
-def _numbers(source: Source, names: list[str]) -> dict[str, float]:
-    source.file.seek(0)
-    with np.load(source.file, allow_pickle=False) as archive:
-        return {name: float(archive[name].reshape(-1)[0]) for name in names}
-
-
-def _titled(source: Source, columns: list[_Column], worded: list[str]) -> list[_Column]:
+def _titled(columns: list[_Column], lists: list[list[str]]) -> list[_Column]:
     """The columns with the names and units that lists of words give those of a matrix."""
-    if not worded:
-        return columns
-    source.file.seek(0)
-    with np.load(source.file, allow_pickle=False) as archive:
-        lists = [[str(word).strip() for word in archive[name].reshape(-1)] for name in worded]
     found = []
     for member, group in groupby(columns, key=lambda column: column[2][0]):
         across = list(group)

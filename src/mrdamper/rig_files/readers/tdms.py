@@ -57,7 +57,11 @@ def _table(source: Source, group: Any, properties: dict[str, Any], title: str) -
     names = [channel.name for channel in channels]
     units = [_unit(channel) for channel in channels]
     steps = {_step(channel) for channel in channels} - {None}
-    begins = {_begin(channel) for channel in channels if _step(channel)}
+    begins = {
+        (float(channel.properties.get("wf_start_offset") or 0.0), str(channel.properties.get("wf_start_time", "")))
+        for channel in channels
+        if _step(channel)
+    }
     sizes = {len(channel) for channel in channels if len(channel)}
     timed = any(name.casefold().startswith(("time", "zeit")) for name in names)
     if not timed and (len(steps) > 1 or len(begins) > 1):
@@ -94,8 +98,3 @@ def _step(channel: Any) -> float | None:
     if not isinstance(step, (int, float)) or not step > 0:
         return None
     return None if step == 1.0 and "wf_xname" not in channel.properties else float(step)
-
-
-def _begin(channel: Any) -> tuple[float, str]:
-    """Where a waveform begins: its offset [s] and its time of day."""
-    return float(channel.properties.get("wf_start_offset") or 0.0), str(channel.properties.get("wf_start_time", ""))

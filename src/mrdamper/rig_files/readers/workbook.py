@@ -61,16 +61,12 @@ class Workbook(Reader):
                 first = first or error
                 tables = []
             tables = [table for table in tables if len(table.names) >= _FEWEST]
-            found += [_labelled(table, name) for table in tables]
+            found += [replace(table, label=table.label or name, form={"sheet": name}) for table in tables]
             beside += () if tables else sheet.head(_NOTES).decode("utf-8", "replace").splitlines()
         if not found:
             raise first or source.refuse("E_NO_DATA", "no sheet holds data", "export the file again")
         found = [replace(table, remarks=(*table.remarks, *beside)) for table in found]
         return found if len(found) > 1 else [replace(found[0], label="")]
-
-
-def _labelled(table: RawTable, sheet: str) -> RawTable:
-    return replace(table, label=table.label or sheet, form={"sheet": sheet})
 
 
 def _sheets(source: Source, form: FileForm) -> list[tuple[str, Source]]:

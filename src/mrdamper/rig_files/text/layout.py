@@ -81,7 +81,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
     if width > MOST_COLUMNS:
         raise source.refuse("E_TOO_MANY_COLUMNS", f"{width} columns", "is one sample one line?", line=first + 1)
     rows = _rows(lines[first:], separator, width, trailing)
-    decimal = form.decimal or _decimal(rows, separator, source, first)
+    decimal = form.decimal or _decimal(rows, source, first)
     header, unit_row = _header_lines(lines, first, separator, width, source, form)
     _refuse_open_quote(lines, header, separator, source)
     names = form.names or (_cells(lines[header], separator, width) if header is not None else ("",) * width)
@@ -300,30 +300,28 @@ def _rows(lines: Sequence[str], separator: str, width: int, trailing: bool) -> l
     return [row[:width] for row in rows if len(row) == width + trailing]
 
 
-def _decimal(rows: Sequence[Sequence[str]], separator: str, source: Source, first: int) -> str:
+def _decimal(rows: Sequence[Sequence[str]], source: Source, first: int) -> str:
     numbers = [c for row in rows for c in row if c and looks_numeric(c) and stamp(c) is None]
     dots = [c for c in numbers if "." in c and "," not in c]
     commas = [c for c in numbers if "," in c and "." not in c]
     few = _STRAY * (len(dots) + len(commas))
     if len(commas) <= few:
         return "."  # the strict reader refuses the few others, with their place
-    if len(dots) <= few:
-        dots = []
-    if dots and commas:
+    if len(dots) > few:
         raise source.refuse(
             "E_AMBIGUOUS",
             f"{dots[0]!r} beside {commas[0]!r}: point or comma for decimals?",
             "write one decimal mark throughout, without separators of thousands",
             line=first + 1,
         )
-    if commas and all(_GROUPED.fullmatch(c) for c in commas):
+    if all(_GROUPED.fullmatch(c) for c in commas):
         raise source.refuse(
             "E_AMBIGUOUS",
             f"{commas[0]!r} may be a decimal comma or thousands",
             'say decimal = "," or decimal = "." under [file] of a profile',
             line=first + 1,
         )
-    return "," if commas else "."
+    return ","
 
 
 def _header_lines(
