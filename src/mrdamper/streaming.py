@@ -29,31 +29,16 @@ FLAGS = ("current", "amplitude", "velocity", "frequency")  # bit 0, 1, 2, 3
 
 @dataclass(frozen=True, eq=False)
 class Stream:
-    """A damper as programs for one sample.
+    """A damper as programs for one sample."""
 
-    Attributes
-    ----------
-    title : str
-        What it is, for people.
-    step : Program
-        From displacement [m], velocity [m/s], acceleration [m/s²], current [A] and the step of
-        time [s] to force [N] and extrapolation flags (bits in the order of `FLAGS`).
-    drives : mapping of str to Program
-        How a motion is made of "displacement" or "velocity" alone.
-    envelope : Envelope or None
-        Ranges of the tests behind it.
-    model : Model or None
-        The model whose parameters can be set; None where they are functions.
-    damper : Damper
-        What was traced.
-    """
-
-    title: str
+    title: str  # what it is, for people
+    # from displacement [m], velocity [m/s], acceleration [m/s²], current [A] and the step of time [s] to force [N]
+    # and extrapolation flags (bits in the order of `FLAGS`)
     step: Program
-    drives: Mapping[str, Program]
-    envelope: Envelope | None
-    model: Model | None
-    damper: Damper
+    drives: Mapping[str, Program]  # how a motion is made of "displacement" or "velocity" alone
+    envelope: Envelope | None  # ranges of the tests behind it
+    model: Model | None  # the model whose parameters can be set; None where they are functions
+    damper: Damper  # what was traced
 
     @cached_property
     def band(self) -> PortableBand | None:

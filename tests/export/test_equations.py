@@ -13,9 +13,8 @@ from mrdamper.dampers.joint import damper_of
 from mrdamper.dampers.kernel import KernelDamper, KernelLaw
 from mrdamper.dampers.published import all_conditioned
 from mrdamper.errors import ParameterError
+from mrdamper.export.documents import LatexExporter, MarkdownExporter
 from mrdamper.export.equations import equations, function_text, number
-from mrdamper.export.latex import LatexExporter
-from mrdamper.export.markdown import MarkdownExporter
 from mrdamper.files.model_file import load_model
 from mrdamper.functions.forms import FORMS, ParameterFunction
 from mrdamper.models import all_models

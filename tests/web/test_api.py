@@ -28,7 +28,7 @@ from mrdamper.files.model_file import dump_model, parse_model
 from mrdamper.identification import identify
 from mrdamper.identification.loop_analysis import analyse_loop
 from mrdamper.identification.methods import all_methods
-from mrdamper.web.frames import frame
+from mrdamper.web.answers import frame
 from mrdamper.web.tasks import export_name
 
 SCREEN = 1e-6  # arrays travel as 32-bit floats: 6e-8 of each value, and sums of two

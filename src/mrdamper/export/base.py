@@ -23,18 +23,10 @@ _RESERVED = re.compile(
 
 @dataclass(frozen=True)
 class Written:
-    """What an export made.
+    """What an export made."""
 
-    Attributes
-    ----------
-    files : mapping of str to bytes
-        Contents by file name.
-    notes : tuple of str
-        What the user should know: limits, platforms left out.
-    """
-
-    files: Mapping[str, bytes]
-    notes: tuple[str, ...] = field(default=())
+    files: Mapping[str, bytes]  # contents by file name
+    notes: tuple[str, ...] = field(default=())  # what the user should know: limits, platforms left out
 
 
 class Exporter(ABC):

@@ -1,4 +1,7 @@
-"""A traced program as C99: structures for parameters, derived numbers and memory, functions on them."""
+"""A traced program as C99: structures for parameters, derived numbers and memory, functions on them.
+
+JavaScript is C's grammar with other words, so it computes in C's order.
+"""
 
 from __future__ import annotations
 
@@ -123,3 +126,24 @@ class CWriter(Writer):
         inside += [f"{name} = next_{name};" for name in carried]
         inside += ["if (!going) {", "    break;", "}"]
         return [*lines, *(f"{pad}    {line}" for line in inside), f"{pad}}}"]
+
+
+class JavaScriptWriter(CWriter):
+    """JavaScript's words; its numbers are C's doubles."""
+
+    member: ClassVar[str] = "."
+    constant: ClassVar[str] = "const"
+    answer: ClassVar[str] = "const"
+    variable: ClassVar[str] = "let"
+    counter: ClassVar[str] = "let"
+    formats: ClassVar[Mapping[str, str]] = {
+        **CWriter.formats,
+        **{op: f"Math.{function}({{}})" for op, function in FUNCTIONS.items()},
+        **{"power": "Math.pow({}, {})", "absolute": "Math.abs({})"},
+        "equal": "({} === {})",
+        "not_equal": "({} !== {})",
+        "isfinite": "Number.isFinite({})",
+    }
+
+    def number(self, value: float) -> str:
+        return repr(float(value))

@@ -19,28 +19,14 @@ _SLOWEST = 0.02  # of the highest tested velocity
 
 @dataclass(frozen=True, eq=False)
 class ForceVelocity:
-    """Forces at mid-stroke of sines of one amplitude and rising frequency.
-
-    Attributes
-    ----------
-    current_A : float
-    amplitude_m : float
-    velocity : (K,) array
-        [m/s], from the highest in compression (negative) to the highest in extension.
-    force : (K,) array
-        [N]
-    peak_force : (K,) array
-        Largest force of the loop in the direction of that velocity [N].
-    tested : (K,) array of bool
-        Whether the sine lies inside the tested ranges.
-    """
+    """Forces at mid-stroke of sines of one amplitude and rising frequency."""
 
     current_A: float
     amplitude_m: float
-    velocity: Floats
-    force: Floats
-    peak_force: Floats
-    tested: np.ndarray
+    velocity: Floats  # (K,) [m/s], from the highest in compression (negative) to the highest in extension
+    force: Floats  # (K,) [N]
+    peak_force: Floats  # (K,), largest force of the loop in the direction of that velocity [N]
+    tested: np.ndarray  # (K,), whether the sine lies inside the tested ranges
 
 
 def force_velocity(

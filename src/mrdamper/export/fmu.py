@@ -96,29 +96,15 @@ class FMUExporter(Exporter):
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """A motion and what the model answers, sample by sample.
+    """A motion and what the model answers, sample by sample."""
 
-    Attributes
-    ----------
-    step : float
-        Communication step [s], a power of two: times and their differences are exact.
-    internal_step : float
-        [s], a power of two.
-    displacement, velocity, current : (N,) arrays
-        Inputs set at the samples [m], [m/s], [A].
-    force : (N,) array
-        Output read at the samples [N]: at rest, then of the inputs set one sample before.
-    flags : (N,) array of int
-        Bits in the order of `FLAGS`.
-    """
-
-    step: float
-    internal_step: float
-    displacement: Floats
-    velocity: Floats
-    current: Floats
-    force: Floats
-    flags: np.ndarray
+    step: float  # communication step [s], a power of two: times and their differences are exact
+    internal_step: float  # [s], a power of two
+    displacement: Floats  # (N,) input set at the samples [m]
+    velocity: Floats  # (N,) the same [m/s]
+    current: Floats  # (N,) the same [A]
+    force: Floats  # (N,) output read at the samples [N]: at rest, then of the inputs set one sample before
+    flags: np.ndarray  # (N,) bits in the order of `FLAGS`
 
 
 def reference(made: Stream) -> Reference:

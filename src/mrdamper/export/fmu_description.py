@@ -35,33 +35,19 @@ _BASE = {"[mass]": "kg", "[length]": "m", "[time]": "s", "[current]": "A"}
 
 @dataclass(frozen=True)
 class Variable:
-    """One variable of the model description.
-
-    Attributes
-    ----------
-    name, description, unit : str
-    symbol : str
-        Of its value reference in the C source.
-    reference, index : int
-        Value reference; place among the variables, from one.
-    causality, variability, initial : str
-        As the standard names them; initial may be empty.
-    kind : "real", "flag" or "choice"
-    attributes : tuple of (str, str)
-        Of its type: unit, start, bounds.
-    """
+    """One variable of the model description."""
 
     name: str
     description: str
-    symbol: str
-    reference: int
-    index: int
-    causality: str
+    symbol: str  # of its value reference in the C source
+    reference: int  # of its value
+    index: int  # its place among the variables, from one
+    causality: str  # as the standard names them
     variability: str
-    initial: str
-    kind: str
+    initial: str  # may be empty
+    kind: str  # "real", "flag" or "choice"
     unit: str
-    attributes: tuple[tuple[str, str], ...]
+    attributes: tuple[tuple[str, str], ...]  # of its type: unit, start, bounds
 
     @property
     def fmi2_type(self) -> str:

@@ -15,7 +15,7 @@ from mrdamper.dampers.base import SLACK, Damper, Envelope
 from mrdamper.dampers.joint import damper_of
 from mrdamper.export.base import Exporter, Written, identifier
 from mrdamper.export.c import TOLERANCE, c_facts, c_sources, reference_motion, shared_points
-from mrdamper.export.js_writer import JavaScriptWriter
+from mrdamper.export.c_writer import JavaScriptWriter
 from mrdamper.export.templates import render
 from mrdamper.export.toolchain import build_webassembly
 from mrdamper.models import Model

@@ -21,24 +21,12 @@ _PATIENCE = 600  # s; a cross compiler builds its C library the first time
 
 @dataclass(frozen=True)
 class Platform:
-    """A platform an FMU can carry a binary for.
+    """A platform an FMU can carry a binary for."""
 
-    Attributes
-    ----------
-    name : str
-        As FMI 3.0 calls it.
-    fmi2 : str
-        As FMI 2.0 calls it; empty where it has no name for it.
-    suffix : str
-        Of its shared libraries.
-    target : str
-        As zig calls it.
-    """
-
-    name: str
-    fmi2: str
-    suffix: str
-    target: str
+    name: str  # as FMI 3.0 calls it
+    fmi2: str  # as FMI 2.0 calls it; empty where it has no name for it
+    suffix: str  # of its shared libraries
+    target: str  # as zig calls it
 
 
 PLATFORMS = (

@@ -23,17 +23,10 @@ _TAIL = 0.00135  # share beyond three standard deviations of a normal distributi
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """A control chart.
+    """A control chart."""
 
-    Attributes
-    ----------
-    values, lower, upper : (N,) arrays
-        What is charted, and its limits.
-    centre : float
-    """
-
-    values: Floats
-    lower: Floats
+    values: Floats  # (N,) what is charted
+    lower: Floats  # (N,) its limits
     upper: Floats
     centre: float
 
@@ -75,24 +68,14 @@ def ewma(values: Floats, target: float, deviation: float, weight: float = 0.2, w
 
 @dataclass(frozen=True)
 class Capability:
-    """How a distribution lies between its limits.
-
-    Attributes
-    ----------
-    ppk, low, high : float
-        Index, and its 95 % interval; NaN for percentiles, whose interval is not known.
-    way : "normal" or "percentiles"
-    count : int
-    outside : int
-        Values beyond a limit.
-    """
+    """How a distribution lies between its limits."""
 
     ppk: float
-    low: float
+    low: float  # ends of its 95 % interval; NaN for percentiles, whose interval is not known
     high: float
-    way: str
+    way: str  # "normal" or "percentiles"
     count: int
-    outside: int
+    outside: int  # values beyond a limit
 
 
 def is_normal(values: Floats) -> bool:
@@ -132,21 +115,11 @@ def capability(values: Floats, lower: float | None, upper: float | None) -> Capa
 
 @dataclass(frozen=True)
 class Gauge:
-    """Where the variation of golden dampers comes from, as standard deviations.
+    """Where the variation of golden dampers comes from, as standard deviations."""
 
-    Attributes
-    ----------
-    repeatability : float
-        What is left when dampers and sessions are accounted for.
-    reproducibility : float
-        From session to session.
-    parts : float
-        From damper to damper of the line.
-    """
-
-    repeatability: float
-    reproducibility: float
-    parts: float
+    repeatability: float  # what is left when dampers and sessions are accounted for
+    reproducibility: float  # from session to session
+    parts: float  # from damper to damper of the line
 
     @property
     def gauge(self) -> float:

@@ -41,31 +41,17 @@ _FIRST_DAY = date(2024, 1, 8)
 
 @dataclass(frozen=True)
 class VirtualDamper:
-    """One damper of one session, and what is true of it.
-
-    Attributes
-    ----------
-    serial, session, batch, date : str
-    golden : bool
-    fault : str
-        A name of `FAULTS`, or empty.
-    rig : VirtualRig
-        The damper and its sensors.
-    gain : float
-        Of the rig's load cell in this session.
-    seed : int
-        Of its sensor noise.
-    """
+    """One damper of one session, and what is true of it."""
 
     serial: str
     session: str
     batch: str
     date: str
     golden: bool
-    fault: str
-    rig: VirtualRig
-    gain: float
-    seed: int
+    fault: str  # a name of `FAULTS`, or empty
+    rig: VirtualRig  # the damper and its sensors
+    gain: float  # of the rig's load cell in this session
+    seed: int  # of its sensor noise
 
     def dataset(self, conditions: Sequence[Condition] = MATRIX, cycles: int = 3) -> Dataset:
         """Its records: steady cycles after one of run-in."""
@@ -87,35 +73,17 @@ class VirtualDamper:
 
 @dataclass(frozen=True)
 class Line:
-    """How a virtual line makes and tests its dampers.
-
-    Attributes
-    ----------
-    dampers : int
-    sessions : int
-        Test days, the dampers spread over them evenly; three sessions are a batch.
-    golden : int
-        Dampers that are tested again in every session.
-    rig_drift, line_drift : float
-        Relative change of the load cell, and of the dampers' forces, from the first session to the last.
-    session_scatter : float
-        Standard deviation of the load cell's gain from session to session.
-    ageing : float
-        Relative loss of viscosity of a golden damper by all its tests.
-    faults : mapping
-        Number of dampers with each fault.
-    base : VirtualRig
-    seed : int
-    """
+    """How a virtual line makes and tests its dampers."""
 
     dampers: int = 200
-    sessions: int = 10
-    golden: int = 2
+    sessions: int = 10  # test days, the dampers spread over them evenly; three sessions are a batch
+    golden: int = 2  # dampers that are tested again in every session
+    # relative change of the load cell, and of the dampers' forces, from the first session to the last
     rig_drift: float = 0.0
     line_drift: float = 0.0
-    session_scatter: float = 0.002
-    ageing: float = 0.0
-    faults: Mapping[str, int] = field(default_factory=dict)
+    session_scatter: float = 0.002  # standard deviation of the load cell's gain from session to session
+    ageing: float = 0.0  # relative loss of viscosity of a golden damper by all its tests
+    faults: Mapping[str, int] = field(default_factory=dict)  # number of dampers with each fault
     base: VirtualRig = field(default_factory=VirtualRig)
     seed: int = 0
 

@@ -34,18 +34,11 @@ class JobError(InputError):
 
 @dataclass(frozen=True)
 class Limits:
-    """What one job may take.
-
-    Attributes
-    ----------
-    cpu_s, wall_s : float
-    memory_bytes : int
-        Of its process and everything that process starts.
-    """
+    """What one job may take."""
 
     cpu_s: float = 120.0
     wall_s: float = 600.0
-    memory_bytes: int = 2 * 2**30
+    memory_bytes: int = 2 * 2**30  # of its process and everything that process starts
 
 
 class Guard:

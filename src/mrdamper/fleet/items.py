@@ -26,37 +26,19 @@ class FleetError(InputError):
 
 @dataclass(frozen=True)
 class Item:
-    """One damper of one session: where its records lie.
+    """One damper of one session: where its records lie."""
 
-    Attributes
-    ----------
-    serial, session : str
-        Together they name it; a golden damper comes again in other sessions.
-    batch, date : str
-        Empty where nothing states them.
-    golden : bool
-        Tested again and again to watch the rig.
-    kind : "dataset", "rig files" or "lake"
-    paths : tuple of str
-        The dataset folder, the rig files, or the lake's files.
-    rows : tuple of (int, int)
-        Of a lake: first row and number of rows in each file.
-    picks : tuple of (str, str)
-        Column and cell of the rows that are its own, where one table holds several dampers.
-    error : InputError, optional
-        Why it cannot be used, known before it is read.
-    """
-
-    serial: str
+    serial: str  # with the session its name: a golden damper comes again in other sessions
     session: str = ""
-    batch: str = ""
+    batch: str = ""  # these two: empty where nothing states them
     date: str = ""
-    golden: bool = False
+    golden: bool = False  # tested again and again to watch the rig
     kind: Kind = "dataset"
-    paths: tuple[str, ...] = ()
-    rows: tuple[tuple[int, int], ...] = ()
+    paths: tuple[str, ...] = ()  # the dataset folder, the rig files, or the lake's files
+    rows: tuple[tuple[int, int], ...] = ()  # of a lake: first row and number of rows in each file
+    # column and cell of the rows that are its own, where one table holds several dampers
     picks: tuple[tuple[str, str], ...] = ()
-    error: InputError | None = None
+    error: InputError | None = None  # why it cannot be used, known before it is read
 
     @property
     def name(self) -> str:

@@ -45,21 +45,11 @@ _FAR = 6.0  # robust standard deviations from the line at which a damper is stud
 
 @dataclass(frozen=True)
 class Settings:
-    """What changes a result, and so belongs to the key it is kept under.
+    """What changes a result, and so belongs to the key it is kept under."""
 
-    Attributes
-    ----------
-    model : str
-        Identified jointly from all runs of a damper.
-    rig_profile : str
-        Of rig files, as TOML text.
-    cold : bool
-        Begin every search from the model's own start, not from the line.
-    """
-
-    model: str = "play-bypass"
-    rig_profile: str = ""
-    cold: bool = False
+    model: str = "play-bypass"  # identified jointly from all runs of a damper
+    rig_profile: str = ""  # of rig files, as TOML text
+    cold: bool = False  # begin every search from the model's own start, not from the line
 
 
 def measure(job: dict[str, Any]) -> dict[str, Any]:

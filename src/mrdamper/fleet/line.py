@@ -30,26 +30,14 @@ _AHEAD = 2  # jobs that wait for each that runs
 
 @dataclass(frozen=True)
 class Fleet:
-    """What came of a fleet.
+    """What came of a fleet."""
 
-    Attributes
-    ----------
-    table : Path
-        `dampers.parquet`.
-    dampers, done, already : int
-        In the source; identified; of those, found in the journal.
-    troubled : tuple of (name, status, reason)
-        Dampers that were refused or whose job failed.
-    plan : Plan, optional
-        None if no damper could be identified.
-    """
-
-    table: Path
-    dampers: int
-    done: int
-    already: int
-    troubled: tuple[tuple[str, str, str], ...]
-    plan: Plan | None
+    table: Path  # `dampers.parquet`
+    dampers: int  # in the source
+    done: int  # identified
+    already: int  # of those, found in the journal
+    troubled: tuple[tuple[str, str, str], ...]  # dampers that were refused or whose job failed
+    plan: Plan | None  # None if no damper could be identified
 
 
 def run_fleet(

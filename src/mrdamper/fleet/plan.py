@@ -25,42 +25,22 @@ class Plan:
 
     Made once from dampers that depend on the serial numbers alone and kept in the journal, so
     that no result depends on the order in which dampers are finished.
-
-    Attributes
-    ----------
-    start : tuple of float
-        Median of the free search axes.
-    held : mapping of str to float
-        Parameters that the line's tests do not determine, at the line's value.
-    error, error_spread, deviation, deviation_spread : float
-        Median, and 1.48 times the median deviation from it, of the median nrmse_pp and of the distance
-        of the measured loops from the line's.
-    matrix : tuple of (current [A], frequency [Hz], amplitude [m])
-        The line's tests.
-    loops : tuple of tuple of float
-        Median measured loop of each [N].
-    speeds : tuple of float
-        Velocity ladder [m/s].
-    rig : str
-        That most reference dampers were tested on; empty if there is none.
-    references : tuple of str
-        Names of the dampers it was made from.
-    draft : bool
-        Made to try a start: nothing stands out yet.
     """
 
-    start: tuple[float, ...]
-    held: dict[str, float]
+    start: tuple[float, ...]  # median of the free search axes
+    held: dict[str, float]  # parameters that the line's tests do not determine, at the line's value
+    # median, and 1.48 times the median deviation from it, of the median nrmse_pp and of the distance of the measured
+    # loops from the line's
     error: float
     error_spread: float
     deviation: float
     deviation_spread: float
-    matrix: tuple[Test, ...]
-    loops: tuple[tuple[float, ...], ...]
-    speeds: tuple[float, ...]
-    rig: str = ""
-    references: tuple[str, ...] = ()
-    draft: bool = False
+    matrix: tuple[Test, ...]  # the line's tests
+    loops: tuple[tuple[float, ...], ...]  # median measured loop of each [N]
+    speeds: tuple[float, ...]  # velocity ladder [m/s]
+    rig: str = ""  # that most reference dampers were tested on; empty if there is none
+    references: tuple[str, ...] = ()  # names of the dampers it was made from
+    draft: bool = False  # made to try a start: nothing stands out yet
 
     @cached_property
     def document(self) -> dict[str, Any]:

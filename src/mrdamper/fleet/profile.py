@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import BaseModel, Field, field_validator, model_validator
 
 from mrdamper.errors import InputError
 from mrdamper.rig_files.profile import ProfileError
@@ -32,30 +32,19 @@ class LimitsError(InputError):
     code = "E_LIMITS"
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+class _Table(BaseModel, extra="forbid", frozen=True):
+    """No other keys."""
 
 
 class FleetProfile(_Table):
-    """The fleet profile, a TOML file; every key may be left out.
+    """The fleet profile, a TOML file; every key may be left out."""
 
-    Attributes
-    ----------
-    names : str, optional
-        Pattern of the names of folders or files: {serial}, {session}, {batch}, {date}, and * for
-        anything: "{batch}_{serial}_*".
-    columns : mapping
-        Column of `runs.csv` or of the lake by fact: serial = "SN".
-    golden : tuple of str
-        Serial numbers of the dampers that are tested again and again to watch the rig.
-    rig : str, optional
-        Rig profile for rig files, relative to this file.
-    """
-
+    # pattern of the names of folders or files: {serial}, {session}, {batch}, {date}, and * for anything:
+    # "{batch}_{serial}_*"
     names: str | None = None
-    columns: dict[str, str] = Field(default_factory=dict)
-    golden: tuple[str, ...] = ()
-    rig: str | None = None
+    columns: dict[str, str] = Field(default_factory=dict)  # column of `runs.csv` or of the lake by fact: serial = "SN"
+    golden: tuple[str, ...] = ()  # serial numbers of the dampers that are tested again and again to watch the rig
+    rig: str | None = None  # rig profile for rig files, relative to this file
 
     @field_validator("columns")
     @classmethod

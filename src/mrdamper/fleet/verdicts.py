@@ -53,21 +53,12 @@ def with_features(frame: pl.DataFrame) -> pl.DataFrame:
 
 @dataclass(frozen=True)
 class Suspect:
-    """A damper that stands out from its line.
-
-    Attributes
-    ----------
-    serial, session : str
-    cause : str
-        What such a damper most often has.
-    findings : tuple of str
-        What lies how far away, the farthest first.
-    """
+    """A damper that stands out from its line."""
 
     serial: str
     session: str
-    cause: str
-    findings: tuple[str, ...]
+    cause: str  # what such a damper most often has
+    findings: tuple[str, ...]  # what lies how far away, the farthest first
 
 
 def suspects(frame: pl.DataFrame) -> list[Suspect]:
@@ -107,19 +98,11 @@ def _away(values: Floats, sessions: np.ndarray) -> Floats:
 
 @dataclass(frozen=True)
 class Drift:
-    """What drifts from the first session to the last.
+    """What drifts from the first session to the last."""
 
-    Attributes
-    ----------
-    verdict : "rig", "line", "both", "none" or "cannot tell"
-    rig, line : float
-        Relative change of the rig, and of the line beside the rig; NaN where nothing tells.
-    text : str
-    """
-
-    verdict: str
-    rig: float
-    line: float
+    verdict: str  # "rig", "line", "both", "none" or "cannot tell"
+    rig: float  # relative change of the rig; NaN where nothing tells
+    line: float  # and of the line beside the rig
     text: str
 
 

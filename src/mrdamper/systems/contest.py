@@ -18,15 +18,9 @@ from mrdamper.systems.structure import System
 
 @dataclass(frozen=True, eq=False)
 class Contest:
-    """Runs of one system at one step.
+    """Runs of one system at one step."""
 
-    Attributes
-    ----------
-    runs : mapping of str to Simulation
-        By title; no current and the highest current first, the preview last.
-    """
-
-    runs: Mapping[str, Simulation]
+    runs: Mapping[str, Simulation]  # by title; no current and the highest current first, the preview last
 
     def share(self, title: str) -> float:
         """How far a run has come from no current (0) to the preview bound (1), in mean square of the aims."""

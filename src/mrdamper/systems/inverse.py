@@ -35,19 +35,12 @@ _LARGEST = 1e150  # force whose square is still a number [N]
 
 @dataclass(frozen=True)
 class Demand:
-    """What an inverse answers; expressions on a tape, or numbers.
+    """What an inverse answers; expressions on a tape, or numbers."""
 
-    Attributes
-    ----------
-    current : current to command [A]
-    force : force at the field that is there now [N]
-    lowest, highest : reachable interval [N]
-    """
-
-    current: Any
-    force: Any
-    lowest: Any
-    highest: Any
+    current: Any  # to command [A]
+    force: Any  # at the field that is there now [N]
+    lowest: Any  # end of the reachable interval [N]
+    highest: Any  # its other end [N]
 
 
 def check_monotone(damper: Damper, highest: float | None = None) -> float:

@@ -30,36 +30,18 @@ Step = Callable[..., Any]
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """A function for one sample, with its numbers: (p, derived, memory, inputs) → (status, outputs, memory).
-
-    Attributes
-    ----------
-    step : callable
-    given, derived, start : tuple of float
-        Parameters, what follows from them, and the memory before the first sample.
-    compiled : callable
-        Gives `step` as machine code.
-    lines : int
-        Of the program: what a step costs in the interpreter.
-    prepare : callable, optional
-        From other parameters to (status, derived).
-    inputs : int
-    names : tuple of str
-        Of its parameters.
-    scale : (float, float)
-        Gain and offset of what it gives first.
-    """
+    """A function for one sample, with its numbers: (p, derived, memory, inputs) → (status, outputs, memory)."""
 
     step: Step
-    given: tuple[float, ...]
-    derived: tuple[float, ...]
-    start: tuple[float, ...]
-    compiled: Callable[[], Step]
-    lines: int = 3
-    prepare: Callable[..., Any] | None = None
+    given: tuple[float, ...]  # its parameters
+    derived: tuple[float, ...]  # what follows from them
+    start: tuple[float, ...]  # the memory before the first sample
+    compiled: Callable[[], Step]  # gives `step` as machine code
+    lines: int = 3  # of the program: what a step costs in the interpreter
+    prepare: Callable[..., Any] | None = None  # from other parameters to (status, derived)
     inputs: int = 5
-    names: tuple[str, ...] = ()
-    scale: tuple[float, float] = (1.0, 0.0)
+    names: tuple[str, ...] = ()  # of its parameters
+    scale: tuple[float, float] = (1.0, 0.0)  # gain and offset of what it gives first
 
     @property
     def scaled_given(self) -> tuple[float, ...]:

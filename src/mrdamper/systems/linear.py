@@ -16,20 +16,11 @@ _TRAVEL, _TYRE = 0.5, 0.5  # weight of a car's travel and tyre deflection beside
 
 @dataclass(frozen=True)
 class Aim:
-    """One thing control keeps small: an acceleration, or a span times a frequency squared.
+    """One thing control keeps small: an acceleration, or a span times a frequency squared."""
 
-    Attributes
-    ----------
-    kind : "acceleration" or "span"
-    name : str
-        Of a point, of a span.
-    weight : float
-        1, or [1/s²].
-    """
-
-    kind: str
-    name: str
-    weight: float
+    kind: str  # "acceleration" or "span"
+    name: str  # of a point, or of a span
+    weight: float  # 1, or [1/s²]
 
 
 def aims(system: System) -> tuple[Aim, ...]:
@@ -52,25 +43,16 @@ def aims(system: System) -> tuple[Aim, ...]:
 
 @dataclass(frozen=True, eq=False)
 class LinearSystem:
-    """z' = A z + B f + E w, z = (x, v), f the forces of the dampers, w the input.
+    """z' = A z + B f + E w, z = (x, v), f the forces of the dampers, w the input."""
 
-    Attributes
-    ----------
-    A, B, E : (2n, 2n), (2n, E), (2n, q) arrays
-    seen : ((S, 2n), (S, E)) arrays
-        Accelerations of the coordinates, then strokes of the dampers, from z and f.
-    aim : ((P, 2n), (P, E)) arrays
-        `aims`, weighted, from z and f; what the input itself adds is left out.
-    mass : float
-        Of everything that translates [kg].
-    """
-
-    A: Floats
-    B: Floats
-    E: Floats
+    A: Floats  # (2n, 2n)
+    B: Floats  # (2n, E)
+    E: Floats  # (2n, q)
+    # ((S, 2n), (S, E)) accelerations of the coordinates, then strokes of the dampers, from z and f
     seen: tuple[Floats, Floats]
+    # ((P, 2n), (P, E)) `aims`, weighted, from z and f; what the input itself adds is left out
     aim: tuple[Floats, Floats]
-    mass: float
+    mass: float  # of everything that translates [kg]
 
 
 def linear_system(system: System, dampers: Sequence[Link]) -> LinearSystem:

@@ -24,44 +24,22 @@ _LEAST_DOF = 3.0  # below, a Student spread has no variance
 
 @dataclass(frozen=True)
 class Draw:
-    """One damper out of those the tests leave open.
+    """One damper out of those the tests leave open."""
 
-    Attributes
-    ----------
-    numbers : mapping of str to float
-        Its own numbers (`Damper.own_numbers`) that differ.
-    gain, offset : float
-        Of its session: the force becomes (1 + gain) F + offset [N].
-    """
-
-    numbers: Mapping[str, float] = field(default_factory=dict)
-    gain: float = 0.0
+    numbers: Mapping[str, float] = field(default_factory=dict)  # its own numbers (`Damper.own_numbers`) that differ
+    gain: float = 0.0  # of its session: the force becomes (1 + gain) F + offset [N]
     offset: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class Bands:
-    """Peaks and measures over many draws.
+    """Peaks and measures over many draws."""
 
-    Attributes
-    ----------
-    peaks : mapping of str to (S, ·) array
-        As `Simulation.peaks`, one row a draw.
-    measures : mapping of str to (S,) array
-        As `measures.measures`.
-    lost : int
-        Draws that had no solution, left out.
-    step : float
-        Of all draws [s].
-    step_change : float
-        Largest relative change of a peak between that step and the one the mean was run at.
-    """
-
-    peaks: Mapping[str, Floats]
-    measures: Mapping[str, Floats]
-    lost: int
-    step: float
-    step_change: float
+    peaks: Mapping[str, Floats]  # (S, ·) each: as `Simulation.peaks`, one row a draw
+    measures: Mapping[str, Floats]  # (S,) each: as `measures.measures`
+    lost: int  # draws that had no solution, left out
+    step: float  # of all draws [s]
+    step_change: float  # largest relative change of a peak between that step and the one the mean was run at
 
     @property
     def count(self) -> int:

@@ -16,19 +16,11 @@ _SETTLE = 12.0  # lags of the coil after which nothing changes any more
 
 @dataclass(frozen=True)
 class RiseTimes:
-    """Times from the step of current to shares of the change of force [s].
+    """Times from the step of current to shares of the change of force [s]."""
 
-    Attributes
-    ----------
-    rise_63, rise_90 : float
-        With the current switched on.
-    fall_63, fall_90 : float
-        Switched off.
-    """
-
-    rise_63: float
+    rise_63: float  # these two with the current switched on
     rise_90: float
-    fall_63: float
+    fall_63: float  # and these switched off
     fall_90: float
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Floats
@@ -24,8 +24,8 @@ NotNegative = Annotated[float, Field(ge=0)]
 Pair = tuple[Positive, Positive]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+class _Strict(BaseModel, extra="forbid", frozen=True, allow_inf_nan=False):
+    """No other keys."""
 
 
 class _Building(_Strict):
@@ -103,17 +103,10 @@ class _Document(_Strict):
 
 @dataclass(frozen=True, eq=False)
 class SystemFile:
-    """A system, and the saved dampers its file names.
-
-    Attributes
-    ----------
-    system : System
-    dampers : mapping of str to Damper
-        By link; links whose damper the file leaves open are missing.
-    """
+    """A system, and the saved dampers its file names."""
 
     system: System
-    dampers: Mapping[str, Damper]
+    dampers: Mapping[str, Damper]  # by link; links whose damper the file leaves open are missing
 
 
 def bundled_systems() -> dict[str, Path]:

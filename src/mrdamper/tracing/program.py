@@ -48,24 +48,14 @@ Statement = Let | Branch | Repeat
 
 @dataclass
 class Program:
-    """What is computed before the first sample, and at each sample.
-
-    Attributes
-    ----------
-    tape : Tape
-    outputs : mapping of str to Expression or float
-    setup, step : list of Statement
-    derived : list of Expression
-        What `setup` hands to `step`.
-    names : dict of int to str
-        Name of an expression, by its id; expressions without one are written where they are used.
-    """
+    """What is computed before the first sample, and at each sample."""
 
     tape: Tape
     outputs: Mapping[str, Any]
     setup: list[Statement] = field(default_factory=list)
     step: list[Statement] = field(default_factory=list)
-    derived: list[Expression] = field(default_factory=list)
+    derived: list[Expression] = field(default_factory=list)  # what `setup` hands to `step`
+    # name of an expression, by its id; expressions without one are written where they are used
     names: dict[int, str] = field(default_factory=dict)
 
     def guards(self, stage: int) -> list[tuple[Expression, bool]]:

@@ -25,7 +25,6 @@ from mrdamper.errors import InputError, MissingExtraError
 from mrdamper.web.api import routers
 from mrdamper.web.drops import NothingTakenError
 from mrdamper.web.page import PageFiles
-from mrdamper.web.read_ahead import ReadAhead
 from mrdamper.web.security import Guard
 from mrdamper.web.sessions import Sessions
 from mrdamper.web.work import refusal
@@ -73,7 +72,7 @@ def create_app(
 
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None, redirect_slashes=False, lifespan=life)
     app.state.sessions, app.state.stopping = sessions, stopping
-    app.state.read_ahead, app.state.token = ReadAhead() if read_ahead else None, token
+    app.state.read_ahead, app.state.token = read_ahead, token
     app.add_exception_handler(InputError, _refuse)
     app.add_exception_handler(RequestValidationError, _misunderstand)
     app.add_exception_handler(HTTPException, _decline)

@@ -26,19 +26,10 @@ class DropError(InputError):
 
 @dataclass(frozen=True)
 class Verdict:
-    """What was said of one dropped file or run.
+    """What was said of one dropped file or run."""
 
-    Attributes
-    ----------
-    name : str
-        File or run, as it was called.
-    state : str
-        "taken", "noted" (taken, with findings) or "refused".
-    findings : tuple of (code, text)
-    """
-
-    name: str
-    state: str
+    name: str  # file or run, as it was called
+    state: str  # "taken", "noted" (taken, with findings) or "refused"
     findings: tuple[tuple[str, str], ...] = ()
 
     def on_screen(self) -> dict[str, object]:
@@ -58,62 +49,29 @@ class NothingTakenError(DropError):
 
 @dataclass(frozen=True, eq=False)
 class Intake:
-    """Data on the bench, and how it came there.
-
-    Attributes
-    ----------
-    dataset : Dataset
-    source : str
-        "bundled" or "drop".
-    verdicts : tuple of Verdict
-        Of dropped rig files; empty for datasets.
-    profile : str
-        The rig profile the files were read with, as TOML; empty where none was needed.
-    """
+    """Data on the bench, and how it came there."""
 
     dataset: Dataset
-    source: str
-    verdicts: tuple[Verdict, ...] = ()
-    profile: str = ""
+    source: str  # "bundled" or "drop"
+    verdicts: tuple[Verdict, ...] = ()  # of dropped rig files; empty for datasets
+    profile: str = ""  # the rig profile the files were read with, as TOML; empty where none was needed
 
 
 @dataclass(eq=False)
 class Drop:
-    """Files on their way in.
-
-    Attributes
-    ----------
-    key : str
-    folder : Path
-        Made for this drop.
-    names : dict of Path to str
-        The name each stored file came with.
-    places : int
-        Made so far.
-    size : int
-        Bytes so far.
-    taken : dict of Path to records
-        Of rig files, the tests that were taken.
-    refused : dict of Path to refusals
-        Of rig files or of some of their tests.
-    toml : str
-        Profile they were last read with; empty where it was guessed.
-    currents : dict of (Path, str) to float
-        Coil current of a test of a file, where it was stated on the page [A].
-    held_out : frozenset of str or None
-        Runs held out on the page; None where nobody chose.
-    """
+    """Files on their way in."""
 
     key: str
-    folder: Path
-    names: dict[Path, str] = field(default_factory=dict)
-    places: int = 0
-    size: int = 0
-    taken: dict[Path, tuple[Record, ...]] = field(default_factory=dict)
-    refused: dict[Path, tuple[Refusal, ...]] = field(default_factory=dict)
-    toml: str = ""
+    folder: Path  # made for this drop
+    names: dict[Path, str] = field(default_factory=dict)  # the name each stored file came with
+    places: int = 0  # made so far
+    size: int = 0  # bytes so far
+    taken: dict[Path, tuple[Record, ...]] = field(default_factory=dict)  # of rig files, the tests that were taken
+    refused: dict[Path, tuple[Refusal, ...]] = field(default_factory=dict)  # of rig files or of some of their tests
+    toml: str = ""  # profile they were last read with; empty where it was guessed
+    # coil current of a test of a file, where it was stated on the page [A]
     currents: dict[tuple[Path, str], float] = field(default_factory=dict)
-    held_out: frozenset[str] | None = None
+    held_out: frozenset[str] | None = None  # runs held out on the page; None where nobody chose
 
     def place(self, name: str) -> Path:
         """Where a file of that name is stored.

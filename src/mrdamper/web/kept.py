@@ -14,7 +14,7 @@ import zlib
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Dataset
@@ -41,40 +41,22 @@ class KeptError(InputError):
 
 @dataclass(frozen=True)
 class Kept:
-    """What such a file holds.
+    """What such a file holds."""
 
-    Attributes
-    ----------
-    intake : Intake or None
-        Data; None where there were none.
-    dampers : list of (Damper, str, str)
-        With how each came to the bench and its note.
-    current : int or None
-        The damper under the sliders.
-    state : str
-        What the page showed, which the page checks.
-    logo : str
-        Of the report's head, as base64; empty where there is none.
-    """
-
-    intake: Intake | None
-    dampers: list[tuple[Damper, str, str]]
-    current: int | None
-    state: str
-    logo: str
+    intake: Intake | None  # data; None where there were none
+    dampers: list[tuple[Damper, str, str]]  # with how each came to the bench and its note
+    current: int | None  # the damper under the sliders
+    state: str  # what the page showed, which the page checks
+    logo: str  # of the report's head, as base64; empty where there is none
 
 
-class _Damper(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
-
+class _Damper(BaseModel, extra="forbid", strict=True):
     file: str = Field(pattern=r"^dampers/\d{1,3}\.json$")
     origin: str = Field(max_length=40)
     note: str = Field(max_length=500)
 
 
-class _List(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
-
+class _List(BaseModel, extra="forbid", strict=True):
     format: str = Field(pattern="^mrdamper-bench$")
     version: int = Field(ge=1, le=1)
     source: str = Field(pattern="^(bundled|drop|)$")

@@ -17,7 +17,7 @@ from mrdamper.identification.loop_analysis import LoopAnalysis, analyse_loop
 from mrdamper.motion import equivalent_sine
 from mrdamper.rig_files.quality.table import Quality, quality_table, record_of
 from mrdamper.study.workflow import usable_sines
-from mrdamper.web.frames import number
+from mrdamper.web.answers import number
 
 MM = 1e3
 _NEAREST = 3  # measured loops laid under a prediction
@@ -28,26 +28,13 @@ _FAR, _ALSO = 0.4, 0.2  # beyond, a run says nothing about the condition asked f
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """One run.
+    """One run."""
 
-    Attributes
-    ----------
-    key : str
-        Made here.
-    run : Run
-    condition : Condition or None
-        Measured; None where the run does not move.
-    loop : LoopAnalysis or None
-        Of steady sines.
-    refused : str
-        Why it is not identified from; empty where it can be.
-    """
-
-    key: str
+    key: str  # made here
     run: Run
-    condition: Condition | None
-    loop: LoopAnalysis | None
-    refused: str
+    condition: Condition | None  # measured; None where the run does not move
+    loop: LoopAnalysis | None  # of steady sines
+    refused: str  # why it is not identified from; empty where it can be
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,25 +38,13 @@ _LAST_WAIT = 10.0  # seconds for workers to end when the bench stops
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """A damper on the bench.
+    """A damper on the bench."""
 
-    Attributes
-    ----------
-    key : str
-        Made here.
-    damper : Damper
-    origin : str
-        How it came: "study", "identification", "comparison", "file".
-    note : str
-        One line on how good it is, or where it came from.
-    learn : callable or None
-        Gives the damper with its covariance, where it has none yet and its runs are known.
-    """
-
-    key: str
+    key: str  # made here
     damper: Damper
-    origin: str
-    note: str = ""
+    origin: str  # how it came: "study", "identification", "comparison", "file"
+    note: str = ""  # one line on how good it is, or where it came from
+    # gives the damper with its covariance, where it has none yet and its runs are known
     learn: Callable[[], Damper] | None = None
 
 

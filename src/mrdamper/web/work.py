@@ -26,32 +26,19 @@ _FREE = threading.BoundedSemaphore(_AT_ONCE)
 
 @dataclass(eq=False)
 class Job:
-    """One piece of long work.
+    """One piece of long work."""
 
-    Attributes
-    ----------
-    key, kind : str
-        Name made by the session, and what it is about.
-    state : str
-        "waiting", "running", "done", "refused" (by the input), "failed" (our fault) or "cancelled".
-    what, share : str, float
-        What is being done, and how much of it, 0...1.
-    error : mapping, optional
-        As the page shows it.
-    answer : mapping, optional
-        What the page is told at the end.
-    """
-
-    key: str
-    kind: str
+    key: str  # made by the session
+    kind: str  # what it is about
     task: Callable[..., Any]
     arguments: tuple[Any, ...]
     conclude: Callable[[Any], dict[str, Any]]
+    # "waiting", "running", "done", "refused" (by the input), "failed" (our fault) or "cancelled"
     state: str = "waiting"
-    what: str = "waiting for a free processor"
-    share: float = 0.0
-    error: dict[str, str] | None = None
-    answer: dict[str, Any] | None = None
+    what: str = "waiting for a free processor"  # is being done
+    share: float = 0.0  # of it that is done, 0...1
+    error: dict[str, str] | None = None  # as the page shows it
+    answer: dict[str, Any] | None = None  # what the page is told at the end
     began: float = field(default_factory=time.monotonic)
     seconds: float = 0.0
     _process: Any = None

@@ -26,30 +26,15 @@ _UNITS = {
 
 @dataclass(frozen=True)
 class Sight:
-    """What the law of one damper can see and do.
+    """What the law of one damper can see and do."""
 
-    Attributes
-    ----------
-    tape : Tape
-        For memory: `remember`, `update`, `select`.
-    link : Link
-        The damper's place.
-    damper : Damper
-    low, high : float
-        Currents it may be given [A].
-    period : float
-        Between two samples [s].
-    shared : dict
-        What the laws of several dampers have in common.
-    """
-
-    tape: Tape
-    link: Link
+    tape: Tape  # for memory: `remember`, `update`, `select`
+    link: Link  # the damper's place
     damper: Damper
-    low: float
-    high: float
-    period: float
-    shared: dict[str, Any]
+    low: float  # lowest current it may be given [A]
+    high: float  # highest [A]
+    period: float  # between two samples [s]
+    shared: dict[str, Any]  # what the laws of several dampers have in common
 
     def __call__(self, point: str, quantity: str) -> Any:
         """A signal: "position", "velocity" or "acceleration" (absolute) of a point.
@@ -113,23 +98,12 @@ def identifier(name: str, taken: Container[str] = ()) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Control:
-    """A controller made ready for a system.
+    """A controller made ready for a system."""
 
-    Attributes
-    ----------
-    program : Program or None
-        From signals and dt to one current a link; None where currents never change.
-    signals : tuple of str
-        Its inputs but dt.
-    start : tuple of float
-        Current of each link before the first sample [A].
-    limits : mapping of str to float
-        Largest current [A] by damper that is asked for a force: at either end, the force is out of reach.
-    """
-
-    program: Program | None
-    signals: tuple[str, ...]
-    start: tuple[float, ...]
+    program: Program | None  # from signals and dt to one current a link; None where currents never change
+    signals: tuple[str, ...]  # its inputs but dt
+    start: tuple[float, ...]  # current of each link before the first sample [A]
+    # largest current [A] by damper that is asked for a force: at either end, the force is out of reach
     limits: Mapping[str, float] = field(default_factory=dict)
 
     @property

@@ -22,27 +22,17 @@ from mrdamper.systems.structure import Link, System
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """z⁺ = A z + B f + L (y − C z − D f), f* = −G z, each sample time.
+    """z⁺ = A z + B f + L (y − C z − D f), f* = −G z, each sample time."""
 
-    Attributes
-    ----------
-    A, B, C, D, L, G : arrays
-        Of the sampled structure, its observer and its feedback.
-    size : (S,) array
-        By which what is seen is weighted.
-    coordinates, dampers : tuple of str
-        Whose accelerations, whose strokes are seen.
-    """
-
-    A: Floats
+    A: Floats  # to D: of the sampled structure
     B: Floats
     C: Floats
     D: Floats
-    L: Floats
-    G: Floats
-    size: Floats
-    coordinates: tuple[str, ...]
-    dampers: tuple[str, ...]
+    L: Floats  # of its observer
+    G: Floats  # of its feedback
+    size: Floats  # (S,) by which what is seen is weighted
+    coordinates: tuple[str, ...]  # whose accelerations are seen
+    dampers: tuple[str, ...]  # whose strokes are seen
 
 
 @dataclass(frozen=True)

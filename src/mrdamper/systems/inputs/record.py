@@ -21,20 +21,13 @@ _STRONGEST = 50.0  # m/s²: five times the strongest ground motion ever recorded
 
 @dataclass(frozen=True, eq=False)
 class Record(Input):
-    """Samples at equal steps, straight lines between them.
-
-    Attributes
-    ----------
-    times, values : (N,) arrays
-        [s]; [m/s²] for the ground, [m] for a road.
-    kind : "ground" or "road"
-    """
+    """Samples at equal steps, straight lines between them."""
 
     name: ClassVar[str] = "record"
     title: ClassVar[str] = "a record"
 
-    times: Floats
-    values: Floats
+    times: Floats  # (N,) [s]
+    values: Floats  # (N,) [m/s²] for the ground, [m] for a road
     kind: Literal["ground", "road"] = "ground"
 
     @property

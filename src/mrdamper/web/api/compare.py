@@ -8,7 +8,7 @@ from typing import Any
 
 from fastapi import APIRouter
 from fastapi.responses import Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from mrdamper.data import Dataset
 from mrdamper.errors import InputError
@@ -18,9 +18,8 @@ from mrdamper.study.comparison import Comparison, RigComparison
 from mrdamper.study.recipe import JOINTLY, Scored, recipes
 from mrdamper.study.workflow import STUDIED
 from mrdamper.validation import RunScore, Validation
+from mrdamper.web.answers import archive, download, frame, number
 from mrdamper.web.curves import measured_cycle, measured_window, predicted_on_run
-from mrdamper.web.downloads import archive, download
-from mrdamper.web.frames import frame, number
 from mrdamper.web.rig_table import condition_on_screen
 from mrdamper.web.sessions import Current, Session
 from mrdamper.web.tasks import compare_models, write_compared
@@ -28,10 +27,8 @@ from mrdamper.web.tasks import compare_models, write_compared
 router = APIRouter(prefix="/sessions/{session}/compare")
 
 
-class Choice(BaseModel):
+class Choice(BaseModel, extra="forbid"):
     """What to compare."""
-
-    model_config = ConfigDict(extra="forbid")
 
     rig: int = Field(ge=0)
     models: list[str] = Field(min_length=1, max_length=100)

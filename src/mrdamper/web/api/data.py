@@ -7,13 +7,13 @@ from typing import Any
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from mrdamper.errors import UnknownNameError
 from mrdamper.rig_files.quality.table import Quality
+from mrdamper.web.answers import frame
 from mrdamper.web.curves import measured_cycle, measured_window, raw_record
 from mrdamper.web.drops import DROP_LIMIT, FILE_LIMIT, Drop, DropError, Intake
-from mrdamper.web.frames import frame
 from mrdamper.web.intake import bundled, read_drop
 from mrdamper.web.rig_table import condition_on_screen, describe
 from mrdamper.web.sessions import Current, Session
@@ -21,10 +21,8 @@ from mrdamper.web.sessions import Current, Session
 router = APIRouter(prefix="/sessions/{session}")
 
 
-class Profile(BaseModel):
+class Profile(BaseModel, extra="forbid"):
     """A rig profile as TOML; empty to guess. It may be for the refused files alone."""
-
-    model_config = ConfigDict(extra="forbid")
 
     toml: str = Field(default="", max_length=100_000)
     refused_only: bool = False

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from fastapi import APIRouter
 from fastapi.responses import Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from mrdamper.dampers.certainty import table as intervals
 from mrdamper.dampers.joint import JointFit
@@ -20,8 +20,8 @@ from mrdamper.report.about import About, about_of, logo_of
 from mrdamper.study.recipe import JOINTLY, Scored
 from mrdamper.study.workflow import Study
 from mrdamper.validation import Validation
+from mrdamper.web.answers import frame, number
 from mrdamper.web.curves import measured_cycle, modelled_cycle, predicted_on_run
-from mrdamper.web.frames import frame, number
 from mrdamper.web.rig_table import condition_on_screen
 from mrdamper.web.sessions import Current, Session
 from mrdamper.web.tasks import ALL_AT_ONCE, RUN_BY_RUN, identify_rig, study
@@ -29,10 +29,8 @@ from mrdamper.web.tasks import ALL_AT_ONCE, RUN_BY_RUN, identify_rig, study
 router = APIRouter(prefix="/sessions/{session}")
 
 
-class Choice(BaseModel):
+class Choice(BaseModel, extra="forbid", allow_inf_nan=False):
     """What to identify."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     rig: int = Field(ge=0)
     model: str = Field(max_length=100)
@@ -43,10 +41,8 @@ class Choice(BaseModel):
     fixed: dict[str, float] = Field(default_factory=dict, max_length=64)
 
 
-class Head(BaseModel):
+class Head(BaseModel, extra="forbid"):
     """What the report says of the tests; the logo as base64."""
-
-    model_config = ConfigDict(extra="forbid")
 
     about: dict[str, str] = Field(default_factory=dict, max_length=20)
     logo: str = Field(default="", max_length=1_000_000)

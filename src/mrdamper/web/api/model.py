@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 from fastapi import APIRouter
 from fastapi.responses import Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from mrdamper.dampers.bands import band, no_band
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Condition
 from mrdamper.metrics import dissipated_power, peak_force
+from mrdamper.web.answers import frame, number
 from mrdamper.web.bench_model import follows_condition, held_model, predict_held, sliders
 from mrdamper.web.curves import on_screen, predicted_cycle
-from mrdamper.web.frames import frame, number
 from mrdamper.web.rig_table import RigTable, condition_on_screen
 from mrdamper.web.sessions import Bench, Current, Session
 
@@ -29,10 +29,8 @@ _TURN = Lock()  # answers in turn: small NumPy calls of many threads at once tak
 _BEYOND = 1.25  # sliders and curves reach past the tested conditions, where the answer is flagged
 
 
-class Ask(BaseModel):
+class Ask(BaseModel, extra="forbid", allow_inf_nan=False):
     """What the sliders say, SI."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     current_A: float = Field(ge=0, le=1000)
     frequency_Hz: float = Field(gt=0, le=10_000)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from fastapi import APIRouter
 from fastapi.responses import Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from mrdamper.data import Floats
 from mrdamper.errors import UnknownNameError
@@ -21,7 +21,7 @@ from mrdamper.systems.result import Simulation
 from mrdamper.systems.simulate import Loop, simulate_system
 from mrdamper.systems.structure import System
 from mrdamper.systems.system_file import bundled_systems, load_system
-from mrdamper.web.frames import frame, number
+from mrdamper.web.answers import frame, number
 from mrdamper.web.sessions import Current
 
 router = APIRouter(prefix="/sessions/{session}/ride")
@@ -31,10 +31,8 @@ _TURN = Lock()  # one at a time: each takes seconds
 _SLOWEST = 0.2  # Hz; what of the ground's motion is slower than this is left out of the picture
 
 
-class Ask(BaseModel):
+class Ask(BaseModel, extra="forbid", allow_inf_nan=False):
     """What the panel says."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     damper: str = Field(max_length=64)
     system: str = Field(max_length=64)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import secrets
+import threading
 from importlib.metadata import version
 from typing import Any
 
 from fastapi import APIRouter, HTTPException, Request
 
 from mrdamper.web.drops import FILE_COUNT_LIMIT, FILE_LIMIT
+from mrdamper.web.intake import bundled
+from mrdamper.web.rig_table import rig_table
 from mrdamper.web.sessions import Current
 
 router = APIRouter(prefix="/sessions")
@@ -21,8 +24,9 @@ def open_session(request: Request) -> dict[str, Any]:
     if token is not None and not secrets.compare_digest(shown.encode(), token.encode()):
         raise HTTPException(403, "Open the address that the terminal shows: its token is missing or of an older bench.")
     session = request.app.state.sessions.open()
-    if request.app.state.read_ahead:
-        request.app.state.read_ahead.begin()
+    if request.app.state.read_ahead:  # not before: it would compete with the page being loaded
+        request.app.state.read_ahead = False
+        threading.Thread(target=_read_ahead, name="bench-read-ahead", daemon=True).start()
     return {
         "session": session.name,
         "version": version("mrdamper"),
@@ -45,3 +49,10 @@ def end(session: Current, request: Request) -> dict[str, bool]:
     """End it and remove its files."""
     request.app.state.sessions.end(session.name)
     return {"ended": True}
+
+
+def _read_ahead() -> None:
+    """Analyse and judge the bundled tests before they are asked for: they open at once, no drop waits for an import."""
+    data = bundled().dataset
+    for table in [rig_table(data, rig) for rig in data.rigs]:
+        _ = table.quality  # also brings the libraries that judging takes

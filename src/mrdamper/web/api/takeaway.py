@@ -7,16 +7,16 @@ from typing import Any
 
 from fastapi import APIRouter
 from fastapi.responses import FileResponse, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from mrdamper.errors import InputError
 from mrdamper.export import all_exporters
 from mrdamper.files.encoding import csv_text
 from mrdamper.files.model_file import dump_model, parse_model
 from mrdamper.report.tables import prediction_rows
+from mrdamper.web.answers import archive, download, zipped
 from mrdamper.web.api.model import Ask
 from mrdamper.web.bench_model import as_damper, predict_held
-from mrdamper.web.downloads import archive, download, zipped
 from mrdamper.web.kept import Kept, keep, open_kept
 from mrdamper.web.sessions import Current, Session
 from mrdamper.web.tasks import Exported, export_damper
@@ -24,18 +24,14 @@ from mrdamper.web.tasks import Exported, export_damper
 router = APIRouter(prefix="/sessions/{session}")
 
 
-class Document(BaseModel):
+class Document(BaseModel, extra="forbid"):
     """The text of a model.json."""
-
-    model_config = ConfigDict(extra="forbid")
 
     text: str = Field(max_length=2_000_000)
 
 
-class Held(BaseModel):
+class Held(BaseModel, extra="forbid", allow_inf_nan=False):
     """Parameters held by hand."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     held: dict[str, float] = Field(default_factory=dict, max_length=64)
 
@@ -114,10 +110,8 @@ def exported(key: str, session: Current) -> Response:
     return zipped({path.name: path.read_bytes() for path in paths}, f"{paths[0].parent.name}.zip")
 
 
-class State(BaseModel):
+class State(BaseModel, extra="forbid"):
     """What the page shows, the damper under its sliders, and the logo of the report as base64."""
-
-    model_config = ConfigDict(extra="forbid")
 
     state: str = Field(max_length=2_000_000)
     damper: str | None = Field(default=None, max_length=40)

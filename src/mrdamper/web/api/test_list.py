@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from fastapi import APIRouter
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from mrdamper.data import Run
 from mrdamper.errors import InputError, UnknownNameError
@@ -25,10 +25,8 @@ router = APIRouter(prefix="/sessions/{session}")
 _LARGEST_A = 200.0
 
 
-class Strict(BaseModel):
+class Strict(BaseModel, extra="forbid"):
     """No other keys."""
-
-    model_config = ConfigDict(extra="forbid")
 
 
 class StatedCurrent(Strict):

@@ -1,4 +1,4 @@
-"""Equations and parameter table for a paper: LaTeX that needs amsmath only."""
+"""Equations and parameter table: LaTeX for a paper, which needs amsmath only, and Markdown for a wiki or a readme."""
 
 from __future__ import annotations
 
@@ -9,9 +9,11 @@ from mrdamper.dampers.joint import damper_of
 from mrdamper.export.base import Exporter, Written
 from mrdamper.export.equations import equations, number, unit_text
 from mrdamper.export.templates import render
-from mrdamper.files.encoding import latex
+from mrdamper.files.encoding import latex, markdown
 from mrdamper.models import Model
 from mrdamper.parameters import latex_symbol
+
+_ROUNDED = ("numbers are rounded to five digits; model.json has them all",)
 
 
 class LatexExporter(Exporter):
@@ -28,7 +30,22 @@ class LatexExporter(Exporter):
             {**row, "meaning": latex(row["meaning"]), "unit": unit_text(row["unit"])} for row in facts["parameters"]
         ]
         text = render("equations.tex.j2", **{**facts, **escaped, "parameters": rows})
-        return Written({f"{name}.tex": text.encode()}, ("numbers are rounded to five digits; model.json has them all",))
+        return Written({f"{name}.tex": text.encode()}, _ROUNDED)
+
+
+class MarkdownExporter(Exporter):
+    """Markdown with equations between dollar signs."""
+
+    name: ClassVar[str] = "markdown"
+    title: ClassVar[str] = "Markdown equations and parameters"
+    suffix: ClassVar[str] = ".md"
+
+    def export(self, damper: Damper | Model, name: str) -> Written:
+        facts = document_facts(damper)
+        facts["rig"] = markdown(facts["rig"])
+        rows = [{**row, "meaning": row["meaning"].replace("|", r"\|")} for row in facts["parameters"]]
+        text = render("equations.md.j2", **{**facts, "parameters": rows})
+        return Written({f"{name}.md": text.encode()}, _ROUNDED)
 
 
 def document_facts(given: Damper | Model) -> dict[str, Any]:

@@ -1,14 +1,17 @@
-"""Numbers on their way to the page: a JSON head and 32-bit floats, one after the other.
+"""Answers to the page: numbers as a JSON head and 32-bit floats one after the other, and files to be saved.
 
 A screen shows no more than 32 bits of a curve, and the page reads the arrays without parsing.
 """
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import struct
-from collections.abc import Mapping
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -43,3 +46,23 @@ def frame(head: Mapping[str, Any], arrays: Mapping[str, Floats]) -> Response:
 def number(value: float | None) -> float | None:
     """A number JSON can hold: what is not finite becomes nothing."""
     return float(value) if value is not None and math.isfinite(value) else None
+
+
+def download(content: bytes, name: str, kind: str) -> Response:
+    """One file."""
+    return Response(content, media_type=kind, headers={"Content-Disposition": f'attachment; filename="{name}"'})
+
+
+def archive(written: Sequence[Path], name: str) -> Response:
+    """Files of one folder, named as they stand in it, the first at its top."""
+    top = written[0].parent
+    return zipped({f"{name}/{path.relative_to(top).as_posix()}": path.read_bytes() for path in written}, f"{name}.zip")
+
+
+def zipped(files: Mapping[str, bytes], name: str) -> Response:
+    """Several files by their names."""
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as made:
+        for inside, content in files.items():
+            made.writestr(inside, content)
+    return download(packed.getvalue(), name, "application/zip")
