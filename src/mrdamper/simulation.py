@@ -92,12 +92,8 @@ def simulate(model: ForceLaw, excitation: Excitation) -> Response:
 def steady_loop(model: ForceLaw, condition: Condition, samples_per_cycle: int = 1000) -> Response:
     """One closed loop of the steady response to a sine.
 
-    Cycles are run until the state closes on itself to 1e-9 of its range.
-
-    Raises
-    ------
-    ExcitationError
-        If it does not close within 512 cycles.
+    Cycles are run until the state closes on itself to 1e-9 of its range. Raises `ExcitationError` if it does not
+    close within 512 cycles.
     """
     cycles = 2
     while cycles <= _MOST_CYCLES:

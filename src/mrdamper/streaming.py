@@ -49,13 +49,9 @@ class Stream:
 def stream(damper: Damper | Model) -> Stream:
     """Trace a damper, or a model, into programs for one sample.
 
-    A model and a joint damper keep their parameters free to be set. Dampers whose parameters
-    follow the condition take frequency and amplitude from the motion so far (`mrdamper.dampers.causal`).
-
-    Raises
-    ------
-    ParameterError
-        If the damper is of a kind that has no form for one sample.
+    A model and a joint damper keep their parameters free to be set. Dampers whose parameters follow the condition
+    take frequency and amplitude from the motion so far (`mrdamper.dampers.causal`). Raises `ParameterError` if the
+    damper is of a kind that has no form for one sample.
     """
     damper = damper_of(damper)
     drives = {"displacement": _from_displacement(), "velocity": _from_velocity()}
@@ -188,10 +184,7 @@ class Stepper:
     ) -> float:
         """Force [N] at the next sample of a motion that is known.
 
-        Raises
-        ------
-        ExcitationError
-            If a value is not finite, dt is not positive, or the model has no answer there.
+        Raises `ExcitationError` if a value is not finite, dt is not positive, or the model has no answer there.
         """
         inputs = numbers(displacement, velocity, acceleration, current, dt)
         self._check(inputs)

@@ -43,13 +43,7 @@ def spread(scores: Validation) -> str:
 
 
 def parse_fixed(pairs: Sequence[str]) -> dict[str, float]:
-    """NAME=VALUE arguments as a mapping.
-
-    Raises
-    ------
-    InputError
-        If one is not of that form.
-    """
+    """NAME=VALUE arguments as a mapping; raises `InputError` if one is not of that form."""
     fixed = {}
     for name, text in parse_pairs(pairs, "--fix").items():
         try:
@@ -60,13 +54,7 @@ def parse_fixed(pairs: Sequence[str]) -> dict[str, float]:
 
 
 def parse_pairs(pairs: Sequence[str], option: str) -> dict[str, str]:
-    """NAME=VALUE arguments as text.
-
-    Raises
-    ------
-    InputError
-        If one is not of that form.
-    """
+    """NAME=VALUE arguments as text; raises `InputError` if one is not of that form."""
     found = {}
     for pair in pairs:
         name, equals, text = pair.partition("=")
@@ -77,13 +65,7 @@ def parse_pairs(pairs: Sequence[str], option: str) -> dict[str, str]:
 
 
 def parse_named(text: str, option: str) -> tuple[str, dict[str, float]]:
-    """NAME or NAME:KEY=VALUE,KEY=VALUE as the name and its numbers.
-
-    Raises
-    ------
-    InputError
-        If it is not of that form.
-    """
+    """NAME or NAME:KEY=VALUE,KEY=VALUE as the name and its numbers; raises `InputError` if it is not of that form."""
     name, colon, rest = text.partition(":")
     if not colon or "=" not in rest:
         return text, {}
@@ -97,13 +79,7 @@ def parse_named(text: str, option: str) -> tuple[str, dict[str, float]]:
 
 
 def parse_gas(text: str | None) -> GasSpring | None:
-    """P,V,A in MPa, cm³ and mm² as a gas spring.
-
-    Raises
-    ------
-    InputError
-        If it is not three positive numbers.
-    """
+    """P,V,A in MPa, cm³ and mm² as a gas spring; raises `InputError` if it is not three positive numbers."""
     if text is None:
         return None
     from mrdamper.gas_spring import GasSpring

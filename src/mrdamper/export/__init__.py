@@ -21,11 +21,5 @@ def all_exporters() -> Mapping[str, type[Exporter]]:
 
 
 def exporter(name: str) -> type[Exporter]:
-    """The export format of that name.
-
-    Raises
-    ------
-    UnknownNameError
-        With the near matches.
-    """
+    """The export format of that name; raises `UnknownNameError` with the near matches."""
     return named("export format", name, all_exporters())

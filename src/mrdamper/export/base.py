@@ -51,10 +51,7 @@ class Exporter(ABC):
 def write_export(written: Written, out: str | Path, suffix: str) -> list[Path]:
     """Write what an export made, whole or not at all: one file at `out`, or several into the folder `out`.
 
-    Raises
-    ------
-    OutputError
-        If it cannot be written.
+    Raises `OutputError` if it cannot be written.
     """
     out = Path(out)
     if suffix and not out.is_dir():
@@ -68,13 +65,7 @@ def write_export(written: Written, out: str | Path, suffix: str) -> list[Path]:
 
 
 def identifier(text: str) -> str:
-    """A name for files and symbols out of any text.
-
-    Raises
-    ------
-    InputError
-        E_EXPORT_NAME if nothing usable is left.
-    """
+    """A name for files and symbols out of any text; raises `InputError` (E_EXPORT_NAME) if nothing usable is left."""
     made = re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_").lower()
     if made and made[0].isdigit():
         made = f"damper_{made}"

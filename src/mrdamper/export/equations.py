@@ -16,10 +16,7 @@ NOWHERE = Condition(0.0, 1.0, 0.01)  # any condition: a damper without ranges ha
 def equations(damper: Damper) -> list[str]:
     """One line of LaTeX an equation: force first, then the state, then what parameters follow.
 
-    Raises
-    ------
-    ParameterError
-        If there is no equation behind the damper that anybody could read.
+    Raises `ParameterError` if there is no equation behind the damper that anybody could read.
     """
     if not damper.equation:
         raise ParameterError("no equations to print", where=damper.title, mend="export a damper with a model behind it")

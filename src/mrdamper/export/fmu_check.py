@@ -47,12 +47,8 @@ class Finding:
 def check_fmu(path: str | Path) -> list[Finding]:
     """Look at everything an FMU made by `FMUExporter` promises; no findings if all is well.
 
-    The binary runs on this machine with this user's rights: check only FMUs you would run.
-
-    Raises
-    ------
-    MissingExtraError
-        Without FMPy.
+    The binary runs on this machine with this user's rights: check only FMUs you would run. Raises `MissingExtraError`
+    without FMPy.
     """
     if importlib.util.find_spec("fmpy") is None:
         raise MissingExtraError("FMPy is not installed", mend="pip install 'mrdamper[fmu]'")

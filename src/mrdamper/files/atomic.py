@@ -30,13 +30,7 @@ _ELSEWHERE = "choose a folder you may write to"
 
 
 def path_of(path: object) -> Path:
-    """A path, of what a user gave for one.
-
-    Raises
-    ------
-    OutputError
-        E_PATH if it is none.
-    """
+    """A path, of what a user gave for one; raises `OutputError` (E_PATH) if it is none."""
     if isinstance(path, str | os.PathLike):
         with contextlib.suppress(UnicodeEncodeError):
             parts = os.fsencode(path).split(os.sep.encode())
@@ -49,13 +43,8 @@ def path_of(path: object) -> Path:
 def write_folder(folder: str | Path, *, replace: bool = False) -> Iterator[Path]:
     """Give a temporary folder that takes the final name when the block ends without an error.
 
-    An existing folder is replaced only if it is empty, or if that is asked for: its other
-    files then move into the new one.
-
-    Raises
-    ------
-    OutputError
-        If the folder exists and is not empty, or cannot be made.
+    An existing folder is replaced only if it is empty, or if that is asked for: its other files then move into the
+    new one. Raises `OutputError` if the folder exists and is not empty, or cannot be made.
     """
     if replace:
         with write_into(folder) as work:
@@ -75,12 +64,7 @@ def write_folder(folder: str | Path, *, replace: bool = False) -> Iterator[Path]
 def write_into(folder: str | Path) -> Iterator[Path]:
     """Give a temporary folder whose files come to `folder` in one step when the block ends.
 
-    Files of the same name are replaced; others stay.
-
-    Raises
-    ------
-    OutputError
-        If the folder cannot be made or written to.
+    Files of the same name are replaced; others stay. Raises `OutputError` if the folder cannot be made or written to.
     """
     final = path_of(folder)
     with _beside(final) as work:
@@ -133,10 +117,7 @@ def publish(
 def write_file(path: str | Path) -> Iterator[Path]:
     """Give a temporary path that takes the final name when the block ends without an error.
 
-    Raises
-    ------
-    OutputError
-        If the file cannot be written.
+    Raises `OutputError` if the file cannot be written.
     """
     final = Path(path).resolve() if Path(path).is_symlink() else Path(path)
     if final.is_dir():
@@ -157,10 +138,7 @@ def write_file(path: str | Path) -> Iterator[Path]:
 def require_writable(path: str | Path) -> None:
     """Refuse at once what could not be written after minutes of work.
 
-    Raises
-    ------
-    OutputError
-        If the path lies in a place that cannot be written to.
+    Raises `OutputError` if the path lies in a place that cannot be written to.
     """
     final = Path(path)
     if final.exists() and not final.is_dir() and not final.is_file():

@@ -107,10 +107,7 @@ def save_dataset(
 def store_split(folder: str | Path, held_out: Collection[str]) -> None:
     """Write into a dataset's runs.csv which runs are held out; nothing else changes.
 
-    Raises
-    ------
-    DatasetError
-        If runs.csv is missing or cannot be read.
+    Raises `DatasetError` if runs.csv is missing or cannot be read.
     """
     folder = Path(folder)
     rows = runs_table(folder)
@@ -144,10 +141,7 @@ def _load(folder: Path, name: str, *, trusted: bool = False) -> Dataset:
 def runs_table(folder: Path) -> list[dict[str, Any]]:
     """Rows of a dataset's runs.csv by column; empty cells are None.
 
-    Raises
-    ------
-    DatasetError, ColumnError
-        If it is missing, cannot be read, or holds no run.
+    Raises `DatasetError` or `ColumnError` if it is missing, cannot be read, or holds no run.
     """
     if folder.is_file():
         mend = "give the folder that holds runs.csv; files of a rig become one with mrdamper import"

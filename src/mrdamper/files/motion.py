@@ -54,10 +54,7 @@ def load_motion(path: str | Path, current: float | None = None) -> Run:
 def read_table(path: Path, mend: str) -> pl.DataFrame:
     """A small table from CSV, packed or not, within the bounds of a rig's file.
 
-    Raises
-    ------
-    DatasetError
-        If it is no such table.
+    Raises `DatasetError` if it is no such table.
     """
     import polars as pl
 

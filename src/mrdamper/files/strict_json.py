@@ -13,11 +13,8 @@ _LONGEST = 40  # characters of a whole number
 def parse_json(text: str) -> Any:
     """Values of a JSON text.
 
-    Raises
-    ------
-    ValueError
-        Also for a key that stands twice, NaN and infinity, numbers beyond a double, whole numbers
-        of more than forty digits, and nesting beyond 64.
+    Raises `ValueError`, also for a key that stands twice, NaN and infinity, numbers beyond a double, whole numbers of
+    more than forty digits, and nesting beyond 64.
     """
     try:
         made = json.loads(

@@ -58,10 +58,7 @@ def local_engine(workers: int, limits: Limits) -> Iterator[tuple[Submit, int]]:
 def outcome(future: Future[Row]) -> Row:
     """The row of a finished job; a job whose cluster workers died one after the other failed.
 
-    Raises
-    ------
-    ClusterError
-        If the scheduler is lost.
+    Raises `ClusterError` if the scheduler is lost.
     """
     from mrdamper.fleet.job import refused
 

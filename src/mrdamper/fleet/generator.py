@@ -134,10 +134,7 @@ def _scaled(rig: VirtualRig, factors: Mapping[str, float]) -> VirtualRig:
 def write_fleet(dampers: Iterator[VirtualDamper] | Line, folder: str | Path) -> None:
     """Write a dataset folder a damper and session: SERIAL, or SERIAL-SESSION for golden dampers.
 
-    Raises
-    ------
-    OutputError
-        If a folder exists already or cannot be written.
+    Raises `OutputError` if a folder exists already or cannot be written.
     """
     for damper in dampers:
         name = f"{damper.serial}-{damper.session}" if damper.golden else damper.serial

@@ -55,10 +55,7 @@ class Settings:
 def measure(job: dict[str, Any]) -> dict[str, Any]:
     """The row of one damper; `job` holds an item, its digest, settings and the plan, if there is one.
 
-    Raises
-    ------
-    InputError
-        If its records cannot be used.
+    Raises `InputError` if its records cannot be used.
     """
     begin = time.perf_counter(), time.process_time()
     if job["version"] != VERSION:
@@ -107,10 +104,7 @@ def refused(error: InputError) -> dict[str, Any]:
 def read(item: Item, settings: Settings) -> tuple[Dataset, tuple[str, ...]]:
     """The records of one damper, and the codes of what was found in them.
 
-    Raises
-    ------
-    InputError
-        If they cannot be read, or come from several rigs.
+    Raises `InputError` if they cannot be read, or come from several rigs.
     """
     findings: list[str] = []
     if item.kind == "lake":

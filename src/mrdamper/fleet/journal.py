@@ -75,13 +75,7 @@ class Journal:
         return self._kept("SELECT json_extract(row, '$.status') FROM results WHERE key = ?", key)
 
     def keep(self, rows: Iterable[tuple[str, dict[str, Any]]]) -> None:
-        """Make rows durable, all or none of them.
-
-        Raises
-        ------
-        ResourceError
-            E_DISK_FULL if the disk is full.
-        """
+        """Make rows durable, all or none of them; raises `ResourceError` (E_DISK_FULL) if the disk is full."""
         self._write("INSERT OR REPLACE INTO results VALUES (?, ?)", [(key, _text(row)) for key, row in rows])
 
     def plan(self, key: str) -> dict[str, Any] | None:

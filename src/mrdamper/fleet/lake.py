@@ -75,10 +75,8 @@ def lake_items(paths: Sequence[Path], profile: FleetProfile) -> list[Item]:
 def lake_dataset(item: Item) -> Dataset:
     """The records of one damper of a lake.
 
-    Raises
-    ------
-    ColumnError, RunError, TimeOrderError, NonFiniteError
-        If the channels of a run do not fit together.
+    Raises `ColumnError` or `RunError` or `TimeOrderError` or `NonFiniteError` if the channels of a run do not fit
+    together.
     """
     import polars as pl
 

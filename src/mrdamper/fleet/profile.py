@@ -117,10 +117,7 @@ class _Limits(_Table):
 def load_fleet_profile(path: str | Path | None) -> FleetProfile:
     """Read a fleet profile; without a path, the one that says nothing.
 
-    Raises
-    ------
-    ProfileError
-        If it is no TOML, or a key or value is not known.
+    Raises `ProfileError` if it is no TOML, or a key or value is not known.
     """
     if path is None:
         return FleetProfile()
@@ -133,9 +130,6 @@ def load_fleet_profile(path: str | Path | None) -> FleetProfile:
 def load_limits(path: str | Path) -> dict[str, Limit]:
     """Read a limits file: a table [limits.COLUMN] with lower, upper or both.
 
-    Raises
-    ------
-    LimitsError
-        If it is no TOML, a key is not known, or a lower limit is not below the upper.
+    Raises `LimitsError` if it is no TOML, a key is not known, or a lower limit is not below the upper.
     """
     return load_toml(Path(path), _Limits, LimitsError, _HELP).limits

@@ -46,10 +46,7 @@ class Demand:
 def check_monotone(damper: Damper, highest: float | None = None) -> float:
     """Widest reachable interval [N] along a tested sine; the force must not turn back with current.
 
-    Raises
-    ------
-    ParameterError
-        E_NOT_MONOTONE: with the current from which more gives less.
+    Raises `ParameterError` (E_NOT_MONOTONE) with the current from which more gives less.
     """
     low, high = 0.0, damper.envelope.current_A[1] if highest is None else highest
     if not high > low:
@@ -185,10 +182,7 @@ class Inverse:
     def step(self, displacement: float, velocity: float, acceleration: float, wanted: float, dt: float) -> Demand:
         """Current for a wanted force at the next sample of a motion.
 
-        Raises
-        ------
-        ParameterError
-            If a value is not finite, dt is not positive, or the damper has no answer there.
+        Raises `ParameterError` if a value is not finite, dt is not positive, or the damper has no answer there.
         """
         sample = numbers(displacement, velocity, acceleration, wanted, dt)
         if not (all(map(math.isfinite, sample)) and sample[-1] > 0):

@@ -60,10 +60,7 @@ class Stage:
     def at(self, given: tuple[float, ...]) -> Stage:
         """The stage with other parameters.
 
-        Raises
-        ------
-        ParameterError
-            If they need another program: another branch, or other bounds.
+        Raises `ParameterError` if they need another program: another branch, or other bounds.
         """
         status, derived = self.prepare(given) if self.prepare else (1, ())
         if status or len(given) != len(self.given):

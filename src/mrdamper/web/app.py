@@ -99,10 +99,7 @@ def create_app(
 def plotly_script() -> Path:
     """The chart library's script inside the plotly package, found without importing it.
 
-    Raises
-    ------
-    MissingExtraError
-        If the package is not installed.
+    Raises `MissingExtraError` if the package is not installed.
     """
     found = importlib.util.find_spec("plotly")
     script = Path(found.origin).parent / "package_data" / "plotly.min.js" if found and found.origin else None

@@ -24,10 +24,7 @@ def follows_condition(damper: Damper) -> bool:
 def held_model(damper: Damper, condition: Condition, held: Mapping[str, float]) -> ForceLaw:
     """The model at a condition with some parameters held.
 
-    Raises
-    ------
-    ParameterError
-        If the model has no such parameter, or the value is outside its bounds.
+    Raises `ParameterError` if the model has no such parameter, or the value is outside its bounds.
     """
     model = damper.model_at(condition)
     if not held:
@@ -50,11 +47,8 @@ def predict_held(damper: Damper, condition: Condition, held: Mapping[str, float]
 def as_damper(damper: Damper, held: Mapping[str, float]) -> Damper:
     """The damper with the held parameters made its own.
 
-    Raises
-    ------
-    InputError
-        If a held parameter is not one the damper is made of: a function of the condition gives
-        another coordinate, from which it follows.
+    Raises `InputError` if a held parameter is not one the damper is made of: a function of the condition gives
+    another coordinate, from which it follows.
     """
     if not held:
         return damper

@@ -74,13 +74,7 @@ class Drop:
     held_out: frozenset[str] | None = None  # runs held out on the page; None where nobody chose
 
     def place(self, name: str) -> Path:
-        """Where a file of that name is stored.
-
-        Raises
-        ------
-        DropError
-            If there are too many.
-        """
+        """Where a file of that name is stored; raises `DropError` if there are too many."""
         if self.places >= FILE_COUNT_LIMIT:
             raise DropError(
                 f"over {FILE_COUNT_LIMIT} files", mend="drop fewer at once, or use mrdamper import", code="E_DROP_COUNT"

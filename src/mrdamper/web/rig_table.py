@@ -72,13 +72,7 @@ class RigTable:
         return sorted(set(current_levels([row.condition.current_A for row in self.rows if row.loop and row.condition])))
 
     def row(self, key: str) -> Row:
-        """The row of that key.
-
-        Raises
-        ------
-        InputError
-            If there is none.
-        """
+        """The row of that key; raises `InputError` if there is none."""
         for row in self.rows:
             if row.key == key:
                 return row

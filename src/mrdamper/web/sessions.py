@@ -72,13 +72,7 @@ class Session:
 
     @property
     def dataset(self) -> Dataset:
-        """The data on the bench.
-
-        Raises
-        ------
-        InputError
-            If there is none yet.
-        """
+        """The data on the bench; raises `InputError` if there is none yet."""
         if self.intake is None:
             raise InputError("no data on the bench", mend="open the bundled tests, or drop files", code="E_NO_DATA")
         return self.intake.dataset
@@ -147,10 +141,7 @@ class Session:
     def job(self, key: str) -> Job:
         """Work begun here, by its key.
 
-        Raises
-        ------
-        UnknownNameError
-            If there is none: it was on other data, or other work has taken its place.
+        Raises `UnknownNameError` if there is none: it was on other data, or other work has taken its place.
         """
         for job in (*self.newest.values(), *self.jobs.values()):
             if job.key == key:
@@ -198,13 +189,7 @@ class Sessions:
         return session
 
     def find(self, name: str) -> Session:
-        """The session of that name.
-
-        Raises
-        ------
-        InputError
-            If it has ended.
-        """
+        """The session of that name; raises `InputError` if it has ended."""
         session = self._open.get(name)
         if session is None:
             raise InputError("this session has ended", mend="load the page again", code="E_SESSION")
