@@ -1,9 +1,12 @@
-"""The curves a damper is drawn with elsewhere: force over velocity, one for each current."""
+"""Force over velocity, one curve for each current: as tables, and in the block format that Adams reads."""
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -11,10 +14,60 @@ from mrdamper.dampers.base import Damper
 from mrdamper.dampers.joint import damper_of
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import InputError
+from mrdamper.export.base import Exporter, Written
+from mrdamper.export.templates import render
 from mrdamper.models import Model
 
+COLUMNS = ("current_A", "amplitude_m", "velocity_m_s", "force_N", "peak_force_N", "tested")
 _SPEEDS, _CURRENTS = 12, 6
 _SLOWEST = 0.02  # of the highest tested velocity
+
+
+class TableExporter(Exporter):
+    """One CSV of all currents, and one grid with a row a velocity and a column a current."""
+
+    name: ClassVar[str] = "table"
+    title: ClassVar[str] = "force–velocity tables (CSV)"
+
+    def export(self, damper: Damper | Model, name: str) -> Written:
+        curves = force_velocity(damper)
+        rows = [
+            (repr(c.current_A), repr(c.amplitude_m), repr(float(v)), repr(float(f)), repr(float(p)), int(t))
+            for c in curves
+            for v, f, p, t in zip(c.velocity, c.force, c.peak_force, c.tested, strict=True)
+        ]
+        heads = ["velocity_m_s", *(f"force_N_at_{c.current_A:g}_A" for c in curves)]
+        grid = [[repr(float(v)), *(repr(float(c.force[i])) for c in curves)] for i, v in enumerate(curves[0].velocity)]
+        note = f"sines of {1e3 * curves[0].amplitude_m:.3g} mm, force at mid-stroke; no hysteresis in such a table"
+        files = {f"{name}_force_velocity.csv": _csv(COLUMNS, rows), f"{name}_grid.csv": _csv(heads, grid)}
+        return Written(files, (note,))
+
+
+class AdamsExporter(Exporter):
+    """Damper property files: mm/s and N, velocity and force positive in extension.
+
+    The layout of the blocks is recalled from public examples, not tried in Adams.
+    """
+
+    name: ClassVar[str] = "adams"
+    title: ClassVar[str] = "Adams-style damper property files"
+
+    def export(self, damper: Damper | Model, name: str) -> Written:
+        files = {}
+        for curve in force_velocity(damper):
+            half = curve.velocity.size // 2
+            at_rest = float(curve.force[half - 1 : half + 1].mean())
+            points = [*zip(1e3 * curve.velocity[:half], curve.force[:half], strict=True), (0.0, at_rest)]
+            points += zip(1e3 * curve.velocity[half:], curve.force[half:], strict=True)
+            text = render(
+                "damper.dmp.j2",
+                rig=damper_of(damper).rig,
+                current=curve.current_A,
+                amplitude=curve.amplitude_m,
+                points=points,
+            )
+            files[f"{name}_{curve.current_A:.3g}A.dmp".replace("-", "minus")] = text.encode("ascii", "replace")
+        return Written(files, ("such a curve knows no hysteresis; c and fmu do",))
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,3 +130,11 @@ def _curve(damper: Damper, current: float, amplitude: float, speeds: Floats) -> 
         np.concatenate([lowest[::-1], highest]),
         np.concatenate([tested[::-1], tested]),
     )
+
+
+def _csv(head, rows) -> bytes:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(head)
+    writer.writerows(rows)
+    return text.getvalue().encode()

@@ -7,7 +7,7 @@ import io
 import math
 import uuid
 import zipfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -192,37 +192,58 @@ def _facts(made: Stream, name: str, rig: str, fmi: int, known: Reference) -> dic
 
 
 def _texts(made: Stream, facts: Mapping[str, Any], known: Reference, rig: str, token: str) -> dict[str, bytes]:
+    time = known.step * np.arange(known.force.size, dtype=np.float64)
+    given = {"displacement": known.displacement, "velocity": known.velocity, "current": known.current}
+    found = {"force": known.force, **{f"outside_{flag}": known.flags >> bit & 1 for bit, flag in enumerate(FLAGS)}}
+    sources = c_sources(made, facts["name"], rig)
+    return all_texts({**facts, "token": token}, sources, "fmu_instance", "fmu_documentation", time, given, found)
+
+
+def all_texts(
+    facts: Mapping[str, Any],
+    sources: Mapping[str, str],
+    instance: str,
+    page: str,
+    time: Floats,
+    given: Mapping[str, np.ndarray],
+    found: Mapping[str, np.ndarray],
+) -> dict[str, bytes]:
+    """The texts of an FMU by path: C sources and those of an instance, what it says of itself, its reference.
+
+    Parameters
+    ----------
+    facts : mapping
+        For the templates.
+    sources : mapping of str to str
+        C of what is inside.
+    instance, page : str
+        Templates of what FMI asks around it, and of its documentation.
+    time : (N,) array
+        Of the reference [s].
+    given, found : mapping of str to (N,) array
+        Its inputs and outputs.
+    """
     name, fmi = facts["name"], facts["fmi"]
     sources = {
-        **c_sources(made, name, rig),
-        f"{name}_fmu.h": render("fmu_instance.h.j2", **facts, token=token),
-        f"{name}_fmu.c": render("fmu_instance.c.j2", **facts),
+        **sources,
+        f"{name}_fmu.h": render(f"{instance}.h.j2", **facts),
+        f"{name}_fmu.c": render(f"{instance}.c.j2", **facts),
         f"{name}_fmi{fmi}.c": render(f"fmi{fmi}_functions.c.j2", **facts),
     }
     listed = sorted(file for file in sources if file.endswith(".c"))
     if fmi == 3:
         sources["buildDescription.xml"] = render("buildDescription.xml.j2", **facts, source_files=listed)
     texts = {
-        "modelDescription.xml": render(f"modelDescription_fmi{fmi}.xml.j2", **facts, token=token, source_files=listed),
+        "modelDescription.xml": render(f"modelDescription_fmi{fmi}.xml.j2", **facts, source_files=listed),
         **{f"sources/{file}": text for file, text in sources.items()},
-        "documentation/index.html": render("fmu_documentation.html.j2", **facts),
-        "resources/reference_in.csv": csv_table(
-            ("time", "displacement", "velocity", "current"),
-            (_times(known), known.displacement, known.velocity, known.current),
-        ),
-        "resources/reference_out.csv": csv_table(
-            ("time", "force", *(f"outside_{flag}" for flag in FLAGS)),
-            (_times(known), known.force, *(known.flags >> bit & 1 for bit in range(len(FLAGS)))),
-        ),
+        "documentation/index.html": render(f"{page}.html.j2", **facts),
+        "resources/reference_in.csv": _csv_table({"time": time, **given}),
+        "resources/reference_out.csv": _csv_table({"time": time, **found}),
     }
     return {path: text.encode() for path, text in texts.items()}
 
 
-def _times(known: Reference) -> Floats:
-    return known.step * np.arange(known.force.size, dtype=np.float64)
-
-
-def csv_table(head: Iterable[str], columns: Iterable[np.ndarray]) -> str:
+def _csv_table(columns: Mapping[str, np.ndarray]) -> str:
     """Rows of numbers under their names, all digits."""
-    rows = zip(*(column.tolist() for column in columns), strict=True)
-    return "".join(f"{','.join(row)}\n" for row in [head, *(map(repr, row) for row in rows)])
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    return "".join(f"{','.join(row)}\n" for row in [columns, *(map(repr, row) for row in rows)])

@@ -12,9 +12,8 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.export.base import Written, identifier, write_export
 from mrdamper.export.c import package_version, program_sources
-from mrdamper.export.fmu import MOST_STEPS, FMUExporter, csv_table, with_token
+from mrdamper.export.fmu import MOST_STEPS, FMUExporter, all_texts, with_token
 from mrdamper.export.fmu_description import units_of, variable
-from mrdamper.export.templates import render
 from mrdamper.files.encoding import c_comment
 from mrdamper.tracing import Program
 from mrdamper.tracing.python import python_functions
@@ -64,7 +63,12 @@ def write_program_fmu(
     """
     kind, word = exporter or FMUExporter(), identifier(name)
     facts = _facts(made, word, title, units, period, tuple(start) or (0.0,) * len(made.outputs), kind.fmi)
-    written: Written = kind.packed(with_token(lambda token: _texts(made, {**facts, "token": token})), word)
+    sources, reference = program_sources(made, word, facts["title"]), _reference(made, facts)
+
+    def texts(token: str) -> dict[str, bytes]:
+        return all_texts({**facts, "token": token}, sources, "fmu_program", "fmu_program", *reference)
+
+    written: Written = kind.packed(with_token(texts), word)
     return write_export(written, out, kind.suffix), written.notes
 
 
@@ -114,28 +118,6 @@ def _facts(
         "settable": [(v.reference, f"set.{v.name}") for v in variables if v.causality == "input"],
         "serial": [*serial, ("int", "program.samples"), ("int", "phase")],
     }
-
-
-def _texts(made: Program, facts: dict[str, Any]) -> dict[str, bytes]:
-    name, fmi = facts["name"], facts["fmi"]
-    sources = {
-        **program_sources(made, name, facts["title"]),
-        f"{name}_fmu.h": render("fmu_program.h.j2", **facts),
-        f"{name}_fmu.c": render("fmu_program.c.j2", **facts),
-        f"{name}_fmi{fmi}.c": render(f"fmi{fmi}_functions.c.j2", **facts),
-    }
-    listed = sorted(file for file in sources if file.endswith(".c"))
-    if fmi == 3:
-        sources["buildDescription.xml"] = render("buildDescription.xml.j2", **facts, source_files=listed)
-    time, given, found = _reference(made, facts)
-    texts = {
-        "modelDescription.xml": render(f"modelDescription_fmi{fmi}.xml.j2", **facts, source_files=listed),
-        **{f"sources/{file}": text for file, text in sources.items()},
-        "documentation/index.html": render("fmu_program.html.j2", **facts),
-        "resources/reference_in.csv": csv_table(("time", *given), (time, *given.values())),
-        "resources/reference_out.csv": csv_table(("time", *found), (time, *found.values())),
-    }
-    return {path: text.encode() for path, text in texts.items()}
 
 
 def _reference(made: Program, facts: dict[str, Any]) -> tuple[Floats, dict[str, Floats], dict[str, Floats]]:

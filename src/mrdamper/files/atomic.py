@@ -135,13 +135,12 @@ def write_file(path: str | Path) -> Iterator[Path]:
         _sync_entry(final.absolute().parent)
 
 
-def require_writable(path: str | Path) -> None:
-    """Refuse at once what could not be written after minutes of work.
+def require_writable(path: str | Path | None) -> None:
+    """Refuse at once what could not be written after minutes of work; None is written nowhere.
 
     Raises `OutputError` if the path lies in a place that cannot be written to.
     """
-    final = Path(path)
-    if final.exists() and not final.is_dir() and not final.is_file():
+    if path is None or ((final := Path(path)).exists() and not final.is_dir() and not final.is_file()):
         return
     with _beside(final) as work:
         (work / "tried").write_bytes(b"\0")

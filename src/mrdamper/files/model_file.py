@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, TypeAdapter, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from mrdamper.dampers import all_kinds
 from mrdamper.dampers.base import Damper, Envelope
@@ -39,8 +39,8 @@ UNITS = {
 }
 
 
-class _Strict(BaseModel, extra="forbid", frozen=True, allow_inf_nan=False):
-    """No other keys."""
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 def _ascending(range_: tuple[float, float]) -> tuple[float, float]:

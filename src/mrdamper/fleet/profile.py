@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, Field, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from mrdamper.errors import InputError
 from mrdamper.rig_files.profile import ProfileError
@@ -32,8 +32,8 @@ class LimitsError(InputError):
     code = "E_LIMITS"
 
 
-class _Table(BaseModel, extra="forbid", frozen=True):
-    """No other keys."""
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class FleetProfile(_Table):

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Floats
@@ -24,8 +24,8 @@ NotNegative = Annotated[float, Field(ge=0)]
 Pair = tuple[Positive, Positive]
 
 
-class _Strict(BaseModel, extra="forbid", frozen=True, allow_inf_nan=False):
-    """No other keys."""
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class _Building(_Strict):

@@ -16,11 +16,6 @@ from mrdamper.simulation import ForceLaw, steady_loop
 _DECADES = 10.0  # a slider without bounds reaches this factor up and down, or twice the value
 
 
-def follows_condition(damper: Damper) -> bool:
-    """Whether the parameters differ from condition to condition."""
-    return damper.one_model is None
-
-
 def held_model(damper: Damper, condition: Condition, held: Mapping[str, float]) -> ForceLaw:
     """The model at a condition with some parameters held.
 
@@ -52,6 +47,7 @@ def as_damper(damper: Damper, held: Mapping[str, float]) -> Damper:
     """
     if not held:
         return damper
+    held_model(damper, damper.envelope.middle, held)  # refuses a name that it does not know
     about = {**damper.provenance, "held by hand": ", ".join(f"{n} = {v!r}" for n, v in sorted(held.items()))}
     return replace(damper.holding(held), provenance=about)  # type: ignore[type-var]
 

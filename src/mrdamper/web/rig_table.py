@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -66,10 +65,15 @@ class RigTable:
     def _quality(self) -> tuple[Quality, ...]:
         return quality_table(record_of(row.run) for row in self.rows)
 
+    @cached_property
+    def steady(self) -> list[tuple[Row, Condition]]:
+        """Steady sines, each with its condition."""
+        return [(row, row.condition) for row in self.rows if row.loop and row.condition]
+
     @property
     def currents(self) -> list[float]:
         """Levels of the steady sines [A], rising."""
-        return sorted(set(current_levels([row.condition.current_A for row in self.rows if row.loop and row.condition])))
+        return sorted(set(current_levels([condition.current_A for _, condition in self.steady])))
 
     def row(self, key: str) -> Row:
         """The row of that key; raises `InputError` if there is none."""
@@ -80,32 +84,31 @@ class RigTable:
 
     def nearest(self, condition: Condition, most: int = _NEAREST, anywhere: bool = False) -> list[Row]:
         """Steady sines measured nearest to a condition, the nearest first; the far ones only if `anywhere`."""
-        loops = [row for row in self.rows if row.loop and row.condition]
-        reach = max((row.condition.current_A for row in loops if row.condition), default=0.0) or 1.0
+        reach = max((c.current_A for _, c in self.steady), default=0.0) or 1.0
 
-        def distance(row: Row) -> float:
-            c = row.condition or condition
+        def distance(steady: tuple[Row, Condition]) -> float:
+            _, c = steady
             return max(
                 abs(c.current_A - condition.current_A) / reach,
                 abs(np.log(c.frequency_Hz / condition.frequency_Hz)),
                 abs(np.log(c.amplitude_m / condition.amplitude_m)),
             )
 
-        ordered = sorted(loops, key=distance)[:most]
-        return [row for i, row in enumerate(ordered) if anywhere or distance(row) <= (_ALSO if i else _FAR)]
+        ordered = sorted(self.steady, key=distance)[:most]
+        return [one[0] for i, one in enumerate(ordered) if anywhere or distance(one) <= (_ALSO if i else _FAR)]
 
     def at_motion(self, condition: Condition) -> list[Row]:
         """Steady sines of the motion of a condition, at any current."""
-        loops = [row for row in self.rows if row.loop and row.condition]
-        groups = same_motion([condition, *(row.condition for row in loops if row.condition)])
-        return [loops[i - 1] for i in groups[0] if i > 0]
+        groups = same_motion([condition, *(c for _, c in self.steady)])
+        return [self.steady[i - 1][0] for i in groups[0] if i > 0]
 
     def motions(self) -> list[list[Row]]:
         """Steady sines of one motion each, slow and small first: the lines of the test matrix."""
-        moving = [row for row in self.rows if row.condition is not None and row.loop is not None]
-        conditions: list[Condition] = [row.condition for row in moving if row.condition]
-        groups = [[moving[i] for i in group] for group in same_motion(conditions)]
-        return sorted(groups, key=lambda g: (round(_of(g).frequency_Hz, 2), _of(g).amplitude_m))
+        rows, conditions = [row for row, _ in self.steady], [c for _, c in self.steady]
+        groups = same_motion(conditions)
+        firsts = [conditions[group[0]] for group in groups]
+        order = sorted(range(len(groups)), key=lambda i: (round(firsts[i].frequency_Hz, 2), firsts[i].amplitude_m))
+        return [[rows[i] for i in groups[place]] for place in order]
 
 
 def rig_table(dataset: Dataset, rig: str) -> RigTable:
@@ -149,12 +152,6 @@ def condition_on_screen(condition: Condition | None) -> dict[str, float] | None:
         "frequency_Hz": condition.frequency_Hz,
         "amplitude_mm": MM * condition.amplitude_m,
     }
-
-
-def _of(rows: Sequence[Row]) -> Condition:
-    first = rows[0].condition
-    assert first is not None  # only moving rows are grouped
-    return first
 
 
 def _condition(run: Run) -> Condition | None:

@@ -77,6 +77,12 @@ class Session:
             raise InputError("no data on the bench", mend="open the bundled tests, or drop files", code="E_NO_DATA")
         return self.intake.dataset
 
+    def result(self, name: str, found: str, mend: str) -> Any:
+        """What work left under a name; raises `InputError` (E_NO_RESULT) where it left nothing."""
+        if not self.results.get(name):
+            raise InputError(found, mend=mend, code="E_NO_RESULT")
+        return self.results[name]
+
     def put(self, intake: Intake) -> None:
         """Change the data: results that came from other data go."""
         self.cancel()

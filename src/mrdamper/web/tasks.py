@@ -6,7 +6,7 @@ A worker imports what its task takes and no more: it starts sooner.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -120,16 +120,8 @@ def write_compared(tell: Tell, comparison: Comparison, folder: Path) -> list[Pat
     return write_comparison(comparison, folder, tell)
 
 
-@dataclass(frozen=True)
-class Exported:
-    """Files an export made, and what to know about them."""
-
-    paths: list[Path]
-    notes: tuple[str, ...]
-
-
-def export_damper(tell: Tell, damper: Damper, form: str, folder: Path) -> Exported:
-    """A damper in an export format, as files in a folder."""
+def export_damper(tell: Tell, damper: Damper, form: str, folder: Path) -> tuple[list[Path], tuple[str, ...]]:
+    """A damper in an export format: files in a folder, and what to know about them."""
     from mrdamper.export import exporter
     from mrdamper.export.base import write_export
 
@@ -138,7 +130,7 @@ def export_damper(tell: Tell, damper: Damper, form: str, folder: Path) -> Export
     written = kind().export(damper, name)
     folder.mkdir()
     out = folder / f"{name}{kind.suffix}" if kind.suffix else folder / f"{name}-{form}"
-    return Exported(write_export(written, out, kind.suffix), written.notes)
+    return write_export(written, out, kind.suffix), written.notes
 
 
 def export_name(rig: str) -> str:

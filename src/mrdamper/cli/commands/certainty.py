@@ -35,8 +35,7 @@ def register(app: typer.Typer) -> None:
         student(level, 1.0)  # refuses a level that is none
         if steps < 10:
             raise InputError(f"--steps {steps}", mend="give some thousands")
-        if out is not None:
-            require_writable(out)
+        require_writable(out)
         damper = load_model(model)
         runs = []
         if damper.certainty is None or profile or samples:

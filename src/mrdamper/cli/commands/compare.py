@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import typer
@@ -48,8 +49,6 @@ def register(app: typer.Typer) -> None:
             for name, why in rig.not_identified.items():
                 typer.echo(f"not identified: {name}: {why}", err=True)
         if as_json:
-            import json
-
             print(json.dumps({"rows": rows, "files": [str(p) for p in written], "seconds": result.seconds}, indent=1))
             return
         for rig in result.rigs:

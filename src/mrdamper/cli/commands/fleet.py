@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
-from typing import Optional
 
 import typer
 
@@ -18,17 +18,17 @@ def register(app: typer.Typer) -> None:
             ..., metavar="SRC", help="Folder of datasets or of rig files, one a damper, or a Parquet lake."
         ),
         out: Path = typer.Option(..., "--out", help="Folder for dampers.parquet and the journal."),
-        workers: Optional[int] = typer.Option(None, "--workers", min=1, help="Processes; default one a core."),  # noqa: UP045
-        scheduler: Optional[str] = typer.Option(  # noqa: UP045
+        workers: int | None = typer.Option(None, "--workers", min=1, help="Processes; default one a core."),
+        scheduler: str | None = typer.Option(
             None, "--scheduler", help="Address of a Dask scheduler (mrdamper cluster shows how to start one)."
         ),
-        tls: Optional[Path] = typer.Option(  # noqa: UP045
+        tls: Path | None = typer.Option(
             None, "--tls", help="Folder with ca.pem, cert.pem and key.pem, for a tls:// scheduler."
         ),
-        profile: Optional[Path] = typer.Option(  # noqa: UP045
+        profile: Path | None = typer.Option(
             None, "--profile", help="Fleet profile (TOML): where serial numbers stand, golden dampers, rig profile."
         ),
-        limits: Optional[Path] = typer.Option(  # noqa: UP045
+        limits: Path | None = typer.Option(
             None, "--limits", help="Limits (TOML), [limits.COLUMN] lower and upper: what passes and what fails."
         ),
         model: str = typer.Option("play-bypass", "--model", help="Identified from all runs of a damper."),
@@ -68,8 +68,6 @@ def register(app: typer.Typer) -> None:
         for name, status, reason in found.troubled:
             typer.echo(f"{status}: {name}: {reason}", err=True)
         if as_json:
-            import json
-
             print(json.dumps({**_summary(found), "page": str(page), "said": said}, indent=1, ensure_ascii=False))
         else:
             print(f"{found.done} of {found.dampers} dampers identified ({found.already} were already)")

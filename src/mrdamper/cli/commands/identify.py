@@ -43,8 +43,7 @@ def register(app: typer.Typer) -> None:
 
         chosen_model, chosen_method = model_type(model), method_named(method, parse_pairs(setting, "--set"))
         fixed, spring = parse_fixed(fix), parse_gas(gas)
-        if out is not None:
-            require_writable(out)
+        require_writable(out)
         dataset = load_dataset(data)
         if run:
             dataset = dataset.only([dataset[name] for name in run])

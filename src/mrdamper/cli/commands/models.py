@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import typer
 
 
@@ -21,8 +23,6 @@ def register(app: typer.Typer) -> None:
         known = {**all_models(), **all_published()}
         chosen = [named("model", name, known)] if name else list(known.values())
         if as_json:
-            import json
-
             print(json.dumps([_entry(model) for model in chosen], indent=1, ensure_ascii=False))
         elif name:
             print(_page(chosen[0]))

@@ -64,8 +64,7 @@ def register(app: typer.Typer) -> None:
             if value is not None and not 0 <= value < math.inf:
                 raise ConditionError(f"{name} {value:g}", mend="give zero or more; a field does not know a sign")
         student(level, 1.0)  # refuses a level that is none
-        if out is not None:
-            require_writable(out)
+        require_writable(out)
         damper = load_model(model)
         if coil_lag is not None:
             driver = damper.coil.driver if damper.coil else None

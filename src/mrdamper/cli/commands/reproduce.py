@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +37,6 @@ def register(app: typer.Typer) -> None:
         as_json: bool = typer.Option(False, "--json", help="Print the verdicts and claims for a program."),
     ) -> None:
         """Example: mrdamper reproduce --out result/"""
-        import json
         import os
 
         from mrdamper.cli.progress import progress_on_stderr

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Optional
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -29,34 +30,28 @@ def register(app: typer.Typer) -> None:
             "--input",
             help="CSV with time_s and acceleration_m_s2, acceleration_g or height_m; or NAME[:KEY=VALUE,…].",
         ),
-        damper: Optional[Path] = typer.Option(None, "--damper", help="model.json for every damper."),  # noqa: UP045
+        damper: Path | None = typer.Option(None, "--damper", help="model.json for every damper."),
         control: str = typer.Option("passive", "--control", help="Controller, NAME[:KEY=VALUE,…]."),
-        current: Optional[float] = typer.Option(  # noqa: UP045
+        current: float | None = typer.Option(
             None, "--current", help="Constant current [A]; with a controller, the largest."
         ),
-        volts: Optional[float] = typer.Option(  # noqa: UP045
-            None, "--volts", help="The same as a command to the damper's driver [V]."
-        ),
+        volts: float | None = typer.Option(None, "--volts", help="The same as a command to the damper's driver [V]."),
         without: bool = typer.Option(False, "--without-damper", help="Take the dampers out."),
         time_scale: float = typer.Option(1.0, "--time-scale", help="How many times faster a record is played."),
-        step: Optional[float] = typer.Option(None, "--step", help="Time step [s]; default: found by halving."),  # noqa: UP045
-        beside: Optional[list[str]] = typer.Option(  # noqa: UP045
+        step: float | None = typer.Option(None, "--step", help="Time step [s]; default: found by halving."),
+        beside: list[str] | None = typer.Option(
             None, "--beside", help="More controllers for the report, or all: side by side, up to the preview bound."
         ),
-        draws: Optional[int] = typer.Option(  # noqa: UP045
+        draws: int | None = typer.Option(
             None, "--draws", help="Runs with dampers drawn from what the tests leave open: bands of 5 to 95 %."
         ),
         seed: int = typer.Option(1, "--seed", help="Of --draws."),
-        out: Optional[Path] = typer.Option(  # noqa: UP045
-            None, "--out", help="Folder for simulation.html, time histories and measures."
-        ),
-        law_out: Optional[Path] = typer.Option(None, "--c", help="Folder for the control law as C99."),  # noqa: UP045
-        law_fmu: Optional[Path] = typer.Option(None, "--fmu", help="File for the control law as an FMU."),  # noqa: UP045
+        out: Path | None = typer.Option(None, "--out", help="Folder for simulation.html, time histories and measures."),
+        law_out: Path | None = typer.Option(None, "--c", help="Folder for the control law as C99."),
+        law_fmu: Path | None = typer.Option(None, "--fmu", help="File for the control law as an FMU."),
         as_json: bool = typer.Option(False, "--json", help="Print JSON, SI units."),
     ) -> None:
         """Simulate a building or a vehicle with its dampers, and print what they let through."""
-        import json
-
         from mrdamper.cli.output import parse_named
         from mrdamper.cli.progress import progress_soon
         from mrdamper.errors import InputError

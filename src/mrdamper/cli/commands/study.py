@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
 
@@ -64,8 +65,6 @@ def register(app: typer.Typer) -> None:
             for name, why in rig.not_identified.items():
                 typer.echo(f"not identified: {name}: {why}", err=True)
         if as_json:
-            import json
-
             print(json.dumps(_summary(result, [str(p) for p in written]), indent=1))
             return
         for rig in result.rigs:

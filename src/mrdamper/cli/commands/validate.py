@@ -43,8 +43,7 @@ def register(app: typer.Typer) -> None:
         if split not in (None, "train", "validate"):
             raise UnknownNameError.of("split", str(split), ("train", "validate"))
         student(level, 1.0)  # refuses a level that is none
-        if out is not None:
-            require_writable(out)
+        require_writable(out)
         damper = load_model(model)
         dataset = load_dataset(data)
         wanted = rig if rig is not None else damper.rig

@@ -11,7 +11,6 @@ from fastapi.responses import Response
 from pydantic import BaseModel, Field
 
 from mrdamper.data import Dataset
-from mrdamper.errors import InputError
 from mrdamper.files.encoding import csv_text
 from mrdamper.report.comparison import summary_rows
 from mrdamper.study.comparison import Comparison, RigComparison
@@ -25,6 +24,7 @@ from mrdamper.web.sessions import Current, Session
 from mrdamper.web.tasks import compare_models, write_compared
 
 router = APIRouter(prefix="/sessions/{session}/compare")
+_NOTHING = ("nothing is compared yet", "start a comparison")
 
 
 class Choice(BaseModel, extra="forbid"):
@@ -66,9 +66,7 @@ def start(choice: Choice, session: Current) -> dict[str, Any]:
 @router.get("/rigs/{rig}/runs/{key}")
 def overlaid(rig: int, key: str, session: Current) -> Response:
     """One run as measured, and as every compared model predicts it."""
-    found: RigComparison | None = session.results.get(f"compared.{rig}")
-    if found is None:
-        raise InputError("nothing is compared yet", mend="start a comparison", code="E_NO_RESULT")
+    found: RigComparison = session.result(f"compared.{rig}", *_NOTHING)
     row = session.table(rig).row(key)
     measured = measured_cycle(row.run) if row.loop else measured_window(row.run)
     arrays = {f"measured.{k}": v for k, v in measured.items()}
@@ -101,17 +99,12 @@ def start_files(rig: int, session: Current) -> dict[str, Any]:
 @router.get("/rigs/{rig}/files.zip")
 def files(rig: int, session: Current) -> Response:
     """What was written, in one archive."""
-    written: list[Path] = session.results.get(f"compared.files.{rig}", [])
-    if not written:
-        raise InputError("the comparison is not written yet", mend="press “Page and tables” again", code="E_NO_RESULT")
-    return archive(written, "mrdamper-comparison")
+    missing = "the comparison is not written yet", "press “Page and tables” again"
+    return archive(session.result(f"compared.files.{rig}", *missing), "mrdamper-comparison")
 
 
 def _whole(session: Session, rig: int) -> Comparison:
-    found: Comparison | None = session.results.get(f"compared.whole.{rig}")
-    if found is None:
-        raise InputError("nothing is compared yet", mend="start a comparison", code="E_NO_RESULT")
-    return found
+    return session.result(f"compared.whole.{rig}", *_NOTHING)
 
 
 def _conclude(session: Session, choice: Choice, found: Comparison) -> dict[str, Any]:

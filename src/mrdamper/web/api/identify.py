@@ -108,9 +108,7 @@ def start_identification(choice: Choice, session: Current) -> dict[str, Any]:
 @router.get("/identified/runs/{number}")
 def residual(number: int, session: Current) -> Response:
     """Measured and identified force of one identified run, and the residual."""
-    table = session.results.get("identified.table")
-    if table is None:
-        raise InputError("nothing is identified yet", mend="start an identification", code="E_NO_RESULT")
+    table = session.result("identified.table", "nothing is identified yet", "start an identification")
     found, scored = session.results["identified"]
     ids = [i.run_id for i in found] or [run.run_id for run in scored.train.runs]
     if not 0 <= number < len(ids):

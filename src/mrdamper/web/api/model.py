@@ -16,7 +16,7 @@ from mrdamper.dampers.base import Damper
 from mrdamper.data import Condition
 from mrdamper.metrics import dissipated_power, peak_force
 from mrdamper.web.answers import frame, number
-from mrdamper.web.bench_model import follows_condition, held_model, predict_held, sliders
+from mrdamper.web.bench_model import held_model, predict_held, sliders
 from mrdamper.web.curves import on_screen, predicted_cycle
 from mrdamper.web.rig_table import RigTable, condition_on_screen
 from mrdamper.web.sessions import Bench, Current, Session
@@ -24,8 +24,10 @@ from mrdamper.web.sessions import Bench, Current, Session
 router = APIRouter(prefix="/sessions/{session}/dampers")
 _FAMILY = 10  # loops of a family over current, at most
 _LEVEL = 0.9  # of the band around a loop
+_OVER = {"peak": "peak_N", "energy": "energy_J"}
 _OF_HAND = "no band: of a parameter held by hand the tests say nothing"
 _TURN = Lock()  # answers in turn: small NumPy calls of many threads at once take the interpreter from each other
+_QUANTITIES = ("current_A", "frequency_Hz", "amplitude_m")
 _BEYOND = 1.25  # sliders and curves reach past the tested conditions, where the answer is flagged
 
 
@@ -65,14 +67,9 @@ def damper(key: str, session: Current) -> dict[str, Any]:
     return {
         **_head(bench),
         "parameters": sliders(found),
-        "follows": follows_condition(found),
-        "start": {"current_A": start.current_A, "frequency_Hz": start.frequency_Hz, "amplitude_m": start.amplitude_m},
-        "envelope": {
-            "current_A": e.current_A,
-            "frequency_Hz": e.frequency_Hz,
-            "amplitude_m": e.amplitude_m,
-            "peak_velocity_m_s": e.peak_velocity_m_s,
-        },
+        "follows": found.one_model is None,
+        "start": {name: getattr(start, name) for name in _QUANTITIES},
+        "envelope": {name: getattr(e, name) for name in (*_QUANTITIES, "peak_velocity_m_s")},
         "reach": {
             "current_A": (0.0, _BEYOND * (e.current_A[1] or 1.0)),
             "frequency_Hz": (e.frequency_Hz[0] / _BEYOND, e.frequency_Hz[1] * _BEYOND),
@@ -142,24 +139,16 @@ def _tested_currents(found: Damper, table: RigTable | None) -> list[float]:
 def _over_current(found: Damper, ask: Ask) -> dict[str, Any]:
     even = np.linspace(0.0, _BEYOND * (found.envelope.current_A[1] or 1.0), max(ask.currents - 2, 2))
     currents = np.union1d(even, found.envelope.current_A)  # the line changes its dash where the tests end
-    figures = [
-        _figures(predict_held(found, Condition(float(I), ask.frequency_Hz, ask.amplitude_m), ask.held))
-        for I in currents
-    ]
-    return {
-        "over.current": currents,
-        "over.peak": np.array([f["peak_N"] for f in figures]),
-        "over.energy": np.array([f["energy_J"] for f in figures]),
-    }
+    conditions = [Condition(float(I), ask.frequency_Hz, ask.amplitude_m) for I in currents]
+    figures = [_figures(predict_held(found, condition, ask.held)) for condition in conditions]
+    curves = {f"over.{end}": np.array([f[name] for f in figures]) for end, name in _OVER.items()}
+    return {"over.current": currents, **curves}
 
 
 def _figures(prediction: Any) -> dict[str, float]:
     motion = prediction.motion
     power = dissipated_power(prediction.force, motion.velocity, motion.time)
-    return {
-        "peak_N": peak_force(prediction.force),
-        "energy_J": power / prediction.condition.frequency_Hz,
-    }
+    return {"peak_N": peak_force(prediction.force), "energy_J": power / prediction.condition.frequency_Hz}
 
 
 def _measured(row: Any) -> dict[str, Any]:

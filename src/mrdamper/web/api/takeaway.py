@@ -19,7 +19,7 @@ from mrdamper.web.api.model import Ask
 from mrdamper.web.bench_model import as_damper, predict_held
 from mrdamper.web.kept import Kept, keep, open_kept
 from mrdamper.web.sessions import Current, Session
-from mrdamper.web.tasks import Exported, export_damper
+from mrdamper.web.tasks import export_damper
 
 router = APIRouter(prefix="/sessions/{session}")
 
@@ -96,7 +96,9 @@ def start_export(key: str, name: str, held: Held, session: Current) -> dict[str,
     """Begin to make a damper in one of these formats: some compile, and take their time."""
     damper = as_damper(session.damper(key).damper, held.held)
     folder = session.folder / session.key("export")
-    return session.start("export", export_damper, (damper, name, folder), lambda made: _conclude(session, folder, made))
+    return session.start(
+        "export", export_damper, (damper, name, folder), lambda made: _conclude(session, folder, *made)
+    )
 
 
 @router.get("/exported/{key}")
@@ -142,9 +144,9 @@ def open_bench(key: str, session: Current) -> dict[str, Any]:
     }
 
 
-def _conclude(session: Session, folder: Path, made: Exported) -> dict[str, Any]:
-    session.results[f"exported.{folder.name}"] = made.paths
-    return {"exported": folder.name, "notes": made.notes}
+def _conclude(session: Session, folder: Path, paths: list[Path], notes: tuple[str, ...]) -> dict[str, Any]:
+    session.results[f"exported.{folder.name}"] = paths
+    return {"exported": folder.name, "notes": notes}
 
 
 def _written(session: Session) -> list[Path]:
