@@ -13,7 +13,7 @@ import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Floats
-from mrdamper.errors import ExcitationError, StepError, StructureError, checked
+from mrdamper.errors import ExcitationError, StepError, StructureError, checked, numbers
 from mrdamper.systems.controllers import Controller
 from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.controllers.preview import Preview
@@ -34,7 +34,7 @@ _LINES_A_STEP = 60  # of the loop itself
 _MOST_STEPS = 20_000_000
 
 
-@checked()
+@checked("step")
 def simulate_system(
     system: System,
     source: Input,
@@ -80,7 +80,7 @@ def simulate_system(
     True
     """
     loop = Loop(system, source, dampers, controller or Passive(), highest)
-    dt = loop.first_step if step is None else step
+    dt = loop.first_step if step is None else numbers(step)[0]
     coarse, first, first_step, last = loop.run(dt), None, dt, math.inf
     while True:
         fine = loop.run(dt / 2)
