@@ -21,7 +21,7 @@ DONE, TOO_STIFF, RAN_AWAY = 0, 1, 2
 _vector = types.float64[::1]
 _matrix = types.float64[:, ::1]
 _rate = types.FunctionType(types.void(types.float64, types.float64, types.float64, _vector, _vector, _vector))
-_compile = njit(cache=True, error_model="numpy")
+_inlined = njit(error_model="numpy", inline="always")  # a call with arrays costs more than a rate
 
 
 @lru_cache
@@ -31,7 +31,7 @@ def compiled(rate: Callable[..., None]) -> Any:
     return njit("void(f8, f8, f8, f8[::1], f8[::1], f8[::1])", cache=ours, error_model="numpy")(rate)
 
 
-@_compile
+@_inlined
 def _cubic(piece, width, x0, x1, v0, v1):
     """Coefficients of the displacement between two samples, as velocities."""
     mean = (x1 - x0) / width
@@ -39,7 +39,7 @@ def _cubic(piece, width, x0, x1, v0, v1):
     piece[2], piece[3] = 3 * mean - 2 * v0 - v1, v0 + v1 - 2 * mean
 
 
-@_compile
+@_inlined
 def _rate_at(rate, p, piece, width, t, y, out):
     s = t / width
     x = piece[0] + width * s * (piece[1] + s * (piece[2] + s * piece[3]))
@@ -47,12 +47,15 @@ def _rate_at(rate, p, piece, width, t, y, out):
     rate(x, v, piece[4] + s * piece[5], y, p, out)
 
 
-@_compile
-def _step(rate, p, piece, width, t, h, y, scale, tolerance, new, work):
-    """One step from y at time t into `new`; returns its error over the tolerance."""
+@_inlined
+def _step(rate, p, piece, width, t, h, y, scale, tolerance, new, work, swapped):
+    """One step from y at time t into `new`; returns its error over the tolerance.
+
+    Element by element: an expression of arrays would make one for every step.
+    """
     size = y.size
-    k, f, slope, here, moved = work[:4], work[4], work[5], work[6], work[7]
-    jacobian, matrix = work[8 : 8 + size], work[8 + size :]
+    f, slope, here, moved = work[0], work[1], work[2], work[3]
+    k0, k1, k2, k3, matrix = work[4], work[5], work[6], work[7], work[8:]
     _rate_at(rate, p, piece, width, t, y, f)
     # Derivatives by differences: small errors in them cost Rodas3 accuracy, not stability.
     for j in range(size):
@@ -60,26 +63,35 @@ def _step(rate, p, piece, width, t, h, y, scale, tolerance, new, work):
         nudge = 1e-7 * max(abs(y[j]), scale[j])
         here[j] += nudge
         _rate_at(rate, p, piece, width, t, here, moved)
-        jacobian[:, j] = (moved - f) / nudge
+        for m in range(size):
+            matrix[m, j] = -((moved[m] - f[m]) / nudge)
+        matrix[j, j] += 2 / h
+    _factor(matrix, swapped)
     _rate_at(rate, p, piece, width, t + 1e-5 * h, y, moved)
-    slope[:] = (moved - f) / 1e-5  # times h
-    k[0] = f + 0.5 * slope
-    _solve(jacobian, h, k[0], matrix)
-    k[1] = f + 4 / h * k[0] + 1.5 * slope
-    _solve(jacobian, h, k[1], matrix)
-    here[:] = y + 2 * k[0]
+    for j in range(size):
+        slope[j] = (moved[j] - f[j]) / 1e-5  # times h
+        k0[j] = f[j] + 0.5 * slope[j]
+    _solve(matrix, swapped, k0)
+    for j in range(size):
+        k1[j] = f[j] + 4 / h * k0[j] + 1.5 * slope[j]
+    _solve(matrix, swapped, k1)
+    for j in range(size):
+        here[j] = y[j] + 2 * k0[j]
     _rate_at(rate, p, piece, width, t + h, here, f)
-    k[2] = f + (k[0] - k[1]) / h
-    _solve(jacobian, h, k[2], matrix)
-    here += k[2]
+    for j in range(size):
+        k2[j] = f[j] + (k0[j] - k1[j]) / h
+    _solve(matrix, swapped, k2)
+    for j in range(size):
+        here[j] += k2[j]
     _rate_at(rate, p, piece, width, t + h, here, f)
-    k[3] = f + (k[0] - k[1] - 8 / 3 * k[2]) / h
-    _solve(jacobian, h, k[3], matrix)
-    new[:] = here + k[3]
+    for j in range(size):
+        k3[j] = f[j] + (k0[j] - k1[j] - 8 / 3 * k2[j]) / h
+    _solve(matrix, swapped, k3)
     worst = 0.0
     for j in range(size):
+        new[j] = here[j] + k3[j]
         size_of = max(abs(y[j]), scale[j])
-        error = abs(k[3, j]) / (tolerance * size_of)
+        error = abs(k3[j]) / (tolerance * size_of)
         # A step may not change a state by more than itself: the method would else hop over a pole.
         error = max(error, abs(new[j] - y[j]) / size_of)
         if not error <= worst:  # catches NaN too
@@ -87,28 +99,33 @@ def _step(rate, p, piece, width, t, h, y, scale, tolerance, new, work):
     return worst
 
 
-@_compile
-def _solve(jacobian, h, right, matrix):
-    """Solve (2/h − J) k = right in place, by elimination with row exchange."""
-    size = right.size
-    for m in range(size):
-        for j in range(size):
-            matrix[m, j] = -jacobian[m, j]
-        matrix[m, m] += 2 / h
+@_inlined
+def _factor(matrix, swapped):
+    """Eliminate below the diagonal in place, by exchange of rows; the factors stay where they made zeros."""
+    size = swapped.size
     for m in range(size):
         top = m
         for r in range(m + 1, size):
             if abs(matrix[r, m]) > abs(matrix[top, m]):
                 top = r
-        if top != m:
-            for j in range(size):
-                matrix[m, j], matrix[top, j] = matrix[top, j], matrix[m, j]
-            right[m], right[top] = right[top], right[m]
+        swapped[m] = top
+        for j in range(size if top != m else 0):
+            matrix[m, j], matrix[top, j] = matrix[top, j], matrix[m, j]
         for r in range(m + 1, size):
-            factor = matrix[r, m] / matrix[m, m]
-            for j in range(m, size):
-                matrix[r, j] -= factor * matrix[m, j]
-            right[r] -= factor * right[m]
+            matrix[r, m] /= matrix[m, m]
+            for j in range(m + 1, size):
+                matrix[r, j] -= matrix[r, m] * matrix[m, j]
+
+
+@_inlined
+def _solve(matrix, swapped, right):
+    """Solve (2/h − J) k = right in place, from its factors."""
+    size = right.size
+    for m in range(size):
+        right[m], right[swapped[m]] = right[swapped[m]], right[m]
+    for m in range(size):
+        for r in range(m + 1, size):
+            right[r] -= matrix[r, m] * right[m]
     for m in range(size - 1, -1, -1):
         for j in range(m + 1, size):
             right[m] -= matrix[m, j] * right[j]
@@ -128,7 +145,8 @@ def path(rate, p, time, x, v, current, start, scale, tolerance, out):
     y = start.copy()
     out[0] = y
     new = np.empty(size)
-    work = np.empty((8 + 2 * size, size))
+    work = np.empty((8 + size, size))
+    swapped = np.empty(size, dtype=np.int64)
     piece = np.empty(6)
     step = time[1] - time[0] if time.size > 1 else 1.0
     for i in range(time.size - 1):
@@ -142,7 +160,7 @@ def path(rate, p, time, x, v, current, start, scale, tolerance, out):
             h = min(step, width - done)
             if tries > MOST_STEPS or h < SHORTEST * width * 1e-3:
                 return TOO_STIFF, i + 1
-            worst = _step(rate, p, piece, width, done, h, y, scale, tolerance, new, work)
+            worst = _step(rate, p, piece, width, done, h, y, scale, tolerance, new, work, swapped)
             if worst <= 1.0:
                 done += h
                 y[:] = new
