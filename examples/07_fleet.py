@@ -12,7 +12,7 @@ from mrdamper.fleet.line import run_fleet
 from mrdamper.fleet.page import write_page
 from mrdamper.fleet.profile import Limit
 
-line = Line(dampers=12, sessions=4, golden=1, rig_drift=0.03, faults={"low gas": 1}, seed=4)
+line = Line(dampers=8, sessions=3, golden=1, rig_drift=0.03, faults={"low gas": 1}, seed=4)
 with tempfile.TemporaryDirectory() as folder:
     write_fleet(line, Path(folder) / "records")
     found = run_fleet(Path(folder) / "records", Path(folder) / "line", workers=2)

@@ -1,5 +1,6 @@
 """What tests share: the bundled data and the vectors."""
 
+import base64
 import json
 import os
 import sys
@@ -14,7 +15,7 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
 import pytest
-from support.browser import launched
+from support.browser import LOGO, WIDE, launched
 
 from mrdamper.data import Condition
 from mrdamper.files.dataset import load_dataset
@@ -23,8 +24,8 @@ from mrdamper.files.dataset import load_dataset
 # of its own. The marks of pytest-xdist do not reach its scheduler under pytest 9.
 GROUPS = {
     "study": (
-        "dampers/test_joint.py", "report/test_pictures.py", "study/test_workflow.py", "test_docs.py",
-        "test_examples.py", "test_numbers.py",
+        "report/test_pictures.py", "study/test_workflow.py", "test_docs.py::test_the_readme", "test_examples.py",
+        "test_numbers.py",
     ),
     "fleet": ("fleet/",),
     "fmu": ("export/test_fmu",),
@@ -32,8 +33,8 @@ GROUPS = {
 
 
 def group_of(nodeid):
-    file = nodeid.partition("::")[0].removeprefix("tests/")
-    return next((name for name, files in GROUPS.items() if file.startswith(files)), file)
+    inside = nodeid.removeprefix("tests/")
+    return next((name for name, those in GROUPS.items() if inside.startswith(those)), inside.partition("::")[0])
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -72,6 +73,20 @@ def bundled_study(bundled):
     from mrdamper.study.workflow import run_study
 
     return run_study(bundled)
+
+
+@pytest.fixture(scope="session")
+def written(bundled_study, tmp_path_factory):
+    """Its report with everything in it, made once."""
+    from mrdamper.report.about import About, logo_of
+    from mrdamper.report.study import write_study
+
+    folder = tmp_path_factory.mktemp("report") / "out"
+    logo = logo_of(base64.b64encode(LOGO).decode())
+    write_study(
+        bundled_study, folder, about=About(title="A report", maker=WIDE, notes="Notes. " * 60, logo=logo), also=("pdf",)
+    )
+    return folder
 
 
 @pytest.fixture

@@ -1,6 +1,5 @@
 """The report of the bundled study as a reader sees it: page, print and figures are looked at, not read."""
 
-import base64
 import csv
 import io
 import re
@@ -9,27 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pypdf import PdfReader
-from support.browser import AUDIT, LOGO
+from support.browser import AUDIT, WIDE
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
-from mrdamper.report.about import About, logo_of
-from mrdamper.report.study import write_study
 from mrdamper.study.comparison import compare
 
 FIGURE_AUDIT = (Path(__file__).parents[1] / "support" / "figure_audit.js").read_text(encoding="utf-8")
 CUT = """[...document.querySelectorAll(".scroll")]
     .filter((e) => e.scrollWidth > e.clientWidth + 1 && !e.closest("details")).map((e) => e.textContent.slice(0, 80))"""
-WIDE = 'A "maker" & <b>sons</b>, of a name as long as a name can be without being cut anywhere on a page of paper'
-
-
-@pytest.fixture(scope="session")
-def written(bundled_study, tmp_path_factory):
-    """The report with everything in it, made once."""
-    folder = tmp_path_factory.mktemp("report") / "out"
-    about = About(title="A report", maker=WIDE, notes="Notes. " * 60, logo=logo_of(base64.b64encode(LOGO).decode()))
-    write_study(bundled_study, folder, about=about, also=("pdf",))
-    return folder
 
 
 @pytest.fixture(scope="session")

@@ -11,6 +11,7 @@ CHROMIUM = Path("/usr/bin/chromium")
 LOGO = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
 )
+WIDE = 'A "maker" & <b>sons</b>, of a name as long as a name can be without being cut anywhere on a page of paper'
 AUDIT = (Path(__file__).parent / "audit.js").read_text(encoding="utf-8")
 
 

@@ -58,7 +58,8 @@ def address():
 
 
 @contextmanager
-def served():
+def served(**options):
+    """A bench in a thread of its own; options are uvicorn's."""
     import uvicorn
 
     from mrdamper.web.server import Connection, _listen
@@ -66,9 +67,8 @@ def served():
     listener = _listen(0)
     port = listener.getsockname()[1]
     app = create_app([f"127.0.0.1:{port}"], lambda: server.should_exit)
-    server = uvicorn.Server(
-        uvicorn.Config(app, http=Connection, log_level="error", access_log=False, timeout_graceful_shutdown=1)
-    )
+    options = {"http": Connection, "log_level": "error", "access_log": False, "timeout_graceful_shutdown": 1, **options}
+    server = uvicorn.Server(uvicorn.Config(app, **options))
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]}, daemon=True)
     thread.start()
     while not server.started:
@@ -82,7 +82,7 @@ def served():
 @pytest.fixture(scope="module")
 def profile(browser):
     """One profile for the pages of a module: the chart library is fetched and compiled once."""
-    context = browser.new_context(viewport=WINDOW, accept_downloads=True)
+    context = browser.new_context(viewport=WINDOW, accept_downloads=True, reduced_motion="reduce")
     context.set_default_timeout(1000 * float(os.environ.get("PAGE_SECONDS", "300")))  # for a busy machine
     yield context
     context.close()

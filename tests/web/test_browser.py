@@ -403,6 +403,7 @@ def test_dark_projector_and_narrow(on_model, shoot):
 
 def test_a_ride_moves_with_its_loop(on_model, shoot):
     page = on_model
+    page.emulate_media(reduced_motion="no-preference")  # else it stands still at first
     open_tab(page, "Ride")
     mark = page.locator('section[aria-label="The damper\'s loop"] .points path')
     mark.wait_for(state="attached")
@@ -424,6 +425,7 @@ def test_a_ride_moves_with_its_loop(on_model, shoot):
     page.get_by_role("button", name="Pause").click()
     moment.fill("600")
     shoot(page, "ride-frame")
+    page.emulate_media(reduced_motion="reduce")
 
 
 def test_work_can_be_cancelled(on_model):

@@ -141,7 +141,10 @@ def test_the_help_shows_an_example():
 def test_half_sent_requests_are_given_up(monkeypatch, sent, answer):
     monkeypatch.setattr(server, "HALF_SENT_S", 0.3)
     monkeypatch.setattr(security, "HALF_SENT_S", 0.3)
-    with served() as address, socket.create_connection(("127.0.0.1", int(address.rsplit(":", 1)[1])), 10) as line:
+    with (
+        served(timeout_keep_alive=0.3) as address,
+        socket.create_connection(("127.0.0.1", int(address.rsplit(":", 1)[1])), 10) as line,
+    ):
         line.sendall(sent.replace(b"{host}", address.removeprefix("http://").encode()))
         received = b""
         while part := line.recv(65536):
