@@ -1,9 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.synthetic import TRUTH, synthetic_run
 
 from mrdamper.dampers.base import Envelope
-from mrdamper.dampers.gram import choose_forms, condense, fit_jointly, leave_out_errors
+from mrdamper.dampers.gram import _Design, _ShapeSearch, choose_forms, condense, fit_jointly, leave_out_errors
 from mrdamper.dampers.modified import fit_modified, fit_modified_jointly
 from mrdamper.data import Condition, Run, same_condition
 from mrdamper.errors import IdentificationError
@@ -63,6 +65,30 @@ def test_all_runs_at_once_recover_the_functions(runs):
     assert at.yield_displacement == pytest.approx(1.2e-3, rel=0.02)
     assert at.c == pytest.approx(expected.c, rel=0.01)
     assert fit.nrmse_pp.max() < 0.01
+
+
+def test_what_is_found_does_not_show_rounding(runs):
+    """Linear algebra of another machine differs by rounding; so do these forces."""
+    start = ParameterFunction("linear-current", (0.1, np.log(5e-4)), log=True)
+    found = []
+    for share in (0.0, 1e-14):
+        seed = np.random.default_rng(3)
+        moved = [replace(r, force=r.force * (1 + share * seed.standard_normal(r.force.size))) for r in runs]
+        forms = {**FORMS, "yield_displacement": "linear-current"}
+        fit = fit_jointly(condense(moved, BoucWen), forms, start)
+        found.append([c for f in fit.parameters.functions.values() for c in f.coefficients])
+    np.testing.assert_allclose(*found, rtol=1e-10, atol=1e-12)
+
+
+def test_the_slopes_of_the_search_are_those_of_its_errors(runs):
+    data = condense(runs, BoucWen)
+    start = ParameterFunction("linear-current", (0.1, np.log(8e-4)), log=True)
+    search = _ShapeSearch(_Design(data, FORMS), start, np.linspace(1, 2, len(runs)))
+    at = np.array(start.coefficients) * search.scale
+    expected = [
+        (np.sum(search.residual(at + s) ** 2) - np.sum(search.residual(at - s) ** 2)) / 4e-5 for s in 1e-5 * np.eye(2)
+    ]
+    np.testing.assert_allclose(search.gradient(at), expected, rtol=1e-6)
 
 
 def test_condensed_error_is_the_error_in_time(runs, identifications):

@@ -268,3 +268,34 @@ def test_a_parabola_turns_where_its_slope_is_zero_within_half_more_than_was_test
     assert found is None if turn is None else found == pytest.approx(turn, abs=1.5 * top / 600)
     early = ParameterFunction("quadratic-current", (-1.0, 0.4, 0.0)).turning_point(top, 1.0, 0.02)
     assert early == pytest.approx(0.2, abs=1.5 * top / 600)
+
+
+@pytest.mark.parametrize("name", [name for name, form in FORMS.items() if form.rate_bounds])
+def test_derivatives_by_the_rates_are_those_of_the_columns(name):
+    form = FORMS[name]
+    features = [np.array([getattr(c, n) for c in CONDITIONS]) for n in ("current_A", "frequency_Hz", "amplitude_m")]
+    at = np.log([0.7, 1.3][: len(form.rate_bounds)])
+
+    def columns(u):
+        return form.columns(*features, tuple(np.exp(u)))
+
+    slopes = form.slopes(columns(at), *features[:2], tuple(np.exp(at)))
+    for k, step in enumerate(1e-5 * np.eye(at.size)):
+        np.testing.assert_allclose(slopes[k], (columns(at + step) - columns(at - step)) / 2e-5, atol=1e-8)
+
+
+def test_rates_are_settled_to_the_last_digits():
+    """A search that ends by its cost knows them to half of the digits; a small error in the values shows it."""
+    values = 200 + 900 * np.exp(-1.7 * CURRENT) + RNG.normal(0, 20, CURRENT.size)
+    rate, near = (
+        fit_function("decaying-current", CONDITIONS, values * (1 + e)).function.rates[0] for e in (0.0, 3e-13)
+    )
+    assert near == pytest.approx(rate, rel=1e-11)
+
+
+def test_a_form_that_needs_every_condition_is_not_chosen():
+    """Without a condition it knows nothing of it; its error there was rounding over rounding."""
+    few, values = [CONDITIONS[i] for i in (0, 4, 6, 8, 11)], np.array([300.0, 640.0, 1290.0, 1310.0, 2080.0])
+    assert fit_function("plane", few, values).left_out == np.inf
+    assert choose_function(["constant", "linear-current", "plane"], few, values).function.form == "linear-current"
+    assert choose_function(["constant"], few[:1], [3.0]).function.coefficients == (3.0,)

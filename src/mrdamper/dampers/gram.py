@@ -25,8 +25,8 @@ from mrdamper.hysteresis import Shape
 from mrdamper.hysteresis.batch import follow_alike
 from mrdamper.identification import Problem
 from mrdamper.models import Model, Scale
-from mrdamper.optimizers.levenberg_marquardt import least_squares
-from mrdamper.optimizers.linear import on_one_blas_thread, robust_weights, solve_linear
+from mrdamper.optimizers.levenberg_marquardt import least_squares, polished
+from mrdamper.optimizers.linear import beside_columns, on_one_blas_thread, robust_weights, solve_linear
 
 _RUNG = 1500 ** (1 / 40)  # from one yield displacement to the next; between them Gram matrices are interpolated
 _LATTICE = 2e-6  # m, one of the rungs, whatever the data
@@ -34,6 +34,7 @@ _SHORTEST = 5e-4  # yield displacement looked for, in the smallest amplitude; th
 _AT_ONCE = 2**17  # states held at a time
 _SETTLED = 1e-6  # relative gain of a step at which a search ends
 _SAME_WEIGHTS = 1e-3  # change of the robust weights below which another round changes nothing
+_REACH = 6.0  # of a search, in units of a function's terms
 _BEST = 1e-4  # nrmse_pp below which a run gains no more weight
 _RIDGE = 1e-7  # interpolated Gram matrices of nearly parallel columns may lose positivity by less
 
@@ -58,6 +59,8 @@ class Condensed:
     gram : (R, K, L+1, L+1) array
         Mean products of the columns and, last, the measured force over its peak-to-peak
         value, at each value of the ladder.
+    bend : (R, K, L+1, L+1) array
+        Their second derivatives along the ladder, counted in rungs, as a cubic spline has them.
     """
 
     model_type: type[Model]
@@ -68,6 +71,7 @@ class Condensed:
     scale: Floats
     ladder: Floats
     gram: Floats
+    bend: Floats
 
     def only(self, rows: Sequence[int]) -> Condensed:
         """The same for some of the runs."""
@@ -78,25 +82,30 @@ class Condensed:
             conditions=tuple(self.conditions[i] for i in index),
             scale=self.scale[index],
             gram=self.gram[index],
+            bend=self.bend[index],
         )
 
-    def at(self, shape_values: Floats) -> Floats:
-        """(R, L+1, L+1) Gram matrices at one shape value a run: cubic in its logarithm."""
-        size = self.ladder.size
+    def at(self, shape_values: Floats) -> tuple[Floats, Floats]:
+        """Gram matrices at one shape value a run, and their slopes by its logarithm, on the spline through the ladder.
+
+        Both (R, L+1, L+1).
+        """
         logs = np.log(self.ladder)
-        u = np.clip((np.log(shape_values) - logs[0]) / (logs[1] - logs[0]), 0, size - 1)
-        first = np.clip(np.floor(u).astype(int) - 1, 0, size - 4)
-        t = u - first
-        weights = np.stack(
+        u = np.clip((np.log(shape_values) - logs[0]) / (logs[1] - logs[0]), 0, logs.size - 1)
+        first = np.minimum(np.floor(u).astype(int), logs.size - 2)
+        after = u - first
+        before, one = 1 - after, np.ones_like(u)
+        weights = np.array(
             [
-                -(t - 1) * (t - 2) * (t - 3) / 6,
-                t * (t - 2) * (t - 3) / 2,
-                -t * (t - 1) * (t - 3) / 2,
-                t * (t - 1) * (t - 2) / 6,
+                [before, after, (before**3 - before) / 6, (after**3 - after) / 6],
+                [-one, one, (1 - 3 * before**2) / 6, (3 * after**2 - 1) / 6],
             ]
-        )
-        nodes = self.gram[np.arange(t.size)[:, None], first[:, None] + np.arange(4)]  # (R, 4, L+1, L+1)
-        return np.einsum("jr,rjkl->rkl", weights, nodes)
+        ).transpose(2, 0, 1)  # (R, 2, 4)
+        weights[:, 1] /= logs[1] - logs[0]
+        rows, pair = np.arange(u.size)[:, None], first[:, None] + np.arange(2)
+        nodes = np.concatenate([self.gram[rows, pair], self.bend[rows, pair]], axis=1)  # (R, 4, L+1, L+1)
+        both = (weights @ nodes.reshape(u.size, 4, -1)).reshape(u.size, 2, *nodes.shape[2:])
+        return both[:, 0], both[:, 1]
 
 
 @on_one_blas_thread
@@ -131,7 +140,18 @@ def condense(runs: Sequence[Run], model_type: type[Model]) -> Condensed:
         np.array([np.ptp(problem.force) for problem in problems]),
         ladder,
         gram,
+        _bend(gram),
     )
+
+
+def _bend(gram: Floats) -> Floats:
+    """Second derivatives of the cubic spline along the second axis that goes on unbroken over its outer knots."""
+    size = gram.shape[1]
+    second = np.eye(size, k=-1) - 2 * np.eye(size) + np.eye(size, k=1)
+    system, right = second + 6 * np.eye(size), 6 * second
+    system[0, :3] = system[-1, -3:] = (1, -2, 1)
+    right[[0, -1]] = 0.0
+    return np.einsum("jk,rk...->rj...", np.linalg.solve(system, right), gram)
 
 
 def _ladder(amplitudes: Sequence[float]) -> Floats:
@@ -202,6 +222,7 @@ def fit_jointly(
     *,
     reweightings: int = 6,
     most_steps: int = 12,
+    polish: bool = True,
 ) -> JointFit:
     """Fit the coefficients of all parameter functions to all runs at once.
 
@@ -215,35 +236,29 @@ def fit_jointly(
         without one.
     reweightings, most_steps : int
         Effort: rounds of robust weights, steps of the search in each.
+    polish : bool
+        Settle to the last digits at the end, so that rounding does not show in what is found.
     """
     design = _Design(data, forms)
     if start is None:
-        solution = _reweighted(design, data.at(np.full(data.scale.size, data.ladder[0])), reweightings)
-        return _finish(design, solution, {})
-    columns = FORMS[start.form].columns(*features(data.conditions), start.rates)
-    scale = np.linalg.norm(columns, axis=0) / np.sqrt(columns.shape[0])
-
-    def shape_values(u: Floats) -> Floats:
-        return np.exp(np.clip(columns @ (u / scale), np.log(data.ladder[0]), np.log(data.ladder[-1])))
-
-    centre = np.array(start.coefficients) * scale
-    reach = np.full(centre.size, 6.0)
-    weights = np.ones(data.scale.size)
-    solution = design.solve(data.at(shape_values(centre)), weights)
+        return _finish(design, _reweighted(design, data.gram[:, 0], reweightings), {})
+    search = _ShapeSearch(design, start, np.ones(data.scale.size))
+    centre = np.array(start.coefficients) * search.scale
+    box = centre - _REACH, centre + _REACH
+    last = search
     for _ in range(reweightings):
-
-        def residual(u: Floats, weights: Floats = weights) -> Floats:
-            return design.solve(data.at(shape_values(u)), weights).residual
-
-        found = least_squares(residual, centre, centre - reach, centre + reach, most_steps, _SETTLED)
-        centre = found.point
-        solution = design.solve(data.at(shape_values(centre)), weights)
-        before, weights = weights, robust_weights(solution.nrmse_pp, _BEST)
-        if np.max(np.abs(weights / before - 1)) < _SAME_WEIGHTS:
+        centre = least_squares(search.residual, centre, *box, most_steps, _SETTLED, slopes=search.slopes).point
+        weights = robust_weights(search.solution(centre).nrmse_pp, _BEST)
+        settled = np.max(np.abs(weights / search.weights - 1)) < _SAME_WEIGHTS
+        last, search = search, search.weighted(weights)
+        if settled:
             break
-    function = ParameterFunction(start.form, tuple((centre / scale).tolist()), start.rates, log=True)
+    if polish:
+        centre = polished(last.gradient, centre, *box)
+    solution = last.solution(centre)
+    function = ParameterFunction(start.form, tuple((centre / search.scale).tolist()), start.rates, log=True)
     made = _finish(design, solution, {data.shape: function})
-    reached, ends = shape_values(centre), data.ladder[[0, -1]]
+    reached, ends = search.shape_values(centre), data.ladder[[0, -1]]
     outside = np.any((reached <= ends[0] * _RUNG**0.01) | (reached >= ends[1] / _RUNG**0.01))
     return replace(made, at_bounds=(data.shape,)) if outside else made
 
@@ -262,7 +277,7 @@ def leave_out_errors(
         if data.shape
         else np.full(data.scale.size, data.ladder[0])
     )
-    table = design.table(data.at(shapes))
+    table, _ = design.table(data.at(shapes)[0])
     weights = robust_weights(fit.nrmse_pp, _BEST)
     errors = np.zeros(data.scale.size)
     for group in groups:
@@ -276,8 +291,11 @@ def leave_out_errors(
 @dataclass(frozen=True)
 class _Solution:
     coefficients: Floats
-    residual: Floats
-    nrmse_pp: Floats
+    error: Floats  # (R, L+1)
+
+    @property
+    def nrmse_pp(self) -> Floats:
+        return np.sqrt(np.sum(self.error**2, axis=1))
 
 
 class _Design:
@@ -297,40 +315,90 @@ class _Design:
             at += block.shape[1]
         self.matrix[:, -1, -1] = 1.0
 
-    def table(self, gram: Floats) -> Floats:
-        """(R, L+1, P+1) rows that stand for a run's samples: by coefficient and, last, the measured force."""
+    def table(self, gram: Floats) -> tuple[Floats, Floats]:
+        """Rows that stand for a run's samples, and the factors of the Gram matrices they are made with.
+
+        (R, L+1, P+1), by coefficient and, last, the measured force; (R, L+1, L+1).
+        """
         size = np.sqrt(np.maximum(np.einsum("rii->ri", gram), 1e-300))
         scaled = gram / size[:, :, None] / size[:, None, :]
         factor = _factor(scaled + _RIDGE * np.eye(gram.shape[1])) * size[:, None, :]
-        return np.asarray(factor @ self.matrix, dtype=float)
+        return factor @ self.matrix, factor
 
-    def solve(self, gram: Floats, weights: Floats) -> _Solution:
-        """Coefficients of least weighted squares; residuals are those of the condensed runs."""
-        return _solve(self.table(gram), weights)
+
+class _ShapeSearch:
+    """Weighted errors of all runs over the coefficients of the shape function, all others solved for."""
+
+    def __init__(self, design: _Design, start: ParameterFunction, weights: Floats):
+        data, self.design, self.start, self.weights = design.data, design, start, weights
+        columns = FORMS[start.form].columns(*features(data.conditions), start.rates)
+        self.scale = np.linalg.norm(columns, axis=0) / np.sqrt(columns.shape[0])
+        self.columns = columns / self.scale
+        self._last: tuple[bytes, Floats, Floats, Floats, _Solution] | None = None
+
+    def weighted(self, weights: Floats) -> _ShapeSearch:
+        """The same with other weights."""
+        return _ShapeSearch(self.design, self.start, weights)
+
+    def shape_values(self, u: Floats) -> Floats:
+        """(R,) values of the shape coordinate."""
+        ladder = self.design.data.ladder
+        return np.exp(np.clip(self.columns @ u, np.log(ladder[0]), np.log(ladder[-1])))
+
+    def solution(self, u: Floats) -> _Solution:
+        """The other functions' coefficients at a point."""
+        return self._at(u)[-1]
+
+    def residual(self, u: Floats) -> Floats:
+        return (self.weights[:, None] * self.solution(u).error).ravel()
+
+    def slopes(self, u: Floats) -> Floats:
+        """Derivatives of the residual, the other coefficients moving along [Kaufman 1975, BIT 15, 49]."""
+        slope, factor, table, solution = self._at(u)
+        inverse = np.linalg.inv(factor)
+        # A triangle whose square moves by `slope` moves by the upper half of this, times itself.
+        moved = np.triu(inverse.transpose(0, 2, 1) @ slope @ inverse)
+        moved[:, *np.diag_indices(moved.shape[1])] /= 2
+        ladder, s = self.design.data.ladder, self.columns @ u
+        inside = (s > np.log(ladder[0])) & (s < np.log(ladder[-1]))
+        by_shape = np.einsum("rij,rj->ri", moved, solution.error) * (self.weights * inside)[:, None]
+        jacobian = (by_shape[:, :, None] * self.columns[:, None, :]).reshape(-1, u.size)
+        weighted = (self.weights[:, None, None] * table[:, :, :-1]).reshape(jacobian.shape[0], -1)
+        return beside_columns(weighted, jacobian)
+
+    def gradient(self, u: Floats) -> Floats:
+        """Of half the squared residual: exact, for the residual does not see the other coefficients move."""
+        return self.residual(u) @ self.slopes(u)
+
+    def _at(self, u: Floats) -> tuple[Floats, Floats, Floats, _Solution]:
+        if self._last is None or self._last[0] != u.tobytes():
+            gram, slope = self.design.data.at(self.shape_values(u))
+            table, factor = self.design.table(gram)
+            self._last = u.tobytes(), slope, factor, table, _solve(table, self.weights)
+        return self._last[1:]
 
 
 def _solve(table: Floats, weights: Floats) -> _Solution:
+    """Coefficients of least weighted squares; errors are those of the condensed runs."""
     weighted = (weights[:, None, None] * table).reshape(-1, table.shape[2])
     solution = solve_linear(weighted[:, :-1], weighted[:, -1], rank_limit=1e-10)
-    error = table[:, :, :-1] @ solution - table[:, :, -1]
-    return _Solution(solution, (weights[:, None] * error).ravel(), np.sqrt(np.sum(error**2, axis=1)))
+    return _Solution(solution, table[:, :, :-1] @ solution - table[:, :, -1])
 
 
 def _factor(gram: Floats) -> Floats:
-    """(R, K, K) matrices T with Tᵀ T the given ones, or the nearest that have such."""
+    """(R, K, K) upper triangles T with Tᵀ T the given ones, or the nearest that have such."""
     try:
         return np.asarray(np.linalg.cholesky(gram).transpose(0, 2, 1), dtype=float)
     except np.linalg.LinAlgError:  # a model that fits to rounding: interpolation took more than the ridge gave
         values, vectors = np.linalg.eigh(gram)
-        return np.asarray(np.sqrt(np.maximum(values, _RIDGE))[:, :, None] * vectors.transpose(0, 2, 1), dtype=float)
+        return np.linalg.qr(np.sqrt(np.maximum(values, _RIDGE))[:, :, None] * vectors.transpose(0, 2, 1))[1]
 
 
 def _reweighted(design: _Design, gram: Floats, reweightings: int) -> _Solution:
-    weights = np.ones(gram.shape[0])
-    solution = design.solve(gram, weights)
+    table, _ = design.table(gram)
+    solution = _solve(table, np.ones(gram.shape[0]))
     for _ in range(reweightings):
-        weights = robust_weights(solution.nrmse_pp, _BEST)
-        solution = design.solve(gram, weights)
+        solution = _solve(table, robust_weights(solution.nrmse_pp, _BEST))
     return solution
 
 
@@ -390,5 +458,5 @@ def _tried(
     for name in data.linear:
         require_determined(forms[name], data.conditions)
     start = fit_function(forms[data.shape], data.conditions, shape_values, log=True).function if data.shape else None
-    fit = fit_jointly(data, forms, start, reweightings=2, most_steps=5)
+    fit = fit_jointly(data, forms, start, reweightings=2, most_steps=5, polish=False)
     return fit, float(np.mean(leave_out_errors(data, fit, groups, forms)))

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import IdentificationError
 from mrdamper.functions.forms import Form, ParameterFunction, features, form_named
-from mrdamper.optimizers.levenberg_marquardt import least_squares
-from mrdamper.optimizers.linear import solve_linear
+from mrdamper.optimizers.levenberg_marquardt import least_squares, polished
+from mrdamper.optimizers.linear import beside_columns, solve_linear
 
 # Below this share of the largest singular value the tests cannot tell the terms apart: a rig repeats a motion to 1e-6.
 _RANK_LIMIT = 1e-5
@@ -31,7 +31,7 @@ class FunctionFit:
         Share of the variance it explains (in the logarithm, where the parameter is logarithmic).
     left_out : float
         RMS error at a condition left out of the fit, over the parameter's spread: under 1 the
-        function knows more than the mean does.
+        function knows more than the mean does; infinite where a term rests on one condition alone.
     """
 
     function: ParameterFunction
@@ -159,17 +159,31 @@ def _best_rates(
     """Search the rates in their logarithm: a grid, then refinement from its three best points."""
     if not form.rate_bounds:
         return ()
-    bounds = np.log(np.array(form.rate_bounds))
+    lower, upper = np.log(np.array(form.rate_bounds)).T
+    right = target * weight
+
+    def fitted(u: Floats) -> tuple[Floats, Floats]:
+        columns = form.columns(I, f, A, tuple(np.exp(u))) * weight[:, None]
+        return columns, solve_linear(columns, right)
 
     def residual(u: Floats) -> Floats:
-        columns = form.columns(I, f, A, tuple(np.exp(u))) * weight[:, None]
-        return columns @ solve_linear(columns, target * weight) - target * weight
+        columns, found = fitted(u)
+        return columns @ found - right
 
-    grid = [np.array(u) for u in product(*(np.linspace(low, high, 6) for low, high in bounds))]
-    grid.sort(key=lambda u: float(np.sum(residual(u) ** 2)))
-    found = [least_squares(residual, u, bounds[:, 0], bounds[:, 1], most_steps=15) for u in grid[:3]]
+    def slopes(u: Floats) -> Floats:
+        columns, found = fitted(u)
+        by_rate = (form.slopes(columns, I, f, tuple(np.exp(u))) @ found).T
+        return beside_columns(columns, by_rate)  # the coefficients move along [Kaufman 1975]
+
+    grid = np.array(list(product(*(np.linspace(low, high, 6) for low, high in zip(lower, upper, strict=True)))))
+    tables = np.stack([form.columns(I, f, A, tuple(rates)) for rates in np.exp(grid)]) * weight[:, None]
+    size = np.linalg.norm(tables, axis=1, keepdims=True)
+    explained = np.sum((right @ np.linalg.qr(tables / np.where(size > 0, size, 1.0))[0]) ** 2, axis=-1)
+    starts = grid[np.argsort(-explained, kind="stable")[:3]]
+    found = [least_squares(residual, u, lower, upper, most_steps=15, slopes=slopes) for u in starts]
     best = min(found, key=lambda minimum: minimum.cost)
-    return tuple(np.exp(best.point).tolist())
+    settled = polished(lambda u: residual(u) @ slopes(u), best.point, lower, upper)
+    return tuple(np.exp(settled).tolist())
 
 
 @lru_cache(maxsize=128)
@@ -186,9 +200,11 @@ def _solved(columns: Floats, target: Floats, weight: Floats, rates: int) -> tupl
     scale = np.linalg.norm(weighted, axis=0)
     q, triangle = np.linalg.qr(weighted / scale)
     along = q.T @ right
-    spare = np.maximum(1.0 - np.sum(q**2, axis=1), 1e-9)
-    penalty = target.size / max(target.size - rates, 1)
-    left_out = float(np.sqrt(np.sum(((right - q @ along) / spare) ** 2) / np.sum(weight**2)) * penalty)
+    spare = 1.0 - np.sum(q**2, axis=1)  # share of a value that the others know
+    left_out = float("inf")
+    if spare.min() > _RANK_LIMIT:  # else some value alone says what a term is: without it the form knows nothing
+        penalty = target.size / max(target.size - rates, 1)
+        left_out = float(np.sqrt(np.sum(((right - q @ along) / spare) ** 2) / np.sum(weight**2)) * penalty)
     return np.linalg.solve(triangle, along) / scale, left_out
 
 

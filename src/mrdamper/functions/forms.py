@@ -81,6 +81,15 @@ class Form:
         """(N, terms) array of the terms."""
         return np.column_stack([term(I, f, A, rates) for term in self.terms])
 
+    def slopes(self, columns: Floats, I: Floats, f: Floats, rates: Sequence[float]) -> Floats:
+        """(rates, N, terms) derivatives of the columns by the logarithm of each rate."""
+        by = np.zeros((len(rates), *columns.shape))
+        for j, term in enumerate(self.terms):
+            for rate, feature in ((term.decay_I, I), (term.decay_f, f), (term.power_f, np.log(f))):
+                if rate is not None:
+                    by[rate, :, j] -= rates[rate] * feature * columns[:, j]
+        return by
+
 
 _ONE, _I, _I2 = Term(), Term(current=1), Term(current=2)
 _SPEED = Term(frequency=1, amplitude=1)  # f A, the peak velocity over 2π

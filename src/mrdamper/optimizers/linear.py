@@ -50,6 +50,17 @@ def solve_linear(columns: Floats, right: Floats, rank_limit: float | None = None
     return np.asarray(np.linalg.lstsq(columns / scale, right, rcond=rank_limit)[0], dtype=float) / scale
 
 
+def beside_columns(columns: Floats, right: Floats, rank_limit: float = 1e-10) -> Floats:
+    """What the columns do not explain of (N,) or (N, D) right sides; arguments as `solve_linear`."""
+    scale = np.linalg.norm(columns, axis=0)
+    basis, triangle = np.linalg.qr(columns / np.where(scale > 0, scale, 1.0))
+    pivots = np.abs(np.diag(triangle))
+    if pivots.min(initial=1.0) <= rank_limit * pivots.max(initial=1.0):  # one column more is rounding
+        turned, sizes, _ = np.linalg.svd(triangle)
+        basis = basis @ turned[:, sizes > rank_limit * sizes[0]]
+    return right - basis @ (basis.T @ right)
+
+
 def solve_bounded(columns: Floats, right: Floats, lower: Floats, upper: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     """Least squares with bounds on the coefficients, by holding violated ones at their bound.
 
