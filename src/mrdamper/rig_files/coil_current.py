@@ -40,7 +40,7 @@ def current_of(
     else:
         statements = _statements(table, path)
         if not statements and channel is None:
-            statements = _set_points(table, rows) or _once(stated_in_titles(table.remarks)) or _folders(table, path)
+            statements = _set_points(table, rows) or stated_in_titles(table.remarks) or _folders(table, path)
     where = printable(table.source.name)
     mend = "correct the name or the line, or say [current] value = ... in a profile"
     try:
@@ -89,11 +89,6 @@ def _set_points(table: RawTable, rows: slice) -> list[Statement]:
         if low == high:
             return [Statement(known.factor * float(low), f"the column {table.names[column]!r}")]
     return []
-
-
-def _once(found: list[Statement]) -> list[Statement]:
-    """Statements in free text, if all say one thing."""
-    return found if len({statement.amperes for statement in found}) == 1 else []
 
 
 def _folders(table: RawTable, path: Path) -> list[Statement]:

@@ -89,13 +89,13 @@ def stated_by_lines(lines: Iterable[str], decimal: str | None = None) -> list[St
 
 
 def stated_in_titles(lines: Iterable[str]) -> list[Statement]:
-    """Currents in the free text of lines that name no limit or range: "Test 3: 0.4 A, 2 Hz"."""
+    """The current in the free text of lines that name no limit or range, if all say one: "Test 3: 0.4 A, 2 Hz"."""
     found = []
     for line in lines:
         stated = () if _RATING.search(line) else currents_in(line)
         if len(stated) == 1:
             found.append(Statement(stated[0], f"the line {line.strip()[:60]!r}"))
-    return found
+    return found if len({statement.amperes for statement in found}) == 1 else []
 
 
 def stated_rate(lines: Iterable[str], numbers: Mapping[str, float], decimal: str | None = None) -> float | None:

@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 from typing import IO
 
 from mrdamper.data.temporary import temporary_folder
-from mrdamper.rig_files.readers.archive import UNREADABLE_ZIP, bomb, check_member, check_sizes, opened, opened_zip
+from mrdamper.rig_files.readers.archive import UNREADABLE_ZIP, as_it_is, bomb, check_member, check_sizes, opened
 from mrdamper.rig_files.readers.base import MOST_RATIO, MOST_UNPACKED, RigFileError, Source
 
 SUFFIXES = (".tar", ".tgz")
@@ -64,7 +64,7 @@ def _folder_of(path: Path, stack: contextlib.ExitStack) -> Path:
     top = stack.enter_context(temporary_folder()) / path.name
     top.mkdir()
     if path.suffix.lower() == ".zip":
-        with opened_zip(path) as source:
+        with as_it_is(path) as source:
             _unzip(source, top)
     else:
         with opened(path, folder=True) as source:

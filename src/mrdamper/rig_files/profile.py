@@ -170,18 +170,15 @@ def parse_profile(text: str, where: str = "profile") -> Profile:
 
 def profile_text(profile: Profile) -> str:
     """The profile as TOML that reads back equal."""
-    values = profile.model_dump(exclude_none=True)
-    default = Profile().model_dump(exclude_none=True)
-    lines = [f"{key} = {_toml(values[key])}" for key in ("rig", "excitation", "split")]
-    form = {key: value for key, value in values["file"].items() if value != default["file"].get(key)}
-    sections = {"file": form}
-    for name, channel in values["channels"].items():
-        plain = Channel().model_dump(exclude_none=True)
-        sections[f"channels.{name}"] = {k: v for k, v in channel.items() if v != plain.get(k) or k == "sign"}
-    if "current" in values:
-        sections["current"] = values["current"]
-    if "correction" in values:
-        sections["correction"] = values["correction"]
+    lines = [f"{key} = {_toml(getattr(profile, key))}" for key in ("rig", "excitation", "split")]
+    sections = {"file": profile.file.model_dump(exclude_none=True, exclude_defaults=True)}
+    plain = Channel().model_dump(exclude_none=True)
+    for name, channel in profile.channels.items():
+        says = channel.model_dump(exclude_none=True)
+        sections[f"channels.{name}"] = {k: v for k, v in says.items() if v != plain.get(k) or k == "sign"}
+    for name in ("current", "correction"):
+        said = getattr(profile, name)
+        sections[name] = {} if said is None else said.model_dump(exclude_none=True)
     for name, section in sections.items():
         if section or name.startswith("channels."):
             lines += ["", f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in section.items())]

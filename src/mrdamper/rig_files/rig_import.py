@@ -31,57 +31,30 @@ _ROWS_SHOWN, _MOST_SHOWN = 6, 30  # rows and columns of a preview
 
 @dataclass(frozen=True, eq=False)
 class Refusal:
-    """A file or a test of it that cannot be used, and why.
-
-    Attributes
-    ----------
-    file : str
-    error : InputError
-    run : str
-        Of a test that could be read and not used, its name.
-    """
+    """A file or a test of it that cannot be used, and why."""
 
     file: str
     error: InputError
-    run: str = ""
+    run: str = ""  # of a test that could be read and not used, its name
 
 
 @dataclass(frozen=True, eq=False)
 class Preview:
-    """How a file begins, and what its columns are taken for.
+    """How a file begins, and what its columns are taken for."""
 
-    Attributes
-    ----------
-    names, units : tuple of str
-        One a column.
-    rows : tuple of tuple of str
-        The first, cell by cell.
-    channels : mapping of str to (int or None, str, int)
-        By channel its column, unit and sign, as far as they are known.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # one a column
     units: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    channels: Mapping[str, tuple[int | None, str, int]]
+    rows: tuple[tuple[str, ...], ...]  # the first, cell by cell
+    channels: Mapping[str, tuple[int | None, str, int]]  # by channel its column, unit and sign, as far as known
 
 
 @dataclass(frozen=True, eq=False)
 class ImportResult:
-    """What came of a set of files.
+    """What came of a set of files."""
 
-    Attributes
-    ----------
-    records : tuple of Record
-        Accepted, with their findings, in the order of the files.
-    refusals : tuple of Refusal
-    left_out : tuple of str
-        Files of the folders that are no rig's files: of other kinds, or texts without a table.
-    """
-
-    records: tuple[Record, ...]
+    records: tuple[Record, ...]  # accepted, with their findings, in the order of the files
     refusals: tuple[Refusal, ...] = ()
-    left_out: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()  # files of the folders that are no rig's: of other kinds, or texts without a table
 
 
 def read_run(path: str | Path, profile: Profile | str | Path | None = None) -> Record:

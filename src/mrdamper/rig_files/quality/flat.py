@@ -15,9 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrdamper.data import Floats, once_per_run
-from mrdamper.rig_files.quality.noise import sample_noise
-from mrdamper.rig_files.quality.presence import runs_of
-from mrdamper.rig_files.quality.view import View
+from mrdamper.rig_files.quality.view import View, runs_of, sample_noise
 from mrdamper.rig_files.record import Finding
 
 FLAT = 5  # samples in a row that make a flat top or a frozen stretch

@@ -7,8 +7,7 @@ import numpy as np
 from mrdamper.rig_files.quality.current import held_in
 from mrdamper.rig_files.quality.loop import damping_share, repeatability
 from mrdamper.rig_files.quality.motion import LEAST_CYCLES, cycles_of, steady_window
-from mrdamper.rig_files.quality.noise import sample_noise
-from mrdamper.rig_files.quality.view import View
+from mrdamper.rig_files.quality.view import View, sample_noise
 
 _NOISE = 0.7  # of a channel's standard deviation: white noise has 1, a noisy load cell 0.1
 _LEAP, _LEAPS = 0.4, 0.4  # a step of such a share of the range, and the part of the path in such steps

@@ -23,8 +23,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.optimizers.linear import on_one_blas_thread
 from mrdamper.rig_files.quality.flat import flagged_samples, flat_tops
-from mrdamper.rig_files.quality.noise import sample_noise
-from mrdamper.rig_files.quality.view import View
+from mrdamper.rig_files.quality.view import View, sample_noise
 from mrdamper.rig_files.record import Finding
 
 LIMIT = 0.02  # of the period

@@ -10,9 +10,7 @@ from mrdamper.data import Floats
 from mrdamper.errors import QualityError
 from mrdamper.motion.harmonics import fit_harmonics
 from mrdamper.rig_files.quality.motion import LEAST_CYCLES, cycles_of
-from mrdamper.rig_files.quality.noise import sample_noise
-from mrdamper.rig_files.quality.presence import runs_of
-from mrdamper.rig_files.quality.view import View
+from mrdamper.rig_files.quality.view import View, runs_of, sample_noise
 from mrdamper.rig_files.record import Finding
 
 _SLOW, _FAST = 0.1, 0.5  # of the largest velocity: samples near the reversals, and away from them

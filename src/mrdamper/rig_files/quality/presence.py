@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mrdamper.rig_files.quality.view import View
+from mrdamper.rig_files.quality.view import View, runs_of
 from mrdamper.rig_files.record import Finding
 
 MOST_MISSING = 0.02  # share of the samples
@@ -70,11 +70,3 @@ def longest_run(mask: np.ndarray) -> tuple[int, int]:
         return 0, 0
     longest = int(np.argmax(stops - starts))
     return int(stops[longest] - starts[longest]), int(starts[longest])
-
-
-def runs_of(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Starts and (excluded) stops of all runs of true values."""
-    edges = np.flatnonzero(mask[1:] != mask[:-1]) + 1
-    bounds = np.concatenate([[0], edges, [mask.size]])
-    first = 0 if mask.size and mask[0] else 1
-    return bounds[:-1][first::2], bounds[1:][first::2]

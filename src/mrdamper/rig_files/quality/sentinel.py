@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.rig_files.quality.presence import USED, runs_of
-from mrdamper.rig_files.quality.view import UNITS, View
+from mrdamper.rig_files.quality.presence import USED
+from mrdamper.rig_files.quality.view import UNITS, View, runs_of
 from mrdamper.rig_files.record import Finding
 
 # Leading digits of the codes in use: 999, 9999, ..., 999.25, 9.91e37, and the ends of 16-, 24- and 32-bit counts.

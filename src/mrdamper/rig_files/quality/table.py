@@ -24,41 +24,18 @@ NOT_IDENTIFIED = ("W_CLIPPED", "W_SHORT", "W_CURRENT_VARIES")  # what identifica
 
 @dataclass(frozen=True, eq=False)
 class Quality:
-    """One record's verdict.
+    """One record's verdict; its figures are NaN for a refused record."""
 
-    Attributes
-    ----------
-    record : Record
-        As judged.
-    condition : Condition or None
-        Measured; None for a motion without a period and for a refused record.
-    current : float
-        Mean over the steady window [A]; NaN where it changes there.
-    cycles, sample_rate_Hz : float
-        NaN for a refused record, like all figures below.
-    repeatability : float
-        Cycle-to-cycle scatter of the force over its peak-to-peak value; NaN under two cycles.
-    offset_force : float
-        Mean force over whole cycles [N]; reported, never taken off.
-    centre : float
-        Mean displacement over whole cycles [m]; reported, never taken off.
-    drift : float
-        Change of the mean displacement over the record [m].
-    distortion : float
-        THD of the motion; NaN for a motion without a period.
-    refusal : QualityError or None
-    """
-
-    record: Record
-    condition: Condition | None = None
-    current: float = np.nan
+    record: Record  # as judged
+    condition: Condition | None = None  # measured; None for a motion without a period and for a refused record
+    current: float = np.nan  # mean over the steady window [A]; NaN where it changes there
     cycles: float = np.nan
     sample_rate_Hz: float = np.nan
-    repeatability: float = np.nan
-    offset_force: float = np.nan
-    centre: float = np.nan
-    drift: float = np.nan
-    distortion: float = np.nan
+    repeatability: float = np.nan  # scatter of the cycles over the peak-to-peak force; NaN under two cycles
+    offset_force: float = np.nan  # mean over whole cycles [N]; reported, never taken off
+    centre: float = np.nan  # mean displacement over whole cycles [m]; reported, never taken off
+    drift: float = np.nan  # change of the mean displacement over the record [m]
+    distortion: float = np.nan  # THD of the motion; NaN for a motion without a period
     refusal: QualityError | None = None
 
     @property

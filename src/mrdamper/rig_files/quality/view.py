@@ -28,20 +28,11 @@ _FINE = 200  # samples per period that are enough for every figure here
 
 @dataclass(eq=False)
 class View:
-    """A record under judgement.
-
-    Attributes
-    ----------
-    record : Record
-    segments : tuple of (int, int)
-        Half-open sample ranges without a gap in time; one range until `clock` has looked.
-    found : list of Finding
-        What the checks so far have noticed.
-    """
+    """A record under judgement."""
 
     record: Record
-    segments: tuple[tuple[int, int], ...] = ()
-    found: list[Finding] = field(default_factory=list)
+    segments: tuple[tuple[int, int], ...] = ()  # half-open sample ranges without a gap; one until `clock` has looked
+    found: list[Finding] = field(default_factory=list)  # what the checks so far have noticed
 
     def __post_init__(self) -> None:
         self.segments = self.record.segments or ((0, self.record.time.size),)
@@ -160,6 +151,25 @@ class View:
     def _there(self, index: np.ndarray) -> np.ndarray:
         channels = (self.record.time, self.record.displacement, self.record.force, self.record.current)
         return index[np.all([np.isfinite(taken(c, index)) for c in channels if c is not None], axis=0)]
+
+
+def sample_noise(signal: Floats) -> float:
+    """Standard deviation of white noise on a smooth signal, from its third differences.
+
+    The median keeps corners of the signal out; 20 is the sum of the squared coefficients
+    1, 3, 3, 1, and 0.6745 the median of a standard normal's size.
+    """
+    third = np.abs(np.diff(signal, 3))
+    third = third[np.isfinite(third)]
+    return float(np.median(third)) / 0.6745 / float(np.sqrt(20)) if third.size else 0.0
+
+
+def runs_of(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Starts and (excluded) stops of all runs of true values."""
+    edges = np.flatnonzero(mask[1:] != mask[:-1]) + 1
+    bounds = np.concatenate([[0], edges, [mask.size]])
+    first = 0 if mask.size and mask[0] else 1
+    return bounds[:-1][first::2], bounds[1:][first::2]
 
 
 UNITS = {

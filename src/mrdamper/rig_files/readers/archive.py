@@ -27,28 +27,21 @@ def opened(path: Path, *, folder: bool = False) -> Iterator[Source]:
 
     Raises `RigFileError`, its code E_FILE, E_EMPTY, E_TRUNCATED, E_FORMAT or E_ARCHIVE with or without an ending.
     """
-    name = path.name
-    size, file = _at(path)
-    with contextlib.ExitStack() as stack:
-        stack.enter_context(file)
-        source = Source(path, name, path.suffix.lower(), file, size, stack)
-        if size == 0:
+    with as_it_is(path) as source:
+        if source.size == 0:
             raise source.refuse("E_EMPTY", "0 bytes", "copy or export the file again")
         head = source.head()
         packed = head.startswith(_GZIP) or is_plain_zip(source)
         if source.suffix in (".gz", ".zip") and not packed:
-            raise source.refuse(
-                "E_TRUNCATED" if size < 4 else "E_FORMAT",
-                f"the content is no {source.suffix[1:]} archive",
-                "copy the file again, or correct its name",
-            )
+            code, found = "E_TRUNCATED" if source.size < 4 else "E_FORMAT", f"no {source.suffix[1:]} archive"
+            raise source.refuse(code, f"the content is {found}", "copy the file again, or correct its name")
         if folder:
             yield _gunzip(source) if head.startswith(_GZIP) else source
             return
         if packed and source.suffix not in (".gz", ".zip", ".gzip", ""):
-            mend = (
-                "an FMU is a model: mrdamper check reads it" if source.suffix == ".fmu" else "rename it to .zip or .gz"
-            )
+            mend = "rename it to .zip or .gz"
+            if source.suffix == ".fmu":
+                mend = "an FMU is a model: mrdamper check reads it"
             raise source.refuse("E_FORMAT", f"the name says {source.suffix}, the content is a packed file", mend)
         if packed:
             source = _unzip(source) if head.startswith(b"PK") else _gunzip(source)
@@ -57,23 +50,18 @@ def opened(path: Path, *, folder: bool = False) -> Iterator[Source]:
 
 
 @contextlib.contextmanager
-def opened_zip(path: Path) -> Iterator[Source]:
-    """A zip as it is."""
-    size, file = _at(path)
+def as_it_is(path: Path) -> Iterator[Source]:
+    """Open a file, whatever it holds."""
+    try:
+        found = "is a folder" if path.is_dir() else "" if path.is_file() else "no such file"
+        size, file = (0, None) if found else (path.stat().st_size, path.open("rb"))
+    except (OSError, ValueError) as error:
+        found, size, file = getattr(error, "strerror", None) or str(error), 0, None
+    if file is None:
+        raise RigFileError("E_FILE", found, file=str(path), mend="give the path of a rig's file")
     with contextlib.ExitStack() as stack:
         stack.enter_context(file)
         yield Source(path, path.name, path.suffix.lower(), file, size, stack)
-
-
-def _at(path: Path) -> tuple[int, IO[bytes]]:
-    """Size of a file, and the file opened."""
-    try:
-        found = "is a folder" if path.is_dir() else "" if path.is_file() else "no such file"
-        if not found:
-            return path.stat().st_size, path.open("rb")
-    except (OSError, ValueError) as error:
-        found = getattr(error, "strerror", None) or str(error)
-    raise RigFileError("E_FILE", found, file=str(path), mend="give the path of a rig's file")
 
 
 def is_plain_zip(source: Source) -> bool:

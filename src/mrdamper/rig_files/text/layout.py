@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -83,7 +83,11 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
     rows = _rows(lines[first:], separator, width, trailing)
     decimal = form.decimal or _decimal(rows, source, first)
     header, unit_row = _header_lines(lines, first, separator, width, source, form)
-    _refuse_open_quote(lines, header, separator, source)
+    if header is not None and not is_comment(lines[header]):
+        try:
+            split(lines[header], separator)
+        except csv.Error as error:
+            raise source.refuse("E_QUOTE", "a quote is not closed", "close or remove it", line=header + 1) from error
     names = form.names or (_cells(lines[header], separator, width) if header is not None else ("",) * width)
     if len(names) != width:
         raise _mismatch(source, separator, len(names), width, first, lines)
@@ -279,19 +283,14 @@ def _first_row(content: Sequence[tuple[int, str]], above: int, separator: str, s
         kind = RigFileError if named else NoTableError
         raise kind("E_NO_DATA", what, file=source.name, mend="export the file again, with its data")
     width = Counter(len(cells) for cells in rows).most_common(1)[0][0]
-    first, cells = next(
-        (i, cells) for i, cells in _split_all(content, separator) if len(cells) == width and _is_row(cells)
-    )
+    split_lines = ((i, _try_split(line, separator)) for i, line in content)
+    first, cells = next((i, cells) for i, cells in split_lines if len(cells) == width and _is_row(cells))
     trailing = width > 1 and separator != SPACES and not cells[-1] and not any(r[-1] for r in rows if len(r) == width)
     if trailing:
-        over = [entry for entry in (*before, *content) if entry[0] < first]
-        header = [c for _, c in _split_all(over, separator) if len(c) in (width, width - 1)]
+        over = (_try_split(line, separator) for i, line in (*before, *content) if i < first)
+        header = [cells for cells in over if len(cells) in (width, width - 1)]
         trailing = not header or len(header[-1]) == width - 1 or not header[-1][-1]
     return first, width - trailing, trailing
-
-
-def _split_all(content: Sequence[tuple[int, str]], separator: str) -> Iterator[tuple[int, list[str]]]:
-    return ((i, _try_split(line, separator)) for i, line in content)
 
 
 def _rows(lines: Sequence[str], separator: str, width: int, trailing: bool) -> list[list[str]]:
@@ -360,15 +359,6 @@ def _header_lines(
     if naming and not form.names:
         raise _mismatch(source, separator, len(_fields(lines[naming[-1]], separator, width)), width, first, lines)
     return None, (form.units_line - 1 if form.units_line else None)
-
-
-def _refuse_open_quote(lines: Sequence[str], header: int | None, separator: str, source: Source) -> None:
-    if header is None or is_comment(lines[header]):
-        return
-    try:
-        split(lines[header], separator)
-    except csv.Error as error:
-        raise source.refuse("E_QUOTE", "a quote is not closed", "close or remove it", line=header + 1) from error
 
 
 def _names_columns(line: str, separator: str) -> bool:
