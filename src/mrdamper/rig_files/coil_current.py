@@ -12,7 +12,7 @@ from mrdamper.errors import ColumnError, InputError, printable
 from mrdamper.rig_files.column_names import names_condition, split_name
 from mrdamper.rig_files.conditions import Statement, agreed, contradicts, currents_in, stated_by_lines, stated_in_titles
 from mrdamper.rig_files.profile import Profile, current_in_name
-from mrdamper.rig_files.readers import RawTable
+from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
 
 _FEWEST_SLOW = 5  # samples of a current that is recorded more rarely than the force

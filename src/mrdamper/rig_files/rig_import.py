@@ -20,7 +20,8 @@ from mrdamper.rig_files.long_records import judge_long
 from mrdamper.rig_files.packed_folder import is_packed_folder, unpacked
 from mrdamper.rig_files.parts import tests_of
 from mrdamper.rig_files.profile import Channel, Profile, current_pattern, load_profile, profile_hash
-from mrdamper.rig_files.readers import NoTableError, RawTable, RigFileError, raw_tables, suffixes
+from mrdamper.rig_files.readers import raw_tables, suffixes
+from mrdamper.rig_files.readers.base import NoTableError, RawTable, RigFileError
 from mrdamper.rig_files.record import Finding, Record
 from mrdamper.rig_files.rig_record import joined, records_of
 from mrdamper.rig_files.tests_table import NAME as TESTS

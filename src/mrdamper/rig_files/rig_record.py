@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,7 +17,8 @@ from mrdamper.rig_files.column_names import role_of
 from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, left_out, rate_of
 from mrdamper.rig_files.parts import stretches_of_time
 from mrdamper.rig_files.profile import Correction, Profile
-from mrdamper.rig_files.readers import RawTable, suffixes
+from mrdamper.rig_files.readers import suffixes
+from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import OPTIONAL, Finding, Record
 from mrdamper.rig_files.text.spool import rescale
 from mrdamper.rig_files.units import Unit
@@ -72,7 +72,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
         records.append(
             Record(
                 id=_run_id(table, path) + (f"_{number}" if len(stretches) > 1 else ""),
-                findings=tuple(_unique(noticed)), provenance={**remarks, **whence}, rig=profile.rig,
+                findings=tuple(dict.fromkeys(noticed)), provenance={**remarks, **whence}, rig=profile.rig,
                 excitation=profile.excitation, split=profile.split, lines=its_lines, further=others, **part,  # type: ignore[arg-type]
             )
         )  # fmt: skip
@@ -257,14 +257,10 @@ def joined(records: list[Record], profile: Profile, tables: list[RawTable]) -> l
     if "current" in partly and "current_from" in records[0].provenance:  # a page's heading states it once
         stated = {float(r.current[0]) for r in records if r.current is not None}
         partly["current"] = constant(stated.pop(), time) if len(stated) == 1 else None
-    alike = set.intersection(*(set(record.further) for record in records))
+    alike = [name for name in records[0].further if all(name in record.further for record in records)]
     further = {name: np.concatenate([record.further[name] for record in records]) for name in alike}
-    findings = _unique(finding for record in records for finding in record.findings)
+    findings = dict.fromkeys(finding for record in records for finding in record.findings)
     return [replace(records[0], findings=tuple(findings), lines=lines, further=further, **channels, **partly)]
-
-
-def _unique(findings: Iterable[Finding]) -> list[Finding]:
-    return list(dict.fromkeys(findings))
 
 
 def _run_id(table: RawTable, path: Path) -> str:

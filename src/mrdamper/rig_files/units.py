@@ -78,19 +78,8 @@ _OTHER = {
     "°F": Unit("temperature", 5 / 9, -160 / 9),
     "degF": Unit("temperature", 5 / 9, -160 / 9),
 }
-DIMENSION = MappingProxyType(
-    {
-        "time": "time",
-        "displacement": "length",
-        "force": "force",
-        "velocity": "velocity",
-        "acceleration": "acceleration",
-        "current": "current",
-        "voltage": "voltage",
-        "temperature": "temperature",
-        "pressure": "pressure",
-    }
-)
+_SAME = ("time", "force", "velocity", "acceleration", "current", "voltage", "temperature", "pressure")
+DIMENSION = MappingProxyType({"displacement": "length", **{name: name for name in _SAME}})  # of a channel
 _PINT = {
     "[time]": "time", "[length]": "length", "[mass] * [length] / [time] ** 2": "force",
     "[length] / [time]": "velocity", "[length] / [time] ** 2": "acceleration", "[current]": "current",

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mrdamper.errors import QualityError
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding
 
@@ -23,38 +22,31 @@ FEWEST_LEVELS, _MANY = 16, 8  # values of a channel, and samples for each
 
 def exchanged_or_out_of_range(view: View) -> None:
     """Refuse channels whose size says that a unit is wrong or that columns are exchanged."""
-    record = view.record
-    stroke = _peak_to_peak(record.displacement)
-    force = _peak_to_peak(record.force)
-    largest = max(abs(float(np.nanmin(record.force))), abs(float(np.nanmax(record.force))))
-    if stroke > LONGEST_STROKE:
-        exchanged = force < LONGEST_STROKE
-        raise _refused(
-            view,
-            f"displacement moves {stroke:.4g} m peak to peak" + (f", force {force:.4g} N" if exchanged else ""),
-            "displacement and force look exchanged: name the columns the other way round"
-            if exchanged
-            else "give the unit of displacement (mm?)",
-        )
-    if largest > LARGEST_FORCE:
-        raise _refused(view, f"force reaches {largest:.4g} N", "give the unit of force")
-    if force < SMALLEST_FORCE:
-        raise _refused(
-            view,
-            f"force changes by {force:.3g} N in the whole record",
-            "check the load cell, the unit of force (kN?), or whether columns are exchanged",
-        )
-    current = (
-        0.0 if record.current is None else max(float(np.nanmax(record.current)), -float(np.nanmin(record.current)))
+    record, strokes = view.record, view.strokes
+    stroke, force = _peak_to_peak(record.displacement), _peak_to_peak(record.force)
+    largest, current = (
+        0.0 if values is None else max(float(np.nanmax(values)), -float(np.nanmin(values)))
+        for values in (record.force, record.current)
     )
-    if current > LARGEST_CURRENT:
-        raise _refused(view, f"current reaches {current:.4g} A", "give its unit (mA?)")
-    if view.run.time.size >= 5 and view.strokes.durations.size:
-        speed = float(np.median(view.strokes.lengths / view.strokes.durations))
-        if speed > FASTEST:
-            raise _refused(
-                view, f"the mean speed of the strokes is {speed:.4g} m/s", "check the units of time and displacement"
-            )
+    speed = float(np.median(strokes.lengths / strokes.durations)) if strokes.durations.size else 0.0
+    moves, exchanged = f"displacement moves {stroke:.4g} m peak to peak", "give the unit of displacement (mm?)"
+    if force < LONGEST_STROKE:
+        moves += f", force {force:.4g} N"
+        exchanged = "displacement and force look exchanged: name the columns the other way round"
+    changes = "check the load cell, the unit of force (kN?), or whether columns are exchanged"
+    for wrong, found, mend in (
+        (stroke > LONGEST_STROKE, moves, exchanged),
+        (largest > LARGEST_FORCE, f"force reaches {largest:.4g} N", "give the unit of force"),
+        (force < SMALLEST_FORCE, f"force changes by {force:.3g} N in the whole record", changes),
+        (current > LARGEST_CURRENT, f"current reaches {current:.4g} A", "give its unit (mA?)"),
+        (
+            speed > FASTEST,
+            f"the mean speed of the strokes is {speed:.4g} m/s",
+            "check the units of time and displacement",
+        ),
+    ):
+        if wrong:
+            raise view.refused("E_RANGE", found, mend)
 
 
 def unusual(view: View) -> Iterator[Finding]:
@@ -79,7 +71,3 @@ def unusual(view: View) -> Iterator[Finding]:
 
 def _peak_to_peak(values: np.ndarray) -> float:
     return float(np.nanmax(values) - np.nanmin(values))
-
-
-def _refused(view: View, found: str, mend: str) -> QualityError:
-    return view.refused("E_RANGE", found, mend)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from mrdamper.discovery import subclasses_in
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.archive import opened
-from mrdamper.rig_files.readers.base import NoTableError, RawTable, Reader, RigFileError, Source
+from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 from mrdamper.rig_files.sandbox import guarded_tables
 
 if TYPE_CHECKING:
@@ -128,17 +128,3 @@ def all_readers() -> Mapping[str, type[Reader]]:
 def suffixes() -> tuple[str, ...]:
     """Suffixes of files a folder is searched for."""
     return tuple(sorted({s for r in all_readers().values() for s in r.suffixes} | {".gz", ".zip"}))
-
-
-__all__ = [
-    "FileForm",
-    "NoTableError",
-    "RawTable",
-    "Reader",
-    "RigFileError",
-    "Source",
-    "all_readers",
-    "raw_tables",
-    "reader_of",
-    "suffixes",
-]

@@ -50,23 +50,6 @@ class Hdf5(Reader):
         return hdf5_tables(source, self.title)
 
 
-class Matlab73(Reader):
-    """MATLAB 7.3."""
-
-    name = "mat73"
-    title = "MATLAB 7.3"
-    suffixes = (".mat73",)
-    library = "h5py"
-
-    def recognises(self, source: Source) -> bool:
-        """By the mark behind MATLAB's own header."""
-        return source.head(520)[512:] == HDF5_MARK
-
-    def tables(self, source: Source, form: FileForm) -> list[RawTable]:
-        """As of HDF5: a struct is a group."""
-        return hdf5_tables(source, self.title)
-
-
 def hdf5_tables(source: Source, title: str) -> list[RawTable]:
     """The groups of an HDF5 file as tables."""
     h5py = load("h5py", title)

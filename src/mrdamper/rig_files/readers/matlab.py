@@ -34,7 +34,7 @@ class Matlab(Reader):
 
     name = "mat"
     title = "MATLAB file"
-    suffixes = (".mat",)
+    suffixes = (".mat", ".mat73")
     library = "scipy.io"
 
     def recognises(self, source: Source) -> bool:
