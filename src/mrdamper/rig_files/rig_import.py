@@ -8,6 +8,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -170,9 +171,12 @@ def _guess_channels(tables: list[RawTable], profile: Profile) -> tuple[RawTable,
         places = {name: place for name, place in propose(table).items() if name not in profile.channels}
     channels = {}
     for name, (column, unit) in places.items():
-        says = {"column": None if column is None else _column(table, column), "unit": unit or None}
-        if name in ("displacement", "force") and column is not None and names_compression(table.names[column]):
-            says = {"sign": -1, **says}
+        says: dict[str, Any] = {"column": None, "unit": unit or None}
+        if column is not None:
+            header = table.names[column]
+            says["column"] = header if header and table.names.count(header) == 1 else column + 1
+            if name in ("displacement", "force") and names_compression(header):
+                says["sign"] = -1
         stated = profile.channel(name).model_dump(exclude_unset=True, exclude_none=True)
         channels[name] = Channel(**{**says, **stated})
     return table, channels
@@ -318,7 +322,8 @@ def _unjudged(path: Path, profile: Profile) -> list[Record]:
             except InputError as error:
                 problems += getattr(error, "errors", (error,))
         CombinedError.raise_from(problems)
-        digest = _digest(path)
+        with path.open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
     records = joined(records, profile, tables)
     remarks = {"file": as_data(path.name), "sha256": digest}
     if profile != Profile():
@@ -361,16 +366,6 @@ def _without_made(tables: list[RawTable]) -> tuple[list[RawTable], list[str]]:
     if not measured or len(measured) == len(tables):
         return tables, []
     return measured, [table.label for table in tables if names_made(table.label)]
-
-
-def _column(table: RawTable, column: int) -> str | int:
-    name = table.names[column]
-    return name if name and table.names.count(name) == 1 else column + 1
-
-
-def _digest(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _files(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:

@@ -101,10 +101,7 @@ def leaps_in(values: Floats, of_range: float, *, against: bool) -> np.ndarray:
     # A channel that stood still leaps to where it would have been: it was frozen, which is said elsewhere.
     at = at[(steps[at - 1] != 0) & (steps[at + 1] != 0)]
     if against:
-        at = np.array([i for i in at if _against(steps, int(i))], dtype=int)
+        signs = np.sign(steps)
+        around = np.array([-3, -2, -1, 1, 2, 3])
+        at = at[np.all(signs[at[:, None] + around] == -signs[at][:, None], axis=1)]
     return there[at]
-
-
-def _against(steps: Floats, at: int) -> bool:
-    leap = np.sign(steps[at])
-    return bool(np.all(np.sign(steps[at - 3 : at]) == -leap) and np.all(np.sign(steps[at + 1 : at + 4]) == -leap))

@@ -28,7 +28,6 @@ _STAMP = re.compile(
     re.IGNORECASE,
 )
 FORTRAN = re.compile(r"[+-]?[0-9]*[.,]?[0-9]+[dD][+-]?[0-9]{1,3}")  # 1.25D-03; taken where a file writes so throughout
-_SPACE = " \t"
 
 
 def number(token: str, mark: str) -> float | None:
@@ -45,7 +44,7 @@ def number(token: str, mark: str) -> float | None:
 
 def looks_numeric(token: str) -> bool:
     """Whether a cell is meant as a value, in whatever writing: tells rows of data from headers."""
-    token = token.strip(_SPACE)
+    token = token.strip(" \t")
     if (
         NUMBER["."].fullmatch(token)
         or token.lower() in MISSING
