@@ -23,15 +23,19 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 from fuzz import counting
 from fuzz.bench_soak import SECONDS, attack_bench
 from fuzz.hostile_input import attack_calls, attack_datasets, attack_models
-from fuzz.hostile_names import attack_exports, attack_names
+from fuzz.hostile_names import attack_names
+from fuzz.hostile_pages import attack_exports, attack_pages
+from fuzz.hostile_requests import attack_requests
 from fuzz.stops import COMMANDS, attack_kills, attack_limits
 
 KINDS = {
     "names": attack_names,
     "exports": attack_exports,
+    "pages": attack_pages,
     "models": attack_models,
     "datasets": attack_datasets,
     "calls": attack_calls,
+    "requests": attack_requests,
     "kills": attack_kills,
     "limits": attack_limits,
     "soak": attack_bench,

@@ -27,6 +27,9 @@ ODD = (
 )  # fmt: skip
 
 
+_TOLD = 5  # of a kind, as they happen
+
+
 @dataclass
 class Count:
     """How many of a kind were tried, and what did not hold."""
@@ -41,11 +44,12 @@ class Count:
         self.tried += 1
         if not held:
             self.broke.append(str(what)[:400])
+            if len(self.broke) <= _TOLD:
+                print(f"    broke: {self.kind}: {self.broke[-1]}", flush=True)
 
     def __str__(self) -> str:
         seconds = time.monotonic() - self.began
-        lines = [f"{self.kind:34}{self.tried:8} tried{self.tried - len(self.broke):8} held{seconds:8.0f} s"]
-        return "\n".join(lines + [f"    broke: {text}" for text in self.broke[:5]])
+        return f"{self.kind:34}{self.tried:8} tried{self.tried - len(self.broke):8} held{seconds:8.0f} s"
 
 
 @dataclass

@@ -13,7 +13,7 @@ import tempfile
 from pathlib import Path
 from xml.etree import ElementTree
 
-from fuzz.counting import NASTY, Count, bench_damper, names, within
+from fuzz.counting import NASTY, Count, names, within
 
 
 def attack_names(share: float) -> list[Count]:
@@ -96,42 +96,3 @@ def _compile(count: Count, comments: list[str]) -> None:
     for i, text in enumerate(comments):
         count.check(done.returncode == 0 and f"f{i}" in found, text)
     count.check(found == {f"f{i}" for i in range(len(comments))}, found - {f"f{i}" for i in range(len(comments))})
-
-
-def attack_exports(share: float) -> list[Count]:
-    """Whole exports of dampers whose rig has a hostile name: compiled, parsed, no canary."""
-    from dataclasses import replace
-
-    from mrdamper.export import all_exporters
-    from mrdamper.files.model_file import dump_model, parse_model
-
-    damper = bench_damper()
-    count, rng = Count("whole export of a named rig"), random.Random(2)
-    folder = Path(tempfile.mkdtemp())
-    for rig in within(list(names(len(NASTY), rng))[: max(4, int(len(NASTY) * share))]):
-        named = replace(damper, rig=rig)
-        for form, kind in all_exporters().items():
-            exporter = kind(platforms=()) if form == "fmu" else kind()
-            files = exporter.export(named, "damper").files
-            for name, content in files.items():
-                if name.endswith(".c") and not name.endswith("_test.c"):
-                    (folder / "damper.h").write_bytes(files["damper.h"])
-                    (folder / name).write_bytes(content)
-                    done = subprocess.run(
-                        ["cc", "-std=c99", "-Werror", "-c", name], cwd=folder, capture_output=True, check=False
-                    )
-                    listed = subprocess.run(["nm", "damper.o"], cwd=folder, capture_output=True, check=False).stdout
-                    count.check(done.returncode == 0 and b"canary" not in listed, (form, rig))
-                elif name.endswith(".html"):
-                    count.check(b"<script>canary" not in content, (form, rig))
-                elif name.endswith(".tex"):
-                    count.check(not re.search(rb"\\(input|write)", content), (form, rig))
-                else:
-                    count.check(True, form)
-        try:
-            parse_model(dump_model(named))
-            count.check(rig.isprintable() or True, rig)
-        except ValueError as error:
-            count.check(hasattr(error, "code"), (rig, error))
-    shutil.rmtree(folder)
-    return [count]

@@ -52,7 +52,7 @@ COMMANDS = {
     "reproduce": ("claims", "reproduce --data ../data{n} --no-comparators --jobs 1 --out claims"),
 }
 _CHANGE = ("add", "split")  # what they find there: a copy of the first dataset
-_DEAR = {"reproduce": 0.4}  # of the usual number of tries
+_DEAR = {"reproduce": 0.4, "fmu": 0.5}  # of the usual number of tries
 _LOADED = (
     "numpy", "scipy.optimize", "scipy.special", "polars", "matplotlib.pyplot", "matplotlib.backends.backend_svg", "jinja2",
     "pydantic", "mrdamper.cli.output", "mrdamper.study.workflow", "mrdamper.study.comparison", "mrdamper.report.study",

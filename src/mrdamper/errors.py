@@ -382,8 +382,8 @@ _RESOURCES = {
 def resource_error(error: BaseException, where: str = "") -> ResourceError | None:
     """What the machine has run out of, if that is what an exception says; libraries say it in several ways."""
     number = getattr(error, "errno", None)
-    if found := re.search(r"\(os error (\d+)\)", str(error)):
-        number = int(found[1])
+    if found := re.search(r"(?<=\(os error )(\d+)|(?<=Os \{ code: )(\d+)", str(error)):  # libraries in Rust
+        number = int(found[0])
     if isinstance(error, MemoryError) or "out of memory" in str(error).lower():
         number = errno.ENOMEM
     if isinstance(error, FileNotFoundError) and "temporary directory" in str(error):

@@ -217,3 +217,10 @@ def test_a_held_parameter_is_that_value_everywhere():
     assert (held.c, held.fy, held.f0) == pytest.approx((1234.0, 10.0, -12.0))
     with pytest.raises(InputError, match="k9"):
         damper().holding({"k9": 1.0})
+
+
+def test_what_follows_a_logarithm_is_held_over_zero_only():
+    assert modified_damper().holding({"yield_displacement": 1e-3}).functions["yield_displacement"].log
+    with pytest.raises(InputError) as refused:
+        modified_damper().holding({"yield_displacement": 0.0})
+    assert refused.value.code == "E_PARAMETER"

@@ -154,6 +154,7 @@ def test_a_device_is_written_to_and_not_replaced(tmp_path):
         (MemoryError(), "E_MEMORY"),
         (RuntimeError("can't start new thread"), "E_PROCESSES"),
         (OSError("No space left on device (os error 28)"), "E_DISK_FULL"),
+        (RuntimeError("called `unwrap()` on `Err`: Os { code: 24, kind: TooManyOpenFiles }"), "E_OPEN_FILES"),
         (FileNotFoundError(errno.ENOENT, "No usable temporary directory found in ['/tmp']"), "E_TEMP"),
     ],
 )

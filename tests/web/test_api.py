@@ -152,6 +152,8 @@ def test_a_held_parameter_replaces_the_models(client, bench, joint):
     text = client.post(f"{bench}/dampers/{key}/document", json={"held": {"f0": 100.0}}).json()["text"]
     assert parse_model(text).model.f0 == 100.0
     assert "held by hand" in parse_model(text).provenance
+    refused = client.post(f"{bench}/dampers/{key}/document", json={"held": {"nothing": 1.0}})
+    assert refused.json()["code"] == "E_HELD"
 
 
 def test_a_function_can_be_held_in_a_saved_model(client, bench, modified):

@@ -190,3 +190,11 @@ def test_the_page_announces_its_modules_and_no_more(client):
         answer = client.get(path)
         assert answer.status_code == 200
         assert answer.headers["content-type"].startswith("text/javascript")
+
+
+def test_a_session_that_ends_while_it_is_asked_is_said_to_have_ended(client, app, session, monkeypatch, capsys):
+    mine = app.state.sessions.find(session.rsplit("/", 1)[-1])
+    monkeypatch.setattr(type(mine), "key", lambda self, kind: app.state.sessions.end(self.name) or kind)
+    answer = client.post(f"{session}/drops")  # its folder is gone by now
+    assert (answer.status_code, answer.json()["code"]) == (410, "E_SESSION")
+    assert "Traceback" not in capsys.readouterr().err

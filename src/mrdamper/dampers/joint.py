@@ -18,7 +18,7 @@ from typing import ClassVar, Literal, Self
 
 import numpy as np
 
-from mrdamper.dampers.base import UNTESTED, Damper, Envelope, Saved
+from mrdamper.dampers.base import UNTESTED, Damper, Envelope, Saved, not_held
 from mrdamper.dampers.certainty import Certainty, OwnNumber
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.strung import Part, Table, beside
@@ -108,6 +108,8 @@ class JointDamper(Damper):
         return self.model
 
     def holding(self, values: Mapping[str, float]) -> JointDamper:
+        if missing := values.keys() - self.model.values().keys():
+            raise not_held(self, sorted(missing))
         return replace(self.with_numbers(values), certainty=None)
 
     @property

@@ -104,6 +104,8 @@ class ModifiedModel(Damper):
         functions = dict(self.functions)
         for name, value in values.items():
             log = functions[name].log
+            if log and not value > 0:
+                raise ParameterError(f"{name} = {value:g}", where=self.title, mend="give a value over zero")
             functions[name] = ParameterFunction("constant", (math.log(value) if log else value,), log=log)
         return replace(self, parameters=ParameterMap(self.parameters.model_type, functions), certainty=None)
 

@@ -189,9 +189,11 @@ def tests_text(records: Sequence[Record]) -> str:
 def _cells(path: Path) -> list[tuple[int, list[str]]]:
     """Line and cells of every row that holds something."""
     try:
-        if path.stat().st_size > _LARGEST:
+        with path.open("rb") as file:
+            content = file.read(_LARGEST + 1)  # no more, whatever it is
+        if len(content) > _LARGEST:
             raise TestsTableError("over 4 MiB", where=path.name, mend="is this a table of tests?")
-        text = _decoded(path.read_bytes())
+        text = _decoded(content)
     except OSError as error:
         raise TestsTableError(error.strerror or str(error), where=str(path), mend="give a CSV file") from error
     except UnicodeDecodeError as error:

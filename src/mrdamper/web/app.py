@@ -130,6 +130,10 @@ def _of_the_allocator(name: str, *arguments: int) -> None:
 
 def _refuse(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, InputError)
+    return _refusal(error)
+
+
+def _refusal(error: InputError) -> JSONResponse:
     said: dict[str, Any] = dict(refusal(error))
     if isinstance(error, NothingTakenError):
         said |= {"verdicts": [v.on_screen() for v in error.verdicts], "profile": error.profile}
@@ -170,8 +174,22 @@ class _Faults:
         except ClientDisconnect:
             return  # an upload that broke off: nobody is left to answer
         except Exception:
+            if not begun and (ended := _ended(scope)):
+                await ended(scope, receive, send)
+                return
             traceback.print_exc(file=sys.stderr)
             if scope["type"] != "http" or begun:
                 raise
             text = "This is our fault, not yours: the terminal shows what happened."
             await JSONResponse({"text": text, "code": "E_OURS"}, status_code=500)(scope, receive, send)
+
+
+def _ended(scope: Scope) -> JSONResponse | None:
+    """What a request is told whose session, with its files, was ended under it."""
+    try:
+        scope["app"].state.sessions.find(scope["path_params"]["session"])
+    except InputError as error:
+        return _refusal(error)
+    except KeyError:
+        return None  # it asked for no session
+    return None

@@ -42,7 +42,7 @@ class Ask(BaseModel, extra="forbid", allow_inf_nan=False):
 
 
 @router.get("/choices")
-def choices() -> dict[str, Any]:
+def choices(session: Current) -> dict[str, Any]:
     """Systems, what shakes them, and laws."""
     records = [{"name": f"{name}@{speed}", "title": f"{name}, {speed} × speed" if speed > 1 else name}
                for name in bundled_records() for speed in (5, 1)]  # fmt: skip

@@ -1,0 +1,50 @@
+"""What is read as a whole is read within bounds: files without an end, and those that unpack to a thousand times."""
+
+import gzip
+from pathlib import Path
+
+import pytest
+
+from mrdamper.errors import InputError
+from mrdamper.files.dataset import load_dataset, save_dataset
+from mrdamper.files.model_file import load_model
+from mrdamper.files.motion import load_motion
+from mrdamper.fleet.profile import load_fleet_profile
+from mrdamper.report.about import load_about, load_limits
+from mrdamper.rig_files.profile import load_profile
+from mrdamper.rig_files.tests_table import load_tests
+from mrdamper.systems.inputs import load_input
+from mrdamper.systems.system_file import load_system
+
+READ = {
+    load_model: "model.json", load_limits: "limits.toml", load_about: "about.toml", load_profile: "rig.toml",
+    load_fleet_profile: "fleet.toml", load_system: "car.toml", load_tests: "tests.csv", load_motion: "motion.csv",
+    load_input: "quake.csv",
+}  # fmt: skip
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="this system has no file without an end")
+@pytest.mark.parametrize("read", READ, ids=lambda read: read.__name__)
+def test_a_file_without_an_end_is_refused(read, tmp_path):
+    endless = tmp_path / READ[read]
+    endless.symlink_to("/dev/zero")
+    with pytest.raises(InputError):
+        read(endless)
+
+
+@pytest.mark.parametrize("read", [load_motion, load_input])
+def test_a_packed_table_is_not_unpacked_beyond_bounds(read, tmp_path):
+    bomb = tmp_path / "table.csv"
+    bomb.write_bytes(gzip.compress(b"time_s,displacement_m,acceleration_m_s2\n" + b"0,0,0\n" * 2_000_000, 1))
+    packed = bomb.rename(tmp_path / "table.csv.gz") if read is load_motion else bomb
+    with pytest.raises(InputError) as refused:
+        read(packed)
+    assert refused.value.code in ("E_DATASET", "E_ARCHIVE_RATIO")
+    assert read is load_input or "times its size" in str(refused.value)
+
+
+def test_further_files_of_a_dataset_stay_inside_it(tmp_path):
+    with pytest.raises(InputError) as refused:
+        save_dataset(load_dataset().rig("labcontrol"), tmp_path / "set", extra_files={"../licence.txt": "mine"})
+    assert refused.value.code == "E_PATH"
+    assert not list(tmp_path.iterdir())
