@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.identification.columns import linear_table
 from mrdamper.identification.covariance import Spread, spread
 from mrdamper.identification.intervals import weaknesses
 from mrdamper.identification.problem import DELAY, Problem, RunCertainty, Solution
@@ -83,13 +85,18 @@ def _sensitivities(
     searched = {name: value for name, value in solution.end.items() if name != DELAY}
     point = {**problem.fixed, **searched, **linear}
     names = [n for n in (*linear, *searched) if (n in problem.free or n in searched) and n not in solution.at_bounds]
+    infos = [info for info in solution.model.parameters() if info.name in names and info.name in linear]
+    bare = replace(solution.model, **{info.name: 0.0 for info in infos})
+    known = dict(zip([info.name for info in infos], linear_table(bare, infos, seen, state)[1].T, strict=True))
     base = residual + problem.force
     columns = []
     for name in names:
+        if name in known:
+            columns.append(known[name])
+            continue
         step = _STEP * abs(point[name]) or _STEP
         moved = problem.model_type.build({**point, name: point[name] + step})
-        there = state if name in linear else moved.state(motion)[problem.scored]  # linear ones do not change it
-        columns.append((moved.force(seen, there) - base) / step)
+        columns.append((moved.force(seen, moved.state(motion)[problem.scored]) - base) / step)
     if DELAY in solution.end and DELAY not in solution.at_bounds:
         names.append(DELAY)
         columns.append(-np.gradient(base, seen.time))
