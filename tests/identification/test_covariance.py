@@ -126,8 +126,8 @@ def test_the_memory_is_that_of_an_autoregressive_process(rho, time):
 def test_standard_errors_are_the_scatter_of_repeated_identifications():
     condition = Condition(1.0, 1.0, 0.02)
     truth = Bingham(fy=300.0, c=1500.0, f0=20.0)
-    found = [
-        identify(synthetic_run(condition, 30.0, seed=s, cycles=3, samples_per_cycle=1000, model=truth), "bingham")
+    found = [  # no sample stands still, where friction has no value
+        identify(synthetic_run(condition, 30.0, seed=s, cycles=3, samples_per_cycle=999, model=truth), "bingham")
         for s in range(60)
     ]
     for name in ("c", "f0"):
