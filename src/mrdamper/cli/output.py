@@ -44,13 +44,7 @@ def spread(scores: Validation) -> str:
 
 def parse_fixed(pairs: Sequence[str]) -> dict[str, float]:
     """NAME=VALUE arguments as a mapping; raises `InputError` if one is not of that form."""
-    fixed = {}
-    for name, text in parse_pairs(pairs, "--fix").items():
-        try:
-            fixed[name] = float(text)
-        except ValueError as error:
-            raise InputError(f"--fix {name}={text}", mend="write --fix NAME=VALUE with a number in SI units") from error
-    return fixed
+    return _numbers(pairs, "--fix", "write --fix NAME=VALUE with a number in SI units")
 
 
 def parse_pairs(pairs: Sequence[str], option: str) -> dict[str, str]:
@@ -69,13 +63,17 @@ def parse_named(text: str, option: str) -> tuple[str, dict[str, float]]:
     name, colon, rest = text.partition(":")
     if not colon or "=" not in rest:
         return text, {}
+    return name, _numbers(rest.split(","), option, "give a number in SI units")
+
+
+def _numbers(pairs: Sequence[str], option: str, mend: str) -> dict[str, float]:
     values = {}
-    for key, value in parse_pairs(rest.split(","), option).items():
+    for name, text in parse_pairs(pairs, option).items():
         try:
-            values[key] = float(value)
+            values[name] = float(text)
         except ValueError as error:
-            raise InputError(f"{option} {key}={value}", mend="give a number in SI units") from error
-    return name, values
+            raise InputError(f"{option} {name}={text}", mend=mend) from error
+    return values
 
 
 def parse_gas(text: str | None) -> GasSpring | None:

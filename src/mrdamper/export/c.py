@@ -40,16 +40,7 @@ class CExporter(Exporter):
 
 
 def c_sources(made: Stream, name: str, rig: str) -> dict[str, str]:
-    """Header and source of a damper, by file name.
-
-    Parameters
-    ----------
-    made : Stream
-    name : str
-        Prefix of files and symbols.
-    rig : str
-        For the comment at the top.
-    """
+    """Header and source of a damper by file name, the rig in the comment at the top."""
     facts = c_facts(made, identifier(name), rig)
     return {f"{name}.h": render("model.h.j2", **facts), f"{name}.c": render("model.c.j2", **facts)}
 

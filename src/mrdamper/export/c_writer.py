@@ -17,11 +17,7 @@ from mrdamper.tracing.text import FUNCTIONS, Writer
 class CWriter(Writer):
     """C's words. Library functions and constants go through macros, so that one source serves both precisions.
 
-    Parameters
-    ----------
-    program : Program
-    memory_prefix : str
-        Of the names in the common state.
+    Names of memory in the common state begin with `memory_prefix`.
     """
 
     def __init__(self, program: Program, memory_prefix: str = ""):

@@ -70,16 +70,7 @@ def compiler_for(wanted: Platform) -> tuple[str, ...]:
 
 
 def build_library(sources: Mapping[str, bytes], wanted: Platform, compiler: Sequence[str] | None = None) -> Built:
-    """Compile C sources into a shared library.
-
-    Parameters
-    ----------
-    sources : mapping of str to bytes
-        Headers and sources by file name.
-    wanted : Platform
-    compiler : sequence of str, optional
-        Command; found on this machine by default.
-    """
+    """Compile C sources, by file name, into a shared library; by default with a compiler found on this machine."""
     command = tuple(compiler) if compiler is not None else compiler_for(wanted)
     if not command:
         return Built(None, "no compiler for it; pip install ziglang")

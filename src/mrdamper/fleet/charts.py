@@ -48,15 +48,8 @@ def individuals(values: Floats) -> tuple[Chart, Chart]:
 def ewma(values: Floats, target: float, deviation: float, weight: float = 0.2, width: float = 3.0) -> Chart:
     """Exponentially weighted moving average, limits for each point's own age [NIST 6.3.2.4].
 
-    Parameters
-    ----------
-    values : (N,) array
-    target, deviation : float
-        Mean and standard deviation of the process in control.
-    weight : float
-        λ of the newest value.
-    width : float
-        Of the limits, in standard deviations of the average.
+    Target and deviation are the mean and standard deviation of the process in control, `weight` is λ of the newest
+    value, and the limits lie `width` standard deviations of the average away.
     """
     averages, last = np.empty(values.size), target
     for i, value in enumerate(values.tolist()):
@@ -135,12 +128,8 @@ class Gauge:
 def gauge_study(table: Floats, line: Floats) -> Gauge | None:
     """Two-way analysis of variance without replication; None for under two sessions.
 
-    Parameters
-    ----------
-    table : (G, S) array
-        Golden dampers by sessions, complete.
-    line : (N,) array
-        Values of the line's dampers: their variation holds the rig's too, which is taken off.
+    `table` (G, S) holds golden dampers by sessions, complete; `line` (N,) the values of the line's dampers, whose
+    variation holds the rig's too, which is taken off.
     """
     dampers, sessions = table.shape
     if sessions < 2 or dampers < 1:

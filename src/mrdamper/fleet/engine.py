@@ -31,12 +31,7 @@ class ClusterError(InputError):
 def local_engine(workers: int, limits: Limits) -> Iterator[tuple[Submit, int]]:
     """Jobs on this machine, each worker a process that can be killed; no socket listens.
 
-    Yields
-    ------
-    submit : callable
-        Takes the argument of a job, returns the future of its row.
-    slots : int
-        Jobs that run at once.
+    Yields a function from the argument of a job to the future of its row, and how many run at once.
     """
     held = threading.local()
     guards: list[Guard] = []

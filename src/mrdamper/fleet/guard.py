@@ -42,12 +42,7 @@ class Limits:
 
 
 class Guard:
-    """Runs jobs one after the other in a process of its own.
-
-    Parameters
-    ----------
-    limits : Limits
-    """
+    """Runs jobs one after the other in a process of its own."""
 
     def __init__(self, limits: Limits | None = None):
         self._limits = limits or Limits()

@@ -54,17 +54,9 @@ class Item:
 def find_items(source: str | Path, profile: FleetProfile) -> list[Item]:
     """The dampers of a source, sorted by serial number and session.
 
-    Parameters
-    ----------
-    source : path
-        A folder of dataset folders, of folders of rig files or of rig files, a dataset folder, or
-        a Parquet lake (a file, or a folder of such files) with a column for the serial number.
-    profile : FleetProfile
-
-    Raises
-    ------
-    FleetError
-        E_FLEET_EMPTY if there is no damper in it.
+    A source is a folder of dataset folders, of folders of rig files or of rig files, a dataset folder, or
+    a Parquet lake (a file, or a folder of such files) with a column for the serial number. Raises
+    `FleetError` (E_FLEET_EMPTY) if there is no damper in it.
     """
     source = Path(source)
     if not source.exists():

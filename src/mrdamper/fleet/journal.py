@@ -36,17 +36,8 @@ class JournalError(InputError):
 class Journal:
     """Results by key, durable once `keep` returns.
 
-    Parameters
-    ----------
-    folder : path
-        Holds `journal.sqlite` and its lock; made if missing.
-
-    Raises
-    ------
-    JournalError
-        E_JOURNAL_TAKEN if another process writes to it, E_JOURNAL_NEWER, E_JOURNAL_NETWORK, E_JOURNAL.
-    OutputError
-        If the folder cannot be written to.
+    The folder holds `journal.sqlite` and its lock, and is made if missing. Raises `OutputError` if it cannot be written
+    to, `JournalError`: E_JOURNAL_TAKEN if another process writes to it, E_JOURNAL_NEWER, E_JOURNAL_NETWORK, E_JOURNAL.
     """
 
     def __init__(self, folder: Path):

@@ -30,28 +30,10 @@ _MOST_NAMED = 50  # refused or failed dampers, and suspects, that the page lists
 
 
 def write_page(table: Path, plan: Plan | None, limits: Mapping[str, Limit], path: Path) -> list[str]:
-    """Write the page of a line.
+    """Write the page of a line; gives what a terminal should say: suspects, drift, limits.
 
-    Parameters
-    ----------
-    table : path
-        `dampers.parquet`.
-    plan : Plan or None
-    limits : mapping of str to Limit
-        By column; without, nothing passes or fails.
-    path : path
-
-    Returns
-    -------
-    list of str
-        What a terminal should say: suspects, drift, limits.
-
-    Raises
-    ------
-    ColumnError
-        If a limit is for no column of numbers.
-    OutputError
-        If the page cannot be written.
+    Without limits (by column of the table) nothing passes or fails. Raises `ColumnError` if a limit is for no column of
+    numbers, `OutputError` if the page cannot be written.
     """
     import polars as pl
 

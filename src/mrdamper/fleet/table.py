@@ -29,19 +29,9 @@ _NUMBERS = (
 def write_table(rows: Iterable[dict[str, Any]], parameters: Iterable[str], plan: Plan | None, path: Path) -> None:
     """Write rows as Parquet, whole or not at all.
 
-    Parameters
-    ----------
-    rows : iterable of dict
-    parameters : iterable of str
-        Names of the model's parameters; each becomes a column `p_NAME`, its standard error `se_NAME`.
-    plan : Plan, optional
-        Its velocity ladder becomes columns `rebound_N_0.1m_s_1A` and `compression_N_...`.
-    path : path
-
-    Raises
-    ------
-    OutputError, ResourceError
-        If the file cannot be written; E_DISK_FULL if the disk is full.
+    Each of the model's parameters becomes a column `p_NAME`, its standard error `se_NAME`; the plan's velocity ladder
+    becomes columns `rebound_N_0.1m_s_1A` and `compression_N_...`. Raises `OutputError` or `ResourceError`
+    (E_DISK_FULL) if the file cannot be written.
     """
     import polars as pl
 

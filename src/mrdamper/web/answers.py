@@ -23,17 +23,11 @@ _STEP = 4  # bytes a float32 takes; a typed array must begin at a multiple
 
 
 def frame(head: Mapping[str, Any], arrays: Mapping[str, Floats]) -> Response:
-    """Answer with named arrays.
+    """Answer with named arrays (N,), and with a head that is ready for JSON.
 
     Layout: length of the head (uint32, little endian), the head as JSON padded with blanks to a
     multiple of four bytes, then the arrays as little-endian float32 in the order of
     `head["arrays"]`, a list of [name, length].
-
-    Parameters
-    ----------
-    head : mapping
-        What goes with them, ready for JSON.
-    arrays : mapping of str to (N,) array
     """
     index = [[name, int(values.size)] for name, values in arrays.items()]
     text = json.dumps({**head, "arrays": index}, ensure_ascii=False, allow_nan=False).encode()

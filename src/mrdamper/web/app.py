@@ -40,7 +40,7 @@ def create_app(
     read_ahead: bool = False,
     token: str | None = None,
 ) -> FastAPI:
-    """Make the application.
+    """Make the application; raises `MissingExtraError` if the chart library is not installed.
 
     Parameters
     ----------
@@ -53,11 +53,6 @@ def create_app(
     token : str, optional
         What a page has to show to open a session: it stands in the printed address, so that other
         users of this machine cannot. Without one, anybody who reaches the bench can.
-
-    Raises
-    ------
-    MissingExtraError
-        If the chart library is not installed.
     """
     chart_library = plotly_script().read_bytes()  # sent in one piece: the first picture waits for it
     sessions = Sessions()

@@ -34,22 +34,10 @@ def _bundled() -> Intake:
 
 
 def read_drop(drop: Drop, profile: str = "", refused_only: bool = False, only: Path | None = None) -> Intake:
-    """Make data of a drop.
+    """Make data of a drop; raises `InputError` with the names the files came with.
 
-    Parameters
-    ----------
-    drop : Drop
-    profile : str
-        Rig profile as TOML that replaces the guessed one; empty to guess.
-    refused_only : bool
-        Keep the rig files that were taken before, and read the refused ones.
-    only : path, optional
-        Read this rig file, and keep what was said of the others.
-
-    Raises
-    ------
-    InputError
-        With the names the files came with.
+    `profile` is a rig profile as TOML that replaces the guessed one; empty to guess. With `refused_only` the rig files
+    that were taken before are kept and the refused ones read; with `only`, that file is, and the others stay.
     """
     if not drop.names:
         raise DropError("no files", mend="drop rig files, or a dataset folder")

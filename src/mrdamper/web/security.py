@@ -47,11 +47,7 @@ _OWN_SITES = frozenset({"same-origin", "none"})  # what a browser says of our pa
 class Guard:
     """Refuse strangers, and send every answer with the headers above.
 
-    Parameters
-    ----------
-    app : ASGI application
-    hosts : iterable of str
-        Values of the Host header that are this bench, with the port.
+    `hosts` are the values of the Host header that are this bench, with the port.
     """
 
     def __init__(self, app: ASGIApp, hosts: Iterable[str]):

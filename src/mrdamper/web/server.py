@@ -25,25 +25,9 @@ _ENDS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if ha
 
 
 def serve(port: int, open_browser: bool = True) -> int:
-    """Serve until a signal ends it; then every file and process of the bench is gone.
+    """Serve until a signal ends it; then every file and process of the bench is gone. Gives the signal.
 
-    Parameters
-    ----------
-    port : int
-        0 for any that is free.
-    open_browser : bool
-
-    Returns
-    -------
-    int
-        The signal.
-
-    Raises
-    ------
-    InputError
-        If the port is taken.
-    MissingExtraError
-        If the chart library is not installed.
+    Port 0 is any that is free. Raises `InputError` if the port is taken, `MissingExtraError` without the chart library.
     """
     listener = _listen(port)
     port = listener.getsockname()[1]

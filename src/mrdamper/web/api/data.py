@@ -32,7 +32,7 @@ class Profile(BaseModel, extra="forbid"):
 def open_bundled(session: Current) -> dict[str, Any]:
     """Put the bundled tests on the bench."""
     session.put(bundled())
-    return _overview(session)
+    return overview(session)
 
 
 @router.post("/drops")
@@ -78,13 +78,22 @@ async def take_file(
 def read(key: str, profile: Profile, session: Current) -> dict[str, Any]:
     """Read what was dropped and put it on the bench."""
     session.put(read_drop(_drop(session, key), profile.toml, profile.refused_only))
-    return _overview(session)
+    return overview(session)
 
 
 @router.get("/data")
 def overview(session: Current) -> dict[str, Any]:
     """What is on the bench, rig by rig."""
-    return _overview(session)
+    intake: Intake = session.intake or bundled()
+    data = session.dataset
+    return {
+        "name": data.name,
+        "source": intake.source,
+        "rigs": [{"name": name, "runs": len(data.rig(name))} for name in data.rigs],
+        "runs": len(data),
+        "verdicts": [v.on_screen() for v in intake.verdicts],
+        "profile": intake.profile,
+    }
 
 
 @router.get("/data/rigs/{number}")
@@ -96,10 +105,7 @@ def rig(number: int, session: Current) -> dict[str, Any]:
     return {
         "rig": table.dataset.rigs[0],
         "runs": [describe(row) for row in table.rows],
-        "matrix": {
-            "currents_A": currents,
-            "motions": [_motion(group, currents) for group in motions],
-        },
+        "matrix": {"currents_A": currents, "motions": [_motion(group, currents) for group in motions]},
     }
 
 
@@ -124,19 +130,6 @@ def loop(number: int, key: str, part: str, session: Current) -> Response:
     else:
         arrays = measured_window(row.run)
     return frame({"key": key, "id": row.run.id, "condition": condition_on_screen(row.condition)}, arrays)
-
-
-def _overview(session: Session) -> dict[str, Any]:
-    intake: Intake = session.intake or bundled()
-    data = session.dataset
-    return {
-        "name": data.name,
-        "source": intake.source,
-        "rigs": [{"name": name, "runs": len(data.rig(name))} for name in data.rigs],
-        "runs": len(data),
-        "verdicts": [v.on_screen() for v in intake.verdicts],
-        "profile": intake.profile,
-    }
 
 
 def _findings(found: Quality) -> list[dict[str, str]]:

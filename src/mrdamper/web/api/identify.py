@@ -76,7 +76,10 @@ def choices(session: Current) -> dict[str, Any]:
             }
             for name, cls in all_models().items()
         ],
-        "methods": [{"name": name, "about": _first_line(method)} for name, method in all_methods().items()],
+        "methods": [
+            {"name": name, "about": (method.__doc__ or "").strip().split("\n")[0]}
+            for name, method in all_methods().items()
+        ],
     }
 
 
@@ -228,7 +231,3 @@ def _units(found: tuple[Identification, ...], scored: Scored | str) -> list[dict
 
 def _percent(validation: Validation) -> str:
     return f"{100 * validation.median():.1f} %"
-
-
-def _first_line(method: type) -> str:
-    return (method.__doc__ or "").strip().split("\n")[0]
