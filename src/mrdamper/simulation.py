@@ -104,14 +104,12 @@ def steady_loop(model: ForceLaw, condition: Condition, samples_per_cycle: int = 
         gap, span = np.abs(state[-1] - state[0]), np.ptp(state, axis=0)
         if np.all(gap <= _CLOSURE * np.maximum(span, np.finfo(float).tiny)):
             loop = motion.part(last)
-            return Response(_from_zero(loop), response.force[last], state)
+            time = loop.time - loop.time[0]
+            from_zero = Excitation(time, loop.displacement, loop.velocity, loop.acceleration, loop.current)
+            return Response(from_zero, response.force[last], state)
         cycles *= 4
     raise ExcitationError(
         f"the loop does not close within {_MOST_CYCLES} cycles",
         where=str(condition),
         mend="raise the amplitude: it is far below the yield displacement",
     )
-
-
-def _from_zero(loop: Excitation) -> Excitation:
-    return Excitation(loop.time - loop.time[0], loop.displacement, loop.velocity, loop.acceleration, loop.current)

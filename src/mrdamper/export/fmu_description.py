@@ -94,23 +94,14 @@ def _variables(made: Stream, fmi: int, internal_step: float, current: float) -> 
         add(f"outside_{flag}", f"The {flag} lies outside the tested range", "flag", "output", "discrete")
     add("status", "Outcome of the last step", "choice", "output", "discrete", type="Status")
     add("drive", "What makes the motion", "choice", "parameter", "fixed", type="Drive", start=1)
-    add(
-        "internal_step",
-        "Longest internal step",
-        "real",
-        "parameter",
-        "tunable",
-        unit="s",
-        start=internal_step,
-        low=SHORTEST,
-    )
+    step = {"unit": "s", "start": internal_step, "low": SHORTEST}
+    add("internal_step", "Longest internal step", "real", "parameter", "tunable", **step)
     for info, tunable in parameters_of_stream(made):
         value, unit = getattr(made.model, info.name), unit_name(info, made)
         kind = ("parameter", "tunable") if tunable else ("local", "constant")
         bounds = {"low": info.bounds[0], "high": info.bounds[1]} if tunable else {}
-        add(
-            info.name, _sentence(info.meaning), "real", *kind, unit=unit, start=value, symbol=f"p_{info.name}", **bounds
-        )
+        said = info.meaning[:1].upper() + info.meaning[1:]
+        add(info.name, said, "real", *kind, unit=unit, start=value, symbol=f"p_{info.name}", **bounds)
     shown = [(reference, v) for reference, v in enumerate(named) if fmi == 3 or v["name"] != "time"]
     return [variable(v, reference, index) for index, (reference, v) in enumerate(shown, 1)]
 
@@ -227,7 +218,3 @@ def c_bounds(info: ParameterInfo) -> str:
     low, high = info.bounds
     checks = [f"value >= {float(low)!r}"] if math.isfinite(low) else []
     return " && ".join(checks + ([f"value <= {float(high)!r}"] if math.isfinite(high) else []))
-
-
-def _sentence(text: str) -> str:
-    return text[:1].upper() + text[1:]

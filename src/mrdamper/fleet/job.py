@@ -28,7 +28,7 @@ from mrdamper.fleet.loops import (
 )
 from mrdamper.fleet.plan import Plan
 from mrdamper.identification.covariance import spread
-from mrdamper.models import Model, SearchAxis
+from mrdamper.models import Model
 from mrdamper.motion import equivalent_sine
 from mrdamper.study.workflow import believed, study_rig, usable
 
@@ -146,7 +146,8 @@ def _identify(dataset: Dataset, settings: Settings, plan: Plan | None) -> dict[s
     loops = np.array([measured_loop(run) for run in train])
     more: dict[str, Any] = {}
     if plan is not None:
-        own = _loops_by_test(tests, loops, plan)
+        # The measured loop of each of the line's tests; None where the damper missed it.
+        own = [None if not like else np.mean(loops[like], axis=0) for like in by_test(tests, plan.matrix)]
         pairs = [(a, np.array(b)) for a, b in zip(own, plan.loops, strict=True) if a is not None]
         more["loop_deviation"] = max((deviation(*pair) for pair in pairs), default=0.0)
         more["shape_deviation"] = max((shape_deviation(*pair) for pair in pairs), default=0.0)
@@ -158,7 +159,8 @@ def _identify(dataset: Dataset, settings: Settings, plan: Plan | None) -> dict[s
         if plan.draft:
             more |= {
                 "axes": [axis.name for axis in problem.axes],
-                "changes": [_change(axis) for axis in problem.axes],
+                # a change of each search axis that would matter to an engineer
+                "changes": [0.2 if axis.log else 0.05 * (axis.upper - axis.lower) for axis in problem.axes],
                 "stands_for": [_stands_for(fit.damper.model, axis.name) for axis in problem.axes],
                 "curvature": _curvature(problem, fit),
             }
@@ -167,7 +169,7 @@ def _identify(dataset: Dataset, settings: Settings, plan: Plan | None) -> dict[s
         "lane": lane,
         "model": settings.model,
         "runs": len(train),
-        "cost": _cost(fit),
+        "cost": float(np.sum(fit.nrmse_pp**2)),
         "nrmse_pp": float(np.median(fit.nrmse_pp)),
         "nrmse_pp_worst": float(np.max(fit.nrmse_pp)),
         "at_bounds": " ".join(fit.at_bounds),
@@ -185,18 +187,9 @@ def _fit(problem: JointProblem, start: Floats | None) -> JointFit:
     return problem.fit(start=start, rounds=_ROUNDS, most_steps=_STEPS, settled=_SETTLED)
 
 
-def _cost(fit: JointFit) -> float:
-    return float(np.sum(fit.nrmse_pp**2))
-
-
 def _test_of(run: Run) -> Test:
     condition = equivalent_sine(run).condition
     return condition.current_A, condition.frequency_Hz, condition.amplitude_m
-
-
-def _loops_by_test(tests: list[Test], loops: Floats, plan: Plan) -> list[Floats | None]:
-    """The measured loop of each of the line's tests; None where the damper missed it."""
-    return [None if not like else np.mean(loops[like], axis=0) for like in by_test(tests, plan.matrix)]
 
 
 def _beside_the_line(fit: JointFit, own: list[Floats | None], plan: Plan) -> dict[str, Any]:
@@ -218,11 +211,6 @@ def _curvature(problem: JointProblem, fit: JointFit) -> list[list[float]]:
     own, linear = np.split(jacobian, [len(problem.axes)], axis=1)
     own = own - linear @ np.linalg.lstsq(linear, own, rcond=1e-10)[0]
     return (own.T @ own / (residual @ residual)).tolist()
-
-
-def _change(axis: SearchAxis) -> float:
-    """A change of a search axis that would matter to an engineer."""
-    return 0.2 if axis.log else 0.05 * (axis.upper - axis.lower)
 
 
 def _standard_errors(problem: JointProblem, fit: JointFit) -> dict[str, float]:

@@ -97,7 +97,8 @@ def run_fleet(
     parameters = [info.name for info in model_type(model).parameters()]
     require_writable(out)
     profile = profile or FleetProfile()
-    items = [_absolute(item) for item in find_items(source, profile)]
+    found = find_items(source, profile)
+    items = [replace(item, paths=tuple(str(Path(path).absolute()) for path in item.paths)) for item in found]
     settings = Settings(model, _rig_profile(profile), cold)
     journal = Journal(out)
     try:
@@ -128,7 +129,8 @@ class _Line:
                 try:
                     self._digests[number] = digest_of(item)
                 except OSError as error:
-                    self._failed[number] = _unreadable(item, error)
+                    found, mend = error.strerror or str(error), "mend the file or its rights"
+                    self._failed[number] = refused(InputError(found, where=item.paths[0], mend=mend))
             if number % 100 == 0:
                 self._progress(f"reading {len(self._items)} dampers", 0.0)
         self._make_plan(submit, slots)
@@ -255,14 +257,6 @@ def _rig_profile(profile: FleetProfile) -> str:
         return ""
     load_profile(profile.rig)
     return Path(profile.rig).read_text(encoding="utf-8-sig")
-
-
-def _absolute(item: Item) -> Item:
-    return replace(item, paths=tuple(str(Path(path).absolute()) for path in item.paths))
-
-
-def _unreadable(item: Item, error: OSError) -> dict[str, Any]:
-    return refused(InputError(error.strerror or str(error), where=item.paths[0], mend="mend the file or its rights"))
 
 
 def _deep_tuple(value: Any) -> Any:

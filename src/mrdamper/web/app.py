@@ -11,6 +11,7 @@ import sys
 import traceback
 from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import asynccontextmanager
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -131,7 +132,7 @@ def _refuse(request: Request, error: Exception) -> JSONResponse:
 def _refusal(error: InputError) -> JSONResponse:
     said: dict[str, Any] = dict(refusal(error))
     if isinstance(error, NothingTakenError):
-        said |= {"verdicts": [v.on_screen() for v in error.verdicts], "profile": error.profile}
+        said |= {"verdicts": [asdict(v) for v in error.verdicts], "profile": error.profile}
     return JSONResponse(said, status_code=_STATUS.get(error.code, 422))
 
 

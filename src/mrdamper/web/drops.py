@@ -32,10 +32,6 @@ class Verdict:
     state: str  # "taken", "noted" (taken, with findings) or "refused"
     findings: tuple[tuple[str, str], ...] = ()
 
-    def on_screen(self) -> dict[str, object]:
-        """Ready for JSON."""
-        return {"name": self.name, "state": self.state, "findings": self.findings}
-
 
 class NothingTakenError(DropError):
     """Every dropped file was refused; the page shows why, and the profile to correct."""

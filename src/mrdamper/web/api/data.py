@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import asdict
 from typing import Any
 
 from fastapi import APIRouter, Query, Request
@@ -91,7 +92,7 @@ def overview(session: Current) -> dict[str, Any]:
         "source": intake.source,
         "rigs": [{"name": name, "runs": len(data.rig(name))} for name in data.rigs],
         "runs": len(data),
-        "verdicts": [v.on_screen() for v in intake.verdicts],
+        "verdicts": [asdict(v) for v in intake.verdicts],
         "profile": intake.profile,
     }
 

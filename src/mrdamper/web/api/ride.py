@@ -70,7 +70,8 @@ def ride(ask: Ask, session: Current) -> Response:
         done = simulate_system(system, source, dampers, law, highest=None if kind is Passive else ask.current_A)
         idle = Loop(system, source, dampers, Passive()).run(done.step)
     every = slice(None, None, -(-done.time.size // _SAMPLES))
-    arrays = {name: values[every] for name, values in (_histories(done, source) | _idle(idle)).items()}
+    unmoved = {f"idle.{name}": idle.a[:, i] for i, name in enumerate(system.coordinates)}
+    arrays = {name: values[every] for name, values in (_histories(done, source) | unmoved).items()}
     head = {
         "kind": _kind(system),
         "title": f"{system.title}, {type(law).title}",
@@ -114,10 +115,6 @@ def _histories(done: Simulation, source: Input) -> dict[str, Floats]:
     if done.system.ground is not None:
         return found | {"way.ground": _moved(source.value(done.time), done.step)}
     return found | {f"way.{name}": done.road[:, i] for i, name in enumerate(done.system.channels)}
-
-
-def _idle(done: Simulation) -> dict[str, Floats]:
-    return {f"idle.{name}": done.a[:, i] for i, name in enumerate(done.system.coordinates)}
 
 
 def _moved(acceleration: Floats, step: float) -> Floats:
