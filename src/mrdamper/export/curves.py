@@ -87,6 +87,8 @@ def force_velocity(
 ) -> list[ForceVelocity]:
     """Force over velocity at mid-stroke, as a damper dynamometer gives it.
 
+    Raises `InputError` (E_EXPORT) if the damper does not know where it was tested.
+
     Parameters
     ----------
     damper : Damper
@@ -95,11 +97,6 @@ def force_velocity(
     speeds : sequence of float, optional
         Peak velocities [m/s]; default twelve up to the highest tested, from a fiftieth of it, evenly
         in the logarithm.
-
-    Raises
-    ------
-    InputError
-        E_EXPORT if the damper does not know where it was tested.
     """
     damper = damper_of(damper)
     if not damper.envelope.tested:

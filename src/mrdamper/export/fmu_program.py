@@ -35,6 +35,8 @@ def write_program_fmu(
 ) -> tuple[list[Path], tuple[str, ...]]:
     """Write a program as an FMU, whole or not at all.
 
+    Raises `OutputError` if it cannot be written.
+
     Parameters
     ----------
     made : Program
@@ -55,11 +57,6 @@ def write_program_fmu(
     -------
     list of Path, tuple of str
         What was written; notes, such as platforms left out.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written.
     """
     kind, word = exporter or FMUExporter(), identifier(name)
     facts = _facts(made, word, title, units, period, tuple(start) or (0.0,) * len(made.outputs), kind.fmi)

@@ -77,19 +77,14 @@ def write_into(folder: str | Path) -> Iterator[Path]:
 def write_result(folder: str | Path, facts: Mapping[str, Any] | None = None) -> Iterator[Path]:
     """Give a temporary folder whose files take the place of an earlier result in one step when the block ends.
 
-    Files of the earlier result that this one does not have are gone afterwards; files of others
-    stay. `made.json` says which are the result's, and holds `facts`.
+    Files of the earlier result that this one does not have are gone afterwards; files of others stay. `made.json`
+    says which are the result's, and holds `facts`. Raises `OutputError` if the folder cannot be made or written to.
 
     Parameters
     ----------
     folder : path
     facts : mapping, optional
         What differs from run to run, such as times: it stands nowhere else.
-
-    Raises
-    ------
-    OutputError
-        If the folder cannot be made or written to.
     """
     final = Path(folder)
     with _beside(final) as work:

@@ -35,16 +35,14 @@ Channels = dict[str, Floats]
 def read_samples(folder: Path, *, trusted: bool = False) -> dict[str, Channels]:
     """Samples of every run by its name: (N,) arrays by channel, NaN where a cell is empty.
 
+    Raises `DatasetError` or `ColumnError` or `UnitError` if the file is missing, damaged or larger than a test can
+    be, or lacks a column.
+
     Parameters
     ----------
     folder : path
     trusted : bool
         The file is our own: no process guards its reading.
-
-    Raises
-    ------
-    DatasetError, ColumnError, UnitError
-        If the file is missing, damaged or larger than a test can be, or lacks a column.
     """
     path = next((folder / name for name in SAMPLE_FILES if (folder / name).is_file()), None)
     if path is None:

@@ -54,20 +54,15 @@ class Bands:
 def draw(dampers: Mapping[str, Damper], count: int, seed: int = 1) -> list[dict[str, Draw]]:
     """Draws from what the dampers know of themselves: their numbers, and the session each is in.
 
-    Links that share a damper share its numbers; each has a session of its own. Spreads are
-    Student's, by the degrees of freedom behind them. What the form itself is wrong by
-    (`Certainty.force`) is no number and is not drawn.
+    Links that share a damper share its numbers; each has a session of its own. Spreads are Student's, by the degrees
+    of freedom behind them. What the form itself is wrong by (`Certainty.force`) is no number and is not drawn. Raises
+    `InputError` (E_CERTAINTY) if a damper was saved without, E_DRAWS if the count is out of range.
 
     Parameters
     ----------
     dampers : mapping of str to Damper
         By link, with `certainty`.
     count, seed : int
-
-    Raises
-    ------
-    InputError
-        E_CERTAINTY if a damper was saved without, E_DRAWS if the count is out of range.
     """
     if not 2 <= count <= _MOST:
         raise InputError(f"{count} draws", mend=f"give 2 to {_MOST:,}", code="E_DRAWS")
@@ -120,6 +115,8 @@ def monte_carlo(
 ) -> Bands:
     """Run a loop again with other numbers of its dampers; it is traced and compiled once.
 
+    Raises `StepError` (E_STEP_LOST) if over a tenth of the draws have no solution.
+
     Parameters
     ----------
     loop : Loop
@@ -131,11 +128,6 @@ def monte_carlo(
         longer: the last halvings for a peak after a switch are worth less than more draws.
     progress : callable
         Told what is being done and the share done, 0...1.
-
-    Raises
-    ------
-    StepError
-        E_STEP_LOST if over a tenth of the draws have no solution.
     """
     machine = (len(draws) > 5 or None) and loop.can_compile
     step = max(2 * mean.step, loop.first_step / 2)

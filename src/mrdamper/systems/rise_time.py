@@ -27,6 +27,8 @@ class RiseTimes:
 def rise_times(damper: Damper, current: float | None = None, velocity: float | None = None) -> RiseTimes:
     """Force at constant velocity after steps of current, up and down.
 
+    Raises `ParameterError` if the force does not change with the current.
+
     Parameters
     ----------
     damper : Damper
@@ -35,11 +37,6 @@ def rise_times(damper: Damper, current: float | None = None, velocity: float | N
         Switched on and off [A]. Default: the highest tested.
     velocity : float, optional
         [m/s]. Default: half the highest tested.
-
-    Raises
-    ------
-    ParameterError
-        If the force does not change with the current.
     """
     current = damper.envelope.current_A[1] if current is None else current
     velocity = 0.5 * damper.envelope.peak_velocity_m_s[1] if velocity is None else velocity

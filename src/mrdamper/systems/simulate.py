@@ -154,6 +154,8 @@ class Loop:
     def run(self, dt: float, machine: bool | None = None, numbers: Numbers | None = None) -> Simulation:
         """The whole input at one step.
 
+        Raises `StepError` if there are too many steps, or one has no solution.
+
         Parameters
         ----------
         dt : float
@@ -162,11 +164,6 @@ class Loop:
             In machine code. Default: where steps are many.
         numbers : Numbers, optional
             Other parameters of the links than the dampers' own.
-
-        Raises
-        ------
-        StepError
-            If there are too many steps, or one has no solution.
         """
         system, n = self.system, len(self.system.coordinates)
         samples = int(min(self.source.duration / dt, 2.0 * _MOST_STEPS) + 1e-6) + 1 if 0 < dt < math.inf else 0

@@ -57,8 +57,9 @@ WEIGHTINGS = {
 def frequency_weighted(acceleration: Floats, step: float, weighting: str) -> Floats:
     """An acceleration as the body feels it.
 
-    The gain is applied in the spectrum, with as much silence appended as the filter remembers: no
-    sampling rate bends it, as the bilinear transform would towards half the rate.
+    The gain is applied in the spectrum, with as much silence appended as the filter remembers: no sampling rate bends
+    it, as the bilinear transform would towards half the rate. Raises `UnknownNameError` if there is no such
+    weighting.
 
     Parameters
     ----------
@@ -68,11 +69,6 @@ def frequency_weighted(acceleration: Floats, step: float, weighting: str) -> Flo
         [s]
     weighting : str
         "Wk", "Wd", "Wf".
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such weighting.
     """
     if weighting not in WEIGHTINGS:
         raise UnknownNameError.of("weighting", weighting, WEIGHTINGS)

@@ -69,32 +69,27 @@ def _entry(model) -> dict:
     def plain(value):
         return value if value is not None and math.isfinite(value) else None
 
-    if not hasattr(model, "parameters"):
-        return {
-            "name": model.name,
-            "title": model.heading,
-            "equation": model.__dict__.get("equation", ""),
-            "source": model.source,
-            "limits": model.limits,
-            "unverified": getattr(model, "unverified", "") or None,
-            "basis": model.basis or None,
-            "parameters": [],
-        }
-    return {
+    own = hasattr(model, "parameters")
+    head = {
         "name": model.name,
-        "title": model.title,
-        "equation": model.equation,
+        "title": model.title if own else model.heading,
+        "equation": model.equation if own else model.__dict__.get("equation", ""),
         "source": model.source,
-        "parameters": [
-            {
-                "name": info.name,
-                "unit": info.unit,
-                "meaning": info.meaning,
-                "bounds": [plain(bound) for bound in info.bounds],
-                "linear": info.linear,
-                "preset": info.preset,
-                "default": plain(info.default),
-            }
-            for info in model.parameters()
-        ],
     }
+    if not own:
+        unverified = getattr(model, "unverified", "") or None
+        further = {"limits": model.limits, "unverified": unverified, "basis": model.basis or None}
+        return head | further | {"parameters": []}
+    parameters = [
+        {
+            "name": info.name,
+            "unit": info.unit,
+            "meaning": info.meaning,
+            "bounds": [plain(bound) for bound in info.bounds],
+            "linear": info.linear,
+            "preset": info.preset,
+            "default": plain(info.default),
+        }
+        for info in model.parameters()
+    ]
+    return head | {"parameters": parameters}
