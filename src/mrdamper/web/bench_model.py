@@ -47,7 +47,6 @@ def as_damper(damper: Damper, held: Mapping[str, float]) -> Damper:
     """
     if not held:
         return damper
-    held_model(damper, damper.envelope.middle, held)  # refuses a name that it does not know
     about = {**damper.provenance, "held by hand": ", ".join(f"{n} = {v!r}" for n, v in sorted(held.items()))}
     return replace(damper.holding(held), provenance=about)  # type: ignore[type-var]
 
