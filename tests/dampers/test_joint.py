@@ -265,13 +265,38 @@ def test_the_third_valley_is_not_looked_into(problem, monkeypatch):
 
 def test_a_linearisation_is_that_of_its_own_fit_and_made_once(problem, fit):
     other = problem.fit(start=fit.point + 1e-3, rounds=1, most_steps=1)
-    residual, jacobian, table = problem.linearised(fit)
-    assert problem.linearised(fit)[0] is residual
-    assert problem.linearised(other)[0] is not residual
+    known = problem.linearised(fit)
+    residual, jacobian, table = known.residual, known.jacobian, known.table
+    assert problem.linearised(fit) is known
+    assert problem.linearised(other) is not known
     errors = np.sqrt(np.bincount(table.owner, residual**2))
     assert errors / errors[0] == pytest.approx(np.sqrt(fit.nrmse_pp / fit.nrmse_pp[0]), rel=0.05)  # weights: 1 / √error
     assert jacobian.shape == (residual.size, len(problem.axes) + len(problem.linear))
     assert fit.seconds < 600
+
+
+def test_what_a_search_without_some_runs_foresees_is_where_it_goes(problem, fit):
+    known, rows = problem.linearised(fit), list(range(1, len(problem.runs)))
+    owner, weights = known.table.owner, known.table.weights
+    for run, triangle in enumerate(known._triangles):  # fewer rows, the same sums of squares of any change
+        change = np.arange(triangle.shape[1]) + 1.0
+        whole = np.column_stack([known.residual, known.jacobian])[owner == run] / weights[run]
+        assert np.linalg.norm(triangle @ change) == pytest.approx(np.linalg.norm(whole @ change))
+    errors, point = known.foreseen(rows, problem.box())
+    found = problem.refit(fit, rows, 1e-6)
+    assert np.linalg.norm(point - found.point) < 0.3 * np.linalg.norm(fit.point - found.point)
+    assert errors == pytest.approx(found.nrmse_pp, rel=0.05)
+
+
+def test_samples_of_some_runs_are_those_they_have_among_all(problem, fit):
+    whole, rows = problem.linearised(fit).table, [2, 5]
+    some = whole.only(rows)
+    missed = np.bincount(whole.owner, whole.residual(fit.point, fit.damper.model) ** 2)[rows]
+    np.testing.assert_allclose(np.bincount(some.owner, some.residual(fit.point, fit.damper.model) ** 2), missed)
+    assert np.all(
+        some.solve(fit.point).nrmse_pp.mean() <= np.sqrt(missed).mean() * 1.001
+    )  # their own linear parameters
+    assert some.laid(fit.point)[1].size == some.picked.size < whole.picked.size
 
 
 def test_a_fit_begins_where_another_problem_ended(problem, fit):
@@ -295,7 +320,7 @@ def test_errors_of_left_out_runs_are_those_of_a_prediction(runs, problem, fit):
         # On the samples that enter, a few hundred of the window.
         assert error == pytest.approx(np.sqrt(np.mean(missed**2)) / np.ptp(run.force[run.in_window]), rel=0.1)
     assert fit.error == pytest.approx(sum(fit.nrmse_pp) / len(runs))
-    assert problem.linearised(fit)[2].solve(fit.point).nrmse_pp == pytest.approx(fit.nrmse_pp, rel=1e-6)
+    assert problem.linearised(fit).table.solve(fit.point).nrmse_pp == pytest.approx(fit.nrmse_pp, rel=1e-6)
 
 
 def test_it_predicts_motions_it_was_never_shown(fit):

@@ -144,12 +144,12 @@ def identify_jointly(
     off |= dict.fromkeys(gone, 0.0)
     if off or coil != problem.given_coil:
         final = JointProblem(runs, MODEL, {**problem.fixed, **off}, free=problem.free, coil=coil, parts=problem.parts)
-        found = final.fit(start=evidence.start(final), rounds=1, most_steps=8, settled=_ROUGHLY / 10)
+        found = final.fit(start=evidence.start(final), rounds=1, settled=_ROUGHLY / 10)
     coil, gone = _absent(final, found)
     if gone or coil != final.given_coil:
         fixed = {**final.fixed, **dict.fromkeys(gone, 0.0)}
         final = JointProblem(runs, MODEL, fixed, free=final.free, coil=coil, parts=final.parts)
-        found = final.fit(start=final.from_point(found), rounds=1, most_steps=4, settled=_ROUGHLY / 10)
+        found = final.fit(start=final.from_point(found), rounds=1, settled=_ROUGHLY / 10)
     progress("one model for all runs", 1.0)
     left_out, before = (Evidence.of(p, f).everything() for p, f in ((final, found), (problem, fit)))
     if _better(before, left_out):  # what one step promised, the search did not keep: terms earn their place here too
@@ -285,8 +285,8 @@ class Evidence:
     @classmethod
     def of(cls, problem: JointProblem, fit: JointFit, by: Grouping | None = None) -> Evidence:
         """Linearise a problem where a fit of it ended; by default conditions are left out."""
-        residual, jacobian, table = problem.linearised(fit)
-        owner = table.owner
+        known = problem.linearised(fit)
+        table, owner = known.table, known.table.owner
         names = [*(a.name for a in problem.axes), *(i.name for i in problem.linear)]
         values = np.array([*fit.point, *(getattr(fit.damper.model, i.name) for i in problem.linear)])
         neutral = values.copy()
@@ -299,7 +299,7 @@ class Evidence:
             runs = float(np.sum(table.share[group]))  # one for each whole run
             return float(np.sqrt(np.sum((weighted[group] / table.weights[owner[group]]) ** 2) / runs))
 
-        return cls(names, values, neutral, residual, jacobian, rows, error)
+        return cls(names, values, neutral, known.residual, known.jacobian, rows, error)
 
     def everything(self) -> dict[str, float]:
         """Mean left-out errors with all parameters."""

@@ -10,7 +10,7 @@ so that one drifting session cannot bend the model (iteratively reweighted).
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
@@ -21,7 +21,7 @@ import numpy as np
 from mrdamper.dampers.base import UNTESTED, Damper, Envelope, Saved, not_held
 from mrdamper.dampers.certainty import Certainty, OwnNumber
 from mrdamper.dampers.coil import Coil
-from mrdamper.dampers.strung import Part, Table, beside
+from mrdamper.dampers.strung import Linearised, Part, Table
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, ParameterError, require
 from mrdamper.models import Model, Scale, SearchAxis, model_type
@@ -364,26 +364,24 @@ class JointProblem:
         begin = time.perf_counter()
         parts = self.parts if rows is None else [self.parts[i] for i in rows]
         table, point = Table(self, parts), self.start if start is None else start
-        return self._search(table, parts, point, [table.slopes] * rounds, most_steps, settled, begin)
+        return self._search(table, parts, point, rounds, most_steps, settled, begin)
 
     def _search(
         self,
         table: Table,
         parts: Sequence[Part],
         point: Floats,
-        rounds: Sequence[Callable[[Floats], Floats]],
+        rounds: int,
         most_steps: int,
         settled: float,
         begin: float,
     ) -> JointFit:
-        """Search with some derivatives in each round, weights by the errors found between them."""
-        evaluations, ending = 0, Ending.SOLVED
-        lower, upper = self.box()
-        for slopes in rounds:
+        """Search in rounds, with weights by the errors the last one left."""
+        evaluations, ending, curved = 0, Ending.SOLVED, settled < _SETTLED
+        for _ in range(rounds):
             if self.axes:
-                curved = settled < _SETTLED
                 found = least_squares(
-                    table.solved_residual, point, lower, upper, most_steps, settled, slopes=slopes, curved=curved
+                    table.solved_residual, point, *self.box(), most_steps, settled, slopes=table.slopes, curved=curved
                 )
                 point, ending = found.point, found.ending
                 evaluations += found.evaluations
@@ -404,8 +402,8 @@ class JointProblem:
     def refit(self, fit: JointFit, rows: Sequence[int], settled: float = _AGAIN) -> JointFit:
         """Fit some of the runs, from the fit to all: what leaving out the others asks for.
 
-        Along the derivatives known from the fit to all as far as they lead down, at a force a step;
-        then with its own, until nothing is gained.
+        First to where the derivatives known from the fit to all lead, which costs no force; then with
+        its own, until nothing is gained.
 
         Parameters
         ----------
@@ -417,40 +415,25 @@ class JointProblem:
             Relative gain of a step at which the search ends.
         """
         begin, rows = time.perf_counter(), sorted(rows)
-        _, jacobian, whole = self.linearised(fit)
-        jacobian = jacobian[np.isin(whole.owner, rows)]
-        table = whole.only(rows)
-        table.weigh(fit.nrmse_pp[rows])
-        known = table.weights
+        known = self.linearised(fit)
+        table = known.table.only(rows)
+        errors, point = known.foreseen(rows, self.box())
+        table.weigh(errors)
+        costs = [float(np.sum(table.solve(u).residual ** 2)) for u in (fit.point, point)]
+        if costs[1] > costs[0]:  # far from where the derivatives hold
+            point = fit.point
+        table.weigh(table.solve(point).nrmse_pp)
+        return self._search(table, [self.parts[i] for i in rows], point, 1, _AGAIN_STEPS, settled, begin)
 
-        def known_slopes(point: Floats) -> Floats:
-            weighted = jacobian * (table.weights / known)[table.owner][:, None]
-            own, linear = np.split(weighted, [len(self.axes)], axis=1)
-            return beside(own, linear)
-
-        parts = [self.parts[i] for i in rows]
-        rounds = (known_slopes, known_slopes, table.slopes)
-        return self._search(table, parts, fit.point, rounds, _AGAIN_STEPS, settled, begin)
-
-    def linearised(self, fit: JointFit) -> tuple[Floats, Floats, Table]:
-        """Residual at a fit, its derivatives, and the table they are of; remembered for the last fit.
-
-        Returns
-        -------
-        residual : (N,) array
-            Weighted: its squares sum to the fit's cost.
-        jacobian : (N, D + L) array
-            By the search axes, then the linear parameters.
-        table : Table
-            All runs, weighted by the errors the fit left.
-        """
+    def linearised(self, fit: JointFit) -> Linearised:
+        """All runs linearised at a fit, weighted by the errors it left; remembered for the last fit."""
         if self._linearisation is None or self._linearisation[0] is not fit:
             table = Table(self, self.parts)
             table.weigh(fit.nrmse_pp)
-            self._linearisation = (fit, *table.linearise(fit.point, fit.damper.model), table)
-        return self._linearisation[1:]
+            self._linearisation = fit, Linearised(table, fit.point, *table.linearise(fit.point, fit.damper.model))
+        return self._linearisation[1]
 
-    _linearisation: tuple[JointFit, Floats, Floats, Table] | None = None
+    _linearisation: tuple[JointFit, Linearised] | None = None
 
     def _damper(self, model: Model, point: Floats, parts: Sequence[Part]) -> JointDamper:
         about = {"runs": str(len(parts)), "fit": "joint, all runs at once"}
@@ -465,8 +448,10 @@ class JointProblem:
 
     def coil_at(self, point: Floats) -> Coil | None:
         """The coil at a point of the search axes."""
+        if all(axis.name != RISE for axis in self.axes):
+            return self.coil
         lags = {axis.name: axis.value(float(u)) for axis, u in zip(self.axes, point, strict=True)}
-        return Coil(lags[RISE], lags[FALL]) if RISE in lags else self.coil
+        return Coil(lags[RISE], lags[FALL])
 
     def _at_bounds(self, point: Floats) -> list[str]:
         """Parameters whose search axis ended at a limit, under their own names."""

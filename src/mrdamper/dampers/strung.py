@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +21,7 @@ from mrdamper.errors import RunError
 from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.models import Model
 from mrdamper.motion import Excitation, equivalent_sine, measured_motion
-from mrdamper.optimizers.levenberg_marquardt import forward_differences
+from mrdamper.optimizers.levenberg_marquardt import forward_differences, least_squares
 from mrdamper.optimizers.linear import robust_weights, solve_bounded
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ _CYCLES = 4  # of a sine that enter: more repeat the same
 _WARM_UP = 1.5  # cycles before the scored samples in which the model forgets its start
 _BEST = 1e-3  # nrmse_pp below which a run gains no more weight
 _STILL = 0.01  # share of the peak velocity below which a damper rests
+_FORESEEN = 3  # rounds of weights on derivatives that are known
 _NEARLY = 1e-11  # keeps columns apart that are nearly alike
 
 
@@ -304,11 +306,58 @@ class Table:
         return residual, np.column_stack([self._moved(point, model, residual), columns])
 
 
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """What a table leaves over near a point of the search axes.
+
+    Attributes
+    ----------
+    table : Table
+    point : (D,) array
+    residual : (N,) array
+        Weighted: its squares sum to the cost.
+    jacobian : (N, D + L) array
+        By the search axes, then the linear parameters.
+    """
+
+    table: Table
+    point: Floats
+    residual: Floats
+    jacobian: Floats
+
+    @cached_property
+    def _triangles(self) -> list[Floats]:
+        """Residual and derivatives of each run turned into as many rows as columns: no sum of squares changes."""
+        whole, owner = np.column_stack([self.residual, self.jacobian]), self.table.owner
+        return [np.linalg.qr(whole[owner == run], mode="r") / weight for run, weight in enumerate(self.table.weights)]
+
+    def foreseen(self, runs: Sequence[int], box: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+        """Errors of some runs, and where a search of these alone would end, the linear parameters following freely."""
+        triangles, point, own = [self._triangles[i] for i in runs], self.point, slice(1, 1 + self.point.size)
+        owner = np.repeat(np.arange(len(runs)), [len(triangle) for triangle in triangles])
+        rows, weights = np.concatenate(triangles), self.table.weights[list(runs)]
+        errors = np.zeros(0)
+        for _ in range(_FORESEEN):
+            weighted = rows * weights[owner][:, None]
+            left = beside(weighted[:, : own.stop], weighted[:, own.stop :])
+            start, slopes = left[:, 0], left[:, own]
+            found = least_squares(
+                lambda u, r=start, J=slopes: r + J @ (u - self.point), point, *box, slopes=lambda _, J=slopes: J
+            )
+            point = found.point
+            errors = np.sqrt(np.bincount(owner, found.residual**2)) / weights
+            weights = self.table.information[list(runs)] * robust_weights(errors, _BEST)
+        return errors, point
+
+
 def beside(slopes: Floats, columns: Floats) -> Floats:
     """(N, D) what of some slopes no combination of columns takes up."""
-    scale = np.sqrt(np.einsum("nl,nl->l", columns, columns))
-    scaled = columns / np.where(scale > 0, scale, 1.0)
-    return slopes - scaled @ np.linalg.solve(scaled.T @ scaled + _NEARLY * np.eye(scale.size), scaled.T @ slopes)
+    gram = columns.T @ columns
+    scale = np.sqrt(np.diag(gram))
+    scale = np.where(scale > 0, scale, 1.0)
+    normal = gram / scale / scale[:, None] + _NEARLY * np.eye(scale.size)
+    taken = columns @ (np.linalg.solve(normal, columns.T @ slopes / scale[:, None]) / scale[:, None])
+    return np.subtract(slopes, taken, out=taken)
 
 
 def string(motions: Iterable[Excitation]) -> Excitation:

@@ -207,7 +207,8 @@ def _beside_the_line(fit: JointFit, own: list[Floats | None], plan: Plan) -> dic
 
 def _curvature(problem: JointProblem, fit: JointFit) -> list[list[float]]:
     """Second derivatives of the squared error along the search axes, linear parameters following, over that error."""
-    residual, jacobian, _ = problem.linearised(fit)
+    known = problem.linearised(fit)
+    residual, jacobian = known.residual, known.jacobian
     own, linear = np.split(jacobian, [len(problem.axes)], axis=1)
     own = own - linear @ np.linalg.lstsq(linear, own, rcond=1e-10)[0]
     return (own.T @ own / (residual @ residual)).tolist()
@@ -215,7 +216,8 @@ def _curvature(problem: JointProblem, fit: JointFit) -> list[list[float]]:
 
 def _standard_errors(problem: JointProblem, fit: JointFit) -> dict[str, float]:
     """Of the parameters that this damper's own records determined, those held at the line's value being right."""
-    residual, jacobian, _ = problem.linearised(fit)
+    known = problem.linearised(fit)
+    residual, jacobian = known.residual, known.jacobian
     model, held = fit.damper.model, set(fit.at_bounds)
     values = model.values()
     slopes = np.zeros((len(values), jacobian.shape[1]))

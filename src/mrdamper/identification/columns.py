@@ -42,7 +42,7 @@ def linear_table(
         (replace(bare, **{info.name: unit}).force(motion, state) - base) / unit
         for info, unit in zip(linear, units, strict=True)
     ]
-    return base, np.column_stack(columns) if columns else np.zeros((base.size, 0))
+    return base, np.array(columns).reshape(len(columns), base.size).T
 
 
 def bounds_of(linear: Sequence[ParameterInfo]) -> tuple[Floats, Floats]:
