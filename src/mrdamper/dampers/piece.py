@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.models import Model
 from mrdamper.motion import Excitation, equivalent_sine, measured_motion
-from mrdamper.simulation import simulate
 
 _SAMPLES = 150  # a cycle
 
@@ -23,6 +22,7 @@ class Piece:
     scored: slice
     force: Floats
     scale: float
+    states: dict[tuple[float, ...], Floats] = field(default_factory=dict)  # by what of a model shapes them
 
     @classmethod
     def of(cls, run: Run) -> Piece:
@@ -41,4 +41,7 @@ class Piece:
 
     def residual(self, model: Model) -> Floats:
         """Predicted minus measured force over the force scale; its squares sum to nrmse_pp²."""
-        return (simulate(model, self.motion).force[self.scored] - self.force) / self.scale
+        shape = tuple(getattr(model, info.name) for info in model.parameters() if not info.linear)
+        if shape not in self.states:
+            self.states[shape] = model.state(self.motion)
+        return (model.force(self.motion, self.states[shape])[self.scored] - self.force) / self.scale

@@ -19,6 +19,8 @@ _SEED = 20240813
 _OUTPUTS = ("fy", "kappa", "v0", "c", "k", "f0")
 _LOGARITHMIC = ("fy", "kappa", "v0")
 _INPUTS = 3
+_LARGEST = 20.0  # weight
+_NUDGE = 1e-6 * (2 * _LARGEST)  # of a weight, for derivatives by differences
 
 
 class BoadaType(ConditionedDamper):
@@ -101,16 +103,16 @@ def _weight_count(outputs: int) -> int:
 
 
 def _network(weights: Floats, inputs: Sequence[Any], outputs: int) -> list[Any]:
-    """One value, or one array of values, an output; inputs likewise."""
+    """One value, or one array of values, an output; inputs likewise. Weights (W,), or (W, S, 1) for S networks."""
     cut = _HIDDEN * (_INPUTS + 1)
-    first = weights[:cut].reshape(_HIDDEN, _INPUTS + 1)
-    second = weights[cut:].reshape(outputs, _HIDDEN + 1)
+    first = weights[:cut].reshape(_HIDDEN, _INPUTS + 1, *weights.shape[1:])
+    second = weights[cut:].reshape(outputs, _HIDDEN + 1, *weights.shape[1:])
     hidden = [np.tanh(_weighted(row, inputs)) for row in first]
     return [_weighted(row, hidden) for row in second]
 
 
 def _weighted(row: Floats, values: Sequence[Any]) -> Any:
-    *factors, offset = row.tolist()
+    *factors, offset = row.tolist() if row.ndim == 1 else row
     return sum((factor * value for factor, value in zip(factors, values, strict=True)), offset)
 
 
@@ -118,8 +120,16 @@ def _train(inputs: Floats, targets: Floats) -> Floats:
     count = _weight_count(targets.shape[1])
     begin = 0.3 * np.random.default_rng(_SEED).standard_normal(count)
 
-    def residual(weights: Floats) -> Floats:
-        error = np.column_stack(_network(weights, list(inputs.T), targets.shape[1])) - targets
-        return np.concatenate([error.ravel(), _DECAY * weights])
+    def residuals(networks: Floats) -> Floats:
+        """(S, R) of (S, W) weights."""
+        found = _network(networks.T[..., None], list(inputs.T), targets.shape[1])
+        error = np.stack(found, axis=-1) - targets
+        return np.concatenate([error.reshape(len(networks), -1), _DECAY * networks], axis=1)
 
-    return least_squares(residual, begin, np.full(count, -20.0), np.full(count, 20.0), most_steps=60).point
+    def slopes(weights: Floats) -> Floats:
+        """Forward differences by all weights at once."""
+        moved = weights + _NUDGE * np.eye(count)
+        return np.column_stack((residuals(moved) - residuals(weights[None])) / _NUDGE)
+
+    box = np.full(count, _LARGEST)
+    return least_squares(lambda w: residuals(w[None])[0], begin, -box, box, most_steps=60, slopes=slopes).point
