@@ -22,52 +22,30 @@ HALVING = 5e-3  # change of a peak when the step is halved that is still called 
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """What a system did.
-
-    Attributes
-    ----------
-    system : System
-    time : (N,) array
-        [s]
-    x, v, a : (N, n) arrays
-        Coordinates [m], their rates [m/s], absolute accelerations [m/s²].
-    links : tuple of Link
-        That were there: without dampers where they were taken out.
-    force, stroke, stroke_rate : (N, E) arrays
-        Of each link [N], [m], [m/s].
-    current : (N, E) array
-        Commanded to each link [A]; zero for stops and tyres.
-    flags : (N, E) array of int
-        Of dampers: bits of `streaming.FLAGS`. Of stops and tyres: touching; in the air.
-    road, road_rate : (N, q) arrays
-        Height of the road by channel [m], [m/s]; zero on the ground.
-    energy : mapping of str to (N,) array
-        Put in, stored, dissipated by the structure, taken by each link since the start [J].
-    limits : mapping of str to float
-        Largest current [A] of dampers that are asked for a force.
-    halving : float
-        Largest relative change of a peak against steps twice as long; NaN where not asked.
-    """
+    """What a system did."""
 
     PEAKS: ClassVar = ("displacement_m", "drift_m", "acceleration_m_s2", "force_N")
 
     system: System
-    time: Floats
-    x: Floats
-    v: Floats
-    a: Floats
-    links: tuple[Link, ...]
-    force: Floats
-    stroke: Floats
-    stroke_rate: Floats
-    current: Floats
+    time: Floats  # (N,) [s]
+    x: Floats  # (N, n) coordinates [m]
+    v: Floats  # (N, n) their rates [m/s]
+    a: Floats  # (N, n) absolute accelerations [m/s²]
+    links: tuple[Link, ...]  # that were there: without dampers where they were taken out
+    force: Floats  # (N, E) of each link [N]
+    stroke: Floats  # (N, E) [m]
+    stroke_rate: Floats  # (N, E) [m/s]
+    current: Floats  # (N, E) commanded to each link [A]; zero for stops and tyres
+    # (N, E) of dampers: bits of `streaming.FLAGS`; of stops and tyres: touching; in the air
     flags: NDArray[np.int64]
-    road: Floats
-    road_rate: Floats
-    energy: Mapping[str, Floats]
+    road: Floats  # (N, q) height of the road by channel [m]; zero on the ground
+    road_rate: Floats  # (N, q) [m/s]
+    energy: Mapping[
+        str, Floats
+    ]  # (N,) each: put in, stored, spent by the structure, taken by a link since the start [J]
     controller: Controller
-    limits: Mapping[str, float]
-    halving: float = math.nan
+    limits: Mapping[str, float]  # largest current [A] of dampers that are asked for a force
+    halving: float = math.nan  # largest relative change of a peak against steps twice as long; NaN where not asked
 
     @property
     def step(self) -> float:

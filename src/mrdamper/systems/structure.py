@@ -21,70 +21,36 @@ _SYMMETRY = 1e-9  # relative difference of K and K' that rounding may leave
 
 @dataclass(frozen=True)
 class Link:
-    """What lies between two points: a damper, a stop, or a tyre that may lift off.
-
-    Attributes
-    ----------
-    name : str
-    above, below : str
-        Points; extension is positive.
-    role : "damper", "stop" or "tyre"
-    stiffness, damping : float
-        Of a stop beyond its gap; of a tyre while it touches [N/m, N s/m].
-    gap : float
-        Free travel either way of a stop; static deflection of a tyre [m].
-    """
+    """What lies between two points: a damper, a stop, or a tyre that may lift off."""
 
     name: str
-    above: str
-    below: str
+    above: str  # a point
+    below: str  # the other; extension is positive
     role: Literal["damper", "stop", "tyre"] = "damper"
-    stiffness: float = 0.0
-    damping: float = 0.0
-    gap: float = 0.0
-
-    def __post_init__(self) -> None:
-        check_fields(self)
+    stiffness: float = 0.0  # of a stop beyond its gap; of a tyre while it touches [N/m]
+    damping: float = 0.0  # the same [N s/m]
+    gap: float = 0.0  # free travel either way of a stop; static deflection of a tyre [m]
 
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """A linear structure M x'' + C x' + K x = load − B' f, f the forces of links.
-
-    Attributes
-    ----------
-    name, title : str
-    coordinates : tuple of str
-        Names of the (n,) coordinates: relative to the ground if that accelerates.
-    M, C, K : (n, n) arrays
-        [kg], [N s/m], [N/m]; moments of inertia and rotations in [kg m²], [rad].
-    channels : tuple of str
-        Of the input: ("ground",), or the road under each wheel.
-    ground : (n,) array or None
-        Share a coordinate takes in the ground's acceleration; None for a road.
-    push : ((n, q), (n, q)) arrays
-        Forces on the coordinates per metre of road height and per m/s of its rate.
-    behind : (q,) tuple of float
-        How far each channel follows the first along the road [m].
-    links : tuple of Link
-    points : mapping of str to (n,) array
-        Further points as combinations of coordinates, such as the corners of a body.
-    spans : mapping of str to (str, str)
-        Relative displacements to report: storey drifts, suspension travel.
-    """
+    """A linear structure M x'' + C x' + K x = load − B' f, f the forces of links."""
 
     name: str
     title: str
-    coordinates: tuple[str, ...]
-    M: Floats
-    C: Floats
-    K: Floats
-    channels: tuple[str, ...] = ("ground",)
-    ground: Floats | None = None
+    coordinates: tuple[str, ...]  # names of the (n,) coordinates: relative to the ground if that accelerates
+    M: Floats  # (n, n) [kg]; moments of inertia [kg m²], of rotations [rad]
+    C: Floats  # (n, n) [N s/m]
+    K: Floats  # (n, n) [N/m]
+    channels: tuple[str, ...] = ("ground",)  # of the input: the ground, or the road under each wheel
+    ground: Floats | None = None  # (n,) share a coordinate takes in the ground's acceleration; None for a road
+    # ((n, q), (n, q)) forces on the coordinates per metre of road height and per m/s of its rate
     push: tuple[Floats, Floats] | None = None
-    behind: tuple[float, ...] = (0.0,)
+    behind: tuple[float, ...] = (0.0,)  # (q,) how far each channel follows the first along the road [m]
     links: tuple[Link, ...] = ()
+    # further points as (n,) combinations of coordinates, such as the corners of a body
     points: Mapping[str, Floats] = field(default_factory=dict)
+    # relative displacements to report, between two points: storey drifts, suspension travel
     spans: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
