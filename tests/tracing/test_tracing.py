@@ -32,6 +32,17 @@ def test_arithmetic_and_numpy_functions_give_the_same_bits(x, y):
     assert step(x, y)[1][0] == pytest.approx(float(formula(x, y)), rel=1e-13, abs=1e-13)
 
 
+def test_an_operator_in_place_binds_the_name_and_leaves_the_other_value():
+    def formula(tape, x):
+        y = x
+        y *= 3.0
+        y += x
+        return y
+
+    _, step = traced(formula, "x")
+    assert step(2.0)[1] == (8.0,)
+
+
 def test_only_the_branch_that_is_taken_is_computed():
     _, step = traced(lambda tape, x: choose(x > 0, lambda: np.log(x), lambda: np.sqrt(-x)), "x")
     assert step(math.e)[1] == (1.0,)

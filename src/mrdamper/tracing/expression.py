@@ -126,7 +126,8 @@ class Expression(NDArrayOperatorsMixin, Traced):
         name = _ALIASES.get(ufunc.__name__, ufunc.__name__)
         if name == "clip":
             return _clip(*inputs)
-        if method != "__call__" or options or name not in OPERATIONS:
+        written = options.pop("out", inputs)[0]  # a *= b writes into a, and binds a to the answer
+        if method != "__call__" or options or written is not inputs[0] or name not in OPERATIONS:
             raise TraceError(f"numpy.{ufunc.__name__} has no scalar form here; add it to OPERATIONS")
         return self.tape.apply(name, *(plain(value) for value in inputs))
 
