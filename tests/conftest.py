@@ -1,6 +1,7 @@
 """What tests share: the bundled data and the vectors."""
 
 import base64
+import gc
 import json
 import os
 import sys
@@ -13,6 +14,10 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 # Two processes read the same test files and start many commands: what one has compiled the others load.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+
+# What is imported and collected stays for good: looking through it again and again for what is rubbish is a fifth of
+# the time of small tests.
+gc.disable()
 
 import pytest
 from support.browser import LOGO, WIDE, launched
@@ -55,6 +60,11 @@ def pytest_collection_modifyitems(items):
     strange = sorted(nodeid for nodeid in looking if group_of(nodeid) != "study")
     if strange:
         raise pytest.UsageError(f"look at the study outside its group in tests/conftest.py: {strange}")
+
+
+def pytest_collection_finish():
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session")

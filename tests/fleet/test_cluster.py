@@ -8,7 +8,6 @@ import sys
 import threading
 import time
 
-import distributed
 import pytest
 from support.fleets import ROWS, planned, same_bits
 from typer.testing import CliRunner
@@ -58,6 +57,8 @@ def cluster(tmp_path):
 
 
 def test_jobs_on_a_cluster_give_the_same_bits(line, identified, tmp_path):
+    import distributed  # a second, for whoever collects it
+
     with distributed.LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as local:
         run_fleet(line, planned(identified, tmp_path / "out"), scheduler=local.scheduler_address)
     assert same_bits(tmp_path / "out") == same_bits(identified.table.parent)

@@ -1,5 +1,7 @@
 """Dampers made without identification, one for each way there is to stream and export them."""
 
+from functools import cache
+
 from mrdamper.dampers.base import Envelope
 from mrdamper.dampers.joint import JointDamper
 from mrdamper.dampers.modified import ModifiedModel
@@ -25,11 +27,13 @@ def all_bare_models():
     return plain | {title: model_type(name).build(values) for title, (name, values) in VARIANTS.items()}
 
 
+@cache  # who asks again gets the same one, which is compiled already
 def joint_damper(name="play-bypass"):
     model = model_type(name).build(EXAMPLES[name])
     return JointDamper("bench", model, tuple(EXAMPLES[name]), ENVELOPE, {})
 
 
+@cache
 def modified_damper():
     functions = {
         "c": ParameterFunction("linear-current", (500.0, 1000.0)),
@@ -41,6 +45,7 @@ def modified_damper():
     return ModifiedModel("bench", ParameterMap(model_type("bouc-wen"), functions), ENVELOPE, {})
 
 
+@cache
 def conditioned_damper():
     """A published damper whose parameters are laws over the condition."""
     coefficients = {
