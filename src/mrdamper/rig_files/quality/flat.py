@@ -80,8 +80,8 @@ def frozen_stretches(view: View, name: str) -> np.ndarray:
     channel, other, time = _channels(view)[name], view.channels[_OTHER[name]], view.record.time
     at_end = np.isin(channel.values[channel.equal[:, 0]], (channel.low, channel.high))
     found = channel.equal[~at_end | channel.leaps(channel.equal)]
-    padded = np.append(other, np.nan)
-    high, low = (extreme.reduceat(padded, found.reshape(-1))[::2] for extreme in (np.fmax, np.fmin))
+    bounds = found.reshape(-1)
+    high, low = (extreme.reduceat(other, bounds[bounds < other.size])[::2] for extreme in (np.fmax, np.fmin))
     found, spread = found[high - low > 0], (high - low)[high - low > 0]
     # The other channel went through a third of its range, for longer than a reversal takes.
     period = np.inf if view.strokes.period is None else view.strokes.period
