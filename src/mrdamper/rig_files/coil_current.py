@@ -10,7 +10,14 @@ from mrdamper.data import Floats, held_current
 from mrdamper.data.pieces import pieces
 from mrdamper.errors import ColumnError, InputError, printable
 from mrdamper.rig_files.column_names import names_condition, split_name
-from mrdamper.rig_files.conditions import Statement, agreed, contradicts, currents_in, stated_by_lines, stated_in_titles
+from mrdamper.rig_files.conditions import (
+    Statement,
+    agreed,
+    contradicted,
+    currents_in,
+    stated_by_lines,
+    stated_in_titles,
+)
 from mrdamper.rig_files.profile import Profile, current_in_name
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
@@ -49,9 +56,8 @@ def current_of(
         code = "E_RANGE" if "no coil current" in str(error) else "E_AMBIGUOUS"
         raise ColumnError(printable(str(error)), where=where, mend=mend, code=code) from None
     if channel is not None and stated is not None:
-        known = channel[np.isfinite(channel)]
-        mean, change = held_current(known) if known.size >= 3 else (stated.amperes, "")
-        if not change and contradicts(mean, stated.amperes):
+        mean = contradicted(channel, stated.amperes)
+        if mean is not None:
             raise ColumnError(
                 printable(f"{stated.whence} gives {stated.amperes:g} A, the current channel {mean:g} A"), where=where,
                 mend=f"if the channel is right, rename; else say [current] value = {stated.amperes:g} in a profile",

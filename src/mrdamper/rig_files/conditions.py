@@ -10,6 +10,9 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from mrdamper.data import Floats, held_current
 from mrdamper.rig_files.column_names import names_condition, split_name
 from mrdamper.rig_files.units import Unit, parse_unit
 
@@ -159,6 +162,13 @@ def agreed(statements: Sequence[Statement]) -> Statement | None:
                 f"{statements[0].whence} gives {statements[0].amperes:g} A, {other.whence} {other.amperes:g} A"
             )
     return statements[0] if statements else None
+
+
+def contradicted(channel: Floats, stated: float) -> float | None:
+    """The mean of a constant current channel that contradicts what is stated [A]; None where it does not."""
+    known = channel[np.isfinite(channel)]
+    mean, change = held_current(known) if known.size >= 3 else (stated, "")
+    return mean if not change and contradicts(mean, stated) else None
 
 
 def contradicts(one: float, other: float) -> bool:

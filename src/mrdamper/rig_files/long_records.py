@@ -24,19 +24,9 @@ _Verdict = tuple[tuple[Finding, ...], tuple[tuple[int, int], ...], InputError | 
 
 
 def judge_long(record: Record, judge: Callable[[Record], Record]) -> Record:
-    """Judge a record part by part; a record of a few parts' length is judged as one.
+    """Judge a record, whose channels may be memory-mapped, part by part; one of a few parts' length as one.
 
-    Parameters
-    ----------
-    record : Record
-        Its channels may be memory-mapped.
-    judge : callable
-        Judges one part.
-
-    Raises
-    ------
-    InputError
-        As `judge`; that nothing moves, only if nothing moves in any part.
+    Raises as `judge`; that nothing moves, only if nothing moves in any part.
     """
     if record.time.size <= 2 * PART:
         return judge(record)

@@ -54,19 +54,8 @@ serve()
 def guarded_tables(source: Source, reader: Reader, form: FileForm) -> Iterator[list[RawTable]]:
     """The tables of a file, read by a process of its own.
 
-    Parameters
-    ----------
-    source : Source
-    reader : Reader
-    form : FileForm
-
-    Raises
-    ------
-    RigFileError
-        What the reader raises; E_FORMAT if its library crashes, hangs or takes too much memory,
-        E_READER_KILLED if somebody else ends it.
-    MissingExtraError
-        If the library is not installed.
+    Raises what the reader raises; E_FORMAT if its library crashes, hangs or takes too much memory,
+    E_READER_KILLED if somebody else ends it; `MissingExtraError` if the library is not installed.
     """
     with contextlib.ExitStack() as stack:
         path = _on_disk(source, stack)

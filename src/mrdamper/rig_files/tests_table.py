@@ -11,8 +11,9 @@ from pathlib import Path, PurePath
 
 from mrdamper.data import held_current
 from mrdamper.errors import CombinedError, InputError
+from mrdamper.rig_files.coil_current import constant
 from mrdamper.rig_files.column_names import split_name
-from mrdamper.rig_files.conditions import LARGEST_STATED, contradicts
+from mrdamper.rig_files.conditions import LARGEST_STATED, contradicted
 from mrdamper.rig_files.record import Record
 from mrdamper.rig_files.units import parse_unit
 
@@ -130,13 +131,7 @@ def load_tests(path: str | Path) -> TestsTable:
 
 
 def applied(record: Record, row: Row | None, table: TestsTable) -> Record:
-    """A record with what its row says.
-
-    Raises
-    ------
-    TestsTableError
-        E_CURRENT_CONTRADICTS if the record's own current channel is another.
-    """
+    """A record with what its row says; E_CURRENT_CONTRADICTS if its own current channel is another."""
     if row is None:
         return record
     if row.current is not None:
@@ -146,21 +141,20 @@ def applied(record: Record, row: Row | None, table: TestsTable) -> Record:
 
 
 def _with_current(record: Record, current: float, table: TestsTable, line: int) -> Record:
-    import numpy as np
-
-    measured = record.current is not None and "current_from" not in record.provenance
-    if measured and record.current is not None:
-        known = record.current[np.isfinite(record.current)]
-        mean, change = held_current(known) if known.size >= 3 else (current, "")
-        if not change and contradicts(mean, current):
+    if record.current is not None and "current_from" not in record.provenance:
+        mean = contradicted(record.current, current)
+        if mean is not None:
             raise TestsTableError(
                 f"line {line} gives {current:g} A, the current channel of {record.id} {mean:g} A",
                 where=table.path.name, mend="correct the one that is wrong, or leave the cell empty",
                 code="E_CURRENT_CONTRADICTS",
             )  # fmt: skip
         return record
-    held = np.broadcast_to(np.float64(current), record.time.shape)
-    return replace(record, current=held, provenance={**record.provenance, "current_from": table.path.name})
+    return replace(
+        record,
+        current=constant(current, record.time),
+        provenance={**record.provenance, "current_from": table.path.name},
+    )
 
 
 def tests_text(records: Sequence[Record]) -> str:

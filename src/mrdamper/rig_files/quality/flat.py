@@ -168,11 +168,11 @@ class _Channel:
         start, stop, apart, length = (part[inside] for part in (start, stop, apart, length))
         into = (3 * x[start] - 4 * x[start - apart] + x[start - 2 * apart]) / (2 * apart)
         out = (-3 * x[stop] + 4 * x[stop + apart] - x[stop + 2 * apart]) / (2 * apart)
-        rise, tau = x[stop] - x[start], np.linspace(0, 1, 9)[:, None]
-        curve = rise * tau**2 * (3 - 2 * tau) + length * tau * (1 - tau) * (into * (1 - tau) - out * tau)
-        inside[inside] = np.max(np.abs(curve), axis=0) > (
-            _BEND * self.span + (_LEVELS + 1.5 * length / apart) * self.level
-        )
+        rise, farthest = x[stop] - x[start], np.zeros(start.size)
+        for tau in np.linspace(0, 1, 9):
+            curve = rise * tau**2 * (3 - 2 * tau) + length * tau * (1 - tau) * (into * (1 - tau) - out * tau)
+            farthest = np.maximum(farthest, np.abs(curve))
+        inside[inside] = farthest > _BEND * self.span + (_LEVELS + 1.5 * length / apart) * self.level
         return inside
 
     def _too_quiet(self, start: int, stop: int) -> bool:

@@ -49,11 +49,7 @@ def missing_value_codes(view: View) -> Iterator[Finding]:
 def code_in(values: Floats, coarsest: float) -> float | None:
     """The value that stands for missing samples in a channel; None if there is none.
 
-    Parameters
-    ----------
-    values : (N,) array
-    coarsest : float
-        Leaps below are the channel's own, in its unit.
+    Leaps below `coarsest` are the channel's own, in its unit.
     """
     present = np.isfinite(values)
     if not present.any():

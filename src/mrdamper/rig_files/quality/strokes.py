@@ -26,13 +26,7 @@ class Strokes:
 
 
 def find_strokes(time: Floats, displacement: Floats) -> Strokes:
-    """Cut a motion at its reversals.
-
-    Parameters
-    ----------
-    time, displacement : (N,) arrays
-        [s], [m].
-    """
+    """Cut a motion [m] over time [s] at its reversals."""
     reversals = _reversals(displacement)
     lengths = np.abs(np.diff(displacement[reversals]))
     durations = np.diff(time[reversals])

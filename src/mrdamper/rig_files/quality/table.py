@@ -60,13 +60,7 @@ class Quality:
 
 
 def quality_table(records: Iterable[Record]) -> tuple[Quality, ...]:
-    """Judge records and measure them; a refused one does not stop the others.
-
-    Parameters
-    ----------
-    records : iterable of Record
-        Judged or not.
-    """
+    """Judge records, judged or not, and measure them; a refused one does not stop the others."""
     return tuple(_quality(record) for record in records)
 
 

@@ -61,18 +61,11 @@ def velocity_channel(view: View) -> None:
 
 
 def delay_between(time: Floats, reference: Floats, signal: Floats, period: float) -> Delay:
-    """How late a signal is against a reference, within half a period either way.
+    """How late a signal is against a reference, within half a period [s] either way.
 
     A signal that is the reference's negative, to a twentieth of its variance, is called that
     rather than half a period late. Otherwise the best of a grid of delays is refined by
     Gauss–Newton on delay, gain and offset.
-
-    Parameters
-    ----------
-    time, reference, signal : (N,) arrays
-        [s], and two signals.
-    period : float
-        Period of the motion [s].
     """
     few = slice(None, None, max(1, time.size // 500))
     turned = _at(0.0, time[few], signal[few], time, reference)

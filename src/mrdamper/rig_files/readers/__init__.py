@@ -53,24 +53,10 @@ _PICKLE = tuple(bytes((0x80, protocol)) for protocol in range(2, 6))
 
 @contextmanager
 def raw_tables(path: str | Path, form: FileForm | None = None) -> Iterator[list[RawTable]]:
-    """Open a rig's file, whatever its format, and give its tables.
+    """Open a rig's file, whatever its format, and give its tables, readable until the block ends.
 
-    Parameters
-    ----------
-    path : path
-    form : FileForm, optional
-        What a profile says about the form of the file.
-
-    Yields
-    ------
-    list of RawTable
-        Readable until the block ends.
-
-    Raises
-    ------
-    RigFileError
-        If the file is damaged, of no known format, of another format than its name says,
-        or can be read in more than one way.
+    Raises `RigFileError` if the file is damaged, of no known format, of another format than its
+    name says, or can be read in more than one way.
     """
     with opened(Path(path)) as source:
         reader = reader_of(source)
