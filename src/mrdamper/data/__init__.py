@@ -1,18 +1,8 @@
 """Test data: a `Condition` of the test matrix, a recorded `Run`, a `Dataset` of runs; and how notebooks show them."""
 
-from mrdamper.data.runs import (
-    Condition,
-    Dataset,
-    Floats,
-    Run,
-    Split,
-    current_levels,
-    held_current,
-    once_per_run,
-    require_name,
-    same_condition,
-    same_motion,
-)
+from mrdamper.data.conditions import Condition, current_levels, same_condition, same_motion
+from mrdamper.data.datasets import Dataset
+from mrdamper.data.runs import Floats, Run, Split, held_current, once_per_run, require_name
 from mrdamper.data.shown import Shown
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Test data: a `Condition` of the test matrix, a recorded `Run`, a `Dataset` of runs.
+"""A recorded `Run`, and its coil current: constant but for noise, or changing.
 
 SI units. Displacement and force count positive in the same direction, so that a damper
 resists: a positive velocity meets a positive force. What enters here has been checked;
@@ -8,24 +8,22 @@ code further up trusts it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
-from numbers import Real
-from typing import Any, Literal, TypeVar
+from typing import Literal, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mrdamper.data.conditions import Condition
 from mrdamper.data.pieces import pieces, taken
 from mrdamper.data.shown import Shown
 from mrdamper.errors import (
-    ConditionError,
     NonFiniteError,
     RunError,
     TimeOrderError,
-    UnknownNameError,
     check_fields,
     checked,
     printable,
@@ -38,108 +36,6 @@ K = TypeVar("K")
 T = TypeVar("T")
 Split = Literal["train", "validate"]
 _LONGEST_NAME = 255
-_LONGEST = 2.0  # amplitude of a damper [m]; more is a slip of the unit
-_SAME = 0.03  # frequencies and amplitudes this close are one condition of the test matrix
-
-
-_NO_NUMBERS = (type(None), str, bytes, complex, list, tuple, dict, set)
-
-
-@dataclass(frozen=True, slots=True, order=True)
-class Condition:
-    """One point of the test matrix.
-
-    Attributes
-    ----------
-    current_A : float
-        Coil current [A].
-    frequency_Hz : float
-        Frequency of the motion [Hz].
-    amplitude_m : float
-        Displacement amplitude, half the peak-to-peak stroke [m].
-
-    Raises
-    ------
-    ConditionError
-        If a value is not finite, the frequency or the amplitude negative, or the amplitude over 2 m.
-
-    Examples
-    --------
-    >>> from mrdamper import Condition
-    >>> print(Condition(current_A=0.5, frequency_Hz=2.0, amplitude_m=0.01))
-    0.5 A, 2 Hz, 10 mm
-    >>> round(Condition(0.5, 2.0, 0.01).peak_velocity, 4)  # [m/s]
-    0.1257
-    """
-
-    current_A: float
-    frequency_Hz: float
-    amplitude_m: float
-
-    def __post_init__(self) -> None:
-        # A traced model is asked at symbols in place of numbers; these have no size.
-        given = (("current", self.current_A, -math.inf), ("frequency", self.frequency_Hz, 0.0))
-        for name, value, least in (*given, ("amplitude", self.amplitude_m, 0.0)):
-            no_number = isinstance(value, _NO_NUMBERS) or (isinstance(value, np.ndarray) and value.ndim > 0)
-            if no_number or (isinstance(value, Real) and not (least < value < math.inf or value == 0.0)):
-                raise ConditionError(f"{name} is {shown(value)}", mend="give a number, zero or more")
-        if isinstance(self.amplitude_m, Real) and self.amplitude_m > _LONGEST:
-            raise ConditionError(f"amplitude is {shown(self.amplitude_m)} m", mend="give metres: 10 mm are 0.01")
-
-    @property
-    def peak_velocity(self) -> float:
-        """Largest velocity of a sine at this condition [m/s]."""
-        return 2 * np.pi * self.frequency_Hz * self.amplitude_m
-
-    def __str__(self) -> str:
-        return f"{self.current_A:g} A, {self.frequency_Hz:.3g} Hz, {1e3 * self.amplitude_m:.3g} mm"
-
-
-def current_levels(currents: Sequence[float]) -> list[float]:
-    """The level of the test matrix each current belongs to [A].
-
-    Measured currents of one level differ by noise; those within 5 mA + 2 % of their neighbour are
-    one level, named by its median to three digits.
-    """
-    order = np.argsort(currents)
-    values = np.asarray(currents, dtype=float)[order]
-    begins = np.diff(values, prepend=-np.inf) > 5e-3 + 0.02 * np.abs(values)
-    level = np.cumsum(begins) - 1
-    names = [float(f"{np.median(values[level == i]):.3g}") for i in range(level[-1] + 1)] if values.size else []
-    found = np.empty(values.size)
-    found[order] = [0.0 if abs(names[i]) < 5e-3 else names[i] for i in level]
-    return found.tolist()
-
-
-def same_condition(conditions: Sequence[Condition]) -> list[list[int]]:
-    """Group the indices of conditions that agree in current and, to 3 %, in frequency and amplitude."""
-    return _grouped(
-        conditions,
-        lambda a, b: (
-            abs(a.current_A - b.current_A) <= 1e-3 + _SAME * abs(b.current_A) and _agree_in_motion(a, b, _SAME)
-        ),
-    )
-
-
-def same_motion(conditions: Sequence[Condition], tolerance: float = 0.05) -> list[list[int]]:
-    """Group the indices of conditions whose frequency and amplitude agree to a tolerance, at any current."""
-    return _grouped(conditions, lambda a, b: _agree_in_motion(a, b, tolerance))
-
-
-def _grouped(conditions: Sequence[Condition], agree: Callable[[Condition, Condition], bool]) -> list[list[int]]:
-    groups: list[list[int]] = []
-    for index, condition in enumerate(conditions):
-        for group in groups:
-            if agree(condition, conditions[group[0]]):
-                group.append(index)
-                break
-        else:
-            groups.append([index])
-    return groups
-
-
-def _agree_in_motion(a: Condition, b: Condition, tolerance: float) -> bool:
-    return abs(a.frequency_Hz / b.frequency_Hz - 1) <= tolerance and abs(a.amplitude_m / b.amplitude_m - 1) <= tolerance
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -458,103 +354,3 @@ def _resolution(current: Floats) -> float:
     levels = np.unique(current[:: max(1, current.size // 2000)])
     step = float(np.min(np.diff(levels))) if 1 < levels.size < 10 else 0.0
     return step if step <= _COARSEST * 1.001 else 0.0
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Dataset(Shown):
-    """Runs that belong together.
-
-    Attributes
-    ----------
-    runs : tuple of Run
-        In the order of the file.
-    name : str
-        Shown in reports.
-
-    Raises
-    ------
-    RunError
-        If there are no runs or two share an id.
-
-    Examples
-    --------
-    >>> from mrdamper import load_dataset
-    >>> tests = load_dataset()
-    >>> tests.rigs
-    ('labcontrol', 'utfsm')
-    >>> len(tests.rig("utfsm").split("validate"))
-    5
-    >>> tests["utf_5mm4Hz_1A"].current_A  # [A]
-    1.0
-    """
-
-    runs: tuple[Run, ...]
-    name: str = "dataset"
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "runs", tuple(self.runs) if np.iterable(self.runs) else self.runs)
-        check_fields(self, "runs", "name")
-        if not self.runs:
-            raise RunError("no runs", where=f"dataset {self.name}", mend="give at least one")
-        seen: set[str] = set()
-        for run in self.runs:
-            if run.id in seen:
-                raise RunError(f"two runs are called {run.id}", where=f"dataset {self.name}", mend="rename one")
-            seen.add(run.id)
-
-    @property
-    def headline(self) -> str:
-        """Name, runs a rig, and how many are held out."""
-        rigs = ", ".join(f"{len(self.rig(name))} of rig {name}" for name in self.rigs)
-        return f"dataset {self.name}: {len(self)} runs, {rigs}; {len(self.split('validate'))} held out"
-
-    @property
-    def table(self) -> Mapping[str, Sequence[Any]]:
-        """A row a run."""
-        runs = self.runs
-        return {
-            "run_id": [run.id for run in runs],
-            "rig": [run.rig for run in runs],
-            "excitation": [run.excitation for run in runs],
-            "split": [run.split for run in runs],
-            "samples": [run.time.size for run in runs],
-            "duration_s": [float(run.time[-1] - run.time[0]) for run in runs],
-            "mean_current_A": [float(np.mean(run.current)) for run in runs],
-            "stroke_m": [float(np.ptp(run.displacement)) for run in runs],
-            "peak_force_N": [float(np.max(np.abs(run.force))) for run in runs],
-        }
-
-    def __iter__(self) -> Iterator[Run]:
-        return iter(self.runs)
-
-    def __len__(self) -> int:
-        return len(self.runs)
-
-    @checked()
-    def __getitem__(self, run_id: str) -> Run:
-        for run in self.runs:
-            if run.id == run_id:
-                return run
-        raise UnknownNameError.of("run", run_id, (run.id for run in self.runs))
-
-    @property
-    def rigs(self) -> tuple[str, ...]:
-        """Names of the rigs, in order of appearance."""
-        return tuple(dict.fromkeys(run.rig for run in self.runs))
-
-    @checked()
-    def rig(self, name: str) -> Dataset:
-        """The runs of one rig."""
-        if name not in self.rigs:
-            raise UnknownNameError.of("rig", name, self.rigs)
-        return self.only([run for run in self.runs if run.rig == name], name=name or self.name)
-
-    @checked()
-    def split(self, split: Split) -> tuple[Run, ...]:
-        """The runs of one split."""
-        return tuple(run for run in self.runs if run.split == split)
-
-    @checked()
-    def only(self, runs: Iterable[Run], name: str | None = None) -> Dataset:
-        """The same dataset with these runs only."""
-        return Dataset(tuple(runs), name or self.name)

@@ -1,0 +1,113 @@
+"""A point of the test matrix, and which of them are one: by current, frequency and amplitude."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from numbers import Real
+
+import numpy as np
+
+from mrdamper.errors import ConditionError, shown
+
+_LONGEST = 2.0  # amplitude of a damper [m]; more is a slip of the unit
+_SAME = 0.03  # frequencies and amplitudes this close are one condition of the test matrix
+_NO_NUMBERS = (type(None), str, bytes, complex, list, tuple, dict, set)
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Condition:
+    """One point of the test matrix.
+
+    Attributes
+    ----------
+    current_A : float
+        Coil current [A].
+    frequency_Hz : float
+        Frequency of the motion [Hz].
+    amplitude_m : float
+        Displacement amplitude, half the peak-to-peak stroke [m].
+
+    Raises
+    ------
+    ConditionError
+        If a value is not finite, the frequency or the amplitude negative, or the amplitude over 2 m.
+
+    Examples
+    --------
+    >>> from mrdamper import Condition
+    >>> print(Condition(current_A=0.5, frequency_Hz=2.0, amplitude_m=0.01))
+    0.5 A, 2 Hz, 10 mm
+    >>> round(Condition(0.5, 2.0, 0.01).peak_velocity, 4)  # [m/s]
+    0.1257
+    """
+
+    current_A: float
+    frequency_Hz: float
+    amplitude_m: float
+
+    def __post_init__(self) -> None:
+        # A traced model is asked at symbols in place of numbers; these have no size.
+        given = (("current", self.current_A, -math.inf), ("frequency", self.frequency_Hz, 0.0))
+        for name, value, least in (*given, ("amplitude", self.amplitude_m, 0.0)):
+            no_number = isinstance(value, _NO_NUMBERS) or (isinstance(value, np.ndarray) and value.ndim > 0)
+            if no_number or (isinstance(value, Real) and not (least < value < math.inf or value == 0.0)):
+                raise ConditionError(f"{name} is {shown(value)}", mend="give a number, zero or more")
+        if isinstance(self.amplitude_m, Real) and self.amplitude_m > _LONGEST:
+            raise ConditionError(f"amplitude is {shown(self.amplitude_m)} m", mend="give metres: 10 mm are 0.01")
+
+    @property
+    def peak_velocity(self) -> float:
+        """Largest velocity of a sine at this condition [m/s]."""
+        return 2 * np.pi * self.frequency_Hz * self.amplitude_m
+
+    def __str__(self) -> str:
+        return f"{self.current_A:g} A, {self.frequency_Hz:.3g} Hz, {1e3 * self.amplitude_m:.3g} mm"
+
+
+def current_levels(currents: Sequence[float]) -> list[float]:
+    """The level of the test matrix each current belongs to [A].
+
+    Measured currents of one level differ by noise; those within 5 mA + 2 % of their neighbour are
+    one level, named by its median to three digits.
+    """
+    order = np.argsort(currents)
+    values = np.asarray(currents, dtype=float)[order]
+    begins = np.diff(values, prepend=-np.inf) > 5e-3 + 0.02 * np.abs(values)
+    level = np.cumsum(begins) - 1
+    names = [float(f"{np.median(values[level == i]):.3g}") for i in range(level[-1] + 1)] if values.size else []
+    found = np.empty(values.size)
+    found[order] = [0.0 if abs(names[i]) < 5e-3 else names[i] for i in level]
+    return found.tolist()
+
+
+def same_condition(conditions: Sequence[Condition]) -> list[list[int]]:
+    """Group the indices of conditions that agree in current and, to 3 %, in frequency and amplitude."""
+    return _grouped(
+        conditions,
+        lambda a, b: (
+            abs(a.current_A - b.current_A) <= 1e-3 + _SAME * abs(b.current_A) and _agree_in_motion(a, b, _SAME)
+        ),
+    )
+
+
+def same_motion(conditions: Sequence[Condition], tolerance: float = 0.05) -> list[list[int]]:
+    """Group the indices of conditions whose frequency and amplitude agree to a tolerance, at any current."""
+    return _grouped(conditions, lambda a, b: _agree_in_motion(a, b, tolerance))
+
+
+def _grouped(conditions: Sequence[Condition], agree: Callable[[Condition, Condition], bool]) -> list[list[int]]:
+    groups: list[list[int]] = []
+    for index, condition in enumerate(conditions):
+        for group in groups:
+            if agree(condition, conditions[group[0]]):
+                group.append(index)
+                break
+        else:
+            groups.append([index])
+    return groups
+
+
+def _agree_in_motion(a: Condition, b: Condition, tolerance: float) -> bool:
+    return abs(a.frequency_Hz / b.frequency_Hz - 1) <= tolerance and abs(a.amplitude_m / b.amplitude_m - 1) <= tolerance

@@ -1,0 +1,113 @@
+"""Runs that belong together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mrdamper.data.runs import Run, Split
+from mrdamper.data.shown import Shown
+from mrdamper.errors import RunError, UnknownNameError, check_fields, checked
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Dataset(Shown):
+    """Runs that belong together.
+
+    Attributes
+    ----------
+    runs : tuple of Run
+        In the order of the file.
+    name : str
+        Shown in reports.
+
+    Raises
+    ------
+    RunError
+        If there are no runs or two share an id.
+
+    Examples
+    --------
+    >>> from mrdamper import load_dataset
+    >>> tests = load_dataset()
+    >>> tests.rigs
+    ('labcontrol', 'utfsm')
+    >>> len(tests.rig("utfsm").split("validate"))
+    5
+    >>> tests["utf_5mm4Hz_1A"].current_A  # [A]
+    1.0
+    """
+
+    runs: tuple[Run, ...]
+    name: str = "dataset"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "runs", tuple(self.runs) if np.iterable(self.runs) else self.runs)
+        check_fields(self, "runs", "name")
+        if not self.runs:
+            raise RunError("no runs", where=f"dataset {self.name}", mend="give at least one")
+        seen: set[str] = set()
+        for run in self.runs:
+            if run.id in seen:
+                raise RunError(f"two runs are called {run.id}", where=f"dataset {self.name}", mend="rename one")
+            seen.add(run.id)
+
+    @property
+    def headline(self) -> str:
+        """Name, runs a rig, and how many are held out."""
+        rigs = ", ".join(f"{len(self.rig(name))} of rig {name}" for name in self.rigs)
+        return f"dataset {self.name}: {len(self)} runs, {rigs}; {len(self.split('validate'))} held out"
+
+    @property
+    def table(self) -> Mapping[str, Sequence[Any]]:
+        """A row a run."""
+        runs = self.runs
+        return {
+            "run_id": [run.id for run in runs],
+            "rig": [run.rig for run in runs],
+            "excitation": [run.excitation for run in runs],
+            "split": [run.split for run in runs],
+            "samples": [run.time.size for run in runs],
+            "duration_s": [float(run.time[-1] - run.time[0]) for run in runs],
+            "mean_current_A": [float(np.mean(run.current)) for run in runs],
+            "stroke_m": [float(np.ptp(run.displacement)) for run in runs],
+            "peak_force_N": [float(np.max(np.abs(run.force))) for run in runs],
+        }
+
+    def __iter__(self) -> Iterator[Run]:
+        return iter(self.runs)
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    @checked()
+    def __getitem__(self, run_id: str) -> Run:
+        for run in self.runs:
+            if run.id == run_id:
+                return run
+        raise UnknownNameError.of("run", run_id, (run.id for run in self.runs))
+
+    @property
+    def rigs(self) -> tuple[str, ...]:
+        """Names of the rigs, in order of appearance."""
+        return tuple(dict.fromkeys(run.rig for run in self.runs))
+
+    @checked()
+    def rig(self, name: str) -> Dataset:
+        """The runs of one rig."""
+        if name not in self.rigs:
+            raise UnknownNameError.of("rig", name, self.rigs)
+        return self.only([run for run in self.runs if run.rig == name], name=name or self.name)
+
+    @checked()
+    def split(self, split: Split) -> tuple[Run, ...]:
+        """The runs of one split."""
+        return tuple(run for run in self.runs if run.split == split)
+
+    @checked()
+    def only(self, runs: Iterable[Run], name: str | None = None) -> Dataset:
+        """The same dataset with these runs only."""
+        return Dataset(tuple(runs), name or self.name)
