@@ -120,8 +120,8 @@ def equivalent_sine(run: Run) -> EquivalentSine:
     ExcitationError
         If nothing moves.
     """
-    run = run.steady()
-    centred = run.displacement - np.mean(run.displacement)
+    steady = run.steady()
+    centred = steady.displacement - np.mean(steady.displacement)
     try:
         analysis = analyse_motion(run)
     except ExcitationError:
@@ -132,7 +132,7 @@ def equivalent_sine(run: Run) -> EquivalentSine:
     spread = float(np.std(centred))
     if analysis is not None and analysis.stray < STRAY_LIMIT and analysis.condition.amplitude_m > 0.5 * spread:
         return EquivalentSine(analysis.condition, analysis.series.mean, True)
-    motion = measured_motion(run)
+    motion = measured_motion(steady)
     rms_x, rms_v = float(np.std(motion.displacement)), float(np.std(motion.velocity))
     condition = Condition(run.mean_current, rms_v / (2 * np.pi * rms_x), float(np.sqrt(2) * rms_x))
     return EquivalentSine(condition, float(np.mean(motion.displacement)), False)
