@@ -20,7 +20,9 @@ from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.motion import measured_motion, sine
 from mrdamper.reproduction.ways import one_per_current, through_chosen
+from mrdamper.study import left_out
 from mrdamper.study import recipe as recipes
+from mrdamper.study.left_out import stretches
 from mrdamper.study.recipe import (
     Basis,
     Made,
@@ -31,7 +33,6 @@ from mrdamper.study.recipe import (
     follow_all,
     identified,
     run_by_run,
-    stretches,
 )
 from mrdamper.validation import RunScore, Validation
 
@@ -190,18 +191,18 @@ def test_a_stretch_has_a_dozen_cycles_and_a_lead_in_of_one_and_a_half(seconds, c
     changing = replace(run, current=np.where(time < 3, 0.5, 1.0))
     with pytest.MonkeyPatch.context() as patch:
         condition = Condition(1.0, 1.0, 0.01)
-        patch.setattr(recipes, "equivalent_sine", lambda run: SimpleNamespace(condition=condition, is_sine=False))
+        patch.setattr(left_out, "equivalent_sine", lambda run: SimpleNamespace(condition=condition, is_sine=False))
         parts = stretches(run)
         assert len(parts) == count
         assert count == 1 or [len(p.time) for p in parts[1:-1]] == pytest.approx([1350] * (count - 2), abs=200)
         for part in parts[1:]:
             assert part.window[0] - part.time[0] == pytest.approx(1.5)
         slow = Condition(1.0, 0.5, 0.01)
-        patch.setattr(recipes, "equivalent_sine", lambda run: SimpleNamespace(condition=slow, is_sine=False))
+        patch.setattr(left_out, "equivalent_sine", lambda run: SimpleNamespace(condition=slow, is_sine=False))
         assert len(stretches(run)) == max(1, count // 2)
         assert len(stretches(replace(run, window=(10.0, seconds - 0.01)))) == max(1, int((seconds - 10) / 24))
         # A sine whose current changes is cut too, a sine at one current stays whole.
-        patch.setattr(recipes, "equivalent_sine", lambda run: SimpleNamespace(condition=condition, is_sine=True))
+        patch.setattr(left_out, "equivalent_sine", lambda run: SimpleNamespace(condition=condition, is_sine=True))
         assert (len(stretches(run)), len(stretches(changing))) == (1, count)
 
 
@@ -219,7 +220,7 @@ def test_records_that_are_no_sine_are_cut_and_left_out_by_themselves(monkeypatch
         asked.update(ids=[p.id for p in pieces], alone=list(alone), conditions=len(conditions))
         return Validation(title, ())
 
-    monkeypatch.setattr(recipes, "leave_one_condition_out", leave)
+    monkeypatch.setattr(left_out, "leave_one_condition_out", leave)
     changing = replace(TRAIN[1], id="changing", current=np.linspace(0, 1, TRAIN[1].time.size))
     train = [TRAIN[0], noise_record(40.0), changing]
     parts = [part.id for part in stretches(train[1])]
@@ -295,13 +296,13 @@ def test_stretches_are_scored_as_the_record_they_were_cut_from():
     def score(name, k, flags):
         return RunScore(name, "rig", Condition(0, 1, 1), Scores(*(k * np.arange(1.0, 7.0))), None, flags)
 
-    pieces = [replace(TRAIN[0], id=f"long {n}", notes={recipes._RECORD: "long"}) for n in (1, 2)] + [TRAIN[1]]
+    pieces = [replace(TRAIN[0], id=f"long {n}", notes={left_out._RECORD: "long"}) for n in (1, 2)] + [TRAIN[1]]
     scores = (
         score("long 1", 3.0, ("current",)),
         score("long 2", 4.0, ("current", "amplitude")),
         score(TRAIN[1].id, 9, ()),
     )
-    whole = recipes._whole_again(Validation("x", scores), pieces)
+    whole = left_out._whole_again(Validation("x", scores), pieces)
     assert [run.run_id for run in whole.runs] == ["long", TRAIN[1].id]
     rms = np.sqrt((3.0**2 + 4.0**2) / 2)
     assert astuple(whole.runs[0].scores) == pytest.approx((rms, 2 * rms, 3 * 3.5, 4 * 3.5, 5 * 3.5, 6 * 3.5))
@@ -310,14 +311,14 @@ def test_stretches_are_scored_as_the_record_they_were_cut_from():
     rests = zip(scores[:2], (3.0, 12.0), strict=True)
     three = [replace(s, rest=rest) for s, rest in rests] + [score("long 1", 11.0, ())]
     three[2] = replace(three[2], condition=Condition(2, 1, 1), rest=4.0)
-    joined = recipes._joined("long", three)
+    joined = left_out._joined("long", three)
     rms = np.sqrt((3.0**2 + 4.0**2 + 11.0**2) / 3)
     assert astuple(joined.scores) == pytest.approx((rms, 2 * rms, 3 * 6, 4 * 6, 5 * 6, 6 * 6))
     assert (joined.rest, joined.condition) == (pytest.approx(13 / np.sqrt(3)), Condition(0, 1, 1))
-    assert recipes._joined("long", [replace(three[0], rest=None), three[1]]).rest == 12.0
-    (alone,) = recipes._whole_again(Validation("x", scores[:1]), pieces).runs
+    assert left_out._joined("long", [replace(three[0], rest=None), three[1]]).rest == 12.0
+    (alone,) = left_out._whole_again(Validation("x", scores[:1]), pieces).runs
     assert (alone.run_id, astuple(alone.scores)) == ("long", pytest.approx(astuple(scores[0].scores)))
-    assert recipes._joined("long 1", [scores[0]]) is scores[0]
+    assert left_out._joined("long 1", [scores[0]]) is scores[0]
 
 
 def test_a_recipe_says_its_model_and_an_unknown_fault_is_not_hidden():

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import pairwise
 
 import numpy as np
 
@@ -30,15 +29,14 @@ from mrdamper.identification.methods.balance import Balance
 from mrdamper.identification.methods.paper import Paper
 from mrdamper.models import Scale, all_models, model_type
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.motion import analyse_motion, equivalent_sine
-from mrdamper.validation import RunScore, Validation, leave_one_condition_out, validate
+from mrdamper.motion import analyse_motion
+from mrdamper.study.left_out import each_left_out, stretches
+from mrdamper.validation import Validation, validate
 
 Progress = Callable[[str, float], None]
 
 JOINTLY = "play-bypass"  # the model whose parameters hold for a whole damper
 GENETIC = ("bouc-wen:paper", "bouc-wen:direct-genetic")
-_STRETCH, _STRETCHES = 12, 8  # cycles of a long record that are left out together, at least; stretches at most
-_RECORD = "stretch of"  # note of a stretch: the record it was cut from
 
 
 @dataclass(frozen=True)
@@ -228,10 +226,7 @@ def follow(
         return without[-1]
 
     if leave_out:
-        motions = [equivalent_sine(run) for run in pieces]
-        others = [i for i, run in enumerate(pieces) if not motions[i].is_sine or run.current_changes]
-        left_out = leave_one_condition_out(pieces, [m.condition for m in motions], refit, title, others)
-        left_out = _whole_again(left_out, pieces)
+        left_out = each_left_out(pieces, refit, title)
     errors = [i.scores.nrmse_pp for i in identifications]
     return Scored(
         recipe=recipe,
@@ -251,49 +246,6 @@ def _spread(dampers: Sequence[Damper]) -> dict[str, tuple[float, float]]:
     """Lowest and highest of every number of the one model that some dampers are."""
     values = [model.values() for damper in dampers if (model := damper.one_model) is not None]
     return {name: (min(v[name] for v in values), max(v[name] for v in values)) for name in (values or [{}])[0]}
-
-
-def stretches(run: Run) -> list[Run]:
-    """A record that is no sine, cut into stretches of a dozen cycles or more, eight at most; a sine as it is."""
-    motion = equivalent_sine(run)
-    period = 1 / motion.condition.frequency_Hz
-    begin, end = run.window or (float(run.time[0]), float(run.time[-1]))
-    count = min(_STRETCHES, int((end - begin) / period / _STRETCH))
-    if (motion.is_sine and not run.current_changes) or count < 2:
-        return [run]
-    cuts = np.searchsorted(run.time, np.linspace(begin, end, count + 1))
-    parts = []
-    for number, (first, last) in enumerate(pairwise(cuts.tolist()), 1):
-        lead = max(0, int(np.searchsorted(run.time, run.time[first] - 1.5 * period)))
-        window = (float(run.time[first]), float(run.time[min(last, run.time.size) - 1]))
-        notes = {**run.notes, _RECORD: run.id}
-        parts.append(replace(run.part(lead, last), id=f"{run.id} {number}/{count}", window=window, notes=notes))
-    return parts
-
-
-def _whole_again(validation: Validation, pieces: Sequence[Run]) -> Validation:
-    """One score a record where its stretches were scored one by one."""
-    record = {piece.id: piece.notes.get(_RECORD, piece.id) for piece in pieces}
-    scored: dict[str, list[RunScore]] = {}
-    for score in validation.runs:
-        scored.setdefault(record[score.run_id], []).append(score)
-    return replace(validation, runs=tuple(_joined(name, scores) for name, scores in scored.items()))
-
-
-def _joined(name: str, scores: Sequence[RunScore]) -> RunScore:
-    """Errors of stretches of about one length as those of the whole: squares add up."""
-    if len(scores) == 1 and scores[0].run_id == name:
-        return scores[0]
-
-    def joined(field_name: str) -> float:
-        values = np.array([getattr(score.scores, field_name) for score in scores])
-        return float(np.sqrt(np.mean(values**2)) if field_name.startswith("nrmse") else np.mean(values))
-
-    whole = replace(scores[0].scores, **{f.name: joined(f.name) for f in fields(scores[0].scores)})
-    flags = tuple(dict.fromkeys(flag for score in scores for flag in score.extrapolation))
-    rests = [score.rest for score in scores if score.rest is not None]
-    rest = float(np.sqrt(np.mean(np.square(rests)))) if rests else None
-    return replace(scores[0], run_id=name, scores=whole, extrapolation=flags, rest=rest, reading=None)
 
 
 def follow_all(
