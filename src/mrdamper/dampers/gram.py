@@ -247,7 +247,9 @@ def fit_jointly(
     box = centre - _REACH, centre + _REACH
     last = search
     for _ in range(reweightings):
-        centre = least_squares(search.residual, centre, *box, most_steps, _SETTLED, slopes=search.slopes).point
+        centre = least_squares(
+            search.residual, centre, *box, most_steps, _SETTLED, slopes=search.slopes, curved=True
+        ).point
         weights = robust_weights(search.solution(centre).nrmse_pp, _BEST)
         settled = np.max(np.abs(weights / search.weights - 1)) < _SAME_WEIGHTS
         last, search = search, search.weighted(weights)
