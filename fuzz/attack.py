@@ -22,6 +22,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 from fuzz import counting
 from fuzz.bench_soak import SECONDS, attack_bench
+from fuzz.extremes import attack_extremes
 from fuzz.hostile_input import attack_calls, attack_datasets, attack_models
 from fuzz.hostile_names import attack_names
 from fuzz.hostile_pages import attack_exports, attack_pages
@@ -36,13 +37,14 @@ KINDS = {
     "datasets": attack_datasets,
     "calls": attack_calls,
     "requests": attack_requests,
+    "extremes": attack_extremes,
     "kills": attack_kills,
     "limits": attack_limits,
     "soak": attack_bench,
 }
-SHARES = {"kills": 0.5, "limits": 0.4, "soak": 0.15}  # of their numbers, where all are tried
+SHARES = {"kills": 0.4, "limits": 0.25, "extremes": 0.2, "pages": 0.2, "soak": 0.15}  # where all are tried
 TIMED = "soak"  # by itself, at the end
-_ALL_S = 9.5 * 60  # seconds for all kinds
+_ALL_S = 9 * 60  # seconds in which a further one is begun
 
 
 def main() -> None:
@@ -53,9 +55,9 @@ def main() -> None:
     arguments.add_argument("--seconds", type=float, default=math.inf, help="after which no further one is tried")
     arguments.add_argument("--of", nargs="+", default=[], help=f"commands that are stopped, of {', '.join(COMMANDS)}")
     chosen = arguments.parse_args()
-    if len(chosen.kinds) == 1:
-        sys.exit(attack_one(chosen.kinds[0], chosen.share, chosen.seconds, chosen.of))
-    sys.exit(attack_all(chosen.kinds or list(KINDS), chosen.share))
+    if chosen.kinds:
+        sys.exit(max(attack_one(kind, chosen.share, chosen.seconds, chosen.of) for kind in chosen.kinds))
+    sys.exit(attack_all(chosen.share))
 
 
 def attack_one(kind: str, share: float, seconds: float, of: list[str]) -> int:
@@ -69,11 +71,10 @@ def attack_one(kind: str, share: float, seconds: float, of: list[str]) -> int:
     return 1 if any(count.broke for count in counts) else 0
 
 
-def attack_all(kinds: list[str], share: float) -> int:
+def attack_all(share: float) -> int:
     """Each in a process of its own: one kind's threads and memory are not the next one's."""
-    aside = [kind for kind in sorted(kinds, key=lambda kind: kind not in SHARES) if kind != TIMED]
-    timed_s = SECONDS * SHARES[TIMED] * share if TIMED in kinds else 0.0
-    until = time.monotonic() + _ALL_S - timed_s - 20
+    aside = [kind for kind in sorted(KINDS, key=lambda kind: kind not in SHARES) if kind != TIMED]
+    until = time.monotonic() + _ALL_S - SECONDS * SHARES[TIMED] * share
 
     def attack(kind: str) -> int:
         seconds = max(1.0, until - time.monotonic()) if kind != TIMED else math.inf
@@ -82,7 +83,7 @@ def attack_all(kinds: list[str], share: float) -> int:
 
     with ThreadPoolExecutor(2) as pool:
         codes = list(pool.map(attack, aside))
-    return max(codes + [attack(kind) for kind in kinds if kind == TIMED])
+    return max(*codes, attack(TIMED))
 
 
 if __name__ == "__main__":

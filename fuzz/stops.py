@@ -71,7 +71,7 @@ def attack_kills(share: float, only: Sequence[str] = ()) -> list[Count]:
     if os.name != "posix":
         return []
     rng, counts = random.Random(6), {what: Count(f"SIGKILL: {what}") for what in ("old or new", "orphans", "litter")}
-    with _workplace() as root:
+    with workplace() as root:
         _adopt_orphans()
         for name, (out, line) in within(_chosen(only)):
             folder, broken = root / name, sum(len(count.broke) for count in counts.values())
@@ -80,7 +80,7 @@ def attack_kills(share: float, only: Sequence[str] = ()) -> list[Count]:
             for n in (1, 2):
                 _begin_anew(folder, n)
                 began = time.monotonic()
-                said += [_run(folder, line.format(n=n))]
+                said += [run_command(folder, line.format(n=n))]
                 span = time.monotonic() - began
                 wholes.append(_content(folder / out.format(n=n)))
             runs = said == [None, None] and all(wholes) and wholes[0] != wholes[1]
@@ -106,7 +106,7 @@ def attack_kills(share: float, only: Sequence[str] = ()) -> list[Count]:
             for n in (1, 2):
                 if name != "split":  # sweeps inside the dataset
                     _begin_anew(folder, n)
-                _run(folder, line.format(n=n))
+                run_command(folder, line.format(n=n))
             left = sorted(path.name for path in [*folder.rglob(".*"), *(root / "tmp").iterdir()])
             counts["litter"].check(not left and _content(folder / out.format(n=2)) == wholes[1], (name, left))
             broken = sum(len(count.broke) for count in counts.values()) - broken
@@ -151,7 +151,7 @@ def _steps(folder: Path, line: str) -> int:
     _begin_anew(folder, 1)
     seen = folder.parent / "steps"
     seen.write_bytes(b"")
-    _run(folder, line, lambda: _at_steps(folder, lambda: _add_to(seen)))
+    run_command(folder, line, lambda: _at_steps(folder, lambda: _add_to(seen)))
     return seen.stat().st_size
 
 
@@ -184,12 +184,12 @@ def attack_limits(share: float, only: Sequence[str] = ()) -> list[Count]:
     if os.name != "posix":
         return []
     counts = {kind: Count(f"starved of {kind}") for kind in _POINTS}
-    with _workplace() as root:
+    with workplace() as root:
         for name, (out, line) in within(_chosen(only)):
             folder, before_it = root / name, [len(count.broke) for count in counts.values()]
             folder.mkdir()
             _begin_anew(folder, 1)
-            _run(folder, line.format(n=1))
+            run_command(folder, line.format(n=1))
             tries = list(_amounts(folder, share * _DEAR.get(name, 1.0)))
             for kind, value in tries:
                 with _starved(folder, kind, value) as (where, limit):
@@ -198,7 +198,7 @@ def attack_limits(share: float, only: Sequence[str] = ()) -> list[Count]:
                     if where == folder:
                         _begin_anew(folder, 2)
                     before = _content(where / out.format(n=2))
-                    said = _run(where, line.format(n=2), limit)
+                    said = run_command(where, line.format(n=2), limit)
                     whole = said is None or _content(where / out.format(n=2)) == before
                     left = [path.name for path in [*where.rglob(".*"), *(root / "tmp").iterdir()]]
                     typed = said is None or re.search(r"\[E_\w+\]\s*$", said) is not None
@@ -219,7 +219,7 @@ def _amounts(folder: Path, share: float) -> Iterator[tuple[str, float]]:
 
 
 @contextlib.contextmanager
-def _workplace() -> Iterator[Path]:
+def workplace() -> Iterator[Path]:
     """Two datasets, their rig files and models, and the libraries loaded."""
     for name in _LOADED:
         importlib.import_module(name)
@@ -229,7 +229,7 @@ def _workplace() -> Iterator[Path]:
         os.environ["TMPDIR"] = str(root / "tmp")
         _wait(_fork(lambda: _prepare(root), 2))
         for n in (1, 2):
-            _run(root / "data1", f"study ../data{n} --out ../study{n}")
+            run_command(root / "data1", f"study ../data{n} --out ../study{n}")
         yield root
 
 
@@ -288,7 +288,7 @@ def _wait(pid: int) -> int:
     return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
 
 
-def _run(folder: Path, line: str, limit: Callable[[], None] | None = None) -> str | None:
+def run_command(folder: Path, line: str, limit: Callable[[], None] | None = None) -> str | None:
     """What a command said that did not end well; None if it did."""
     reading, writing = os.pipe()  # no file: a limit of the size of files would hold for it too
     status = _wait(_begin(folder, line, limit, writing))

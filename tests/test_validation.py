@@ -5,11 +5,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.dampers import joint_damper
+from support.synthetic import synthetic_run
 
 from mrdamper import validation
 from mrdamper.data import Condition, Run
+from mrdamper.errors import InputError
 from mrdamper.metrics import dissipated_power
-from mrdamper.motion import sine
+from mrdamper.motion import analyse_motion, sine
 from mrdamper.validation import (
     RunScore,
     Validation,
@@ -235,3 +238,16 @@ def test_the_floor_of_several_runs_is_their_median():
     each = [session_drift(Exact(), [run]).floor for run in runs]
     assert each == sorted(each)
     assert session_drift(Exact(), runs).floor == pytest.approx(each[1])
+
+
+def test_what_no_rig_measures_has_no_score():
+    run = synthetic_run(Condition(0.5, 1.0, 0.01))
+    damper = joint_damper("bouc-wen")
+    for force in (1e-300 * run.force, 1e297 * run.force):
+        refused = validate(damper, [replace(run, force=force)]).refused
+        assert "the force changes by" in refused[run.id]
+    three = run.part(0, 3)
+    with pytest.raises(InputError):
+        analyse_motion(three)
+    with pytest.raises(InputError, match="give amperes"):
+        Condition(1e300, 1.0, 0.01)

@@ -15,6 +15,8 @@ from mrdamper.data import Condition, Run, Shown, same_condition
 from mrdamper.errors import InputError, RunError, UnknownNameError, checked, require
 from mrdamper.metrics import Scores, dissipated_power, peak_force, score
 
+_LEAST_SWING = 1e-100  # of a force, and its inverse the most [N]: their squares are numbers
+
 
 @dataclass(frozen=True, eq=False)
 class RunScore:
@@ -166,10 +168,12 @@ def score_run(damper: Damper, run: Run, known: Sessions | None = None) -> RunSco
     Raises
     ------
     InputError
-        If the run does not move, or its force does not change.
+        If the run does not move, or its force does not change, or not as a force does.
     """
-    if np.ptp(run.force[run.in_window]) == 0:
-        raise RunError("the force does not change", where=f"run {run.id}", mend="check the channel")
+    swing = float(np.ptp(run.force[run.in_window]))
+    if not _LEAST_SWING < swing < 1 / _LEAST_SWING:
+        found = f"the force changes by {swing:.3g} N" if swing else "the force does not change"
+        raise RunError(found, where=f"run {run.id}", mend="check the channel")
     prediction = damper.predict_run(run)
     inside = run.in_window
     reading = Reading.of(run.force[inside], prediction.force[inside])

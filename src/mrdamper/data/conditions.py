@@ -11,6 +11,7 @@ import numpy as np
 
 from mrdamper.errors import ConditionError, shown
 
+_MOST_CURRENT = 1e6  # of a coil [A]; more is no current
 _LONGEST = 2.0  # amplitude of a damper [m]; more is a slip of the unit
 _SAME = 0.03  # frequencies and amplitudes this close are one condition of the test matrix
 _NO_NUMBERS = (type(None), str, bytes, complex, list, tuple, dict, set)
@@ -32,7 +33,8 @@ class Condition:
     Raises
     ------
     ConditionError
-        If a value is not finite, the frequency or the amplitude negative, or the amplitude over 2 m.
+        If a value is not finite, the frequency or the amplitude negative, the amplitude over 2 m,
+        or the current over 1e6 A.
 
     Examples
     --------
@@ -54,6 +56,8 @@ class Condition:
             no_number = isinstance(value, _NO_NUMBERS) or (isinstance(value, np.ndarray) and value.ndim > 0)
             if no_number or (isinstance(value, Real) and not (least < value < math.inf or value == 0.0)):
                 raise ConditionError(f"{name} is {shown(value)}", mend="give a number, zero or more")
+        if isinstance(self.current_A, Real) and abs(self.current_A) > _MOST_CURRENT:
+            raise ConditionError(f"current is {shown(self.current_A)} A", mend="give amperes: 500 mA are 0.5")
         if isinstance(self.amplitude_m, Real) and self.amplitude_m > _LONGEST:
             raise ConditionError(f"amplitude is {shown(self.amplitude_m)} m", mend="give metres: 10 mm are 0.01")
 

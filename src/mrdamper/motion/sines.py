@@ -70,7 +70,10 @@ def analyse_motion(run: Run) -> MotionAnalysis:
     where = f"run {run.id}"
     if np.ptp(run.displacement) < _STILL:
         raise ExcitationError("the displacement does not move", where=where, mend="check the channel")
-    frequency = fundamental_frequency(run.time, run.displacement)
+    try:
+        frequency = fundamental_frequency(run.time, run.displacement)
+    except np.linalg.LinAlgError as error:
+        raise ExcitationError("too few samples for a sine", where=where, mend="record a full cycle") from error
     orders = _ORDERS if np.ptp(run.time) * frequency > 2 else 3  # harmonics of a short record overlap its drift
     series = fit_harmonics(run.time, run.displacement, orders, frequency=frequency)
     cycles = float(np.ptp(run.time) * series.frequency)

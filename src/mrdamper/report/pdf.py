@@ -330,8 +330,10 @@ class _Writer:
                 share = spare / (sum(lack.values()) or 1.0)
                 return size, [least[i] + share * lack[i] if i in least else w for i, w in enumerate(widths)]
             if size <= _SMALLEST:
-                scale = paper.epw / (free + kept)
-                return _SMALLEST - 0.1, [w * scale for w in widths]
+                fair = [min(width, paper.epw / columns) for width in widths]  # one long word leaves room for the others
+                more = sum(widths) - sum(fair) or 1.0
+                share = (paper.epw - sum(fair)) / more
+                return _SMALLEST - 0.1, [f + share * (w - f) for f, w in zip(fair, widths, strict=True)]
             size -= 0.5
 
 
