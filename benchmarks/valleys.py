@@ -44,7 +44,8 @@ def main() -> None:
             continue
         begin = time.process_time()
         problem = JointProblem(runs, "play-bypass", free=_TERMS)
-        problem = problem.with_parts([part.steady_end() for part in problem.parts])
+        steady = [part.steady_end() for part in problem.parts]
+        problem = JointProblem(runs, "play-bypass", free=_TERMS, parts=steady)
         single, searched = ends(problem, given.starts)
         least = min(end.error for end in [*single, *searched])
         shares = [np.mean([end.error <= _SAME * least for end in found]) for found in (single, searched)]

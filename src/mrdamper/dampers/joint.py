@@ -266,10 +266,6 @@ class JointProblem:
         held = {**self.fixed, **(fixed or {})}
         return JointProblem(self.runs, self.model_type, held, free=free, coil=self.given_coil, parts=self.parts)
 
-    def with_parts(self, parts: Sequence[Part]) -> JointProblem:
-        """The same problem on other stretches of the runs."""
-        return JointProblem(self.runs, self.model_type, self.fixed, free=self.free, coil=self.given_coil, parts=parts)
-
     def from_point(self, fit: JointFit) -> Floats:
         """(D,) the end of another problem's fit on these axes; what it did not have begins at its own start."""
         lags = fit.damper.coil
