@@ -2,6 +2,7 @@
 
 import csv
 import json
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -79,7 +80,8 @@ def test_what_ships_with_the_package_can_be_read():
         load_system("dyke96")
 
 
-def test_a_report_with_controllers_side_by_side(tmp_path):
+def test_a_report_with_controllers_side_by_side(tmp_path, monkeypatch):
+    monkeypatch.setattr("mrdamper.report.plots.simulation._LOOP_POINTS", 300)
     save_model(joint_damper(), tmp_path / "model.json")
     (tmp_path / "frame.toml").write_text(TWO)
     time = np.arange(0, 1, 0.01)
@@ -101,6 +103,9 @@ def test_a_report_with_controllers_side_by_side(tmp_path):
     assert "J8" in page
     with (tmp_path / "out/measures.csv").open(encoding="utf-8") as file:
         table = {row["measure"]: row for row in csv.DictReader(file)}
+    with (tmp_path / "out/figures/spectra.csv").open(encoding="utf-8") as file:
+        loops = Counter(row["y_is"] for row in csv.DictReader(file))["force (N)"]
+    assert 300 < loops <= 6 * 300 < len(histories)  # those of all laws together
     best = min((float(v), k) for k, v in table["cost_m_s2"].items() if k != "measure")
     assert best[1] == "optimum with the whole record known"
 
