@@ -49,7 +49,7 @@ ROOMS = (
     _room("reproduction.virtual_rig", "reproduction/test_virtual_rig.py"),
     _room("report.tables study.recipe study.left_out", "report/test_tables.py study/test_recipe.py"),
     _room("dampers.paper dampers.modified", "dampers/test_modified.py dampers/test_gram.py study/test_recipe.py"),
-    _room("dampers.joint", "dampers/test_joint.py", "real_dampers"),
+    _room("dampers.joint", "dampers/test_joint.py"),
     _room(
         "dampers.published.ali dampers.published.boada dampers.published.dominguez dampers.published.lei"
         " dampers.published.lv dampers.published.base",
