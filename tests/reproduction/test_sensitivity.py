@@ -48,6 +48,12 @@ def test_sobol_indices_have_intervals_and_rank_like_single_changes():
         sobol(MODEL, Condition(1.0, 1.0, 0.05), spread=1.5)
 
 
+def test_intervals_of_indices_are_drawn_the_same_every_time():
+    first, again = (sobol(MODEL, Condition(1.0, 1.0, 0.05), ("c", "f0"), samples=8) for _ in range(2))
+    assert first.first_confidence.tolist() == again.first_confidence.tolist()
+    assert first.total_confidence.tolist() == again.total_confidence.tolist()
+
+
 def test_indices_are_those_of_the_change_of_the_force(monkeypatch):
     analysis = pytest.importorskip("SALib.analyze.sobol")
     condition, given = Condition(0.7, 1.3, 0.05), {}

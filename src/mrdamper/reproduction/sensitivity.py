@@ -152,7 +152,8 @@ def sobol(
         np.sqrt(np.mean((_loop(_varied(model, dict(zip(names, p, strict=True))), condition) - base) ** 2))
         for p in points.tolist()
     ]
-    found = analysis.analyze(problem, np.array(change), calc_second_order=False, seed=seed)
+    # SALib takes a seed of 0 for none, and draws other intervals every time.
+    found = analysis.analyze(problem, np.array(change), calc_second_order=False, seed=seed + 1)
     return Sobol(tuple(names), found["S1"], found["ST"], found["S1_conf"], found["ST_conf"], spread)
 
 
