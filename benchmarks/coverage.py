@@ -191,7 +191,8 @@ def jointly(name: str, repeats: int, seed: int = 0) -> tuple[Covered, Floats]:
 
 def _textbook(problem: JointProblem, fit: JointFit) -> dict[str, float]:
     """Standard errors by s² (JᵀJ)⁻¹ of the weighted residual, in the damper's own numbers."""
-    residual, jacobian, _ = problem.linearised(fit)
+    known = problem.linearised(fit)
+    residual, jacobian = known.residual, known.jacobian
     axes = [axis.name for axis in problem.axes]
     names = [*axes, *(info.name for info in problem.linear)]
     turned = np.eye(len(names))

@@ -158,7 +158,7 @@ def test_stopping_leaves_nothing_behind(app):
 
 
 def test_a_fault_of_ours_shows_no_inside(client, session, monkeypatch, capsys):
-    monkeypatch.setattr("mrdamper.web.api.data._overview", lambda session: 1 / 0)
+    monkeypatch.setattr("mrdamper.web.api.data.bundled", lambda: 1 / 0)
     answer = client.get(f"{session}/data")
     assert answer.status_code == 500
     assert answer.json()["code"] == "E_OURS"

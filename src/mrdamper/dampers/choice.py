@@ -150,10 +150,12 @@ def identify_jointly(
         fixed = {**final.fixed, **dict.fromkeys(gone, 0.0)}
         final = JointProblem(runs, MODEL, fixed, free=final.free, coil=coil, parts=final.parts)
         found = final.fit(start=final.from_point(found), rounds=1, settled=_ROUGHLY / 10)
-    progress("one model for all runs", 1.0)
     left_out, before = (Evidence.of(p, f).everything() for p, f in ((final, found), (problem, fit)))
     if _better(before, left_out):  # what one step promised, the search did not keep: terms earn their place here too
-        final, found, left_out = problem, fit, before
+        final, found = problem, fit
+    found = final.fit(start=found.point, rounds=1, settled=_ROUGHLY / 10, to_the_last_digit=True)
+    progress("one model for all runs", 1.0)
+    left_out = Evidence.of(final, found).everything()
     left_out = {**left_out, **current, **Evidence.of(final, found, _by_session).everything()}
     tried = (*tried, *more)
     kept = "; ".join(t.term for t in tried if t.kept)

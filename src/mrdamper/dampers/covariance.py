@@ -11,7 +11,7 @@ from mrdamper.dampers.base import Damper, Prediction
 from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.slopes import force_slopes
 from mrdamper.data import Floats, Run
-from mrdamper.identification.covariance import score_covariance
+from mrdamper.identification.covariance import alike_groups, score_covariance
 from mrdamper.identification.intervals import weaknesses
 from mrdamper.metrics import Scores, peak_force
 
@@ -20,7 +20,6 @@ _CYCLES = 4  # of a sine that enter, as in the joint fit
 _WARM_UP = 1.5  # cycles before them in which the model forgets its start
 _BEST = 1e-3  # nrmse_pp below which a run gains no more weight, as in the joint fit
 _DRAWS, _ROUNDS, _SEED = 600, 4, 20240813  # of sessions; of weights, as in the joint fit
-_TAKES_PART = 0.1  # in a direction, of its unit vector
 _ONE_RUN = 0.6  # share of what is known of a number from which it rests on one run
 _UNKNOWN = 1e-10  # of the largest: eigenvalue of the scaled normal matrix below which a direction is unknown
 
@@ -148,9 +147,9 @@ def _known(
         values, vectors = np.linalg.eigh(normal[np.ix_(keep, keep)] / np.outer(scale, scale))
         if values[0] > _UNKNOWN * values[-1]:
             return keep, unseen, alike, (vectors / values) @ vectors.T / np.outer(scale, scale)
-        weight = np.abs(vectors[:, 0])
-        alike.append([keep[i] for i in np.flatnonzero(weight > _TAKES_PART)])
-        keep.pop(int(np.argmax(weight)))
+        groups = alike_groups(vectors[:, values <= _UNKNOWN * values[-1]])
+        alike += [[keep[i] for i in group] for group, _ in groups]
+        keep = [i for at, i in enumerate(keep) if at not in {one for _, one in groups}]
     return [], unseen, alike, np.zeros((0, 0))
 
 

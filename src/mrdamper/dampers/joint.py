@@ -26,7 +26,7 @@ from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, ParameterError, require
 from mrdamper.models import Model, Scale, SearchAxis, model_type
 from mrdamper.optimizers.ending import Ending
-from mrdamper.optimizers.levenberg_marquardt import Minimum, least_squares
+from mrdamper.optimizers.levenberg_marquardt import Minimum, least_squares, polished
 from mrdamper.optimizers.linear import on_one_blas_thread
 
 RISE, FALL = "coil.rise_s", "coil.fall_s"  # names of the coil's lags on the search axes
@@ -344,6 +344,8 @@ class JointProblem:
         rounds: int = 3,
         most_steps: int = 25,
         settled: float = _SETTLED,
+        *,
+        to_the_last_digit: bool = False,
     ) -> JointFit:
         """Identify from all runs, or from those at some indices.
 
@@ -356,11 +358,13 @@ class JointProblem:
             Rounds of robust weights, and steps of the search in each.
         settled : float
             Relative gain of a step at which the search ends; below the default its curvature is learnt too.
+        to_the_last_digit : bool
+            Go on to where the gradient vanishes, which does not hang on rounding.
         """
         begin = time.perf_counter()
         parts = self.parts if rows is None else [self.parts[i] for i in rows]
         table, point = Table(self, parts), self.start if start is None else start
-        return self._search(table, parts, point, rounds, most_steps, settled, begin)
+        return self._search(table, parts, point, rounds, most_steps, settled, begin, to_the_last_digit)
 
     def _search(
         self,
@@ -371,16 +375,19 @@ class JointProblem:
         most_steps: int,
         settled: float,
         begin: float,
+        to_the_last_digit: bool = False,
     ) -> JointFit:
         """Search in rounds, with weights by the errors the last one left."""
         evaluations, ending, curved = 0, Ending.SOLVED, settled < _SETTLED
-        for _ in range(rounds):
+        for left in reversed(range(rounds)):
             if self.axes:
                 found = least_squares(
                     table.solved_residual, point, *self.box(), most_steps, settled, slopes=table.slopes, curved=curved
                 )
                 point, ending = found.point, found.ending
                 evaluations += found.evaluations
+                if to_the_last_digit and not left:
+                    point = polished(table.gradient, point, *self.box())
             table.weigh(table.solve(point).nrmse_pp)
         solved = table.solve(point)
         return JointFit(

@@ -96,7 +96,7 @@ def spread(jacobian: Floats, residual: Floats, time: Floats | None = None, frequ
     weak = values <= _NO_MORE * values[-1]
     lost = np.sum(vectors[:, weak] ** 2, axis=1) > 1e-6
     rows = np.flatnonzero(known)
-    alike = tuple(tuple(int(rows[i]) for i in np.flatnonzero(np.abs(v) > _TAKES_PART)) for v in vectors[:, weak].T)
+    alike = tuple(tuple(int(rows[i]) for i in group) for group, _ in alike_groups(vectors[:, weak]))
     covariance[np.ix_(rows, rows)] = middle / scale[known][:, None] / scale[known]
     for row in rows[lost]:
         covariance[row, :] = covariance[:, row] = 0.0
@@ -109,6 +109,28 @@ def spread(jacobian: Floats, residual: Floats, time: Floats | None = None, frequ
     free = np.ones(count)
     free[rows] = np.clip(dof, 1.0, max(size - known.sum(), 1))
     return Spread(covariance, free, np.minimum(effective, whole), np.sqrt(textbook), memory, alike)
+
+
+def alike_groups(vectors: Floats) -> list[tuple[list[int], int]]:
+    """Groups of parameters that do the same to a residual, each with the one that takes most part.
+
+    Two pairs that are alike span a plane, and any mixture of them is an eigenvector as well: each
+    group is told by the reduced form of the basis, in which it has a parameter of its own.
+
+    Parameters
+    ----------
+    vectors : (P, K) array
+        Combinations of parameters that change nothing.
+    """
+    basis, own = vectors.T.copy(), []
+    for k in range(len(basis)):
+        row, column = np.unravel_index(int(np.argmax(np.abs(basis[k:]))), basis[k:].shape)
+        basis[[k, k + row]] = basis[[k + row, k]]
+        basis[k] /= basis[k, column]
+        others = np.arange(len(basis)) != k
+        basis[others] -= np.multiply.outer(basis[others, column], basis[k])
+        own.append(int(column))
+    return [(np.flatnonzero(np.abs(row) > _TAKES_PART).tolist(), one) for row, one in zip(basis, own, strict=True)]
 
 
 def score_covariance(

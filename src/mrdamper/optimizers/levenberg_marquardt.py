@@ -19,8 +19,9 @@ _STEP = 1e-6  # forward difference, relative to the width of the box
 _STIFFEST = 1e12  # damping at which no step is left to try
 _CURVED = 1e-7  # difference of gradients, relative to the width of the box
 _NEAR = 2e-2  # of the box: where a search ended, its minimum is nearer
-_AT_REST = 1e-13  # of the box
-_POLISHING = 12  # steps
+_AT_REST, _ROUNDED = 1e-13, 1e-10  # of the box: the end, and where rounding may keep steps from shrinking on
+_PLAIN = 1e-12  # share of the largest curvature
+_POLISHING = 25  # steps
 _WORTHLESS = 1e-3  # share of the tolerated gain below which a step is not even tried
 
 
@@ -121,35 +122,41 @@ def polished(gradient: Callable[[Floats], Floats], point: Floats, lower: Floats,
 
     The cost tells the place of its minimum to half of the digits only, and a search that ends by it
     ends where rounding says. The gradient tells all of them: Newton's steps on it alone, the
-    curvature by differences, until they stay below 1e-13 of the box. Where they do not shrink, at
-    an edge or on a plain, the point stays.
+    curvature by differences, until they stay below 1e-13 of the box. Where they do not come to rest
+    nearby, at an edge or on a plain, the point stays.
 
     Parameters
     ----------
     gradient : callable
-        (D,) point -> (D,) derivatives of the cost, exact.
+        (D,) point -> (D,) derivatives of the cost, without noise and without jumps.
     point, lower, upper : (D,) arrays
     """
     width = upper - lower
     free = (point > lower) & (point < upper)
     first = gradient(point)
     steps = np.diag(_CURVED * width)
-    curvature = np.stack([(gradient(point + s) - first) / s.sum() for s in steps])
+    curvature = np.stack([(gradient(point + s) - first) * width / _CURVED for s in steps])  # in widths of the box
     curvature = (curvature + curvature.T)[np.ix_(free, free)] / 2
-    if not free.any() or not _is_positive(curvature):
+    if not free.any() or _is_plain(curvature):
         return point
-    found, slope, before = point, first, _NEAR
+    found, slope, moved = point, first, np.inf
     for _ in range(_POLISHING):
         step = np.zeros(point.size)
-        step[free] = -np.linalg.solve(curvature, slope[free])
-        moved = float(np.max(np.abs(step) / width))
+        step[free] = -np.linalg.solve(curvature, (slope * width)[free])
+        moved = float(np.max(np.abs(step)))
         if moved < _AT_REST:
-            return found
-        if not moved < before / 2:
+            break
+        found = np.clip(found + step * width, lower, upper)
+        if np.max(np.abs(found - point) / width) > _NEAR:
             return point
-        found, before = np.clip(found + step, lower, upper), moved
         slope = gradient(found)
-    return point
+    return found if moved < _ROUNDED else point
+
+
+def _is_plain(curvature: Floats) -> bool:
+    """Whether some way costs nothing, as far as rounding lets one see, or leads down."""
+    values = np.linalg.eigvalsh(curvature)
+    return not values[0] > _PLAIN * values[-1]
 
 
 def forward_differences(

@@ -1,0 +1,21 @@
+"""Newton's steps at the end of a search."""
+
+import numpy as np
+
+from mrdamper.optimizers.levenberg_marquardt import polished
+
+NEAR = np.array([1.01, 0.7])
+
+
+def ended(gradient):
+    return polished(gradient, NEAR, np.zeros(2), np.full(2, 2.0))
+
+
+def test_the_last_steps_find_the_minimum():
+    found = ended(lambda u: np.array([np.sinh(u[0] - 1), u[1] - 0.7 + 0.1 * (u[0] - 1) ** 2]))
+    np.testing.assert_allclose(found, [1.0, 0.7], atol=1e-12)
+
+
+def test_a_plain_and_a_minimum_far_away_leave_the_point():
+    np.testing.assert_array_equal(ended(lambda u: np.full(2, u.sum() - 1.7)), NEAR)
+    np.testing.assert_array_equal(ended(lambda u: u - 1.5), NEAR)
