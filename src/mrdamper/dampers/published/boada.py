@@ -129,7 +129,7 @@ def _train(inputs: Floats, targets: Floats) -> Floats:
     def slopes(weights: Floats) -> Floats:
         """Forward differences by all weights at once."""
         moved = weights + _NUDGE * np.eye(count)
-        return np.column_stack((residuals(moved) - residuals(weights[None])) / _NUDGE)
+        return np.ascontiguousarray(((residuals(moved) - residuals(weights[None])) / _NUDGE).T)
 
     box = np.full(count, _LARGEST)
     return least_squares(lambda w: residuals(w[None])[0], begin, -box, box, most_steps=60, slopes=slopes).point
