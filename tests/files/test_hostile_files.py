@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from mrdamper.errors import InputError
+from mrdamper.files.atomic import MADE, write_result
 from mrdamper.files.dataset import load_dataset, save_dataset
 from mrdamper.files.model_file import load_model
 from mrdamper.files.motion import load_motion
@@ -48,3 +49,11 @@ def test_further_files_of_a_dataset_stay_inside_it(tmp_path):
         save_dataset(load_dataset().rig("labcontrol"), tmp_path / "set", extra_files={"../licence.txt": "mine"})
     assert refused.value.code == "E_PATH"
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="this system has no file without an end")
+def test_a_record_without_an_end_in_an_old_result_is_not_read(tmp_path):
+    (tmp_path / MADE).symlink_to("/dev/zero")
+    with write_result(tmp_path) as work:
+        (work / "new.txt").write_text("new")
+    assert (tmp_path / "new.txt").read_text() == "new"

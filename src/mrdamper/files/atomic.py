@@ -182,6 +182,8 @@ def _require_absent(final: Path) -> None:
 
 def _earlier(final: Path) -> frozenset[str]:
     """Files of the result that stands there."""
+    if not (final / MADE).is_file():  # nothing, or something that may have no end
+        return frozenset()
     try:
         files = json.loads((final / MADE).read_text(encoding="utf-8"))["files"]
         return frozenset({MADE, *(str(name) for name in files)})

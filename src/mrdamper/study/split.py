@@ -88,7 +88,7 @@ def hold_out(
         reasons.append(f"all at {wanted}")
     if every is not None:
         held.update(run.id for run in dataset.runs[every - 1 :: every])
-        reasons.append(f"every {every}th run")
+        reasons.append(f"one run in {every}")
     if not reasons and not none:
         held, reason = _stratified(known, where)
         reasons.append(reason)
