@@ -11,20 +11,15 @@ from mrdamper.errors import ExcitationError
 from mrdamper.motion.excitation import Excitation
 
 _SAMPLES_PER_CYCLE = 1000
-_ROUNDING = 1e-12  # of the phase, after hundreds of cycles
 
 
 def sine(condition: Condition, cycles: float = 1.0, samples_per_cycle: int = _SAMPLES_PER_CYCLE) -> Excitation:
-    """X = X sin(2πft) at constant current; the last sample closes the last cycle.
-
-    Where it turns its velocity is zero, not what rounding leaves: friction takes the sign of it.
-    """
+    """X = X sin(2πft) at constant current; the last sample closes the last cycle."""
     _require_positive(frequency_Hz=condition.frequency_Hz, amplitude_m=condition.amplitude_m, cycles=cycles)
     omega = 2 * np.pi * condition.frequency_Hz
     time = np.arange(round(cycles * samples_per_cycle) + 1) / (samples_per_cycle * condition.frequency_Hz)
     x = condition.amplitude_m * np.sin(omega * time)
-    cosine = np.cos(omega * time)
-    v = condition.amplitude_m * omega * np.where(np.abs(cosine) < _ROUNDING, 0.0, cosine)
+    v = condition.amplitude_m * omega * np.cos(omega * time)
     return Excitation(time, x, v, -(omega**2) * x, np.full(time.size, condition.current_A))
 
 
