@@ -90,6 +90,7 @@ GOOD = rows("a,0,0,0", "a,1,1,1", "a,2,0,0", "a,3,1,1")
         ("name,current_A\na,1\n", GOOD, ColumnError, "column run_id is missing"),
         (HEADER, GOOD, DatasetError, "no rows"),
         (HEADER + "a,1\nb,1\n", GOOD, DatasetError, "run b has no samples"),
+        (HEADER + "a,1\n", rows(), DatasetError, "run a has no samples"),
         (HEADER + "b,1\n", GOOD.replace("a,0", "b,0"), DatasetError, "samples name run 'a'"),
         (HEADER + "a,\n", GOOD, ColumnError, "no current_A"),
         (HEADER + "a,x\n", GOOD, ColumnError, "current_A is 'x'"),

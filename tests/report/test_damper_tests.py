@@ -2,6 +2,7 @@
 
 import csv
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from mrdamper.files.dataset import save_dataset
 from mrdamper.identification.characteristics import characterise
 from mrdamper.motion import sine
 from mrdamper.report.about import AboutError, load_about, load_limits, parse_ladder
+from mrdamper.report.damper_tests import facts_of_tests
 
 GAS, COULOMB, REBOUND, COMPRESSION = 80.0, 120.0, 3000.0, 1500.0  # N, N, N s/m, N s/m
 
@@ -78,6 +80,12 @@ def test_nothing_is_said_outside_the_tests(dataset):
     found = characterise(dataset.runs)
     assert np.isnan(found.at_velocity(1.0, 0.5, 0))
     assert all(0.03 < v < 0.19 for v in found.ladder())
+
+
+def test_a_force_channel_that_was_dead_has_no_dynamic_range():
+    dead = [replace(made_run(i, 1.0), force=np.zeros(1001)) for i in (0.0, 0.5)]
+    facts = facts_of_tests({"made": characterise(dead)})
+    assert np.isnan([row["dynamic_range"] for row in facts["currents"]]).all()
 
 
 def test_without_a_cycle_nothing_is_characterised():

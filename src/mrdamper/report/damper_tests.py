@@ -216,8 +216,8 @@ def _dynamic_range(specimen: Characteristics, current: float) -> float:
     ratios = []
     for group in same_motion([s.condition for s in specimen.strokes]):
         members = {specimen.strokes[i].condition.current_A: specimen.strokes[i] for i in group}
-        if lowest in members and current in members:
-            ratios.append(_both_sides(specimen, members[current]) / _both_sides(specimen, members[lowest]))
+        if lowest in members and current in members and (least := _both_sides(specimen, members[lowest])):
+            ratios.append(_both_sides(specimen, members[current]) / least)
     return float(np.median(ratios)) if ratios else float("nan")
 
 

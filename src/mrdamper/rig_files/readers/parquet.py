@@ -125,7 +125,7 @@ def words_in(values: pl.Series) -> Words:
     values = values.cast(pl.String).fill_null("")
     labels = values.unique(maintain_order=True)
     codes = values.replace_strict(labels, pl.int_range(labels.len(), eager=True), return_dtype=pl.Int32)
-    return Words(codes.to_numpy(), tuple(labels.to_list()))
+    return Words(codes.cast(pl.Int32).to_numpy(), tuple(labels.to_list()))  # of no rows they have no kind
 
 
 def _no_numbers(kind: pl.DataType) -> np.ndarray:
