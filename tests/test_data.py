@@ -70,8 +70,12 @@ def test_conditions_agree_to_three_per_cent():
 
 
 @pytest.mark.parametrize(
-    "values", [(float("nan"), 1, 0.01), (0.5, -1, 0.01), (0.5, 1, -0.01), (0.5, float("inf"), 0.01), (0.5, 1, 10.0)]
-)
+    "values",
+    [
+        (float("nan"), 1, 0.01), (0.5, -1, 0.01), (0.5, 1, -0.01), (0.5, float("inf"), 0.01), (0.5, 1, 10.0),
+        (0.5, 5e-324, 0.01), (0.5, 1e300, 0.01),
+    ],
+)  # fmt: skip
 def test_conditions_no_test_can_have_are_refused(values):
     with pytest.raises(ConditionError) as error:
         Condition(*values)

@@ -13,6 +13,7 @@ from mrdamper.errors import ConditionError, shown
 
 _MOST_CURRENT = 1e6  # of a coil [A]; more is no current
 _LONGEST = 2.0  # amplitude of a damper [m]; more is a slip of the unit
+_SLOWEST, _FASTEST = 1e-100, 1e100  # [Hz]; beyond, times or accelerations of a cycle are no numbers
 _SAME = 0.03  # frequencies and amplitudes this close are one condition of the test matrix
 _NO_NUMBERS = (type(None), str, bytes, complex, list, tuple, dict, set)
 
@@ -34,7 +35,7 @@ class Condition:
     ------
     ConditionError
         If a value is not finite, the frequency or the amplitude negative, the amplitude over 2 m,
-        or the current over 1e6 A.
+        the current over 1e6 A, or the frequency neither zero nor in 1e-100...1e100 Hz.
 
     Examples
     --------
@@ -60,6 +61,8 @@ class Condition:
             raise ConditionError(f"current is {shown(self.current_A)} A", mend="give amperes: 500 mA are 0.5")
         if isinstance(self.amplitude_m, Real) and self.amplitude_m > _LONGEST:
             raise ConditionError(f"amplitude is {shown(self.amplitude_m)} m", mend="give metres: 10 mm are 0.01")
+        if isinstance(self.frequency_Hz, Real) and self.frequency_Hz and not _SLOWEST <= self.frequency_Hz <= _FASTEST:
+            raise ConditionError(f"frequency is {shown(self.frequency_Hz)} Hz", mend="give hertz; zero for none")
 
     @property
     def peak_velocity(self) -> float:
