@@ -32,8 +32,8 @@ export class Chart {
   constructor({ title, x, y, name, keys = false, zero = false, layout = () => ({}) }) {
     Object.assign(this, { title, x, y, name, zero, more: layout, ranges: null, revision: 0 });
     this.held = false; // while something is dragged: the axes stay, and grow where they must
-    this.plot = h("div", { class: "plot" });
-    this.plot.setAttribute("role", "group"); // no picture: its tool bar takes the focus
+    // No picture, for its tool bar takes the focus; named before anything is drawn.
+    this.plot = h("div", { class: "plot", role: "group", "aria-label": title });
     this.keys = keys ? h("div", { class: "keys-place" }) : null;
     const save = h("button", { class: "quiet save", "aria-label": `Save “${title}” as an image`, title: "Save as an image", onclick: () => this.save() }, "PNG");
     this.frame = h("div", { class: "frame" }, this.plot);
