@@ -38,7 +38,7 @@ COMMANDS = {
     "check": ("loops.svg", "check ../data{n} --figure loops.svg"),
     "study": ("s", "study ../data{n} --out s"),
     "compare": ("m", "compare ../data{n} --models bingham --models biviscous --out m"),
-    "certainty": ("sure", "certainty ../study{n}/model.json ../data{n} --out sure"),
+    "uncertainty": ("sure", "uncertainty ../study{n}/model.json ../data{n} --out sure"),
     "report": ("r", "report ../data{n} --out r"),
     "plan": ("plan", "plan --limits ../limits.toml --hours 0.{n}9 --out plan"),
     "simulate": (

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from support.command import mrdamper
 
+from mrdamper.cli import application
 from mrdamper.dampers.base import Envelope
 from mrdamper.dampers.modified import ModifiedModel
 from mrdamper.dampers.parameter_map import ParameterMap
@@ -39,6 +40,21 @@ def test_help_has_an_example(command):
     assert "mrdamper" in done.stdout
     if command:
         assert f"Example: mrdamper {command}" in done.stdout
+
+
+def test_every_command_has_one_uncut_line_in_a_terminal_of_80_columns():
+    lines = mrdamper("--help").stdout.splitlines()
+    commands = {line.split()[0]: line for line in lines if line.startswith("  ") and line[2:3].isalpha()}
+    names = {c.name or c.callback.__name__ for c in application().registered_commands}
+    assert {name.strip("_") for name in names} <= set(commands)
+    for name in names:
+        line = commands[name.strip("_")]
+        assert len(line) <= 80
+        assert line.endswith((".", "(2024)."))
+        assert "..." not in line
+    assert [line for line in lines if line.endswith(":") and not line.startswith(" ")] == [
+        "Options:", "Data:", "Identify:", "Use:", "Export:", "More:",
+    ]  # fmt: skip
 
 
 def test_a_process_ends_with_the_same_status_and_line():
@@ -89,7 +105,7 @@ def test_predict_along_a_motion_from_a_file(model, tmp_path):
 def test_extrapolation_is_warned_of_and_flagged(model):
     done = mrdamper("predict", model, "--current", 2, "--frequency", 2, "--amplitude", 10, "--json")
     assert done.returncode == 0
-    assert "warning: current lies outside" in done.stderr
+    assert "warning: current lies outside the tested range" in done.stderr
     assert json.loads(done.stdout)[0]["extrapolation"] == "current"
 
 
@@ -117,7 +133,7 @@ def test_validate_scores_the_models_rig(model):
 def test_a_lag_is_not_asked_of_constant_currents(tmp_path):
     done = mrdamper("study", "--lag", "--out", tmp_path / "result")
     assert done.returncode == 2
-    assert "the current changes in no train run" in done.stderr
+    assert "the current is constant in every identification run" in done.stderr
     assert "[E_LAG]" in done.stderr
 
 

@@ -95,13 +95,13 @@ def test_the_command_says_and_draws(few, tmp_path):
     made, runs, _ = few
     save_model(made, tmp_path / "m.json")
     save_dataset(runs, tmp_path / "rig")
-    asked = ["certainty", str(tmp_path / "m.json"), str(tmp_path / "rig"), "--profile", "f0"]
+    asked = ["uncertainty", str(tmp_path / "m.json"), str(tmp_path / "rig"), "--profile", "f0"]
     got = CliRunner().invoke(application(), [*asked, "--out", str(tmp_path / "out")])
     assert got.exit_code == 0, got.output
     assert "profile of f0: bounded" in got.stdout
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
         "made.json",
-        "numbers.csv",
+        "parameters.csv",
         "profile.csv",
         "profile.svg",
     }

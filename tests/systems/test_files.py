@@ -90,7 +90,7 @@ def test_a_report_with_controllers_side_by_side(tmp_path, monkeypatch):
     done = CliRunner().invoke(
         application(),
         ["simulate", str(tmp_path / "frame.toml"), "--input", str(tmp_path / "quake.csv"), "--damper",
-         str(tmp_path / "model.json"), "--control", "skyhook", "--beside", "sh-add:crossover_Hz=3", "--out",
+         str(tmp_path / "model.json"), "--control", "skyhook", "--compare", "sh-add:crossover_Hz=3", "--out",
          str(tmp_path / "out"), "--json"],
     )  # fmt: skip
     assert done.exit_code == 0, done.output
@@ -125,7 +125,7 @@ def test_options_that_contradict_each_other(tmp_path):
         (["--without-damper", "--draws", "10"], "draws without a damper"),
         (["--damper", str(tmp_path / "model.json"), "--draws", "10"], "E_CERTAINTY"),
         (["--damper", str(tmp_path / "model.json"), "--fmu", str(tmp_path / "law.fmu")], "no law to export"),
-        (["--without-damper", "--beside", "all"], "--out"),
+        (["--without-damper", "--compare", "all"], "--out"),
         (["--without-damper", "--time-scale", "5"], "E_RECORD"),
     ):
         done = CliRunner().invoke(application(), base + extra)

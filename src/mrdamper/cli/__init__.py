@@ -1,7 +1,7 @@
-"""The command line: argument parsing only; the work is done by `workflow`.
+"""The command line: argument parsing only; `study`, `report` and the other packages do the work.
 
-Exit status: 0 done, 2 the user's input or a machine that has run out of something (one line says
-what, where and how to mend it), 1 our fault, 128 and the number of the signal that ended it.
+Exit status: 0 done; 2 unusable input or exhausted resources (one line states what was found, where,
+and what to do); 1 internal error; 128 plus the signal number where a signal ended the process.
 """
 
 from __future__ import annotations
@@ -21,9 +21,10 @@ from typing import Any, NoReturn
 import typer
 
 from mrdamper.cli import commands
+from mrdamper.cli.help import CommandGroups, OptionGroups
 from mrdamper.errors import InputError, ResourceError, resource_error
 
-_LEAST_MEMORY = 2 * 2**30  # bytes; a study of the bundled data maps 1.3e9
+_MIN_ADDRESS_SPACE = 2 * 2**30  # address space [bytes]; a study of the bundled data maps 1.3e9
 
 
 def main() -> None:
@@ -37,7 +38,7 @@ def main() -> None:
         with _ended_by_signals():
             application()(prog_name="mrdamper")
     except BrokenPipeError:
-        # Whoever read has gone; nothing more is said, not even by the flush at the end.
+        # The reader of the pipe has closed it: write nothing more, not even in the final flush.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
     except _EndedError as end:
@@ -49,29 +50,29 @@ def main() -> None:
         typed = error if isinstance(error, InputError) else resource_error(error)
         if typed is None:
             traceback.print_exc()
-            _say("this is our fault, not yours; please report the lines above")
+            _say("internal error; please report the lines above")
             sys.exit(1)
         _say(str(typed))
         sys.exit(2)
 
 
 def _require_memory() -> None:
-    """Refuse a limit of address space under which the libraries for tables abort, or sleep for ever."""
+    """Refuse an address-space limit under which the table libraries abort or hang."""
     try:
         import resource
     except ImportError:
         return  # no such limit on this system
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if limit != resource.RLIM_INFINITY and limit < _LEAST_MEMORY and not {"--help", "--version"} & set(sys.argv):
+    if limit != resource.RLIM_INFINITY and limit < _MIN_ADDRESS_SPACE and not {"--help", "--version"} & set(sys.argv):
         raise ResourceError(
             f"the limit of address space is {limit / 2**20:.0f} MiB",
-            mend=f"raise it to {_LEAST_MEMORY / 2**20:.0f} MiB or more (ulimit -v)",
+            mend=f"raise it to {_MIN_ADDRESS_SPACE / 2**20:.0f} MiB or more (ulimit -v)",
             code="E_MEMORY",
         )
 
 
 class _EndedError(BaseException):
-    """A signal asked this process to end; `finally` and `with` still clean up."""
+    """Request of a signal to end this process; `finally` and `with` still clean up."""
 
     def __init__(self, number: int):
         self.number = number
@@ -81,8 +82,8 @@ class _EndedError(BaseException):
 @contextmanager
 def _ended_by_signals() -> Iterator[None]:
     def end(number: int, frame: FrameType | None) -> NoReturn:
-        for known in before:
-            signal.signal(known, signal.SIG_IGN)  # a second one would come between the cleaning up
+        for handled in before:
+            signal.signal(handled, signal.SIG_IGN)  # a second signal would interrupt the clean-up
         raise _EndedError(number)
 
     before: dict[int, Any] = {}
@@ -104,10 +105,11 @@ def _say(text: str) -> None:
 
 
 def application() -> typer.Typer:
-    """The commands: every module in `commands` adds its own."""
+    """Build the application; every module in `commands` registers its own command."""
     app = typer.Typer(
         name="mrdamper",
-        help="From magnetorheological damper test records to a validated model.",
+        cls=CommandGroups,
+        help="Identify magnetorheological dampers from test-rig files; validate, predict and export the model.",
         no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,
@@ -116,6 +118,8 @@ def application() -> typer.Typer:
     app.callback()(_root)
     for module in sorted(pkgutil.iter_modules(commands.__path__), key=lambda m: m.name):
         importlib.import_module(f"{commands.__name__}.{module.name}").register(app)
+    for command in app.registered_commands:
+        command.cls = OptionGroups
     return app
 
 

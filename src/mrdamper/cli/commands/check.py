@@ -1,4 +1,4 @@
-"""`mrdamper check`: the quality verdicts on a stored dataset, or what an exported FMU is worth."""
+"""`mrdamper check`: quality checks of a stored dataset, or checks of an exported FMU."""
 
 from __future__ import annotations
 
@@ -35,12 +35,16 @@ def register(app: typer.Typer) -> None:
     @app.command(epilog="Example: mrdamper check rig/ --figure loops.png")
     def check(
         data: Path | None = typer.Argument(None, help="Dataset folder, or an .fmu; default: the bundled tests."),
-        figure: Path | None = typer.Option(None, "--figure", help="Loops with flagged samples: PNG, SVG or PDF."),
+        figure: Path | None = typer.Option(
+            None, "--figure", help="Draw the loops with flagged samples: PNG, SVG or PDF."
+        ),
         as_json: bool = typer.Option(False, "--json", help="Print JSON instead of a table."),
     ) -> None:
-        """Judge every run of a dataset again: sign, lag, clipping, distortion, drift; exit 2 if one is refused.
+        """Check the quality of every run of a dataset.
 
-        An FMU that mrdamper exported is loaded and has to answer its reference motion.
+        Sign, lag, clipping, distortion and drift are checked; the exit status is 2 if a run is refused.
+
+        An exported FMU is loaded and compared with its reference force.
         """
         from mrdamper.cli.output import put
         from mrdamper.cli.progress import watched
@@ -51,7 +55,7 @@ def register(app: typer.Typer) -> None:
 
         if data is not None and data.suffix.lower() == ".fmu":
             if figure is not None:
-                raise InputError("--figure for an FMU", mend="leave --figure out: it shows tests", code="E_OPTION")
+                raise InputError("--figure for an FMU", mend="omit --figure, which draws test runs", code="E_OPTION")
             _check_fmu(data, as_json)
             return
         if figure is not None:

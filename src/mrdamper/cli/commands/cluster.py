@@ -5,16 +5,16 @@ from __future__ import annotations
 import typer
 
 _TEXT = """\
-A cluster is a scheduler and any number of workers; fleets run on Dask: pip install 'mrdamper[fleet]'
-on every machine, the same version. All of them have to see the records under the same path.
+A cluster is a scheduler and any number of workers. Install the same version on every machine with
+pip install 'mrdamper[fleet]'. All machines must reach the files under the same path.
 
-1. One private network, or one machine (whoever reaches the port can run code there):
+1. One private network, or one machine (anybody who reaches the port can run code there):
 
    on one machine      dask scheduler --host {host} --port {port} --no-dashboard
    on every machine    dask worker tcp://{host}:{port} --nworkers auto --nthreads 1 --no-dashboard
    then                mrdamper fleet records/ --out line/ --scheduler tcp://{host}:{port}
 
-2. Over a network others use: encrypted, and only for who holds a certificate of yours.
+2. Over a shared network: encrypted, for holders of your certificate only.
 
    once                openssl req -x509 -newkey rsa:3072 -nodes -days 365 -subj /CN=mrdamper-fleet \\
                          -addext "basicConstraints=critical,CA:TRUE" -keyout tls/key.pem -out tls/cert.pem
@@ -25,8 +25,8 @@ on every machine, the same version. All of them have to see the records under th
                          --tls-ca-file tls/ca.pem --tls-cert tls/cert.pem --tls-key tls/key.pem
    then                mrdamper fleet records/ --out line/ --scheduler tls://{host}:{port} --tls tls/
 
-The journal lies where mrdamper fleet runs, on a local disk. A worker, the scheduler or the command may
-die: run the same command again. On Slurm, PBS or Kubernetes, dask-jobqueue and dask-kubernetes start
+The journal is written where mrdamper fleet runs, on a local disk. If a worker, the scheduler or the
+command stops, run the same command again. On Slurm, PBS or Kubernetes, dask-jobqueue and dask-kubernetes start
 the same scheduler and workers."""
 
 
@@ -38,5 +38,5 @@ def register(app: typer.Typer) -> None:
         host: str = typer.Option("127.0.0.1", "--host", help="Address of the machine the scheduler will run on."),
         port: int = typer.Option(8786, "--port", min=1, max=65535, help="Its port."),
     ) -> None:
-        """Print how to start a cluster for `mrdamper fleet --scheduler`; start nothing."""
+        """Show how to start a computing cluster for fleet."""
         print(_TEXT.format(host=host, port=port))

@@ -1,4 +1,4 @@
-"""`mrdamper compare`: all models on the same data."""
+"""`mrdamper compare`: several models identified from the same data."""
 
 from __future__ import annotations
 
@@ -17,13 +17,17 @@ def register(app: typer.Typer) -> None:
         out: Path = typer.Option(..., "--out", help="Folder for comparison.html, tables and figures."),
         models: list[str] = typer.Option([], "--models", help="Only this model; may be repeated. Default: all."),
         genetic: bool = typer.Option(
-            False, "--genetic", help="Also by genetic algorithm, 60 generations; takes minutes."
+            False, "--genetic", help="Also identify by genetic algorithm, 60 generations (minutes)."
         ),
-        jobs: int | None = typer.Option(None, "--jobs", min=1, help="Processes; default one a core."),
-        png: bool = typer.Option(False, "--png", help="Figures as PNG beside the SVG."),
+        jobs: int | None = typer.Option(None, "--jobs", min=1, help="Number of processes; default: one per core."),
+        png: bool = typer.Option(False, "--png", help="Also write every figure as PNG."),
         as_json: bool = typer.Option(False, "--json", help="Print the table as JSON."),
     ) -> None:
-        """Compare models: accuracy on train, left-out and held-out runs, numbers, data needed, time."""
+        """Compare models identified from the same data.
+
+        Reported per model: cross-validated and validation error, number of parameters, number of
+        runs needed, computing time.
+        """
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.dataset import load_dataset

@@ -1,4 +1,4 @@
-"""`mrdamper export`: hand a model on."""
+"""`mrdamper export`: a saved model in other formats."""
 
 from __future__ import annotations
 
@@ -19,12 +19,14 @@ def register(app: typer.Typer) -> None:
     def export(
         model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
         to: str = typer.Option(..., "--to", help="c, fmu, page, latex, markdown, table, adams."),
-        out: Path = typer.Option(..., "--out", help="Folder to write into; for fmu, page, latex, markdown a file."),
-        name: str | None = typer.Option(None, "--name", help="Of files and symbols; default: the rig."),
-        inverse: bool = typer.Option(False, "--inverse", help="For c and fmu: the current for a wanted force instead."),
-        fmi: int | None = typer.Option(None, "--fmi", help="For fmu: version of the standard, 2 (default) or 3."),
+        out: Path = typer.Option(..., "--out", help="Folder; for fmu, page, latex and markdown a file."),
+        name: str | None = typer.Option(None, "--name", help="Name of files and symbols; default: the rig."),
+        inverse: bool = typer.Option(
+            False, "--inverse", help="For c and fmu: the inverse model, current from demanded force."
+        ),
+        fmi: int | None = typer.Option(None, "--fmi", help="For fmu: FMI version, 2 (default) or 3."),
     ) -> None:
-        """Export a saved model: C99 source, FMU, web page, LaTeX or Markdown equations, force–velocity tables."""
+        """Export a model as C, FMU, web page, equations or tables."""
         from mrdamper.cli.progress import progress_soon
         from mrdamper.errors import InputError
         from mrdamper.export import exporter

@@ -1,4 +1,4 @@
-"""`mrdamper fleet`: the same study over thousands of dampers."""
+"""`mrdamper fleet`: identification of a population of dampers."""
 
 from __future__ import annotations
 
@@ -15,27 +15,34 @@ def register(app: typer.Typer) -> None:
     @app.command(epilog="Example: mrdamper fleet records/ --out line/ --workers 8")
     def fleet(
         source: Path = typer.Argument(
-            ..., metavar="SRC", help="Folder of datasets or of rig files, one a damper, or a Parquet lake."
+            ..., metavar="SRC", help="Folder of datasets or rig files, one per damper, or of Parquet files."
         ),
         out: Path = typer.Option(..., "--out", help="Folder for dampers.parquet and the journal."),
-        workers: int | None = typer.Option(None, "--workers", min=1, help="Processes; default one a core."),
+        workers: int | None = typer.Option(
+            None, "--workers", min=1, help="Number of processes; default: one per core."
+        ),
         scheduler: str | None = typer.Option(
-            None, "--scheduler", help="Address of a Dask scheduler (mrdamper cluster shows how to start one)."
+            None, "--scheduler", help="Address of a Dask scheduler (see mrdamper cluster)."
         ),
         tls: Path | None = typer.Option(
             None, "--tls", help="Folder with ca.pem, cert.pem and key.pem, for a tls:// scheduler."
         ),
         profile: Path | None = typer.Option(
-            None, "--profile", help="Fleet profile (TOML): where serial numbers stand, golden dampers, rig profile."
+            None, "--profile", help="Fleet profile (TOML): serial numbers, master dampers, rig profile."
         ),
         limits: Path | None = typer.Option(
-            None, "--limits", help="Limits (TOML), [limits.COLUMN] lower and upper: what passes and what fails."
+            None, "--limits", help="TOML file with limits of the result columns (mrdamper init limits)."
         ),
-        model: str = typer.Option("play-bypass", "--model", help="Identified from all runs of a damper."),
-        cold: bool = typer.Option(False, "--cold", help="Begin every search from nothing, to check the fast lane."),
-        as_json: bool = typer.Option(False, "--json", help="Print a summary a program can read."),
+        model: str = typer.Option("play-bypass", "--model", help="Model fitted to all runs of each damper."),
+        cold: bool = typer.Option(
+            False, "--cold", help="Start every search without a previous result (slower, for checking)."
+        ),
+        as_json: bool = typer.Option(False, "--json", help="Print the summary as JSON."),
     ) -> None:
-        """Identify every damper of a fleet into one table; interrupted at any moment, the same command goes on."""
+        """Identify many dampers and write one table.
+
+        An interrupted run continues when the same command is given again.
+        """
         import signal
 
         from mrdamper.cli.progress import progress_on_stderr
@@ -63,14 +70,14 @@ def register(app: typer.Typer) -> None:
                 page = found.table.with_name("fleet.html")
                 said = write_page(found.table, found.plan, bounds, page)
         except KeyboardInterrupt:
-            typer.echo("stopped; what was finished is safe: run the same command again to go on", err=True)
+            typer.echo("stopped; finished dampers are saved: run the same command again to continue", err=True)
             raise typer.Exit(130) from None
         for name, status, reason in found.troubled:
             typer.echo(f"{status}: {name}: {reason}", err=True)
         if as_json:
             print(json.dumps({**_summary(found), "page": str(page), "said": said}, indent=1, ensure_ascii=False))
         else:
-            print(f"{found.done} of {found.dampers} dampers identified ({found.already} were already)")
+            print(f"{found.done} of {found.dampers} dampers identified ({found.already} in an earlier run)")
             print("\n".join(said), end="\n" if said else "")
             print(f"table: {found.table}\npage: {page}")
         if not found.done:

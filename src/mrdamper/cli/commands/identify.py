@@ -1,4 +1,4 @@
-"""`mrdamper identify`: one model, run by run."""
+"""`mrdamper identify`: one model identified from each run."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-_MOST_DOUBTS = 10  # lines on the screen
+_MAX_WARNINGS = 10  # number of lines on the terminal
 
 
 def register(app: typer.Typer) -> None:
@@ -17,19 +17,19 @@ def register(app: typer.Typer) -> None:
         data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests."),
         model: str = typer.Option("bouc-wen", "--model", help="Name of the model."),
         method: str = typer.Option("projection", "--method", help="Name of the identification method."),
-        free: list[str] = typer.Option([], "--free", help="Preset parameter to determine as well; may be repeated."),
-        fix: list[str] = typer.Option([], "--fix", help="NAME=VALUE [SI] held fixed; may be repeated."),
-        setting: list[str] = typer.Option([], "--set", help="SWITCH=VALUE of the method; may be repeated."),
+        free: list[str] = typer.Option([], "--free", help="Also identify this preset parameter; may be repeated."),
+        fix: list[str] = typer.Option([], "--fix", help="NAME=VALUE [SI]: fix a parameter; may be repeated."),
+        setting: list[str] = typer.Option([], "--set", help="SETTING=VALUE of the method; may be repeated."),
         gas: str | None = typer.Option(
-            None, "--gas", help="Known gas spring: pressure MPa, volume cm3, rod area mm2, as P,V,A."
+            None, "--gas", help="Gas spring as P,V,A: pressure [MPa], volume [cm3], rod area [mm2]."
         ),
-        delay: bool = typer.Option(False, "--delay", help="Also determine a delay of the force, within 3 ms."),
-        clipped: bool = typer.Option(False, "--clipped", help="Use records with a channel cut off at its extreme too."),
-        run: list[str] = typer.Option([], "--run", help="Only this run; may be repeated."),
+        delay: bool = typer.Option(False, "--delay", help="Also identify a delay of the force up to 3 ms."),
+        clipped: bool = typer.Option(False, "--clipped", help="Also use runs with a clipped channel."),
+        run: list[str] = typer.Option([], "--run", help="Identify only this run; may be repeated."),
         out: Path | None = typer.Option(None, "--out", help="CSV to write; default: standard output."),
         as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
     ) -> None:
-        """Identify a model from every sine run of a dataset, run by run."""
+        """Identify one model from every sine run, one run at a time."""
         from mrdamper import identification
         from mrdamper.cli.output import parse_fixed, parse_gas, parse_pairs, put
         from mrdamper.cli.progress import progress_on_stderr
@@ -69,7 +69,7 @@ def register(app: typer.Typer) -> None:
             typer.echo(f"not identified: {name}: {why}", err=True)
         put(identification_rows(found), out, as_json, csv_text)
         doubts = [f"warning: run {one.run_id}: {doubt}" for one in found for doubt in one.doubts]
-        for line in doubts[:_MOST_DOUBTS]:
+        for line in doubts[:_MAX_WARNINGS]:
             typer.echo(line, err=True)
-        if len(doubts) > _MOST_DOUBTS:
-            typer.echo(f"warning: {len(doubts) - _MOST_DOUBTS} more of this kind in the column notes", err=True)
+        if len(doubts) > _MAX_WARNINGS:
+            typer.echo(f"warning: {len(doubts) - _MAX_WARNINGS} more of this kind in the column notes", err=True)

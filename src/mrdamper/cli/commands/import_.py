@@ -1,4 +1,4 @@
-"""`mrdamper import`: a rig's own files become a dataset."""
+"""`mrdamper import`: conversion of test-rig files to a dataset."""
 
 from __future__ import annotations
 
@@ -23,10 +23,12 @@ def register(app: typer.Typer) -> None:
         "mrdamper import tests/a.csv --write-profile rig.toml; mrdamper import tests --write-tests tests/tests.csv",
     )
     def import_(
-        files: list[Path] = typer.Argument(..., help="Files of a rig, or folders of them."),
+        files: list[Path] = typer.Argument(..., help="Test-rig files, or folders of them."),
         out: Path | None = typer.Option(None, "--out", help="Dataset folder to write."),
         add: bool = typer.Option(False, "--add", help="Add to the dataset there instead of writing a new one."),
-        profile: Path | None = typer.Option(None, "--profile", help="Rig profile (TOML): what the files do not say."),
+        profile: Path | None = typer.Option(
+            None, "--profile", help="Rig profile (TOML): columns and units (mrdamper init profile)."
+        ),
         tests: Path | None = typer.Option(
             None, "--tests", help="Table of tests: current, split, session of each; default: tests.csv of the folder."
         ),
@@ -40,7 +42,10 @@ def register(app: typer.Typer) -> None:
         quiet: bool = typer.Option(False, "--quiet", help="No progress."),
         as_json: bool = typer.Option(False, "--json", help="Print JSON a program can read."),
     ) -> None:
-        """Read a rig's files, judge every test, and write them as a dataset: all, or nothing."""
+        """Read test-rig files, check every test and write a dataset.
+
+        Without --skip-refused nothing is written if one test is refused.
+        """
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.errors import InputError
         from mrdamper.rig_files.profile import Profile, load_profile

@@ -1,4 +1,4 @@
-"""`mrdamper models`: what there is to choose from."""
+"""`mrdamper models`: list of the damper models."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ def register(app: typer.Typer) -> None:
     @app.command(epilog="Example: mrdamper models spencer")
     def models(
         name: str | None = typer.Argument(None, help="Show this model in full; default: list all."),
-        as_json: bool = typer.Option(False, "--json", help="Print JSON a program can read."),
+        as_json: bool = typer.Option(False, "--json", help="Print JSON."),
     ) -> None:
-        """List the damper models and published dampers, or show one: equation, parameters, source."""
+        """List the models, or show equation, parameters and source of one."""
         from mrdamper.dampers.published import all_published
         from mrdamper.discovery import named
         from mrdamper.models import all_models

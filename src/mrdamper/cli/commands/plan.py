@@ -1,4 +1,4 @@
-"""`mrdamper plan`: which tests next."""
+"""`mrdamper plan`: proposal of the next tests."""
 
 from __future__ import annotations
 
@@ -12,17 +12,22 @@ def register(app: typer.Typer) -> None:
 
     @app.command(epilog="Example: mrdamper plan model.json --limits limits.toml --hours 2 --out next")
     def plan(
-        model: Path | None = typer.Argument(None, help="model.json written by mrdamper study; none: a first matrix."),
+        model: Path | None = typer.Argument(
+            None, help="model.json written by mrdamper study; omit for a first test matrix."
+        ),
         limits: Path | None = typer.Option(
-            None, "--limits", help="TOML: current_A, frequency_Hz, amplitude_mm = [lowest, highest], velocity_m_s, ..."
+            None, "--limits", help="TOML file with limits of the test rig (mrdamper init limits)."
         ),
-        hours: float = typer.Option(..., "--hours", help="Rig time [h], sessions set up in it."),
+        hours: float = typer.Option(..., "--hours", help="Rig time [h], including setting up."),
         about: str | None = typer.Option(
-            None, "--about", help="The doubt to shrink: a number of the model, or A,Hz,mm; default: the whole envelope."
+            None, "--about", help="Parameter, or condition A,Hz,mm, to be determined best; default: all conditions."
         ),
-        out: Path = typer.Option(..., "--out", help="Folder for plan.csv and the records to play."),
+        out: Path = typer.Option(..., "--out", help="Folder for plan.csv and one motion file per test."),
     ) -> None:
-        """Propose the records that shrink a doubt about a damper most, or a first test matrix."""
+        """Propose the tests that reduce the uncertainty most.
+
+        Without a model a first test matrix within the limits of the rig is proposed.
+        """
         import numpy as np
 
         from mrdamper.cli.progress import progress_soon

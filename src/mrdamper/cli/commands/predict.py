@@ -1,4 +1,4 @@
-"""`mrdamper predict`: the force at a condition, or along a motion."""
+"""`mrdamper predict`: damper force at a test condition or along a motion."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from mrdamper.dampers.base import Prediction
 
 WARNINGS = {
-    "not a sine": "the motion is no sine; a model over frequency and amplitude uses running estimates of them",
-    "sampling": "fewer than two samples fall into the knee after a reversal; sample the motion faster",
+    "not a sine": "the motion is not sinusoidal; frequency and amplitude are estimated along it",
+    "sampling": "fewer than two samples within the yield displacement after a reversal; increase the sampling rate",
 }
 
 
@@ -33,19 +33,21 @@ def register(app: typer.Typer) -> None:
             None, "--motion", help="CSV with time_s, displacement_m and optionally current_A."
         ),
         coil_lag: float | None = typer.Option(
-            None, "--coil-lag", help="Time constant of the coil [ms], in place of the model's own."
+            None, "--coil-lag", help="Time constant of the coil [ms]; default: the model's value."
         ),
         check_run: list[str] = typer.Option(
-            [], "--check-run", help="Predict for the session of this run of --data, corrected by it."
+            [], "--check-run", help="Check run of --data: correct gain and offset for its test session."
         ),
-        data: Path | None = typer.Option(
-            None, "--data", help="Dataset with the check runs; default: the bundled tests."
-        ),
-        level: float = typer.Option(0.9, "--level", help="Share of sessions whose force the band holds."),
+        data: Path | None = typer.Option(None, "--data", help="Dataset with the check runs; default: bundled tests."),
+        level: float = typer.Option(0.9, "--level", help="Coverage of the prediction interval."),
         out: Path | None = typer.Option(None, "--out", help="CSV to write; default: standard output."),
         as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
     ) -> None:
-        """Predict the force of a saved model at a condition, or along a motion from a file."""
+        """Predict the force at a test condition or along a motion.
+
+        The prediction interval of the peak force, the dissipated energy and the equivalent damping
+        are printed on standard error.
+        """
         from dataclasses import replace
 
         from mrdamper.cli.output import put
@@ -62,7 +64,9 @@ def register(app: typer.Typer) -> None:
 
         for name, value in (("--current", current), ("--frequency", frequency), ("--amplitude", amplitude)):
             if value is not None and not 0 <= value < math.inf:
-                raise ConditionError(f"{name} {value:g}", mend="give zero or more; a field does not know a sign")
+                raise ConditionError(
+                    f"{name} {value:g}", mend="give zero or more; the force depends on the magnitude only"
+                )
         student(level, 1.0)  # refuses a level that is none
         require_writable(out)
         damper = load_model(model)
@@ -71,7 +75,7 @@ def register(app: typer.Typer) -> None:
             damper = replace(damper, coil=Coil(1e-3 * coil_lag, 1e-3 * coil_lag, driver))  # type: ignore[type-var]
         if motion is not None:
             if frequency is not None or amplitude is not None:
-                raise InputError("--motion beside --frequency or --amplitude", mend="give one or the other")
+                raise InputError("--motion together with --frequency or --amplitude", mend="give one of them")
             prediction = damper.predict_run(load_motion(motion, current))
         else:
             if current is None or frequency is None or amplitude is None:
@@ -81,7 +85,7 @@ def register(app: typer.Typer) -> None:
             prediction = damper.predict(Condition(current, frequency, 1e-3 * amplitude))
         for flag in prediction.extrapolation:
             typer.echo(
-                f"warning: {WARNINGS.get(flag, f'{flag} lies outside the tests this model was identified from')}",
+                f"warning: {WARNINGS.get(flag, f'{flag} lies outside the tested range (extrapolation)')}",
                 err=True,
             )
         known = band(damper, prediction, level)

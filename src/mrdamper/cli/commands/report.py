@@ -1,4 +1,4 @@
-"""`mrdamper report`: a test report of one damper, or of several side by side."""
+"""`mrdamper report`: test report of one damper, or comparison of several."""
 
 from __future__ import annotations
 
@@ -16,14 +16,24 @@ def register(app: typer.Typer) -> None:
 
     @app.command(epilog="Example: mrdamper report before/ after/ --about about.toml --out report/")
     def report(
-        specimens: list[str] = typer.Argument(help="Dataset folders, one a damper; FOLDER:RIG where it holds several."),
+        specimens: list[str] = typer.Argument(help="Dataset folders, one per damper; FOLDER:RIG if it holds several."),
         out: Path = typer.Option(..., "--out", help="Folder for report.html, report.pdf, tables and figures."),
-        about: Path | None = typer.Option(None, "--about", help="TOML with title, customer, specimen, rig, logo, ..."),
-        limits: Path | None = typer.Option(None, "--limits", help="TOML with bands the forces must lie in."),
-        velocities: str = typer.Option("", "--velocities", help="Velocities of the table of forces, m/s: 0.05,0.1,0.2"),
-        png: bool = typer.Option(False, "--png", help="Figures as PNG beside SVG and PDF."),
+        about: Path | None = typer.Option(
+            None, "--about", help="TOML file with customer, specimen, logo (mrdamper init about)."
+        ),
+        limits: Path | None = typer.Option(
+            None, "--limits", help="TOML file with force limits (mrdamper init limits)."
+        ),
+        velocities: str = typer.Option(
+            "", "--velocities", help="Velocities of the force table [m/s], such as 0.05,0.1,0.2."
+        ),
+        png: bool = typer.Option(False, "--png", help="Also write every figure as PNG."),
     ) -> None:
-        """Write a test report: forces at set velocities, peak force over velocity, cycles, friction, gas force."""
+        """Write a test report of one or several dampers.
+
+        It holds forces at set velocities, peak force over velocity, cycles, friction and gas force.
+        No model is identified.
+        """
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.files.atomic import require_writable
         from mrdamper.report.about import load_about, load_limits, parse_ladder

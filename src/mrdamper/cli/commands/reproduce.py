@@ -13,7 +13,8 @@ def register(app: typer.Typer) -> None:
     """Add the command."""
 
     @app.command(
-        help="Reproduce the study of Qian et al. 2024, claim by claim, on the (synthetic) virtual rig or on data."
+        epilog="Example: mrdamper reproduce --out result/",
+        help="Reproduce the study of Qian et al. (2024).\n\nOn the virtual rig (synthetic data) or on a dataset.",
     )
     def reproduce(
         out: Path = typer.Option(..., "--out", help="Folder for reproduction.html, tables and figures."),

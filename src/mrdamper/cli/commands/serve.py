@@ -1,4 +1,4 @@
-"""`mrdamper serve`: the live bench, a local page."""
+"""`mrdamper serve`: the app, a page served on this machine."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ def register(app: typer.Typer) -> None:
 
     @app.command(epilog="Example: mrdamper serve --port 8765")
     def serve(
-        port: int = typer.Option(8765, "--port", min=0, max=65535, help="Port on this machine; 0 for any free one."),
+        port: int = typer.Option(8765, "--port", min=0, max=65535, help="Port on this machine; 0: any free port."),
         browser: bool = typer.Option(True, "--browser/--no-browser", help="Open the page in the browser."),
     ) -> None:
-        """Open the live bench: drop rig files, see loops, identify, move the damper, take the report away."""
+        """Open the app: import files, identify, explore and export."""
         from mrdamper.errors import MissingExtraError
 
         missing = [name for name in _NEEDS if importlib.util.find_spec(name) is None]
         if missing:
-            raise MissingExtraError(f"the live bench needs {', '.join(missing)}", mend="pip install 'mrdamper[web]'")
+            raise MissingExtraError(f"the app needs {', '.join(missing)}", mend="pip install 'mrdamper[web]'")
         from mrdamper.web.server import serve as run
 
         ended_by = run(port, browser)
         sys.stdout.flush()
-        # All is cleaned up; threads that still compute for a session are not waited for.
+        # Clean-up is complete; computing threads are not waited for.
         os._exit(0 if ended_by == signal.SIGINT else 128 + ended_by)  # Ctrl-C is the way to stop it

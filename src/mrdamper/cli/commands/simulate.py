@@ -1,4 +1,4 @@
-"""`mrdamper simulate`: a damper at work in a building or a vehicle."""
+"""`mrdamper simulate`: a vehicle or building with dampers and a controller."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def register(app: typer.Typer) -> None:
 
     @app.command(epilog="Example: mrdamper simulate dyke1996 --input elcentro --time-scale 5 --volts 2.25 --json")
     def simulate(
-        system: str = typer.Argument(..., help="dyke1996, quarter-car, half-car, or a system TOML file."),
+        system: str = typer.Argument(..., help="dyke1996, quarter-car, half-car, or a TOML file of the system."),
         source: str = typer.Option(
             ...,
             "--input",
@@ -35,23 +35,29 @@ def register(app: typer.Typer) -> None:
         current: float | None = typer.Option(
             None, "--current", help="Constant current [A]; with a controller, the largest."
         ),
-        volts: float | None = typer.Option(None, "--volts", help="The same as a command to the damper's driver [V]."),
-        without: bool = typer.Option(False, "--without-damper", help="Take the dampers out."),
-        time_scale: float = typer.Option(1.0, "--time-scale", help="How many times faster a record is played."),
-        step: float | None = typer.Option(None, "--step", help="Time step [s]; default: found by halving."),
-        beside: list[str] | None = typer.Option(
-            None, "--beside", help="More controllers for the report, or all: side by side, up to the preview bound."
+        volts: float | None = typer.Option(
+            None, "--volts", help="Command voltage of the current driver [V], instead of --current."
+        ),
+        without: bool = typer.Option(False, "--without-damper", help="Simulate the system without dampers."),
+        time_scale: float = typer.Option(
+            1.0, "--time-scale", help="Factor by which the input record is played faster."
+        ),
+        step: float | None = typer.Option(
+            None, "--step", help="Time step [s]; default: halved until peak values converge."
+        ),
+        compare: list[str] | None = typer.Option(
+            None, "--compare", help="Controllers to compare in the report, or all; may be repeated."
         ),
         draws: int | None = typer.Option(
-            None, "--draws", help="Runs with dampers drawn from what the tests leave open: bands of 5 to 95 %."
+            None, "--draws", help="Monte Carlo runs over the parameter uncertainty: 5 to 95 % intervals."
         ),
-        seed: int = typer.Option(1, "--seed", help="Of --draws."),
-        out: Path | None = typer.Option(None, "--out", help="Folder for simulation.html, time histories and measures."),
-        law_out: Path | None = typer.Option(None, "--c", help="Folder for the control law as C99."),
-        law_fmu: Path | None = typer.Option(None, "--fmu", help="File for the control law as an FMU."),
+        seed: int = typer.Option(1, "--seed", help="Random seed of --draws."),
+        out: Path | None = typer.Option(None, "--out", help="Folder for simulation.html, time histories and results."),
+        law_out: Path | None = typer.Option(None, "--c", help="Folder for the controller as C99 source."),
+        law_fmu: Path | None = typer.Option(None, "--fmu", help="File for the controller as FMU."),
         as_json: bool = typer.Option(False, "--json", help="Print JSON, SI units."),
     ) -> None:
-        """Simulate a building or a vehicle with its dampers, and print what they let through."""
+        """Simulate a vehicle or building with dampers and a controller."""
         from mrdamper.cli.output import parse_named
         from mrdamper.cli.progress import progress_soon
         from mrdamper.errors import InputError
@@ -66,8 +72,8 @@ def register(app: typer.Typer) -> None:
 
         if out is not None:
             require_writable(out)
-        elif beside:
-            raise InputError("--beside without --out", mend="give a folder for the report")
+        elif compare:
+            raise InputError("--compare without --out", mend="give a folder for the report")
         found = load_system(system)
         shaken_by = load_input(*parse_named(source, "--input"), time_scale=time_scale)
         dampers: dict[str, Damper] = {} if without else dict(found.dampers)
@@ -85,18 +91,18 @@ def register(app: typer.Typer) -> None:
         controller = _controller(control)
         if control == "passive" and highest is not None:
             controller = with_values(controller_type("passive"), {"current_A": highest})
-        others = [_controller(text) for text in _all_of(beside or [])]
+        others = [_controller(text) for text in _all_of(compare or [])]
         if others and not dampers:
-            raise InputError("controllers without a damper", mend="leave out --without-damper or --beside")
+            raise InputError("controllers without a damper", mend="omit --without-damper or --compare")
         if law_out is not None or law_fmu is not None:
             _export_law(Loop(found.system, shaken_by, dampers, controller, highest), law_out, law_fmu)
         drawn = None
         if draws is not None:
             if not dampers:
-                raise InputError("draws without a damper", mend="leave out --without-damper or --draws")
+                raise InputError("draws without a damper", mend="omit --without-damper or --draws")
             drawn = draw(dampers, draws, seed)
         bands, paths = None, []
-        with progress_soon(f"{found.system.title}, finer until the peaks settle") as tell:
+        with progress_soon(f"{found.system.title}, time step halved until peaks converge") as tell:
             done = simulate_system(found.system, shaken_by, dampers, controller, step, highest)
             if drawn is not None:
                 loop = Loop(found.system, shaken_by, dampers, controller, highest, free=True)

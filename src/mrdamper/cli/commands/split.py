@@ -1,4 +1,4 @@
-"""`mrdamper split`: which runs of a dataset are held out for validation."""
+"""`mrdamper split`: choice of the validation runs of a dataset."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ def register(app: typer.Typer) -> None:
     @app.command(epilog="Example: mrdamper split rig; mrdamper split rig --current 0.5; mrdamper split rig --every 4")
     def split(
         data: Path = typer.Argument(..., help="Dataset folder."),
-        run: list[str] = typer.Option([], "--run", help="Hold this run out; may be repeated."),
-        current: list[float] = typer.Option([], "--current", help="Hold every run at this current out [A]."),
-        condition: list[str] = typer.Option([], "--condition", help="Hold this condition out: A,Hz,mm."),
-        every: int | None = typer.Option(None, "--every", min=2, help="Hold every n-th run out."),
-        none: bool = typer.Option(False, "--none", help="Hold nothing out."),
-        replace: bool = typer.Option(False, "--replace", help="Give up the split that the dataset has."),
+        run: list[str] = typer.Option([], "--run", help="Use this run for validation; may be repeated."),
+        current: list[float] = typer.Option([], "--current", help="Use every run at this current for validation [A]."),
+        condition: list[str] = typer.Option([], "--condition", help="Use this condition for validation: A,Hz,mm."),
+        every: int | None = typer.Option(None, "--every", min=2, help="Use every n-th run for validation."),
+        none: bool = typer.Option(False, "--none", help="Use all runs for identification."),
+        replace: bool = typer.Option(False, "--replace", help="Replace the present split of the dataset."),
     ) -> None:
-        """Hold runs out: by hand, by condition, a whole current, every n-th, or a stratified fifth.
+        """Choose the validation runs of a dataset.
 
-        Held-out runs are never identified from; every report scores the model on them.
+        Without options a stratified fifth of the runs is chosen. Validation runs are never used for
+        identification; reports state the error on them.
         """
         from mrdamper.files.dataset import load_dataset, store_split
         from mrdamper.study.split import hold_out
@@ -34,4 +35,4 @@ def register(app: typer.Typer) -> None:
         store_split(data, chosen.held_out)
         for item in dataset:
             print(f"{'validate' if item.id in chosen.held_out else 'train':8}  {item.id}  {chosen.shown[item.id]}")
-        print(f"{len(chosen.held_out)} of {len(dataset)} runs held out: {chosen.reason}")
+        print(f"{len(chosen.held_out)} of {len(dataset)} runs are validation runs: {chosen.reason}")

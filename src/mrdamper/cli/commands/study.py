@@ -1,4 +1,4 @@
-"""`mrdamper study`: the whole method on a dataset."""
+"""`mrdamper study`: identification, validation and report of a dataset."""
 
 from __future__ import annotations
 
@@ -16,17 +16,23 @@ def register(app: typer.Typer) -> None:
     def study(
         data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests of two dampers."),
         out: Path = typer.Option(..., "--out", help="Folder for report.html, model.json, tables and figures."),
-        model: str | None = typer.Option(None, "--model", help="Save this model instead of the best."),
+        model: str | None = typer.Option(None, "--model", help="Save this model instead of the best one."),
         about: Path | None = typer.Option(
-            None, "--about", help="TOML with title, customer, specimen, ...; makes a PDF."
+            None, "--about", help="TOML file with customer, specimen, logo (mrdamper init about)."
         ),
-        limits: Path | None = typer.Option(None, "--limits", help="TOML with bands the measured forces must lie in."),
-        pdf: bool = typer.Option(False, "--pdf", help="report.pdf too, and every figure as PDF."),
-        png: bool = typer.Option(False, "--png", help="Figures as PNG beside the SVG."),
-        lag: bool = typer.Option(False, "--lag", help="Refuse tests that cannot show the lags of the coil."),
-        as_json: bool = typer.Option(False, "--json", help="Print a summary a program can read."),
+        limits: Path | None = typer.Option(
+            None, "--limits", help="TOML file with force limits (mrdamper init limits)."
+        ),
+        pdf: bool = typer.Option(False, "--pdf", help="Also write report.pdf and every figure as PDF."),
+        png: bool = typer.Option(False, "--png", help="Also write every figure as PNG."),
+        lag: bool = typer.Option(False, "--lag", help="Require tests from which the coil lag can be identified."),
+        as_json: bool = typer.Option(False, "--json", help="Print the summary as JSON."),
     ) -> None:
-        """Study a dataset: identify every run, map the parameters, validate; write report and models."""
+        """Identify, validate and report a dataset in one step.
+
+        Every run is identified, models of the whole damper are fitted and cross-validated, and the
+        best is saved with a report.
+        """
         from mrdamper.cli.output import percent, spread
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.dampers.certainty import table, unsure
@@ -43,8 +49,8 @@ def register(app: typer.Typer) -> None:
         dataset = load_dataset(data)
         if lag and not any(run.current_changes for run in dataset.split("train")):
             raise IdentificationError(
-                "the current changes in no train run, and a lag of the coil shows nowhere else",
-                mend="record a current that is switched, or leave out --lag",
+                "the current is constant in every identification run, so the coil lag cannot be identified",
+                mend="record a run in which the current is switched, or omit --lag",
                 code="E_LAG",
             )
         workers = min(os.cpu_count() or 1, len(dataset.rigs))

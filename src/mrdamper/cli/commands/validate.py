@@ -1,4 +1,4 @@
-"""`mrdamper validate`: score a saved model on a dataset."""
+"""`mrdamper validate`: errors of a saved model on measured runs."""
 
 from __future__ import annotations
 
@@ -14,19 +14,24 @@ def register(app: typer.Typer) -> None:
     def validate(
         model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
         data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests."),
-        rig: str | None = typer.Option(None, "--rig", help="Score the runs of this rig instead."),
-        split: str | None = typer.Option(None, "--split", help="Only train or only validate runs."),
+        rig: str | None = typer.Option(None, "--rig", help="Use the runs of this rig instead."),
+        split: str | None = typer.Option(
+            None, "--split", help="Only identification (train) or only validation (validate) runs."
+        ),
         check_run: list[str] = typer.Option(
-            [], "--check-run", help="Correct the runs of its session by this run; once for each."
+            [], "--check-run", help="Check run that corrects its session; may be repeated."
         ),
         own_sessions: bool = typer.Option(
-            False, "--own-sessions", help="Correct runs of the model's own sessions by what it was identified from."
+            False, "--own-sessions", help="Correct for the sessions of the identification runs."
         ),
-        level: float = typer.Option(0.9, "--level", help="Share of runs whose peak force the band holds."),
+        level: float = typer.Option(0.9, "--level", help="Coverage of the prediction interval of the peak force."),
         out: Path | None = typer.Option(None, "--out", help="CSV to write; default: standard output."),
         as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
     ) -> None:
-        """Score a saved model on the runs of its rig: nrmse, wape, peak force and energy."""
+        """Calculate the errors of a saved model on measured runs.
+
+        Per run: nrmse_pp, nrmse_std, wape, errors of peak force and dissipated energy.
+        """
         from mrdamper.cli.output import put
         from mrdamper.cli.progress import watched
         from mrdamper.dampers.sessions import KNOWN, When, sessions_known

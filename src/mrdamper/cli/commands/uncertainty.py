@@ -1,4 +1,4 @@
-"""`mrdamper certainty`: how sure the numbers of a saved model are, and what its runs cannot tell."""
+"""`mrdamper uncertainty`: confidence intervals and limitations of a saved model."""
 
 from __future__ import annotations
 
@@ -10,19 +10,24 @@ import typer
 def register(app: typer.Typer) -> None:
     """Add the command."""
 
-    @app.command(epilog="Example: mrdamper certainty model.json rig/ --profile c1 --out sure/")
-    def certainty(
+    @app.command(epilog="Example: mrdamper uncertainty model.json rig/ --profile c1 --out uncertainty/")
+    def uncertainty(
         model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
         data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests."),
-        level: float = typer.Option(0.95, "--level", help="Share of such intervals that hold the truth."),
+        level: float = typer.Option(0.95, "--level", help="Confidence level of the intervals."),
         profile: list[str] = typer.Option(
-            [], "--profile", help="Number whose likelihood is followed; may be repeated."
+            [], "--profile", help="Parameter whose profile likelihood is computed; may be repeated."
         ),
-        samples: bool = typer.Option(False, "--samples", help="Markov chains over all numbers; needs mrdamper[uq]."),
-        steps: int = typer.Option(4000, "--steps", help="Of each chain."),
-        out: Path | None = typer.Option(None, "--out", help="Folder for numbers.csv, profile.svg, corner.svg."),
+        samples: bool = typer.Option(
+            False, "--samples", help="Sample the posterior by Markov chains; needs mrdamper[uq]."
+        ),
+        steps: int = typer.Option(4000, "--steps", help="Steps of each Markov chain."),
+        out: Path | None = typer.Option(None, "--out", help="Folder for parameters.csv, profile.svg, corner.svg."),
     ) -> None:
-        """Say how sure a model's numbers are: intervals, what the tests cannot tell, profiles, samples."""
+        """Print confidence intervals and limitations of a model.
+
+        Options add profile likelihoods of single parameters and samples of the posterior.
+        """
         from mrdamper.dampers.certainty import table, unsure
         from mrdamper.dampers.covariance import certain
         from mrdamper.errors import InputError
@@ -34,7 +39,7 @@ def register(app: typer.Typer) -> None:
 
         student(level, 1.0)  # refuses a level that is none
         if steps < 10:
-            raise InputError(f"--steps {steps}", mend="give some thousands")
+            raise InputError(f"--steps {steps}", mend="give at least 10, usually some thousands")
         require_writable(out)
         damper = load_model(model)
         runs = []
@@ -72,7 +77,7 @@ def register(app: typer.Typer) -> None:
         from mrdamper.report.plots.style import save_figure
 
         with write_result(out) as folder:
-            (folder / "numbers.csv").write_text(csv_text(rows), encoding="utf-8")
+            (folder / "parameters.csv").write_text(csv_text(rows), encoding="utf-8")
             if found:
                 save_figure(profile_curves(found), folder / "profile")
             if drawn is not None:
@@ -82,11 +87,11 @@ def register(app: typer.Typer) -> None:
 
 
 def _used(dataset) -> list:
-    """The runs the study identifies from: train runs with a steady sine."""
+    """Select the runs a study identifies from: identification runs with a steady sine."""
     from mrdamper.errors import InputError
     from mrdamper.study.workflow import usable_sines
 
     runs = [run for run in usable_sines(dataset)[0] if run.split == "train"]
     if not runs:
-        raise InputError("no train runs with a steady sine", mend="check the split column of runs.csv")
+        raise InputError("no identification run with a steady sine", mend="check the split column of runs.csv")
     return runs
