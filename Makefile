@@ -4,7 +4,7 @@ VENV   ?= .venv
 BIN    := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help study serve test test-all bench fuzz attack mutants lint format docs release-check clean
+.PHONY: help study serve test coverage test-all bench fuzz attack mutants lint format docs release-check clean
 
 help:  ## show this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -17,6 +17,9 @@ serve: $(VENV)/.web  ## set up and open the live bench
 
 test: $(VENV)/.dev  ## set up and run the tests
 	$(BIN)/python -m pytest -m "not slow" -n 2
+
+coverage: $(VENV)/.dev  ## the fast tests with the share of lines they reach
+	$(BIN)/python -m pytest -m "not slow" -n 2 --cov=mrdamper --cov-report=term:skip-covered --cov-report=xml
 
 test-all: $(VENV)/.dev  ## the tests, slow ones too
 	$(BIN)/python -m pytest
@@ -63,9 +66,11 @@ $(VENV)/.web: pyproject.toml constraints.txt | $(VENV)/bin/python
 	@touch $@ $(VENV)/.core
 
 $(VENV)/.dev: pyproject.toml constraints.txt | $(VENV)/bin/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt 'pip>=25.1'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[all,compiler]' --group dev
 	@touch $@ $(VENV)/.core $(VENV)/.web
 
 $(VENV)/.docs: pyproject.toml constraints.txt | $(VENV)/bin/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt 'pip>=25.1'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[fast]' --group docs
 	@touch $@ $(VENV)/.core
