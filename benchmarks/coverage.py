@@ -130,7 +130,7 @@ class Rig:
         lower, upper = problem.box()
         point = np.clip(fit.point, lower + _INSIDE * (upper - lower), upper - _INSIDE * (upper - lower))
         linear = {info.name: getattr(fit.damper.model, info.name) for info in problem.linear}
-        truth = replace(fit.damper, model=replace(problem.bare(point), **linear))
+        truth = replace(fit.damper, model=replace(problem.without_linear(point), **linear))
         clean = tuple(replace(r, force=truth.predict_run(r).force) for r in runs)
         return cls(JointProblem(clean, "play-bypass"), clean, truth, point)
 
@@ -169,7 +169,7 @@ def _slower(run: Run) -> Run:
 def jointly(name: str, repeats: int, seed: int = 0) -> tuple[Covered, Floats]:
     """Coverage of the joint fit on a rig's motions; shares of new sessions in the 90 % bands of peak, energy, force."""
     rig, rng = Rig.of(name), np.random.default_rng(seed)
-    names = tuple(rig.truth.own_numbers)
+    names = tuple(rig.truth.fitted_parameters)
     ours, textbook, inside, counted = np.zeros(len(names)), np.zeros(len(names)), [], np.zeros(len(names))
     for repeat in range(repeats):
         runs = rig.draw(rng)
@@ -177,7 +177,7 @@ def jointly(name: str, repeats: int, seed: int = 0) -> tuple[Covered, Floats]:
         made = certain(fit.damper, runs, held=fit.at_bounds)
         plain = _textbook(problem, fit)
         for i, n in enumerate(names):
-            own, truth = made.own_numbers[n], rig.truth.own_numbers[n].value
+            own, truth = made.fitted_parameters[n], rig.truth.fitted_parameters[n].value
             if made.certainty is None or n not in made.certainty.names:
                 continue
             counted[i] += 1

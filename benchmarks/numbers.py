@@ -92,13 +92,15 @@ def of_study(study: Study) -> list[Told]:
     for name, title in names.items():
         both = [next(c for c in rig.candidates if c.recipe.name == name) for rig in (one, other)]
         counts = " / ".join(dict.fromkeys(str(c.damper.parameter_count) for c in both))
-        errors = [_median_worst(v) for c in both for v in (c.left_out, c.held_out)]
+        errors = [_median_worst(v) for c in both for v in (c.cross_validated, c.validation)]
         rows.append(f"| {title} | {counts} | {' | '.join(errors)} |")
     floors = [
         f"{100 * np.median([r.repeatability for r in rig.dataset if r.repeatability]):.1f}" for rig in (one, other)
     ]
     rows.append(f"| cycle-to-cycle scatter of the rigs | | {floors[0]} | {floors[0]} | {floors[1]} | {floors[1]} |")
-    drifts = [session_drift(r.damper, [r.dataset[s.run_id] for s in r.chosen.left_out.runs]) for r in (other, one)]
+    drifts = [
+        session_drift(r.damper, [r.dataset[s.run_id] for s in r.chosen.cross_validated.runs]) for r in (other, one)
+    ]
     raw, offset, left = _sweep(one)
     page = "docs/play-and-bypass.md"
     gains, rest = tuple(sorted(100 * d.gain for d in drifts)), tuple(100 * d.floor for d in drifts)
@@ -121,10 +123,10 @@ def of_comparison(folder: Path) -> list[Told]:
         rows = []
         for row in (r for r in found if r["rig"] == rig and r["rank"]):
             errors = [_percent(row[f"{name}_nrmse_pp"]) for name in ("per_run", "train")]
-            for name in ("left_out", "held_out"):
+            for name in ("cv", "validation"):
                 errors.append(f"{_percent(row[f'{name}_nrmse_pp'])} ({_percent(row[f'{name}_worst_nrmse_pp'])})")
             head, took = f"{row['rank']}. {row['title']}", f"{seconds[rig][row['model']]:.1f}"
-            rows.append(f"| {' | '.join([head, *errors, row['numbers'], took])} |")
+            rows.append(f"| {' | '.join([head, *errors, row['parameters'], took])} |")
         tables.append(Table(_MODELS, _COMPARED, tuple(rows), f"### {rig}"))
     return tables
 
@@ -136,7 +138,7 @@ def of_both(study: Study) -> list[Told]:
     for rig in study.rigs:
         rows = []
         for c in (c for c in rig.candidates if c.recipe.name in titles):
-            errors = [f"{100 * c.train.median():.1f}", _median_worst(c.left_out), _median_worst(c.held_out)]
+            errors = [f"{100 * c.train.median():.1f}", _median_worst(c.cross_validated), _median_worst(c.validation)]
             rows.append(f"| {titles[c.recipe.name]} | {' | '.join(['', *errors, str(c.damper.parameter_count), ''])} |")
         tables.append(Table(_MODELS, _COMPARED, tuple(rows), f"### {rig.rig}", whole=False))
     return tables

@@ -22,7 +22,7 @@ from mrdamper.data import Condition, Run
 from mrdamper.models.play_bypass import PlayBypass
 from mrdamper.motion import Excitation, measured_motion, random_motion, sine
 from mrdamper.simulation import simulate
-from mrdamper.study.left_out import stretches
+from mrdamper.study.cross_validation import stretches
 from mrdamper.validation import score_run
 
 

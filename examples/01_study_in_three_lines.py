@@ -9,4 +9,4 @@ from mrdamper import load_dataset, run_study
 dataset = load_dataset()
 study = run_study(dataset)
 for rig in study.rigs:
-    print(f"{rig.rig}: {rig.chosen.title}, held-out runs {100 * rig.chosen.held_out.median():.1f} % of peak-to-peak")
+    print(f"{rig.rig}: {rig.chosen.title}, held-out runs {100 * rig.chosen.validation.median():.1f} % of peak-to-peak")

@@ -59,7 +59,8 @@ def main(folder: Path) -> None:
     for quality in quality_table(imported.records):
         print(f"{quality.record.id}: {quality.condition}, {quality.cycles:.1f} cycles, {quality.verdict}")
     rig = run_study(to_dataset(imported.records, "my rig")).rigs[0]
-    print(f"{rig.chosen.title}: {100 * rig.chosen.left_out.median():.1f} % of peak-to-peak on conditions left out")
+    error = rig.chosen.cross_validated.median()
+    print(f"{rig.chosen.title}: {100 * error:.1f} % of peak-to-peak at cross-validated conditions")
 
 
 if __name__ == "__main__":

@@ -22,10 +22,10 @@ _FUNCTIONS = {"min": "max", "max": "min", "minimum": "maximum", "maximum": "mini
               "cos": "sin", "exp": "expm1", "median": "mean", "std": "var", "ptp": "max", "sqrt": "abs",
               "any": "all", "all": "any", "argmin": "argmax", "argmax": "argmin", "log": "log1p"}  # fmt: skip
 _TWINS = (
-    ("train", "held_out"), ("current_A", "frequency_Hz"), ("frequency_Hz", "amplitude_m"), ("nrmse_pp", "nrmse_std"),
+    ("train", "validation"), ("current_A", "frequency_Hz"), ("frequency_Hz", "amplitude_m"), ("nrmse_pp", "nrmse_std"),
     ("wape", "mean_relative_error"), ("peak_error", "energy_error"), ("displacement", "velocity"),
     ("first", "total"), ("alpha", "beta"), ("gamma", "beta"), ("c", "k1"), ("low", "high"),
-    ("per_run", "seconds"), ("left_out", "validation"), ("peak_force", "dissipated_energy"), ("effect", "left"),
+    ("per_run", "seconds"), ("cross_validated", "validation"), ("peak_force", "dissipated_energy"), ("effect", "left"),
     ("reached", "optimum"), ("measured", "predicted"), ("median", "worst"), ("split", "rig"), ("yield_off", "mass"),
 )  # fmt: skip
 _SYMMETRIC = {"max", "min", "maximum", "minimum", "hypot", "rmse", "isclose", "dict",

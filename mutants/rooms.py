@@ -47,7 +47,7 @@ ROOMS = (
     _room("reproduction.sensitivity", "reproduction/test_sensitivity.py"),
     _room("dampers.bands", "dampers/test_bands_by_hand.py"),
     _room("reproduction.virtual_rig", "reproduction/test_virtual_rig.py"),
-    _room("report.tables study.recipe study.left_out", "report/test_tables.py study/test_recipe.py"),
+    _room("report.tables study.recipe study.cross_validation", "report/test_tables.py study/test_recipe.py"),
     _room("dampers.paper dampers.modified", "dampers/test_modified.py dampers/test_gram.py study/test_recipe.py"),
     _room("dampers.joint", "dampers/test_joint.py"),
     _room(

@@ -13,7 +13,7 @@ from benchmarks.virtual_dampers import DAMPERS, identified
 from mrdamper.motion import Path
 from mrdamper.motion.lag import leaking_load
 from mrdamper.motion.measured import smooth, whole_clock
-from mrdamper.study.left_out import stretches
+from mrdamper.study.cross_validation import stretches
 from mrdamper.validation import score_run
 
 BY_NAME = {virtual.name: virtual for virtual in DAMPERS}

@@ -12,7 +12,7 @@ from support.dampers import joint_damper
 
 from mrdamper.dampers import joint
 from mrdamper.dampers.base import UNTESTED, Envelope
-from mrdamper.dampers.certainty import OwnNumber
+from mrdamper.dampers.certainty import FittedParameter
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.joint import FALL, RISE, JointDamper, JointFit, JointProblem, damper_of
 from mrdamper.dampers.strung import Part, string
@@ -173,11 +173,11 @@ def test_constants_of_other_dampers_count_among_the_numbers(problem, fit):
 def test_own_numbers_are_those_the_tests_gave_with_their_units_and_scales(fit):
     held = replace(fit.damper, free=("d", "h0"))
     infos = {info.name: info for info in PlayBypass.parameters()}
-    assert dict(held.own_numbers) == {
-        "d": OwnNumber(fit.damper.model.d, infos["d"].bounds, True, "m"),
-        "h0": OwnNumber(fit.damper.model.h0, infos["h0"].bounds, False, "-"),
+    assert dict(held.fitted_parameters) == {
+        "d": FittedParameter(fit.damper.model.d, infos["d"].bounds, True, "m"),
+        "h0": FittedParameter(fit.damper.model.h0, infos["h0"].bounds, False, "-"),
     }
-    assert held.with_numbers({"d": 1e-3}).model == replace(fit.damper.model, d=1e-3)
+    assert held.with_parameters({"d": 1e-3}).model == replace(fit.damper.model, d=1e-3)
     bare = damper_of(TRUTH)
     assert (bare.model, bare.rig, bare.free, bare.envelope) == (TRUTH, "", (), UNTESTED)
     assert damper_of(held) is held
@@ -282,7 +282,7 @@ def test_what_a_search_without_some_runs_foresees_is_where_it_goes(problem, fit)
         change = np.arange(triangle.shape[1]) + 1.0
         whole = np.column_stack([known.residual, known.jacobian])[owner == run] / weights[run]
         assert np.linalg.norm(triangle @ change) == pytest.approx(np.linalg.norm(whole @ change))
-    errors, point = known.foreseen(rows, problem.box())
+    errors, point = known.extrapolate_refit(rows, problem.box())
     found = problem.refit(fit, rows, 1e-6)
     assert np.linalg.norm(point - found.point) < 0.3 * np.linalg.norm(fit.point - found.point)
     assert errors == pytest.approx(found.nrmse_pp, rel=0.05)
@@ -296,7 +296,7 @@ def test_samples_of_some_runs_are_those_they_have_among_all(problem, fit):
     assert np.all(
         some.solve(fit.point).nrmse_pp.mean() <= np.sqrt(missed).mean() * 1.001
     )  # their own linear parameters
-    assert some.laid(fit.point)[1].size == some.picked.size < whole.picked.size
+    assert some.linear_columns(fit.point)[1].size == some.picked.size < whole.picked.size
 
 
 def test_a_fit_begins_where_another_problem_ended(problem, fit):
@@ -309,7 +309,7 @@ def test_a_fit_begins_where_another_problem_ended(problem, fit):
             assert point[axis.name] == axis.coordinate(axis.grid[0])
     held = problem.with_free((), {"d": 3e-4})
     assert "d" not in [axis.name for axis in held.axes]
-    assert held.bare(held.from_point(fit)).d == 3e-4
+    assert held.without_linear(held.from_point(fit)).d == 3e-4
 
 
 def test_errors_of_left_out_runs_are_those_of_a_prediction(runs, problem, fit):

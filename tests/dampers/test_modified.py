@@ -202,10 +202,10 @@ def test_a_saved_model_is_the_same_again_and_numbers_have_their_places():
     assert one.model_at(at).values() == pytest.approx(
         {**Bingham(fy=780.0, c=math.exp(0.5 * math.exp(-1.4) + 7), f0=-12.0).values()}
     )
-    assert {name: number.value for name, number in one.own_numbers.items()} == {
+    assert {name: number.value for name, number in one.fitted_parameters.items()} == {
         "fy.0": 900.0, "fy.1": 150.0, "c.0": 0.5, "c.1": 7.0, "c.2": 2.0, "f0.0": -12.0,
     }  # fmt: skip
-    moved = one.with_numbers({"c.2": 3.0, "fy.1": 160.0})
+    moved = one.with_parameters({"c.2": 3.0, "fy.1": 160.0})
     assert moved.functions["c"].rates == (3.0,)
     assert moved.functions["c"].coefficients == (0.5, 7.0)
     assert moved.functions["fy"].coefficients == (900.0, 160.0)

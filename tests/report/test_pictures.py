@@ -170,7 +170,7 @@ def test_one_number_stands_everywhere(bundled, bundled_study, written, tmp_path,
         for candidate in rig.candidates:
             own = [r for r in rows if (r["rig"], r["model"], r["way"]) == (rig.rig, *_way(candidate))]
             said = {}
-            for name, scores in (("left out", candidate.left_out), ("held out", candidate.held_out)):
+            for name, scores in (("left out", candidate.cross_validated), ("held out", candidate.validation)):
                 values = [float(r["nrmse_pp"]) for r in own if r["set"] == name]
                 said[name] = float(np.median(values))
                 assert said[name] == scores.median()
@@ -184,8 +184,8 @@ def test_one_number_stands_everywhere(bundled, bundled_study, written, tmp_path,
             assert (bench["left_out"], bench["held_out"]) == (said["left out"], said["held out"])
             if _way(candidate) == ("bingham", "run by run"):
                 (entry,) = compared[rig.rig].entries
-                assert entry.left_out.median() == pytest.approx(said["left out"], rel=1e-9)
-                assert entry.held_out.median() == pytest.approx(said["held out"], rel=1e-9)
+                assert entry.cross_validated.median() == pytest.approx(said["left out"], rel=1e-9)
+                assert entry.validation.median() == pytest.approx(said["held out"], rel=1e-9)
 
 
 def _way(candidate):

@@ -114,7 +114,7 @@ def test_left_out_and_held_out_errors_stand_in_their_own_rows():
 
     candidate = SimpleNamespace(
         recipe=SimpleNamespace(model="dahl", way="joint"),
-        train=scored("fitted", 0.3), left_out=scored("left", 0.1), held_out=scored("held", 0.2),
+        train=scored("fitted", 0.3), cross_validated=scored("left", 0.1), validation=scored("held", 0.2),
     )  # fmt: skip
     study = SimpleNamespace(rigs=(SimpleNamespace(rig="bench", candidates=(candidate,)),))
     rows = list(csv.DictReader(_validation_table(study).splitlines()))

@@ -41,7 +41,7 @@ def scored(values=None, at_bounds=(), median=0.03, worst=0.04, per_run=0.02, **m
         runs=(1,), median=lambda: median,
         worst=lambda: SimpleNamespace(scores=SimpleNamespace(nrmse_pp=worst), condition=CONDITIONS[0]),
     )  # fmt: skip
-    return SimpleNamespace(identifications=tuple(found), held_out=held, per_run=per_run, fit=None, **more)
+    return SimpleNamespace(identifications=tuple(found), validation=held, per_run=per_run, fit=None, **more)
 
 
 @pytest.mark.parametrize(
@@ -107,7 +107,7 @@ def test_accuracy_is_compared_on_the_runs_both_were_made_of(own, want):
     ("own", "count", "want"), [(0.03, 7, "holds"), (0.9, 7, "holds in part"), (0.9, 2, "does not hold")]
 )
 def test_few_parameters_are_judged_by_error_and_count(own, count, want):
-    contenders = {LITERAL: scored(median=own, worst=own), ALI: scored(median=0.03, numbers_per_run=count)}
+    contenders = {LITERAL: scored(median=own, worst=own), ALI: scored(median=0.03, parameters_per_run=count)}
     found = identified.few_parameters(study_of(contenders=contenders))
     assert found.numbers["median held-out error over the Ali-type's"] == pytest.approx(own / 0.03)
     assert verdict("few parameters", found) == want

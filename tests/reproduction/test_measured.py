@@ -226,7 +226,7 @@ def test_searches_are_judged_parameter_by_parameter_with_the_worst_beside():
 
 
 def test_what_cannot_be_measured_says_why():
-    one = SimpleNamespace(identifications=(), held_out=SimpleNamespace(runs=()))
+    one = SimpleNamespace(identifications=(), validation=SimpleNamespace(runs=()))
     for contenders in ({}, {LITERAL: one}, {ALI: one}, {LITERAL: one, ALI: one}):
         assert "could not be followed" in identified.few_parameters(study_of(contenders)).evidence
     for contenders in ({}, {LITERAL: one}, {DIRECT: one}, {LITERAL: one, DIRECT: one}):
@@ -253,24 +253,24 @@ def test_time_and_accuracy_are_ratios_of_ours_to_theirs():
     assert found.evidence.startswith("median 30 forces computed against 15")
     worst = {"scores": SimpleNamespace(nrmse_pp=0.174), "condition": Condition(2.0, 1.0, 0.08)}
     literal = SimpleNamespace(
-        held_out=SimpleNamespace(runs=(1,), median=lambda: 0.156, worst=lambda: SimpleNamespace(**worst)), per_run=0.1
+        validation=SimpleNamespace(runs=(1,), median=lambda: 0.156, worst=lambda: SimpleNamespace(**worst)), per_run=0.1
     )
     ali = SimpleNamespace(
-        held_out=SimpleNamespace(
+        validation=SimpleNamespace(
             runs=(1,),
             median=lambda: 0.04,
             worst=lambda: SimpleNamespace(**{**worst, "scores": SimpleNamespace(nrmse_pp=0.099)}),
         ),
-        numbers_per_run=8,
+        parameters_per_run=8,
     )
     found = identified.few_parameters(study_of({LITERAL: literal, ALI: ali}))
     assert list(found.numbers.values()) == pytest.approx([3.9, 0.25])
     assert found.evidence.startswith("held out 15.6 % against 4.0 %; worst 17.4 % and 9.9 %; 2 searched against 8")
-    ali.numbers_per_run = 1
+    ali.parameters_per_run = 1
     assert identified.few_parameters(study_of({LITERAL: literal, ALI: ali})).numbers == pytest.approx(
         {"median held-out error over the Ali-type's": 3.9, "searched parameters a run over the Ali-type's": 2.0}
     )
-    empty = SimpleNamespace(held_out=SimpleNamespace(runs=()))
+    empty = SimpleNamespace(validation=SimpleNamespace(runs=()))
     for pair in ({LITERAL: empty, ALI: ali}, {LITERAL: literal, ALI: empty}, {LITERAL: literal}, {ALI: ali}):
         assert "no run is held out" in identified.few_parameters(study_of(pair)).evidence
     found = identified.generalisation(study_of({LITERAL: literal}))

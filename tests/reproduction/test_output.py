@@ -36,7 +36,7 @@ def contender(title, way, start, seconds):
     return SimpleNamespace(
         recipe=SimpleNamespace(title=title, way=way, basis=None),
         damper=SimpleNamespace(parameter_count=round(100 * start)),
-        held_out=Validation(title, runs), train=Validation(title, ()), left_out=Validation(title, ()),
+        validation=Validation(title, runs), train=Validation(title, ()), cross_validated=Validation(title, ()),
         per_run=start / 7, seconds=seconds, identifications=(), fit=None,
     )  # fmt: skip
 
@@ -56,7 +56,7 @@ def study(**more):
 def test_table_5_holds_the_median_and_the_worst_of_the_held_out_runs():
     first, second = verdicts(study())
     assert first == {
-        "verdict": "paper (literal)", "method": "one", "numbers": 10, "nrmse_pp": pytest.approx(0.3),
+        "verdict": "paper (literal)", "method": "one", "parameters": 10, "nrmse_pp": pytest.approx(0.3),
         "worst_nrmse_pp": pytest.approx(0.6), "nrmse_std": pytest.approx(0.31), "wape": pytest.approx(0.32),
         "mean_relative_error": pytest.approx(0.35), "per_run_nrmse_pp": pytest.approx(0.1 / 7), "forces_a_run": None,
         "seeds": None, "seed_median_nrmse_pp": None, "seed_lowest_nrmse_pp": None, "seed_highest_nrmse_pp": None,

@@ -59,11 +59,11 @@ def study(quick):
 
 
 def test_the_consistent_balance_predicts_what_the_literal_recipe_cannot(study):
-    errors = {c.recipe.title: c.held_out.median() for c in study.contenders}
+    errors = {c.recipe.title: c.validation.median() for c in study.contenders}
     assert errors[HALF] < errors[LITERAL]
     assert errors[SAME_FORMS] < 0.5 * errors[LITERAL]
     assert errors[CONSISTENT] < 0.05
-    assert study.best.held_out.median() < 0.05
+    assert study.best.validation.median() < 0.05
     groups = {row["verdict"] for row in verdicts(study)}
     assert groups == {"paper (literal)", "consistent", "joint", "traditional"}
 
@@ -315,12 +315,12 @@ def test_the_command_writes_the_full_study_in_two_minutes_of_processor_time(tmp_
 def test_other_models_join_the_tables(study):
     """On a few runs of the study: every contender is validated, and titles differ."""
     from mrdamper.reproduction.ways import literature
-    from mrdamper.study.recipe import follow_all
+    from mrdamper.study.recipe import fit_and_score_all
 
     few = [run for run in study.train if run.current_A in (0.0, 0.5, 1.0, 2.0)]
-    made, refused = follow_all(literature(few), study.held_out[:2], leave_out=False)
+    made, refused = fit_and_score_all(literature(few), study.held_out[:2], leave_out=False)
     titles = [c.recipe.title for c in made]
     assert not refused
     assert len(set(titles)) == len(titles) >= 8
-    assert all(np.isfinite(c.held_out.median()) for c in made)
+    assert all(np.isfinite(c.validation.median()) for c in made)
     assert {"play and bypass", "hyperbolic tangent"} <= set(titles)

@@ -51,7 +51,7 @@ def test_a_seed_is_judged_on_held_out_runs_and_with_its_own_friction_test(monkey
 
     monkeypatch.setattr(seeds, "CURRENTS", (0.0,))
     monkeypatch.setattr(seeds, "judge_all", judged)
-    monkeypatch.setattr(seeds, "follow_all", lambda *_, **__: ([way({"train": 0.9, "held_out": 0.1})], {}))
+    monkeypatch.setattr(seeds, "fit_and_score_all", lambda *_, **__: ([way({"train": 0.9, "validation": 0.1})], {}))
     monkeypatch.setattr(seeds, "friction_test", lambda rig, **more: asked.update(more) or "slow")
     found = one_seed(VirtualRig(force_noise=7.0), Switches(friction_test=friction), 5, lambda what, share: None)
     assert found == Seed({"one": 0.1}, {"phase": "holds"})

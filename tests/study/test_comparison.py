@@ -77,8 +77,8 @@ def test_the_truth_wins_and_the_crudest_loses(compared):
     entries = compared.rigs[0].entries
     assert not compared.rigs[0].refused
     assert entries[0].recipe.name == "bouc-wen"
-    assert entries[0].left_out.median() < 0.02
-    medians = [entry.left_out.median() for entry in entries]
+    assert entries[0].cross_validated.median() < 0.02
+    medians = [entry.cross_validated.median() for entry in entries]
     assert medians == sorted(medians)
     bingham = next(entry for entry in entries if entry.recipe.name == "bingham")
     assert bingham.per_run > 2 * entries[0].per_run
@@ -88,8 +88,8 @@ def test_every_entry_is_judged_on_the_same_runs(compared, dataset):
     train = {run.id for run in dataset.split("train")}
     for entry in compared.rigs[0].entries:
         assert {run.run_id for run in entry.train.runs} == train
-        assert {run.run_id for run in entry.left_out.runs} == train
-        assert {run.run_id for run in entry.held_out.runs} == {run.id for run in dataset.split("validate")}
+        assert {run.run_id for run in entry.cross_validated.runs} == train
+        assert {run.run_id for run in entry.validation.runs} == {run.id for run in dataset.split("validate")}
         assert {i.run_id for i in entry.identifications} in (train, set())
 
 
@@ -98,8 +98,8 @@ def test_one_process_gives_the_same_bits(compared, dataset):
     for a, b in zip(alone.rigs[0].entries, compared.rigs[0].entries, strict=True):
         assert a.recipe.name == b.recipe.name
         assert [i.model for i in a.identifications] == [i.model for i in b.identifications]
-        assert [r.scores for r in a.left_out.runs] == [r.scores for r in b.left_out.runs]
-        assert [r.scores for r in a.held_out.runs] == [r.scores for r in b.held_out.runs]
+        assert [r.scores for r in a.cross_validated.runs] == [r.scores for r in b.cross_validated.runs]
+        assert [r.scores for r in a.validation.runs] == [r.scores for r in b.validation.runs]
 
 
 def test_the_files_agree_with_each_other(compared, tmp_path):
@@ -109,7 +109,7 @@ def test_the_files_agree_with_each_other(compared, tmp_path):
     with (tmp_path / "out" / "comparison.csv").open(encoding="utf-8") as file:
         table = list(csv.DictReader(file))
     assert [row["model"] for row in rows] == [row["model"] for row in table]
-    assert [float(row["left_out_nrmse_pp"]) for row in table] == [row["left_out_nrmse_pp"] for row in rows]
+    assert [float(row["cv_nrmse_pp"]) for row in table] == [row["cv_nrmse_pp"] for row in rows]
     page = written[0].read_text(encoding="utf-8")
     for row in summary_rows(compared):
         assert row["reason"]
@@ -262,5 +262,5 @@ def test_the_joint_model_is_compared_on_records_of_any_motion():
     force = simulate(model, motion).force
     record = Run("random", time, motion.displacement, force, current, rig="any", excitation="random")
     entry = compare(Dataset((record,)), ["play-bypass"]).rigs[0].entries[0]
-    assert [run.run_id for run in entry.left_out.runs] == ["random"]
-    assert entry.left_out.median() < 0.02
+    assert [run.run_id for run in entry.cross_validated.runs] == ["random"]
+    assert entry.cross_validated.median() < 0.02

@@ -16,7 +16,7 @@ import numpy as np
 from support.synthetic import synthetic_run
 from mrdamper.data import Condition
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.study.recipe import follow_all, jointly, modified
+from mrdamper.study.recipe import fit_and_score_all, jointly, modified
 
 runs = []
 for I in (0.0, 0.5, 1.0, 1.5):
@@ -25,7 +25,8 @@ for I in (0.0, 0.5, 1.0, 1.5):
         noise = 0.015 * (2 * law["yield_force"] + 12 * law["c"] * f * A)
         made = {"model": BoucWen.build(law), "cycles": 3, "samples_per_cycle": 300}
         runs.append(synthetic_run(Condition(I, f, A), noise, len(runs), id=f"r{len(runs)}", rig="made", **made))
-scored, refused = follow_all([(make(m), runs) for m in ("bouc-wen", "bingham") for make in (modified, jointly)], [])
+steps = [(make(m), runs) for m in ("bouc-wen", "bingham") for make in (modified, jointly)]
+scored, refused = fit_and_score_all(steps, [])
 assert len(scored) == 4, refused
 numbers = {}
 for c in scored:
@@ -33,7 +34,7 @@ for c in scored:
         key = f"{c.recipe.name} {name}"
         numbers[f"{key} form"] = function.form
         numbers[key] = [*function.coefficients, *function.rates]
-    numbers[f"{c.recipe.name} scores"] = [r.scores.nrmse_pp for v in (c.train, c.left_out) for r in v.runs]
+    numbers[f"{c.recipe.name} scores"] = [r.scores.nrmse_pp for v in (c.train, c.cross_validated) for r in v.runs]
 json.dump(numbers, sys.stdout)
 """
 

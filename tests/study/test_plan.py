@@ -73,7 +73,7 @@ def test_a_sessions_records_tell_what_its_own_gain_leaves(reckoning):
 def test_a_doubt_can_be_chosen(damper, reckoning):
     made, about = plan_tests(damper, LIMITS, 0.3, "c1")
     i = about.names.index("c1")
-    error = np.sqrt(damper.certainty.covariance[i, i]) / damper.own_numbers["c1"].value
+    error = np.sqrt(damper.certainty.covariance[i, i]) / damper.fitted_parameters["c1"].value
     assert made[0].before == pytest.approx(error, rel=1e-3)
     assert "standard error of c1" in about.said(made)
     whole = reckoning.chosen(0.3)

@@ -20,19 +20,19 @@ from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.motion import measured_motion, sine
 from mrdamper.reproduction.ways import one_per_current, through_chosen
-from mrdamper.study import left_out
+from mrdamper.study import cross_validation
 from mrdamper.study import recipe as recipes
-from mrdamper.study.left_out import stretches
+from mrdamper.study.cross_validation import stretches
 from mrdamper.study.recipe import (
     Basis,
-    Made,
+    FitResult,
+    PaperAssumptions,
     Recipe,
-    Settled,
-    by_the_paper,
-    follow,
-    follow_all,
+    fit_and_score,
+    fit_and_score_all,
+    fit_paper_functions,
+    fit_per_run,
     identified,
-    run_by_run,
 )
 from mrdamper.validation import RunScore, Validation
 
@@ -60,7 +60,7 @@ class Memory:
 
 
 def remember(runs, identifications):
-    return Made(Memory(runs), lambda rows: Memory([runs[i] for i in rows]))
+    return FitResult(Memory(runs), lambda rows: Memory([runs[i] for i in rows]))
 
 
 def made(current, frequency, name):
@@ -78,16 +78,19 @@ REMEMBER = Recipe("memory", Basis("bingham"), remember)
 
 def test_fitted_left_out_and_held_out_errors_stay_apart():
     errors = [SimpleNamespace(scores=SimpleNamespace(nrmse_pp=e)) for e in (0.1, 0.9, 0.2)]
-    found = follow(REMEMBER, TRAIN, errors, HELD, spent=100.0)
-    wape = {name: [run.scores.wape for run in getattr(found, name).runs] for name in ("train", "left_out", "held_out")}
+    found = fit_and_score(REMEMBER, TRAIN, errors, HELD, spent=100.0)
+    wape = {
+        name: [run.scores.wape for run in getattr(found, name).runs]
+        for name in ("train", "cross_validated", "validation")
+    }
     # What it was made of it knows; without the condition, and of what was held out, it knows nothing.
-    assert wape == {"train": [0.0] * 4, "left_out": pytest.approx([1.0] * 4), "held_out": pytest.approx([1.0])}
-    assert [run.run_id for run in found.left_out.runs] == [run.id for run in TRAIN]
-    assert [run.run_id for run in found.held_out.runs] == ["held"]
+    assert wape == {"train": [0.0] * 4, "cross_validated": pytest.approx([1.0] * 4), "validation": pytest.approx([1.0])}
+    assert [run.run_id for run in found.cross_validated.runs] == [run.id for run in TRAIN]
+    assert [run.run_id for run in found.validation.runs] == ["held"]
     assert found.per_run == 0.2
     assert 100.0 <= found.seconds < 110.0
-    without = follow(REMEMBER, TRAIN, [], HELD, leave_out=False)
-    assert without.left_out.runs == ()
+    without = fit_and_score(REMEMBER, TRAIN, [], HELD, leave_out=False)
+    assert without.cross_validated.runs == ()
     assert np.isnan(without.per_run)
 
 
@@ -95,11 +98,11 @@ def test_parameters_spread_as_each_condition_is_left_out():
     def of(runs):
         return replace(joint_damper("bingham"), model=Bingham(fy=sum(run.nominal.current_A for run in runs), c=9.0))
 
-    recipe = Recipe("sum", None, lambda runs, _: Made(of(runs), lambda rows: of([runs[i] for i in rows])))
-    found = follow(recipe, [*TRAIN, made(4.0, 1.0, "4A")], [], HELD)
+    recipe = Recipe("sum", None, lambda runs, _: FitResult(of(runs), lambda rows: of([runs[i] for i in rows])))
+    found = fit_and_score(recipe, [*TRAIN, made(4.0, 1.0, "4A")], [], HELD)
     assert found.damper.model.fy == 6.0
     assert (found.spread["fy"], found.spread["c"]) == ((2.0, 6.0), (9.0, 9.0))
-    assert follow(REMEMBER, TRAIN, [], HELD).spread == {}
+    assert fit_and_score(REMEMBER, TRAIN, [], HELD).spread == {}
 
 
 def test_what_cannot_be_made_is_refused_by_its_name_and_the_others_go_on():
@@ -108,7 +111,7 @@ def test_what_cannot_be_made_is_refused_by_its_name_and_the_others_go_on():
 
     steps = [(Recipe("broken", None, broken), TRAIN), (Recipe("memory", None, remember), TRAIN[:2])]
     told = []
-    scored, refused = follow_all(steps, HELD, lambda what, share: told.append((what, share)))
+    scored, refused = fit_and_score_all(steps, HELD, lambda what, share: told.append((what, share)))
     assert [s.recipe.name for s in scored] == ["memory"]
     assert [run.run_id for run in scored[0].train.runs] == [run.id for run in TRAIN[:2]]
     assert set(refused) == {"broken"}
@@ -141,7 +144,7 @@ def tests():
     return runs, [Basis("bouc-wen", Balance()).identify(run) for run in runs]
 
 
-@pytest.mark.parametrize("make", [run_by_run, by_the_paper, one_per_current, through_chosen])
+@pytest.mark.parametrize("make", [fit_per_run, fit_paper_functions, one_per_current, through_chosen])
 def test_a_refit_is_what_the_kept_runs_alone_make(tests, make):
     runs, identifications = tests
     rows = [i for i in range(len(runs)) if i not in (1, 7)]
@@ -158,8 +161,8 @@ def test_by_the_paper_only_identifications_of_kept_runs_count_where_some_runs_ha
     runs, identifications = tests
     some = identifications[2:]  # the first two runs were no pure sines
     rows = [i for i in range(len(runs)) if i != 5]
-    refitted = by_the_paper(runs, some).refit(rows)
-    alone = by_the_paper(runs, [i for i in some if i.run_id != runs[5].id]).damper
+    refitted = fit_paper_functions(runs, some).refit(rows)
+    alone = fit_paper_functions(runs, [i for i in some if i.run_id != runs[5].id]).damper
     assert refitted.model_at(Condition(0.7, 0.7, 0.02)).values() == alone.model_at(Condition(0.7, 0.7, 0.02)).values()
 
 
@@ -191,18 +194,22 @@ def test_a_stretch_has_a_dozen_cycles_and_a_lead_in_of_one_and_a_half(seconds, c
     changing = replace(run, current=np.where(time < 3, 0.5, 1.0))
     with pytest.MonkeyPatch.context() as patch:
         condition = Condition(1.0, 1.0, 0.01)
-        patch.setattr(left_out, "equivalent_sine", lambda run: SimpleNamespace(condition=condition, is_sine=False))
+        patch.setattr(
+            cross_validation, "equivalent_sine", lambda run: SimpleNamespace(condition=condition, is_sine=False)
+        )
         parts = stretches(run)
         assert len(parts) == count
         assert count == 1 or [len(p.time) for p in parts[1:-1]] == pytest.approx([1350] * (count - 2), abs=200)
         for part in parts[1:]:
             assert part.window[0] - part.time[0] == pytest.approx(1.5)
         slow = Condition(1.0, 0.5, 0.01)
-        patch.setattr(left_out, "equivalent_sine", lambda run: SimpleNamespace(condition=slow, is_sine=False))
+        patch.setattr(cross_validation, "equivalent_sine", lambda run: SimpleNamespace(condition=slow, is_sine=False))
         assert len(stretches(run)) == max(1, count // 2)
         assert len(stretches(replace(run, window=(10.0, seconds - 0.01)))) == max(1, int((seconds - 10) / 24))
         # A sine whose current changes is cut too, a sine at one current stays whole.
-        patch.setattr(left_out, "equivalent_sine", lambda run: SimpleNamespace(condition=condition, is_sine=True))
+        patch.setattr(
+            cross_validation, "equivalent_sine", lambda run: SimpleNamespace(condition=condition, is_sine=True)
+        )
         assert (len(stretches(run)), len(stretches(changing))) == (1, count)
 
 
@@ -220,16 +227,16 @@ def test_records_that_are_no_sine_are_cut_and_left_out_by_themselves(monkeypatch
         asked.update(ids=[p.id for p in pieces], alone=list(alone), conditions=len(conditions))
         return Validation(title, ())
 
-    monkeypatch.setattr(left_out, "leave_one_condition_out", leave)
+    monkeypatch.setattr(cross_validation, "leave_one_condition_out", leave)
     changing = replace(TRAIN[1], id="changing", current=np.linspace(0, 1, TRAIN[1].time.size))
     train = [TRAIN[0], noise_record(40.0), changing]
     parts = [part.id for part in stretches(train[1])]
-    zero = Made(Zero(), lambda rows: Zero())
-    follow(Recipe("zero", None, lambda runs, _: zero), train, [], [])
+    zero = FitResult(Zero(), lambda rows: Zero())
+    fit_and_score(Recipe("zero", None, lambda runs, _: zero), train, [], [])
     ids = [TRAIN[0].id, *parts, "changing"]
     assert asked == {"ids": ids, "alone": list(range(1, len(ids))), "conditions": len(ids)}
     assert len(parts) > 1
-    follow(Recipe("zero", Basis("bingham"), lambda runs, _: zero), train, [], [])
+    fit_and_score(Recipe("zero", Basis("bingham"), lambda runs, _: zero), train, [], [])
     assert asked["ids"] == [TRAIN[0].id, "sweep", "changing"]
 
 
@@ -251,25 +258,25 @@ def test_joint_ways_hand_on_what_their_fits_make(monkeypatch):
     asked = []
     fit = SimpleNamespace(damper="damper")
     monkeypatch.setattr(recipes, "fit_modified_jointly", lambda *given: asked.append(given) or (fit, "refit"))
-    made_ = recipes.at_once("ab", identifications)
+    made_ = recipes.fit_functions_jointly("ab", identifications)
     assert (made_.damper, made_.refit, made_.fit) == ("damper", "refit", fit)
     assert asked == [("ab", identifications, {"method": "balance", "train runs": "2", "functions": "joint"})]
     problem = SimpleNamespace(refit=lambda fit, rows: SimpleNamespace(damper=(fit, rows)))
     monkeypatch.setattr(recipes, "identify_jointly", lambda runs: SimpleNamespace(problem=problem, fit=fit))
-    made_ = recipes.one_set("ab", [])
+    made_ = recipes.fit_global_model("ab", [])
     assert (made_.damper, made_.fit, made_.refit([1])) == ("damper", fit, (fit, [1]))
     law = SimpleNamespace(basis="spencer", fit=lambda *given: given)
-    made_ = recipes.by_its_laws(law, "abc", [7, 8, 9])
+    made_ = recipes.fit_published(law, "abc", [7, 8, 9])
     assert made_.damper == (["a", "b", "c"], [7, 8, 9], {"train runs": "3"})
     assert made_.refit([2, 0]) == (["c", "a"], [9, 7], {"train runs": "3"})
     law.basis = None
-    assert recipes.by_its_laws(law, "abc", []).damper == (["a", "b", "c"], [], {"train runs": "3"})
+    assert recipes.fit_published(law, "abc", []).damper == (["a", "b", "c"], [], {"train runs": "3"})
 
 
 def test_steps_tell_how_far_they_are_and_take_pure_sines_where_they_must(monkeypatch):
     monkeypatch.setattr(recipes, "analyse_motion", lambda run: SimpleNamespace(is_sine=run.id != "sweep"))
     told, found, given = [], {}, []
-    zero = Made(Zero(), lambda rows: Zero())
+    zero = FitResult(Zero(), lambda rows: Zero())
 
     def make(runs, identifications):
         given.append(([run.id for run in runs], [i.run_id for i in identifications]))
@@ -277,7 +284,7 @@ def test_steps_tell_how_far_they_are_and_take_pure_sines_where_they_must(monkeyp
 
     runs = [TRAIN[2], noise_record(15.0), TRAIN[3]]
     steps = [(Recipe(name, Basis("bingham"), make, pure=pure), runs) for name, pure in (("all", False), ("pure", True))]
-    scored, refused = follow_all(
+    scored, refused = fit_and_score_all(
         steps, HELD, lambda what, share: told.append((what, share)), leave_out=False, found=found
     )
     assert refused == {}
@@ -286,7 +293,7 @@ def test_steps_tell_how_far_they_are_and_take_pure_sines_where_they_must(monkeyp
     shares = [("all, run " + name, 0.25 * k / 3) for k, name in enumerate(names)]
     assert told == [*shares, ("all, over all conditions", 0.25), ("pure, over all conditions", 0.75)]
     assert {run_id for _, run_id in found} == set(names)
-    assert [s.left_out.runs for s in scored] == [(), ()]
+    assert [s.cross_validated.runs for s in scored] == [(), ()]
     spent = sum(seconds for _, seconds in found.values())
     assert spent <= scored[0].seconds < spent + 60
     assert spent < 60
@@ -296,13 +303,13 @@ def test_stretches_are_scored_as_the_record_they_were_cut_from():
     def score(name, k, flags):
         return RunScore(name, "rig", Condition(0, 1, 1), Scores(*(k * np.arange(1.0, 7.0))), None, flags)
 
-    pieces = [replace(TRAIN[0], id=f"long {n}", notes={left_out._RECORD: "long"}) for n in (1, 2)] + [TRAIN[1]]
+    pieces = [replace(TRAIN[0], id=f"long {n}", notes={cross_validation._RECORD: "long"}) for n in (1, 2)] + [TRAIN[1]]
     scores = (
         score("long 1", 3.0, ("current",)),
         score("long 2", 4.0, ("current", "amplitude")),
         score(TRAIN[1].id, 9, ()),
     )
-    whole = left_out._whole_again(Validation("x", scores), pieces)
+    whole = cross_validation._whole_again(Validation("x", scores), pieces)
     assert [run.run_id for run in whole.runs] == ["long", TRAIN[1].id]
     rms = np.sqrt((3.0**2 + 4.0**2) / 2)
     assert astuple(whole.runs[0].scores) == pytest.approx((rms, 2 * rms, 3 * 3.5, 4 * 3.5, 5 * 3.5, 6 * 3.5))
@@ -311,14 +318,14 @@ def test_stretches_are_scored_as_the_record_they_were_cut_from():
     rests = zip(scores[:2], (3.0, 12.0), strict=True)
     three = [replace(s, rest=rest) for s, rest in rests] + [score("long 1", 11.0, ())]
     three[2] = replace(three[2], condition=Condition(2, 1, 1), rest=4.0)
-    joined = left_out._joined("long", three)
+    joined = cross_validation._joined("long", three)
     rms = np.sqrt((3.0**2 + 4.0**2 + 11.0**2) / 3)
     assert astuple(joined.scores) == pytest.approx((rms, 2 * rms, 3 * 6, 4 * 6, 5 * 6, 6 * 6))
     assert (joined.rest, joined.condition) == (pytest.approx(13 / np.sqrt(3)), Condition(0, 1, 1))
-    assert left_out._joined("long", [replace(three[0], rest=None), three[1]]).rest == 12.0
-    (alone,) = left_out._whole_again(Validation("x", scores[:1]), pieces).runs
+    assert cross_validation._joined("long", [replace(three[0], rest=None), three[1]]).rest == 12.0
+    (alone,) = cross_validation._whole_again(Validation("x", scores[:1]), pieces).runs
     assert (alone.run_id, astuple(alone.scores)) == ("long", pytest.approx(astuple(scores[0].scores)))
-    assert left_out._joined("long 1", [scores[0]]) is scores[0]
+    assert cross_validation._joined("long 1", [scores[0]]) is scores[0]
 
 
 def test_a_recipe_says_its_model_and_an_unknown_fault_is_not_hidden():
@@ -329,7 +336,7 @@ def test_a_recipe_says_its_model_and_an_unknown_fault_is_not_hidden():
         raise ValueError("a fault of the program")
 
     with pytest.raises(ValueError, match="a fault"):
-        follow_all([(Recipe("ours", None, ours), TRAIN)], HELD)
+        fit_and_score_all([(Recipe("ours", None, ours), TRAIN)], HELD)
     assert not issubclass(ValueError, InputError)
 
 
@@ -350,14 +357,19 @@ def test_every_recipe_says_what_it_is():
     assert (ali.title, ali.basis.model, ali.source) == (
         "Ali-type (Spencer-based)", "spencer", all_published()["ali-type"].source,
     )  # fmt: skip
-    assert (both.basis, both.make, one.basis) == (Basis("dahl"), recipes.at_once, Basis("dahl"))
+    assert (both.basis, both.make, one.basis) == (Basis("dahl"), recipes.fit_functions_jointly, Basis("dahl"))
     ours = known["play-bypass"]
     assert (ours.basis, ours.make, ours.way, ours.title, ours.source) == (
-        None, recipes.one_set, "joint", "play and bypass", model_type("play-bypass").source,
+        None, recipes.fit_global_model, "joint", "play and bypass", model_type("play-bypass").source,
     )  # fmt: skip
-    assert (ali.make.func, ali.make.args) == (recipes.by_its_laws, (all_published()["ali-type"],))
-    paper = recipes.literal(Settled(None))
-    assert (paper.name, paper.make, paper.way, paper.pure) == ("bouc-wen:literal", by_the_paper, "paper, literal", True)
+    assert (ali.make.func, ali.make.args) == (recipes.fit_published, (all_published()["ali-type"],))
+    paper = recipes.literal(PaperAssumptions(None))
+    assert (paper.name, paper.make, paper.way, paper.pure) == (
+        "bouc-wen:literal",
+        fit_paper_functions,
+        "paper, literal",
+        True,
+    )
     assert known["kernel"].basis is None
     assert known["bouc-wen:paper"].basis.method == "paper"
     assert known["bouc-wen:paper"].title.endswith("method paper")
@@ -384,11 +396,11 @@ def runs_with(k1, mass, frequencies):
 
 
 def test_an_unknown_gas_spring_is_told_from_the_mass_by_the_frequencies():
-    settled = Settled.of(runs_with(1400.0, 12.0, (0.5, 1.0, 2.0)), None)
+    settled = PaperAssumptions.of(runs_with(1400.0, 12.0, (0.5, 1.0, 2.0)), None)
     assert dict(settled.fixed)["k1"] == pytest.approx(1400.0, rel=0.01)
     assert (dict(settled.fixed)["k2"], dict(settled.fixed)["k3"], settled.free) == (0.0, 0.0, ("m",))
     assert "m = 12" in settled.notes[0] or "m = 11.9" in settled.notes[0]
-    alone = Settled.of(runs_with(1400.0, 12.0, (1.0,)), None)
+    alone = PaperAssumptions.of(runs_with(1400.0, 12.0, (1.0,)), None)
     assert (alone.gas, alone.fixed, alone.free) == (None, (), ())
     assert "k1 holds k1 − m ω²" in alone.notes[0]
     basis = settled.preset((("n", 3.0),)).basis("balance")
@@ -398,26 +410,28 @@ def test_an_unknown_gas_spring_is_told_from_the_mass_by_the_frequencies():
 def test_a_gas_spring_that_is_known_must_leave_volume():
     runs = runs_with(0.0, 0.0, (1.0,))
     gas = GasSpring(1.5e6, 1.5e-4, 3e-4)
-    assert Settled.of(runs, gas) == Settled(gas)
+    assert PaperAssumptions.of(runs, gas) == PaperAssumptions(gas)
     with pytest.raises(InputError, match="gas volume"):
-        Settled.of(runs, GasSpring(1.5e6, 5e-6, 3e-4))
+        PaperAssumptions.of(runs, GasSpring(1.5e6, 5e-6, 3e-4))
     # 30 mm of gas: room for ±20 mm, none for ±40.
     short = GasSpring(1.5e6, 9e-6, 3e-4)
-    assert Settled.of(runs, short).gas is short
+    assert PaperAssumptions.of(runs, short).gas is short
     wide = synthetic_run(Condition(0.5, 1.0, 0.04), cycles=2, samples_per_cycle=200)
     for train in ([*runs, wide], [wide, *runs]):
         with pytest.raises(InputError, match="gas volume"):
-            Settled.of(train, short)
+            PaperAssumptions.of(train, short)
 
 
 def test_the_numbers_of_a_way_are_counted():
     function = SimpleNamespace(function=SimpleNamespace(coefficients=(1.0, 2.0, 3.0), rates=(4.0,)))
     short = SimpleNamespace(function=SimpleNamespace(coefficients=(1.0,), rates=()))
-    scored = follow(REMEMBER, TRAIN, [SimpleNamespace(free=("c", "fy"), scores=SimpleNamespace(nrmse_pp=0.1))], HELD)
-    assert (scored.numbers_per_run, scored.conditions_needed, scored.title) == (2, 3, "memory")
+    scored = fit_and_score(
+        REMEMBER, TRAIN, [SimpleNamespace(free=("c", "fy"), scores=SimpleNamespace(nrmse_pp=0.1))], HELD
+    )
+    assert (scored.parameters_per_run, scored.conditions_needed, scored.title) == (2, 3, "memory")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(recipes, "ModifiedFit", SimpleNamespace)
         fitted = replace(scored, fit=SimpleNamespace(functions={"a": short, "b": function}))
         assert fitted.conditions_needed == 4
-    assert follow(Recipe("memory", None, remember, "joint"), TRAIN, [], HELD).title == "memory, joint"
-    assert follow(REMEMBER, TRAIN, [], HELD).numbers_per_run == 0
+    assert fit_and_score(Recipe("memory", None, remember, "joint"), TRAIN, [], HELD).title == "memory, joint"
+    assert fit_and_score(REMEMBER, TRAIN, [], HELD).parameters_per_run == 0

@@ -39,9 +39,9 @@ def small(few):
 def test_held_out_runs_are_predicted_better_than_by_bingham(bundled_study, rig):
     found = bundled_study.rig(rig)
     bingham = [c for c in found.candidates if c.recipe.model == "bingham"]
-    assert found.chosen.held_out.median() <= 0.05
-    assert all(found.chosen.held_out.median() < other.held_out.median() for other in bingham)
-    assert found.chosen.left_out.median() < min(other.left_out.median() for other in bingham)
+    assert found.chosen.validation.median() <= 0.05
+    assert all(found.chosen.validation.median() < other.validation.median() for other in bingham)
+    assert found.chosen.cross_validated.median() < min(other.cross_validated.median() for other in bingham)
 
 
 @pytest.mark.parametrize(("rig", "left_out", "held_out"), [("utfsm", 0.037, 0.028), ("labcontrol", 0.028, 0.025)])
@@ -49,8 +49,8 @@ def test_real_dampers_are_predicted_where_nobody_tested(bundled_study, rig, left
     """Bounds a little above what is measured (docs/play-and-bypass.md)."""
     candidates = next(r for r in bundled_study.rigs if r.rig == rig).candidates
     joint = next(c for c in candidates if c.recipe.name == "play-bypass")
-    assert joint.left_out.median() < left_out
-    assert joint.held_out.median() < held_out
+    assert joint.cross_validated.median() < left_out
+    assert joint.validation.median() < held_out
 
 
 def test_train_runs_alone_make_the_model(bundled_study, bundled):
@@ -58,13 +58,13 @@ def test_train_runs_alone_make_the_model(bundled_study, bundled):
     for rig in bundled_study.rigs:
         for candidate in rig.candidates:
             assert not validate_ids & {i.run_id for i in candidate.identifications}
-            assert {r.run_id for r in candidate.held_out.runs} <= validate_ids
+            assert {r.run_id for r in candidate.validation.runs} <= validate_ids
 
 
 def test_the_sweep_is_predicted_but_not_identified_from(bundled_study):
     rig = bundled_study.rig("utfsm")
     assert "utf_chirp15_0A" in rig.not_identified
-    sweep = next(r for r in rig.chosen.held_out.runs if r.run_id == "utf_chirp15_0A")
+    sweep = next(r for r in rig.chosen.validation.runs if r.run_id == "utf_chirp15_0A")
     assert {"amplitude", "not a sine"} <= set(sweep.extrapolation)
 
 
@@ -103,7 +103,7 @@ def test_saved_models_predict_what_the_study_predicted(written, bundled_study, b
     for rig in bundled_study.rigs:
         damper = load_model(written / f"model-{rig.rig}.json")
         again = validate(damper, bundled.rig(rig.rig).split("validate"))
-        assert [r.scores for r in again.runs] == [r.scores for r in rig.chosen.held_out.runs]
+        assert [r.scores for r in again.runs] == [r.scores for r in rig.chosen.validation.runs]
 
 
 def test_tables_carry_units_and_numbers(written):
@@ -154,7 +154,7 @@ def test_report_is_one_file_without_scripts_or_links_outside(written):
 
 
 def numbers(rig):
-    return [c.damper.own_numbers for c in rig.candidates], [r.scores for r in rig.chosen.left_out.runs]
+    return [c.damper.fitted_parameters for c in rig.candidates], [r.scores for r in rig.chosen.cross_validated.runs]
 
 
 def test_a_study_is_the_same_twice_and_in_another_process(small, few, tmp_path):
@@ -208,5 +208,5 @@ def test_terms_the_runs_do_not_show_are_not_in_the_model(bundled_study):
         for name in ("cq", "qb", "c1", "h1", "m"):  # what `identify_jointly` may do without
             if name in known.names:
                 at = known.names.index(name)
-                value, error = rig.damper.own_numbers[name].value, known.covariance[at, at] ** 0.5
+                value, error = rig.damper.fitted_parameters[name].value, known.covariance[at, at] ** 0.5
                 assert abs(value) > 1.5 * error, f"{rig.rig}: {name} {value:.3g} within {error:.2g} of none"

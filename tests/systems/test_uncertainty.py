@@ -30,7 +30,7 @@ ROAD = load_input("bump", {"length_s": 1.0})
 
 
 def certain(damper, names, sizes, gain=0.0, offset=0.0):
-    logs = tuple(damper.own_numbers[name].log for name in names)
+    logs = tuple(damper.fitted_parameters[name].log for name in names)
     many = np.full(len(names), 1e6)
     return replace(damper, certainty=Certainty(names, logs, np.diag(sizes) ** 2, many, (), (), gain, offset, 1e6))
 
@@ -41,12 +41,12 @@ DAMPERS = {"joint": (joint_damper(), ("c0", "c1")), "modified": (modified_damper
 @pytest.mark.parametrize("kind", DAMPERS)
 def test_other_numbers_in_one_loop_are_other_dampers(kind):
     damper, names = DAMPERS[kind]
-    damper = certain(damper, names, [0.05, 0.05] if damper.own_numbers[names[0]].log else [60.0, 40.0])
+    damper = certain(damper, names, [0.05, 0.05] if damper.fitted_parameters[names[0]].log else [60.0, 40.0])
     loop = Loop(CAR, ROAD, {"damper": damper}, Passive(0.5), free=True)
     draws = draw({"damper": damper}, 3, seed=4)
     bands = monte_carlo(loop, draws, loop.run(1e-3, machine=False))
     for row, one in zip(bands.peaks["acceleration_m_s2"], draws, strict=True):
-        other = damper.with_numbers(one["damper"].numbers)
+        other = damper.with_parameters(one["damper"].numbers)
         alone = Loop(CAR, ROAD, {"damper": other}, Passive(0.5)).run(bands.step, machine=False)
         assert row == pytest.approx(alone.peaks["acceleration_m_s2"], rel=1e-9)
     low, middle, high = bands.quantiles()["force_N"]
@@ -67,10 +67,14 @@ def test_a_session_brings_a_gain_and_an_offset():
 
 def test_draws_scatter_as_the_damper_says():
     damper = certain(
-        joint_damper(), ("c0", "fy0"), [0.02, 0.05] if joint_damper().own_numbers["c0"].log else [20.0, 5.0], 0.03, 7.0
+        joint_damper(),
+        ("c0", "fy0"),
+        [0.02, 0.05] if joint_damper().fitted_parameters["c0"].log else [20.0, 5.0],
+        0.03,
+        7.0,
     )
     draws = draw({"front": damper, "rear": damper}, 4000)
-    own = damper.own_numbers
+    own = damper.fitted_parameters
     for i, name in enumerate(damper.certainty.names):
         values = np.array([row["front"].numbers[name] for row in draws])
         moved = np.log(values / own[name].value) if own[name].log else values - own[name].value

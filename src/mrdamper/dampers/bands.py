@@ -103,7 +103,7 @@ def band(
 
 def no_band(damper: Damper) -> str:
     """Why there is no band, in words."""
-    if not damper.own_numbers:
+    if not damper.fitted_parameters:
         return "no band: how sure a model of this kind is cannot be worked out"
     if damper.certainty is None:
         return "no band: the model was saved without its covariance"

@@ -16,7 +16,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from mrdamper.dampers.causal import SLACK, causal_force
-from mrdamper.dampers.certainty import Certainty, OwnNumber, table
+from mrdamper.dampers.certainty import Certainty, FittedParameter, table
 from mrdamper.dampers.coil import Coil
 from mrdamper.data import Condition, Floats, Run, Shown
 from mrdamper.errors import InputError, checked
@@ -283,11 +283,11 @@ class Damper(Shown):
         return {}
 
     @property
-    def own_numbers(self) -> Mapping[str, OwnNumber]:
+    def fitted_parameters(self) -> Mapping[str, FittedParameter]:
         """The numbers determined from the data; none where nobody could name them."""
         return {}
 
-    def with_numbers(self, values: Mapping[str, float]) -> Self:
+    def with_parameters(self, values: Mapping[str, float]) -> Self:
         """The damper with some of its own numbers changed; only for derivatives and draws."""
         raise not_held(self, values)
 
@@ -339,9 +339,9 @@ class Damper(Shown):
     def force_along(self, motion: Excitation, condition: Condition) -> Floats:
         """Force [N] along a motion about mid-stroke that amounts to a condition."""
         at = replace(condition, current_A=abs(condition.current_A))
-        return simulate(self.model_at(at), self.felt(motion)).force
+        return simulate(self.model_at(at), self.with_field_current(motion)).force
 
-    def felt(self, motion: Excitation) -> Excitation:
+    def with_field_current(self, motion: Excitation) -> Excitation:
         """The motion with the current whose field is there: its magnitude, behind the coil's lags."""
         if self.coil is None:
             return motion.with_current(np.abs(motion.current))
@@ -370,9 +370,9 @@ class Damper(Shown):
         if self.knee is not None and samples_in_knee(motion, self.knee) < _SAMPLES_IN_KNEE:
             flags = (*flags, COARSE)
         made = Prediction(motion, np.zeros(len(motion)), found.condition, flags)
-        return replace(made, force=self.again(made))
+        return replace(made, force=self.force_for(made))
 
-    def again(self, prediction: Prediction) -> Floats:
+    def force_for(self, prediction: Prediction) -> Floats:
         """The force of this damper for what another one's prediction was made for."""
         motion, condition = prediction.motion, prediction.condition
         if prediction.steady:

@@ -87,8 +87,8 @@ def trace(damper: Damper, free: bool = False) -> Program:
         model = type(one)(**{i.name: tape.parameter(i.name, getattr(one, i.name)) for i in one.parameters()})
     else:
         if free:
-            own: Any = {name: tape.parameter(free_name(name), n.value) for name, n in damper.own_numbers.items()}
-            damper = damper.with_numbers(own)
+            own: Any = {name: tape.parameter(free_name(name), n.value) for name, n in damper.fitted_parameters.items()}
+            damper = damper.with_parameters(own)
         running, outside = _running_condition(damper, motion)
         model = damper.model_at(running)
     force = model.force(motion, model.state(motion))  # type: ignore[arg-type]

@@ -27,7 +27,7 @@ _BADLY = 0.5  # standard error over the value from which a number is known to a 
 
 
 @dataclass(frozen=True)
-class OwnNumber:
+class FittedParameter:
     """A number of a damper determined from data; `log` where it is searched in the logarithm."""
 
     value: float
@@ -102,7 +102,7 @@ class Certainty:
             return None
         i = self.names.index(name)
         error = float(np.sqrt(self.covariance[i, i]))
-        return interval_about(damper.own_numbers[name].value, error, self.dof[i], level, self.logs[i])
+        return interval_about(damper.fitted_parameters[name].value, error, self.dof[i], level, self.logs[i])
 
     def interval(self, damper: Damper, name: str, level: float = 0.95) -> tuple[float, float]:
         """Ends of a number's interval.
@@ -123,7 +123,7 @@ def unsure(damper: Damper) -> list[str]:
     known: Certainty | None = damper.certainty
     if known is None:
         return ["How sure the numbers are is not known: the model was saved without it."]
-    numbers = damper.own_numbers
+    numbers = damper.fitted_parameters
     said = [f"{name} ended at {_limit(numbers[name])}: only one side of it is open." for name in known.one_sided]
     said += [f"{text}." for text in known.words]
     told = " ".join(known.words)
@@ -150,7 +150,7 @@ def unsure(damper: Damper) -> list[str]:
     return [*said, *(f"{text}." for text in weaknesses(names, block))]
 
 
-def _limit(own: OwnNumber) -> str:
+def _limit(own: FittedParameter) -> str:
     for end, name in zip(own.bounds, ("lower", "upper"), strict=True):
         if np.isclose(own.value, end, rtol=1e-6, atol=1e-12):
             return f"its {name} limit {end:g}"
@@ -165,7 +165,7 @@ def table(damper: Damper, level: float = 0.95) -> list[dict[str, Any]]:
     """
     known: Certainty | None = damper.certainty
     rows = []
-    for name, own in damper.own_numbers.items():
+    for name, own in damper.fitted_parameters.items():
         ends = known.ends(damper, name, level) if known else None
         if known is None:
             state = "no covariance"

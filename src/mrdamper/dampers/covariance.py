@@ -52,10 +52,10 @@ def certain(
     bounded : bool
         Numbers at a bound are held there; otherwise they count like the others, as if there were none.
     """
-    if not damper.own_numbers or not runs:
+    if not damper.fitted_parameters or not runs:
         return damper
     parts = [Part.of(damper, run) for run in runs]
-    numbers = damper.own_numbers
+    numbers = damper.fitted_parameters
     at_bound = tuple(
         name
         for name, own in numbers.items()
@@ -114,7 +114,7 @@ class Part:
             first = max(first, int(np.searchsorted(run.time, run.time[last] - _CYCLES * period)))
             begin = int(np.searchsorted(run.time, run.time[first] - _WARM_UP * period))
             short = replace(prediction, motion=prediction.motion.part(slice(begin, last + 1)))
-            prediction = replace(short, force=damper.again(short))
+            prediction = replace(short, force=damper.force_for(short))
         measured = run.force[first : last + 1 : max(1, (last + 1 - first) // _ROWS)]
         picked = np.arange(first, last + 1, max(1, (last + 1 - first) // _ROWS)) - begin
         residual = prediction.force[picked] - measured

@@ -26,7 +26,7 @@ from mrdamper.hysteresis.batch import follow_alike
 from mrdamper.identification import Problem
 from mrdamper.models import Model, Scale
 from mrdamper.optimizers.levenberg_marquardt import least_squares, polished
-from mrdamper.optimizers.linear import beside_columns, on_one_blas_thread, robust_weights, solve_linear
+from mrdamper.optimizers.linear import on_one_blas_thread, project_out_columns, robust_weights, solve_linear
 
 _RUNG = 1500 ** (1 / 40)  # from one yield displacement to the next; between them Gram matrices are interpolated
 _LATTICE = 2e-6  # m, one of the rungs, whatever the data
@@ -366,7 +366,7 @@ class _ShapeSearch:
         by_shape = np.einsum("rij,rj->ri", moved, solution.error) * (self.weights * inside)[:, None]
         jacobian = (by_shape[:, :, None] * self.columns[:, None, :]).reshape(-1, u.size)
         weighted = (self.weights[:, None, None] * table[:, :, :-1]).reshape(jacobian.shape[0], -1)
-        return beside_columns(weighted, jacobian)
+        return project_out_columns(weighted, jacobian)
 
     def gradient(self, u: Floats) -> Floats:
         """Of half the squared residual: exact, for the residual does not see the other coefficients move."""

@@ -19,7 +19,7 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 
 from mrdamper.dampers.base import UNTESTED, Damper, Envelope, Saved, not_held
-from mrdamper.dampers.certainty import Certainty, OwnNumber
+from mrdamper.dampers.certainty import Certainty, FittedParameter
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.strung import Linearised, Part, Table
 from mrdamper.data import Condition, Floats, Run
@@ -110,17 +110,17 @@ class JointDamper(Damper):
     def holding(self, values: Mapping[str, float]) -> JointDamper:
         if missing := values.keys() - self.model.values().keys():
             raise not_held(self, sorted(missing))
-        return replace(self.with_numbers(values), certainty=None)
+        return replace(self.with_parameters(values), certainty=None)
 
     @property
-    def own_numbers(self) -> Mapping[str, OwnNumber]:
+    def fitted_parameters(self) -> Mapping[str, FittedParameter]:
         return {
-            info.name: OwnNumber(getattr(self.model, info.name), info.bounds, info.scale == "log", info.unit)
+            info.name: FittedParameter(getattr(self.model, info.name), info.bounds, info.scale == "log", info.unit)
             for info in self.model.parameters()
             if info.name in self.free
         }
 
-    def with_numbers(self, values: Mapping[str, float]) -> Self:
+    def with_parameters(self, values: Mapping[str, float]) -> Self:
         return replace(self, model=replace(self.model, **values))
 
     def to_saved(self) -> SavedJoint:
@@ -420,7 +420,7 @@ class JointProblem:
         begin, rows = time.perf_counter(), sorted(rows)
         known = self.linearised(fit)
         table = known.table.only(rows)
-        errors, point = known.foreseen(rows, self.box())
+        errors, point = known.extrapolate_refit(rows, self.box())
         table.weigh(errors)
         costs = [float(np.sum(table.solve(u).residual ** 2)) for u in (fit.point, point)]
         if costs[1] > costs[0]:  # far from where the derivatives hold
@@ -465,7 +465,7 @@ class JointProblem:
             if not axis.at_bound(float(point[i])):
                 continue
             inward = np.where(np.arange(point.size) == i, middle, point)
-            here, there = self.bare(point).values(), self.bare(inward).values()
+            here, there = self.without_linear(point).values(), self.without_linear(inward).values()
             stands_for = [n for n in here if here[n] != there[n]]
             found += [axis.name] if axis.name in own or not stands_for else stands_for
         return found
@@ -477,7 +477,7 @@ class JointProblem:
             np.array([axis.coordinate(axis.upper) for axis in self.axes]),
         )
 
-    def bare(self, point: Floats) -> Model:
+    def without_linear(self, point: Floats) -> Model:
         """The model at a point of the search axes, its linear parameters zero."""
         values = {axis.name: axis.value(float(u)) for axis, u in zip(self.axes, point, strict=True)}
         values = {name: value for name, value in values.items() if name not in (RISE, FALL)}

@@ -75,7 +75,7 @@ class Likelihood:
             raise InputError(
                 "these runs determine no number of the damper", mend="give its train runs", code="E_CERTAINTY"
             )
-        names, numbers = known.names, damper.own_numbers
+        names, numbers = known.names, damper.fitted_parameters
         parts = tuple(Part.of(damper, run) for run in runs)
         slopes = [force_slopes(damper, p.prediction, names)[p.picked] for p in parts]
         normal = normal_of(slopes, parts)
@@ -104,7 +104,7 @@ class Likelihood:
         values = {
             n: float(np.exp(u)) if log else float(u) for n, u, log in zip(self.names, point, self.logs, strict=True)
         }
-        moved = self.damper.with_numbers(values)
+        moved = self.damper.with_parameters(values)
         return self.instruments @ (self._force(moved) - self.measured) - self.offset
 
     def __call__(self, point: Floats) -> float:
@@ -115,7 +115,7 @@ class Likelihood:
     def _force(self, damper: Damper) -> Floats:
         model = damper.one_model
         if model is None or self._strung is None:
-            return np.concatenate([damper.again(p.prediction)[p.picked] for p in self.parts])
+            return np.concatenate([damper.force_for(p.prediction)[p.picked] for p in self.parts])
         whole, picked, seen = self._strung
         return model.force(seen, model.state(whole)[picked])
 
@@ -124,7 +124,7 @@ class Likelihood:
         """All runs in one motion, followed faster than many short ones; None where one does not forget the other."""
         if self.damper.one_model is None or min(int(p.picked[0]) for p in self.parts) < _FORGETS:
             return None
-        motions = [self.damper.felt(p.prediction.motion) for p in self.parts]
+        motions = [self.damper.with_field_current(p.prediction.motion) for p in self.parts]
         begins = np.cumsum([0, *(len(m) for m in motions)])[:-1]
         picked = np.concatenate([p.picked + b for p, b in zip(self.parts, begins, strict=True)])
         whole = string(motions)
@@ -135,7 +135,7 @@ def damper_bounds(damper: Damper) -> set[str]:
     """Numbers at a bound, by value."""
     return {
         name
-        for name, own in damper.own_numbers.items()
+        for name, own in damper.fitted_parameters.items()
         if np.isclose(own.value, own.bounds, rtol=1e-6, atol=1e-12).any()
     }
 
@@ -186,9 +186,9 @@ def profile(likelihood: Likelihood, name: str) -> Profile:
     InputError
         E_CERTAINTY if the damper has no such number.
     """
-    own = likelihood.damper.own_numbers.get(name)
+    own = likelihood.damper.fitted_parameters.get(name)
     if own is None:
-        known = ", ".join(likelihood.damper.own_numbers)
+        known = ", ".join(likelihood.damper.fitted_parameters)
         raise InputError(f"no number {name}", mend=f"known: {known}", code="E_CERTAINTY")
     if name not in likelihood.names or name in (likelihood.damper.certainty or _NONE).unknown:
         flat = np.array([own.value])

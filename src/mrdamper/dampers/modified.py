@@ -14,7 +14,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Envelope, Saved, not_held
-from mrdamper.dampers.certainty import Certainty, OwnNumber
+from mrdamper.dampers.certainty import Certainty, FittedParameter
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.gram import Condensed, choose_forms, condense, fit_jointly
 from mrdamper.dampers.parameter_map import ParameterMap
@@ -110,14 +110,14 @@ class ModifiedModel(Damper):
         return replace(self, parameters=ParameterMap(self.parameters.model_type, functions), certainty=None)
 
     @property
-    def own_numbers(self) -> Mapping[str, OwnNumber]:
+    def fitted_parameters(self) -> Mapping[str, FittedParameter]:
         return {
-            f"{name}.{i}": OwnNumber(value)
+            f"{name}.{i}": FittedParameter(value)
             for name, function in self.functions.items()
             for i, value in enumerate((*function.coefficients, *function.rates))
         }
 
-    def with_numbers(self, values: Mapping[str, float]) -> Self:
+    def with_parameters(self, values: Mapping[str, float]) -> Self:
         functions = {}
         for name, f in self.functions.items():
             numbers = [values.get(f"{name}.{i}", v) for i, v in enumerate((*f.coefficients, *f.rates))]

@@ -47,16 +47,16 @@ def _linear(damper: Damper, prediction: Prediction, names: Sequence[str]) -> dic
         loop = damper.loop(prediction.condition)
         motion, state = loop.excitation, loop.state
     else:
-        motion = damper.felt(prediction.motion)
+        motion = damper.with_field_current(prediction.motion)
         state = model.state(motion)
     bare = replace(model, **{info.name: 0.0 for info in linear})
     return dict(zip([info.name for info in linear], linear_table(bare, linear, motion, state)[1].T, strict=True))
 
 
 def _moved(damper: Damper, prediction: Prediction, name: str) -> Floats:
-    own = damper.own_numbers[name]
+    own = damper.fitted_parameters[name]
     step = _STEP if own.log else _STEP * (abs(own.value) or 1.0)
     there = own.value * np.exp(step) if own.log else own.value + step
     if there > own.bounds[1]:
         step, there = -step, own.value * np.exp(-step) if own.log else own.value - step
-    return (damper.with_numbers({name: there}).again(prediction) - prediction.force) / step
+    return (damper.with_parameters({name: there}).force_for(prediction) - prediction.force) / step

@@ -192,7 +192,7 @@ class Strung:
         self.measured.path  # noqa: B018  cut into strokes once, for every current that is laid along
         self._felt: tuple[Coil | None, Excitation] = None, self.measured.with_current(np.abs(self.measured.current))
 
-    def felt(self, coil: Coil | None) -> Excitation:
+    def with_field_current(self, coil: Coil | None) -> Excitation:
         """The motion with the current that the field feels; remembered while the coil stays."""
         if self._felt[0] != coil:
             current = np.abs(self.measured.current)
@@ -246,18 +246,18 @@ class Table:
 
     def _followed(self, model: Model, point: Floats) -> tuple[Excitation, Floats]:
         """Motion and state of a model at the samples."""
-        motion = self.strung.felt(self.problem.coil_at(point))
+        motion = self.strung.with_field_current(self.problem.coil_at(point))
         if self._seen is None or self._seen[0] is not motion:
             self._seen = motion, motion.part(self.picked)
         return self._seen[1], model.state(motion)[self.picked]
 
-    def laid(self, point: Floats) -> tuple[Model, Floats, Floats]:
+    def linear_columns(self, point: Floats) -> tuple[Model, Floats, Floats]:
         """Model at a point without its linear parameters, its force [N], and what one unit of each adds.
 
         Remembered for the last point: weights do not touch it.
         """
         if self._laid is None or not np.array_equal(self._laid[0], point):
-            bare = self.problem.bare(point)
+            bare = self.problem.without_linear(point)
             seen, state = self._followed(bare, point)
             self._laid = point, bare, *linear_table(bare, self.problem.linear, seen, state)
         return self._laid[1:]
@@ -267,7 +267,7 @@ class Table:
         if self._solved is not None and np.array_equal(self._solved[0], point):
             return self._solved[1]
         linear, factor = self.problem.linear, self.factor
-        bare, base, columns = self.laid(point)
+        bare, base, columns = self.linear_columns(point)
         columns, right = columns * factor[:, None], (self.target - base) * factor
         solution, held = solve_bounded(columns, right, *bounds_of(linear))
         residual = columns @ solution - right
@@ -313,13 +313,15 @@ class Table:
 
     def residual(self, point: Floats, model: Model) -> Floats:
         """(N,) of the linear parameters of a model at a point; its squares sum to each run's nrmse_pp²."""
-        moved = replace(self.problem.bare(point), **{i.name: getattr(model, i.name) for i in self.problem.linear})
+        moved = replace(
+            self.problem.without_linear(point), **{i.name: getattr(model, i.name) for i in self.problem.linear}
+        )
         return (moved.force(*self._followed(moved, point)) - self.target) * self.unit
 
     def linearise(self, point: Floats, model: Model) -> tuple[Floats, Floats]:
         """Weighted residual of a model, and its derivatives by search axes and linear parameters."""
         residual = self.residual(point, model) * self.weights[self.owner]
-        columns = self.laid(point)[2] * self.factor[:, None]
+        columns = self.linear_columns(point)[2] * self.factor[:, None]
         return residual, np.column_stack([self._moved(point, model, residual), columns])
 
 
@@ -348,7 +350,7 @@ class Linearised:
         whole, owner = np.column_stack([self.residual, self.jacobian]), self.table.owner
         return [np.linalg.qr(whole[owner == run], mode="r") / weight for run, weight in enumerate(self.table.weights)]
 
-    def foreseen(self, runs: Sequence[int], box: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    def extrapolate_refit(self, runs: Sequence[int], box: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
         """Errors of some runs, and where a search of these alone would end, the linear parameters following freely."""
         triangles, point, own = [self._triangles[i] for i in runs], self.point, slice(1, 1 + self.point.size)
         owner = np.repeat(np.arange(len(runs)), [len(triangle) for triangle in triangles])

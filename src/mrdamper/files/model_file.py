@@ -291,7 +291,7 @@ def _with_certainty(damper: Damper, saved: _Covariance, where: str) -> Damper:
     square = len(saved.matrix) == size and all(len(row) == size for row in saved.matrix)
     matrix = np.array(saved.matrix, dtype=float).reshape(size, size) if square else np.zeros((0, 0))
     lengths = len(saved.logarithmic) == len(saved.degrees_of_freedom) == size
-    named = all(name in damper.own_numbers for name in (*saved.parameters, *saved.one_sided, *saved.unknown))
+    named = all(name in damper.fitted_parameters for name in (*saved.parameters, *saved.one_sided, *saved.unknown))
     if (
         not (square and lengths and named)
         or not np.allclose(matrix, matrix.T, rtol=1e-6)

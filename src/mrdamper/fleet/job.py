@@ -257,7 +257,7 @@ def _study(dataset: Dataset) -> dict[str, Any]:
         chosen = study_rig(dataset).chosen
     except InputError as error:
         return {"study": str(error)}
-    return {"study": chosen.title, "study_left_out_nrmse_pp": float(chosen.left_out.median())}
+    return {"study": chosen.title, "study_cv_nrmse_pp": float(chosen.cross_validated.median())}
 
 
 def _usable(dataset: Dataset) -> list[Run]:

@@ -21,7 +21,7 @@ _TEXT = (
     "at_bounds", "study",
 )  # fmt: skip
 _NUMBERS = (
-    "cost", "nrmse_pp", "nrmse_pp_worst", "study_left_out_nrmse_pp", "gas_force_N", "friction_N",
+    "cost", "nrmse_pp", "nrmse_pp_worst", "study_cv_nrmse_pp", "gas_force_N", "friction_N",
     "loop_deviation", "shape_deviation",
 )  # fmt: skip
 

@@ -14,7 +14,7 @@ from mrdamper.data import Condition, Floats
 from mrdamper.errors import IdentificationError
 from mrdamper.functions.forms import Form, ParameterFunction, features, form_named
 from mrdamper.optimizers.levenberg_marquardt import least_squares, polished
-from mrdamper.optimizers.linear import beside_columns, solve_linear
+from mrdamper.optimizers.linear import project_out_columns, solve_linear
 
 # Below this share of the largest singular value the tests cannot tell the terms apart: a rig repeats a motion to 1e-6.
 _RANK_LIMIT = 1e-5
@@ -173,7 +173,7 @@ def _best_rates(
     def slopes(u: Floats) -> Floats:
         columns, found = fitted(u)
         by_rate = (form.slopes(columns, I, f, tuple(np.exp(u))) @ found).T
-        return beside_columns(columns, by_rate)  # the coefficients move along [Kaufman 1975]
+        return project_out_columns(columns, by_rate)  # the coefficients move along [Kaufman 1975]
 
     grid = np.array(list(product(*(np.linspace(low, high, 6) for low, high in zip(lower, upper, strict=True)))))
     tables = np.stack([form.columns(I, f, A, tuple(rates)) for rates in np.exp(grid)]) * weight[:, None]

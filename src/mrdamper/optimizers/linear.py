@@ -50,7 +50,7 @@ def solve_linear(columns: Floats, right: Floats, rank_limit: float | None = None
     return np.asarray(np.linalg.lstsq(columns / scale, right, rcond=rank_limit)[0], dtype=float) / scale
 
 
-def beside_columns(columns: Floats, right: Floats, rank_limit: float = 1e-10) -> Floats:
+def project_out_columns(columns: Floats, right: Floats, rank_limit: float = 1e-10) -> Floats:
     """What the columns do not explain of (N,) or (N, D) right sides; arguments as `solve_linear`."""
     scale = np.linalg.norm(columns, axis=0)
     basis, triangle = np.linalg.qr(columns / np.where(scale > 0, scale, 1.0))

@@ -88,7 +88,7 @@ def run_rows(comparison: Comparison) -> list[dict[str, Any]]:
             head = {"rig": rig.rig, "model": entry.recipe.name}
             for found in entry.identifications:
                 rows.append({**head, "set": "per run", "run_id": found.run_id, "nrmse_pp": found.scores.nrmse_pp})
-            sets = {"train": entry.train, "left out": entry.left_out, "held out": entry.held_out}
+            sets = {"train": entry.train, "left out": entry.cross_validated, "held out": entry.validation}
             for name, validation in sets.items():
                 rows += [{**head, "set": name, **score_row(run)} for run in validation.runs]
     return rows
@@ -105,13 +105,13 @@ def _rows(rig: RigComparison) -> list[dict[str, Any]]:
                 "title": entry.recipe.title,
                 "per_run_nrmse_pp": _plain(entry.per_run),
                 "train_nrmse_pp": _plain(entry.train.median()),
-                "left_out_nrmse_pp": _plain(entry.left_out.median()),
-                "left_out_worst_nrmse_pp": _plain(entry.left_out.worst_error()),
-                "held_out_nrmse_pp": _plain(entry.held_out.median()),
-                "held_out_worst_nrmse_pp": _plain(entry.held_out.worst_error()),
-                "held_out_energy_error": _plain(entry.held_out.median("energy_error")),
-                "numbers_per_run": entry.numbers_per_run,
-                "numbers": entry.damper.parameter_count,
+                "cv_nrmse_pp": _plain(entry.cross_validated.median()),
+                "cv_worst_nrmse_pp": _plain(entry.cross_validated.worst_error()),
+                "validation_nrmse_pp": _plain(entry.validation.median()),
+                "validation_worst_nrmse_pp": _plain(entry.validation.worst_error()),
+                "validation_energy_error": _plain(entry.validation.median("energy_error")),
+                "parameters_per_run": entry.parameters_per_run,
+                "parameters": entry.damper.parameter_count,
                 "conditions_needed": entry.conditions_needed,
                 "forces_computed_per_run": _evaluations(entry),
                 "seconds": entry.seconds,
@@ -131,14 +131,16 @@ def _evaluations(entry: Scored) -> int | None:
 
 def _reason(entry: Scored, entries: Sequence[Scored]) -> str:
     """Say why it stands where it stands."""
-    own, best = entry.left_out.median(), entries[0]
+    own, best = entry.cross_validated.median(), entries[0]
     text = f"{100 * own:.1f} % on left-out conditions with {entry.damper.parameter_count} numbers"
     if entry is best:
         text += ": the lowest error"
     else:
-        text += f", {100 * (own / best.left_out.median() - 1):.0f} % above the first"
+        text += f", {100 * (own / best.cross_validated.median() - 1):.0f} % above the first"
     leaner = [
-        e for e in entries if e.left_out.median() <= own and e.damper.parameter_count < entry.damper.parameter_count
+        e
+        for e in entries
+        if e.cross_validated.median() <= own and e.damper.parameter_count < entry.damper.parameter_count
     ]
     if leaner and entry is not best:
         fewest = min(leaner, key=lambda e: e.damper.parameter_count)
@@ -149,7 +151,9 @@ def _reason(entry: Scored, entries: Sequence[Scored]) -> str:
 
 
 def _chapter(rig: RigComparison, folder: Path, suffix: str, png: bool) -> dict[str, Any]:
-    scores = {e.recipe.title: (e.train.median(), e.left_out.median(), e.held_out.median()) for e in rig.entries}
+    scores = {
+        e.recipe.title: (e.train.median(), e.cross_validated.median(), e.validation.median()) for e in rig.entries
+    }
     runs = _shown(rig)
     best = {entry.recipe.title: entry.damper for entry in rig.entries[:_OVERLAID]}
     figures = {"ranking": ranking(scores), "loops": overlaid_loops(runs, best)}
@@ -160,7 +164,7 @@ def _chapter(rig: RigComparison, folder: Path, suffix: str, png: bool) -> dict[s
         "refused": rig.refused,
         "not_identified": rig.not_identified,
         "verdict": (
-            f"{first.recipe.title} predicts left-out conditions best: {100 * first.left_out.median():.1f} % of the "
+            f"{first.recipe.title} has the least cross-validated error: {100 * first.cross_validated.median():.1f} % of the "
             f"peak-to-peak force, among {len(rig.entries)} models."
         ),
         "loops_caption": (
@@ -176,7 +180,7 @@ def _chapter(rig: RigComparison, folder: Path, suffix: str, png: bool) -> dict[s
 def _shown(rig: RigComparison) -> list[Run]:
     """Held-out sines, where there are any, over the currents."""
     entry = rig.entries[0]
-    scored = entry.held_out.only(rig.sines).runs or entry.train.runs
+    scored = entry.validation.only(rig.sines).runs or entry.train.runs
     ordered = sorted(scored, key=lambda run: (run.condition.current_A, run.condition.peak_velocity))
     picks = np.unique(np.linspace(0, len(ordered) - 1, min(_LOOPS, len(ordered))).round().astype(int))
     return [rig.dataset[ordered[i].run_id] for i in picks]
@@ -190,13 +194,13 @@ def text_table(rows: Sequence[Mapping[str, Any]]) -> str:
     """The ranking for a terminal."""
     lines = [
         f"{'':3} {'model':42} {'per run':>8} {'train':>6} {'left out':>8} {'worst':>6} {'held out':>8} {'worst':>6} "
-        f"{'numbers':>7} {'s':>6}"
+        f"{'parameters':>10} {'s':>6}"
     ]
-    names = ("per_run", "train", "left_out", "left_out_worst", "held_out", "held_out_worst")
+    names = ("per_run", "train", "cv", "cv_worst", "validation", "validation_worst")
     for row in rows:
         shown = ["–" if (s := row[f"{name}_nrmse_pp"]) is None else f"{100 * s:.2f}" for name in names]
         lines.append(
             f"{row['rank']:3} {row['title']:42} {shown[0]:>8} {shown[1]:>6} {shown[2]:>8} {shown[3]:>6} {shown[4]:>8} "
-            f"{shown[5]:>6} {row['numbers']:7} {row['seconds']:6.1f}"
+            f"{shown[5]:>6} {row['parameters']:10} {row['seconds']:6.1f}"
         )
     return "\n".join(lines)

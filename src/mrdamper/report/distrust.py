@@ -26,7 +26,7 @@ def doubts(found: Scored, loops: Sequence[LoopAnalysis]) -> list[str]:
     sentences = [
         *_outside(found.damper),
         *(unsure(found.damper) if found.damper.certainty else ()),
-        *_runs(found.left_out, found.held_out),
+        *_runs(found.cross_validated, found.validation),
         *(_functions(found.fit) if isinstance(found.fit, ModifiedFit) else ()),
         *(_joint(found.fit) if isinstance(found.fit, JointFit) else ()),
         *_identifications(found.identifications),

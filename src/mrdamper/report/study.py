@@ -163,7 +163,7 @@ def _validation_table(study: Study) -> str:
     rows = []
     for rig in study.rigs:
         for candidate in rig.candidates:
-            for split, validation in (("left out", candidate.left_out), ("held out", candidate.held_out)):
+            for split, validation in (("left out", candidate.cross_validated), ("held out", candidate.validation)):
                 for run in validation.runs:
                     rows.append(
                         {
@@ -181,10 +181,10 @@ def _figures(rig: RigStudy) -> dict[str, Figure]:
     chosen = rig.chosen
     scores = {}
     for candidate in rig.candidates:
-        scores[f"{candidate.title}, left out"] = candidate.left_out
-        if candidate.held_out.runs:
-            scores[f"{candidate.title}, held out"] = candidate.held_out
-    train = [rig.dataset[run.run_id] for run in chosen.left_out.runs]
+        scores[f"{candidate.title}, left out"] = candidate.cross_validated
+        if candidate.validation.runs:
+            scores[f"{candidate.title}, held out"] = candidate.validation
+    train = [rig.dataset[run.run_id] for run in chosen.cross_validated.runs]
     measured = _measured(rig)
     return {
         **(figures_of_tests(rig.dataset, measured) if measured else {}),
@@ -308,7 +308,7 @@ def _parameters_table(study: Study) -> str:
 
 
 def _drift(rig: RigStudy) -> str:
-    drift = session_drift(rig.damper, [rig.dataset[run.run_id] for run in rig.chosen.left_out.runs])
+    drift = session_drift(rig.damper, [rig.dataset[run.run_id] for run in rig.chosen.cross_validated.runs])
     return (
         f"From run to run the measured force differs from the prediction by gains of {100 * drift.gain:.1f} % and "
         f"offsets of {drift.offset:.0f} N (standard deviations): the session's, or the model's own misfit at that "
@@ -331,12 +331,12 @@ def _left_out(rig: RigStudy) -> str:
 
 def _verdict(rig: RigStudy) -> str:
     chosen, best = rig.chosen, rig.chosen.damper
-    train, validate = len(chosen.left_out.runs), len(chosen.held_out.runs)
+    train, validate = len(chosen.cross_validated.runs), len(chosen.validation.runs)
     text = f"The model “{best.title}” was identified from {train} train runs"
     if validate:
         text += (
             f" and predicts {validate} held-out runs with a median error of "
-            f"{100 * chosen.held_out.median():.1f} % of the peak-to-peak force"
+            f"{100 * chosen.validation.median():.1f} % of the peak-to-peak force"
         )
     return text + "."
 
@@ -346,11 +346,11 @@ def _choice(rig: RigStudy) -> str:
     reason = "Asked for; error on" if rig.asked_for else "Chosen by the error on"
     text = (
         f"{reason} conditions left out of the identification: {chosen.title} with "
-        f"{100 * chosen.left_out.median():.1f} % and {chosen.damper.parameter_count} numbers"
+        f"{100 * chosen.cross_validated.median():.1f} % and {chosen.damper.parameter_count} numbers"
     )
     if others:
         text += " against " + ", ".join(
-            f"{o.title} with {100 * o.left_out.median():.1f} % and {o.damper.parameter_count}" for o in others
+            f"{o.title} with {100 * o.cross_validated.median():.1f} % and {o.damper.parameter_count}" for o in others
         )
     return text + ". Within a tenth of the best, fewer numbers win. Held-out runs confirm; they choose nothing."
 

@@ -144,8 +144,8 @@ class Reproduction:
     @property
     def best(self) -> Scored | None:
         """The contender that predicts the held-out runs best, where there are any."""
-        judged = [c for c in self.contenders if c.held_out.runs]
-        return min(judged, key=lambda c: c.held_out.median(), default=None)
+        judged = [c for c in self.contenders if c.validation.runs]
+        return min(judged, key=lambda c: c.validation.median(), default=None)
 
 
 def motions(study: Reproduction) -> list[list[int]]:

@@ -105,15 +105,15 @@ def accuracy(study: Reproduction) -> Measured:
 def few_parameters(study: Reproduction) -> Measured:
     """Held-out error and searched parameters beside Ali's model."""
     literal, ali = study.contender(LITERAL), study.contender(ALI)
-    if literal is None or ali is None or not (ali.held_out.runs and literal.held_out.runs):
+    if literal is None or ali is None or not (ali.validation.runs and literal.validation.runs):
         return unknown("Ali's model could not be followed on these runs, or no run is held out")
-    worst = [100 * c.held_out.worst().scores.nrmse_pp for c in (literal, ali)]
+    worst = [100 * c.validation.worst().scores.nrmse_pp for c in (literal, ali)]
     return measured(
         "few parameters",
-        literal.held_out.median() / ali.held_out.median(),
-        2 / max(ali.numbers_per_run, 1),
-        evidence=f"held out {100 * literal.held_out.median():.1f} % against {100 * ali.held_out.median():.1f} %; "
-        f"worst {worst[0]:.1f} % and {worst[1]:.1f} %; 2 searched against {ali.numbers_per_run}",
+        literal.validation.median() / ali.validation.median(),
+        2 / max(ali.parameters_per_run, 1),
+        evidence=f"held out {100 * literal.validation.median():.1f} % against {100 * ali.validation.median():.1f} %; "
+        f"worst {worst[0]:.1f} % and {worst[1]:.1f} %; 2 searched against {ali.parameters_per_run}",
     )
 
 
@@ -132,11 +132,11 @@ def fast(study: Reproduction) -> Measured:
 def generalisation(study: Reproduction) -> Measured:
     """Held-out error over that of identification, and the worst."""
     literal, consistent = study.contender(LITERAL), study.contender(CONSISTENT)
-    if literal is None or not literal.held_out.runs:
+    if literal is None or not literal.validation.runs:
         return unknown("the literal recipe could not be followed, or predicts no held-out run")
-    median, worst = literal.held_out.median(), literal.held_out.worst()
+    median, worst = literal.validation.median(), literal.validation.worst()
     error = worst.scores.nrmse_pp
-    beside = f"; consistent {100 * consistent.held_out.median():.1f} %" if consistent else ""
+    beside = f"; consistent {100 * consistent.validation.median():.1f} %" if consistent else ""
     return measured(
         "generalisation",
         median / literal.per_run,

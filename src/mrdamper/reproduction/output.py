@@ -137,14 +137,14 @@ def verdicts(study: Reproduction) -> Rows:
     """One row a contender: accuracy on the held-out runs and time; the counterpart of Table 5."""
     rows = []
     for contender in study.contenders:
-        held = contender.held_out
+        held = contender.validation
         median = held.median if held.runs else lambda name="": None
         spread = study.seed_errors.get(contender.recipe.title)
         rows.append(
             {
                 "verdict": _GROUPS[contender.recipe.way],
                 "method": contender.recipe.title,
-                "numbers": contender.damper.parameter_count,
+                "parameters": contender.damper.parameter_count,
                 "nrmse_pp": median("nrmse_pp"),
                 "worst_nrmse_pp": held.worst().scores.nrmse_pp if held.runs else None,
                 "nrmse_std": median("nrmse_std"),
@@ -194,7 +194,7 @@ def _tables(study: Reproduction, claims: tuple[Claim, ...]) -> tuple[dict[str, R
              "mean_relative_error": run.scores.mean_relative_error, "wape": run.scores.wape,
              "nrmse_pp": run.scores.nrmse_pp, "nrmse_std": run.scores.nrmse_std}
             for c in study.contenders
-            for run in c.held_out.runs
+            for run in c.validation.runs
         ],
         "table5_methods": verdicts(study),
         "functions": _function_rows(study),

@@ -23,7 +23,15 @@ from mrdamper.reproduction.sensitivity import OneAtATime, Sobol, one_at_a_time, 
 from mrdamper.reproduction.switches import Switches
 from mrdamper.reproduction.ways import CONSISTENT, DIRECT, JOINT, LITERAL, Steps
 from mrdamper.study.parallel import Processes, identify_quickly, quickened
-from mrdamper.study.recipe import Basis, Found, Progress, Recipe, Scored, Settled, follow_all
+from mrdamper.study.recipe import (
+    Basis,
+    IdentificationCache,
+    PaperAssumptions,
+    Progress,
+    Recipe,
+    Scored,
+    fit_and_score_all,
+)
 
 SOBOL_SAMPLES = 512
 
@@ -51,7 +59,7 @@ class OnRun:
 class FromRun:
     """Identifications of a run, and forces computed until a genetic search settled, by basis and run id."""
 
-    found: Found = field(default_factory=dict)
+    found: IdentificationCache = field(default_factory=dict)
     to_settle: dict[tuple[Basis, str], int] = field(default_factory=dict)
 
 
@@ -107,9 +115,9 @@ def identified_from(task: OnRun, progress: Progress) -> FromRun:
 
 
 def followed(
-    steps: Steps, held_out: Sequence[Run], found: Found, processes: Processes, progress: Progress
+    steps: Steps, held_out: Sequence[Run], found: IdentificationCache, processes: Processes, progress: Progress
 ) -> tuple[list[Scored], dict[str, str]]:
-    """`follow_all` from what is identified already, a recipe a piece; the joint fit takes longest."""
+    """`fit_and_score_all` from what is identified already, a recipe a piece; the joint fit takes longest."""
     order = sorted(steps, key=lambda step: step[0].title != JOINT)
     pieces = [
         (recipe, runs, {(b, run.id): found[b, run.id] for run in runs if (b := recipe.basis) and (b, run.id) in found})
@@ -122,13 +130,13 @@ def followed(
 
 
 def _follow(
-    held_out: Sequence[Run], piece: tuple[Recipe, Sequence[Run], Found], progress: Progress
+    held_out: Sequence[Run], piece: tuple[Recipe, Sequence[Run], IdentificationCache], progress: Progress
 ) -> tuple[list[Scored], dict[str, str]]:
     recipe, runs, found = piece
-    return follow_all([(recipe, runs)], held_out, progress, leave_out=False, found=found)
+    return fit_and_score_all([(recipe, runs)], held_out, progress, leave_out=False, found=found)
 
 
-def searches_of(train: Sequence[Run], settled: Settled, switches: Switches) -> dict[str, Basis]:
+def searches_of(train: Sequence[Run], settled: PaperAssumptions, switches: Switches) -> dict[str, Basis]:
     """The genetic search for alpha and beta on every train run, each with a seed of its own."""
     return {
         run.id: settled.basis(Paper(bounds=switches.bounds, genetic=GeneticSettings(seed=seed), explain=False))
@@ -162,7 +170,9 @@ def of_different_force(train: Sequence[Run]) -> list[tuple[int, Run]]:
     return list(enumerate(ordered[i] for i in picks))
 
 
-def genetic_check(settled: Settled, switches: Switches, pick: tuple[int, Run], progress: Progress) -> GeneticCheck:
+def genetic_check(
+    settled: PaperAssumptions, switches: Switches, pick: tuple[int, Run], progress: Progress
+) -> GeneticCheck:
     """The genetic search with the paper's settings on a run."""
     seed, run = pick
     progress(f"genetic search, {run.id}", 0.0)
@@ -177,7 +187,7 @@ def genetic_check(settled: Settled, switches: Switches, pick: tuple[int, Run], p
 
 
 def sensitivities(
-    settled: Settled, train: Sequence[Run], progress: Progress
+    settled: PaperAssumptions, train: Sequence[Run], progress: Progress
 ) -> tuple[tuple[OneAtATime, ...], Sobol | None, tuple[str, ...]]:
     """At the run in the middle of the train runs, as the consistent way identifies it; and why there are none."""
     progress("sensitivity", 0.0)

@@ -17,7 +17,7 @@ from mrdamper.reproduction.found import Reproduction
 from mrdamper.reproduction.switches import Switches
 from mrdamper.reproduction.virtual_rig import VirtualRig, friction_test, noisy_dataset, true_runs
 from mrdamper.reproduction.ways import HALF, JOINT, ways
-from mrdamper.study.recipe import Progress, Settled, follow_all
+from mrdamper.study.recipe import PaperAssumptions, Progress, fit_and_score_all
 
 CURRENTS = (0.0, 0.5, 1.0, 1.5, 2.0)
 _CYCLES = 2
@@ -52,9 +52,9 @@ def one_seed(rig: VirtualRig, switches: Switches, seed: int, progress: Progress)
     progress(f"noise seed {seed}", 0.0)
     dataset = noisy_dataset(rig, _truth(rig), seed)
     train, held_out = list(dataset.split("train")), list(dataset.split("validate"))
-    settled = Settled.of(train, rig.gas).preset(switches.fixed)
+    settled = PaperAssumptions.of(train, rig.gas).preset(switches.fixed)
     steps = [step for step in ways(train, held_out, settled, switches, explain=False) if step[0].title not in _ONCE]
-    contenders, _ = follow_all(steps, held_out, leave_out=False)
+    contenders, _ = fit_and_score_all(steps, held_out, leave_out=False)
     study = Reproduction(
         dataset=dataset,
         rig=rig,
@@ -67,7 +67,9 @@ def one_seed(rig: VirtualRig, switches: Switches, seed: int, progress: Progress)
         contenders=tuple(contenders),
         switches=switches,
     )
-    return Seed({c.recipe.title: c.held_out.median() for c in contenders}, {c.key: c.verdict for c in judge_all(study)})
+    return Seed(
+        {c.recipe.title: c.validation.median() for c in contenders}, {c.key: c.verdict for c in judge_all(study)}
+    )
 
 
 @cache

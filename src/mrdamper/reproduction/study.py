@@ -35,7 +35,7 @@ from mrdamper.reproduction.switches import Switches
 from mrdamper.reproduction.virtual_rig import CURRENTS, VirtualRig, friction_test, noisy_dataset, true_runs
 from mrdamper.reproduction.ways import CONSISTENT, DIRECT, LITERAL, Steps, comparators, literature, ways
 from mrdamper.study.parallel import HERE, Processes
-from mrdamper.study.recipe import Progress, Settled
+from mrdamper.study.recipe import PaperAssumptions, Progress
 from mrdamper.study.workflow import usable_sines
 
 SEEDS = 20
@@ -88,7 +88,7 @@ def reproduce(
         dataset, gas = noisy_dataset(rig, true_runs(rig, CURRENTS), 0), rig.gas
     assert dataset is not None
     train, held_out, notes = _splits(dataset)
-    settled = Settled.of(train, gas).preset(chosen.fixed)
+    settled = PaperAssumptions.of(train, gas).preset(chosen.fixed)
     steps = [*ways(train, held_out, settled, chosen), *(literature(train) if with_models else ())]
     costly: Steps = comparators(train, held_out, settled) if with_comparators else []
     searches = searches_of(train, settled, chosen) if with_comparators else {}

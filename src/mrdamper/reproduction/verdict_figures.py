@@ -16,14 +16,14 @@ from mrdamper.study.recipe import Scored
 
 def accuracy_rate(study: Reproduction) -> Made:
     """Median and worst held-out error, and forces computed for an identification, by way."""
-    ways = [c for c in study.contenders if c.held_out.runs]
+    ways = [c for c in study.contenders if c.validation.runs]
     if not ways:
         return "nothing predicts a held-out run"
     with house_style():
         figure, axes = new_figure(1, 2, 1.15 + 0.26 * len(ways), left=2.4, top=0.45)
         rows = _rows_of(axes, ways)
-        axes[0].barh(rows, [100 * c.held_out.median() for c in ways], color=PALETTE[6], label="median")
-        axes[0].plot([100 * c.held_out.worst().scores.nrmse_pp for c in ways], rows, "k|", ms=8, label="worst run")
+        axes[0].barh(rows, [100 * c.validation.median() for c in ways], color=PALETTE[6], label="median")
+        axes[0].plot([100 * c.validation.worst().scores.nrmse_pp for c in ways], rows, "k|", ms=8, label="worst run")
         _key_above(axes[0])
         label(axes[0], "Held-out nrmse_pp (%)", "")
         axes[1].barh(rows, [forces_a_run(study, c) for c in ways], color=PALETTE[3])
@@ -67,14 +67,14 @@ def genetic_figure(study: Reproduction) -> Made:
 
 def errors_figure(study: Reproduction) -> Made:
     """Error of every held-out run by contender, over current."""
-    if not any(c.held_out.runs for c in study.contenders):
+    if not any(c.validation.runs for c in study.contenders):
         return "nothing predicts a held-out run"
     with house_style():
         figure, (axes,) = new_figure(1, 1, 3.4, right=2.6)
         colours = PALETTE[:7]  # yellow is lost on white
         for number, contender in enumerate(study.contenders):
             again, place = divmod(number, len(colours))
-            runs = sorted(contender.held_out.runs, key=lambda r: r.condition.current_A)
+            runs = sorted(contender.validation.runs, key=lambda r: r.condition.current_A)
             axes.plot(
                 [r.condition.current_A for r in runs],
                 [100 * r.scores.nrmse_pp for r in runs],

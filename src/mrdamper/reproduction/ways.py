@@ -23,12 +23,12 @@ from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.reproduction.switches import Switches
 from mrdamper.study.recipe import (
     Basis,
-    Made,
+    FitResult,
+    PaperAssumptions,
     Recipe,
-    Settled,
-    at_once,
-    by_the_paper,
     conditioned,
+    fit_functions_jointly,
+    fit_paper_functions,
     modified,
     play_and_bypass,
 )
@@ -44,7 +44,12 @@ Steps = list[tuple[Recipe, Sequence[Run]]]
 
 
 def ways(
-    train: Sequence[Run], held_out: Sequence[Run], settled: Settled, switches: Switches, *, explain: bool = True
+    train: Sequence[Run],
+    held_out: Sequence[Run],
+    settled: PaperAssumptions,
+    switches: Switches,
+    *,
+    explain: bool = True,
 ) -> Steps:
     """Every way but the costly ones, and the train runs each needs; `way` says to which group it belongs.
 
@@ -53,14 +58,14 @@ def ways(
     literal = Paper(search="optimum", bounds=switches.bounds, explain=explain)
     half = replace(literal, force_amplitude="half-peak-to-peak", explain=False)
     consistent = settled.basis(Balance())
-    by_paper = partial(by_the_paper, mass_law=switches.mass_law)
+    by_paper = partial(fit_paper_functions, mass_law=switches.mass_law)
     plain = Basis("bouc-wen", Balance(), fixed=switches.fixed)
     steps: Steps = [
         (Recipe("bouc-wen:literal", settled.basis(literal), by_paper, "paper", LITERAL), train),
         (Recipe("bouc-wen:half", settled.basis(half), by_paper, "paper", HALF), train),
         (Recipe("bouc-wen:same-forms", consistent, by_paper, "consistent", SAME_FORMS), train),
         (Recipe("bouc-wen:consistent", consistent, through_chosen, "consistent", CONSISTENT), train),
-        (Recipe("bouc-wen:joint", plain, at_once, "joint", JOINT), train),
+        (Recipe("bouc-wen:joint", plain, fit_functions_jointly, "joint", JOINT), train),
     ]
     nearest = [(TRADITIONAL, peak_velocity(held_out))] if held_out else []
     for title, speed in (*nearest, (SLOWEST, 0.0)):
@@ -69,7 +74,7 @@ def ways(
     return steps
 
 
-def comparators(train: Sequence[Run], held_out: Sequence[Run], settled: Settled) -> Steps:
+def comparators(train: Sequence[Run], held_out: Sequence[Run], settled: PaperAssumptions) -> Steps:
     """What the paper compares with: every parameter by the genetic algorithm, one run a current; and Ali's model.
 
     Ali's, whose every run is integrated thousands of times, sees every other current of a large matrix.
@@ -96,16 +101,16 @@ def literature(train: Sequence[Run]) -> Steps:
     return [(replace(recipe, way="literature"), train) for recipe in found]
 
 
-def through_chosen(runs: Sequence[Run], identifications: Sequence[Identification]) -> Made:
+def through_chosen(runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
     """Functions chosen by how they predict left-out conditions."""
     fit = chosen_functions(identifications)
-    return Made(fit.damper, lambda rows: chosen_functions([identifications[i] for i in rows]).damper, fit)
+    return FitResult(fit.damper, lambda rows: chosen_functions([identifications[i] for i in rows]).damper, fit)
 
 
-def one_per_current(runs: Sequence[Run], identifications: Sequence[Identification]) -> Made:
+def one_per_current(runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
     """One set of parameters a current, used at every motion: the traditional use."""
     damper = OnePerCurrent.of(identifications)
-    return Made(damper, lambda rows: OnePerCurrent.of([identifications[i] for i in rows]))
+    return FitResult(damper, lambda rows: OnePerCurrent.of([identifications[i] for i in rows]))
 
 
 def chosen_functions(found: Sequence[Identification]) -> ModifiedFit:

@@ -18,7 +18,7 @@ from mrdamper.data import Dataset, Run
 from mrdamper.errors import IdentificationError
 from mrdamper.identification import Identification
 from mrdamper.study.parallel import crew
-from mrdamper.study.recipe import Basis, Found, Progress, Recipe, Scored, recipes
+from mrdamper.study.recipe import Basis, IdentificationCache, Progress, Recipe, Scored, recipes
 from mrdamper.study.workflow import believed, judged_on_all, usable, usable_sines
 
 
@@ -133,7 +133,7 @@ def _seen(rig: Dataset) -> _Seen:
 
 
 def _ranked(
-    rig: _Seen, chosen: Sequence[Recipe], followed: Mapping[tuple[str, str], Scored | str], found: Found
+    rig: _Seen, chosen: Sequence[Recipe], followed: Mapping[tuple[str, str], Scored | str], found: IdentificationCache
 ) -> RigComparison:
     name = rig.dataset.rigs[0]
     made = {recipe.name: followed.get((name, recipe.name), "no train runs with a steady sine") for recipe in chosen}
@@ -147,12 +147,12 @@ def _ranked(
             mend="choose other models with --models, or leave this rig out of the dataset",
         )
     entries = [replace(entry, per_run=_per_run(entry.recipe.basis, rig.sines, found)) for entry in entries]
-    entries.sort(key=lambda entry: entry.left_out.median())
+    entries.sort(key=lambda entry: entry.cross_validated.median())
     steady = frozenset(run.id for run in rig.sines)
     return RigComparison(name, rig.dataset, steady, tuple(entries), refused, rig.not_identified)
 
 
-def _per_run(basis: Basis | None, sines: Sequence[Run], found: Found) -> float:
+def _per_run(basis: Basis | None, sines: Sequence[Run], found: IdentificationCache) -> float:
     """Median error of all sines, the held-out ones too, each identified for itself."""
     every = [found[basis, run.id][0] for run in sines] if basis else []
     errors = [one.scores.nrmse_pp for one in every if isinstance(one, Identification)]

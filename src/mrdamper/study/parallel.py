@@ -23,7 +23,7 @@ from mrdamper.models import model_type
 from mrdamper.motion import analyse_motion
 from mrdamper.optimizers.linear import on_one_blas_thread
 from mrdamper.study.processes import processes
-from mrdamper.study.recipe import Basis, Found, Progress, Recipe, Scored, follow_all
+from mrdamper.study.recipe import Basis, IdentificationCache, Progress, Recipe, Scored, fit_and_score_all
 
 _CYCLES = 2  # of a run that costly identifications see
 _PER_CYCLE = 200  # samples of a cycle they see
@@ -116,7 +116,7 @@ class Crew:
 
     pool: Executor
 
-    def identify(self, tasks: Sequence[tuple[Basis, Run]], progress: Progress) -> Found:
+    def identify(self, tasks: Sequence[tuple[Basis, Run]], progress: Progress) -> IdentificationCache:
         """Every basis from its run; what takes long begins first."""
         named = [(basis, run.id) for basis, run in sorted(tasks, key=lambda task: not task[0].costly)]
         return self._each(_identify_one, {one: one for one in named}, "identified", progress)
@@ -125,7 +125,7 @@ class Crew:
         self,
         steps: Sequence[tuple[Recipe, Sequence[Run]]],
         held_out: Mapping[str, Sequence[Run]],
-        found: Found,
+        found: IdentificationCache,
         progress: Progress,
     ) -> dict[tuple[str, str], Scored | str]:
         """Recipes followed from identifications there are already, or why not, by rig and name of the recipe.
@@ -193,9 +193,11 @@ def quickened(basis: Basis, run: Run) -> tuple[Method, Problem]:
     return method, basis.problem(shortened(run) if basis.costly else run)
 
 
-def _follow_one(recipe: Recipe, runs: Sequence[str], held_out: Sequence[str], found: Found) -> Scored | str:
+def _follow_one(
+    recipe: Recipe, runs: Sequence[str], held_out: Sequence[str], found: IdentificationCache
+) -> Scored | str:
     train = [_RUNS[run_id] for run_id in runs]
-    scored, refused = follow_all([(recipe, train)], [_RUNS[run_id] for run_id in held_out], found=found)
+    scored, refused = fit_and_score_all([(recipe, train)], [_RUNS[run_id] for run_id in held_out], found=found)
     return scored[0] if scored else refused[recipe.name]
 
 

@@ -122,7 +122,7 @@ class Reckoning:
             mend = "study the tests again, or plan without a model"
             raise InputError("the model does not know how sure it is", mend=mend, code="E_CERTAINTY")
         # What no run could tell is planned for too: anything within a factor, or what moves the force by all of it.
-        unknown = [n for n in damper.own_numbers if n not in known.names and n not in known.one_sided]
+        unknown = [n for n in damper.fitted_parameters if n not in known.names and n not in known.one_sided]
         names = (*known.names, *unknown)
         told = []
         for number, condition in enumerate(conditions):
@@ -132,14 +132,14 @@ class Reckoning:
         doubt = seen if not isinstance(about, Condition) else np.array([_slopes(damper, known, names, about)])
         by_number = doubt[..., : len(names)]
         goal = np.einsum("cdkp,cdkq->pq", by_number, by_number) / np.prod(doubt.shape[:3])
-        logs = [damper.own_numbers[name].log for name in names]
+        logs = [damper.fitted_parameters[name].log for name in names]
         covariance = np.diag(np.where(logs, _FACTOR**2, 1 / np.maximum(np.diag(goal), 1e-12)))
         covariance[: len(known.names), : len(known.names)] = known.covariance
         covariance += 1e-12 * np.diag(np.diag(covariance))
         if isinstance(about, str):
             if about not in names:
                 raise UnknownNameError.of("number to plan for", about, names)
-            own = damper.own_numbers[about]
+            own = damper.fitted_parameters[about]
             goal = np.zeros_like(goal)
             goal[names.index(about), names.index(about)] = 1 if own.log else 1 / (own.value or 1.0) ** 2
         grams = np.einsum("cdkp,cdkq->cdpq", seen, seen) / max(known.force, _FLOOR) ** 2
@@ -251,10 +251,10 @@ def _slopes(damper: Damper, known: Certainty, names: Sequence[str], condition: C
     made = []
     for draw in range(_DRAWS + 1):
         shift = 0.5 * root @ rng.standard_normal(len(known.names)) * (draw > 0)
-        own = [damper.own_numbers[name] for name in known.names]
+        own = [damper.fitted_parameters[name] for name in known.names]
         moved = [n.value * math.exp(s) if n.log else n.value + s for n, s in zip(own, shift, strict=True)]
         values = {name: float(np.clip(v, *n.bounds)) for name, v, n in zip(known.names, moved, own, strict=True)}
-        drawn = damper.with_numbers(values)
+        drawn = damper.with_parameters(values)
         base = Prediction(motion, drawn.force_along(motion, condition), condition, ())
         force = base.force[last]
         half = float(np.ptp(force) / 2) or 1.0

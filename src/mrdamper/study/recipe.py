@@ -30,7 +30,7 @@ from mrdamper.identification.methods.paper import Paper
 from mrdamper.models import Scale, all_models, model_type
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.motion import analyse_motion
-from mrdamper.study.left_out import each_left_out, stretches
+from mrdamper.study.cross_validation import cross_validate, stretches
 from mrdamper.validation import Validation, validate
 
 Progress = Callable[[str, float], None]
@@ -76,11 +76,11 @@ class Basis:
         return self.method != "projection" or model_type(self.model).integrated
 
 
-Found = dict[tuple[Basis, str], tuple[Identification | str, float]]  # or why there is none; seconds
+IdentificationCache = dict[tuple[Basis, str], tuple[Identification | str, float]]  # or why there is none; seconds
 
 
 @dataclass(frozen=True, eq=False)
-class Made:
+class FitResult:
     """What a recipe makes of runs.
 
     Attributes
@@ -121,7 +121,7 @@ class Recipe:
 
     name: str
     basis: Basis | None
-    make: Callable[[Sequence[Run], Sequence[Identification]], Made] = field(compare=False)
+    make: Callable[[Sequence[Run], Sequence[Identification]], FitResult] = field(compare=False)
     way: str = ""
     title: str = ""
     source: str = ""
@@ -147,7 +147,7 @@ class Scored:
         Of the train runs; empty where nothing is identified from single runs.
     per_run : float
         Median nrmse_pp of runs identified for themselves: what one run allows; NaN without.
-    train, left_out, held_out : Validation
+    train, cross_validated, validation : Validation
         Train runs; train runs predicted without their condition; held-out runs.
     seconds : float
         Spent on identification and the fit over conditions.
@@ -161,8 +161,8 @@ class Scored:
     identifications: tuple[Identification, ...]
     per_run: float
     train: Validation
-    left_out: Validation
-    held_out: Validation
+    cross_validated: Validation
+    validation: Validation
     seconds: float
     spread: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
@@ -172,7 +172,7 @@ class Scored:
         return f"{self.damper.title}, {self.recipe.way}" if self.recipe.way else self.damper.title
 
     @property
-    def numbers_per_run(self) -> int:
+    def parameters_per_run(self) -> int:
         """Parameters determined from a single run."""
         return len(self.identifications[0].free) if self.identifications else 0
 
@@ -184,7 +184,7 @@ class Scored:
         return max(len(f.function.coefficients) + len(f.function.rates) for f in self.fit.functions.values())
 
 
-def follow(
+def fit_and_score(
     recipe: Recipe,
     train: Sequence[Run],
     identifications: Sequence[Identification],
@@ -226,7 +226,7 @@ def follow(
         return without[-1]
 
     if leave_out:
-        left_out = each_left_out(pieces, refit, title)
+        left_out = cross_validate(pieces, refit, title)
     errors = [i.scores.nrmse_pp for i in identifications]
     return Scored(
         recipe=recipe,
@@ -235,8 +235,8 @@ def follow(
         identifications=tuple(identifications),
         per_run=float(np.median(errors)) if errors else float("nan"),
         train=validate(made.damper, train),
-        left_out=left_out or Validation(title, ()),
-        held_out=validate(made.damper, held_out),
+        cross_validated=left_out or Validation(title, ()),
+        validation=validate(made.damper, held_out),
         seconds=seconds,
         spread=_spread(without),
     )
@@ -248,13 +248,13 @@ def _spread(dampers: Sequence[Damper]) -> dict[str, tuple[float, float]]:
     return {name: (min(v[name] for v in values), max(v[name] for v in values)) for name in (values or [{}])[0]}
 
 
-def follow_all(
+def fit_and_score_all(
     steps: Sequence[tuple[Recipe, Sequence[Run]]],
     held_out: Sequence[Run],
     progress: Progress = lambda what, share: None,
     *,
     leave_out: bool = True,
-    found: Found | None = None,
+    found: IdentificationCache | None = None,
 ) -> tuple[list[Scored], dict[str, str]]:
     """Follow several recipes on one rig; what more than one of them starts from is identified once.
 
@@ -284,14 +284,14 @@ def follow_all(
             seen = [run for run in runs if analyse_motion(run).is_sine] if recipe.pure else runs
             identifications, spent = identified(recipe.basis, seen, found, lambda what, share: tell(what, 0.5 * share))
             tell("over all conditions", 0.5)
-            scored.append(follow(recipe, runs, identifications, held_out, spent=spent, leave_out=leave_out))
+            scored.append(fit_and_score(recipe, runs, identifications, held_out, spent=spent, leave_out=leave_out))
         except InputError as error:
             refused[recipe.name] = str(error)
     return scored, refused
 
 
 def identified(
-    basis: Basis | None, runs: Sequence[Run], found: Found, progress: Progress = lambda what, share: None
+    basis: Basis | None, runs: Sequence[Run], found: IdentificationCache, progress: Progress = lambda what, share: None
 ) -> tuple[list[Identification], float]:
     """Identifications of runs, made where they are not found yet, and the seconds they took.
 
@@ -316,28 +316,30 @@ def identified(
     return made, spent
 
 
-def run_by_run(runs: Sequence[Run], identifications: Sequence[Identification]) -> Made:
+def fit_per_run(runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
     """Parameter functions through the values identified from single runs."""
     about = _about(runs, identifications, "run by run")
     fit = fit_modified(identifications, provenance=about)
-    return Made(fit.damper, lambda rows: fit_modified([identifications[i] for i in rows]).damper, fit)
+    return FitResult(fit.damper, lambda rows: fit_modified([identifications[i] for i in rows]).damper, fit)
 
 
-def at_once(runs: Sequence[Run], identifications: Sequence[Identification]) -> Made:
+def fit_functions_jointly(runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
     """Parameter functions fitted to the forces of all runs at once."""
     fit, refit = fit_modified_jointly(runs, identifications, _about(runs, identifications, "joint"))
-    return Made(fit.damper, refit, fit)
+    return FitResult(fit.damper, refit, fit)
 
 
-def one_set(runs: Sequence[Run], identifications: Sequence[Identification]) -> Made:
+def fit_global_model(runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
     """One set of parameters for every condition, of the model that takes the current as an input."""
     choice = identify_jointly(runs)
     problem, fit = choice.problem, choice.fit
 
-    return Made(fit.damper, lambda rows: problem.refit(fit, rows).damper, fit)
+    return FitResult(fit.damper, lambda rows: problem.refit(fit, rows).damper, fit)
 
 
-def by_the_paper(runs: Sequence[Run], identifications: Sequence[Identification], mass_law: str = "exponential") -> Made:
+def fit_paper_functions(
+    runs: Sequence[Run], identifications: Sequence[Identification], mass_law: str = "exponential"
+) -> FitResult:
     """The paper's functions through the values identified from single runs [Qian et al. 2024, Eq. 23–43]."""
     fit = paper_functions(identifications, mass_law)
 
@@ -345,17 +347,17 @@ def by_the_paper(runs: Sequence[Run], identifications: Sequence[Identification],
         kept = {runs[i].id for i in rows}
         return paper_functions([i for i in identifications if i.run_id in kept], mass_law).damper
 
-    return Made(fit.damper, refit, fit)
+    return FitResult(fit.damper, refit, fit)
 
 
-def by_its_laws(cls: Published, runs: Sequence[Run], identifications: Sequence[Identification]) -> Made:
+def fit_published(cls: Published, runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
     """The laws of a published damper, started from single runs and refined on all."""
     about = {"train runs": str(len(runs))}
 
     def refit(rows: Sequence[int]) -> Damper:
         return cls.fit([runs[i] for i in rows], [identifications[i] for i in rows] if cls.basis else [], about)
 
-    return Made(refit(range(len(runs))), refit)
+    return FitResult(refit(range(len(runs))), refit)
 
 
 def modified(name: str, method: str = "projection") -> Recipe:
@@ -366,7 +368,7 @@ def modified(name: str, method: str = "projection") -> Recipe:
     return Recipe(
         name if plain else f"{name}:{method}",
         Basis(name, method),
-        run_by_run,
+        fit_per_run,
         "run by run",
         cls.title if plain else f"{cls.title}, method {method}",
         cls.source,
@@ -378,23 +380,25 @@ def jointly(name: str) -> Recipe:
     """A model whose parameter functions are fitted to all forces at once."""
     apart, cls = modified(name), model_type(name)
     title = f"{cls.title}, functions fitted jointly"
-    return Recipe(f"{name}:joint", apart.basis, at_once, "joint", title, cls.source, apart.limits)
+    return Recipe(f"{name}:joint", apart.basis, fit_functions_jointly, "joint", title, cls.source, apart.limits)
 
 
 def play_and_bypass() -> Recipe:
     """The model whose one set of parameters holds for every condition."""
     cls = model_type(JOINTLY)
-    return Recipe(JOINTLY, None, one_set, "joint", cls.title, cls.source, "takes any motion and a current that varies")
+    return Recipe(
+        JOINTLY, None, fit_global_model, "joint", cls.title, cls.source, "takes any motion and a current that varies"
+    )
 
 
 def conditioned(cls: Published) -> Recipe:
     """A published damper with its own laws over current, frequency and amplitude."""
     basis = Basis(cls.basis, free=cls.basis_free) if cls.basis else None
-    return Recipe(cls.name, basis, partial(by_its_laws, cls), "", cls.heading, cls.source, cls.limits)
+    return Recipe(cls.name, basis, partial(fit_published, cls), "", cls.heading, cls.source, cls.limits)
 
 
 @dataclass(frozen=True)
-class Settled:
+class PaperAssumptions:
     """What is held in every identification by the paper's recipe: the gas spring, or what stands in for it.
 
     Attributes
@@ -412,7 +416,7 @@ class Settled:
     notes: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, train: Sequence[Run], gas: GasSpring | None) -> Settled:
+    def of(cls, train: Sequence[Run], gas: GasSpring | None) -> PaperAssumptions:
         """Take the gas spring, or separate stiffness and mass by the frequencies of the train runs."""
         if gas is not None:
             longest = max(float(np.ptp(run.displacement)) / 2 for run in train)
@@ -436,18 +440,18 @@ class Settled:
         """Bouc–Wen by a method, with what is settled."""
         return Basis("bouc-wen", method, self.free, self.fixed, self.gas)
 
-    def preset(self, presets: Sequence[tuple[str, float]]) -> Settled:
+    def preset(self, presets: Sequence[tuple[str, float]]) -> PaperAssumptions:
         """The same with more parameters held."""
         return replace(self, fixed=(*self.fixed, *presets))
 
 
-def literal(settled: Settled) -> Recipe:
+def literal(settled: PaperAssumptions) -> Recipe:
     """The paper's recipe to the letter, for its verdict beside the others; it takes sines only.
 
     Its alpha and beta are the optimum that the genetic search of the paper approaches.
     """
     basis = settled.basis(Paper(search="optimum"))
-    return Recipe("bouc-wen:literal", basis, by_the_paper, "paper, literal", pure=True)
+    return Recipe("bouc-wen:literal", basis, fit_paper_functions, "paper, literal", pure=True)
 
 
 def catalogue() -> Mapping[str, Recipe]:

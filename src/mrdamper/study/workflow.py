@@ -28,11 +28,11 @@ from mrdamper.rig_files.quality.table import judged
 from mrdamper.study.parallel import HERE, Processes
 from mrdamper.study.recipe import (
     JOINTLY,
+    PaperAssumptions,
     Progress,
     Recipe,
     Scored,
-    Settled,
-    follow_all,
+    fit_and_score_all,
     jointly,
     literal,
     modified,
@@ -89,7 +89,7 @@ class RigStudy(Shown):
     @property
     def headline(self) -> str:
         """Rig, chosen model and its errors."""
-        left, held = (100 * scores.median() for scores in (self.chosen.left_out, self.chosen.held_out))
+        left, held = (100 * scores.median() for scores in (self.chosen.cross_validated, self.chosen.validation))
         return f"rig {self.rig}: {self.chosen.title}, left out {left:.2f} %, held out {held:.2f} % (median nrmse_pp)"
 
     @property
@@ -99,9 +99,9 @@ class RigStudy(Shown):
         return {
             "rig": [self.rig] * len(candidates),
             "model": [c.title for c in candidates],
-            "numbers": [c.damper.parameter_count for c in candidates],
-            "left_out_nrmse_pp": [c.left_out.median() for c in candidates],
-            "held_out_nrmse_pp": [c.held_out.median() for c in candidates],
+            "parameters": [c.damper.parameter_count for c in candidates],
+            "cv_nrmse_pp": [c.cross_validated.median() for c in candidates],
+            "validation_nrmse_pp": [c.validation.median() for c in candidates],
         }
 
     @property
@@ -230,7 +230,7 @@ def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None, *
             where=f"rig {rig or dataset.name}",
             mend="a model over conditions needs at least two, or a record of other motion; check the split column",
         )
-    candidates, impossible = follow_all(
+    candidates, impossible = fit_and_score_all(
         _steps(train, everything),
         [run for run in trusted if run.split == "validate"],
         lambda what, share: progress(f"{rig or 'rig'}: {what}", share),
@@ -251,7 +251,7 @@ def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None, *
     chosen = min(near, key=lambda c: c.damper.parameter_count)
     candidates.sort(key=lambda c: c is not chosen)
     held = chosen.fit.at_bounds if isinstance(chosen.fit, JointFit | ModifiedFit) else ()
-    errors_left_out = [r.scores for r in chosen.left_out.runs]
+    errors_left_out = [r.scores for r in chosen.cross_validated.runs]
     chosen = replace(
         chosen, damper=certain(chosen.damper, train if chosen.recipe.basis else everything, errors_left_out, held)
     )
@@ -264,7 +264,7 @@ def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None, *
 def _with_sessions(chosen: Scored, dataset: Dataset) -> tuple[Scored, float | str]:
     """The candidate whose damper knows what sessions share, and its left-out error with them known, or why not."""
     damper, own = chosen.damper, {score.run_id: score.reading for score in chosen.train.runs}
-    left_out = [score for score in chosen.left_out.runs if own.get(score.run_id) is not None]
+    left_out = [score for score in chosen.cross_validated.runs if own.get(score.run_id) is not None]
     runs = [dataset[score.run_id] for score in left_out]
     seen = [score.reading for score in left_out if score.reading is not None]
     try:
@@ -280,17 +280,19 @@ def _with_sessions(chosen: Scored, dataset: Dataset) -> tuple[Scored, float | st
 
 def judged_on_all(candidate: Scored, everything: Sequence[Run]) -> Scored:
     """The same with the train runs that its recipe could not take among the left-out ones: it never saw them."""
-    known = {score.run_id for score in (*candidate.train.runs, *candidate.left_out.runs)}
+    known = {score.run_id for score in (*candidate.train.runs, *candidate.cross_validated.runs)}
     others = validate(candidate.damper, [run for run in everything if run.id not in known])
     if not others.runs:
         return candidate
-    left_out = candidate.left_out
-    return replace(candidate, left_out=Validation(left_out.title, (*left_out.runs, *others.runs), others.refused))
+    left_out = candidate.cross_validated
+    return replace(
+        candidate, cross_validated=Validation(left_out.title, (*left_out.runs, *others.runs), others.refused)
+    )
 
 
 def _left_out(candidate: Scored, sines: Collection[str]) -> float:
     """Median error on left-out conditions, sines and other records alike; infinite where nothing was left out."""
-    runs = candidate.left_out.runs
+    runs = candidate.cross_validated.runs
     kinds = [[abs(run.scores.nrmse_pp) for run in runs if (run.run_id in sines) == kind] for kind in (True, False)]
     medians = [float(np.median(errors)) for errors in kinds if errors]
     return float(np.mean(medians)) if medians else float("inf")
@@ -396,5 +398,5 @@ def _steps(train: Sequence[Run], everything: Sequence[Run]) -> list[tuple[Recipe
         steps += [(make(name), train) for name in STUDIED for make in (modified, jointly)]
     pure = [run for run in train if analyse_motion(run).is_sine]  # the paper's recipe takes no other
     if len(pure) > 2:
-        steps.append((literal(Settled.of(pure, None)), train))
+        steps.append((literal(PaperAssumptions.of(pure, None)), train))
     return [*steps, (play_and_bypass(), everything)]

@@ -26,7 +26,7 @@ _LEAST_DOF = 3.0  # below, a Student spread has no variance
 class Draw:
     """One damper out of those the tests leave open."""
 
-    numbers: Mapping[str, float] = field(default_factory=dict)  # its own numbers (`Damper.own_numbers`) that differ
+    numbers: Mapping[str, float] = field(default_factory=dict)  # fitted parameters that differ from the damper's
     gain: float = 0.0  # of its session: the force becomes (1 + gain) F + offset [N]
     offset: float = 0.0
 
@@ -88,7 +88,7 @@ def draw(dampers: Mapping[str, Damper], count: int, seed: int = 1) -> list[dict[
 
 
 def _numbers_drawn(damper: Damper, count: int, rng: np.random.Generator) -> list[dict[str, float]]:
-    known, own = damper.certainty, damper.own_numbers
+    known, own = damper.certainty, damper.fitted_parameters
     assert known is not None
     if not known.names:
         return [{} for _ in range(count)]

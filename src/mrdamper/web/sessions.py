@@ -117,7 +117,10 @@ class Session:
             return self.add(found.damper, origin, note)
         runs = [self.dataset[run.run_id] for run in found.train.runs]
         return self.add(
-            found.damper, origin, note, partial(certain, found.damper, runs, [r.scores for r in found.left_out.runs])
+            found.damper,
+            origin,
+            note,
+            partial(certain, found.damper, runs, [r.scores for r in found.cross_validated.runs]),
         )
 
     def damper(self, key: str, sure: bool = False) -> Bench:

@@ -20,12 +20,12 @@ from mrdamper.study.recipe import (
     JOINTLY,
     Basis,
     Scored,
-    at_once,
-    follow,
+    fit_and_score,
+    fit_functions_jointly,
+    fit_per_run,
     identified,
     modified,
     play_and_bypass,
-    run_by_run,
 )
 from mrdamper.study.workflow import Study, run_study, usable_sines
 
@@ -93,11 +93,11 @@ def identify_rig(
     else:
         recipe = modified(model, method)
         basis = Basis(model, method, tuple(free), tuple(sorted(fixed.items())))
-        recipe = replace(recipe, basis=basis, make=at_once if over == ALL_AT_ONCE else run_by_run)
+        recipe = replace(recipe, basis=basis, make=fit_functions_jointly if over == ALL_AT_ONCE else fit_per_run)
     found, spent = identified(recipe.basis, runs, {}, lambda what, share: tell(what, 0.8 * share))
     tell("over all conditions", 0.8)
     try:
-        scored = follow(recipe, runs, found, dataset.split("validate"), spent=spent, leave_out=False)
+        scored = fit_and_score(recipe, runs, found, dataset.split("validate"), spent=spent, leave_out=False)
     except InputError as error:
         if not found:
             raise

@@ -77,7 +77,7 @@ def register(app: typer.Typer) -> None:
             print(f"{rig.rig or dataset.name}: {rig.damper.title} ({rig.damper.parameter_count} numbers)")
             print(f"  {'nrmse_pp, median (worst) of the runs':38}{'left out':>19}{'held out':>19}{'one by one':>12}")
             for candidate in rig.candidates:
-                left_out, held_out = (spread(scores) for scores in (candidate.left_out, candidate.held_out))
+                left_out, held_out = (spread(scores) for scores in (candidate.cross_validated, candidate.validation))
                 print(f"  {candidate.title:38}{left_out:>19}{held_out:>19}{percent(candidate.per_run):>12}")
             numbers = (f"{row['name']} {row['written']}" for row in table(rig.damper))
             print(f"  numbers, 95 %: {'; '.join(numbers)}")
@@ -95,10 +95,10 @@ def _summary(result, written: list[str]) -> dict:
                     c.title: {
                         "parameters": c.damper.parameter_count,
                         "per_run_nrmse_pp": c.per_run if c.identifications else None,
-                        "left_out_nrmse_pp": c.left_out.median(),
-                        "left_out_worst_nrmse_pp": c.left_out.worst_error(),
-                        "held_out_nrmse_pp": c.held_out.median() if c.held_out.runs else None,
-                        "held_out_worst_nrmse_pp": c.held_out.worst_error() if c.held_out.runs else None,
+                        "cv_nrmse_pp": c.cross_validated.median(),
+                        "cv_worst_nrmse_pp": c.cross_validated.worst_error(),
+                        "validation_nrmse_pp": c.validation.median() if c.validation.runs else None,
+                        "validation_worst_nrmse_pp": c.validation.worst_error() if c.validation.runs else None,
                     }
                     for c in rig.candidates
                 },

@@ -10,7 +10,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Envelope, Saved
-from mrdamper.dampers.certainty import Certainty, OwnNumber
+from mrdamper.dampers.certainty import Certainty, FittedParameter
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.piece import Piece
 from mrdamper.data import Condition, Floats, Run
@@ -146,10 +146,10 @@ class ConditionedDamper(Damper):
         return replace(self, coefficients=dict(zip(names, (found.point * size).tolist(), strict=True)))
 
     @property
-    def own_numbers(self) -> Mapping[str, OwnNumber]:
-        return {name: OwnNumber(value) for name, value in self.coefficients.items()}
+    def fitted_parameters(self) -> Mapping[str, FittedParameter]:
+        return {name: FittedParameter(value) for name, value in self.coefficients.items()}
 
-    def with_numbers(self, values: Mapping[str, float]) -> Self:
+    def with_parameters(self, values: Mapping[str, float]) -> Self:
         return replace(self, coefficients={**self.coefficients, **values})
 
     def to_saved(self) -> SavedConditioned:

@@ -115,7 +115,7 @@ def _conclude(session: Session, choice: Choice, found: Comparison) -> dict[str, 
     keys = {row.run.id: row.key for row in table.rows}
     entries = []
     for entry in rig.entries:
-        note = f"left out {100 * entry.left_out.median():.1f} %"
+        note = f"left out {100 * entry.cross_validated.median():.1f} %"
         entries.append(_entry(rig, entry, session.scored(entry, "comparison", note).key, keys))
     return {
         "rig": rig.rig,
@@ -138,10 +138,10 @@ def _entry(rig: RigComparison, entry: Scored, key: str, keys: dict[str, str]) ->
         "numbers": entry.damper.parameter_count,
         "runs_needed": entry.conditions_needed,
         "train": _median(entry.train),
-        "left_out": _median(entry.left_out),
-        "held_out": _median(entry.held_out),
+        "left_out": _median(entry.cross_validated),
+        "held_out": _median(entry.validation),
         "seconds": round(entry.seconds, 2),
-        "scores": [_score(run, keys) for run in entry.held_out.runs],
+        "scores": [_score(run, keys) for run in entry.validation.runs],
     }
 
 

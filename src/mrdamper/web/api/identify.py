@@ -134,7 +134,7 @@ def _conclude_study(session: Session, found: Study, written: list[Any]) -> dict[
     for rig in found.rigs:
         listed = []
         for candidate in rig.candidates:
-            errors = {"left out": candidate.left_out, "held out": candidate.held_out}
+            errors = {"left out": candidate.cross_validated, "held out": candidate.validation}
             note = ", ".join(f"{name} {_percent(scores)}" for name, scores in errors.items() if scores.runs)
             listed.append(_candidate(candidate, session.scored(candidate, "study", note).key))
         rigs.append({"rig": rig.rig, "chosen": listed[0]["damper"], "candidates": listed})
@@ -147,8 +147,8 @@ def _candidate(candidate: Scored, key: str) -> dict[str, Any]:
         "title": candidate.title,
         "numbers": candidate.damper.parameter_count,
         "per_run": number(candidate.per_run),
-        "left_out": number(candidate.left_out.median()),
-        "held_out": number(candidate.held_out.median()) if candidate.held_out.runs else None,
+        "left_out": number(candidate.cross_validated.median()),
+        "held_out": number(candidate.validation.median()) if candidate.validation.runs else None,
         "seconds": round(candidate.seconds, 2),
     }
 
@@ -164,7 +164,7 @@ def _conclude_identification(
     session.results["identified.table"] = session.table(choice.rig)
     damper, held_out, bench = None, None, None
     if isinstance(scored, Scored):
-        damper, held_out = scored.damper, scored.held_out
+        damper, held_out = scored.damper, scored.validation
         bench = session.add(damper, "identification", f"held out {_percent(held_out)}" if held_out.runs else "")
     errors = [i.scores.nrmse_pp for i in found] or _joint_fit(scored).nrmse_pp.tolist()
     return {

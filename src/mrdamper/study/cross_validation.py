@@ -17,7 +17,7 @@ _STRETCH, _STRETCHES = 12, 8  # cycles of a long record that are left out togeth
 _RECORD = "stretch of"  # note of a stretch: the record it was cut from
 
 
-def each_left_out(pieces: Sequence[Run], refit: Callable[[Sequence[int]], Damper], title: str) -> Validation:
+def cross_validate(pieces: Sequence[Run], refit: Callable[[Sequence[int]], Damper], title: str) -> Validation:
     """Every run and record scored with a damper made without its condition, or without the stretch that is scored.
 
     Parameters
