@@ -164,7 +164,8 @@ def _chapter(rig: RigComparison, folder: Path, suffix: str, png: bool) -> dict[s
         "refused": rig.refused,
         "not_identified": rig.not_identified,
         "verdict": (
-            f"{first.recipe.title} has the least cross-validated error: {100 * first.cross_validated.median():.1f} % of the "
+            f"{first.recipe.title} has the least cross-validated error: "
+            f"{100 * first.cross_validated.median():.1f} % of the "
             f"peak-to-peak force, among {len(rig.entries)} models."
         ),
         "loops_caption": (
