@@ -1,6 +1,7 @@
 """Parameter functions through identified values: those the values were made with come back, and the paper's own."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,15 +10,19 @@ from support.dampers import modified_damper
 
 from mrdamper.dampers import modified
 from mrdamper.dampers.base import Envelope
+from mrdamper.dampers.causal import causal_force
 from mrdamper.dampers.modified import ModifiedModel, fit_modified
 from mrdamper.dampers.paper import PAPER_FORMS, paper_functions
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.data import Condition
 from mrdamper.errors import IdentificationError, InputError
+from mrdamper.export.equations import equations
 from mrdamper.functions.fitting import choose_function
 from mrdamper.functions.forms import FORMS, ParameterFunction
+from mrdamper.functions.motion_hull import MotionHull
 from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
+from mrdamper.motion import sine
 
 MOTIONS = ((0.5, 0.05), (1.0, 0.02), (1.5, 0.05), (2.0, 0.02))
 CONDITIONS = [Condition(I, f, A) for I in (0.0, 0.5, 1.2, 2.0) for f, A in MOTIONS]
@@ -224,3 +229,36 @@ def test_what_follows_a_logarithm_is_held_over_zero_only():
     with pytest.raises(InputError) as refused:
         modified_damper().holding({"yield_displacement": 0.0})
     assert refused.value.code == "E_PARAMETER"
+
+
+CORNERS = ((0.5, 0.02), (3.0, 0.004), (1.0, 0.02))
+
+
+@pytest.mark.parametrize("outside", [(3.0, 0.02), (0.5, 0.004), (10.0, 0.001)])
+def test_outside_the_tested_motions_the_parameters_are_those_of_the_nearest_one(outside):
+    slope = ParameterFunction("linear-current-speed", (100.0, 5e4, 300.0))
+    functions = {"c": slope, "fy": slope, "k": ParameterFunction("constant", (0.0,)), "f0": slope}
+    functions = {name: f for name, f in functions.items() if name in Bingham.map_forms()}
+    motions = MotionHull(CORNERS)
+    damper = ModifiedModel("bench", ParameterMap(Bingham, functions, motions), Envelope.of(CONDITIONS), {})
+    nearest = Condition(0.7, *(float(v) for v in motions.nearest(*outside)))
+    assert damper.model_at(Condition(0.7, *outside)) == damper.model_at(nearest)
+    assert damper.holding({"c": 700.0}).tested_motions == motions
+    again = ModifiedModel.from_saved(damper.to_saved(), "bench", damper.envelope, {}, None)
+    assert again.parameters.motions == motions
+    assert any("convex hull" in line for line in equations(damper))
+
+
+def test_a_stream_holds_the_parameters_outside_the_tested_motions_too():
+    slope = ParameterFunction("linear-current-speed", (100.0, 5e4, 300.0))
+    still = ParameterFunction("constant", (0.0,))
+    functions = {name: slope if name in ("c", "fy") else still for name in Bingham.map_forms()}
+    tested = [Condition(i, f, A) for i in (0.0, 1.0) for f, A in CORNERS]
+    damper = ModifiedModel("bench", ParameterMap(Bingham, functions, MotionHull(CORNERS)), Envelope.of(tested), {})
+    outside = Condition(0.7, 2.5, 0.018)
+    motion = sine(outside, 40, 200)
+    wanted, streamed = damper.force_along(motion, outside), causal_force(damper, motion)
+    last = slice(-400, None)
+    assert np.abs(streamed - wanted)[last].max() < 0.01 * np.ptp(wanted[last])
+    free = replace(damper, parameters=replace(damper.parameters, motions=None))
+    assert np.ptp(free.force_along(motion, outside)) > 1.1 * np.ptp(wanted)

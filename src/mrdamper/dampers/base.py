@@ -18,16 +18,20 @@ import numpy as np
 from mrdamper.dampers.causal import SLACK, causal_force
 from mrdamper.dampers.certainty import Certainty, FittedParameter, table
 from mrdamper.dampers.coil import Coil
-from mrdamper.data import Condition, Floats, Run, Shown
+from mrdamper.data import Condition, Floats, Run, Shown, same_condition
 from mrdamper.errors import InputError, checked
 from mrdamper.functions.forms import ParameterFunction
+from mrdamper.functions.motion_hull import MotionHull
 from mrdamper.models import Model
 from mrdamper.motion import Excitation, equivalent_sine, measured_motion
 from mrdamper.simulation import ForceLaw, Response, simulate, steady_loop
 
 NOT_A_SINE = "not a sine"
 COARSE = "sampling"
+COMBINATION = "combination"  # every quantity was tested, these together were not
+_TOGETHER = 10.0  # weight of the sum of shares, which is one, against distances in the hull
 _SAME_CURRENT = 1e-3  # A; a current that varies less is one current
+_LEAST = 1e-12  # frequency [Hz] and amplitude [m] that stand for zero in a logarithm
 _SAMPLES_IN_KNEE = 2  # below, the knee falls between samples
 
 
@@ -41,6 +45,8 @@ class Envelope:
         Lowest and highest tested.
     any_motion : bool
         Motions that are no sine, or currents that change, were among the tests.
+    conditions : tuple of (float, float, float)
+        Tested currents [A] with their frequencies [Hz] and amplitudes [m]; empty where only the ranges are known.
     """
 
     current_A: tuple[float, float]
@@ -48,6 +54,7 @@ class Envelope:
     amplitude_m: tuple[float, float]
     peak_velocity_m_s: tuple[float, float]
     any_motion: bool = False
+    conditions: tuple[tuple[float, float, float], ...] = ()
 
     @classmethod
     def of(cls, conditions: Sequence[Condition]) -> Envelope:
@@ -61,6 +68,7 @@ class Envelope:
             span([c.frequency_Hz for c in conditions]),
             span([c.amplitude_m for c in conditions]),
             span([c.peak_velocity for c in conditions]),
+            conditions=tuple(_point(conditions[group[0]]) for group in same_condition(conditions)),
         )
 
     def with_motion(self, current: Floats, displacement: Floats, velocity: Floats) -> Envelope:
@@ -101,9 +109,22 @@ class Envelope:
             ("amplitude", condition.amplitude_m, self.amplitude_m),
             ("velocity", condition.peak_velocity, self.peak_velocity_m_s),
         )
-        return tuple(
+        outside = tuple(
             name for name, value, (low, high) in checks if value < low - SLACK * high or value > high * (1 + SLACK)
         )
+        return outside or (() if self._combined(condition) else (COMBINATION,))
+
+    def _combined(self, condition: Condition) -> bool:
+        """Whether a condition lies in the convex hull of the tested ones, in I, log f and log A (and log f·A)."""
+        if not self.conditions or condition.frequency_Hz <= 0 or condition.amplitude_m <= 0:
+            return True
+        from scipy.optimize import nnls  # slow to import, and needed only here
+
+        scale = max(self.current_A[1], _SAME_CURRENT)
+        corners = np.array([_features(point, scale) for point in self.conditions])
+        asked = _features(_point(condition), scale)
+        centred = np.column_stack([corners - asked, np.full(len(corners), _TOGETHER)])
+        return bool(nnls(centred.T, np.array([0.0, 0.0, 0.0, _TOGETHER]))[1] < SLACK)
 
     def motion_flags(self, motion: Excitation) -> tuple[str, ...]:
         """Which quantities of a motion that is no sine lie outside."""
@@ -173,6 +194,14 @@ class Prediction(Shown):
             "current_A": motion.current,
             "force_N": self.force,
         }
+
+
+def _point(condition: Condition) -> tuple[float, float, float]:
+    return abs(condition.current_A), condition.frequency_Hz, condition.amplitude_m
+
+
+def _features(point: tuple[float, float, float], current_scale: float) -> Floats:
+    return np.array([point[0] / current_scale, np.log(max(point[1], _LEAST)), np.log(max(point[2], _LEAST))])
 
 
 _ANY = (-np.inf, np.inf)
@@ -281,6 +310,11 @@ class Damper(Shown):
     def functions(self) -> Mapping[str, ParameterFunction]:
         """Parameter functions by what they give; none where the parameters are no such functions."""
         return {}
+
+    @property
+    def tested_motions(self) -> MotionHull | None:
+        """Motions outside which its functions are held at the nearest one; None where they follow any motion."""
+        return None
 
     @property
     def fitted_parameters(self) -> Mapping[str, FittedParameter]:

@@ -22,6 +22,7 @@ from mrdamper.data import Condition, Floats, Run, same_condition, same_motion
 from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.functions.fitting import FunctionFit, assess, choose_function
 from mrdamper.functions.forms import FORMS, ParameterFunction
+from mrdamper.functions.motion_hull import MotionHull
 from mrdamper.identification import Identification
 from mrdamper.models import Model, model_type
 
@@ -43,6 +44,7 @@ class SavedModified(Saved):
 
     model: str
     functions: dict[str, SavedFunction]
+    tested_motions: tuple[tuple[float, float], ...] = ()  # corners: frequency [Hz], amplitude [m]; none: not held
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -93,6 +95,10 @@ class ModifiedModel(Damper):
     def functions(self) -> Mapping[str, ParameterFunction]:
         return self.parameters.functions
 
+    @property
+    def tested_motions(self) -> MotionHull | None:
+        return self.parameters.motions if self.parameters.follows_motion else None
+
     def model_at(self, condition: Condition) -> Model:
         """The model at a condition."""
         return self.parameters.at(condition)
@@ -107,7 +113,7 @@ class ModifiedModel(Damper):
             if log and not value > 0:
                 raise ParameterError(f"{name} = {value:g}", where=self.title, mend="give a value over zero")
             functions[name] = ParameterFunction("constant", (math.log(value) if log else value,), log=log)
-        return replace(self, parameters=ParameterMap(self.parameters.model_type, functions), certainty=None)
+        return replace(self, parameters=replace(self.parameters, functions=functions), certainty=None)
 
     @property
     def fitted_parameters(self) -> Mapping[str, FittedParameter]:
@@ -123,20 +129,22 @@ class ModifiedModel(Damper):
             numbers = [values.get(f"{name}.{i}", v) for i, v in enumerate((*f.coefficients, *f.rates))]
             cut = len(f.coefficients)
             functions[name] = replace(f, coefficients=tuple(numbers[:cut]), rates=tuple(numbers[cut:]))
-        return replace(self, parameters=ParameterMap(self.parameters.model_type, functions))
+        return replace(self, parameters=replace(self.parameters, functions=functions))
 
     def to_saved(self) -> SavedModified:
         functions = {
             name: SavedFunction(f.form, f.coefficients, f.rates, f.log, f.formula) for name, f in self.functions.items()
         }
-        return SavedModified(self.parameters.model_type.name, functions)
+        motions = self.parameters.motions
+        return SavedModified(self.parameters.model_type.name, functions, motions.corners if motions else ())
 
     @classmethod
     def from_saved(
         cls, saved: SavedModified, rig: str, envelope: Envelope, provenance: Mapping[str, str], coil: Coil | None
     ) -> Self:
         functions = {n: ParameterFunction(f.form, f.coefficients, f.rates, f.log) for n, f in saved.functions.items()}
-        made = cls(rig, ParameterMap(model_type(saved.model), functions), envelope, provenance, coil)
+        motions = MotionHull(saved.tested_motions) if saved.tested_motions else None
+        made = cls(rig, ParameterMap(model_type(saved.model), functions, motions), envelope, provenance, coil)
         try:
             made.model_at(envelope.middle)
         except (TypeError, KeyError) as error:
@@ -214,7 +222,9 @@ def fit_modified(
     }
     damper = ModifiedModel(
         rig=rig,
-        parameters=ParameterMap(model_type, {name: fit.function for name, fit in fits.items()}),
+        parameters=ParameterMap(
+            model_type, {name: fit.function for name, fit in fits.items()}, MotionHull.of(conditions)
+        ),
         envelope=Envelope.of(conditions),
         provenance=dict(provenance or {}),
     )
@@ -255,7 +265,8 @@ def fit_modified_jointly(
     start = joint.parameters.functions.get(data.shape)
 
     def model(part: Condensed, parameters: ParameterMap) -> ModifiedModel:
-        return ModifiedModel(identifications[0].rig, parameters, Envelope.of(part.conditions), dict(provenance or {}))
+        held = replace(parameters, motions=MotionHull.of(part.conditions))
+        return ModifiedModel(identifications[0].rig, held, Envelope.of(part.conditions), dict(provenance or {}))
 
     def refit(rows: Sequence[int]) -> ModifiedModel:
         part = data.only(rows)

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from mrdamper.data import Condition
-from mrdamper.functions.forms import ParameterFunction
+from mrdamper.functions.forms import ParameterFunction, form_named
+from mrdamper.functions.motion_hull import MotionHull
 from mrdamper.models import Model
 
 
@@ -19,18 +20,30 @@ class ParameterMap:
     model_type : type of Model
     functions : mapping of str to ParameterFunction
         By parameter, or by a coordinate the model can be built from.
+    motions : MotionHull, optional
+        Tested motions: outside them the functions are those of the nearest one. Without, they follow any
+        motion, as the functions of a publication do.
     """
 
     model_type: type[Model]
     functions: Mapping[str, ParameterFunction]
+    motions: MotionHull | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "functions", dict(self.functions))
 
     def at(self, condition: Condition) -> Model:
         """The model at a condition; values a function drives past a parameter's bounds stop there."""
-        point = (condition.current_A, condition.frequency_Hz, condition.amplitude_m)
+        motion = condition.frequency_Hz, condition.amplitude_m
+        if self.motions is not None and self.follows_motion:
+            motion = self.motions.nearest(*motion)
+        point = (condition.current_A, *motion)
         return self.model_type.nearest({name: function(*point) for name, function in self.functions.items()})
+
+    @property
+    def follows_motion(self) -> bool:
+        """Whether any function depends on the frequency or the amplitude."""
+        return any(form_named(function.form).follows_motion for function in self.functions.values())
 
     @property
     def parameter_count(self) -> int:

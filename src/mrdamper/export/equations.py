@@ -24,7 +24,16 @@ def equations(damper: Damper) -> list[str]:
     symbols = {name: letter for name, (letter, _) in type(model).coordinates.items()}
     symbols |= {info.name: info.symbol for info in model.parameters()}
     lines = [line.strip() for line in damper.equation.split(r",\quad")]
-    return lines + [f"{symbols[name]} = {function_text(function)}" for name, function in damper.functions.items()]
+    lines += [f"{symbols[name]} = {function_text(function)}" for name, function in damper.functions.items()]
+    if damper.tested_motions is not None:
+        corners = ",\\; ".join(
+            rf"({number(f)}\,\mathrm{{Hz}},\ {number(1e3 * A)}\,\mathrm{{mm}})"
+            for f, A in damper.tested_motions.corners
+        )
+        lines.append(
+            rf"(f, A) \to \text{{nearest motion, in }}(\ln f, \ln A)\text{{, of the convex hull of }} {corners}"
+        )
+    return lines
 
 
 def function_text(function: ParameterFunction) -> str:

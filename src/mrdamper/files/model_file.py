@@ -65,6 +65,7 @@ class _Envelope(_Strict):
     amplitude_m: Range
     peak_velocity_m_s: Range
     any_motion: bool | None = None  # since 1.2; written where it holds
+    conditions: tuple[tuple[float, float, float], ...] | None = None  # tested: [A], [Hz], [m]
 
 
 class _Driver(_Strict):

@@ -35,6 +35,11 @@ class Term:
     decay_f: int | None = None
     power_f: int | None = None
 
+    @property
+    def follows_motion(self) -> bool:
+        """Whether it depends on the frequency or the amplitude."""
+        return bool(self.frequency or self.amplitude) or self.decay_f is not None or self.power_f is not None
+
     def __call__(self, I: Floats, f: Floats, A: Floats, rates: Sequence[float]) -> Floats:
         value = I**self.current * f**self.frequency * A**self.amplitude
         if self.decay_I is not None:
@@ -76,6 +81,22 @@ class Form:
     terms: tuple[Term, ...]
     rate_bounds: tuple[tuple[float, float], ...] = ()
     source: str = ""
+
+    @property
+    def current_terms(self) -> int:
+        """Parameters of its law over the current, the constant included."""
+        terms = [term for term in self.terms if not term.follows_motion]
+        return len(terms) + len({term.decay_I for term in terms} - {None})
+
+    @property
+    def motion_terms(self) -> int:
+        """Parameters over frequency and amplitude."""
+        return len(self.terms) + len(self.rate_bounds) - self.current_terms
+
+    @property
+    def follows_motion(self) -> bool:
+        """Whether it depends on the frequency or the amplitude."""
+        return any(term.follows_motion for term in self.terms)
 
     def columns(self, I: Floats, f: Floats, A: Floats, rates: Sequence[float]) -> Floats:
         """(N, terms) array of the terms."""
