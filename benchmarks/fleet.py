@@ -39,7 +39,7 @@ from mrdamper.fleet.plan import Plan
 from mrdamper.fleet.profile import FleetProfile
 from mrdamper.fleet.table import TIMES
 from mrdamper.fleet.verdicts import drift, suspects, with_features
-from mrdamper.reproduction.virtual_rig import VirtualRig
+from mrdamper.paper.virtual_rig import VirtualRig
 
 STRONG = VirtualRig(
     gas_pressure=4e6, gas_volume=3e-4, rod_diameter=0.03, offset_force=400.0, yield_off=60.0, yield_per_ampere=3200.0,

@@ -86,7 +86,7 @@ def of_study(study: Study) -> list[Told]:
         "bouc-wen:joint": "modified Bouc–Wen, all runs at once",
         "bouc-wen": "modified Bouc–Wen, run by run",
         "bingham:joint": "modified Bingham, all runs at once",
-        "bouc-wen:literal": "modified Bouc–Wen, the paper's recipe taken literally",
+        "paper": "modified Bouc–Wen, the paper's recipe taken literally",
     }
     rows = []
     for name, title in names.items():

@@ -58,7 +58,7 @@ _LOADED = (
     "pydantic", "mrdamper.cli.output", "mrdamper.study.workflow", "mrdamper.study.comparison", "mrdamper.report.study",
     "mrdamper.report.comparison", "mrdamper.report.damper_tests", "mrdamper.report.simulation", "mrdamper.export",
     "mrdamper.files.dataset", "mrdamper.files.model_file", "mrdamper.validation", "mrdamper.rig_files.rig_import",
-    "mrdamper.systems.simulate", "mrdamper.study.plan", "mrdamper.reproduction.output",
+    "mrdamper.systems.simulate", "mrdamper.study.plan", "mrdamper.paper.output",
 )  # fmt: skip
 _STEPS = ("os.rename", "os.link", "os.remove", "os.rmdir", "os.mkdir", "ctypes.dlsym")  # the last: before an exchange
 _POINTS = {"disk": 20, "memory": 20, "file size": 10, "files": 4, "temporary folder": 1}  # of each command

@@ -39,16 +39,15 @@ ROOMS = (
     ),
     _room("functions.forms functions.fitting", "functions"),
     _room(
-        "reproduction.verdicts reproduction.claims reproduction.tested reproduction.identified reproduction.seeds",
-        "reproduction/test_verdicts.py reproduction/test_claims.py reproduction/test_measured.py"
-        " reproduction/test_seeds.py",
+        "paper.verdicts paper.claims paper.claims_on_tests paper.claims_on_fits paper.seeds",
+        "paper/test_verdicts.py paper/test_claims.py paper/test_measured.py paper/test_seeds.py",
     ),
-    _room("reproduction.output", "reproduction/test_output.py"),
-    _room("reproduction.sensitivity", "reproduction/test_sensitivity.py"),
+    _room("paper.output", "paper/test_output.py"),
+    _room("paper.sensitivity", "paper/test_sensitivity.py"),
     _room("dampers.bands", "dampers/test_bands_by_hand.py"),
-    _room("reproduction.virtual_rig", "reproduction/test_virtual_rig.py"),
+    _room("paper.virtual_rig", "paper/test_virtual_rig.py"),
     _room("report.tables study.recipe study.cross_validation", "report/test_tables.py study/test_recipe.py"),
-    _room("dampers.paper dampers.modified", "dampers/test_modified.py dampers/test_gram.py study/test_recipe.py"),
+    _room("paper.functions dampers.modified", "dampers/test_modified.py dampers/test_gram.py study/test_recipe.py"),
     _room("dampers.joint", "dampers/test_joint.py"),
     _room(
         "dampers.published.ali dampers.published.boada dampers.published.dominguez dampers.published.lei"
@@ -57,8 +56,8 @@ ROOMS = (
     ),
     _room("models.play_bypass", "models/test_play_bypass.py"),
     _room(
-        "identification.methods.paper identification.harmonic_balance",
-        "identification/test_harmonic_balance.py dampers/test_paper.py",
+        "paper.paper_method identification.harmonic_balance",
+        "identification/test_harmonic_balance.py paper/test_functions.py",
     ),
     _room("rig_files.quality.loop", "rig_files/test_loop_check.py rig_files/test_silent_faults.py"),
 )

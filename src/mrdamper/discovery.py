@@ -14,11 +14,26 @@ from mrdamper.errors import UnknownNameError
 
 N = TypeVar("N", bound=type)
 
+# Modules above the core that hold classes of a kind: imported when these are looked up.
+EXTENSIONS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "methods": ("mrdamper.paper.paper_method", "mrdamper.paper.direct_genetic"),
+        "study methods": ("mrdamper.paper.options",),
+    }
+)
 
-def subclasses_in(package: str, path: Iterable[str], base: N) -> Mapping[str, N]:
-    """Import every module of a package; the direct subclasses of `base` by their `name`, sorted."""
+
+def subclasses_in(package: str, path: Iterable[str], base: N, kind: str = "") -> Mapping[str, N]:
+    """Import every module of a package and the extensions of a kind; the direct subclasses of `base` by `name`."""
     for module in pkgutil.iter_modules(path):
         importlib.import_module(f"{package}.{module.name}")
+    return known_subclasses(base, kind)
+
+
+def known_subclasses(base: N, kind: str = "") -> Mapping[str, N]:
+    """Direct subclasses of `base`, those of the extensions of a kind included, by their `name`, sorted."""
+    for module in EXTENSIONS.get(kind, ()):
+        importlib.import_module(module)
     found = sorted(base.__subclasses__(), key=lambda cls: cls.name)
     return MappingProxyType({cls.name: cls for cls in found})
 
@@ -56,15 +71,14 @@ MOVED = MappingProxyType(
         "joint": "dampers.joint",
         "loop_analysis": "identification.loop_analysis",
         "modified": "dampers.modified",
-        "paper": "dampers.paper",
         "parameter_functions": "functions.forms",
         "plots": "report.plots",
         "publication": "report.study",
         "recursion": "motion.lag",
-        "sensitivity": "reproduction.sensitivity",
+        "sensitivity": "paper.sensitivity",
         "threads": "optimizers.linear",
         "uncertainty": "identification.covariance",
-        "virtual_rig": "reproduction.virtual_rig",
+        "virtual_rig": "paper.virtual_rig",
         "workflow": "study.workflow",
     }
 )

@@ -12,7 +12,6 @@ from mrdamper.dampers import modified
 from mrdamper.dampers.base import Envelope
 from mrdamper.dampers.causal import causal_force
 from mrdamper.dampers.modified import ModifiedModel, fit_modified
-from mrdamper.dampers.paper import PAPER_FORMS, paper_functions
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.data import Condition
 from mrdamper.errors import IdentificationError, InputError
@@ -23,6 +22,7 @@ from mrdamper.functions.motion_hull import MotionHull
 from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.motion import sine
+from mrdamper.paper.functions import PAPER_FORMS, paper_functions
 
 MOTIONS = ((0.5, 0.05), (1.0, 0.02), (1.5, 0.05), (2.0, 0.02))
 CONDITIONS = [Condition(I, f, A) for I in (0.0, 0.5, 1.2, 2.0) for f, A in MOTIONS]

@@ -19,18 +19,19 @@ from mrdamper.models import model_type
 from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.motion import measured_motion, sine
-from mrdamper.reproduction.ways import one_per_current, through_chosen
+from mrdamper.paper.assumptions import PaperAssumptions
+from mrdamper.paper.functions import fit_paper_functions
+from mrdamper.paper.options import PaperOptions
+from mrdamper.paper.recipes import one_per_current, through_chosen
 from mrdamper.study import cross_validation
 from mrdamper.study import recipe as recipes
 from mrdamper.study.cross_validation import stretches
 from mrdamper.study.recipe import (
     Basis,
     FitResult,
-    PaperAssumptions,
     Recipe,
     fit_and_score,
     fit_and_score_all,
-    fit_paper_functions,
     fit_per_run,
     identified,
 )
@@ -363,19 +364,16 @@ def test_every_recipe_says_what_it_is():
         None, recipes.fit_global_model, "joint", "play and bypass", model_type("play-bypass").source,
     )  # fmt: skip
     assert (ali.make.func, ali.make.args) == (recipes.fit_published, (all_published()["ali-type"],))
-    paper = recipes.literal(PaperAssumptions(None))
-    assert (paper.name, paper.make, paper.way, paper.pure) == (
-        "bouc-wen:literal",
-        fit_paper_functions,
-        "paper, literal",
-        True,
-    )
+    paper = PaperOptions(functions="shorter").recipe(runs_with(1400.0, 12.0, (0.5, 1.0, 2.0)))
+    assert (paper.name, paper.make.func, paper.pure) == ("paper", fit_paper_functions, True)
+    assert paper.basis.method.search == "genetic"
     assert known["kernel"].basis is None
     assert known["bouc-wen:paper"].basis.method == "paper"
     assert known["bouc-wen:paper"].title.endswith("method paper")
     assert [r.name for r in recipes.recipes(("dahl", "ali-type"))] == ["dahl", "ali-type"]
-    assert not set(recipes.GENETIC) & {r.name for r in recipes.recipes()}
-    assert set(recipes.GENETIC) <= {r.name for r in recipes.recipes(genetic=True)}
+    genetic = {"bouc-wen:paper", "bouc-wen:direct-genetic"}
+    assert not genetic & {r.name for r in recipes.recipes()}
+    assert genetic <= {r.name for r in recipes.recipes(genetic=True)}
     with pytest.raises(UnknownNameError, match="dahl"):
         recipes.recipes(("dall",))
     assert [Basis("bingham").costly, Basis("spencer").costly, Basis("bouc-wen", "balance").costly] == [
@@ -396,15 +394,15 @@ def runs_with(k1, mass, frequencies):
 
 
 def test_an_unknown_gas_spring_is_told_from_the_mass_by_the_frequencies():
-    settled = PaperAssumptions.of(runs_with(1400.0, 12.0, (0.5, 1.0, 2.0)), None)
-    assert dict(settled.fixed)["k1"] == pytest.approx(1400.0, rel=0.01)
-    assert (dict(settled.fixed)["k2"], dict(settled.fixed)["k3"], settled.free) == (0.0, 0.0, ("m",))
-    assert "m = 12" in settled.notes[0] or "m = 11.9" in settled.notes[0]
+    assumptions = PaperAssumptions.of(runs_with(1400.0, 12.0, (0.5, 1.0, 2.0)), None)
+    assert dict(assumptions.fixed)["k1"] == pytest.approx(1400.0, rel=0.01)
+    assert (dict(assumptions.fixed)["k2"], dict(assumptions.fixed)["k3"], assumptions.free) == (0.0, 0.0, ("m",))
+    assert "m = 12" in assumptions.notes[0] or "m = 11.9" in assumptions.notes[0]
     alone = PaperAssumptions.of(runs_with(1400.0, 12.0, (1.0,)), None)
     assert (alone.gas, alone.fixed, alone.free) == (None, (), ())
     assert "k1 holds k1 − m ω²" in alone.notes[0]
-    basis = settled.preset((("n", 3.0),)).basis("balance")
-    assert basis == Basis("bouc-wen", "balance", ("m",), (*settled.fixed, ("n", 3.0)), None)
+    basis = assumptions.preset((("n", 3.0),)).basis("balance")
+    assert basis == Basis("bouc-wen", "balance", ("m",), (*assumptions.fixed, ("n", 3.0)), None)
 
 
 def test_a_gas_spring_that_is_known_must_leave_volume():

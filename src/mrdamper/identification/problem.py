@@ -169,6 +169,10 @@ class Method(ABC):
     def solve(self, problem: Problem) -> Solution:
         """Determine the free parameters of a problem."""
 
+    def for_many_runs(self) -> Method:
+        """Return the method with the effort that is affordable where dozens of runs are identified."""
+        return self
+
 
 @dataclass(frozen=True)
 class RunCertainty:

@@ -16,8 +16,6 @@ from mrdamper.data import Run
 from mrdamper.errors import InputError
 from mrdamper.identification import Identification, Method, Problem, conclude
 from mrdamper.identification.methods import method_named
-from mrdamper.identification.methods.direct_genetic import DirectGenetic
-from mrdamper.identification.methods.paper import Paper
 from mrdamper.identification.methods.projection import Projection
 from mrdamper.models import model_type
 from mrdamper.motion import analyse_motion
@@ -31,8 +29,6 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 T = TypeVar("T")
 R = TypeVar("R")
-
-GENERATIONS = 60  # of a genetic search here, where the paper takes 500: a comparison has dozens of runs
 
 
 @dataclass(frozen=True)
@@ -185,9 +181,7 @@ def identify_quickly(basis: Basis, run: Run) -> tuple[Identification | str, floa
 
 def quickened(basis: Basis, run: Run) -> tuple[Method, Problem]:
     """The method where it is one of many, and what it sees of a run."""
-    method = method_named(basis.method) if isinstance(basis.method, str) else basis.method
-    if isinstance(method, Paper | DirectGenetic):
-        method = replace(method, genetic=replace(method.genetic, generations=GENERATIONS))
+    method = (method_named(basis.method) if isinstance(basis.method, str) else basis.method).for_many_runs()
     if model_type(basis.model).integrated:
         method = Projection(refine_best=1)
     return method, basis.problem(shortened(run) if basis.costly else run)

@@ -8,9 +8,11 @@ recipes from here, so that one name means one way and every way is scored alike.
 from __future__ import annotations
 
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
+from typing import ClassVar
 
 import numpy as np
 
@@ -18,17 +20,13 @@ from mrdamper.dampers.base import Damper
 from mrdamper.dampers.choice import identify_jointly
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit, fit_modified, fit_modified_jointly
-from mrdamper.dampers.paper import paper_functions
 from mrdamper.dampers.published import Published, all_published
 from mrdamper.data import Run
+from mrdamper.discovery import known_subclasses
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError
 from mrdamper.gas_spring import GasSpring
 from mrdamper.identification import Identification, Method, Problem, identify
-from mrdamper.identification.harmonic_balance import separate_mass
-from mrdamper.identification.methods.balance import Balance
-from mrdamper.identification.methods.paper import Paper
 from mrdamper.models import Scale, all_models, model_type
-from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.motion import analyse_motion
 from mrdamper.study.cross_validation import cross_validate, stretches
 from mrdamper.validation import Validation, validate
@@ -36,7 +34,6 @@ from mrdamper.validation import Validation, validate
 Progress = Callable[[str, float], None]
 
 JOINTLY = "play-bypass"  # the model whose parameters hold for a whole damper
-GENETIC = ("bouc-wen:paper", "bouc-wen:direct-genetic")
 
 
 @dataclass(frozen=True)
@@ -127,6 +124,8 @@ class Recipe:
     source: str = ""
     limits: str = ""
     pure: bool = False  # identified from pure sines only; scored on every run all the same
+    on_request: bool = False  # takes most of the time of a comparison
+    notes: tuple[str, ...] = ()  # for the reader of the result
 
     @property
     def model(self) -> str:
@@ -337,19 +336,6 @@ def fit_global_model(runs: Sequence[Run], identifications: Sequence[Identificati
     return FitResult(fit.damper, lambda rows: problem.refit(fit, rows).damper, fit)
 
 
-def fit_paper_functions(
-    runs: Sequence[Run], identifications: Sequence[Identification], mass_law: str = "exponential"
-) -> FitResult:
-    """The paper's functions through the values identified from single runs [Qian et al. 2024, Eq. 23–43]."""
-    fit = paper_functions(identifications, mass_law)
-
-    def refit(rows: Sequence[int]) -> Damper:
-        kept = {runs[i].id for i in rows}
-        return paper_functions([i for i in identifications if i.run_id in kept], mass_law).damper
-
-    return FitResult(fit.damper, refit, fit)
-
-
 def fit_published(cls: Published, runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
     """The laws of a published damper, started from single runs and refined on all."""
     about = {"train runs": str(len(runs))}
@@ -397,68 +383,47 @@ def conditioned(cls: Published) -> Recipe:
     return Recipe(cls.name, basis, partial(fit_published, cls), "", cls.heading, cls.source, cls.limits)
 
 
-@dataclass(frozen=True)
-class PaperAssumptions:
-    """What is held in every identification by the paper's recipe: the gas spring, or what stands in for it.
+class StudyMethod(ABC):
+    """A published method that a study can follow, with its options as fields.
 
     Attributes
     ----------
-    gas : GasSpring or None
-    fixed : tuple of (str, float)
-    free : tuple of str
-    notes : tuple of str
-        How it was settled, where the gas spring is not known.
+    name : str
+        What `study --model` calls it.
     """
 
-    gas: GasSpring | None
-    fixed: tuple[tuple[str, float], ...] = ()
-    free: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    name: ClassVar[str]
+
+    @abstractmethod
+    def recipe(self, train: Sequence[Run]) -> Recipe:
+        """Make the recipe for the sine runs of one rig.
+
+        Raises
+        ------
+        InputError
+            If the method cannot be followed on these runs.
+        """
+
+    def beside_others(self) -> StudyMethod:
+        """Return the method with the effort that is affordable beside other recipes."""
+        return self
 
     @classmethod
-    def of(cls, train: Sequence[Run], gas: GasSpring | None) -> PaperAssumptions:
-        """Take the gas spring, or separate stiffness and mass by the frequencies of the train runs."""
-        if gas is not None:
-            longest = max(float(np.ptp(run.displacement)) / 2 for run in train)
-            gas.force([-longest, longest])  # refuses motions that leave no gas volume
-            return cls(gas)
-        found = [identify(run, BoucWen, Balance()) for run in train]
-        stiffness = [float(i.model.k1) for i in found if isinstance(i.model, BoucWen)]
-        try:
-            apart = separate_mass([i.condition for i in found], stiffness)
-        except IdentificationError as error:
-            return cls(
-                None, notes=(f"the gas spring is unknown and {error}: the mass is left out, k1 holds k1 − m ω²",)
-            )
-        note = (
-            f"the gas spring is unknown: k1 = {apart.k1:.4g} N/m comes from a regression of the consistent in-phase "
-            f"stiffness k1 − m ω² over the frequencies (with m = {apart.m:.3g} kg); k2 = k3 = 0"
-        )
-        return cls(None, (("k1", apart.k1), ("k2", 0.0), ("k3", 0.0)), ("m",), (note,))
-
-    def basis(self, method: str | Method) -> Basis:
-        """Bouc–Wen by a method, with what is settled."""
-        return Basis("bouc-wen", method, self.free, self.fixed, self.gas)
-
-    def preset(self, presets: Sequence[tuple[str, float]]) -> PaperAssumptions:
-        """The same with more parameters held."""
-        return replace(self, fixed=(*self.fixed, *presets))
+    def compared(cls) -> Sequence[Recipe]:
+        """Recipes that a comparison of models offers besides."""
+        return ()
 
 
-def literal(settled: PaperAssumptions) -> Recipe:
-    """The paper's recipe to the letter, for its verdict beside the others; it takes sines only.
-
-    Its alpha and beta are the optimum that the genetic search of the paper approaches.
-    """
-    basis = settled.basis(Paper(search="optimum"))
-    return Recipe("bouc-wen:literal", basis, fit_paper_functions, "paper, literal", pure=True)
+def study_methods() -> Mapping[str, type[StudyMethod]]:
+    """Every study method by its name."""
+    return known_subclasses(StudyMethod, "study methods")  # type: ignore[type-abstract]
 
 
 def catalogue() -> Mapping[str, Recipe]:
     """Every recipe that can be compared, by name; models and dampers dropped in are found."""
     found = [modified(name) for name in all_models() if name != JOINTLY]
     found += [jointly(name) for name in _closed_shapes()]
-    found += [modified(*name.split(":")) for name in GENETIC]
+    found += [recipe for method in study_methods().values() for recipe in method.compared()]
     found += [play_and_bypass(), *(conditioned(cls) for cls in all_published().values())]
     return {recipe.name: recipe for recipe in found}
 
@@ -481,7 +446,7 @@ def recipes(names: Sequence[str] = (), genetic: bool = False) -> list[Recipe]:
     for name in names:
         if name not in known:
             raise UnknownNameError.of("model", name, known)
-    return [known[name] for name in (names or known) if names or genetic or name not in GENETIC]
+    return [known[name] for name in (names or known) if names or genetic or not known[name].on_request]
 
 
 def _closed_shapes() -> list[str]:

@@ -28,15 +28,15 @@ from mrdamper.rig_files.quality.table import judged
 from mrdamper.study.parallel import HERE, Processes
 from mrdamper.study.recipe import (
     JOINTLY,
-    PaperAssumptions,
     Progress,
     Recipe,
     Scored,
+    StudyMethod,
     fit_and_score_all,
     jointly,
-    literal,
     modified,
     play_and_bypass,
+    study_methods,
 )
 from mrdamper.validation import Validation, validate
 
@@ -166,7 +166,7 @@ def run_study(
     dataset: Dataset,
     progress: Progress = lambda what, share: None,
     *,
-    model: str | None = None,
+    model: str | StudyMethod | None = None,
     processes: Processes = HERE,
 ) -> Study:
     """Study a dataset: identify, map, validate, rig by rig.
@@ -176,8 +176,9 @@ def run_study(
     dataset : Dataset
     progress : callable
         Told what is being done and the share done, 0...1.
-    model : str, optional
-        Choose the best candidate of this model instead of the best of all.
+    model : str or StudyMethod, optional
+        Choose the best candidate of this model instead of the best of all; or follow this published
+        method with its options ("paper" with its defaults).
     processes : Processes
         Where rigs are studied; the results are the same bits.
 
@@ -205,10 +206,19 @@ def run_study(
     return Study(dataset, tuple(rigs), time.perf_counter() - begin)
 
 
-def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None, *, model: str | None = None) -> RigStudy:
+def study_rig(
+    dataset: Dataset,
+    progress: Progress = lambda what, share: None,
+    *,
+    model: str | StudyMethod | None = None,
+) -> RigStudy:
     """Study the runs of one rig; arguments as `run_study`."""
-    if model not in (None, *STUDIED, JOINTLY):
-        raise UnknownNameError.of("studied model", str(model), (*STUDIED, JOINTLY))
+    methods = study_methods()
+    if isinstance(model, str) and model in methods:
+        model = methods[model]()
+    if not isinstance(model, StudyMethod) and model not in (None, *STUDIED, JOINTLY):
+        raise UnknownNameError.of("studied model", str(model), (*STUDIED, JOINTLY, *methods))
+    method, model = (model, model.name) if isinstance(model, StudyMethod) else (None, model)
     rig = dataset.rigs[0]
     progress(f"{rig or 'rig'}: loops", 0.0)
     sines, refused = usable_sines(dataset)
@@ -231,7 +241,7 @@ def study_rig(dataset: Dataset, progress: Progress = lambda what, share: None, *
             mend="a model over conditions needs at least two, or a record of other motion; check the split column",
         )
     candidates, impossible = fit_and_score_all(
-        _steps(train, everything),
+        _steps(train, everything, method),
         [run for run in trusted if run.split == "validate"],
         lambda what, share: progress(f"{rig or 'rig'}: {what}", share),
     )
@@ -391,12 +401,16 @@ def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], di
     return sines, refused
 
 
-def _steps(train: Sequence[Run], everything: Sequence[Run]) -> list[tuple[Recipe, Sequence[Run]]]:
+def _steps(
+    train: Sequence[Run], everything: Sequence[Run], method: StudyMethod | None
+) -> list[tuple[Recipe, Sequence[Run]]]:
     """The recipes of a study, and the runs each is followed on: sines run by run, everything at once."""
     steps: list[tuple[Recipe, Sequence[Run]]] = []
     if len(train) > 1:
         steps += [(make(name), train) for name in STUDIED for make in (modified, jointly)]
-    pure = [run for run in train if analyse_motion(run).is_sine]  # the paper's recipe takes no other
-    if len(pure) > 2:
-        steps.append((literal(PaperAssumptions.of(pure, None)), train))
+    pure = [run for run in train if analyse_motion(run).is_sine]  # published methods take no other
+    if method is not None:
+        steps.append((method.recipe(pure), train))
+    elif len(pure) > 2:
+        steps += [(cls().beside_others().recipe(pure), train) for cls in study_methods().values()]
     return [*steps, (play_and_bypass(), everything)]

@@ -44,12 +44,12 @@ def register(app: typer.Typer) -> None:
         from mrdamper.errors import InputError
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.dataset import load_dataset
-        from mrdamper.reproduction.output import summary, write_reproduction
-        from mrdamper.reproduction.study import reproduce as run_reproduction
+        from mrdamper.paper.output import summary, write_reproduction
+        from mrdamper.paper.study import reproduce as run_reproduction
         from mrdamper.study.parallel import several
 
         require_writable(out)
-        switches = _switches(preset, box, mass_law, friction)
+        options = _switches(preset, box, mass_law, friction)
         dataset = None if data is None else load_dataset(data)
         if dataset is None and rig is not None:
             raise InputError("--rig without --data", mend="give --data DATASET, or leave --rig out")
@@ -61,7 +61,7 @@ def register(app: typer.Typer) -> None:
         with progress_on_stderr() as progress, several(jobs or os.cpu_count() or 1) as processes:
             study = run_reproduction(
                 dataset,
-                switches=switches,
+                options=options,
                 with_comparators=comparators,
                 with_models=with_models,
                 seeds=seeds,
@@ -90,7 +90,7 @@ def register(app: typer.Typer) -> None:
 def _switches(preset: list[str], box: list[str], mass_law: str, friction: str):
     from mrdamper.cli.output import parse_pairs
     from mrdamper.errors import InputError, UnknownNameError
-    from mrdamper.reproduction.switches import Switches
+    from mrdamper.paper.options import PaperOptions
 
     given: dict[str, Any] = {"mass_law": mass_law, "friction_test": friction}
     for option, pairs, names in (("--preset", preset, ("A", "n", "gamma")), ("--box", box, ("alpha", "beta"))):
@@ -103,7 +103,7 @@ def _switches(preset: list[str], box: list[str], mass_law: str, friction: str):
             except ValueError as error:
                 form = "NAME=NUMBER" if option == "--preset" else "NAME=LOW:HIGH"
                 raise InputError(f"{option} {name}={text}", mend=f"write {option} {form}") from error
-    return Switches(**given)
+    return PaperOptions(**given)
 
 
 def _one(numbers: tuple[float, ...], option: str) -> float | tuple[float, ...]:

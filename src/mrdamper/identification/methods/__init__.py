@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 @cache
 def all_methods() -> Mapping[str, type[Method]]:
-    """Every method by its name."""
-    return subclasses_in(__name__, __path__, Method)
+    """Every method by its name, those of other packages included."""
+    return subclasses_in(__name__, __path__, Method, "methods")
 
 
 def method_named(name: str, settings: Mapping[str, str] | None = None) -> Method:

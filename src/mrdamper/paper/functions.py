@@ -1,0 +1,102 @@
+"""The paper's functions of current, frequency and amplitude, fitted to the parameters of single runs.
+
+[Qian et al. 2024, Eq. 23–43]
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mrdamper.dampers.base import Damper, Envelope
+from mrdamper.dampers.modified import ModifiedFit, ModifiedModel
+from mrdamper.dampers.parameter_map import ParameterMap
+from mrdamper.data import Condition, Floats, Run
+from mrdamper.errors import IdentificationError
+from mrdamper.functions.fitting import FunctionFit, assess, fit_function
+from mrdamper.identification import Identification
+from mrdamper.models.bouc_wen import BoucWen
+from mrdamper.study.recipe import FitResult
+
+PAPER_FORMS = {
+    "c": "viscous-paper",
+    "m": "mass-exponential",
+    "alpha": "plane",
+    "beta": "current-decay-frequency",
+    "f0": "constant",
+    "k1": "constant",
+    "k2": "constant",
+    "k3": "constant",
+}
+_SHORTER = ("quadratic-current", "linear-current", "constant")
+
+
+def paper_functions(
+    identifications: Sequence[Identification], mass_law: str = "exponential", provenance: dict[str, str] | None = None
+) -> ModifiedFit:
+    """Fit the paper's functions [Qian et al. 2024, Eq. 23–43] by plain least squares.
+
+    Shorter ones replace those that the tests do not determine. c is fitted through the viscous part of
+    F0, as the paper does [Eq. 24–26]. beta spans decades and must stay positive: its function gives the
+    logarithm.
+
+    Parameters
+    ----------
+    identifications : sequence of Identification
+    mass_law : {"exponential", "inverse-square", "power"}
+        Reading of Eq. 29, which the text leaves open.
+    provenance : mapping, optional
+    """
+    forms = {**PAPER_FORMS, "m": f"mass-{mass_law}"}
+    conditions = tuple(i.condition for i in identifications)
+    values = {name: np.array([float(getattr(i.model, name)) for i in identifications]) for name in PAPER_FORMS}
+    functions = {
+        name: _first_determined((form, *_SHORTER), conditions, values[name], log=name == "beta")
+        for name, form in forms.items()
+    }
+    damper = ModifiedModel(
+        rig=identifications[0].rig,
+        parameters=ParameterMap(BoucWen, {name: fit.function for name, fit in functions.items()}),
+        envelope=Envelope.of(conditions),
+        provenance=dict(provenance or {}),
+    )
+    return ModifiedFit(damper, functions, values, conditions)
+
+
+def fit_paper_functions(
+    runs: Sequence[Run], identifications: Sequence[Identification], mass_law: str = "exponential"
+) -> FitResult:
+    """Make the modified model of the paper from the identifications of single runs [Eq. 41–43]."""
+    about = {"method": "Qian et al. 2024, literal", "train runs": str(len(identifications)), "mass law": mass_law}
+    fit = paper_functions(identifications, mass_law, about)
+
+    def refit(rows: Sequence[int]) -> Damper:
+        kept = {runs[i].id for i in rows}
+        return paper_functions([i for i in identifications if i.run_id in kept], mass_law).damper
+
+    return FitResult(fit.damper, refit, fit)
+
+
+def _first_determined(forms: Sequence[str], conditions: Sequence[Condition], values: Floats, log: bool) -> FunctionFit:
+    for form in forms[:-1]:
+        try:
+            return (
+                _viscous(conditions, values)
+                if form == "viscous-paper"
+                else fit_function(form, conditions, values, log=log)
+            )
+        except IdentificationError:
+            continue
+    return fit_function(forms[-1], conditions, values, log=log)
+
+
+def _viscous(conditions: Sequence[Condition], c: Floats) -> FunctionFit:
+    """Fit F0 sin φ = 2π f A c over current and f A, and read it as the function of c [Eq. 24–26]."""
+    speed = 2 * math.pi * np.array([condition.frequency_Hz * condition.amplitude_m for condition in conditions])
+    found = fit_function("quadratic-current-speed", conditions, speed * c)
+    coefficients = tuple(value / (2 * math.pi) for value in found.function.coefficients)
+    function = replace(found.function, form="viscous-paper", coefficients=coefficients)
+    return replace(assess(function, conditions, c), left_out=found.left_out)

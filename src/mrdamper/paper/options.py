@@ -1,0 +1,164 @@
+"""The points that the paper's text leaves open, as options, and the recipe that a study follows with them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import ClassVar, Literal, get_args
+
+from mrdamper.data import Run
+from mrdamper.errors import ParameterError, UnknownNameError
+from mrdamper.gas_spring import GasSpring
+from mrdamper.identification.harmonic_balance import AmplitudeReading, OffsetReading, PhaseReading
+from mrdamper.paper.assumptions import PaperAssumptions, outside_paper_range, require_paper_functions
+from mrdamper.paper.functions import fit_paper_functions
+from mrdamper.paper.generation import GeneticSettings
+from mrdamper.paper.paper_method import Paper
+from mrdamper.study.recipe import Recipe, StudyMethod, modified
+
+MassLaw = Literal["exponential", "inverse-square", "power"]
+FrictionTest = Literal["dry", "filled"]
+Search = Literal["genetic", "optimum"]
+
+
+@dataclass(frozen=True)
+class PaperOptions(StudyMethod):
+    """Presets, gas spring, readings of the text and search of the paper's method.
+
+    Attributes
+    ----------
+    gas : GasSpring or None
+        Gas spring of the damper [Eq. 3–8]. Unknown: k1 and m come from a regression of the in-phase
+        stiffness over the frequencies, k2 = k3 = 0.
+    A, n : float
+        Presets of the loop [-]. A scales alpha and beta and changes no force.
+    gamma : float or None
+        Preset [m^-n, for A = 1]; None ties it to beta.
+    force_amplitude : {"first-harmonic", "half-peak-to-peak", "maximum"}
+        Reading of F0 [Eq. 16–19].
+    phase : {"harmonic", "peaks"}
+        Reading of phi.
+    offset : {"extremes", "mean"}
+        Reading of f0; the paper takes maximum and minimum.
+    quadratic_stiffness : {"kept", "dropped"}
+        Whether k2 is part of the gas spring [Eq. 7].
+    mass_law : {"exponential", "inverse-square", "power"}
+        Reading of Eq. 29.
+    functions : {"paper", "shorter"}
+        Refuse tests that do not determine the paper's functions, or take shorter ones in their place.
+    friction_test : {"dry", "filled"}
+        Of the virtual rig: without fluid, as in the paper, or with it, which adds the yield force without current.
+    search : {"genetic", "optimum"}
+        The paper's genetic search, or the least error that it approaches.
+    generations : int
+        Of the genetic search, in each of its seven boxes.
+    seed : int
+        Of the genetic search; every run draws its own numbers.
+    alpha_box, beta_box : (float, float)
+        Bounds of the search [N/m, m^-n].
+    """
+
+    name: ClassVar[str] = "paper"
+
+    gas: GasSpring | None = None
+    A: float = 1.0
+    n: float = 2.0
+    gamma: float | None = None
+    force_amplitude: AmplitudeReading = "first-harmonic"
+    phase: PhaseReading = "harmonic"
+    offset: OffsetReading = "extremes"
+    quadratic_stiffness: Literal["kept", "dropped"] = "kept"
+    mass_law: MassLaw = "exponential"
+    functions: Literal["paper", "shorter"] = "paper"
+    friction_test: FrictionTest = "dry"
+    search: Search = "genetic"
+    generations: int = 500
+    seed: int = 0
+    alpha_box: tuple[float, float] = (0.0, 1e8)
+    beta_box: tuple[float, float] = (0.0, 1e8)
+
+    def __post_init__(self) -> None:
+        if not 0 < self.A < float("inf"):
+            raise ParameterError(f"preset A is {self.A:g}", mend="give a positive number")
+        if not 1 <= self.n <= 10:
+            raise ParameterError(f"preset n is {self.n:g}", mend="give a number from 1 to 10")
+        if self.gamma is not None and not 0 <= self.gamma < float("inf"):
+            raise ParameterError(f"preset gamma is {self.gamma:g}", mend="give a number that is not negative")
+        for name, (low, high) in (("alpha", self.alpha_box), ("beta", self.beta_box)):
+            if not 0 <= low < high < float("inf"):
+                raise ParameterError(f"the box of {name} runs from {low:g} to {high:g}", mend="give 0 <= LOW < HIGH")
+        for name, allowed in (
+            ("mass_law", MassLaw),
+            ("friction_test", FrictionTest),
+            ("search", Search),
+            ("force_amplitude", AmplitudeReading),
+            ("phase", PhaseReading),
+            ("offset", OffsetReading),
+        ):
+            if getattr(self, name) not in get_args(allowed):
+                raise UnknownNameError.of(name.replace("_", " "), getattr(self, name), get_args(allowed))
+        GeneticSettings(generations=self.generations)  # refuses a count that is too small
+
+    @property
+    def fixed(self) -> tuple[tuple[str, float], ...]:
+        """Presets other than the method's own, as parameters held [SI, for A = 1]."""
+        presets = (("n", self.n if self.n != 2.0 else None), ("gamma", self.gamma))
+        return tuple((name, value) for name, value in presets if value is not None)
+
+    @property
+    def bounds(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """The boxes as the method takes them, for A = 1."""
+        a, b = self.A, self.A ** (self.n - 1)
+        return (a * self.alpha_box[0], a * self.alpha_box[1]), (b * self.beta_box[0], b * self.beta_box[1])
+
+    def scaled(self, name: str, value: float) -> float:
+        """Return a parameter identified with A = 1 as it reads with the preset A."""
+        powers = {"alpha": -1.0, "beta": 1 - self.n, "gamma": 1 - self.n}
+        return value * self.A ** powers.get(name, 0.0)
+
+    def method(self, search: Search | None = None, seed: int | None = None) -> Paper:
+        """Return the identification of single runs."""
+        genetic = GeneticSettings(generations=self.generations, seed=self.seed if seed is None else seed)
+        return Paper(
+            self.force_amplitude, self.phase, self.offset, self.quadratic_stiffness, search or self.search, genetic,
+            self.bounds,
+        )  # fmt: skip
+
+    def assumptions(self, train: Sequence[Run]) -> PaperAssumptions:
+        """Return the parameters that are held in every identification of these runs."""
+        return PaperAssumptions.of(train, self.gas).preset(self.fixed)
+
+    def recipe(self, train: Sequence[Run]) -> Recipe:
+        """Make the recipe: every sine run by the paper's method, then its functions over the conditions.
+
+        Raises
+        ------
+        IdentificationError
+            E_PAPER_TESTS if the runs do not determine every function of the paper.
+        ParameterError
+            If the motion leaves no gas volume.
+        """
+        if self.functions == "paper":
+            require_paper_functions(train)
+        assumptions = self.assumptions(train)
+        return Recipe(
+            name=self.name,
+            basis=assumptions.basis(self.method()),
+            make=partial(fit_paper_functions, mass_law=self.mass_law),
+            way="paper, literal",
+            title="Method of Qian et al. 2024",
+            source="Qian et al. 2024",
+            limits="sines only; the parameter functions need the frequency and amplitude of a sine",
+            pure=True,
+            notes=(*assumptions.notes, *outside_paper_range(train)),
+        )
+
+    def beside_others(self) -> PaperOptions:
+        """Return the method with the optimum that its genetic search approaches, and shorter functions if need be."""
+        return replace(self, search="optimum", functions="shorter")
+
+    @classmethod
+    def compared(cls) -> Sequence[Recipe]:
+        """Bouc–Wen by the genetic searches, with parameter functions as of other models."""
+        return [replace(modified("bouc-wen", method), on_request=True) for method in ("paper", "direct-genetic")]

@@ -1,0 +1,372 @@
+"""What claims read off runs and results, on made ones whose numbers were put in."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mrdamper.data import Condition, Run
+from mrdamper.motion import measured_motion, sine, triangle
+from mrdamper.paper import claims, claims_on_fits, claims_on_tests
+from mrdamper.paper import results as found_module
+from mrdamper.paper.claims import judge_all
+from mrdamper.paper.claims_on_tests import friction_along, lost_length
+from mrdamper.paper.recipes import ALI, CONSISTENT, DIRECT, LITERAL
+from mrdamper.paper.results import Ended, function_of
+from mrdamper.paper.verdicts import Measured
+
+
+def study_of(contenders=(), **more):
+    made = SimpleNamespace(rig=None, seed_verdicts={}, **more)
+    made.contender = lambda title: dict(contenders).get(title)
+    return made
+
+
+def loop(current=1.0, frequency=1.0, amplitude=0.02, peak=500.0, energy=10.0):
+    return SimpleNamespace(
+        condition=Condition(current, frequency, amplitude), peak_force=peak, dissipated_energy=energy
+    )
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_friction_is_half_the_force_between_the_strokes_where_both_were_measured(sign):
+    motion = triangle(Condition(0.0, 0.01, 0.02), 1.25, 4000)
+    x = sign * motion.displacement
+    size = 50 + 1000 * x  # [N]
+    force = size * np.sign(sign * motion.velocity) + 3e3 * x + 1e6 * x**2 + 120.0
+    found, friction = friction_along(Run("slow", motion.time, x, force, 0.0))
+    assert found.size == 80
+    assert (found[0], found[-1]) == pytest.approx(
+        (-0.018, 0.018), abs=8e-4
+    )  # less a twentieth a side, and what fills no bin
+    assert np.all(np.diff(found) > 0)
+    assert friction == pytest.approx(50 + 1000 * found, abs=0.5)
+
+
+def test_friction_is_compared_where_both_strokes_were():
+    x = np.concatenate([np.linspace(0, -0.02, 500), np.linspace(-0.02, 0.02, 2000), np.linspace(0.02, -0.01, 1500)])
+    force = 60 * np.sign(np.gradient(x)) + 2e3 * x
+    found, friction = friction_along(Run("slow", np.arange(x.size) / 100, x, force, 0.0))  # type: ignore[arg-type]
+    assert (found[0], found[-1]) == pytest.approx((-0.01 + 0.0015, 0.02 - 0.0015), abs=8e-4)
+    assert friction == pytest.approx(60, abs=0.5)
+    found, _ = friction_along(Run("slow", np.arange(x.size) / 100, -x, -force, 0.0))  # type: ignore[arg-type]
+    assert (found[0], found[-1]) == pytest.approx((-0.02 + 0.0015, 0.01 - 0.0015), abs=8e-4)
+
+
+def test_mid_stroke_is_a_third_of_the_stroke_either_side():
+    A, L = 0.03, 0.02
+    motion = sine(Condition(1.0, 1.0, A), 4, 8000)
+    path, x = motion.path, motion.displacement
+    size = np.minimum(path.distance / L, 1) * (1 + np.abs(x) / A)
+    run = Run("one", motion.time, x + 0.05, 400 * path.direction * size, 1.0, window=(1.0, float(motion.time[-1])))
+    # Of a sine the phases within 0.3 X are even: the middle one lies at sin(asin(0.3)/2).
+    full = 0.9 * (1 + np.sin(np.arcsin(0.3) / 2))
+    ways = np.linspace(0, L, 4001)
+    expected = ways[np.flatnonzero(ways / L * (1 + (A - ways) / A) >= full)[0]]
+    assert lost_length(run, 0.0) == pytest.approx(expected, rel=3e-3)
+
+
+def reversals(lengths, damping=800.0, full=400.0, offset=90.0):
+    """A sine whose force is back over a length [m] after every reversal, a length a stroke."""
+    motion = sine(Condition(1.0, 1.0, 0.03), 4, 4000)
+    path = motion.path
+    length = np.array([lengths[k % len(lengths)] for k in path.stroke])
+    force = full * path.direction * np.minimum(path.distance / length, 1) + damping * motion.velocity + offset
+    return Run("one", motion.time, motion.displacement + 0.004, force, 1.0, window=(1.0, float(motion.time[-1])))
+
+
+def test_the_lost_length_ends_where_nine_tenths_of_the_force_beyond_the_viscous_one_are_back():
+    assert lost_length(reversals([0.005]), 800.0) == pytest.approx(0.9 * 0.005, rel=0.01)
+    assert lost_length(reversals([0.010], full=100.0), 800.0) == pytest.approx(0.9 * 0.010, rel=0.01)
+    # One stroke in six is slow to recover: the median does not care.
+    assert lost_length(reversals([0.005] * 5 + [0.02]), 800.0) == pytest.approx(0.9 * 0.005, rel=0.02)
+    # Strokes 3, 4 and 5 lie whole in the window; the ones cut off at its ends do not count.
+    some = replace(reversals([0.02, 0.02, 0.02, 0.003, 0.005, 0.008, 0.02, 0.02, 0.02]), window=(1.0, 3.0))
+    assert lost_length(some, 800.0) == pytest.approx(0.9 * 0.005, rel=0.05)
+    # Without the viscous force taken out, the force at mid-stroke counts for more.
+    assert lost_length(reversals([0.005]), 0.0) > 0.0055
+    assert measured_motion(reversals([0.005])).path.stroke[-1] >= 7
+
+
+def test_a_bulge_on_one_stroke_alone_is_seen_there():
+    motion = sine(Condition(1.0, 1.0, 0.02), 4, 2000)
+    run = Run("one", motion.time, motion.displacement, 300 * np.maximum(motion.velocity, 0) + 7.0, 1.0)
+    assert claims_on_tests.bulge(run) == pytest.approx(1 / 0.6, rel=0.01)
+
+
+def test_the_width_is_taken_at_one_place_of_both_strokes():
+    motion = sine(Condition(1.0, 1.0, 0.02), 4, 2000)
+    run = Run("one", motion.time, motion.displacement, (1 + motion.displacement / 0.02) * np.sign(motion.velocity), 1.0)
+    assert claims_on_tests.bulge(run) == pytest.approx(2.0 / 3.6, rel=0.01)
+
+
+def test_the_largest_spread_over_amplitudes_counts_and_three_motions_are_enough():
+    conditions = [Condition(1.0, f, A) for f in (1.0, 2.0) for A in (0.01, 0.02)] + [Condition(0.5, 1.0, 0.03)]
+    assert claims_on_fits.amplitude_spread(conditions, np.array([10.0, 12.0, 10.0, 17.0, 11.0])) == pytest.approx(
+        7 / 12
+    )
+    assert np.isnan(claims_on_fits.amplitude_spread(conditions[-1:], np.array([10.0])))
+    three = [Condition(I, f, 0.01) for I in (0.0, 1.0, 2.0) for f in (1.0, 2.0, 3.0)]
+    first, last = claims_on_fits.scatter_over_motions(three, np.array([1.0, 2.0, 3.0, 0.0, 9.0, 0.0, 2.0, 4.0, 6.0]))
+    assert last / first == pytest.approx(2.0)
+    assert np.isnan(claims_on_fits.scatter_over_motions(three[:5], np.arange(5.0))[0])
+    # A level with two motions does not count; two levels with three do.
+    found = claims_on_fits.scatter_over_motions(three[1:], np.array([9.0, 0.0, 0.0, 9.0, 0.0, 2.0, 4.0, 6.0]))
+    assert found == pytest.approx((np.std([0.0, 9.0, 0.0]), np.std([2.0, 4.0, 6.0])))
+    negative = claims_on_fits.amplitude_spread(conditions, np.array([-10.0, -12.0, 10.0, 17.0, 11.0]))
+    assert negative == pytest.approx(7 / 12)
+
+
+def test_gas_and_friction_are_measured_where_they_were_tested():
+    asked = []
+    gas = SimpleNamespace(taylor_error=lambda X: asked.append(X) or 0.013)
+    found = claims_on_tests.gas_series(study_of(gas=gas, loops=[loop(amplitude=A) for A in (0.02, 0.08, 0.05)]))
+    assert (asked, found.numbers) == ([0.08], {"error of the series over the gas force": 0.013})
+    assert "±80 mm" in found.evidence
+    assert "not known" in claims_on_tests.gas_series(study_of(gas=None)).evidence
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(claims_on_tests, "friction_along", lambda run: (None, np.array([30.0, 45.0, 90.0])))
+        options = SimpleNamespace(friction_test="filled")
+        found = claims_on_tests.friction(
+            study_of(friction=1, loops=[loop(peak=P) for P in (900.0, 550.0)], options=options)
+        )
+    assert list(found.numbers.values()) == pytest.approx([30.0, 90.0, 55.0 / 550.0])
+    assert found.evidence == "test with fluid"
+    assert claims_on_tests.friction(study_of(friction=None)).numbers == {}
+
+
+def test_shares_of_loops_and_of_steps_are_counted():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(claims_on_tests, "bulge", lambda run: run)
+        found = claims_on_tests.bulges(study_of(train=[0.9, 1.1, 1.2, 1.3]))
+    assert found.numbers == {"share of loops wider at x = 0 than at 0.8 X": 0.75}
+    assert found.evidence == "ratio of widths 0.90–1.30"
+    energies = {(0.0, 1.0): 5.0, (1.0, 1.0): 9.0, (0.0, 2.0): 7.0, (1.0, 2.0): 9.5}
+    loops = [loop(I, f, energy=E) for (I, f), E in energies.items()]
+    found = claims_on_tests.energy(study_of(loops=loops))
+    assert list(found.numbers.values()) == [1.0, 1.0]
+    assert found.evidence == "5–9.5 J a cycle"
+    falling = claims_on_tests.energy(study_of(loops=[*loops, loop(2.0, 1.0, energy=1.0)][::-1]))
+    assert list(falling.numbers.values()) == pytest.approx([2 / 3, 1.0])
+
+
+def test_the_phase_counts_runs_in_the_band_and_the_motion_that_changes_most():
+    conditions = [Condition(I, f, 0.02) for f in (1.0, 2.0) for I in (0.0, 1.0)] + [Condition(0.0, 0.5, 0.05)]
+    readings = [SimpleNamespace(phase=p) for p in (1.41, 1.45, 1.45, 1.30, 1.2)]
+    above = claims_on_tests.phase(
+        study_of(conditions=conditions, readings=[*readings[:4], SimpleNamespace(phase=1.55)])
+    )
+    assert above.numbers["share of runs within 1.4–1.5 rad"] == 3 / 5
+    found = claims_on_tests.phase(study_of(conditions=conditions, readings=readings))
+    assert list(found.numbers.values()) == pytest.approx([3 / 5, 0.15])
+    assert found.evidence == f"1.200–1.450 rad; smallest sine {np.sin(1.2):.3f}"
+
+
+def test_the_stroke_end_compares_the_fastest_with_the_slowest_motion_at_the_highest_current():
+    speeds = {"slow": 0.5, "fast": 2.0, "middle": 1.0, "other": 9.0}
+    conditions = [Condition(2.0 if name != "other" else 1.95, f, 0.02) for name, f in speeds.items()]
+    models = [SimpleNamespace(c=100.0 + n) for n in range(4)]
+    consistent = SimpleNamespace(identifications=[SimpleNamespace(model=m) for m in models])
+    lengths = {("slow", 100.0): 0.002, ("fast", 101.0): 0.005}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(claims_on_tests, "lost_length", lambda run, c: lengths[run, c])
+        study = study_of({CONSISTENT: consistent}, conditions=conditions, train=list(speeds))
+        found = claims_on_tests.stroke_end(study)
+    assert list(found.numbers.values()) == pytest.approx([2.5])
+    assert found.evidence.startswith(
+        "at 2 A 90 % of the force beyond the viscous one is back after 2.00 mm at 0.06 m/s"
+    )
+    assert found.evidence.endswith("after 5.00 mm at 0.25 m/s")
+    alike = study_of({CONSISTENT: consistent}, conditions=[Condition(2.0, 1 + 0.05 * n, 0.02) for n in range(4)],
+                     train=list(speeds))  # fmt: skip
+    assert claims_on_tests.stroke_end(alike).evidence == "one speed at the highest current"
+
+
+def test_a_claim_is_said_with_its_numbers_and_what_was_built_in_is_recovered():
+    asked = []
+
+    def measure(study):
+        asked.append(study)
+        return Measured({"least R² of a motion": 0.995}, "more")
+
+    entry = ("quadratic", "the text", "Eq. 23", "fig11", True, measure)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(claims, "_CLAIMS", (entry, (*entry[:4], False, measure)))
+        virtual = study_of()
+        virtual.rig, virtual.seed_verdicts = "rig", {"quadratic": ("holds", "does not hold")}
+        built_in, open_ = judge_all(virtual)
+        real, _ = judge_all(study_of())
+    assert (built_in.verdict, built_in.said, open_.said, real.said) == ("holds", "recovered", "holds", "holds")
+    assert (built_in.key, built_in.text, built_in.source, built_in.figure) == (
+        "quadratic",
+        "the text",
+        "Eq. 23",
+        "fig11",
+    )
+    assert built_in.evidence == "least R² of a motion 0.995; more"
+    assert built_in.threshold == "least R² of a motion ≥ 0.98 (in part: ≥ 0.9)"
+    assert (built_in.seeds, real.seeds) == ("1 of 2; 1 does not hold", "")
+
+
+def test_every_claim_points_to_a_figure_that_is_drawn_and_stands_once():
+    from mrdamper.paper.figures import FIGURES
+
+    keys = [key for key, *_ in claims._CLAIMS]
+    assert len(set(keys)) == len(keys) == 19
+    drawn = {*FIGURES, ""}
+    assert {figure for _, _, _, figure, *_ in claims._CLAIMS} <= drawn
+    assert {key for key, _, _, _, built_in, _ in claims._CLAIMS if built_in} == {
+        "gas series", "friction", "stroke end", "saturation",
+    }  # fmt: skip
+
+
+def test_searches_are_judged_parameter_by_parameter_with_the_worst_beside():
+    ends = ((2.0, 0.1, 1.0), (0.5, 8.0, 1.2), (3.0, 5.0, 1.1))
+    ended = [Ended(str(i), i, *end, 9, 5, 1.0) for i, end in enumerate(ends)]
+    found = claims_on_fits.search(study_of(ended=ended))
+    assert found.numbers == pytest.approx(
+        {"median factor by which α misses the optimum": 2.0, "median factor by which β misses the optimum": 8.0}
+    )
+    assert found.evidence == "3 runs, a seed each; worst factors 3 and 10; largest error over the least 1.2"
+
+
+def test_what_cannot_be_measured_says_why():
+    one = SimpleNamespace(identifications=(), validation=SimpleNamespace(runs=()))
+    for contenders in ({}, {LITERAL: one}, {ALI: one}, {LITERAL: one, ALI: one}):
+        assert "could not be followed" in claims_on_fits.few_parameters(study_of(contenders)).evidence
+    for contenders in ({}, {LITERAL: one}, {DIRECT: one}, {LITERAL: one, DIRECT: one}):
+        assert "no traditional" in claims_on_fits.accuracy(study_of(contenders)).evidence
+        assert "no genetic searches" in claims_on_fits.fast(study_of(contenders, ended=(), direct=(7,))).evidence
+    assert "could not be followed" in claims_on_fits.generalisation(study_of({LITERAL: one})).evidence
+
+
+@pytest.mark.parametrize("form", [None, "plane", "mass-power"])
+def test_a_mass_that_was_held_or_has_another_function_is_not_judged(form):
+    fit = form and SimpleNamespace(r2=0.95, function=SimpleNamespace(form=form))
+    held = SimpleNamespace(identifications=[SimpleNamespace(model=SimpleNamespace(m=4.0))] * 2)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(claims_on_fits, "function_of", lambda study, name: fit)
+        found = claims_on_fits.mass(study_of({LITERAL: held}, conditions=[Condition(0, 1, 1), Condition(0, 2, 1)]))
+    assert found.numbers == {}
+    assert "m is held" in found.evidence
+
+
+def test_time_and_accuracy_are_ratios_of_ours_to_theirs():
+    ended = [Ended(name, 0, 1, 1, 1, 99, forces, 1.0) for name, forces in (("a", 10), ("b", 30), ("c", 90))]
+    found = claims_on_fits.fast(study_of(ended=ended, direct=(10, 15, 90)))
+    assert list(found.numbers.values()) == [2.0]
+    assert found.evidence.startswith("median 30 forces computed against 15")
+    worst = {"scores": SimpleNamespace(nrmse_pp=0.174), "condition": Condition(2.0, 1.0, 0.08)}
+    literal = SimpleNamespace(
+        validation=SimpleNamespace(runs=(1,), median=lambda: 0.156, worst=lambda: SimpleNamespace(**worst)), per_run=0.1
+    )
+    ali = SimpleNamespace(
+        validation=SimpleNamespace(
+            runs=(1,),
+            median=lambda: 0.04,
+            worst=lambda: SimpleNamespace(**{**worst, "scores": SimpleNamespace(nrmse_pp=0.099)}),
+        ),
+        parameters_per_run=8,
+    )
+    found = claims_on_fits.few_parameters(study_of({LITERAL: literal, ALI: ali}))
+    assert list(found.numbers.values()) == pytest.approx([3.9, 0.25])
+    assert found.evidence.startswith("held out 15.6 % against 4.0 %; worst 17.4 % and 9.9 %; 2 searched against 8")
+    ali.parameters_per_run = 1
+    assert claims_on_fits.few_parameters(study_of({LITERAL: literal, ALI: ali})).numbers == pytest.approx(
+        {"median held-out error over the Ali-type's": 3.9, "searched parameters a run over the Ali-type's": 2.0}
+    )
+    empty = SimpleNamespace(validation=SimpleNamespace(runs=()))
+    for pair in ({LITERAL: empty, ALI: ali}, {LITERAL: literal, ALI: empty}, {LITERAL: literal}, {ALI: ali}):
+        assert "no run is held out" in claims_on_fits.few_parameters(study_of(pair)).evidence
+    found = claims_on_fits.generalisation(study_of({LITERAL: literal}))
+    assert list(found.numbers.values()) == pytest.approx([1.56, 0.174])
+    assert found.evidence == "median 15.6 %, worst 17.4 % at 2 A, 1 Hz, 80 mm"
+
+
+def test_slopes_of_the_saturation_are_in_newtons_an_ampere_and_motions_are_averaged():
+    conditions = [Condition(I, f, 0.02) for f in (1.0, 2.0) for I in (0.0, 0.5, 1.0, 1.5, 2.0)]
+    readings = [
+        SimpleNamespace(amplitude=100 * c.frequency_Hz + 800 * min(c.current_A, 1.5) + 80 * max(c.current_A - 1.5, 0))
+        for c in conditions
+    ]
+    found = claims_on_tests.saturation(study_of(conditions=conditions, readings=readings))
+    assert list(found.numbers.values()) == pytest.approx([0.1])
+    assert found.evidence == "F0 rises by 800 N/A up to 1 A and by 80 N/A above 1.5 A"
+    some = [c for c in conditions if c.current_A <= 1.0]
+    assert "tested up to 1 A" in claims_on_tests.saturation(study_of(conditions=some, readings=readings[:6])).evidence
+
+
+def test_two_currents_on_either_side_are_enough_for_the_saturation():
+    conditions = [Condition(I, 1.0, 0.02) for I in (0.5, 1.0, 1.5, 2.0)]
+    readings = [SimpleNamespace(amplitude=F) for F in (300.0, 700.0, 900.0, 980.0)]
+    found = claims_on_tests.saturation(study_of(conditions=conditions, readings=readings))
+    assert list(found.numbers.values()) == pytest.approx([0.2])
+
+
+def made_of(**values):
+    numbers = [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
+    return SimpleNamespace(identifications=[SimpleNamespace(model=SimpleNamespace(**n), at_bounds=()) for n in numbers])
+
+
+def test_the_closed_form_is_compared_where_both_balances_were_followed():
+    both = {LITERAL: made_of(c=[200.0, 300.0, 900.0]), CONSISTENT: made_of(c=[100.0] * 3)}
+    assert list(claims_on_fits.viscosity(study_of(both)).numbers.values()) == [3.0]
+    for pair in ({LITERAL: both[LITERAL], CONSISTENT: made_of(c=[100.0])}, {CONSISTENT: both[CONSISTENT]}, {}):
+        assert "could not be followed" in claims_on_fits.viscosity(study_of(pair)).evidence
+
+
+def test_accuracy_is_compared_by_medians_of_the_runs_both_were_made_of():
+    def errors(**by_run):
+        return SimpleNamespace(
+            identifications=[
+                SimpleNamespace(run_id=name, scores=SimpleNamespace(nrmse_pp=e)) for name, e in by_run.items()
+            ]
+        )
+
+    pair = {LITERAL: errors(a=0.02, b=0.03, c=0.4, d=9.0), DIRECT: errors(c=0.3, b=0.01, a=0.02)}
+    found = claims_on_fits.accuracy(study_of(pair))
+    assert list(found.numbers.values()) == pytest.approx([1.5])
+    assert found.evidence.startswith("nrmse_pp 3.00 % against 2.00 %")
+    apart = {LITERAL: errors(d=1.0), DIRECT: errors(a=1.0)}
+    assert claims_on_fits.accuracy(study_of(apart)).numbers == {}
+
+
+def test_functions_are_those_of_the_literal_recipe(monkeypatch):
+    fit = SimpleNamespace(functions={"alpha": "its function"})
+    monkeypatch.setattr(found_module, "ModifiedFit", SimpleNamespace)
+    assert function_of(study_of({LITERAL: SimpleNamespace(fit=fit)}), "alpha") == "its function"
+    assert function_of(study_of({LITERAL: SimpleNamespace(fit=fit)}), "beta") is None
+    assert function_of(study_of({CONSISTENT: SimpleNamespace(fit=fit)}), "alpha") is None
+    assert function_of(study_of({LITERAL: SimpleNamespace(fit=None)}), "alpha") is None
+    assert "too few motions" in claims_on_fits.alpha(study_of()).evidence
+    assert "could not be followed" in claims_on_fits.beta(study_of()).evidence
+    monkeypatch.setattr(claims_on_fits, "function_of", lambda study, name: SimpleNamespace(r2=0.9, function="any"))
+    assert "could not be followed" in claims_on_fits.beta(study_of()).evidence
+    monkeypatch.setattr(
+        claims_on_fits, "function_of", lambda study, name: SimpleNamespace(function=SimpleNamespace(form="tilt"))
+    )
+    assert "too few motions" in claims_on_fits.alpha(study_of()).evidence
+
+
+def test_the_scatter_of_beta_is_that_of_its_logarithm(monkeypatch):
+    monkeypatch.setattr(claims_on_fits, "function_of", lambda study, name: SimpleNamespace(r2=0.9))
+    conditions = [Condition(I, f, 0.01) for I in (0.0, 1.0) for f in (1.0, 2.0, 3.0)]
+    # Betas about one: the logarithm of one more would be another.
+    study = study_of({LITERAL: made_of(beta=[0.1, 1.0, 10.0, 1.0, 2.0, 4.0])}, conditions=conditions)
+    found = claims_on_fits.beta(study)
+    ratio = np.std(np.log([1.0, 2.0, 4.0])) / np.std(np.log([0.1, 1.0, 10.0]))
+    assert list(found.numbers.values()) == pytest.approx([ratio, 0.9, 0.0])
+
+
+def test_a_quadratic_needs_four_currents_at_a_motion():
+    conditions = [Condition(I, 1.0, 0.02) for I in (0.0, 0.5, 1.0)] + [Condition(I, 3.0, 0.02) for I in (0.0, 1.0)]
+    assert (
+        claims_on_tests._tested_at(SimpleNamespace(conditions=conditions), 3)
+        == "1 of 2 motions were tested at 3 currents or more"
+    )
+    assert claims_on_tests._tested_at(SimpleNamespace(conditions=conditions), 4).startswith("0 of 2")
+    readings = [SimpleNamespace(amplitude=100.0 + 50 * n) for n in range(5)]
+    three = claims_on_tests.quadratic(study_of(conditions=conditions, readings=readings))
+    assert three.numbers == {}
+    assert "prove nothing" in three.evidence

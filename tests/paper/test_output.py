@@ -1,0 +1,242 @@
+"""Tables of the reproduction by made results whose numbers are all different: each in its own column and row."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mrdamper.data import Condition
+from mrdamper.errors import ExcitationError
+from mrdamper.functions.fitting import FunctionFit
+from mrdamper.functions.forms import ParameterFunction
+from mrdamper.metrics import Scores
+from mrdamper.models.bingham import Bingham
+from mrdamper.models.bouc_wen import BoucWen
+from mrdamper.paper import output
+from mrdamper.paper.claims import Claim
+from mrdamper.paper.figures import TIMES
+from mrdamper.paper.options import PaperOptions
+from mrdamper.paper.output import verdicts
+from mrdamper.paper.recipes import CONSISTENT, LITERAL
+from mrdamper.paper.results import Ended, GeneticCheck
+from mrdamper.paper.sensitivity import OneAtATime, Sobol
+from mrdamper.paper.virtual_rig import VirtualRig
+from mrdamper.report.plots.style import Picture
+from mrdamper.validation import RunScore, Validation
+
+
+def scored(name, current, start):
+    scores = Scores(*(start + k / 100 for k in range(6)))
+    return RunScore(name, "rig", Condition(current, 1.0, 0.08), scores, None, ())
+
+
+def contender(title, way, start, seconds):
+    runs = (scored("h0", 0.0, start), scored("h1", 1.0, start + 0.2), scored("h2", 2.0, start + 0.5))
+    return SimpleNamespace(
+        recipe=SimpleNamespace(title=title, way=way, basis=None),
+        damper=SimpleNamespace(parameter_count=round(100 * start)),
+        validation=Validation(title, runs), train=Validation(title, ()), cross_validated=Validation(title, ()),
+        per_run=start / 7, seconds=seconds, identifications=(), fit=None,
+    )  # fmt: skip
+
+
+def study(**more):
+    given = dict(
+        contenders=(contender("one", "paper", 0.1, 3.0), contender("two", "joint", 0.3, 5.0)),
+        seed_errors={"two": np.array([0.31, 0.33, 0.38])}, seed_verdicts={}, loops=(), held_out=(), genetic=(),
+        ended=(), there={}, train=(), seconds=12.0,
+        sensitivity=(), sobol=None, rig=None, options=PaperOptions(), conditions=(),
+    )  # fmt: skip
+    made = SimpleNamespace(**(given | more))
+    made.contender = lambda title: next((c for c in made.contenders if c.recipe.title == title), None)
+    return made
+
+
+def test_table_5_holds_the_median_and_the_worst_of_the_held_out_runs():
+    first, second = verdicts(study())
+    assert first == {
+        "verdict": "paper (literal)", "method": "one", "parameters": 10, "nrmse_pp": pytest.approx(0.3),
+        "worst_nrmse_pp": pytest.approx(0.6), "nrmse_std": pytest.approx(0.31), "wape": pytest.approx(0.32),
+        "mean_relative_error": pytest.approx(0.35), "per_run_nrmse_pp": pytest.approx(0.1 / 7), "forces_a_run": None,
+        "seeds": None, "seed_median_nrmse_pp": None, "seed_lowest_nrmse_pp": None, "seed_highest_nrmse_pp": None,
+    }  # fmt: skip
+    spread = [second[f"seed_{name}_nrmse_pp"] for name in ("lowest", "median", "highest")]
+    assert (second["verdict"], second["seeds"], spread) == ("joint", 3, [0.31, 0.33, 0.38])
+
+
+def tables(**more):
+    claim = Claim("phase", "text", "Eq. 1", "holds", "recovered", "1 rad", "limit", "fig12", "20 of 20")
+    return output._tables(study(**more), (claim,))
+
+
+def test_table_4_holds_every_run_of_every_method_under_its_own_name():
+    made, absent = tables()
+    rows = made["table4_errors"]
+    assert [(r["method"], r["run_id"], r["current_A"]) for r in rows] == [
+        (title, f"h{n}", float(n)) for title in ("one", "two") for n in range(3)
+    ]
+    assert rows[4] == {
+        "method": "two", "run_id": "h1", "current_A": 1.0, "frequency_Hz": 1.0, "amplitude_m": 0.08,
+        "mean_relative_error": pytest.approx(0.55), "wape": pytest.approx(0.52), "nrmse_pp": pytest.approx(0.5),
+        "nrmse_std": pytest.approx(0.51),
+    }  # fmt: skip
+    assert made["seeds"] == [{"method": "two", "seed": n, "nrmse_pp": v} for n, v in ((1, 0.31), (2, 0.33), (3, 0.38))]
+    assert made["claims"][0] == {
+        "key": "phase", "text": "text", "source": "Eq. 1", "verdict": "holds", "said": "recovered", "evidence": "1 rad",
+        "threshold": "limit", "figure": "fig12", "seeds": "20 of 20",
+    }  # fmt: skip
+    assert absent["genetic"] == "no genetic search was made"
+    assert absent["virtual_rig"] == "the data are not of the virtual rig"
+    assert absent["table1_tests"] == "the data allow no row of it"
+    assert absent["table3_parameters"] == "no run is held out"
+    assert not set(absent) & set(made)
+    assert made["table5_methods"] == verdicts(study())
+
+
+def test_everything_is_written_and_shown_in_its_place(monkeypatch, tmp_path):
+    claim = Claim("phase", "text", "Eq. 1", "holds", "recovered", "1 rad", "limit", "fig12", "20 of 20")
+    page, asked = {}, []
+
+    def drawn(study, also, names, progress):
+        asked.append((also, names))
+        return {name: "one motion" if name == "fig09" else Picture({"svg": name.encode()}) for name in names}
+
+    def render(template, title, about, **given):
+        page.update(given, template=template, about=about)
+        return "<p>page</p>"
+
+    monkeypatch.setattr(output, "judge_all", lambda study: (claim,))
+    figures = {"fig09": ("a loop", None), "fig12": ("the phase", None), TIMES: ("times", None)}
+    monkeypatch.setattr(output, "FIGURES", figures)
+    monkeypatch.setattr(output, "pictures", drawn)
+    monkeypatch.setattr(output, "render_page", render)
+    monkeypatch.setattr(output, "made_from", lambda dataset: f"from {dataset}")
+    made = study(notes=("first",), seconds=12.4, dataset="rig 1", best="one")
+    told = []
+    written = output.write_reproduction(made, tmp_path / "out", lambda what, share: told.append((what, share)))
+    assert written[0] == tmp_path / "out" / "reproduction.html"
+    assert written[0].read_text(encoding="utf-8") == "<p>page</p>"
+    assert (tmp_path / "out" / "figures" / "fig12.svg").is_file()
+    assert (tmp_path / "out" / "tables" / "claims.csv").read_text(encoding="utf-8").startswith("key,text,source")
+    assert (tmp_path / "out" / "figures" / f"{TIMES}.svg").is_file()
+    assert [also for also, _ in asked] == [(), ()]
+    assert sorted(name for _, names in asked for name in names) == sorted(figures)
+    assert page["pictures"] == {"fig12": ("the phase", b"fig12")}
+    tables, absent = output._tables(made, (claim,))
+    assert page["tables"] == tables
+    assert page["claims"] == (claim,)
+    missing = [f"{name} is not made: {why}" for name, why in absent.items()]
+    assert page["notes"] == ("first", "fig09 is not drawn: one motion", *missing)
+    assert (page["study"], page["best"], page["synthetic"]) == (made, "one", False)
+    assert page["about"].startswith("from rig 1. Reference")
+    times = (tmp_path / "out" / "tables" / "table5_times.csv").read_text(encoding="utf-8").splitlines()
+    assert times[1:] == ["one,0,3.0,3.0", "two,0,5.0,5.0", "in all,0,12.4,"]
+    facts = json.loads((tmp_path / "out" / "made.json").read_text(encoding="utf-8"))
+    assert facts["seconds"] == {"in all": 12.4, "one": 3.0, "two": 5.0}
+    assert told[-1] == ("written", 1.0)
+    made.rig = VirtualRig()
+    output.write_reproduction(made, tmp_path / "out", png=True)
+    assert page["synthetic"]
+    assert asked[-1][0] == ("png",)
+
+
+def test_tests_and_searches_stand_in_their_columns():
+    loop = SimpleNamespace(run_id="a", split="train", condition=Condition(0.5, 2.0, 0.03), peak_force=900.0,
+                           dissipated_energy=33.0)  # fmt: skip
+    minimum = SimpleNamespace(evaluations=123, point=np.array([4e5, 7e6]))
+    check = GeneticCheck(Condition(1.0, 1.5, 0.05), minimum, 21.0, 20.0, 8.0)
+    made, _ = tables(loops=(loop,), genetic=(check,), ended=(Ended("a", 3, 1.5, 0.2, 1.01, 420, 90, 0.7),))
+    assert made["table1_tests"] == [
+        {"run_id": "a", "split": "train", "current_A": 0.5, "frequency_Hz": 2.0, "amplitude_m": 0.03,
+         "peak_force_N": 900.0, "dissipated_energy_J": 33.0}
+    ]  # fmt: skip
+    assert made["genetic"] == [
+        {"current_A": 1.0, "frequency_Hz": 1.5, "amplitude_m": 0.05, "reached_rmse_N": 21.0, "least_rmse_N": 20.0,
+         "evaluations": 123, "alpha": 4e5, "beta": 7e6}
+    ]  # fmt: skip
+    assert made["genetic_runs"] == [
+        {"run_id": "a", "seed": 3, "alpha_over_optimum": 1.5, "beta_over_optimum": 0.2, "error_over_least": 1.01,
+         "forces": 420, "forces_to_settle": 90}
+    ]  # fmt: skip
+
+
+def test_sensitivities_and_functions_stand_in_their_columns():
+    numbers = [np.array([k + 0.1, k + 0.2]) for k in (1, 2, 3, 4)]
+    indices = Sobol(("c", "n"), *numbers, 0.2)
+    single = (OneAtATime("n", 0.1, 0.7, 0.02), OneAtATime("A", 0.1, 0.5, float("nan")))
+    made, _ = tables(sensitivity=single, sobol=indices)
+    assert made["sensitivity"] == [
+        {"parameter": "n", "change": 0.1, "effect": 0.7, "left_after_identifying_anew": 0.02, "sobol_first": 1.2,
+         "sobol_first_half_width": 3.2, "sobol_total": 2.2, "sobol_total_half_width": 4.2},
+        {"parameter": "A", "change": 0.1, "effect": 0.5, "left_after_identifying_anew": None},
+    ]  # fmt: skip
+
+
+def test_a_parameter_that_was_held_has_no_r2(monkeypatch):
+    def function(value, r2):
+        return FunctionFit(ParameterFunction("linear-current", (value, 1.0)), r2, 0.5)
+
+    fit = SimpleNamespace(
+        functions={"c": function(2.0, 0.9), "k1": function(3.0, 1.0), "k2": function(4.0, 0.8)},
+        values={"c": np.array([1.0, 2.0]), "k1": np.array([5.0, 5.0]), "k2": np.array([-5.0, -5.0 + 1e-9])},
+    )
+    monkeypatch.setattr(output, "ModifiedFit", SimpleNamespace)
+    one = contender("one", "paper", 0.1, 3.0)
+    one.fit = fit
+    rows = output._function_rows(study(contenders=(one,)))
+    assert [(r["method"], r["parameter"], r["form"], r["function"], r["r2"], r["coefficients"]) for r in rows] == [
+        ("one", "c", "linear-current", "2 I +1", 0.9, "2.0 1.0"),
+        ("one", "k1", "linear-current", "3 I +1", None, "3.0 1.0"),
+        ("one", "k2", "linear-current", "4 I +1", None, "4.0 1.0"),
+    ]
+
+
+def test_parameters_at_the_held_out_condition_are_listed_way_by_way(monkeypatch):
+    predicted, identified = (BoucWen(c=c, alpha=a, beta=b, gamma=b) for c, a, b in ((1e3, 4e5, 6e6), (900.0, 3e5, 5e6)))
+    condition = Condition(1.5, 1.0, 0.08)
+    monkeypatch.setattr(output, "SineRecord", SimpleNamespace(of=lambda run: SimpleNamespace(condition=condition)))
+
+    def refuses(_):
+        raise ExcitationError("no sine")
+
+    there = {(LITERAL, "h0"): SimpleNamespace(model=identified), (CONSISTENT, "h0"): "no sine"}
+    ways = [contender(LITERAL, "paper", 0.1, 1.0), contender("tanh", "literature", 0.2, 1.0)]
+    ways += [contender(CONSISTENT, "consistent", 0.1, 1.0), contender("broken", "joint", 0.1, 1.0)]
+    ways[0].damper.model_at, ways[1].damper.model_at = lambda at: predicted, lambda at: Bingham(fy=1.0, c=1.0, f0=0.0)
+    ways[2].damper.model_at, ways[3].damper.model_at = lambda at: predicted, refuses
+    held = (SimpleNamespace(id="h0"),)
+    rows = output.parameter_rows(study(contenders=ways, held_out=held, options=PaperOptions(A=2.0), there=there))
+    told = [(r["method"], r["values"], r["run_id"], r["current_A"], r["c [N s/m]"], r["alpha [N/m]"]) for r in rows]
+    assert told == [
+        (LITERAL, "by the functions", "h0", 1.5, 1000.0, 2e5),
+        (CONSISTENT, "by the functions", "h0", 1.5, 1000.0, 2e5),
+        (LITERAL, "identified there", "h0", 1.5, 900.0, 1.5e5),
+    ]
+    assert (rows[0]["beta [m^-n]"], rows[0]["A [-]"], rows[0]["amplitude_m"]) == (3e6, 2.0, 0.08)
+    there[CONSISTENT, "h0"] = SimpleNamespace(model=predicted)
+    rows = output.parameter_rows(study(contenders=ways, held_out=held, there=there))
+    shown = [(r["method"], r["c [N s/m]"]) for r in rows if r["values"] == "identified there"]
+    assert shown == [(LITERAL, 900.0), (CONSISTENT, 1000.0)]
+    rows = output.parameter_rows(study(contenders=ways[:2], held_out=held, there=there))
+    assert [r["method"] for r in rows] == [LITERAL, LITERAL]
+    _, absent = tables(contenders=ways[1:2], held_out=held)
+    assert absent["table3_parameters"] == "the data allow no row of it"
+
+
+def test_a_program_reads_verdicts_and_whether_the_data_are_synthetic(monkeypatch):
+    claim = Claim("phase", "text", "Eq. 1", "holds", "recovered", "1 rad", "limit", "fig12", "20 of 20")
+    monkeypatch.setattr(output, "judge_all", lambda study: (claim,))
+    made = study(notes=("one",), seconds=12.0)
+    found = output.summary(made)
+    assert found["claims"] == [
+        {"claim": "text", "verdict": "holds", "said": "recovered", "evidence": "1 rad", "threshold": "limit",
+         "seeds": "20 of 20"}
+    ]  # fmt: skip
+    assert (found["synthetic"], found["notes"], found["times"][-1]["seconds"]) == (False, ["one"], 12.0)
+    assert found["verdicts"] == verdicts(made)
+    made.rig = VirtualRig()
+    assert output.summary(made)["synthetic"]
+    rows = {r["parameter"]: r for r in output._tables(made, ())[0]["virtual_rig"]}
+    assert rows["mass"]["value"] == 4.0
+    assert (rows["mass"]["unit"], rows["mass"]["meaning"]) == ("kg", "moving mass beyond the load cell")
