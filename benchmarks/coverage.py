@@ -18,9 +18,9 @@ from scipy.signal import lfilter
 
 from mrdamper.dampers.bands import band
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.covariance import certain, session_of
+from mrdamper.dampers.covariance import certain
 from mrdamper.dampers.joint import JointDamper, JointFit, JointProblem
-from mrdamper.data import Condition, Floats, Run
+from mrdamper.data import Condition, Floats, Run, session_of
 from mrdamper.files.dataset import load_dataset
 from mrdamper.identification import identify
 from mrdamper.identification.intervals import interval_about

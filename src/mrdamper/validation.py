@@ -10,6 +10,7 @@ import numpy as np
 
 from mrdamper.dampers.bands import band
 from mrdamper.dampers.base import Damper, Prediction
+from mrdamper.dampers.calibration import PredictedRun
 from mrdamper.dampers.sessions import KNOWN, UNKNOWN, Expected, Reading, Sessions, When
 from mrdamper.data import Condition, Run, Shown, same_condition
 from mrdamper.errors import InputError, RunError, UnknownNameError, checked, require
@@ -40,6 +41,8 @@ class RunScore:
         "unknown": predicted as it is; "known": corrected by other runs of its session.
     reading : Reading or None
         Gain and offset that would have fitted the run best; no score is corrected by them.
+    predicted : PredictedRun or None
+        Samples of the uncorrected prediction beside the measured ones.
     """
 
     run_id: str
@@ -51,6 +54,7 @@ class RunScore:
     rest: float | None = None
     session: str = UNKNOWN
     reading: Reading | None = None
+    predicted: PredictedRun | None = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -177,6 +181,7 @@ def score_run(damper: Damper, run: Run, known: Sessions | None = None) -> RunSco
     prediction = damper.predict_run(run)
     inside = run.in_window
     reading = Reading.of(run.force[inside], prediction.force[inside])
+    beside = PredictedRun.of(run, prediction.force, prediction.motion.velocity)
     expected = known.expected(When.of(run), without=run.id) if known else None
     if expected is not None:
         prediction = expected.corrected(prediction)
@@ -190,6 +195,7 @@ def score_run(damper: Damper, run: Run, known: Sessions | None = None) -> RunSco
         _at_rest(run, prediction),
         UNKNOWN if expected is None else KNOWN,
         reading,
+        beside,
     )
 
 

@@ -1,4 +1,4 @@
-"""Bands: where the force of a damper lies in a session nobody has seen, and once its gain is known."""
+"""Prediction intervals of the force along a motion, of its peak and of the dissipated energy."""
 
 from __future__ import annotations
 
@@ -9,23 +9,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.dampers.base import Damper, Prediction
+from mrdamper.dampers.calibration import Quantity
 from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.slopes import force_slopes
-from mrdamper.data import Floats
+from mrdamper.data import SESSIONS_NEEDED, Floats
 from mrdamper.identification.intervals import student
 from mrdamper.metrics import dissipated_power, peak_force
 
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """Where the force of an unknown session lies.
+    """Prediction intervals at one level.
 
     Attributes
     ----------
     low, high : (N,) arrays
         [N]
     parameter, session, model : (N,) arrays
-        Standard deviations of the parts [N].
+        Standard deviations of the parts: of the parameters, between sessions, and between runs of one
+        session with the error of the form [N].
     peak : (float, float)
         Of half the peak-to-peak force [N].
     energy : (float, float)
@@ -47,7 +49,9 @@ class Band:
 def band(
     damper: Damper, prediction: Prediction, level: float = 0.9, shown: NDArray[np.bool_] | None = None
 ) -> Band | None:
-    """Where the force lies at a level, in a session nobody has seen; None where that cannot be known.
+    """Prediction intervals in a future test session; None where the runs cannot show how runs differ.
+
+    Where fewer than three sessions are known they hold for sessions like the tested ones (`scope`).
 
     Parameters
     ----------
@@ -65,7 +69,7 @@ def band(
     """
     student(level, 1.0)
     known: Certainty | None = damper.certainty
-    if known is None or known.one_session:
+    if known is None or not (known.of_sessions or known.run_dof > 0):
         return None
     seen_at = slice(None) if shown is None else shown
     force, motion = prediction.force[seen_at], prediction.motion.part(seen_at)
@@ -73,49 +77,80 @@ def band(
     half = peak_force(force)
     parameter = np.einsum("np,pq,nq->n", slopes, known.covariance, slopes)
     session = (known.gain * force) ** 2 + known.offset**2
-    model = np.full(force.size, (known.force * half) ** 2)
+    model = (known.run_gain * force) ** 2 + known.run_offset**2 + (known.force * half) ** 2
     top, bottom = int(np.argmax(force)), int(np.argmin(force))
     swing = (slopes[top] - slopes[bottom]) / 2
     own = float(swing @ known.covariance @ swing)
-    worst = float(np.min(known.dof)) if known.names else 1.0
-    dofs = (worst, max(known.session_dof, 1.0), max(known.left_out - 1.0, 1.0))
+    dofs = _degrees_of_freedom(known)
 
-    def reach(parts: Sequence[float]) -> float:
+    def reach(quantity: Quantity, parts: Sequence[float]) -> float:
         whole = sum(parts)
         if whole <= 0:
             return 0.0
         dof = whole**2 / sum(part**2 / d for part, d in zip(parts, dofs, strict=True))
-        return student(level, dof) * float(np.sqrt(whole))
+        factor = known.calibration.factor(quantity, level) if known.calibration else 1.0
+        return factor * student(level, dof) * float(np.sqrt(whole))
 
-    t = reach([float(np.mean(v)) for v in (parameter, session, model)])
+    t = reach("force", [float(np.mean(v)) for v in (parameter, session, model)])
     mean = float(np.mean(parameter + session + model))
     width = (t / np.sqrt(mean) if mean > 0 else 0.0) * np.sqrt(parameter + session + model)
-    unseen = reach([own, (known.gain * half) ** 2, (known.peak * half) ** 2])
-    seen = reach([own, 0.0, (known.peak * half) ** 2])
+    of_run = (known.run_gain**2 + known.peak**2) * half**2
+    unseen = reach("peak", [own, (known.gain * half) ** 2, of_run])
+    seen = reach("peak", [own, 0.0, of_run])
     power = dissipated_power(force, motion.velocity, motion.time) or 1.0
     turned = np.array([dissipated_power(column, motion.velocity, motion.time) for column in slopes.T]) / power
-    loss = reach([float(turned @ known.covariance @ turned), known.gain**2, known.energy**2])
+    loss = reach(
+        "energy", [float(turned @ known.covariance @ turned), known.gain**2, known.run_gain**2 + known.energy**2]
+    )
     return Band(
         force - width, force + width, np.sqrt(parameter), np.sqrt(session), np.sqrt(model),
         (max(half - unseen, 0.0), half + unseen), (-loss, loss), (max(half - seen, 0.0), half + seen),
     )  # fmt: skip
 
 
+def _degrees_of_freedom(known: Certainty) -> tuple[float, float, float]:
+    """Behind the variances of parameters, sessions and the rest; calibration counts the runs of the last by itself."""
+    worst = float(np.min(known.dof)) if known.names else 1.0
+    runs = np.inf if known.calibration else max(known.run_dof, 1.0)
+    return worst, max(known.session_dof, 1.0), float(runs)
+
+
+def scope(damper: Damper, level: float) -> str:
+    """Sessions a band holds for, and how far it is calibrated, as a phrase."""
+    known: Certainty | None = damper.certainty
+    if known is None:
+        return ""
+    text = (
+        "in a future test session"
+        if known.of_sessions
+        else f"for sessions like the tested ones (fewer than {SESSIONS_NEEDED} known)"
+    )
+    found = known.calibration
+    if found is None:
+        return f"{text}, not calibrated: no cross-validated runs"
+    if level > found.reachable:
+        text += (
+            f", calibrated to {100 * found.reachable:.0f} % at most by {found.units} independent {found.unit}s and "
+            "beyond by a normal distribution"
+        )
+    return text
+
+
 def no_band(damper: Damper) -> str:
-    """Why there is no band, in words."""
+    """Reason why there is no band."""
     if not damper.fitted_parameters:
-        return "no band: how sure a model of this kind is cannot be worked out"
+        return "no band: the uncertainty of a model of this kind is not known"
     if damper.certainty is None:
         return "no band: the model was saved without its covariance"
-    return "no band: all its runs are of one session, and how far another one lies cannot be known; test on another day"
+    return "no band: its runs are too few to show how runs differ; test more conditions, on another day too"
 
 
 @dataclass(frozen=True)
 class PortableBand:
-    """A band in three numbers, for where a damper travels without its covariance.
+    """A band in three parameters, for exports of a damper without its covariance.
 
     The force F of a loop with half its peak-to-peak force P lies within
-    sqrt((gain F)² + offset_N² + (of_peak P)²) of the prediction, in a session nobody has seen.
+    sqrt((gain F)² + offset_N² + (of_peak P)²) of the prediction, in a future test session.
 
     Attributes
     ----------
@@ -125,7 +160,7 @@ class PortableBand:
     offset_N : float
         [N]
     of_peak : float
-        Of half the peak-to-peak force: the model's own error and that of its numbers.
+        Of half the peak-to-peak force: the model's own error and that of its parameters.
     """
 
     level: float
@@ -135,10 +170,10 @@ class PortableBand:
 
 
 def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
-    """The band of a damper in three numbers, from loops at the lowest, middle and highest tested current.
+    """The band of a damper in three parameters, from loops at the lowest, middle and highest tested current.
 
-    None where nothing is known of it. The error that comes from the damper's numbers is taken at
-    its root mean square over these loops, so a band may differ by some per cent from `band`.
+    None where there is no band. The error that comes from the damper's parameters is taken at its
+    root mean square over these loops, so a band may differ by some per cent from `band`.
 
     Raises
     ------
@@ -162,4 +197,6 @@ def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
         own.append(np.mean(found.parameter**2) / peak_force(prediction.force) ** 2)
         quantile.append(np.mean(found.high - prediction.force) / (np.mean(parts) or 1.0))
     t = float(np.mean(quantile))
-    return PortableBand(level, t * known.gain, t * known.offset, t * float(np.sqrt(known.force**2 + np.mean(own))))
+    return PortableBand(
+        level, t * known.total_gain, t * known.total_offset, t * float(np.sqrt(known.force**2 + np.mean(own)))
+    )

@@ -15,15 +15,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mrdamper.dampers.calibration import Calibration
 from mrdamper.dampers.sessions import Sessions
 from mrdamper.data import Floats
 from mrdamper.errors import InputError
-from mrdamper.identification.intervals import CANNOT_BE_KNOWN, interval_about, weaknesses, written
+from mrdamper.identification.intervals import NOT_IDENTIFIABLE, interval_about, weaknesses, written
 
 if TYPE_CHECKING:
     from mrdamper.dampers.base import Damper
-_AT_ALL = 3.0  # standard error of a logarithm from which nothing is known of the number
-_BADLY = 0.5  # standard error over the value from which a number is known to a factor only
+_BADLY = 0.5  # standard error over the estimate from which a parameter is not significant
 
 
 @dataclass(frozen=True)
@@ -57,12 +57,19 @@ class Certainty:
     gain, offset : float
         Standard deviations between sessions, of the force as a share and as a shift [N].
     session_dof : float
-        Degrees of freedom behind them; below 1 there are too few runs to know.
+        Degrees of freedom behind them; zero where fewer than three known sessions show them. Then
+        intervals are for sessions like the tested ones.
+    run_gain, run_offset : float
+        Standard deviations between runs of one session [-] and [N].
+    run_dof : float
+        Degrees of freedom behind them; zero where the runs cannot show them.
     force, peak, energy : float
-        Standard deviations of the model's own error: of the force over half its peak-to-peak value,
-        of the peak force and of the dissipated energy, relative.
+        Standard deviations of what a run's own gain and offset leave: of the force over half its
+        peak-to-peak value, of the peak force and of the dissipated energy, relative.
     left_out : int
-        Runs left out that say so.
+        Cross-validated runs behind them; zero where the residuals of the fit stand in.
+    calibration : Calibration or None
+        Of prediction intervals, on cross-validated runs.
     sessions : Sessions or None
         What sessions share, day and hour, where the tests could tell.
     words : tuple of str
@@ -82,6 +89,9 @@ class Certainty:
     gain: float = 0.0
     offset: float = 0.0
     session_dof: float = 0.0
+    run_gain: float = 0.0
+    run_offset: float = 0.0
+    run_dof: float = 0.0
     force: float = 0.0
     peak: float = 0.0
     energy: float = 0.0
@@ -90,11 +100,22 @@ class Certainty:
     taught: Mapping[str, float] = field(default_factory=dict)
     effective: Mapping[str, float] = field(default_factory=dict)
     sessions: Sessions | None = None
+    calibration: Calibration | None = None
 
     @property
-    def one_session(self) -> bool:
-        """Whether all runs are of one session, so that nobody can say how sessions differ."""
-        return self.session_dof < 0.5
+    def of_sessions(self) -> bool:
+        """Whether the scatter between sessions is known, so that intervals are for future sessions."""
+        return self.session_dof > 0
+
+    @property
+    def total_gain(self) -> float:
+        """Standard deviation of the gain of a run in a future session."""
+        return math.hypot(self.gain, self.run_gain)
+
+    @property
+    def total_offset(self) -> float:
+        """Standard deviation of the offset of a run in a future session [N]."""
+        return math.hypot(self.offset, self.run_offset)
 
     def ends(self, damper: Damper, name: str, level: float = 0.95) -> tuple[float, float] | None:
         """Of a number's interval; None where a bound holds it or these runs cannot tell it."""
@@ -114,38 +135,40 @@ class Certainty:
         """
         if ends := self.ends(damper, name, level):
             return ends
-        why = "is held by a bound" if name in self.one_sided else CANNOT_BE_KNOWN
+        why = "is held by a bound" if name in self.one_sided else NOT_IDENTIFIABLE
         raise InputError(f"{name} {why}", mend="test where it matters", code="E_CERTAINTY")
 
 
 def unsure(damper: Damper) -> list[str]:
-    """What cannot be known from these runs, and what is known badly, in words."""
+    """Sentences on parameters that are not identifiable or badly determined, and on sessions."""
     known: Certainty | None = damper.certainty
     if known is None:
-        return ["How sure the numbers are is not known: the model was saved without it."]
+        return ["The uncertainty of the parameters is not known: the model was saved without it."]
     numbers = damper.fitted_parameters
     said = [f"{name} ended at {_limit(numbers[name])}: only one side of it is open." for name in known.one_sided]
     said += [f"{text}." for text in known.words]
     told = " ".join(known.words)
     if silent := [name for name in known.unknown if name not in told]:
-        said.append(f"{', '.join(silent)} {CANNOT_BE_KNOWN}: others do the same to the force.")
-    if known.one_session:
+        said.append(f"{', '.join(silent)} {NOT_IDENTIFIABLE}.")
+    if not known.of_sessions:
         said.append(
-            "All runs are of one session: how sessions differ cannot be known, and intervals hold for it alone."
+            "Fewer than three known sessions: the scatter between sessions is not estimated, and intervals hold for "
+            "sessions like the tested ones."
         )
     elif known.session_dof < 2:
-        said.append("There are too few sessions to know how much they differ.")
+        said.append("The scatter between sessions rests on fewer than two degrees of freedom.")
+    apart = []
     for i, name in enumerate(known.names):
-        error = float(np.sqrt(known.covariance[i, i]))
-        if name in known.unknown:
+        ends = known.ends(damper, name)
+        if ends is None:
             continue
+        apart.append(i)
+        error = float(np.sqrt(known.covariance[i, i]))
         if known.logs[i] and error > _BADLY:
-            size = f"known to a factor of {np.exp(error):.1f} only" if error < _AT_ALL else "not known at all"
-            said.append(f"{name} is {size}.")
+            said.append(f"95 % interval of {name} spans a factor of {ends[1] / ends[0]:.2g}.")
         elif not known.logs[i] and error > _BADLY * abs(numbers[name].value):
-            about = written(error, None, numbers[name].unit)
-            said.append(f"{name} cannot be told from zero: its standard error is {about}.")
-    apart = [i for i, name in enumerate(known.names) if name not in known.unknown]
+            about = written(numbers[name].value, ends, numbers[name].unit)
+            said.append(f"{name} is not significant ({about}).")
     names, block = [known.names[i] for i in apart], known.covariance[np.ix_(apart, apart)]
     return [*said, *(f"{text}." for text in weaknesses(names, block))]
 
@@ -172,7 +195,7 @@ def table(damper: Damper, level: float = 0.95) -> list[dict[str, Any]]:
         elif name in known.one_sided:
             state = f"one-sided: at {_limit(own)}"
         else:
-            state = "determined" if ends else CANNOT_BE_KNOWN
+            state = "determined" if ends else NOT_IDENTIFIABLE
         low, high = ends or (math.nan, math.nan)
         row = {"name": name, "value": own.value, "unit": own.unit, "low": low, "high": high}
         row["effective_samples"] = known.effective.get(name, math.nan) if known and ends else math.nan

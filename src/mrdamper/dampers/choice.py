@@ -15,8 +15,7 @@ import numpy as np
 
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.joint import FALL, RISE, JointFit, JointProblem, Valley
-from mrdamper.dampers.sessions import When
-from mrdamper.data import Floats, Run, same_condition
+from mrdamper.data import SESSIONS_NEEDED, Floats, Run, same_condition, session_of
 from mrdamper.errors import InputError
 from mrdamper.optimizers.linear import on_one_blas_thread, solve_linear
 
@@ -391,10 +390,11 @@ def _by_condition(problem: JointProblem, owner: np.ndarray) -> dict[str, list[np
 def _by_session(problem: JointProblem, owner: np.ndarray) -> dict[str, list[np.ndarray]]:
     """Rows of runs recorded in one session, where there are sessions of several runs."""
     try:
-        sessions = [When.of(run).session for run in problem.runs]
+        sessions = [session_of(run) for run in problem.runs]
     except InputError:
         return {}  # a clock that is no date: what sessions share is refused where it is asked for
-    found = dict.fromkeys(sessions)
-    if not 2 < len(found) < len(sessions):
+    known = [session for session in sessions if session is not None]
+    found = dict.fromkeys(known)
+    if not SESSIONS_NEEDED <= len(found) < len(known):
         return {}
     return {"session": [np.flatnonzero(np.isin(owner, [i for i, s in enumerate(sessions) if s == n])) for n in found]}

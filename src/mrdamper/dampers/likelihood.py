@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.certainty import Certainty
-from mrdamper.dampers.covariance import Part, certain, normal_of
+from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.run_residuals import RunResiduals, normal_matrix
 from mrdamper.dampers.slopes import force_slopes
 from mrdamper.dampers.strung import string
 from mrdamper.data import Floats, Run
@@ -54,7 +55,7 @@ class Likelihood:
     covariance: Floats
     logs: tuple[bool, ...]
     bounds: Floats
-    parts: tuple[Part, ...]
+    parts: tuple[RunResiduals, ...]
     instruments: Floats
     measured: Floats
     offset: Floats
@@ -76,9 +77,9 @@ class Likelihood:
                 "these runs determine no number of the damper", mend="give its train runs", code="E_CERTAINTY"
             )
         names, numbers = known.names, damper.fitted_parameters
-        parts = tuple(Part.of(damper, run) for run in runs)
+        parts = tuple(RunResiduals.of(damper, run) for run in runs)
         slopes = [force_slopes(damper, p.prediction, names)[p.picked] for p in parts]
-        normal = normal_of(slopes, parts)
+        normal = normal_matrix(slopes, parts)
         root = np.linalg.cholesky(positive(normal @ known.covariance @ normal))
         rows = np.concatenate([s * p.weight**2 for s, p in zip(slopes, parts, strict=True)])
         instruments: Floats = np.asarray(np.linalg.solve(root, rows.T), dtype=float)

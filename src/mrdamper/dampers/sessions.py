@@ -11,14 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
 from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mrdamper.data import Floats, Run
+from mrdamper.data import SESSIONS_NEEDED, Floats, Run, hour_of, session_of
 from mrdamper.errors import InputError
 
 if TYPE_CHECKING:
@@ -30,46 +29,30 @@ Mask = NDArray[np.bool_]
 UNKNOWN, KNOWN = "unknown", "known"  # session of a score: predicted as it is, or corrected by other runs of the day
 _HOURS = (0.5, 1.0, 2.0, 4.0, 8.0)  # over which what an hour shares is forgotten
 _LEAST = 0.2  # of the spread: each run has at least so much of its own, for the model misses every condition anew
-_NEEDED = "record a condition twice a day, on two days or more; recorded_at or session in runs.csv say when"
+_NEEDED = "record a condition twice a day, on three days or more; state recorded_at or session in runs.csv"
 
 
 @dataclass(frozen=True)
 class When:
-    """When a run was recorded.
+    """Session and time of a recording.
 
     Attributes
     ----------
-    session : str
-        As stated, or the day; the run by itself where neither is known.
+    session : str or None
+        None where it is not known.
     hour : float or None
         Hours since 1970; None where only a day or a name is known.
     """
 
     __pydantic_config__: ClassVar = STRICT
 
-    session: str
+    session: str | None
     hour: float | None = None
 
     @classmethod
     def of(cls, run: Run) -> When:
-        """From the notes `session` and `recorded_at` (ISO 8601) of a run.
-
-        Raises
-        ------
-        InputError
-            E_CLOCK if the clock is no date.
-        """
-        clock, named = run.notes.get("recorded_at", ""), run.notes.get("session", "")
-        if not clock:
-            return cls(named or f"run {run.id}")
-        try:
-            at = datetime.fromisoformat(clock)
-        except ValueError:
-            raise InputError(
-                f"recorded_at is {clock!r}", where=f"run {run.id}", mend="write 2024-05-31T14:05:00", code="E_CLOCK"
-            ) from None
-        since = at.replace(tzinfo=None) - datetime(1970, 1, 1)
-        return cls(named or clock[:10], None if len(clock) <= 10 else since.total_seconds() / 3600)
+        """From the notes of a run; raises E_CLOCK as `session_of`."""
+        return cls(session_of(run), hour_of(run))
 
 
 @dataclass(frozen=True)
@@ -139,7 +122,8 @@ class Spread:
 
     def covariance(self, a: Sequence[When], b: Sequence[When]) -> Floats:
         """(A, B) of runs that are not the same."""
-        same = np.array([[x.session == y.session for y in b] for x in a], dtype=float).reshape(len(a), len(b))
+        shared = [[x.session is not None and x.session == y.session for y in b] for x in a]
+        same = np.array(shared, dtype=float).reshape(len(a), len(b))
         hours = [[np.nan if w.hour is None else w.hour for w in when] for when in (a, b)]
         apart = np.abs(np.subtract.outer(*hours))
         near = np.where(np.isfinite(apart), np.exp(-np.nan_to_num(apart) / self.hours), 0.0)
@@ -217,7 +201,8 @@ class Expected:
 
         if damper.certainty is None:
             return None
-        left = replace(damper.certainty, gain=self.gain_spread, offset=self.offset_spread)
+        spreads = {"gain": self.gain_spread, "offset": self.offset_spread, "run_gain": 0.0, "run_offset": 0.0}
+        left = replace(damper.certainty, **spreads)
         found = band(replace(damper, certainty=left), prediction, level, shown)  # type: ignore[type-var]
         if found is None:
             return None
@@ -273,14 +258,17 @@ class Sessions:
         Raises
         ------
         InputError
-            E_SESSION if no session has two runs, or there is one session; E_CLOCK if sessions overlap in time.
+            E_SESSION if no session has two runs, or there are under three; E_CLOCK if sessions overlap in time.
         """
         when = tuple(When.of(run) for run in runs)
         _refuse_disorder(runs, when)
-        names = [w.session for w in when]
-        if len(set(names)) < 2 or len(set(names)) == len(names):
-            found = "one session" if len(set(names)) == 1 else "sessions of one run each"
-            raise InputError(f"{found}: what a day shares cannot be told", mend=_NEEDED, code="E_SESSION")
+        names = [w.session for w in when if w.session is not None]
+        count = len(set(names))
+        if count < SESSIONS_NEEDED or count == len(names):
+            found = "every session holds one run" if count >= SESSIONS_NEEDED else f"{count} known sessions"
+            raise InputError(
+                f"{found}: the scatter between sessions cannot be estimated", mend=_NEEDED, code="E_SESSION"
+            )
         gain = Spread.likeliest(when, np.array([r.gain - 1 for r in left_out]))
         offset = Spread.likeliest(when, np.array([r.offset for r in left_out]))
         gains, offsets = tuple(r.gain for r in own), tuple(r.offset for r in own)
@@ -297,7 +285,7 @@ class Sessions:
         """
         rows = [i for i, name in enumerate(self.run_ids) if name != without]
         when = [self.when[i] for i in rows]
-        if all(w.session != at.session for w in when):
+        if at.session is None or all(w.session != at.session for w in when):
             return None
         gain, gain_spread = self.gain.given(at, when, np.array([self.gains[i] for i in rows]) - 1)
         offset, offset_spread = self.offset.given(at, when, np.array([self.offsets[i] for i in rows]))
@@ -365,7 +353,8 @@ def known_errors(runs: Sequence[Run], left_out: Sequence[Reading]) -> Floats:
 def _refuse_disorder(runs: Sequence[Run], when: Sequence[When]) -> None:
     """A session is one stretch of time: runs of another within it say that a clock or a name is wrong."""
     timed = sorted((i for i, w in enumerate(when) if w.hour is not None), key=lambda i: when[i].hour or 0.0)
-    ended: set[str] = set()
+    timed = [i for i in timed if when[i].session is not None]
+    ended: set[str | None] = set()
     for i, j in pairwise(timed):
         if when[i].session != when[j].session:
             ended.add(when[i].session)

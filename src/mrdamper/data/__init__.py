@@ -3,9 +3,11 @@
 from mrdamper.data.conditions import Condition, current_levels, same_condition, same_motion
 from mrdamper.data.datasets import Dataset
 from mrdamper.data.runs import Floats, Run, Split, held_current, once_per_run, require_name
+from mrdamper.data.sessions import SESSIONS_NEEDED, hour_of, session_of
 from mrdamper.data.shown import Shown
 
 __all__ = [
+    "SESSIONS_NEEDED",
     "Condition",
     "Dataset",
     "Floats",
@@ -14,8 +16,10 @@ __all__ = [
     "Split",
     "current_levels",
     "held_current",
+    "hour_of",
     "once_per_run",
     "require_name",
     "same_condition",
     "same_motion",
+    "session_of",
 ]

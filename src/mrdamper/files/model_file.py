@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, TypeAdapter, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from mrdamper.dampers import all_kinds
 from mrdamper.dampers.base import Damper, Envelope
+from mrdamper.dampers.calibration import Calibration
 from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.coil import Coil, Driver
 from mrdamper.dampers.sessions import Sessions
@@ -26,8 +27,9 @@ from mrdamper.files.atomic import path_of, write_file
 from mrdamper.files.strict_json import parse_json
 
 FORMAT = "mrdamper-model"
-MAJOR, MINOR = 1, 4
+MAJOR, MINOR = 1, 5
 _LARGEST = 64_000_000  # bytes of a file
+_MAX_DEVIATION = 1e4  # standard deviation of a parameter over its size, or of its logarithm
 UNITS = {
     "time": "s",
     "displacement": "m",
@@ -81,16 +83,20 @@ class _Coil(_Strict):
     driver: _Driver | None = None
 
 
+# Standard deviations whose squares, and whose sums with a force, are numbers.
+Deviation = Annotated[float, Field(ge=0, le=1e12)]
+
+
 class _Session(_Strict):
-    gain: float
-    offset_N: float
-    degrees_of_freedom: float
+    gain: Deviation
+    offset_N: Deviation
+    degrees_of_freedom: Deviation
 
 
 class _ModelError(_Strict):
-    force: float
-    peak: float
-    energy: float
+    force: Deviation
+    peak: Deviation
+    energy: Deviation
     left_out: int
 
 
@@ -107,6 +113,8 @@ class _Covariance(_Strict):
     taught: dict[str, float] = {}
     effective: dict[str, float] = {}
     sessions: Sessions | None = None  # since 1.4
+    runs: _Session | None = None  # since 1.5
+    calibration: Calibration | None = None  # since 1.5
 
 
 class _Document(_Strict):
@@ -283,6 +291,8 @@ def _describe_certainty(known: Certainty | None) -> _Covariance | None:
         taught=dict(known.taught),
         effective=dict(known.effective),
         sessions=known.sessions,
+        runs=_Session(gain=known.run_gain, offset_N=known.run_offset, degrees_of_freedom=known.run_dof),
+        calibration=known.calibration,
     )
 
 
@@ -299,11 +309,18 @@ def _with_certainty(damper: Damper, saved: _Covariance, where: str) -> Damper:
         or np.any(np.diag(matrix) < 0)
     ):
         raise ModelFileError("covariance: it does not fit the damper", where=where, mend="write the model again")
+    for name, log, variance in zip(saved.parameters, saved.logarithmic, np.diag(matrix).tolist(), strict=True):
+        widest = 1.0 if log else max(abs(damper.fitted_parameters[name].value), 1.0)
+        if variance > (_MAX_DEVIATION * widest) ** 2:
+            raise ModelFileError(
+                f"covariance: the variance of {name} is {variance:.3g}", where=where, mend="write the model again"
+            )
+    runs = saved.runs or _Session(gain=0.0, offset_N=0.0, degrees_of_freedom=0.0)
     known = Certainty(
         saved.parameters, saved.logarithmic, matrix, np.array(saved.degrees_of_freedom), saved.one_sided, saved.unknown,
-        session.gain, session.offset_N, session.degrees_of_freedom,
+        session.gain, session.offset_N, session.degrees_of_freedom, runs.gain, runs.offset_N, runs.degrees_of_freedom,
         model.force, model.peak, model.energy, model.left_out, saved.words, saved.taught,
-        saved.effective, saved.sessions,
+        saved.effective, saved.sessions, saved.calibration,
     )  # fmt: skip
     return replace(damper, certainty=known)  # type: ignore[type-var]
 

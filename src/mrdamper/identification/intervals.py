@@ -10,10 +10,10 @@ import numpy as np
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import InputError
 
-_ALIKE = 0.98  # correlation from which two parameters are known together only
+_ALIKE = 0.98  # correlation from which two parameters are strongly correlated
 _SAME = 0.03  # frequencies and amplitudes this close are one
-_WIDEST = math.log(1e3) / 2  # half an interval of a logarithm over which it says nothing
-CANNOT_BE_KNOWN = "cannot be known from these runs"
+_MAX_RATIO = 1e3  # of an interval's half width to its estimate, or of its ends: beyond, it is not identifiable
+NOT_IDENTIFIABLE = "not identifiable from these runs"
 _LOPSIDED = 0.1  # of an interval's half width: shifted by less, it is written with ±
 
 
@@ -35,12 +35,20 @@ def student(level: float, dof: float) -> float:
 def interval_about(value: float, error: float, dof: float, level: float, log: bool) -> tuple[float, float] | None:
     """Ends of an interval; of a logarithm where `log`, then `error` is that of the logarithm.
 
-    None where nothing is known: from an error that is not finite, or over more than three decades.
+    None where the parameter is not identifiable: an error that is not finite, ends a factor of more
+    than a thousand apart, or a half width of more than a thousand times the estimate.
     """
     half = student(level, dof) * error
-    if not math.isfinite(half) or (log and half > _WIDEST):
+    if not math.isfinite(half) or relative_width(value, half, log) > 1:
         return None
     return (value * math.exp(-half), value * math.exp(half)) if log else (value - half, value + half)
+
+
+def relative_width(value: float, half: float, log: bool) -> float:
+    """Half an interval over the widest one of an identifiable parameter."""
+    if log:
+        return half / (math.log(_MAX_RATIO) / 2)
+    return half / (_MAX_RATIO * abs(value)) if value else math.inf * half if half else 0.0
 
 
 _SHOWN = {"-": (1.0, ""), "m": (1e3, "mm"), "m/s": (1e3, "mm/s")}  # how a unit stands on screens
@@ -90,7 +98,8 @@ def weaknesses(
     """
     reason = _only_one(conditions)
     said = [
-        f"{_listed([names[i] for i in group])} cannot {_both(group)} be known{reason}: they do the same to the force"
+        f"{_listed([names[i] for i in group])} are not {_both(group)} identifiable{reason}: "
+        "they do the same to the force"
         for group in alike
     ]
     grouped = {i for group in alike for i in group}
@@ -102,7 +111,7 @@ def weaknesses(
         for j in known[a + 1 :]:
             together = covariance[i, j] / np.sqrt(covariance[i, i] * covariance[j, j])
             if abs(together) > _ALIKE:
-                said.append(f"{names[i]} and {names[j]} are known together, not apart (correlation {together:.3f})")
+                said.append(f"{names[i]} and {names[j]} are strongly correlated (r = {together:.3f})")
     return said
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from mrdamper.data import Condition, Floats, Run, Shown
 from mrdamper.errors import IdentificationError, UnknownNameError, checked
 from mrdamper.gas_spring import GasSpring
-from mrdamper.identification.intervals import CANNOT_BE_KNOWN, interval_about, written
+from mrdamper.identification.intervals import NOT_IDENTIFIABLE, interval_about, written
 from mrdamper.metrics import Scores
 from mrdamper.models import Model
 from mrdamper.motion import Excitation, MotionAnalysis, analyse_motion, measured_motion
@@ -258,7 +258,7 @@ class Identification(Shown):
             return self.ask()
         except (np.linalg.LinAlgError, ArithmeticError) as error:
             unknown = dict.fromkeys(self.free, np.inf)
-            return RunCertainty(unknown, unknown, doubts=(f"how sure the parameters are {CANNOT_BE_KNOWN}: {error}",))
+            return RunCertainty(unknown, unknown, doubts=(f"how sure the parameters are {NOT_IDENTIFIABLE}: {error}",))
 
     @property
     def standard_errors(self) -> Mapping[str, float]:
@@ -297,7 +297,7 @@ class Identification(Shown):
             return "held"
         if name not in self.standard_errors:
             return "at a bound: one-sided"
-        return "determined" if self.interval(name) else CANNOT_BE_KNOWN
+        return "determined" if self.interval(name) else NOT_IDENTIFIABLE
 
     @checked()
     def interval(self, name: str, level: float = 0.95) -> tuple[float, float] | None:

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from mrdamper.dampers.base import Damper
+from mrdamper.dampers.calibration import PredictedRun
 from mrdamper.data import Run
 from mrdamper.motion import equivalent_sine
 from mrdamper.validation import RunScore, Validation, leave_one_condition_out
@@ -74,4 +75,6 @@ def _joined(name: str, scores: Sequence[RunScore]) -> RunScore:
     flags = tuple(dict.fromkeys(flag for score in scores for flag in score.extrapolation))
     rests = [score.rest for score in scores if score.rest is not None]
     rest = float(np.sqrt(np.mean(np.square(rests)))) if rests else None
-    return replace(scores[0], run_id=name, scores=whole, extrapolation=flags, rest=rest, reading=None)
+    seen = [score.predicted for score in scores if score.predicted is not None]
+    beside = PredictedRun.joined(name, seen) if seen else None
+    return replace(scores[0], run_id=name, scores=whole, extrapolation=flags, rest=rest, reading=None, predicted=beside)

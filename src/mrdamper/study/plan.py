@@ -144,9 +144,9 @@ class Reckoning:
             goal[names.index(about), names.index(about)] = 1 if own.log else 1 / (own.value or 1.0) ** 2
         grams = np.einsum("cdkp,cdkq->cdpq", seen, seen) / max(known.force, _FLOOR) ** 2
         half = 1 / float(np.mean(seen[..., -1]))
-        session = np.array([max(known.gain, _NO_GAIN), max(known.offset, _NO_OFFSET * half)]) ** -2.0
+        session = np.array([max(known.total_gain, _NO_GAIN), max(known.total_offset, _NO_OFFSET * half)]) ** -2.0
         mean = np.mean(doubt[..., len(names) :] ** 2, axis=(0, 1, 2))
-        beside = float(mean @ [known.gain**2, known.offset**2]) + known.force**2
+        beside = float(mean @ [known.total_gain**2, known.total_offset**2]) + known.force**2
         words = about if isinstance(about, str) else f"at {about}" if about else "over the envelope"
         return cls(limits, conditions, names, np.linalg.inv(covariance), goal, grams, session, words, beside)
 

@@ -261,10 +261,8 @@ def study_rig(
     chosen = min(near, key=lambda c: c.damper.parameter_count)
     candidates.sort(key=lambda c: c is not chosen)
     held = chosen.fit.at_bounds if isinstance(chosen.fit, JointFit | ModifiedFit) else ()
-    errors_left_out = [r.scores for r in chosen.cross_validated.runs]
-    chosen = replace(
-        chosen, damper=certain(chosen.damper, train if chosen.recipe.basis else everything, errors_left_out, held)
-    )
+    beside = [score.predicted for score in chosen.cross_validated.runs if score.predicted is not None]
+    chosen = replace(chosen, damper=certain(chosen.damper, train if chosen.recipe.basis else everything, beside, held))
     candidates[0], known = _with_sessions(chosen, dataset)
     return RigStudy(
         rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), refused, impossible, model is not None, known

@@ -80,8 +80,9 @@ def draw(dampers: Mapping[str, Damper], count: int, seed: int = 1) -> list[dict[
             )
         if id(damper) not in shared:
             shared[id(damper)] = _numbers_drawn(damper, count, rng)
-        spread = np.array([known.gain, known.offset])
-        sessions = (_student(rng, known.session_dof, count) * rng.standard_normal((count, 2)) * spread).tolist()
+        spread = np.array([known.total_gain, known.total_offset])
+        dof = known.session_dof if known.of_sessions else known.run_dof
+        sessions = (_student(rng, dof, count) * rng.standard_normal((count, 2)) * spread).tolist()
         for row, numbers, (gain, offset) in zip(found, shared[id(damper)], sessions, strict=True):
             row[link] = Draw(numbers, gain, offset)
     return found

@@ -1,0 +1,258 @@
+"""Prediction intervals calibrated on runs that were predicted by models identified without them.
+
+The error model gives the shape of an interval: a standard deviation at every sample, of the peak force and of the
+dissipated energy. How many of these standard deviations hold a stated share is read from cross-validated residuals:
+by samples pooled over independent units, each unit counting alike [Dunn, Wasserman and Ramdas 2023, J. Am. Stat.
+Assoc. 118, 2491], and by runs for the peak force and the energy [Vovk, Gammerman and Shafer 2005; with several runs a
+unit: Lee, Barber and Willett 2023, arXiv:2306.06342]. Residuals of left-out folds stand in for those of a calibration
+set [Barber, Candès, Ramdas and Tibshirani 2021, Ann. Stat. 49, 486: the jackknife, whose level holds for stable fits].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+from scipy.special import ndtri
+
+from mrdamper.data import Floats, Run, session_of
+from mrdamper.metrics import dissipated_power, peak_force
+
+Quantity = Literal["force", "peak", "energy"]
+QUANTITIES: tuple[Quantity, ...] = ("force", "peak", "energy")
+LEVELS = (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.975, 0.99)  # at which factors are stored
+REPORTED_LEVEL = 0.9  # of the coverage that a study states
+_MAX_SAMPLES = 400  # of a run
+_ENOUGH_UNITS = 9  # independent units that reach a level of 90 %
+_MAX_FACTOR = 1e3  # standard deviations; an error beyond is no longer told apart
+_NORMAL_MEDIAN = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
+
+
+@dataclass(frozen=True, eq=False)
+class PredictedRun:
+    """A run beside its prediction, inside the steady window.
+
+    Attributes
+    ----------
+    run_id : str
+    session : str or None
+        None where it is not known.
+    predicted, measured : (N,) arrays
+        At most some hundred samples [N].
+    peak : float
+        Measured over predicted peak-to-peak force.
+    energy : float
+        Measured over predicted dissipated energy.
+    """
+
+    run_id: str
+    session: str | None
+    predicted: Floats
+    measured: Floats
+    peak: float
+    energy: float
+
+    @classmethod
+    def of(cls, run: Run, predicted: Floats, velocity: Floats) -> PredictedRun:
+        """From the prediction (N,) [N] along the whole run; raises E_CLOCK as `session_of`."""
+        at = np.flatnonzero(run.in_window)
+        measured, force, time, v = run.force[at], predicted[at], run.time[at], velocity[at]
+        power = dissipated_power(force, v, time)
+        step = max(1, at.size // _MAX_SAMPLES)
+        return cls(
+            run.id,
+            session_of(run),
+            force[::step],
+            measured[::step],
+            peak_force(measured) / max(peak_force(force), 1e-300),
+            dissipated_power(measured, v, time) / power if power else np.inf,
+        )
+
+    @classmethod
+    def joined(cls, run_id: str, parts: Sequence[PredictedRun]) -> PredictedRun:
+        """The run of stretches of about one length."""
+        thin = slice(None, None, len(parts))
+        return cls(
+            run_id,
+            parts[0].session,
+            np.concatenate([part.predicted[thin] for part in parts]),
+            np.concatenate([part.measured[thin] for part in parts]),
+            float(np.mean([part.peak for part in parts])),
+            float(np.mean([part.energy for part in parts])),
+        )
+
+    @property
+    def half(self) -> float:
+        """Half the peak-to-peak predicted force [N]."""
+        return peak_force(self.predicted) or 1.0
+
+    @property
+    def gain_and_offset(self) -> tuple[float, float]:
+        """Least squares of the measured force on the predicted one: [-] and [N]."""
+        swing = self.predicted - self.predicted.mean()
+        square = float(swing @ swing)
+        gain = float(swing @ self.measured) / square if square > 0 else 1.0
+        return gain, float(self.measured.mean()) - gain * float(self.predicted.mean())
+
+
+@dataclass(frozen=True)
+class ModelError:
+    """Standard deviations of what a run's own gain and offset leave, and of these between runs.
+
+    Attributes
+    ----------
+    force : float
+        Over half the peak-to-peak predicted force.
+    peak, energy : float
+        Relative.
+    gain, offset : float
+        Of all runs about the prediction, sessions in it [-] and [N].
+    """
+
+    force: float
+    peak: float
+    energy: float
+    gain: float
+    offset: float
+
+
+def model_error(runs: Sequence[PredictedRun]) -> ModelError:
+    """Root mean square of what is left after each run's own gain and offset; median spread of these.
+
+    Parameters
+    ----------
+    runs : sequence of PredictedRun, length R > 0
+    """
+    rests, peaks, energies, gains, offsets = [], [], [], [], []
+    for run in runs:
+        gain, offset = run.gain_and_offset
+        rests.append(np.mean((run.measured - gain * run.predicted - offset) ** 2) / run.half**2)
+        gains.append(gain - 1)
+        offsets.append(offset)
+        if gain > 0:
+            peaks.append(run.peak / gain - 1)
+            energies.append(run.energy / gain - 1)
+
+    def root(values: Sequence[float]) -> float:
+        finite = [v for v in values if np.isfinite(v)]
+        return float(np.sqrt(np.mean(np.square(finite)))) if finite else 0.0
+
+    def spread(values: Sequence[float]) -> float:
+        return _NORMAL_MEDIAN * float(np.median(np.abs(values)))
+
+    return ModelError(float(np.sqrt(np.mean(rests))), root(peaks), root(energies), spread(gains), spread(offsets))
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Factors on the standard deviations of the error model, and the coverage found with them.
+
+    Attributes
+    ----------
+    unit : "run" or "session"
+        Taken as independent.
+    units : int
+    force, peak, energy : tuple of float
+        Factor on the quantile of a normal distribution at each of `LEVELS` that these units reach.
+    coverage : tuple of float, length 3
+        Share of samples, peak forces and energies inside their interval of 90 %, or of the level that can be
+        reached, each unit held out of the calibration in turn.
+    """
+
+    __pydantic_config__: ClassVar = {"extra": "forbid", "allow_inf_nan": False}
+
+    unit: Literal["run", "session"]
+    units: int
+    force: tuple[float, ...]
+    peak: tuple[float, ...]
+    energy: tuple[float, ...]
+    coverage: tuple[float, float, float]
+
+    @property
+    def reachable(self) -> float:
+        """Highest level that this many independent units support."""
+        return self.units / (self.units + 1)
+
+    @property
+    def level(self) -> float:
+        """Of the coverage that was found."""
+        return min(REPORTED_LEVEL, self.reachable)
+
+    def factor(self, quantity: Quantity, level: float) -> float:
+        """Factor on a normal interval; beyond the reachable level that of the highest one."""
+        values = getattr(self, quantity)
+        return float(np.interp(level, LEVELS[: len(values)], values)) if values else 1.0
+
+    @classmethod
+    def of(cls, runs: Sequence[PredictedRun], scores: Sequence[Scored]) -> Calibration:
+        """From cross-validated runs and their errors over the standard deviation of the error model.
+
+        Parameters
+        ----------
+        runs : sequence of PredictedRun, length R
+        scores : sequence of Scored, length R
+        """
+        sessions = {run.session for run in runs}
+        by_session = None not in sessions and len(sessions) >= _ENOUGH_UNITS
+        names = [run.session if by_session else run.run_id for run in runs]
+        units = [[s for s, n in zip(scores, names, strict=True) if n == name] for name in dict.fromkeys(names)]
+        factors = {q: _factors(units, q) for q in QUANTITIES}
+        whole = cls("session" if by_session else "run", len(units), **factors, coverage=(0.0, 0.0, 0.0))
+        others = [[other for other in units if other is not unit] for unit in units]
+        found = tuple(_covered(units, others, q, whole.level) for q in QUANTITIES)
+        return cls(whole.unit, whole.units, whole.force, whole.peak, whole.energy, found)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """Errors of one run over their standard deviations, magnitudes: of samples (N,), of the peak, of the energy."""
+
+    force: Floats
+    peak: Floats
+    energy: Floats
+
+    @classmethod
+    def of(cls, run: PredictedRun, force: Floats, peak: float, energy: float) -> Scored:
+        """By standard deviations of the force (N,) [N], and of peak and energy, relative."""
+
+        def over(error: Floats | float, deviation: Floats | float) -> Floats:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                ratio = np.atleast_1d(np.abs(error) / deviation)
+            return np.nan_to_num(ratio, nan=0.0, posinf=np.inf)
+
+        return cls(over(run.measured - run.predicted, force), over(run.peak - 1, peak), over(run.energy - 1, energy))
+
+
+def _factors(units: Sequence[Sequence[Scored]], quantity: Quantity) -> tuple[float, ...]:
+    """Quantiles of the scores over those of a normal distribution, at the levels that can be reached."""
+    reach = len(units) / (len(units) + 1)
+    return tuple(
+        min(_quantile(units, quantity, level) / float(ndtri((1 + level) / 2)), _MAX_FACTOR)
+        for level in LEVELS
+        if level <= reach
+    )
+
+
+def _quantile(units: Sequence[Sequence[Scored]], quantity: Quantity, level: float) -> float:
+    """Quantile of the scores with equal weight of units; for one value a run, with room for a unit to come."""
+    scores = [getattr(scored, quantity) for unit in units for scored in unit]
+    weights = [np.full(getattr(s, quantity).size, 1 / getattr(s, quantity).size / len(u)) for u in units for s in u]
+    values, weight = np.concatenate(scores), np.concatenate(weights)
+    order = np.argsort(values)
+    wanted = level * (len(units) + (quantity != "force"))
+    at = int(np.searchsorted(np.cumsum(weight[order]), wanted * (1 - 1e-12)))
+    return float(values[order[min(at, values.size - 1)]])
+
+
+def _covered(
+    units: Sequence[Sequence[Scored]], others: Sequence[Sequence[Sequence[Scored]]], quantity: Quantity, level: float
+) -> float:
+    """Share of scores that factors from the other units cover, each unit counting alike."""
+    shares = []
+    for unit, rest in zip(units, others, strict=True):
+        reached = min(level, len(rest) / (len(rest) + 1)) if rest else 0.0
+        most = _quantile(rest, quantity, reached) if rest else np.inf
+        shares.append(np.mean([np.mean(getattr(scored, quantity) <= most) for scored in unit]))
+    return float(np.mean(shares))

@@ -1,0 +1,194 @@
+"""Gains and offsets that differ between sessions and between runs, estimated from what a fit leaves over.
+
+A measured force is (1 + g + h) F + o + p and a remainder: g and o are those of its session, h and p those of the
+run. Their four variances follow from quadratic statistics of the gains and offsets that the residuals of each run
+show, less what noise shows, with the share counted that the fit has absorbed [Rao 1971; Searle, Casella and
+McCulloch 1992, Variance Components, chapter 5]. A variance is not negative (non-negative least squares), and one of
+which the fit has absorbed nearly everything is not estimated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrdamper.dampers.run_residuals import RunResiduals
+from mrdamper.data import SESSIONS_NEEDED, Floats
+
+_MIN_RETAINED = 0.05  # share of a variance that the fit must have left in the residuals for it to be estimated
+_MAX_CONDITION = 100.0  # condition number of the moment equations; beyond, runs and sessions are not separated
+_DRAWS, _ROUNDS, _SEED = 600, 4, 20240813  # draws of gains and offsets; rounds of weights, as in the joint fit
+_LEAST_ERROR = 1e-3  # nrmse_pp below which a run gains no more weight, as in the joint fit
+
+
+@dataclass(frozen=True)
+class Effects:
+    """Standard deviations of gains and offsets; zero degrees of freedom where these runs cannot show them.
+
+    Attributes
+    ----------
+    gain, offset : float
+        Between sessions, of the force as a share and as a shift [N].
+    session_dof : float
+    run_gain, run_offset : float
+        Between runs of one session [-] and [N].
+    run_dof : float
+    """
+
+    gain: float = 0.0
+    offset: float = 0.0
+    session_dof: float = 0.0
+    run_gain: float = 0.0
+    run_offset: float = 0.0
+    run_dof: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Component:
+    """One of the four variances: its design (2R, K), and the statistic (J, 2R) that reads it."""
+
+    design: Floats
+    statistic: Floats
+
+
+class GainsAndOffsets:
+    """Gains and offsets of runs as the residuals of a fit show them.
+
+    Parameters
+    ----------
+    runs : sequence of RunResiduals, length R
+    slopes : sequence of (N, P) arrays
+        Derivatives of the force by the parameters at the samples of each run.
+    influence : sequence of (P, N) arrays
+        Change of the parameters by a change of each residual [per N].
+    """
+
+    def __init__(self, runs: Sequence[RunResiduals], slopes: Sequence[Floats], influence: Sequence[Floats]):
+        self.runs, self.slopes = runs, slopes
+        self.unit = float(np.median([np.ptp(run.predicted) / 2 for run in runs])) or 1.0  # of offsets [N]
+        count = len(runs)
+        tables = [np.column_stack([r.predicted, np.full(r.picked.size, self.unit)]) for r in runs]
+        self.effect = -np.concatenate([i @ t for i, t in zip(influence, tables, strict=True)], axis=1)  # (P, 2R)
+        self._shown = np.zeros((2 * count, 2 * count))  # what each gain and offset shows as in every run
+        self._read, self._noise = np.zeros(2 * count), np.zeros(2 * count)
+        for k, (run, slope, table) in enumerate(zip(runs, slopes, tables, strict=True)):
+            own, solve = slice(2 * k, 2 * k + 2), np.linalg.pinv(table)
+            self._read[own] = solve @ run.residual
+            self._shown[own] = solve @ slope @ self.effect
+            self._shown[own, own] += solve @ table
+            rest = run.residual - table @ self._read[own]
+            self._noise[own] = np.sum(solve**2, axis=1) * float(np.mean(rest**2))
+        names = sorted({run.session for run in runs if run.session is not None})
+        members = [[k for k, run in enumerate(runs) if run.session == name] for name in names]
+        self.sessions = members if len(names) >= SESSIONS_NEEDED else []
+
+    def effects(self) -> Effects:
+        """The four standard deviations and the degrees of freedom behind them."""
+        single = [[k] for k in range(len(self.runs))]
+        between, within = self._pair(self.sessions), self._pair(single)
+        if not between or self._dof(between[0], len(self.sessions)) < 1:
+            between = []
+        if not within:
+            return self._solved(between, [])
+        if between and self._condition([*between, *within]) > _MAX_CONDITION:
+            within = []  # sessions of one run each: all scatter is counted as that between sessions
+        return self._solved(between, within)
+
+    def covariance(self, effects: Effects) -> tuple[Floats, Floats, Floats]:
+        """(P, P) covariance of the parameters by gains and offsets, and each parameter's share (P,) of the two kinds.
+
+        The fit counts a run less the worse it is described, so a run far off moves the parameters
+        less than its gain would say. Each draw of gains and offsets is therefore fitted as the runs
+        were: linearised, weights and parameters in turn.
+        """
+        rng, count = np.random.default_rng(_SEED), len(self.runs)
+        drawn = rng.standard_normal((_DRAWS, count, 2)) * [effects.run_gain, effects.run_offset]
+        shared = rng.standard_normal((_DRAWS, len(self.sessions), 2)) * [effects.gain, effects.offset]
+        for k, members in enumerate(self.sessions):
+            drawn[:, members] += shared[:, k : k + 1]
+        whole = self._refitted(drawn)
+        kinds = []
+        for members, (gain, offset) in (
+            (self.sessions, (effects.gain, effects.offset)),
+            ([[k] for k in range(count)], (effects.run_gain, effects.run_offset)),
+        ):
+            scale = np.array([gain, offset / self.unit])
+            moved = [self.effect[:, 2 * np.array(group)[:, None] + [0, 1]].sum(axis=1) * scale for group in members]
+            kinds.append(np.sum(np.square(moved), axis=(0, 2)) if moved else np.zeros(len(self.effect)))
+        total = np.maximum(kinds[0] + kinds[1], np.finfo(float).tiny)
+        return whole, kinds[0] / total, kinds[1] / total
+
+    def _pair(self, groups: Sequence[Sequence[int]]) -> list[_Component]:
+        """Gain and offset shared by groups of runs; empty unless the residuals still show the gain."""
+        made = []
+        for which in (0, 1):
+            design = np.zeros((2 * len(self.runs), len(groups)))
+            for k, members in enumerate(groups):
+                design[2 * np.array(members) + which, k] = 1.0
+            statistic = (design / np.sqrt(np.maximum(design.sum(axis=0), 1.0))).T
+            made.append(_Component(design, statistic))
+        return made if groups and self._retained(made[0]) >= _MIN_RETAINED else []
+
+    def _moment(self, statistic: Floats, design: Floats) -> float:
+        return float(np.sum((statistic @ self._shown @ design) ** 2))
+
+    def _retained(self, component: _Component) -> float:
+        """Share of a component's variance that the fit has left."""
+        whole = float(np.sum((component.statistic @ component.design) ** 2))
+        return self._moment(component.statistic, component.design) / whole
+
+    def _dof(self, component: _Component, count: int) -> float:
+        """Degrees of freedom of a variance read by its statistic, at most one less than the groups it is of."""
+        shown = component.statistic @ self._shown @ component.design
+        gram = shown.T @ shown
+        trace, square = float(np.trace(gram)), float(np.sum(gram**2))
+        return min(trace**2 / square, count - 1.0) if square > 0 else 0.0
+
+    def _equations(self, components: Sequence[_Component]) -> Floats:
+        """Expectation of each statistic by each variance, every row over its own diagonal."""
+        table = np.array([[self._moment(a.statistic, b.design) for b in components] for a in components])
+        return table / np.maximum(np.diag(table), np.finfo(float).tiny)[:, None]
+
+    def _condition(self, components: Sequence[_Component]) -> float:
+        return float(np.linalg.cond(self._equations(components)))
+
+    def _solved(self, between: Sequence[_Component], within: Sequence[_Component]) -> Effects:
+        from scipy.optimize import nnls
+
+        used = [c for c in (*between, *within) if self._retained(c) >= _MIN_RETAINED]
+        if not used:
+            return Effects()
+        own = np.array([self._moment(c.statistic, c.design) for c in used])
+        read = np.array([np.sum((c.statistic @ self._read) ** 2) - np.sum(c.statistic**2 @ self._noise) for c in used])
+        variances = dict(zip(map(id, used), nnls(self._equations(used), read / own)[0].tolist(), strict=True))
+        gain, offset = (float(np.sqrt(variances.get(id(c), 0.0))) for c in between) if between else (0.0, 0.0)
+        run_gain, run_offset = (float(np.sqrt(variances.get(id(c), 0.0))) for c in within) if within else (0.0, 0.0)
+        return Effects(
+            gain, offset * self.unit, self._dof(between[0], len(self.sessions)) if between else 0.0,
+            run_gain, run_offset * self.unit, self._dof(within[0], len(self.runs)) if within else 0.0,
+        )  # fmt: skip
+
+    def _refitted(self, shift: Floats) -> Floats:
+        """(P, P) mean square of the parameters over draws (D, R, 2) of gains and offsets [-, N]."""
+        size, count = self.slopes[0].shape[1], len(self.runs)
+        grams, rest = np.empty((count, size + 2, size + 2)), np.empty(count)
+        for i, (run, slope) in enumerate(zip(self.runs, self.slopes, strict=True)):
+            table = np.column_stack([slope, run.predicted, np.ones(run.picked.size)])
+            grams[i] = table.T @ table
+            own = table[:, size:]
+            rest[i] = np.sum((run.residual - own @ np.linalg.lstsq(own, run.residual, rcond=None)[0]) ** 2)
+        pulls = np.einsum("rpk,drk->drp", grams[:, :size, size:], shift)
+        scale = np.array([run.scale * np.sqrt(run.picked.size) for run in self.runs])
+        moved, weight = np.zeros((len(shift), size)), np.ones((len(shift), count))
+        for _ in range(_ROUNDS):
+            pull = weight / scale**2
+            normal = np.einsum("dr,rpq->dpq", pull, grams[:, :size, :size])
+            unit = np.sqrt(np.einsum("dpp->dp", normal))
+            right = np.einsum("dr,drp->dp", pull, pulls) / unit
+            moved = np.linalg.solve(normal / unit[:, :, None] / unit[:, None, :], right[:, :, None])[:, :, 0] / unit
+            left = np.concatenate([np.broadcast_to(moved[:, None, :], (len(shift), count, size)), -shift], axis=2)
+            squares = np.einsum("drp,rpq,drq->dr", left, grams, left, optimize=True) + rest
+            weight = 1 / np.maximum(np.sqrt(np.maximum(squares, 0)) / scale, _LEAST_ERROR)
+        return moved.T @ moved / len(shift)

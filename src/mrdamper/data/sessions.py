@@ -1,0 +1,60 @@
+"""The session a run was recorded in: runs of one session share what a rig changes from day to day."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from mrdamper.data.runs import Run
+from mrdamper.errors import InputError
+
+SESSIONS_NEEDED = 3  # sessions from which the scatter between sessions is estimated
+
+
+def session_of(run: Run) -> str | None:
+    """Session of a run: as stated in its note `session`, else the day of `recorded_at`, else None.
+
+    A run of unknown session (None) belongs to no session, not to one of its own.
+
+    Raises
+    ------
+    InputError
+        E_CLOCK if the clock is needed and is no date.
+
+    Examples
+    --------
+    >>> from mrdamper import load_dataset
+    >>> from mrdamper.data import session_of
+    >>> session_of(load_dataset()["lab_A.1"])
+    '2020-06-10'
+    """
+    stated = str(run.notes.get("session", "")).strip()
+    if stated:
+        return stated
+    clock = _clock_of(run)
+    return None if clock is None else clock.date().isoformat()
+
+
+def hour_of(run: Run) -> float | None:
+    """Hours since 1970-01-01 at which a run was recorded; None where no time of day is known.
+
+    Raises
+    ------
+    InputError
+        E_CLOCK if the clock is no date.
+    """
+    clock = _clock_of(run)
+    if clock is None or len(str(run.notes["recorded_at"]).strip()) <= len("2024-05-31"):
+        return None
+    return (clock - datetime(1970, 1, 1)).total_seconds() / 3600
+
+
+def _clock_of(run: Run) -> datetime | None:
+    text = str(run.notes.get("recorded_at", "")).strip()
+    if not text:
+        return None
+    try:
+        return datetime.fromisoformat(text).replace(tzinfo=None)
+    except ValueError:
+        raise InputError(
+            f"recorded_at is {text!r}", where=f"run {run.id}", mend="write 2024-05-31T14:05:00", code="E_CLOCK"
+        ) from None
