@@ -42,7 +42,7 @@ class Stream:
 
     @cached_property
     def band(self) -> PortableBand | None:
-        """Where the force lies in a session nobody has seen; None where nothing is known of it."""
+        """Prediction interval of the force in three parameters; None where there is none."""
         return portable_band(self.damper)
 
 

@@ -25,7 +25,7 @@ SLOPES = np.column_stack([MOTION.velocity, np.sign(MOTION.velocity + 1e-9)])
 COVARIANCE = np.array([[90.0, -4.0], [-4.0, 30.0]])
 KNOWN = Certainty(
     ("c", "fy"), (False, False), COVARIANCE, np.array([12.0, 5.0]), gain=0.03, offset=4.0, session_dof=3.0,
-    force=0.02, peak=0.015, energy=0.05, left_out=9,
+    run_gain=0.012, run_offset=2.5, run_dof=8.0, force=0.02, peak=0.015, energy=0.05, left_out=9,
 )  # fmt: skip
 
 
@@ -57,37 +57,38 @@ def test_a_band_adds_numbers_sessions_and_form(level, shown):
     found, force, slopes = band(damper(), PREDICTION, level, shown), FORCE[at], SLOPES[at]
     half = (force.max() - force.min()) / 2
     own = np.array([s @ COVARIANCE @ s for s in slopes])
-    session, form = (0.03 * force) ** 2 + 16.0, (0.02 * half) ** 2
+    session, form = (0.03 * force) ** 2 + 16.0, (0.012 * force) ** 2 + 2.5**2 + (0.02 * half) ** 2
     assert found.parameter == pytest.approx(np.sqrt(own))
     assert found.session == pytest.approx(np.sqrt(session))
-    assert found.model == pytest.approx(np.full(force.size, 0.02 * half))
+    assert found.model == pytest.approx(np.sqrt(form))
     whole = own + session + form
-    t = reach(level, own.mean(), session.mean(), form) / np.sqrt(whole.mean())
+    t = reach(level, own.mean(), session.mean(), form.mean()) / np.sqrt(whole.mean())
     assert found.high - force == pytest.approx(t * np.sqrt(whole))
     assert force - found.low == pytest.approx(t * np.sqrt(whole))
     swing = (slopes[force.argmax()] - slopes[force.argmin()]) / 2
-    parts = swing @ COVARIANCE @ swing, (0.03 * half) ** 2, (0.015 * half) ** 2
+    parts = swing @ COVARIANCE @ swing, (0.03 * half) ** 2, (0.012**2 + 0.015**2) * half**2
     unseen, seen = reach(level, *parts), reach(level, parts[0], 0.0, parts[2])
     assert found.peak == pytest.approx((half - unseen, half + unseen))
     assert found.known_session == pytest.approx((half - seen, half + seen))
     time, v = MOTION.time[at], MOTION.velocity[at]
     power, *turned = (np.trapezoid(f * v, time) for f in (force, slopes[:, 0], slopes[:, 1]))
     share = np.array(turned) / power
-    loss = reach(level, share @ COVARIANCE @ share, 0.03**2, 0.05**2)
+    loss = reach(level, share @ COVARIANCE @ share, 0.03**2, 0.012**2 + 0.05**2)
     assert found.energy == pytest.approx((-loss, loss))
 
 
 def test_where_nothing_is_known_there_is_no_band_and_its_reason():
     assert band(damper(None), PREDICTION) is None
-    assert band(damper(replace(KNOWN, session_dof=0.4)), PREDICTION) is None
-    assert band(damper(replace(KNOWN, session_dof=0.6)), PREDICTION) is not None
+    assert band(damper(replace(KNOWN, session_dof=0.0, run_dof=0.0)), PREDICTION) is None
+    assert band(damper(replace(KNOWN, session_dof=0.0)), PREDICTION) is not None
+    assert band(damper(replace(KNOWN, run_dof=0.0)), PREDICTION) is not None
     assert "without its covariance" in no_band(damper(None))
-    assert "one session" in no_band(damper())
+    assert "too few" in no_band(damper())
     for level in (0.0, 1.0):
         with pytest.raises(InputError, match="level"):
             band(damper(None), PREDICTION, level)
     # Not below nothing, however unsure; one run of each kind has one degree of freedom.
-    wild = replace(KNOWN, gain=9.0, session_dof=0.6, left_out=1, dof=np.array([1.0, 1.0]))
+    wild = replace(KNOWN, gain=9.0, session_dof=1.0, run_dof=1.0, dof=np.array([1.0, 1.0]))
     assert band(damper(wild), PREDICTION).peak[0] == 0.0
 
 
@@ -110,7 +111,9 @@ def test_a_band_in_three_numbers_is_that_of_loops_at_three_currents(monkeypatch)
     portable = portable_band(replace(made, envelope=tested), 0.8)
     t = np.mean([30.0, 60.0, 130.0]) / 13
     own = np.mean([9 / (100 + 50 * I) ** 2 for I in widths])
-    assert (portable.level, portable.gain, portable.offset_N) == (0.8, pytest.approx(0.03 * t), pytest.approx(4 * t))
+    assert (portable.level, portable.gain, portable.offset_N) == (
+        0.8, pytest.approx(np.hypot(0.03, 0.012) * t), pytest.approx(np.hypot(4, 2.5) * t),
+    )  # fmt: skip
     assert portable.of_peak == pytest.approx(t * np.sqrt(0.02**2 + own))
     assert asked == [replace(CONDITION, current_A=I) for I in widths]
     slow = SimpleNamespace(**(vars(tested) | {"peak_velocity_m_s": (0.0, 0.05)}))  # slower than the middle of all
@@ -138,15 +141,16 @@ def test_what_is_known_badly_is_told_number_by_number():
         return " ".join(unsure(damper(replace(KNOWN, **more))))
 
     assert "sessions" not in said()
-    assert "too few sessions" in said(session_dof=1.9)
-    assert "of one session" in said(session_dof=0.4)
+    assert "fewer than two degrees of freedom" in said(session_dof=1.9)
+    assert "Fewer than three known sessions" in said(session_dof=0.0)
     errors = np.diag([1001.0**2, 49.0**2])
-    assert "c cannot be told from zero" in said(covariance=errors)
-    assert "fy cannot" not in said(covariance=errors)
+    assert "c is not significant (2000 ± 2200 N s/m)" in said(covariance=errors)
+    assert "fy is not" not in said(covariance=errors)
     logs = np.diag([0.49**2, 0.7**2])
-    assert "fy is known to a factor of 2.0 only" in said(covariance=logs, logs=(True, True))
-    assert "c is known" not in said(covariance=logs, logs=(True, True))
-    assert "fy is not known at all" in said(covariance=np.diag([0.1, 3.1**2]), logs=(True, True))
+    factor = np.exp(2 * 0.7 * students_t.ppf(0.975, 5.0))
+    assert f"95 % interval of fy spans a factor of {factor:.2g}" in said(covariance=logs, logs=(True, True))
+    assert "interval of c spans" not in said(covariance=logs, logs=(True, True))
+    assert "fy" not in said(covariance=np.diag([0.1, 3.1**2]), logs=(True, True)).replace("fy0", "")
     assert "c ended at" in said(names=("fy",), logs=(False,), covariance=np.eye(1), dof=np.ones(1), one_sided=("c",))
 
 
@@ -168,7 +172,8 @@ def test_hours_are_counted_from_1970_where_a_clock_is_stated():
 
     assert when(recorded_at="1970-01-02T02:30:00") == When("1970-01-02", 26.5)
     assert when(recorded_at="1970-01-02", session="morning") == When("morning", None)
-    assert (when(), when(session="b")) == (When("run r7"), When("b"))
+    assert (when(), when(session="b")) == (When(None), When("b"))
+    assert not SPREAD.covariance([When(None)], [When(None), When("a")]).any()  # unknown is no session
 
 
 def test_the_mean_given_others_is_that_of_the_joint_normal():
@@ -201,7 +206,7 @@ def test_gains_are_expected_of_other_runs_of_the_session_and_bands_follow():
         replace(sessions, gains=(1.0,))
     known = Expected(1.2, 0.01, 5.0, 2.0)
     assert known.corrected(PREDICTION).force == pytest.approx(1.2 * FORCE + 5)
-    plain = band(damper(replace(KNOWN, gain=0.01, offset=2.0)), PREDICTION, 0.8)
+    plain = band(damper(replace(KNOWN, gain=0.01, offset=2.0, run_gain=0.0, run_offset=0.0)), PREDICTION, 0.8)
     moved = known.band(damper(), PREDICTION, 0.8)
     assert moved.low == pytest.approx(1.2 * plain.low + 5)
     assert moved.high == pytest.approx(1.2 * plain.high + 5)

@@ -11,26 +11,31 @@ from typer.testing import CliRunner
 
 from mrdamper.cli import application
 from mrdamper.dampers.bands import band, no_band, portable_band
+from mrdamper.dampers.calibration import PredictedRun
 from mrdamper.dampers.certainty import Certainty, table, unsure
-from mrdamper.dampers.covariance import certain, session_of
+from mrdamper.dampers.covariance import certain
 from mrdamper.data import Condition
 from mrdamper.errors import InputError, ModelFileError
 from mrdamper.files.model_file import dump_model, parse_model, save_model
-from mrdamper.metrics import score
 
 
 @pytest.fixture(scope="module")
 def damper():
     truth = joint_damper()
-    return certain(truth, session_runs(truth))
+    return certain(truth, named(session_runs(truth)))
+
+
+def named(runs):
+    """Runs with a session of its own stated for each."""
+    return [replace(run, notes={"session": f"day {number}"}) for number, run in enumerate(runs)]
 
 
 def test_gains_of_sessions_are_found():
     truth = joint_damper()
-    found = [certain(truth, session_runs(truth, seed=s, repeats=2)).certainty for s in range(4)]
+    found = [certain(truth, named(session_runs(truth, seed=s, repeats=2))).certainty for s in range(4)]
     # 18 sessions know their spread to a sixth, four repeats to a twelfth.
     assert np.sqrt(np.mean([c.gain**2 for c in found])) == pytest.approx(0.045, rel=0.35)
-    still = certain(truth, session_runs(truth, gain=0.0)).certainty
+    still = certain(truth, named(session_runs(truth, gain=0.0))).certainty
     assert still.gain < 0.01
     assert np.all(np.diag(still.covariance) < np.diag(found[0].covariance))
 
@@ -39,7 +44,18 @@ def test_a_certainty_is_saved_bit_by_bit(damper):
     back = parse_model(dump_model(damper)).certainty
     assert np.array_equal(back.covariance, damper.certainty.covariance)
     assert np.array_equal(back.dof, damper.certainty.dof)
-    for name in ("names", "gain", "offset", "words", "taught", "unknown", "one_sided"):
+    for name in (
+        "names",
+        "gain",
+        "offset",
+        "run_gain",
+        "run_dof",
+        "calibration",
+        "words",
+        "taught",
+        "unknown",
+        "one_sided",
+    ):
         assert getattr(back, name) == getattr(damper.certainty, name)
     assert sum(back.taught.values()) == pytest.approx(1.0)
     assert "covariance" not in json.loads(dump_model(joint_damper()))
@@ -77,7 +93,7 @@ def test_three_numbers_say_nearly_what_the_whole_covariance_says(damper):
 
 def test_the_band_of_the_peak_holds_new_sessions():
     truth = joint_damper()
-    made = certain(truth, session_runs(truth, seed=5, repeats=2))
+    made = certain(truth, named(session_runs(truth, seed=5, repeats=2)))
     inside = []
     for run in session_runs(truth, seed=6, repeats=3):
         prediction = made.predict_run(run)
@@ -89,10 +105,14 @@ def test_the_band_of_the_peak_holds_new_sessions():
 def test_what_left_out_conditions_were_wrong_by_widens_the_band():
     truth = joint_damper()
     runs = session_runs(truth)
-    wrong = [score(r.force, 1.2 * r.force, np.gradient(r.displacement, r.time), r.time) for r in runs]
+    steps = [np.sign(np.diff(r.displacement, prepend=0.0)) * 0.3 * np.ptp(r.force) for r in runs]
+    wrong = [
+        PredictedRun.of(r, r.force + s, np.gradient(r.displacement, r.time)) for r, s in zip(runs, steps, strict=True)
+    ]
     sure, unsure = certain(truth, runs), certain(truth, runs, wrong)
     prediction = truth.predict(Condition(0.5, 1.0, 0.01))
-    assert unsure.certainty.peak > 0.1
+    assert unsure.certainty.force > 2 * sure.certainty.force
+    assert unsure.certainty.calibration.units == 9
     assert np.ptp(band(unsure, prediction).peak) > np.ptp(band(sure, prediction).peak)
 
 
@@ -121,13 +141,6 @@ def test_functions_have_a_spread_too():
     assert isinstance(parse_model(dump_model(made)).certainty, Certainty)
 
 
-def test_a_session_is_a_day_and_hour_or_the_run():
-    run = session_runs(joint_damper())[0]
-    assert session_of(run) == "run r0"
-    assert session_of(replace(run, notes={"recorded_at": "2020-06-10T10:05:11"})) == "2020-06-10T10"
-    assert session_of(replace(run, notes={"recorded_at": "2020-06-10T10:05:11", "session": "a"})) == "a"
-
-
 def test_the_command_writes_the_band(damper, tmp_path):
     path = tmp_path / "m.json"
     runner, ask = CliRunner(), ["--current", "0.5", "--frequency", "1", "--amplitude", "10"]
@@ -142,20 +155,27 @@ def test_the_command_writes_the_band(damper, tmp_path):
     assert "no band" in got.stderr
 
 
-def test_one_session_or_one_run_gives_no_band(tmp_path):
+def test_one_session_gives_a_band_for_sessions_like_it_and_one_run_none(tmp_path):
     truth = joint_damper()
     runs = [replace(run, notes={"session": "monday"}) for run in session_runs(truth)]
+    ask = ["predict", str(tmp_path / "m.json"), "--current", "0.5", "--frequency", "1", "--amplitude", "10"]
     for few in (runs, runs[:1]):
         made = certain(truth, few)
-        assert band(made, made.predict(Condition(0.5, 1.0, 0.01))) is None
-        assert "All runs are of one session" in " ".join(unsure(made))
-        assert no_band(made) != no_band(truth)
-    save_model(made, tmp_path / "m.json")
-    ask = ["predict", str(tmp_path / "m.json"), "--current", "0.5", "--frequency", "1", "--amplitude", "10"]
-    got = CliRunner().invoke(application(), ask)
-    assert got.exit_code == 0
-    assert "one session" in got.stderr
-    assert "force_low_N" not in got.stdout
+        assert made.certainty.gain == made.certainty.offset == made.certainty.session_dof == 0.0
+        assert "Fewer than three known sessions" in " ".join(unsure(made))
+        save_model(made, tmp_path / "m.json")
+        got = CliRunner().invoke(application(), ask)
+        assert got.exit_code == 0
+        around = band(made, made.predict(Condition(0.5, 1.0, 0.01)))
+        if few is runs:
+            assert around is not None
+            assert "for sessions like the tested ones" in got.stderr
+            assert "force_low_N" in got.stdout
+        else:
+            assert around is None
+            assert "too few to show how runs differ" in got.stderr
+            assert "force_low_N" not in got.stdout
+    assert no_band(made) != no_band(truth)
 
 
 def test_a_perfect_fit_claims_nothing_infinite_and_writes_zero():
@@ -180,7 +200,7 @@ def test_what_does_the_same_to_the_force_has_no_interval_though_the_rest_has():
     made = certain(truth, [run for run in session_runs(truth, gain=0.0) if run.current_A == 0.5])
     said = " ".join(unsure(made))
     for pair in ("c0 and c1", "fy0 and fy1", "h0 and h1"):
-        assert f"{pair} cannot both be known from one current" in said
+        assert f"{pair} are not both identifiable from one current" in said
     assert set(made.certainty.unknown) == {"c0", "c1", "fy0", "fy1", "h0", "h1"}
     low, high = made.certainty.interval(made, "f0")
     assert low < truth.model.f0 < high

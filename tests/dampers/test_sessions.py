@@ -75,7 +75,7 @@ def test_other_runs_of_the_day_take_most_of_a_day_away():
     unknown = [each.error(1.0, 0.0) for each in readings]
     assert np.mean(known_errors(runs, readings)) < 0.6 * np.mean(unknown)
     shuffled = [replace(r, notes={"session": f"{i % 6} {i // 6}"}) for i, r in enumerate(runs[:12])]
-    with pytest.raises(InputError, match="one run each") as caught:
+    with pytest.raises(InputError, match="every session holds one run") as caught:
         known_errors(shuffled, readings[:12])
     assert caught.value.code == "E_SESSION"
 

@@ -65,7 +65,9 @@ def test_a_motion_that_never_yields_says_so():
 def test_what_the_tests_have_one_of_is_the_reason():
     one = [Condition(0.5, 1.0, a) for a in (0.01, 0.02)]
     said = weaknesses(["k1", "m", "c"], np.diag([np.inf, np.inf, 1.0]), [(0, 1)], one)
-    assert said == ["k1 and m cannot both be known from one frequency and one current: they do the same to the force"]
+    assert said == [
+        "k1 and m are not both identifiable from one frequency and one current: they do the same to the force"
+    ]
     still = [Condition(0.0, f, a) for f, a in ((1.0, 0.01), (2.0, 0.02))]
     assert "fy1 unseen without current" in weaknesses(["fy1"], np.diag([np.inf]), (), still)[0]
 
@@ -182,6 +184,6 @@ def test_a_certainty_that_cannot_be_computed_says_so():
     found = replace(identify(synthetic_run(CONDITION, 5.0, model=TRUTH)), ask=fails)
     assert found.interval("c") is None
     assert "c = " in repr(found)
-    assert "(cannot be known from these runs)" in repr(found)
-    assert found.table["state"][0] == "cannot be known from these runs"
-    assert "cannot be known from these runs: Singular matrix" in found.doubts[0]
+    assert "(not identifiable from these runs)" in repr(found)
+    assert found.table["state"][0] == "not identifiable from these runs"
+    assert "not identifiable from these runs: Singular matrix" in found.doubts[0]

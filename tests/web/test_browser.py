@@ -128,7 +128,7 @@ def test_from_drop_to_report(page, small_rig, tmp_path, shoot):
     assert page.locator("tbody tr").count() == 2
     shoot(page, "4-compared")
     page.get_by_role("button", name="Move Bingham", exact=True).click()  # how sure it is is worked out now
-    page.get_by_text("of unseen sessions:").wait_for()
+    page.get_by_text("% prediction interval").wait_for()
     open_tab(page, "Compare")
 
     with page.expect_download() as waiting:
@@ -270,7 +270,7 @@ def test_impossible_input_is_refused_in_words_and_the_tool_bar_is_beside_the_cur
 
 def test_the_band_follows_a_slider_that_is_dragged(on_model):
     page, chart = on_model, "section[aria-label='Force over displacement']"
-    page.locator(f"{chart} .keys").get_by_text("90 % of unseen sessions lie between").wait_for()
+    page.locator(f"{chart} .keys").get_by_text("90 % interval").wait_for()
 
     def low():
         return page.locator(f"{chart} .scatterlayer .js-line").first.get_attribute("d")
@@ -282,7 +282,7 @@ def test_the_band_follows_a_slider_that_is_dragged(on_model):
     page.mouse.down()
     page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + box["height"] / 2)
     comes_to(page, lambda: low() != before, True)
-    assert page.get_by_text("of unseen sessions:").count() == 1
+    assert page.get_by_text("% prediction interval").count() == 1
     page.mouse.up()
     at_rest(page)
 

@@ -161,12 +161,15 @@ class PortableBand:
         [N]
     of_peak : float
         Of half the peak-to-peak force: the model's own error and that of its parameters.
+    scope : str
+        Sessions it holds for, as a phrase.
     """
 
     level: float
     gain: float
     offset_N: float
     of_peak: float
+    scope: str = ""
 
 
 def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
@@ -197,6 +200,5 @@ def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
         own.append(np.mean(found.parameter**2) / peak_force(prediction.force) ** 2)
         quantile.append(np.mean(found.high - prediction.force) / (np.mean(parts) or 1.0))
     t = float(np.mean(quantile))
-    return PortableBand(
-        level, t * known.total_gain, t * known.total_offset, t * float(np.sqrt(known.force**2 + np.mean(own)))
-    )
+    of_peak = t * float(np.sqrt(known.force**2 + np.mean(own)))
+    return PortableBand(level, t * known.total_gain, t * known.total_offset, of_peak, scope(damper, level))

@@ -72,7 +72,10 @@ def certain(
     infinite = np.diag([np.inf if i in unseen else 1.0 for i in range(len(free))])
     words = weaknesses(free, infinite, alike, conditions)
     unknown = {free[i] for i in (*unseen, *(i for group in alike for i in group))}
-    spread, wide = _identifiable([free[i] for i in known], numbers, parts, [s[:, known] for s in slopes], inverse)
+    names = [free[i] for i in known]
+    # A parameter at its bound of zero has no size that its interval could be compared with.
+    sized = {name for name in names if bounded or numbers[name].value}
+    spread, wide = _identifiable(names, sized, numbers, parts, [s[:, known] for s in slopes], inverse)
     effects = spread.effects
     made = Certainty(
         spread.names, tuple(numbers[n].log for n in spread.names), spread.covariance, spread.dof, at_bound,
@@ -127,6 +130,7 @@ class _Spread:
 
 def _identifiable(
     names: list[str],
+    sized: Collection[str],
     own: Mapping[str, FittedParameter],
     parts: Sequence[RunResiduals],
     slopes: Sequence[Floats],
@@ -145,7 +149,7 @@ def _identifiable(
             interval_about(own[n].value, float(e), float(d), _LEVEL, own[n].log)
             for n, e, d in zip(names, errors, found.dof, strict=True)
         ]
-        lost = [i for i, each in enumerate(ends) if each is None]
+        lost = [i for i, each in enumerate(ends) if each is None and names[i] in sized]
         if not lost:
             return found, wide
         wide |= {names[i] for i in lost}

@@ -115,7 +115,8 @@ class GainsAndOffsets:
             ([[k] for k in range(count)], (effects.run_gain, effects.run_offset)),
         ):
             scale = np.array([gain, offset / self.unit])
-            moved = [self.effect[:, 2 * np.array(group)[:, None] + [0, 1]].sum(axis=1) * scale for group in members]
+            by_run = self.effect.reshape(len(self.effect), count, 2)
+            moved = [by_run[:, group].sum(axis=1) * scale for group in members]
             kinds.append(np.sum(np.square(moved), axis=(0, 2)) if moved else np.zeros(len(self.effect)))
         total = np.maximum(kinds[0] + kinds[1], np.finfo(float).tiny)
         return whole, kinds[0] / total, kinds[1] / total

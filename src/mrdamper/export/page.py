@@ -139,7 +139,7 @@ def _words(damper: Damper | Model, made: Stream) -> list[str]:
         if made.model is None:
             sentences.append(_FUNCTIONS)
         if made.band is not None:
-            sentences.append(f"Shaded: where {100 * made.band.level:g} % of forces lie in a session nobody has seen.")
+            sentences.append(f"Shaded: {100 * made.band.level:g} % prediction interval of the force {made.band.scope}.")
     else:
         sentences.append("A model without tests behind it.")
     return sentences

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from mrdamper.dampers.bands import scope
 from mrdamper.dampers.certainty import table
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
@@ -255,7 +256,7 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
             else "Train runs, last cycle of the steady window: the dataset holds no validate runs."
         )
         + (
-            f" Dotted: where the force of a session nobody has seen lies, {100 * BAND_LEVEL:.0f} in a hundred."
+            f" Dotted: {100 * BAND_LEVEL:.0f} % prediction interval {scope(chosen.damper, BAND_LEVEL)}."
             if chosen.damper.certainty
             else ""
         ),

@@ -51,7 +51,7 @@ def register(app: typer.Typer) -> None:
         from dataclasses import replace
 
         from mrdamper.cli.output import put
-        from mrdamper.dampers.bands import band, no_band
+        from mrdamper.dampers.bands import band, no_band, scope
         from mrdamper.dampers.coil import Coil
         from mrdamper.data import Condition
         from mrdamper.errors import ConditionError, InputError
@@ -103,11 +103,13 @@ def register(app: typer.Typer) -> None:
                 f"offset {expected.offset:.3g} ± {expected.offset_spread:.2g} N",
                 err=True,
             )
-        typer.echo(_said(prediction, known, level) if known else f"note: {no_band(damper)}", err=True)
+        typer.echo(
+            _said(prediction, known, level, scope(damper, level)) if known else f"note: {no_band(damper)}", err=True
+        )
         put(prediction_rows(prediction, known), out, as_json, csv_text)
 
 
-def _said(prediction: Prediction, known: Band, level: float) -> str:
+def _said(prediction: Prediction, known: Band, level: float, where: str) -> str:
     """The peak force, its band, and where the band comes from."""
     from mrdamper.metrics import dissipated_power, peak_force
 
@@ -122,9 +124,10 @@ def _said(prediction: Prediction, known: Band, level: float) -> str:
     damping = 2 * power / c.peak_velocity**2 if c.peak_velocity > 0 else math.nan
     low, high = (1 + share for share in known.energy)
     return (
-        f"peak force {peak_force(prediction.force):.4g} N; {100 * level:g} % band {known.peak[0]:.4g} to "
-        f"{known.peak[1]:.4g} N in an unknown session, {known.known_session[0]:.4g} to {known.known_session[1]:.4g} N "
-        f"once its gain is known; dissipated energy {energy:.4g} J a cycle ({energy * low:.4g} to "
+        f"peak force {peak_force(prediction.force):.4g} N; "
+        f"{100 * level:g} % prediction interval {known.peak[0]:.4g} to "
+        f"{known.peak[1]:.4g} N {where}; {known.known_session[0]:.4g} to {known.known_session[1]:.4g} N "
+        f"once a session's gain is known; dissipated energy {energy:.4g} J a cycle ({energy * low:.4g} to "
         f"{energy * high:.4g}), equivalent damping {damping:.4g} N s/m ({damping * low:.4g} to {damping * high:.4g}); "
         f"standard deviations: {parts}"
     )

@@ -31,7 +31,7 @@ from mrdamper.report.plots.style import (
 )
 from mrdamper.validation import Validation
 
-BAND_LEVEL = 0.9  # share of the sessions nobody has seen whose force the band holds
+BAND_LEVEL = 0.9  # level of the prediction intervals of reports
 _WORST_SHOWN = 25.0  # per cent; a run beyond is drawn as an arrow at the edge
 _AXES = {
     "c": ("Viscous damping c (N s/m)", 1.0),
@@ -64,7 +64,7 @@ def predicted_loops(damper: Damper, runs: Sequence[Run]) -> Figure:
                 edge = {"color": PREDICTED, "lw": 0.6, "ls": ":"}
                 curves += [
                     (around.low, edge),
-                    (around.high, {**edge, "label": f"{100 * BAND_LEVEL:.0f} % of sessions"}),
+                    (around.high, {**edge, "label": f"{100 * BAND_LEVEL:.0f} % interval"}),
                 ]
             curves.append((prediction.force[last], {"color": PREDICTED, "label": "predicted"}))
             for force, look in curves:

@@ -11,7 +11,7 @@ from fastapi import APIRouter
 from fastapi.responses import Response
 from pydantic import BaseModel, Field
 
-from mrdamper.dampers.bands import band, no_band
+from mrdamper.dampers.bands import band, no_band, scope
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Condition
 from mrdamper.metrics import dissipated_power, peak_force
@@ -101,7 +101,12 @@ def _predicted(found: Damper, ask: Ask, session: Session) -> Response:
         if name == "now" and ask.band and not ask.held and (around := band(found, prediction, _LEVEL)):
             for end, force in (("low", around.low), ("high", around.high)):
                 arrays |= {f"{end}.{axis}": v for axis, v in on_screen(prediction.motion, force).items()}
-            loops[-1] |= {"peak_from_N": around.peak[0], "peak_to_N": around.peak[1], "level": _LEVEL}
+            loops[-1] |= {
+                "peak_from_N": around.peak[0],
+                "peak_to_N": around.peak[1],
+                "level": _LEVEL,
+                "scope": scope(found, _LEVEL),
+            }
         elif name == "now" and ask.band:
             loops[-1]["no_band"] = _OF_HAND if ask.held else no_band(found)
     if ask.currents:

@@ -86,13 +86,13 @@ export class ModelCharts {
 const heldOut = (row) => (row.split === "validate" ? " (held out)" : "");
 const shade = (current, head) => `shade ${Math.min(1, current / (head.tested_A[1] || 1)).toFixed(3)}`;
 
-/** Where the force of a session nobody has seen lies, as two lines around the loop. */
+/** Prediction interval of the force as two lines around the loop. */
 function band(head, arrays, a, b) {
   const [{ level }] = head.loops;
   if (!level) return [];
   return ["low", "high"].map((end) => ({
     x: arrays[`${end}.${a}`], y: arrays[`${end}.${b}`], color: "predicted", width: 1, dash: "dot", opacity: 0.75, quiet: true,
-    name: `${Math.round(100 * level)} % of unseen sessions lie between`, legend: end === "low",
+    name: `${Math.round(100 * level)} % interval`, legend: end === "low",
   }));
 }
 

@@ -200,7 +200,7 @@ class ModelView {
     const said = flags.length ? `Extrapolation in ${flags.map(([name]) => name).join(", ")}` : "Inside the tested conditions";
     if (this.spoken !== said) this.bench.speak(said); // when it changes, not at every move
     this.spoken = said;
-    const between = now.level ? ` (${Math.round(100 * now.level)} % of unseen sessions: ${figures(now.peak_from_N, 3)} to ${figures(now.peak_to_N, 3)} N)` : "";
+    const between = now.level ? ` (${Math.round(100 * now.level)} % prediction interval ${now.scope}: ${figures(now.peak_from_N, 3)} to ${figures(now.peak_to_N, 3)} N)` : "";
     const none = now.level ? "" : ` ${capital(now.no_band ?? (this.pace > SLOW ? "no band: this model takes too long for one" : "the band follows at rest"))}.`;
     const amounts = `Predicted: peak force ${figures(now.peak_N)} N${between}, energy ${figures(now.energy_J)} J a cycle.${none} ${nearest(head.nearest[0])}`;
     put(this.verdict, flags.length
