@@ -71,7 +71,7 @@ def current_of(
 def _statements(table: RawTable, path: Path) -> list[Statement]:
     """Every current that stands beside the columns, the surest place first."""
     held = held_current_of(table)
-    found = [] if held is None else [Statement(held, "a number in the file")]
+    found = [] if held is None else [Statement(held, table.stated_in or "a number in the file")]
     found += stated_by_lines(table.remarks, table.form.get("decimal"))  # type: ignore[arg-type]
     member = table.source.name.removeprefix(f"{path.name}:").removeprefix(f"{path.name}, sheet ")
     for text, whence in ((table.label, "the title"), (path.name, "file name"), (member, "file name")):

@@ -82,6 +82,10 @@ _ELSEWHERE = frozenset(
     ("lateral", "side", "transverse", "transversal", "radial", "bending", "shear", "quer", "querkraft", "seitenkraft",
      "motor", "pump", "pumpe", "heater", "drive", "servo", "servovalve", "leakage", "mains")
 )  # fmt: skip
+# Forces that a laboratory shows as weights.
+_WEIGHT = frozenset(
+    ("load", "loadcell", "last", "charge", "carga", "carico", "weight", "gewicht", "poids", "peso", "荷重", "载荷")
+)
 _COIL = frozenset(
     ("coil", "spule", "spulenstrom", "bobine", "bobina", "solenoid", "magnet", "线圈电流", "damper", "icoil", "ispule")
 )
@@ -194,6 +198,11 @@ def names_condition(key: str, role: str) -> bool:
     """Whether a line's or an attribute's name stands for a channel's value in the whole test, set or measured."""
     kept = [word for word in words_of(key) if word.casefold() not in _SET]
     return bool(kept) and role_of(" ".join(kept)) == role
+
+
+def names_weight(name: str) -> bool:
+    """Whether a name is of a load that is shown as a weight."""
+    return any(word.casefold().rstrip("0123456789") in _WEIGHT for word in words_of(name))
 
 
 def says_nothing(name: str) -> bool:

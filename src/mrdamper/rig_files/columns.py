@@ -106,6 +106,22 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
     return assigned
 
 
+def partly_assigned(table: RawTable, profile: Profile) -> dict[str, Assigned]:
+    """The channels of a table that is no whole test, as far as they are known beyond doubt."""
+    found: dict[str, Assigned] = {}
+    for role in ROLES:
+        try:
+            stated = profile.channel(role).column
+            column = _choose(table, role, [e.column for e in found.values()]) if stated is None else None
+            column = _named(table, stated, role) if stated is not None else column
+            entry = None if column is None else _convert(table, role, column, profile.channel(role))
+        except InputError:
+            continue
+        if entry is not None:
+            found[role] = entry
+    return found
+
+
 def rate_of(table: RawTable, profile: Profile) -> float | None:
     """Sampling rate [Hz] of a table without time stamps, by the profile or by what stands beside the columns."""
     if profile.file.sample_rate_Hz:
@@ -164,6 +180,20 @@ def propose(table: RawTable) -> dict[str, tuple[int | None, str]]:
         elif role in REQUIRED:
             proposed[role] = None, ""
     return proposed
+
+
+def candidates_of(table: RawTable, role: str) -> list[int]:
+    """The columns that may be a channel: the one its name tells, else all of its unit that name nothing else."""
+    try:
+        choice = _choose(table, role, ())
+    except InputError:
+        choice = None
+    if choice is not None:
+        return [choice]
+    headers = table.headers
+    fitting = [i for i, header in enumerate(headers) if header.dimension == DIMENSION[role]]
+    named = [i for i in fitting if headers[i].role == role]
+    return named or [i for i in fitting if says_nothing(headers[i].name)]
 
 
 def _choose(table: RawTable, role: str, taken: Collection[int]) -> int | None:

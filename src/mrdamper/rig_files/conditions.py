@@ -72,6 +72,11 @@ def currents_in(text: str) -> tuple[float, ...]:
     return tuple(dict.fromkeys(found))
 
 
+def without_currents(text: str) -> str:
+    """A title without the currents it states."""
+    return re.sub(r"\s{2,}", " ", _IN_NAME.sub(" ", text[:255])).strip() if currents_in(text) else text
+
+
 def amperes(number: str, unit: str) -> float:
     """A number with decimal point, comma, x or p, in A or mA."""
     value = float(re.sub("[,xp]", ".", number))

@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from mrdamper.data.pieces import pieces
+from mrdamper.errors import InputError
 from mrdamper.rig_files.column_names import role_of, words_of
 from mrdamper.rig_files.conditions import currents_in
 from mrdamper.rig_files.file_form import FileForm
@@ -20,6 +21,7 @@ from mrdamper.rig_files.units import DIMENSION
 
 MOST_RUNS = 2000
 _FEWEST_ROWS = 5  # of a test, on average
+_SMALL = 32 * 2**20  # bytes of a file whose columns are kept together
 _RUN_WORDS = frozenset(
     ("run", "test", "specimen", "experiment", "trial", "versuch", "prüfung", "prüflauf", "lauf", "messung", "essai",
      "éprouvette", "ensayo", "prova", "teste", "тест", "试验", "試験", "measurement", "recording", "record")
@@ -36,7 +38,7 @@ def tests_of(table: RawTable, form: FileForm) -> list[RawTable]:
         parts = _by_run(table, column, stated=form.run_column is not None)
         if parts:
             return parts
-    return _groups(table, form) or [table]
+    return _groups(table, form) or _shared_motion(table) or [table]
 
 
 def _run_column(table: RawTable, form: FileForm) -> int | None:
@@ -84,8 +86,24 @@ def _rows_of(codes: np.ndarray, code: int) -> slice | np.ndarray:
 
 
 def _remembered(table: RawTable) -> Callable[[tuple[int, ...]], Content]:
-    """The table's columns, kept while its tests are taken out one by one."""
-    return lru_cache(maxsize=2)(lambda columns: table.read(columns))
+    """The table's columns, kept while its tests are taken out one by one; of a small file all are read in one pass."""
+    if table.source.size > _SMALL:
+        return lru_cache(maxsize=2)(lambda columns: table.read(columns))
+
+    @cache
+    def every() -> Content | None:
+        wanted = [i for i, header in enumerate(table.headers) if header.role is not None or header.dimension]
+        try:
+            return table.read(wanted)
+        except InputError:
+            return None  # one of them cannot be read, which matters only if it is asked for
+
+    @lru_cache(maxsize=2)
+    def read(columns: tuple[int, ...]) -> Content:
+        known = every()
+        return known if known is not None and set(columns) <= set(known.values) else table.read(columns)
+
+    return read
 
 
 def _part(
@@ -146,6 +164,30 @@ def _groups(table: RawTable, form: FileForm) -> list[RawTable]:
             titles[key],
         )
         for key, roles in members.items()
+    ]
+
+
+def _shared_motion(table: RawTable) -> list[RawTable]:
+    """One motion with several forces, each of which has a title that states its current: a test each."""
+    columns = {role: [i for i, header in enumerate(table.headers) if header.role == role] for role in DIMENSION}
+    forces = [i for i in columns["force"] if table.headers[i].dimension in (None, "force")]
+    titles = [table.over[i] if table.over else "" for i in forces]
+    stated = [currents_in(title) for title in titles]
+    if len(forces) < 2 or len(columns["displacement"]) != 1 or any(len(currents) != 1 for currents in stated):
+        return []
+    if len(set(stated)) < len(stated):
+        return []
+    read = _remembered(table)
+    others = [i for i in range(len(table.names)) if i not in forces]
+    return [
+        _part(
+            table,
+            read,
+            sorted([*others, i]),
+            cache(partial(_filled, table, read, {"force": i, "displacement": i}, t)),
+            t,
+        )
+        for i, t in zip(forces, titles, strict=True)
     ]
 
 

@@ -18,6 +18,17 @@ from mrdamper.rig_files.coil_current import as_data, held_current_of
 from mrdamper.rig_files.column_names import names_compression, names_made
 from mrdamper.rig_files.columns import assign, propose, rate_of
 from mrdamper.rig_files.long_records import judge_long
+from mrdamper.rig_files.mapping.companions import (
+    joined_parts,
+    part_of,
+    results_of,
+    with_currents_of,
+    with_results_of,
+)
+from mrdamper.rig_files.mapping.completion import completed
+from mrdamper.rig_files.mapping.proposals import with_channels_by_physics, with_unit_of_time
+from mrdamper.rig_files.mapping.rasters import with_one_clock
+from mrdamper.rig_files.mapping.results import with_results
 from mrdamper.rig_files.packed_folder import is_packed_folder, unpacked
 from mrdamper.rig_files.parts import tests_of
 from mrdamper.rig_files.profile import Channel, Profile, current_pattern, load_profile, profile_hash
@@ -28,6 +39,7 @@ from mrdamper.rig_files.rig_record import joined, records_of
 from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests
 
+_MAY_BE_PARTS = ("E_COLUMN", "E_UNITS_MISSING", "E_UNITS_DIMENSION", "E_AMBIGUOUS", "E_NO_DATA", "E_NUMBER")
 _ROWS_SHOWN, _MOST_SHOWN = 6, 30  # rows and columns of a preview
 
 
@@ -221,26 +233,111 @@ def import_files(
             tests = beside[0]
         table = tests if tests is None or isinstance(tests, TestsTable) else load_tests(tests)
         files, left_out = _files(given)
-        records: list[Record] = []
-        refusals: list[Refusal] = []
-        notes: list[Refusal] = []
-        met: list[tuple[Path, str]] = []
+        intake = _Intake(profile, table)
         for number, path in enumerate(files):
             progress(path.name, number / len(files))
-            good, refused, names = _read_judged(path, profile, table)
-            if path not in given and [type(refusal.error) for refusal in refused] == [NoTableError]:
-                notes += refused
-                continue
-            records += good
-            refusals += refused
-            met += [(path, name) for name in names or [""]]
+            intake.read(path, given=path in given)
+        intake.join()
         if table is not None:
-            table.require_found(met)
-        if records or refusals:
-            left_out += [Path(note.file) for note in notes]
+            table.require_found(intake.met)
+        refusals = intake.refusals
+        if intake.records or refusals:
+            left_out += [Path(note.file) for note in intake.notes]
         else:
-            refusals = notes
-        return ImportResult(with_unique_ids(records), tuple(refusals), tuple(path.name for path in left_out))
+            refusals = intake.notes
+        return ImportResult(with_unique_ids(intake.records), tuple(refusals), tuple(path.name for path in left_out))
+
+
+class _Intake:
+    """The tests of a set of files: checked, refused, or still without a current that another file may state."""
+
+    def __init__(self, profile: Profile, table: TestsTable | None):
+        self._profile, self._table = profile, table
+        self._order: dict[str, int] = {}
+        self._pending: list[tuple[Path, Record]] = []
+        self._found: list[tuple[int, Record]] = []
+        self.refusals: list[Refusal] = []
+        self.notes: list[Refusal] = []  # texts of a folder that hold no table
+        self.met: list[tuple[Path, str]] = []
+
+    @property
+    def records(self) -> list[Record]:
+        """The accepted tests, in the order of their files."""
+        return [record for _, record in sorted(self._found, key=lambda entry: entry[0])]
+
+    def read(self, path: Path, *, given: bool) -> None:
+        """Read a file, and check the tests in it whose current is known."""
+        self._order[str(path)] = len(self._order)
+        try:
+            with np.errstate(all="ignore"):  # numbers near the end of the range overflow in sums and are refused
+                records = _unjudged(path, self._profile)
+        except InputError as error:
+            refusals = [Refusal(str(path), one) for one in getattr(error, "errors", (error,))]
+            self.met.append((path, ""))
+            if not given and [type(refusal.error) for refusal in refusals] == [NoTableError]:
+                self.notes += refusals
+            else:
+                self.refusals += refusals
+            return
+        self.met += [(path, record.id) for record in records]
+        for record in records:
+            known, problems = record, []
+            if self._table is not None:
+                try:
+                    known = applied(record, self._table.of(path, record.id), self._table)
+                except InputError as error:
+                    problems.append(error)
+            if known.current is None and not problems:
+                self._pending.append((path, known))
+            else:
+                self._check(path, known, problems, several=len(records) > 1)
+
+    def _check(self, path: Path, record: Record, problems: list[InputError], *, several: bool) -> None:
+        from mrdamper.rig_files.quality import judge
+
+        judged = record
+        for step in (_with_current, lambda record: judge_long(record, judge)):
+            try:
+                with np.errstate(all="ignore"):
+                    judged = step(judged)
+            except InputError as error:
+                problems.append(error)
+        where = f"{path}, {record.id}" if several else str(path)
+        self.refusals += [Refusal(where, problem, record.id) for problem in problems]
+        if not problems:
+            self._found.append((self._order[str(path)], judged))
+
+    def join(self) -> None:
+        """Join tests with what other files state of them, and check what was waiting."""
+        others = [Path(refusal.file) for refusal in self.refusals if refusal.error.code in _MAY_BE_PARTS]
+        others = [path for path in dict.fromkeys(others) if path.is_file()]
+        parts = [part for path in others if (part := part_of(path, self._profile))]
+        used: set[Path] = set()
+        for record, paths in joined_parts(parts, self._profile):
+            used |= set(paths)
+            if record.current is None:
+                self._pending.append((paths[0], record))
+            else:
+                self._check(paths[0], record, [], several=False)
+        pending = self._pending
+        joined = with_currents_of(pending, parts) if pending and parts else None
+        if joined:
+            used |= {path for _, path in joined}
+            pending = [(path, record) for (path, _), (record, _) in zip(pending, joined, strict=True)]
+        elif pending:
+            notes = [Path(note.file) for note in self.notes]
+            for path in [path for path in (*others, *notes) if path not in used]:
+                results = results_of(path)
+                stated = with_results_of(pending, results, path) if results else None
+                if stated:
+                    pending = [(file, record) for (file, _), record in zip(pending, stated, strict=True)]
+                    used.add(path)
+                    break
+        self.refusals = [refusal for refusal in self.refusals if Path(refusal.file) not in used]
+        self.notes = [note for note in self.notes if Path(note.file) not in used]
+        files = [path for path, _ in pending]
+        for path, record in pending:
+            self._check(path, record, [], several=files.count(path) > 1)
 
 
 def found_tests(
@@ -258,38 +355,6 @@ def found_tests(
             except InputError as error:
                 refusals.append(Refusal(str(path), error))
     return tuple(records), tuple(refusals)
-
-
-def _read_judged(
-    path: Path, profile: Profile, table: TestsTable | None
-) -> tuple[list[Record], list[Refusal], list[str]]:
-    """A file's good tests, everything that is wrong with it, and the names of all its tests."""
-    from mrdamper.rig_files.quality import judge
-
-    good: list[Record] = []
-    refusals: list[Refusal] = []
-    with np.errstate(all="ignore"):  # numbers near the end of the range overflow in sums and are refused as such
-        try:
-            records = _unjudged(path, profile)
-        except InputError as error:
-            return [], [Refusal(str(path), one) for one in getattr(error, "errors", (error,))], []
-        for record in records:
-            where = str(path) if len(records) == 1 else f"{path}, {record.id}"
-            problems: list[InputError] = []
-            judged = record
-            for step in (
-                lambda record: applied(record, table.of(path, record.id), table) if table is not None else record,
-                _with_current,
-                lambda record: judge_long(record, judge),
-            ):
-                try:
-                    judged = step(judged)
-                except InputError as error:
-                    problems.append(error)
-            refusals += [Refusal(where, problem, record.id) for problem in problems]
-            if not problems:
-                good.append(judged)
-    return good, refusals, [record.id for record in records]
 
 
 def to_dataset(records: Sequence[Record], name: str = "dataset") -> Dataset:
@@ -337,7 +402,16 @@ def _unjudged(path: Path, profile: Profile) -> list[Record]:
 
 
 def _parts(tables: list[RawTable], profile: Profile) -> list[RawTable]:
-    return [part for table in tables for part in ([table] if table.fallback else tests_of(table, profile.file))]
+    tables = [completed(table) for table in tables]
+    tables = [with_one_clock(table) for table in tables]
+    parts = [part for table in tables for part in ([table] if table.fallback else tests_of(table, profile.file))]
+    parts = [with_channels_by_physics(with_unit_of_time(table), _said(profile)) for table in with_results(parts)]
+    return parts
+
+
+def _said(profile: Profile) -> list[str]:
+    """The channels whose column the profile names."""
+    return [name for name, channel in profile.channels.items() if channel.column is not None]
 
 
 def _tables_with_channels(tables: list[RawTable], profile: Profile) -> list[RawTable]:

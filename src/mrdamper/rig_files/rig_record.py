@@ -93,7 +93,7 @@ def _read(table: RawTable, found: dict[str, Assigned]):
                 column=column + 1,
             )
     _refuse_unscaled(table, found, raw)
-    findings = list(content.findings)
+    findings = [*table.findings, *content.findings]
     for name in [name for name in found if name in _LENIENT]:
         try:
             raw[found[name].column] = table.read([found[name].column]).values[found[name].column]

@@ -26,7 +26,16 @@ import numpy as np
 
 from mrdamper.errors import CombinedError, MissingExtraError
 from mrdamper.rig_files.file_form import FileForm
-from mrdamper.rig_files.readers.base import MOST_RATIO, Content, RawTable, Reader, RigFileError, Source, Words
+from mrdamper.rig_files.readers.base import (
+    MOST_RATIO,
+    Content,
+    NoTableError,
+    RawTable,
+    Reader,
+    RigFileError,
+    Source,
+    Words,
+)
 from mrdamper.rig_files.record import Finding, LineNumbers
 
 _SECONDS = 0.6  # processor time of the child for the smallest file; a busy machine makes three of each second
@@ -93,7 +102,10 @@ class _Asked:
             )
         if "missing" in answer:
             raise MissingExtraError(answer["missing"], where=self._source.name, mend=answer["mend"])
-        CombinedError.raise_from(RigFileError(file=self._source.name, **told) for told in answer.get("wrong", ()))
+        CombinedError.raise_from(
+            (NoTableError if told.pop("no_table") else RigFileError)(file=self._source.name, **told)
+            for told in answer.get("wrong", ())
+        )
         return answer
 
     def table(self, index: int, table: dict[str, Any]) -> RawTable:
@@ -141,7 +153,7 @@ class _Sandbox:
             self._say(request)
             self._watch(patience)
             answer = self._answers.readline()
-        except OSError:
+        except (OSError, ValueError):  # the pipe is broken, or was closed when the child ended
             answer = b""
         if not answer.endswith(b"\n"):
             with contextlib.suppress(subprocess.TimeoutExpired):

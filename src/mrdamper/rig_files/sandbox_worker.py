@@ -15,7 +15,7 @@ import numpy as np
 
 from mrdamper.errors import CombinedError, MissingExtraError
 from mrdamper.rig_files.file_form import FileForm
-from mrdamper.rig_files.readers.base import RawTable, Reader, RigFileError, Source
+from mrdamper.rig_files.readers.base import NoTableError, RawTable, Reader, RigFileError, Source
 
 _SAYS = ("names", "units", "line", "label", "form", "fallback", "constants", "odd", "remarks", "over")
 _TOLD = ("code", "found", "line", "column", "mend")
@@ -49,7 +49,8 @@ def serve() -> None:
                     replies,
                     {
                         "wrong": [
-                            {name: getattr(one, name) for name in _TOLD} for one in getattr(error, "errors", (error,))
+                            {name: getattr(one, name) for name in _TOLD} | {"no_table": isinstance(one, NoTableError)}
+                            for one in getattr(error, "errors", (error,))
                         ]
                     },
                 )

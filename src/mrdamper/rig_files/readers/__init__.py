@@ -41,13 +41,9 @@ _FOREIGN = MappingProxyType(
         b"<HTML": "HTML",
         b"<?xml": "XML",
         b"RIFF": "RIFF",
-        b"{": "JSON",
-        b"[{": "JSON",
-        b"[[": "JSON",
     }
 )
 _PICTURES = ("PNG image", "JPEG image", "GIF image")
-_SAVED_MODEL = b'"mrdamper-model"'
 _PICKLE = tuple(bytes((0x80, protocol)) for protocol in range(2, 6))
 
 
@@ -92,11 +88,6 @@ def reader_of(source: Source) -> Reader:
         mend = f"rename it to {found.suffixes[0]}" if found else "rename it to .csv" if text else "export it as CSV"
         if foreign in _PICTURES:
             mend = "give the numbers it was drawn from"
-        elif _SAVED_MODEL in head:
-            is_now, mend = (
-                "a saved model",
-                "give it to mrdamper predict, validate or export; tests are what import reads",
-            )
         raise source.refuse(
             "E_FORMAT",
             f"the name says {named.title if named else source.suffix or 'nothing'}, the content is {is_now}",

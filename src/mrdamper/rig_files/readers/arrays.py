@@ -49,6 +49,7 @@ def array_table(
     fallback: bool = False,
     constants: Mapping[str, float] | None = None,
     remarks: Sequence[str] = (),
+    over: Sequence[str] = (),
 ) -> RawTable:
     """A table whose columns are loaded as arrays, one by one; E_TOO_MANY_COLUMNS beyond a thousand."""
     if len(names) > MOST_COLUMNS:
@@ -75,7 +76,7 @@ def array_table(
 
     return RawTable(
         source, tuple(names), tuple(units), read, label=label, fallback=fallback, constants=constants or {},
-        remarks=tuple(remarks), words=words,
+        remarks=tuple(remarks), words=words, over=tuple(over),
     )  # fmt: skip
 
 

@@ -129,6 +129,8 @@ class RawTable:
     remarks: tuple[str, ...] = ()  # what the file says beside the columns: lines above them, attributes, properties
     over: tuple[str, ...] = ()  # where a row of titles stands above the names of columns
     words: Callable[[int], Words] | None = None  # takes the position of a column
+    findings: tuple[Finding, ...] = ()  # what was decided on the way from the file to this table
+    stated_in: str = ""  # where a constant that was added on that way stands
 
     @cached_property
     def headers(self) -> tuple[Header, ...]:

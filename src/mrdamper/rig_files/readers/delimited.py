@@ -197,7 +197,9 @@ def _without_cut_row(form: Form, block: Block) -> tuple[Block, tuple[Finding, ..
         raise stream.source.refuse(
             "E_QUOTE", "a quote is not closed", "copy or export the file again", line=line
         ) from error
-    if len(cells) < width or (len(cells) == width and not cells[-1]):
+    before = stream.decode(tail[: len(tail) - len(last)].rstrip(b"\r\n").rpartition(b"\n")[2])
+    ends_empty = len(cells) == width and before.rstrip().endswith(form.layout.separator)  # as the row above does
+    if len(cells) < width or (len(cells) == width and not cells[-1] and not ends_empty):
         raise field_count(form, len([c for c in cells if c]), line, True)
     if len(cells) > width + 1:
         raise field_count(form, len(cells), line, True)

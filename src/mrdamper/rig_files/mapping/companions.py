@@ -1,0 +1,173 @@
+"""Tests whose channels lie in two files, joined by the numbers in their names; and tables of results beside them."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from mrdamper.data import Floats, held_current
+from mrdamper.errors import InputError
+from mrdamper.rig_files.coil_current import as_data, constant
+from mrdamper.rig_files.columns import partly_assigned
+from mrdamper.rig_files.mapping.completion import completed
+from mrdamper.rig_files.mapping.results import Results, results_in
+from mrdamper.rig_files.profile import Profile
+from mrdamper.rig_files.readers import raw_tables
+from mrdamper.rig_files.readers.base import RawTable
+from mrdamper.rig_files.record import Finding, Record
+
+_MOST_ROWS = 2000  # of a table of results
+_MOST_COLUMNS = 60
+_LARGEST_TEXT = 2**18  # bytes
+_TEXTS = (".csv", ".txt", ".tsv", ".dat", ".md", ".log")
+_SAME_START = 0.02  # of a record: clocks of two loggers that are one
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """The channels of a file that are no whole test."""
+
+    path: Path
+    time: Floats  # (N,) [s]
+    channels: Mapping[str, Floats]  # by name, (N,) in SI
+
+
+def part_of(path: Path, profile: Profile) -> Part | None:
+    """The channels with a time of a file that is no whole test; None if it has none, or several tables."""
+    try:
+        with raw_tables(path, profile.file) as tables:
+            if len(tables) != 1:
+                return None
+            table = completed(tables[0])
+            found = partly_assigned(table, profile)
+            if "time" not in found or len(found) < 2:
+                return None
+            raw = table.read([entry.column for entry in found.values()]).values
+            channels = {role: e.factor * raw[e.column] + e.offset for role, e in found.items()}
+    except InputError:
+        return None
+    time = channels.pop("time")
+    there = np.isfinite(time)
+    if np.count_nonzero(there) < 2 or np.any(np.diff(time[there]) <= 0):
+        return None
+    return Part(path, time[there], {role: values[there] for role, values in channels.items()})
+
+
+def number_of(path: Path) -> tuple[str, ...]:
+    """The numbers in a file's name, by which files of one test belong together."""
+    return str(path.parent), *(str(int(number)) for number in re.findall(r"[0-9]+", path.stem))
+
+
+def with_currents_of(pending: Sequence[tuple[Path, Record]], parts: Sequence[Part]) -> list[tuple[Record, Path]] | None:
+    """The records with the current of the other file of their number, and that file; None unless all have one."""
+    holders = [part for part in parts if "current" in part.channels and "force" not in part.channels]
+    by_number = {number_of(part.path): part for part in holders}
+    numbers = [number_of(path) for path, _ in pending]
+    if len(by_number) < len(holders) or len(set(numbers)) < len(numbers) or not set(numbers) <= set(by_number):
+        return None
+    return [
+        (_joined(record, by_number[number]), by_number[number].path)
+        for (_, record), number in zip(pending, numbers, strict=True)
+    ]
+
+
+def _joined(record: Record, part: Part) -> Record:
+    current = part.channels["current"]
+    there = np.isfinite(current)
+    held, change = held_current(current[there])
+    if change:
+        values = np.interp(record.time, part.time[there], current[there])
+        values[~np.isfinite(record.time)] = np.nan
+    else:
+        values = constant(held, record.time)
+    how = "interpolated onto the force's clock" if change else f"its mean {held:g} A"
+    text = f"the current is that of {part.path.name}, {how}"
+    provenance = {**record.provenance, "current_file": as_data(part.path.name)}
+    return replace(record, current=values, provenance=provenance).noticed(Finding("W_RASTER", text))
+
+
+def joined_parts(parts: Sequence[Part], profile: Profile) -> list[tuple[Record, tuple[Path, ...]]]:
+    """Tests whose displacement and force lie in two files of one number and one clock, and these files."""
+    by_number: dict[tuple[str, ...], list[Part]] = defaultdict(list)
+    for part in parts:
+        by_number[number_of(part.path)].append(part)
+    found = []
+    for group in by_number.values():
+        loads = [part for part in group if "force" in part.channels]
+        names = [name for part in group for name in part.channels]
+        if len(group) < 2 or len(loads) != 1 or "displacement" not in names or len(set(names)) < len(names):
+            continue
+        clock = loads[0].time
+        span = clock[-1] - clock[0]
+        far = [abs(part.time[i] - clock[i]) > _SAME_START * span for part in group for i in (0, -1)]
+        if any(far):
+            continue
+        channels = {
+            name: values if part is loads[0] else np.interp(clock, part.time, values)
+            for part in group
+            for name, values in part.channels.items()
+        }
+        files = [part.path.name for part in group]
+        stem = re.sub(r"[^\w.+=-]+", "_", loads[0].path.stem)
+        remarks = {"file": as_data(files[0]), "files": as_data(", ".join(files)), "columns": ", ".join(names)}
+        said = Finding("W_RASTER", f"joined from {' and '.join(files)}, on the force's clock")
+        record = Record(
+            id=stem, time=clock, findings=(said,), provenance=remarks, rig=profile.rig, excitation=profile.excitation,
+            split=profile.split, **channels,  # type: ignore[arg-type]
+        )  # fmt: skip
+        found.append((record, tuple(part.path for part in group)))
+    return found
+
+
+def results_of(path: Path) -> Results | None:
+    """The table of results that a file holds; None if it holds none."""
+    try:
+        if path.suffix.lower() in _TEXTS:
+            with path.open("rb") as file:
+                content = file.read(_LARGEST_TEXT + 1)
+            if len(content) > _LARGEST_TEXT:
+                return None
+            return results_in(_decoded(content).splitlines())
+        with raw_tables(path) as tables:
+            found = [results for table in tables[:20] if (results := results_in(_lines(table)))]
+            return found[0] if len(found) == 1 else None
+    except (InputError, OSError, UnicodeError):
+        return None
+
+
+def _decoded(content: bytes) -> str:
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return content.decode("utf-16")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("cp1252")
+
+
+def _lines(table: RawTable) -> list[str]:
+    """A small table as lines of text."""
+    if table.words is None or len(table.names) > _MOST_COLUMNS:
+        return []
+    columns = [table.words(i) for i in range(len(table.names))]
+    if any(words.codes.size > _MOST_ROWS for words in columns):
+        return []
+    rows = zip(*([words.labels[code] for code in words.codes] for words in columns), strict=True)
+    return ["\t".join(cells) for cells in (table.names, table.units, *rows)]
+
+
+def with_results_of(pending: Sequence[tuple[Path, Record]], results: Results, path: Path) -> list[Record] | None:
+    """The records with the currents that a table of results states; None unless it names every one of them."""
+    tests = [(record.id, file.name, file.stem) for file, record in pending]
+    currents = results.by_test(tests)
+    if len(currents) < len(pending):
+        return None
+    said = {"current_from": as_data(f"{path.name}, {results.title}")}
+    return [
+        replace(record, current=constant(currents[i], record.time), provenance={**record.provenance, **said})
+        for i, (_, record) in enumerate(pending)
+    ]

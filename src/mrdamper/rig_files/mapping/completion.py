@@ -1,0 +1,172 @@
+"""Names, units and scales of columns that a file states elsewhere than in its row of names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+
+from mrdamper.rig_files.column_names import names_weight, role_of, says_nothing, split_name, words_of
+from mrdamper.rig_files.conditions import currents_in, without_currents
+from mrdamper.rig_files.readers.base import Content, RawTable
+from mrdamper.rig_files.record import Finding
+from mrdamper.rig_files.text.spool import rescale
+from mrdamper.rig_files.units import DIMENSION, is_unit, parse_unit
+
+_SEPARATORS = ("\t", ";", ",", "|")
+_CLOCKS = {"micros": "us", "millis": "ms", "microseconds": "us", "milliseconds": "ms", "nanoseconds": "ns",
+           "seconds": "s", "secs": "s", "sec": "s", "nanos": "ns", "usec": "us", "msec": "ms", "elapsed seconds": "s",
+           "time since start": "", "epoch ms": "ms", "timestamp ms": "ms"}  # fmt: skip
+_WEIGHTS = {"g": "gf", "kg": "kgf", "t": "tf", "gram": "gf", "grams": "gf", "G": "gf", "Kg": "kgf", "KG": "kgf"}
+_SCALE = re.compile(
+    r"(?<![\w.,])(?P<one>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>[A-Za-zµ]{1,4})\s*(?:/|=|per|pro|entspricht|->)\s*"
+    r"(?P<other>[0-9]+(?:[.,][0-9]+)?)?\s*(?P<volt>[A-Za-zµ]{1,4})(?![A-Za-z0-9/])"
+)
+_MONITOR = frozenset(("mon", "monitor", "imon", "iout", "i", "current", "curr", "strom", "amp", "amplifier", "shunt"))
+_LONGEST_LINE = 300
+
+
+def completed(table: RawTable) -> RawTable:
+    """The table with the names, units and scales that the file states above, below or beside its row of names."""
+    if not any(table.names):
+        return table
+    table = _with_titles(table)
+    table = _with_listed_units(table)
+    table = _with_clocks_and_weights(table)
+    return _with_scales(table)
+
+
+def _with_titles(table: RawTable) -> RawTable:
+    """Names joined with the titles above them where only both together name a channel; conditions become titles."""
+    over = list(table.over or ("",) * len(table.names))
+    names, units = list(table.names), list(table.units)
+    for i, (name, title) in enumerate(zip(names, over, strict=True)):
+        header = split_name(name, units[i])
+        if header.dimension == "time" and header.role not in ("time", None) and len(header.name) <= 2:
+            names[i] = f"{split_name(title).name} time" if title else "time"
+            units[i] = units[i] or header.unit
+        elif title and header.role is None and (bare := split_name(without_currents(title))).role is not None:
+            if header.dimension == "time" and bare.role != "time":
+                names[i], units[i] = f"{bare.name} time", units[i] or header.unit  # an x column of its own
+            elif header.dimension in (None, DIMENSION[bare.role]) and (says_nothing(header.name) or currents_in(name)):
+                names[i] = bare.name
+                units[i] = units[i] or header.unit or bare.unit
+                over[i] = f"{title} {name}".strip()
+        stated = currents_in(names[i])
+        rest = without_currents(names[i]).strip(" ,;:@-_/()[]") if len(stated) == 1 else ""
+        if rest and split_name(rest, units[i]).role in ("force", "displacement", "time", "velocity"):
+            over[i] = over[i] if currents_in(over[i]) else f"{over[i]} {names[i]}".strip()
+            names[i] = without_currents(names[i]).strip(" ,;:@-_/")
+    if names == list(table.names) and units == list(table.units):
+        return table
+    return replace(table, names=tuple(names), units=tuple(units), over=tuple(over) if any(over) else ())
+
+
+def _with_listed_units(table: RawTable) -> RawTable:
+    """Units of a list of channels above the columns: a line a channel, its name and its unit among the cells."""
+    bare = [i for i, header in enumerate(table.headers) if header.name and not header.unit]
+    if not bare or not table.remarks:
+        return table
+    wanted = {table.names[i].strip().casefold(): i for i in bare}
+    for separator in _SEPARATORS:
+        found: dict[int, list[str]] = {}
+        for line in table.remarks:
+            cells = [cell.strip().strip('"') for cell in line[:_LONGEST_LINE].lstrip("#%/ ").split(separator)]
+            named = [wanted[cell.casefold()] for cell in cells if cell.casefold() in wanted]
+            if len(named) == 1 and len(cells) > 1:
+                found[named[0]] = [cell.strip("[]()") for cell in cells]
+        if len(found) < 2:
+            continue
+        width = min(map(len, found.values()))
+        column = next((c for c in range(width) if sum(is_unit(cells[c]) for cells in found.values()) >= 2), None)
+        if column is None:
+            continue
+        units = list(table.units)
+        for i, cells in found.items():
+            units[i] = cells[column] if is_unit(cells[column]) else units[i]
+        return replace(table, units=tuple(units))
+    return table
+
+
+def _with_clocks_and_weights(table: RawTable) -> RawTable:
+    """Names of clocks of microcontrollers as times, and loads that a scale shows in kg or g as forces."""
+    names, units = list(table.names), list(table.units)
+    notes = []
+    for i, header in enumerate(table.headers):
+        key = re.sub(r"[\s_()]+", " ", header.name.strip().casefold()).strip()
+        if not header.unit and key in _CLOCKS:
+            names[i], units[i] = "time", _CLOCKS[key]
+        elif header.role == "force" and header.unit in _WEIGHTS and names_weight(header.name):
+            names[i], units[i] = header.name, _WEIGHTS[header.unit]
+            notes.append(Finding("W_UNITS", f"{header.name!r} in {header.unit} is the force of that weight"))
+    return replace(table, names=tuple(names), units=tuple(units), findings=(*table.findings, *notes))
+
+
+def _with_scales(table: RawTable) -> RawTable:
+    """Channels recorded in volts, by a scale the file states: amplifier monitor: 0.5 A/V."""
+    volts = [i for i, header in enumerate(table.headers) if header.dimension == "voltage"]
+    for i in volts:
+        other = _stated_scale(table, i, volts)
+        if other is None:
+            continue
+        unit, factor, line = other
+        header = table.headers[i]
+        text = f"column {table.names[i]!r} is scaled as the file states: {line.strip()[:60]!r}"
+        role = next((role for role, dimension in DIMENSION.items() if dimension == parse_unit(unit).dimension), "")  # type: ignore[union-attr]
+        name = header.name if header.role == role else f"{role} {header.name}"
+        table = _scaled(table, i, name, unit, factor * (header.known.factor if header.known else 1.0), text)
+    return table
+
+
+def _stated_scale(table: RawTable, column: int, volts: Sequence[int]) -> tuple[str, float, str] | None:
+    """Unit, its number per volt and the line of a scale that can only be meant for a column; else None."""
+    name = table.headers[column].name
+    found = []
+    for line in (table.names[column], *table.remarks):
+        for unit, factor in _scales(line[:_LONGEST_LINE]):
+            known = parse_unit(unit)
+            role = next((r for r, d in DIMENSION.items() if known is not None and d == known.dimension), None)
+            if role is None or role in ("voltage", "time"):
+                continue
+            words = {word.casefold() for word in words_of(name)}
+            meant = role_of(name) == role or name.casefold() in line.casefold()
+            meant = meant or (role == "current" and bool(words & _MONITOR))
+            alone = len(volts) == 1 and role_of(name) in (None, "voltage") and role == "current"
+            has = any(header.dimension == known.dimension for header in table.headers) if known else True
+            if (meant or alone) and not has:
+                found.append((unit, factor, line))
+    return found[0] if len({entry[:2] for entry in found}) == 1 else None
+
+
+def _scales(line: str) -> list[tuple[str, float]]:
+    """Unit and number per volt of every scale that a line states: 0.5 A/V, 100 mV/A, 1 V = 2 A."""
+    found = []
+    for match in _SCALE.finditer(line):
+        one, other = parse_unit(match["unit"]), parse_unit(match["volt"])
+        if one is None or other is None or (one.dimension == "voltage") == (other.dimension == "voltage"):
+            continue
+        left, right = (float((match[key] or "1").replace(",", ".")) for key in ("one", "other"))
+        if not left or not right:
+            continue
+        if other.dimension == "voltage":
+            found.append((match["unit"], left / (right * other.factor)))
+        else:
+            found.append((match["volt"], right / (left * one.factor)))
+    return found
+
+
+def _scaled(table: RawTable, column: int, name: str, unit: str, factor: float, text: str) -> RawTable:
+    """The table with a column multiplied by a number, in another unit."""
+    inner = table.read
+
+    def read(columns: Sequence[int]) -> Content:
+        content = inner(columns)
+        if column not in content.values:
+            return content
+        values = {**content.values, column: rescale(content.values[column], factor)}
+        return Content(values, content.lines, content.findings)
+
+    names, units = list(table.names), list(table.units)
+    names[column], units[column] = name, unit
+    findings = (*table.findings, Finding("W_SCALE", text))
+    return replace(table, names=tuple(names), units=tuple(units), read=read, findings=findings)

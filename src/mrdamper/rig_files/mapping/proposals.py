@@ -1,0 +1,163 @@
+"""Candidates for what a file leaves open, tried on its data: physics chooses columns, never a sign or a scale."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from mrdamper.data import Floats
+from mrdamper.errors import ExcitationError, InputError
+from mrdamper.rig_files.column_names import split_name
+from mrdamper.rig_files.columns import candidates_of
+from mrdamper.rig_files.readers.base import RawTable
+from mrdamper.rig_files.record import REQUIRED, Finding
+
+_FREQUENCY = re.compile(
+    r"(?<![0-9A-Za-z.,])(?:f|freq|frequency)?[_ =]?([0-9]{1,3}(?:[.,px][0-9]{1,4})?)[ _]?(m?)Hz(?![A-Za-z])"
+)
+_CLOCK_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
+_AGREE = 0.05  # of a frequency that is stated
+_LARGEST = 64 * 2**20  # bytes of a file whose columns are tried
+_MOST_SAMPLES = 20_000
+_MOST_TRIED = 24  # combinations of columns
+_CLEAR, _POOR = 0.5, 0.2  # share of the force that velocity explains: of a damper's, and of another channel
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """Columns that may be the channels, and how far the force is a damper's."""
+
+    columns: dict[str, int]
+    score: float
+
+
+def with_unit_of_time(table: RawTable) -> RawTable:
+    """The table with the unit of its time, where only one agrees with the frequency that the file states."""
+    times = [i for i, header in enumerate(table.headers) if header.role == "time"]
+    moved = [i for i, header in enumerate(table.headers) if header.role == "displacement"]
+    if len(times) != 1 or len(moved) != 1 or table.headers[times[0]].unit or table.source.size > _LARGEST:
+        return table
+    stated = set(_frequencies(table))
+    if len(stated) != 1:
+        return table
+    try:
+        values = table.read([times[0], moved[0]]).values
+    except InputError:
+        return table
+    measured = _frequency(values[times[0]], values[moved[0]])
+    frequency = stated.pop()
+    units = [u for u, f in _CLOCK_UNITS.items() if measured and abs(measured / f - frequency) < _AGREE * frequency]
+    if len(units) != 1:
+        return table
+    text = f"the unit of time is {units[0]}: so the motion has the {frequency:g} Hz that the file states"
+    stated_units = [units[0] if i == times[0] else unit for i, unit in enumerate(table.units)]
+    return replace(table, units=tuple(stated_units), findings=(*table.findings, Finding("W_UNITS", text)))
+
+
+def with_channels_by_physics(table: RawTable, taken: Sequence[str] = ()) -> RawTable:
+    """The table with the columns named that alone make a damper's loop, where names leave open which they are."""
+    if table.source.size > _LARGEST:
+        return table
+    open_roles = {role: candidates_of(table, role) for role in REQUIRED if role not in taken}
+    if all(len(columns) == 1 for columns in open_roles.values()) or not all(open_roles.values()):
+        return table
+    ranked = ranked_candidates(table, open_roles)
+    good = [candidate for candidate in ranked if candidate.score >= _CLEAR]
+    rest = [candidate for candidate in ranked if _POOR <= candidate.score < _CLEAR]
+    if len(good) != 1 or rest:
+        return table
+    names = list(table.names)
+    chosen = []
+    for role, columns in open_roles.items():
+        if len(columns) < 2:
+            continue
+        own = good[0].columns[role]
+        chosen.append(f"{table.names[own] or f'column {own + 1}'} as the {role}")
+        for column in columns:
+            header = table.headers[column]
+            names[column] = f"{role} [{header.unit}]" if column == own else f"other {column + 1} [{header.unit}]"
+    text = f"{' and '.join(chosen)}: only so the force takes energy in phase with the velocity"
+    units = tuple("" if name != old else unit for name, old, unit in zip(names, table.names, table.units, strict=True))
+    return replace(table, names=tuple(names), units=units, findings=(*table.findings, Finding("W_CHOSEN", text)))
+
+
+def ranked_candidates(table: RawTable, open_roles: dict[str, list[int]]) -> list[Candidate]:
+    """The combinations of columns and how far each is a damper's test, the best first."""
+    wanted = sorted({column for columns in open_roles.values() for column in columns})
+    try:
+        values = table.read(wanted).values
+    except InputError:
+        return []
+    found = []
+    for columns in list(product(*open_roles.values()))[: _MOST_TRIED + 1]:
+        if len(set(columns)) < len(columns):
+            continue
+        chosen = dict(zip(open_roles, columns, strict=True))
+        score = damping_share(*(values[chosen[role]] for role in REQUIRED))
+        found.append(Candidate(chosen, score))
+    return sorted(found, key=lambda candidate: -candidate.score) if len(found) <= _MOST_TRIED else []
+
+
+def damping_share(time: Floats, displacement: Floats, force: Floats) -> float:
+    """Share of the force's variance beside a spring's that velocity explains, as a damper's does; 0 if it gives energy.
+
+    Parameters
+    ----------
+    time, displacement, force : (N,) arrays
+        In any units: the share does not depend on them.
+    """
+    there = np.flatnonzero(np.isfinite(time) & np.isfinite(displacement) & np.isfinite(force))
+    if there.size < 50 or np.any(np.diff(time[there]) <= 0):
+        return 0.0
+    there = there[:: max(1, there.size // _MOST_SAMPLES)]
+    time, x, force = time[there], displacement[there], force[there] - np.mean(force[there])
+    x = x - np.mean(x)
+    velocity = _smooth_slope(time, x)
+    if not np.ptp(x) or not np.std(velocity) or not np.std(force):
+        return 0.0
+    if float(np.sum(force * velocity)) <= 0:
+        return 0.0
+    x, velocity = x / np.std(x), velocity / np.std(velocity)
+    spring = np.column_stack([np.ones_like(x), x])
+    damper = np.column_stack([spring, velocity, np.tanh(3 * velocity)])
+    without, rest = (np.sum((force - m @ np.linalg.lstsq(m, force, rcond=None)[0]) ** 2) for m in (spring, damper))
+    if without < 0.01 * np.sum(force**2):  # nothing but a spring, or another displacement
+        return 0.0
+    return float(1 - rest / without)
+
+
+def _smooth_slope(time: Floats, x: Floats) -> Floats:
+    """Velocity by differences over about a hundredth of the record's motion."""
+    half = max(1, min(x.size // 400, 5))
+    slope = np.zeros_like(x)
+    slope[half:-half] = (x[2 * half :] - x[: -2 * half]) / (time[2 * half :] - time[: -2 * half])
+    return slope
+
+
+def _frequencies(table: RawTable) -> Iterator[float]:
+    """Frequencies [Hz] that the title, the file's name or a number beside the columns states."""
+    for text in (table.label, table.source.name, *table.remarks[-20:]):
+        for match in _FREQUENCY.finditer(text[:255]):
+            yield float(re.sub("[,px]", ".", match[1])) * (1e-3 if match[2] else 1.0)
+    for name, value in table.constants.items():
+        header = split_name(name)
+        if header.dimension == "frequency" and re.search(r"(?i)freq|^f$", header.name) and header.known:
+            yield header.known.factor * value
+
+
+def _frequency(time: Floats, x: Floats) -> float | None:
+    """Frequency of a motion, by the reversals of its sign about the middle."""
+    from mrdamper.rig_files.quality.strokes import find_strokes
+
+    there = np.isfinite(time) & np.isfinite(x)
+    if np.count_nonzero(there) < 20 or np.any(np.diff(time[there]) <= 0):
+        return None
+    try:
+        period = find_strokes(time[there], x[there]).period
+    except (ExcitationError, ValueError):
+        return None
+    return 1 / period if period else None

@@ -1,0 +1,138 @@
+"""Channels with clocks of their own, brought onto the clock of the force by linear interpolation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from mrdamper.data import Floats, held_current
+from mrdamper.errors import InputError
+from mrdamper.rig_files.column_names import Header, role_of
+from mrdamper.rig_files.readers.base import Content, RawTable
+from mrdamper.rig_files.record import OPTIONAL, REQUIRED, Finding
+
+_FEWEST_OVERLAP = 0.5  # of the force's time that every needed channel must cover
+_TINY = 1e-9  # of the record: clocks that differ by less are one
+
+
+def with_one_clock(table: RawTable) -> RawTable:
+    """The table with every channel on the force's clock, where groups of columns have times of their own.
+
+    Raises
+    ------
+    RigFileError
+        E_RASTER, when the table is read, if a channel covers less than half of the force's time.
+    """
+    groups = _clocks(table)
+    if len(groups) < 2:
+        return table
+    owner = {column: clock for clock, columns in groups.items() for column in columns}
+    roles = {role: [i for i in owner if _is(table.headers[i], role)] for role in (*REQUIRED[1:], *OPTIONAL)}
+    if not roles["force"] or not roles["displacement"]:
+        return table
+    together = [c for c in groups if all(any(owner[i] == c for i in roles[r]) for r in ("displacement", "force"))]
+    if together and (len(together) > 1 or not roles["current"] or owner[roles["current"][0]] in together):
+        return table  # groups that are tests, or a clock with all that is needed
+    clock = together[0] if together else owner[roles["force"][0]]
+    kept = [clock, *(i for i in owner if owner[i] == clock), *(i for i in owner if owner[i] != clock)]
+    return _resampled(table, clock, kept, owner)
+
+
+def _is(header: Header, role: str) -> bool:
+    return header.role == role
+
+
+def _clocks(table: RawTable) -> dict[int, list[int]]:
+    """By the column of each time the channels that follow it."""
+    groups: dict[int, list[int]] = {}
+    clock = None
+    for i, header in enumerate(table.headers):
+        if header.role == "time" and header.dimension in (None, "time"):
+            clock = i
+            groups[i] = []
+        elif clock is not None:
+            groups[clock].append(i)
+    return {clock: columns for clock, columns in groups.items() if columns}
+
+
+def _resampled(table: RawTable, clock: int, kept: Sequence[int], owner: dict[int, int]) -> RawTable:
+    read = lru_cache(maxsize=4)(lambda column: table.read([column]).values[column])
+    factor = {i: header.known.factor if header.known else 1.0 for i, header in enumerate(table.headers)}
+
+    def on_clock(column: int) -> Floats:
+        own = owner.get(column, column)
+        target = _filled(read(clock)) * factor[clock]
+        if own == clock:
+            return _filled(read(column))[: target.size]
+        return _interpolated(table, column, target, read(own) * factor[own], read(column))
+
+    def columns_of(columns: Sequence[int]) -> Content:
+        return Content({i: on_clock(kept[i]) for i in columns})
+
+    moved = sorted({table.headers[i].name for i in kept if owner.get(i, i) != clock})
+    text = f"on clocks of their own, interpolated onto the force's: {', '.join(moved[:6])}"
+    findings = (*table.findings, Finding("W_RASTER", text)) if _differ(table, clock, owner, factor) else table.findings
+    return replace(
+        table,
+        names=tuple("time" if i == clock else table.names[i] for i in kept),
+        units=tuple(table.headers[i].unit if i == clock else table.units[i] for i in kept),
+        odd=tuple(table.odd[i] for i in kept) if table.odd else (),
+        over=(),
+        words=None,
+        read=columns_of,
+        findings=findings,
+    )
+
+
+def _differ(table: RawTable, clock: int, owner: dict[int, int], factor: dict[int, float]) -> bool:
+    try:
+        first = _filled(table.read([clock]).values[clock]) * factor[clock]
+        others = (_filled(table.read([c]).values[c]) * factor[c] for c in sorted({*owner.values()} - {clock}))
+        return any(other.size != first.size or not np.allclose(other, first, rtol=0, atol=1e-9) for other in others)
+    except InputError:
+        return True
+
+
+def _filled(values: Floats) -> Floats:
+    """The values down to the last: shorter columns end in empty cells."""
+    there = np.flatnonzero(np.isfinite(values))
+    return values[: there[-1] + 1] if there.size else values
+
+
+def _interpolated(table: RawTable, column: int, target: Floats, time: Floats, values: Floats) -> Floats:
+    size = min(time.size, values.size)
+    there = np.flatnonzero(np.isfinite(time[:size]) & np.isfinite(values[:size]))
+    name = table.headers[column].name
+    if there.size < 2:
+        raise table.source.refuse("E_NO_DATA", f"no samples in the column of {name!r}", "export the channel again")
+    time, values = time[there], values[there]
+    return resampled(table, name, target, time, values)
+
+
+def resampled(table: RawTable, name: str, target: Floats, time: Floats, values: Floats) -> Floats:
+    """A channel on another clock [s], by linear interpolation; its ends are held for one of its own steps.
+
+    Raises
+    ------
+    RigFileError
+        E_RASTER if the clock runs backwards or covers less than half of the other.
+    """
+    if np.any(np.diff(time) <= 0):
+        raise table.source.refuse("E_TIME_ORDER", f"the clock of {name!r} stands or runs backwards", "export it again")
+    begin, end = float(np.nanmin(target)), float(np.nanmax(target))
+    step = float(np.median(np.diff(time)))
+    inside = (target >= time[0] - 1.5 * step) & (target <= time[-1] + 1.5 * step)
+    if np.mean(inside) < _FEWEST_OVERLAP:
+        raise table.source.refuse(
+            "E_RASTER",
+            f"{name!r} is recorded from {time[0]:.4g} to {time[-1]:.4g} s, the force from {begin:.4g} to {end:.4g} s",
+            "export the channels with one clock",
+        )
+    if name and role_of(name) == "current" and time.size < target.size and not held_current(values)[1]:
+        return np.full(target.shape, held_current(values)[0])  # between its samples there is nothing but noise
+    found = np.interp(target, time, values)
+    found[~inside] = np.nan
+    return found

@@ -1,0 +1,170 @@
+"""Tables of results: one row a test, with its current, above the columns, on another sheet or in another file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mrdamper.rig_files.column_names import names_condition, split_name
+from mrdamper.rig_files.readers.base import RawTable
+from mrdamper.rig_files.units import is_unit, parse_unit
+
+_SEPARATORS = ("\t", ";", ",", "|")
+_NUMBER = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")
+_QUANTITY = re.compile(r"([+-]?[0-9]+(?:[.,][0-9]+)?)\s*(m?A)")
+_MOST_LINES, _LONGEST_LINE = 4000, 2000
+_FEWEST_ROWS = 2
+_SPECIMEN = re.compile(
+    r"(?i)^(?:specimen|probe|prüfkörper|test|versuch|run|sample|essai|éprouvette|ensayo|no|nr)\b[\s.:#]*"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Results:
+    """Rows of a table of results: the current of every test, and the cells by which it is told."""
+
+    current: tuple[float, ...]  # [A], one a row
+    cells: tuple[tuple[str, ...], ...]  # of every row those beside the current, by column
+    title: str  # heading of the column of currents
+
+    def by_test(self, tests: Sequence[Iterable[str]]) -> dict[int, float]:
+        """The current [A] of each test by its number, where one column of the table tells all of them apart.
+
+        Parameters
+        ----------
+        tests : sequence of iterables of str
+            What each test is called: its label, its file, the lines above it.
+        """
+        names = [_names(texts) for texts in tests]
+        for exact in (True, False):
+            found = [match for column in zip(*self.cells, strict=True) if (match := _match(column, names, exact))]
+            currents = [{i: self.current[row] for i, row in match.items()} for match in found]
+            if currents:
+                return currents[0] if all(other == currents[0] for other in currents) else {}
+        return {}
+
+
+def results_in(lines: Sequence[str], decimal: str | None = None) -> Results | None:
+    """The table of results among lines of text; None if there is none or several."""
+    found = {}
+    for separator in _SEPARATORS:
+        for results in _tables(lines[:_MOST_LINES], separator):
+            found[results.current, results.cells] = results
+        if found:
+            break
+    return next(iter(found.values())) if len(found) == 1 else None
+
+
+def with_results(tables: list[RawTable]) -> list[RawTable]:
+    """Tables of a file's tests with the currents that its table of results states."""
+    lines = list(dict.fromkeys(line for table in tables for line in table.remarks))
+    results = results_in(lines) if len(lines) > _FEWEST_ROWS else None
+    if results is None:
+        return tables
+    shared = set(tables[0].remarks).intersection(*(table.remarks for table in tables[1:])) if len(tables) > 1 else set()
+    tests = [[table.label, *(_last_lines(table, shared))] for table in tables]
+    currents = results.by_test(tests)
+    if len(currents) < len(tables):
+        return tables
+    said = f"table of results, {results.title}"
+    return [
+        replace(table, constants={**_without_current(table.constants), "current [A]": currents[i]}, stated_in=said)
+        for i, table in enumerate(tables)
+    ]
+
+
+def _without_current(constants: Mapping[str, float]) -> dict[str, float]:
+    return {name: value for name, value in constants.items() if not names_condition(split_name(name).name, "current")}
+
+
+def _last_lines(table: RawTable, shared: set[str]) -> list[str]:
+    """The lines right above the columns of a table that name its test."""
+    own = [line for line in table.remarks if line not in shared or table.label.startswith("block")]
+    filled = [len([cell for cell in re.split(r"[\t;,|]", line) if cell.strip(' "')]) for line in own]
+    return [line for line, cells in zip(own[-4:], filled[-4:], strict=True) if cells <= 2]
+
+
+def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
+    rows = [[cell.strip().strip('"').strip() for cell in line[:_LONGEST_LINE].split(separator)] for line in lines]
+    for at, row in enumerate(rows):
+        columns = [i for i, cell in enumerate(row) if cell and _is_current(cell)]
+        if len(row) < 2 or not columns or sum(map(bool, row)) < 2:
+            continue
+        below = at + 1
+        unit = ""
+        if below < len(rows) and _is_units_row(rows[below], len(row)):
+            unit = rows[below][columns[0]].strip("[]()") if columns[0] < len(rows[below]) else ""
+            below += 1
+        body = []
+        for cells in rows[below:]:
+            cell = cells[columns[0]] if len(cells) > columns[0] else ""
+            if not _QUANTITY.fullmatch(cell) and not _NUMBER.fullmatch(cell):
+                break
+            body.append([*cells, *[""] * (len(row) - len(cells))][: len(row)])
+        currents = [_amperes(cells[columns[0]], unit or split_name(row[columns[0]]).unit) for cells in body]
+        if len(body) < _FEWEST_ROWS or any(value is None for value in currents):
+            continue
+        others = [i for i in range(len(row)) if i not in columns]
+        yield Results(
+            tuple(value for value in currents if value is not None),
+            tuple((str(n), *(cells[i] for i in others)) for n, cells in enumerate(body, 1)),
+            row[columns[0]],
+        )
+
+
+def _is_current(cell: str) -> bool:
+    header = split_name(cell)
+    return names_condition(header.name, "current") and header.dimension in (None, "current")
+
+
+def _is_units_row(cells: Sequence[str], width: int) -> bool:
+    filled = [cell.strip("[]()") for cell in cells if cell and cell not in ("-", "[-]", "(-)")]
+    return 0 < len(filled) <= width and all(is_unit(cell) for cell in filled)
+
+
+def _amperes(cell: str, unit: str) -> float | None:
+    match = _QUANTITY.fullmatch(cell)
+    number, known = (match[1], parse_unit(match[2])) if match else (cell, parse_unit(unit))
+    if not _NUMBER.fullmatch(number) or known is None or known.dimension != "current":
+        return None
+    value = known.factor * float(number.replace(",", "."))
+    return value if np.isfinite(value) and abs(value) <= 100 else None
+
+
+def _names(texts: Iterable[str]) -> tuple[set[str], set[str]]:
+    """What a test is called, in full, and the numbers in it."""
+    whole: set[str] = set()
+    numbers: set[str] = set()
+    for text in texts:
+        bare = text.strip().strip('"').strip()
+        for part in (bare, *re.split(r"[:=;,\t/]", bare)):
+            part = part.strip().strip('"').strip()
+            whole |= {_key(part), _key(_SPECIMEN.sub("", part))} - {""}
+        tail = re.search(r"([0-9]+)\D*$", _SPECIMEN.sub("", bare)) if len(bare) < 60 else None
+        if tail:
+            numbers.add(str(int(tail[1])))
+    return whole, numbers
+
+
+def _key(text: str) -> str:
+    """A name as it is compared: no case, spaces, or leading zeros of a plain number."""
+    text = re.sub(r"\.(csv|txt|dat|asc|tra|mat|xlsx?|h5|tdms|json|parquet)$", "", text.casefold().strip())
+    text = re.sub(r"[\s_]+", " ", text)
+    return str(int(text)) if text.isascii() and text.isdigit() else text
+
+
+def _match(column: Sequence[str], names: Sequence[tuple[set[str], set[str]]], exact: bool) -> dict[int, int] | None:
+    """The row of each test by one column; None unless every test has one row, and no row two."""
+    keys = [_key(cell) for cell in column]
+    if len(set(keys)) < len(keys) or "" in keys:
+        return None
+    found = {}
+    for test, (whole, numbers) in enumerate(names):
+        candidates = [row for row, key in enumerate(keys) if key in (whole if exact else numbers | whole)]
+        if len(candidates) != 1:
+            return None
+        found[test] = candidates[0]
+    return found if found and len(set(found.values())) == len(found) else None

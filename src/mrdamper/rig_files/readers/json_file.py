@@ -1,0 +1,109 @@
+"""JSON: records, columns, and nested objects, as loggers, web services and scripts write them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.readers.arrays import damaged, twice
+from mrdamper.rig_files.readers.base import NoTableError, RawTable, Reader, Source
+from mrdamper.rig_files.readers.nested import MOST_ITEMS, nested_tables
+from mrdamper.rig_files.text.tokens import stamp
+
+_LARGEST = 200 * 10**6  # bytes: a text of numbers, read as a whole
+_SAVED_MODEL = "mrdamper-model"
+_FEWEST = 8  # samples of a test
+
+
+class Json(Reader):
+    """Objects of lists, lists of records, and these within each other; one record a line, too."""
+
+    name = "json"
+    title = "JSON"
+    suffixes = (".json", ".jsonl", ".ndjson")
+    library = "json"
+
+    def recognises(self, source: Source) -> bool:
+        """By the first signs; a list may begin a text of another kind, so that its second sign counts, too."""
+        start = source.head(512).lstrip(b"\xef\xbb\xbf \t\r\n")
+        return start[:1] == b"{" or (start[:1] == b"[" and start[1:].lstrip()[:1] in (b"{", b"[", b'"'))
+
+    def tables(self, source: Source, form: FileForm) -> list[RawTable]:
+        """One table a node that holds lists of numbers."""
+        if source.size > _LARGEST:
+            raise source.refuse("E_FORMAT", f"JSON of over {_LARGEST // 10**6} MB", "export it as CSV or Parquet")
+        source.file.seek(0)
+        tree = _tree(_parsed(source, source.file.read()))
+        if isinstance(tree, Mapping) and _SAVED_MODEL in map(str, tree.values()):
+            mend = "give it to mrdamper predict, validate or export; tests are what import reads"
+            raise NoTableError("E_FORMAT", "a saved model", file=source.name, mend=mend)
+        tables = nested_tables(source, tree if isinstance(tree, Mapping) else {"": tree}, self.title)
+        if not any(len(table.names) > 1 for table in tables):
+            mend = "export it as CSV, or the samples of every channel as a list"
+            raise NoTableError("E_FORMAT", "JSON without lists of numbers", file=source.name, mend=mend)
+        return tables
+
+
+def _parsed(source: Source, content: bytes) -> Any:
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found = dict(pairs)
+        if len(found) < len(pairs):
+            names = [name for name, _ in pairs]
+            raise twice(source, next(name for name in names if names.count(name) > 1))
+        return found
+
+    text = ""
+    try:
+        text = content.decode("utf-8-sig")
+        try:
+            return json.loads(text, object_pairs_hook=unique)
+        except json.JSONDecodeError as error:
+            if not error.msg.startswith("Extra data"):
+                raise
+            return [json.loads(line, object_pairs_hook=unique) for line in text.splitlines() if line.strip()]
+    except json.JSONDecodeError as error:
+        early = error.pos >= len(text.rstrip()) - 1
+        raise damaged(source, Json.title, "truncated" if early else f"{error.msg}, line {error.lineno}") from error
+    except UnicodeDecodeError as error:
+        raise source.refuse("E_ENCODING", "bytes that are no UTF-8", "save it as UTF-8") from error
+    except (RecursionError, ValueError) as error:  # or a whole number of thousands of digits
+        raise source.refuse(
+            "E_FORMAT", "nested too deeply, or a number without end", "export the samples as lists"
+        ) from error
+
+
+def _tree(value: Any) -> Any:
+    """The document with arrays for its lists of numbers; mappings from row numbers are lists."""
+    if isinstance(value, dict):
+        if len(value) >= _FEWEST and all(key.isdigit() for key in value):
+            return _tree(list(value.values()))
+        return {key: _tree(item) for key, item in value.items()}
+    if isinstance(value, bool):
+        return str(value)
+    if isinstance(value, (int, float)):
+        return float(value) if abs(value) < 1e308 else float("inf")
+    if not isinstance(value, list):
+        return "" if value is None else value
+    if len(value) > 1 and all(isinstance(item, str) for item in value):
+        stamps = [stamp(item) for item in value] if stamp(value[0]) is not None else [None]
+        known = [entry[0] for entry in stamps if entry is not None]
+        return (np.array(known) - known[0]) / 1e9 if len(known) == len(value) else value
+    if value and all(item is None or isinstance(item, (int, float)) for item in value):
+        return np.array([np.nan if item is None else item for item in value], dtype=float)
+    rows = value and all(isinstance(item, list) and len(item) == len(value[0]) for item in value)
+    if rows and all(isinstance(cell, (int, float)) or cell is None for row in value for cell in row):
+        return np.array([[np.nan if cell is None else cell for cell in row] for row in value], dtype=float)
+    items = [item for item in value if item is not None]
+    if items and all(isinstance(item, dict) for item in items) and _are_records(items):
+        return items
+    return [_tree(item) for item in items[:MOST_ITEMS]]
+
+
+def _are_records(items: list[dict[str, Any]]) -> bool:
+    return len(items) >= _FEWEST and all(
+        cell is None or isinstance(cell, (int, float, str)) for item in items for cell in item.values()
+    )

@@ -1,0 +1,231 @@
+"""Nested structures (structs of MATLAB, objects of JSON) as tables: one a node that holds arrays of samples.
+
+A node is a mapping, a list, an array, a number or a text. The path of a node becomes the label of its
+table; single numbers and texts of a node, of the nodes above it and of nodes beside it that hold no
+arrays stand beside its columns. A mapping with data, a name and a unit is one channel, with an x of
+its own where it has one: recordings of real-time systems, logged signals, exported time series.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from mrdamper.rig_files.column_names import split_name
+from mrdamper.rig_files.readers.arrays import array_table, expand, pick, titles_of
+from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Source
+from mrdamper.rig_files.units import is_unit
+
+DEEPEST = 8  # levels
+MOST_ITEMS = 2000  # of a list
+_MOST_TEXT = 200  # characters
+_NAMES = ("name", "label", "title", "channel", "channelname", "signal", "signalname", "key", "longname", "long_name",
+          "blockname")  # fmt: skip
+_DATA = ("data", "values", "value", "y", "samples", "ydata", "signaldata", "data_array")
+_TIMES = ("time", "t", "x", "xdata", "timestamps", "times", "time_s", "zeit")
+_UNITS = ("unit", "units", "einheit", "yunit", "y_unit", "dataunits", "yunits")
+_TIME_UNITS = ("xunit", "x_unit", "timeunit", "timeunits", "time_unit", "xunits")
+_PORTS = frozenset(("out1", "in1", "value", "out", "in", "signal", "outport", "inport", "model root", "y"))
+
+
+@dataclass(frozen=True)
+class _Column:
+    name: str
+    unit: str
+    array: np.ndarray
+    part: int | None = None
+    over: str = ""  # the channel that a column of time belongs to
+
+
+@dataclass
+class _Node:
+    """A table in the making."""
+
+    label: str
+    columns: list[_Column] = field(default_factory=list)
+    lists: list[list[str]] = field(default_factory=list)
+    constants: dict[str, float] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
+
+
+def nested_tables(source: Source, tree: Mapping[str, Any], title: str) -> list[RawTable]:
+    """The tables of a nested structure, in the order they appear; empty if it holds no array."""
+    nodes = [node for node in _walk(tree, _Node("")) if node.columns]
+    return [_table(source, node, title) for node in nodes]
+
+
+def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Node]:
+    inner: list[tuple[str, Any]] = []
+    for key, value in tree.items():
+        if isinstance(value, list) and all(isinstance(item, str) for item in value):
+            if value and split_name(key).role is None:
+                node.lists.append(value)
+        elif isinstance(value, list):
+            inner += _items(key, value[:MOST_ITEMS], node)
+        elif isinstance(value, np.ndarray):
+            node.columns += _across(key, "", value)
+        elif isinstance(value, Mapping):
+            channel = _channel(key, value)
+            if channel:
+                node.columns += channel
+            elif _is_plain(value):
+                _tell(node, value, key)
+            else:
+                inner.append((key, value))
+        else:
+            _tell(node, {key: value}, "")
+    yield node
+    for key, value in inner if depth < DEEPEST else ():
+        label = f"{node.label}/{key}" if node.label and key else node.label or key
+        yield from _walk(value, _Node(label, [], [], dict(node.constants), list(node.remarks)), depth + 1)
+
+
+def _items(key: str, items: list[Any], node: _Node) -> list[tuple[str, Mapping[str, Any]]]:
+    """Nodes of their own among the items of a list; items that are channels become columns, records a table."""
+    mappings = [item for item in items if isinstance(item, Mapping)]
+    channels = [_channel("", item) for item in mappings]
+    if mappings and all(channels):
+        node.columns += [column for channel in channels for column in channel]
+        return []
+    records = _records(mappings) if len(mappings) == len(items) else {}
+    if records:
+        return [(key, records)]
+    number = len(items) > 1
+    nodes = [(f"{key}_{i}" if number else key, item) for i, item in enumerate(items, 1) if isinstance(item, Mapping)]
+    nodes = [(name, item) for name, item in nodes if not _is_plain(item)]
+    arrays = [item for item in items if isinstance(item, np.ndarray)]
+    node.columns += [
+        column
+        for i, array in enumerate(arrays, 1)
+        for column in _across(f"{key}_{i}" if len(arrays) > 1 else key, "", array)
+    ]
+    return nodes
+
+
+def _records(items: list[Mapping[str, Any]]) -> dict[str, Any]:
+    """Columns of a list of records with the same keys, each value a number or a text; empty if they are none."""
+    if len(items) < 3 or any(item.keys() != items[0].keys() for item in items):
+        return {}
+    columns: dict[str, Any] = {}
+    for key in items[0]:
+        cells = [item[key] for item in items]
+        if all(cell is None or isinstance(cell, (int, float)) for cell in cells):
+            columns[key] = np.array([np.nan if cell is None else cell for cell in cells], dtype=float)
+        elif all(isinstance(cell, str) for cell in cells):
+            columns[key] = np.array([cell[:_MOST_TEXT] for cell in cells])
+        else:
+            return {}
+    return columns
+
+
+def _channel(key: str, says: Mapping[str, Any]) -> list[_Column]:
+    """The columns of a mapping that is one channel: its data, and its own x before it; empty if it is none."""
+    lower = {name.casefold(): value for name, value in says.items()}
+    data = next((lower[name] for name in _DATA if isinstance(lower.get(name), np.ndarray)), None)
+    if data is None or data.size < 2:
+        data = next((v["values"] for v in (lower.get("signals"),) if isinstance(v, Mapping) and "values" in v), None)
+        if not isinstance(data, np.ndarray):
+            return []
+    time = next((lower[name] for name in _TIMES if isinstance(lower.get(name), np.ndarray)), None)
+    others = [v for v in lower.values() if isinstance(v, np.ndarray) and v is not data and v is not time and v.size > 1]
+    stated = next((lower[name] for name in _NAMES if isinstance(lower.get(name), str) and lower[name].strip()), "")
+    if others or not (stated or key):
+        return []
+    unit = _unit_of(lower, _UNITS, "datainfo")
+    if not stated and not unit and time is None:
+        return []
+    name = _title(stated or key)
+    if split_name(name).role is None and split_name(key).role is not None:
+        name = key
+    columns = [_Column(c.name, unit if is_unit(unit) else "", c.array, c.part, name) for c in _across(name, "", data)]
+    if time is None or time.size != max(data.shape):
+        return columns
+    clock = _unit_of(lower, _TIME_UNITS, "timeinfo") or ("s" if "timeinfo" in lower else "")
+    clock = {"seconds": "s", "milliseconds": "ms"}.get(clock, clock)
+    return [_Column("time", clock, time, None, name), *columns]
+
+
+def _unit_of(lower: Mapping[str, Any], names: Sequence[str], inside: str) -> str:
+    info = lower.get(inside)
+    if isinstance(info, Mapping):
+        lower = {**lower, **{name.casefold(): value for name, value in info.items()}}
+    return next((lower[name].strip() for name in names if isinstance(lower.get(name), str)), "")
+
+
+def _title(stated: str) -> str:
+    """The part of a path in a model that names a channel: "Model Root"/"Load cell [N]"/"Out1"."""
+    whole = '"/"' not in stated and (split_name(stated).unit or "/" not in stated)
+    parts = [stated] if whole else stated.split("/")
+    parts = [part.strip().strip('"').strip() for part in parts]
+    parts = [part for part in parts if part]
+    telling = [part for part in parts if split_name(part).role is not None or split_name(part).unit]
+    plain = [part for part in parts if part.casefold() not in _PORTS]
+    return (telling or plain or parts or [stated])[-1]
+
+
+def _is_plain(value: Any) -> bool:
+    """Whether nothing in a node is an array or a list of nodes: it only describes the nodes beside it."""
+    if isinstance(value, Mapping):
+        return all(_is_plain(item) for item in value.values())
+    return not isinstance(value, (np.ndarray, list)) or (isinstance(value, list) and not value)
+
+
+def _tell(node: _Node, says: Mapping[str, Any], above: str) -> None:
+    """Keep single numbers and texts beside the columns of a node."""
+    lower = {key.casefold(): value for key, value in says.items()}
+    number, unit = lower.get("value"), lower.get("unit", lower.get("units"))
+    if above and isinstance(number, float) and isinstance(unit, str):  # {"current": {"value": 0.5, "unit": "A"}}
+        says = {f"{above} [{unit}]": number}
+    for key, value in says.items():
+        if isinstance(value, Mapping):
+            _tell(node, value, key)
+        elif isinstance(value, float) and len(node.constants) < MOST_COLUMNS:
+            known = node.constants.get(key, value)
+            node.constants[key if known == value else f"{above} {key}"] = value
+        elif isinstance(value, str) and len(node.remarks) < MOST_COLUMNS:
+            node.remarks.append(f"{key}: {value}"[:_MOST_TEXT])
+
+
+def _across(key: str, unit: str, array: np.ndarray) -> list[_Column]:
+    if array.dtype.kind == "O":
+        return [_Column(key, unit, array)]
+    return [_Column(name, unit, array, part) for name, part in expand(key, array.shape)]
+
+
+def _table(source: Source, node: _Node, title: str) -> RawTable:
+    columns: list[_Column] = []
+    arrays = {id(column.array): column.array for column in node.columns}
+    for key in arrays:
+        across = [column for column in node.columns if id(column.array) == key]
+        titles = titles_of(len(across), node.lists) if len(across) > 1 else None
+        for i, column in enumerate(across):
+            name, unit = (titles[0][i], titles[1][i]) if titles else (column.name, column.unit)
+            columns.append(_Column(name, unit, column.array, column.part, column.over))
+    columns = _one_time(columns)
+    over = tuple(column.over or column.name for column in columns) if any(c.over for c in columns) else ()
+    return array_table(
+        source,
+        [column.name for column in columns],
+        [column.unit for column in columns],
+        lambda column: pick(columns[column].array, columns[column].part),
+        label=node.label,
+        title=title,
+        constants=node.constants,
+        remarks=node.remarks,
+        over=over,
+    )
+
+
+def _one_time(columns: list[_Column]) -> list[_Column]:
+    """The columns with one time in front, where every channel has the same."""
+    times = [column for column in columns if column.over and column.name == "time"]
+    same = len(times) > 1 and all(
+        t.unit == times[0].unit and np.array_equal(t.array.reshape(-1), times[0].array.reshape(-1)) for t in times
+    )
+    if not same:
+        return columns
+    time = _Column("time", times[0].unit, times[0].array)
+    return [time, *(_Column(c.name, c.unit, c.array, c.part) for c in columns if not any(c is t for t in times))]
