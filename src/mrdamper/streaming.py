@@ -10,10 +10,10 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
+from mrdamper.compiled import RecordProgram
 from mrdamper.dampers.bands import PortableBand, portable_band
 from mrdamper.dampers.base import Damper, Envelope
 from mrdamper.dampers.causal import trace
@@ -222,7 +222,7 @@ class Stepper:
     def run(
         self, time: Floats, displacement: Floats, velocity: Floats, acceleration: Floats, current: Floats
     ) -> Floats:
-        """Force [N] along a sampled motion, from the state at hand; compiled, or stepped where numba is missing.
+        """Force [N] along a sampled motion, from the state at hand; compiled where there is a C compiler.
 
         Parameters
         ----------
@@ -233,26 +233,19 @@ class Stepper:
             time=time, displacement=displacement, velocity=velocity, acceleration=acceleration, current=current
         )
         steps = steps_of(t)
-        if self._compiled is None:
-            rows = zip(*(channel.tolist() for channel in (*channels, steps)), strict=True)
-            return np.array([self.step_motion(*row) for row in rows])
-        force, flags = np.empty(steps.size), np.empty(steps.size)
-        memory = np.array(self._memory)
-        failed = self._compiled(self._given, self._derived, memory, *channels, steps, force, flags)
+        record = self._record
+        found = record.along(self._given, self._derived, self._memory, (*channels, steps))
+        (force, flags), failed = found.outputs, found.failed
         if failed >= 0 or not np.isfinite(force).all():
             raise ExcitationError(
                 f"no force at sample {failed}", where=self.stream.title, mend="check the motion there"
             )
-        self._memory, self._flags = tuple(memory.tolist()), int(flags[-1])
+        self._memory, self._flags = found.memory, int(flags[-1])
         return force
 
     @cached_property
-    def _compiled(self) -> Any:
-        try:
-            from mrdamper.tracing.compiled import compiled_run
-        except ImportError:
-            return None  # numba is the extra `fast`
-        return compiled_run(self.stream.step)
+    def _record(self) -> RecordProgram:
+        return RecordProgram(self.stream.step)
 
     @property
     def source(self) -> str:

@@ -1,12 +1,10 @@
 """The integrator keeps its tolerance, converges, stays stable where explicit methods do not, and refuses."""
 
-import sys
-
 import numpy as np
 import pytest
 
 from mrdamper.data import Condition
-from mrdamper.errors import ExcitationError, MissingExtraError, ParameterError
+from mrdamper.errors import ExcitationError, ParameterError
 from mrdamper.hysteresis import Shape, follow
 from mrdamper.integrator import integrate
 from mrdamper.models import Scale
@@ -123,8 +121,11 @@ def test_step_halving_at_the_search_bounds():
         assert np.abs(a - b[::2]).max() < 1e-3 * np.abs(b).max(), values
 
 
-def test_without_numba_the_hint_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "mrdamper.integrator.rosenbrock", None)
-    monkeypatch.delattr("mrdamper.integrator.rosenbrock", raising=False)
-    with pytest.raises(MissingExtraError, match=r"mrdamper\[fast\]"):
-        integrate(lambda *_: None, (), (np.arange(3.0),) * 4, (0.0,), (1.0,))
+def test_the_interpreter_gives_the_same_states_as_compiled_code(monkeypatch):
+    short = tuple(channel[:60] for channel in CHANNELS)
+    p = np.array([300.0])
+    monkeypatch.setattr("mrdamper.compiled.record._WORTHWHILE", 0)
+    compiled = integrate(bouc_wen, p, short, np.zeros(1), np.ones(1))
+    monkeypatch.setenv("MRDAMPER_COMPILER", "none")
+    interpreted = integrate(lambda *given: bouc_wen(*given), p, short, np.zeros(1), np.ones(1))
+    np.testing.assert_array_equal(interpreted, compiled)

@@ -12,12 +12,12 @@ from support.dampers import joint_damper
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
+from mrdamper.compiled.toolchain import here
 from mrdamper.errors import InputError
 from mrdamper.export.c import program_sources
 from mrdamper.export.fmu import FMUExporter
 from mrdamper.export.fmu_check import check_fmu
 from mrdamper.export.fmu_program import write_program_fmu
-from mrdamper.export.toolchain import here
 from mrdamper.files.model_file import save_model
 from mrdamper.streaming import stepper
 from mrdamper.systems.controllers import controller_type

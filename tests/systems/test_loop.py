@@ -101,8 +101,7 @@ def test_the_rear_axle_follows_the_front():
     assert np.abs(heave.x[:, 1]).max() < 0.1 * np.abs(heave.x[:, 0]).max()
 
 
-def test_machine_code_and_interpreter_agree():
-    pytest.importorskip("numba")
+def test_compiled_code_and_interpreter_agree():
     frame = building("frame", ["a"], np.eye(1) * 100, np.eye(1) * 10, np.eye(1) * 1e5, [Link("d", "a", "ground")])
     loop = Loop(frame, pulse(end=0.3), {"d": dashpot(2e3, fy=50.0)}, Passive())
     slow, fast = loop.run(1e-3, machine=False), loop.run(1e-3, machine=True)

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mrdamper.compiled import RecordProgram
 from mrdamper.dampers.coil import field_step
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import ExcitationError, ParameterError
 from mrdamper.tracing import Program, Tape, Traced, program
-from mrdamper.tracing.python import python_functions
 
 if TYPE_CHECKING:
     from mrdamper.dampers.base import Damper
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 SLACK = 0.02  # a test bench repeats a condition to a few per cent; within that nothing is extrapolated
 _STEADY = 1e-18  # mean square displacement under which nothing moves [m²]
-_LONG = 100_000  # samples from which compiling pays
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,26 +148,13 @@ def causal_force(damper: Damper, motion: Excitation) -> Floats:
     ExcitationError
         If there is no force at a sample.
     """
-    made = trace(damper)
-    prepare, advance = python_functions(made)
-    given = tuple(float(e.value) for e in made.tape.parameters.values())
-    _, derived = prepare(given)
+    record = RecordProgram(trace(damper))
+    given = tuple(float(e.value) for e in record.program.tape.parameters.values())
+    derived = record.prepare(given) or ()
     steps = np.diff(motion.time, prepend=2 * motion.time[0] - motion.time[1])
     channels = (motion.displacement, motion.velocity, motion.acceleration, motion.current, steps)
-    starts = tuple(made.tape.starts.values())
-    if len(motion) > _LONG:
-        from mrdamper.tracing.compiled import compiled_run
-
-        force, flags = np.empty(steps.size), np.empty(steps.size)
-        inputs = [np.ascontiguousarray(channel, dtype=float) for channel in channels]
-        failed = compiled_run(made)(given, derived, np.array(starts), *inputs, force, flags)
-    else:
-        force, memory, failed = np.empty(steps.size), starts, -1
-        for i, sample in enumerate(zip(*(channel.tolist() for channel in channels), strict=True)):
-            status, (force[i], _), memory = advance(given, derived, memory, sample)
-            if status:
-                failed = i
-                break
+    found = record.along(given, derived, record.starts, channels)
+    force, failed = found.outputs[0], found.failed
     if failed >= 0 or not np.isfinite(force).all():
         at = failed if failed >= 0 else int(np.flatnonzero(~np.isfinite(force))[0])
         raise ExcitationError(

@@ -14,12 +14,12 @@ from mrdamper.dampers.base import Damper
 from mrdamper.dampers.joint import damper_of
 from mrdamper.data import Floats
 from mrdamper.export.base import Exporter, Written, identifier, write_export
-from mrdamper.export.c_writer import CWriter
 from mrdamper.export.templates import render
 from mrdamper.files.encoding import c_comment
 from mrdamper.models import Model
 from mrdamper.streaming import FLAGS, Stepper, Stream, stream
 from mrdamper.tracing import Program
+from mrdamper.tracing.c_writer import CWriter
 from mrdamper.tracing.tape import Table
 
 TOLERANCE = 1e-9  # of the largest force: the self-test forgives other compilers and libraries this much

@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from mrdamper.compiled.toolchain import PLATFORMS, Platform, build_library
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.joint import damper_of
 from mrdamper.data import Floats
@@ -21,7 +22,6 @@ from mrdamper.export.base import Exporter, Written, identifier
 from mrdamper.export.c import c_facts, c_sources, reference_motion
 from mrdamper.export.fmu_description import c_bounds, description_facts, parameters_of_stream, serial_fields
 from mrdamper.export.templates import render
-from mrdamper.export.toolchain import PLATFORMS, Platform, build_library
 from mrdamper.models import Model
 from mrdamper.streaming import FLAGS, Stepper, Stream, stream
 

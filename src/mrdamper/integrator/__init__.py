@@ -9,13 +9,20 @@ tolerance, and what cannot be kept below it is refused, never returned.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
+from mrdamper.compiled import RecordProgram
 from mrdamper.data import Floats
-from mrdamper.errors import ExcitationError, MissingExtraError, ParameterError
+from mrdamper.errors import ExcitationError, ParameterError
 from mrdamper.integrator.streamed import Rate, integrate_step
-from mrdamper.tracing import streamed
+from mrdamper.tracing import Tape, program, streamed
+from mrdamper.tracing.functions import Step
+
+_RUNAWAY = 1e6  # state over its scale
+_MOST_STEPS = 20_000  # between two samples of a record
 
 
 @streamed(integrate_step)
@@ -36,8 +43,8 @@ def integrate(
     Parameters
     ----------
     rate : function (x, v, current, state, parameters, out)
-        Writes d(state)/dt into `out`. A plain module-level function of numbers and arrays: it
-        is compiled.
+        Writes d(state)/dt into `out`, with operators and NumPy's functions. It runs once on symbols
+        (`mrdamper.tracing`); what comes out is compiled.
     parameters : P numbers
         Passed on to `rate`.
     motion : four (N,) arrays
@@ -57,8 +64,6 @@ def integrate(
     ------
     ExcitationError
         If time does not increase.
-    MissingExtraError
-        If numba is not installed.
     ParameterError
         If the tolerance cannot be kept: the parameters make the model too stiff, or it runs away.
 
@@ -68,32 +73,61 @@ def integrate(
     problems II: Rosenbrock solvers", Atmospheric Environment 31, 3459–3472; coefficients
     recalled, order and stability tested here.
     """
-    time, x, v, current = (np.array(channel, dtype=float, order="C") for channel in motion)
+    time, x, v, current = (np.asarray(channel, dtype=float) for channel in motion)
     if not np.all(np.diff(time) > 0):
         raise ExcitationError("time does not increase", mend="sort the samples and drop the repeated ones")
-    out = np.empty((time.size, len(start)))
-    try:
-        from mrdamper.integrator import rosenbrock  # compiles, or reads what was compiled before
-    except ImportError as error:
-        raise MissingExtraError(
-            "a model that is integrated needs numba for whole records", mend="pip install 'mrdamper[fast]'"
-        ) from error
-    status, at = rosenbrock.path(
-        rosenbrock.compiled(rate),
-        np.array(parameters, dtype=float),
-        time,
-        x,
-        v,
-        current,
-        np.array(start, dtype=float),
-        np.array(scale, dtype=float),
-        tolerance,
-        out,
-    )
-    if status:
-        why = "needs more than 20 000 steps" if status == rosenbrock.TOO_STIFF else "runs away"
+    given = (*map(float, parameters), *map(float, scale), float(tolerance))
+    record, derived = _record(rate, len(start), given)
+    steps = np.concatenate([[1.0], np.diff(time)])
+    begin = {f"state{i}": float(value) for i, value in enumerate(start)}
+    memory = [begin.get(name, value) for name, value in record.program.tape.starts.items()]
+    found = record.along(given, derived, memory, (x, v, current, steps))
+    out = found.outputs.T
+    limit = _RUNAWAY * np.asarray(scale, dtype=float)
+    lost = np.flatnonzero(~(np.abs(out[: found.failed if found.failed >= 0 else None]) <= limit).all(axis=1))
+    if lost.size or found.failed >= 0:
+        at = int(lost[0]) if lost.size else found.failed
+        why = "runs away" if lost.size else f"needs more than {_MOST_STEPS:_} steps".replace("_", " ")
         raise ParameterError(
             f"the model's state {why} between samples {at - 1} and {at} ({time[at]:.4g} s)",
             mend="its parameters are too stiff or unstable; bring them nearer to the data's scales",
         )
     return out
+
+
+def _record(rate: Rate, states: int, given: tuple[float, ...]) -> tuple[RecordProgram, tuple[float, ...]]:
+    """The program of a rate that holds for some parameters, and what follows from them."""
+    known = _programs(rate, states, len(given))
+    for record in known:
+        if (derived := record.prepare(given)) is not None:
+            return record, derived
+    known.append(RecordProgram(_traced(rate, states, given)))
+    derived = known[-1].prepare(given)
+    if derived is None:
+        raise ParameterError(f"parameters {given}", mend="give finite numbers")
+    return known[-1], derived
+
+
+@lru_cache(maxsize=64)
+def _programs(rate: Rate, states: int, given: int) -> list[RecordProgram]:
+    """Programs of a rate so far, one for each answer to what it asks of its parameters."""
+    return []
+
+
+def _traced(rate: Rate, states: int, given: tuple[float, ...]) -> Any:
+    """The program of one sample; its parameters are those of the rate, the scale and the tolerance."""
+    tape = Tape()
+    x, v, current, dt = (tape.input(name) for name in ("displacement", "velocity", "current", "dt"))
+    numbers = [tape.parameter(f"p{i}", value) for i, value in enumerate(given)]
+    own = len(given) - states - 1
+    out = integrate_step(
+        tape,
+        rate,
+        numbers[:own],
+        (Step(dt), x, v, current),
+        (0.0,) * states,
+        numbers[own:-1],
+        tolerance=numbers[-1],
+        most=_MOST_STEPS,
+    )
+    return program(tape, {f"state{i}": value for i, value in enumerate(out)})

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mrdamper.tracing import Tape, TraceError
+from mrdamper.tracing import Tape
 
 Rate = Callable[[Any, Any, Any, Any, Any, Any], None]
 MOST_STEPS = 400  # between two samples; a sound model takes a handful
@@ -33,11 +33,10 @@ def integrate_step(
     start: Sequence[float],
     scale: Sequence[Any],
     *,
-    tolerance: float = 1e-5,
+    tolerance: Any = 1e-5,
+    most: int = MOST_STEPS,
 ) -> Any:
-    """States after one sample, from those before; a model of one or two states."""
-    if len(start) > 2:
-        raise TraceError(f"a model of {len(start)} integrated states has no form for one sample yet")
+    """States after one sample, from those before, in at most `most` steps."""
     held = [tape.remember(f"state{i}", value) for i, value in enumerate(start)]
     size = tape.remember("substep", 1.0)
     time, *channels = motion
@@ -60,7 +59,7 @@ def integrate_step(
         next_share = np.minimum(tape.select(worst < 1e9, h * factor, h * 0.1) / width, 1.0)
         return after < width * (1 - 1e-12), [after, next_share, *kept]
 
-    walked, share, *reached = tape.loop([0.0, tape.apply("maximum", size, 1e-3), *held], advance, MOST_STEPS)
+    walked, share, *reached = tape.loop([0.0, tape.apply("maximum", size, 1e-3), *held], advance, most)
     later = [tape.select(tape.first, h, r) for h, r in zip(held, reached, strict=True)]
     for memory, value in zip((*held, size), (*later, tape.select(tape.first, size, share)), strict=True):
         tape.update(memory, value)
@@ -89,9 +88,13 @@ def _rodas3(
     h: Any,
     y: Sequence[Any],
     scale: Sequence[Any],
-    tolerance: float,
+    tolerance: Any,
 ) -> tuple[list[Any], Any]:
-    """One step, and its error over the tolerance. [Sandu et al. 1997, as in `rosenbrock`]"""
+    """One step, and its error over the tolerance. [Sandu et al. 1997]
+
+    Derivatives by differences: small errors in them cost Rodas3 accuracy, not stability. A step may not change
+    a state by more than itself: the method would else step over a pole.
+    """
     order = range(len(y))
     sizes = [np.maximum(abs(y[j]), scale[j]) for j in order]
     f = slopes(t, y)
@@ -121,14 +124,35 @@ def _rodas3(
 
 
 def _solver(jacobian: list[list[Any]], h: Any) -> Callable[[list[Any]], list[Any]]:
-    """Solutions of (2/h − J) k = right, for one or two states."""
-    if len(jacobian) == 1:
+    """Solutions of (2/h − J) k = right, by Cramer's rule: models have few states."""
+    size = len(jacobian)
+    if size == 1:
         pivot = 2 / h - jacobian[0][0]
         return lambda right: [right[0] / pivot]
-    (a, b), (c, d) = jacobian
-    p, q = 2 / h - a, 2 / h - d
-    determinant = p * q - b * c
-    return lambda right: [
-        (q * right[0] + b * right[1]) / determinant,
-        (c * right[0] + p * right[1]) / determinant,
+    matrix = [[2 / h - value if i == j else -value for j, value in enumerate(row)] for i, row in enumerate(jacobian)]
+    order = tuple(range(size))
+    cofactors = [
+        [(-1) ** (i + j) * _determinant(matrix, _without(order, i), _without(order, j)) for j in order] for i in order
     ]
+    determinant = _sum([matrix[0][j] * cofactors[0][j] for j in order])
+    return lambda right: [_sum([cofactors[i][j] * right[i] for i in order]) / determinant for j in order]
+
+
+def _determinant(matrix: list[list[Any]], rows: tuple[int, ...], columns: tuple[int, ...]) -> Any:
+    if len(rows) == 1:
+        return matrix[rows[0]][columns[0]]
+    first, rest = rows[0], rows[1:]
+    return _sum(
+        [(-1) ** i * matrix[first][j] * _determinant(matrix, rest, _without(columns, j)) for i, j in enumerate(columns)]
+    )
+
+
+def _without(places: tuple[int, ...], left_out: int) -> tuple[int, ...]:
+    return tuple(place for place in places if place != left_out)
+
+
+def _sum(terms: list[Any]) -> Any:
+    total = terms[0]
+    for term in terms[1:]:
+        total = total + term
+    return total

@@ -5,7 +5,7 @@ force of every element at the end of the step: unconditionally stable for the st
 for elements as stiff as they come. The discrete energy balance holds to rounding, so a gap in
 it means a wrong sign or a search that was not finished, never the step.
 
-One source runs in the interpreter and, for many steps or many runs, as machine code.
+`mrdamper.systems.machine` runs the same loop compiled, for many steps or many runs.
 """
 
 from __future__ import annotations
@@ -13,13 +13,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import ParameterError
+from mrdamper.tracing import Program
 
 _MOST_TRIES = 60  # evaluations of one element in one search
 _MOST_SWEEPS = 50  # over all elements in one step
@@ -36,10 +37,9 @@ class Stage:
     given: tuple[float, ...]  # its parameters
     derived: tuple[float, ...]  # what follows from them
     start: tuple[float, ...]  # the memory before the first sample
-    compiled: Callable[[], Step]  # gives `step` as machine code
-    lines: int = 3  # of the program: what a step costs in the interpreter
-    prepare: Callable[..., Any] | None = None  # from other parameters to (status, derived)
-    inputs: int = 5
+    program: Program  # what `step` was made of
+    lines: int  # of the program: what a step costs in the interpreter
+    prepare: Callable[..., Any]  # from other parameters to (status, derived)
     names: tuple[str, ...] = ()  # of its parameters
     scale: tuple[float, float] = (1.0, 0.0)  # gain and offset of what it gives first
 
@@ -62,7 +62,7 @@ class Stage:
 
         Raises `ParameterError` if they need another program: another branch, or other bounds.
         """
-        status, derived = self.prepare(given) if self.prepare else (1, ())
+        status, derived = self.prepare(given)
         if status or len(given) != len(self.given):
             raise ParameterError("parameters that need another program", mend="trace that damper by itself")
         return replace(self, given=given, derived=tuple(derived))
@@ -84,8 +84,8 @@ class Numbers:
         return cls(strung("scaled_given"), strung("derived"), strung("start"))
 
 
-def make_walk(elements: Sequence[Stage], control: Stage | None, machine: bool) -> Callable[..., int]:
-    """The loop for these stages, interpreted or as machine code: `walk` without its first two arguments.
+def interpreted_walk(elements: Sequence[Stage], control: Stage | None) -> Callable[..., int]:
+    """The loop for these stages in the interpreter: `walk` without its first two arguments.
 
     Parameters
     ----------
@@ -94,55 +94,24 @@ def make_walk(elements: Sequence[Stage], control: Stage | None, machine: bool) -
         outputs force [N] and flags.
     control : Stage, optional
         From signals and dt to one command [A] an element.
-    machine : bool
-        Compile what is new in these stages; takes seconds, and gains a hundredfold.
     """
-    tools = _tools(machine)
-    command = tools.compile_(_no_command)
+    command: Any = _no_command
     if control is not None:
-        step = control.compiled() if machine else control.step
-        p, d, m = (tools.cut(b, size) for b, size in zip((2, 0, 0), control.sizes, strict=True))
-        keep = tools.compile_(_keeper(0, len(control.start)))
-        command = tools.compile_(_command(step, p, d, m, tools.cut(0, control.inputs), keep))
-    return tools.walk_of(_evaluation(tuple(elements), machine), tools.command(command))
-
-
-@lru_cache(maxsize=8)  # laws side by side share what their dampers answer
-def _evaluation(elements: tuple[Stage, ...], machine: bool) -> Any:
-    """What the elements answer, by their number."""
-    tools = _tools(machine)
-    evaluate = tools.compile_(_nothing)
+        p, d, m = (_cut(b, size) for b, size in zip((2, 0, 0), control.sizes, strict=True))
+        inputs = _cut(0, len(control.program.tape.inputs))
+        command = _command(control.step, p, d, m, inputs, _keeper(0, len(control.start)))
+    evaluate: Any = _nothing
     ends = np.cumsum([[2, 0, 0], *([2 + p, d, m] for p, d, m in (e.sizes for e in elements))], axis=0)
     for index in reversed(range(len(elements))):
         stage, begin = elements[index], ends[index].tolist()
-        step = stage.compiled() if machine else stage.step
-        keep = tools.compile_(_keeper(begin[2], len(stage.start)))
-        p, d, m = (tools.cut(b, size) for b, size in zip(begin, stage.sizes, strict=True))
-        first = tools.compile_(_one(step, begin[0] - 2, p, d, m, keep))
-        evaluate = tools.compile_(_either(index, first, evaluate))
-    return tools.evaluation(evaluate)
+        p, d, m = (_cut(b, size) for b, size in zip(begin, stage.sizes, strict=True))
+        first = _one(stage.step, begin[0] - 2, p, d, m, _keeper(begin[2], len(stage.start)))
+        evaluate = _either(index, first, evaluate)
+    return partial(walk, evaluate, command)
 
 
-class _Interpreter:
-    """What `mrdamper.systems.machine` does for machine code, for plain functions: nothing."""
-
-    compile_ = command = evaluation = staticmethod(lambda function: function)
-
-    @staticmethod
-    def walk_of(evaluate: Any, command: Any) -> Callable[..., int]:
-        return partial(walk, evaluate, command)
-
-    @staticmethod
-    def cut(begin: int, size: int) -> Any:
-        return lambda values: tuple(values[begin : begin + size].tolist())
-
-
-def _tools(machine: bool) -> Any:
-    if not machine:
-        return _Interpreter
-    from mrdamper.systems import machine as compiled
-
-    return compiled
+def _cut(begin: int, size: int) -> Any:
+    return lambda values: tuple(values[begin : begin + size].tolist())
 
 
 def _nothing(j, p, d, memory, later, x, v, a, current, dt):
@@ -154,9 +123,7 @@ def _no_command(p, d, memory, y, out):
 
 
 def _keeper(begin: int, size: int) -> Any:
-    """A function that puts a tuple into an array; an empty tuple has no items to ask for, even in no turns."""
-    if size == 0:
-        return lambda values, new: None
+    """A function that puts a tuple into an array."""
 
     def keep(values, new):
         for i in range(size):

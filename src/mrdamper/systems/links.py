@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
+
+import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.causal import trace
 from mrdamper.systems.kernel import Stage
 from mrdamper.systems.structure import Link
-from mrdamper.tracing import Program
+from mrdamper.tracing import Program, Tape, program
 from mrdamper.tracing.python import python_functions, python_source
 
 
@@ -19,15 +20,10 @@ def stage_of(program: Program) -> Stage:
     prepare, step = python_functions(program)
     given = tuple(float(e.value) for e in program.tape.parameters.values())
     derived = prepare(given)[1]
-
-    def compiled() -> Any:
-        from mrdamper.tracing.compiled import compiled_step
-
-        return compiled_step(program)
-
     lines, tape = python_source(program).count("\n"), program.tape
-    memory, names = tuple(tape.starts.values()), tuple(tape.parameters)
-    return Stage(step, given, tuple(derived), memory, compiled, lines, prepare, len(tape.inputs), names)
+    return Stage(
+        step, given, tuple(derived), tuple(tape.starts.values()), program, lines, prepare, tuple(tape.parameters)
+    )
 
 
 @lru_cache(maxsize=32)  # a loop is made again for every law
@@ -39,29 +35,23 @@ def damper_stage(damper: Damper, free: bool = False) -> Stage:
 @lru_cache(maxsize=32)
 def contact_stage(link: Link) -> Stage:
     """A bump stop, or the part of a tyre's force that is missing while it is in the air."""
-    step = _stop if link.role == "stop" else _tyre
-    return Stage(step, (link.stiffness, link.damping, link.gap), (), (), lambda: _machine(step))
+    tape = Tape()
+    stiffness, damping = (tape.parameter(name, getattr(link, name)) for name in ("stiffness", "damping"))
+    gap = tape.parameter("gap", link.gap)
+    x, v = tape.input("displacement"), tape.input("velocity")
+    for name in ("acceleration", "current", "dt"):
+        tape.input(name)
+    force, touching = (_stop if link.role == "stop" else _tyre)(tape, x, v, stiffness, damping, gap)
+    return stage_of(program(tape, {"force": force, "flags": tape.select(touching, 1.0, 0.0)}))
 
 
-def _machine(step: Callable[..., Any]) -> Any:
-    from numba import njit
-
-    return njit(error_model="numpy")(step)
-
-
-def _stop(p: Any, d: Any, memory: Any, u: Any) -> Any:
-    stiffness, damping, gap = p
-    x, v, _, _, _ = u
-    if x > gap:
-        return 0, (max(stiffness * (x - gap) + damping * v, 0.0), 1.0), memory
-    if x < -gap:
-        return 0, (min(stiffness * (x + gap) + damping * v, 0.0), 1.0), memory
-    return 0, (0.0, 0.0), memory
+def _stop(tape: Tape, x: Any, v: Any, stiffness: Any, damping: Any, gap: Any) -> tuple[Any, Any]:
+    above = np.maximum(stiffness * (x - gap) + damping * v, 0.0)
+    below = np.minimum(stiffness * (x + gap) + damping * v, 0.0)
+    return tape.select(x > gap, above, tape.select(x < -gap, below, 0.0)), (x > gap) | (x < -gap)
 
 
-def _tyre(p: Any, d: Any, memory: Any, u: Any) -> Any:
+def _tyre(tape: Tape, x: Any, v: Any, stiffness: Any, damping: Any, gap: Any) -> tuple[Any, Any]:
     """The structure holds the tyre as a spring that also pulls; what it would pull is given back here."""
-    stiffness, damping, gap = p
-    x, v, _, _, _ = u
     pull = stiffness * (x - gap) + damping * v
-    return 0, (-pull if pull > 0 else 0.0, 1.0 if pull > 0 else 0.0), memory
+    return tape.select(pull > 0, -pull, 0.0), pull > 0

@@ -1,60 +1,135 @@
-"""The loop as machine code. The loop itself is compiled once and kept on disk; what a damper or a law
-answers enters through an address, and is all that is compiled anew. Importing this imports numba.
-"""
+"""The loop compiled: `loop.c`, with what the elements and the control law answer as the C of their programs."""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable
-from typing import Any
+import ctypes
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from pathlib import Path
 
-from numba import cfunc, njit, types
-from numba.core.errors import NumbaExperimentalFeatureWarning
-from numba.extending import register_jitable
-from numba.np.unsafe.ndarray import to_fixed_tuple
+import numpy as np
 
-from mrdamper.systems import kernel
+from mrdamper.compiled.cache import load
+from mrdamper.compiled.record import address
+from mrdamper.compiled.writer import PREAMBLE, functions
+from mrdamper.systems.kernel import Stage, interpreted_walk
 
-_number, _whole = types.float64, types.int64
-_vector, _matrix = types.float64[::1], types.float64[:, ::1]
-_evaluate = types.Tuple((_whole, _number, _number))(_whole, *[_vector] * 4, *[_number] * 5)
-_command = _whole(*[_vector] * 5)
+_LOOP = Path(__file__).with_name("loop.c")
+_TRIED = 40  # steps over which a new library is compared with the interpreter
+_ALIKE = 1e-9  # relative difference allowed there
 
-compile_ = njit(error_model="numpy")
-register_jitable(error_model="numpy")(kernel.search)
-_walk = njit(
-    _whole(
-        types.FunctionType(_evaluate), types.FunctionType(_command), _number, _whole, *[_matrix] * 10,
-        *[_vector] * 6, *[_matrix] * 5,
-    ),
-    cache=True,
-    error_model="numpy",
-)(kernel.walk)  # fmt: skip
+_EVALUATE = """
+static int evaluate(whole j, const real *p, const real *d, const real *memory, real *later, real x, real v, real a,
+    real current, real dt, real *force, real *flags)
+{{
+    const real u[5] = {{x, v, a, current, dt}};
+    real out[2];
+    switch (j) {{
+{cases}    default:
+        return 0;
+    }}
+}}
+"""
+_CASE = """    case {index}:
+        memcpy(later + {m}, memory + {m}, {size} * sizeof(real));
+        if (!step_{program}(p + {p} + 2, d + {d}, later + {m}, u, out)) {{
+            return 0;
+        }}
+        *force = p[{p}] * out[0] + p[{p} + 1];
+        *flags = out[1];
+        return 1;
+"""
+_COMMAND = """
+static int command(const real *p, const real *d, real *memory, const real *signals, real *out)
+{{
+    {body}
+}}
+"""
 
 
-def evaluation(evaluate: Any) -> Any:
-    """What answers for the elements, as an address."""
-    return cfunc(_evaluate)(evaluate.py_func)
+def compiled_walk(elements: Sequence[Stage], control: Stage | None) -> Callable[..., int] | None:
+    """The loop for these stages, compiled; None without a usable compiler. Arguments as `interpreted_walk`."""
+    library = _library(tuple(elements), control)
+    return None if library is None else _walk_of(library)
 
 
-def command(command: Any) -> Any:
-    """What answers for the law, as an address."""
-    return cfunc(_command)(command.py_func)
+@lru_cache(maxsize=16)
+def _library(elements: tuple[Stage, ...], control: Stage | None) -> ctypes.CDLL | None:
+    def holds(library: ctypes.CDLL) -> bool:
+        return _alike(_walk_of(library), interpreted_walk(elements, control), elements, control)
+
+    return load(_source(elements, control), holds)
 
 
-def walk_of(evaluate: Any, command: Any) -> Callable[..., int]:
-    """`kernel.walk` with what answers for the elements, and for the law."""
+def _source(elements: Sequence[Stage], control: Stage | None) -> str:
+    programs = list({id(stage.program): stage.program for stage in elements}.values())
+    places = {id(program): index for index, program in enumerate(programs)}
+    begins = np.cumsum([[0, 0, 0], *([2 + p, d, m] for p, d, m in (e.sizes for e in elements))], axis=0).tolist()
+    cases = "".join(
+        _CASE.format(index=i, program=places[id(stage.program)], p=p, d=d, m=m, size=len(stage.start))
+        for i, (stage, (p, d, m)) in enumerate(zip(elements, begins, strict=False))
+    )
+    text = PREAMBLE + "".join(functions(program, index) for index, program in enumerate(programs))
+    text += _EVALUATE.format(cases=cases)
+    body = "return 1;"
+    if control is not None:
+        text += functions(control.program, len(programs))
+        body = f"return step_{len(programs)}(p + 2, d, memory, signals, out);"
+    return text + _COMMAND.format(body=body) + "\n" + _LOOP.read_text(encoding="utf-8")
 
-    def walk(*arguments: Any) -> int:
-        with warnings.catch_warnings():  # functions by address are called experimental since numba 0.49
-            warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
-            return _walk(evaluate, command, *arguments)
+
+def _walk_of(library: ctypes.CDLL) -> Callable[..., int]:
+    run = library.walk
+    run.restype = ctypes.c_longlong
+
+    def walk(
+        dt: float, every: int, P, Q, R, G, B, loads, road, road_rate, H, seen, p, d, memory, cp, cd, cm, currents,
+        x, v, f, flags,
+    ) -> int:  # fmt: skip
+        samples, n = x.shape
+        count, signals = f.shape[1], H.shape[0]
+        sizes = np.array([samples, n, count, signals, every, memory.size], dtype=np.int64)
+        given = [np.ascontiguousarray(a) for a in (P, Q, R, G, B, loads, road, road_rate, H, seen, p, d, cp, cd)]
+        kept = cm.copy()
+        work = np.zeros(3 * n + 5 * count + signals + memory.size + 1)
+        inputs, outputs = (
+            np.array([a.ctypes.data for a in arrays], dtype=np.uintp)
+            for arrays in (given, (memory, kept, currents, x, v, f, flags))
+        )
+        return int(run(ctypes.c_double(dt), address(sizes), address(inputs), address(outputs), address(work)))
 
     return walk
 
 
-def cut(begin: int, size: int) -> Any:
-    """A function from an array to a tuple of `size` of its numbers."""
-    if size == 0:
-        return compile_(lambda values: ())
-    return compile_(lambda values: to_fixed_tuple(values[begin : begin + size], size))  # type: ignore[call-arg]
+def _alike(
+    one: Callable[..., int], other: Callable[..., int], elements: Sequence[Stage], control: Stage | None
+) -> bool:
+    """Whether two loops give the same motion of one mass on a spring, all elements beside it, for some steps."""
+    from mrdamper.systems.kernel import Numbers
+
+    count, dt = len(elements), 1e-3
+    numbers, law = Numbers.of(elements), Numbers.of([] if control is None else [control])
+    mass, stiffness = 300.0, 2e4
+    S = np.array([[1 / (2 / dt * mass + dt / 2 * stiffness)]])
+    B, H = np.ones((count, 1)), np.zeros((0 if control is None else len(control.program.tape.inputs) - 1, 2 + count))
+    R = S @ B.T
+    turns = np.linspace(0.0, 4.0, _TRIED)[:, None]
+    loads = S[0, 0] * 500.0 * np.sin(turns)
+    still = np.zeros((_TRIED, count))
+    found = []
+    for walk in (one, other):
+        x, v = np.zeros((2, _TRIED, 1))
+        f, flags = np.zeros((2, _TRIED, count))
+        currents = np.full((_TRIED, count), 0.1)
+        try:
+            failed = walk(
+                dt, 1, S * 2 / dt * mass, -S * stiffness, R, B @ R, B, loads, still, still.copy(), H,
+                np.zeros((_TRIED, H.shape[0])), numbers.given, numbers.derived, numbers.start.copy(), law.given,
+                law.derived, law.start, currents, x, v, f, flags,
+            )  # fmt: skip
+        except (ValueError, ArithmeticError):
+            return True  # of the interpreter, where compiled code goes on with what is not finite
+        found.append((failed, np.column_stack([x, v, f, currents])))
+    (failed, motion), (expected, reference) = found
+    size = np.abs(reference).max(axis=0) + 1e-30
+    return failed == expected and bool(np.all(np.abs(motion - reference) <= _ALIKE * size))

@@ -130,7 +130,7 @@ def monte_carlo(
     progress : callable
         Told what is being done and the share done, 0...1.
     """
-    machine = (len(draws) > 5 or None) and loop.can_compile
+    machine = len(draws) > 5 or None
     step = max(2 * mean.step, loop.first_step / 2)
     peaks, found, lost = [], [], 0
     for number, one in enumerate(draws):

@@ -11,16 +11,16 @@ their motion instead and need a bounded z.
 
 from __future__ import annotations
 
-import importlib.util
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
+from mrdamper.compiled import RecordProgram
 from mrdamper.data import Floats
 from mrdamper.errors import ParameterError, RecordError, StepError
 from mrdamper.optimizers.levenberg_marquardt import least_squares
+from mrdamper.tracing import Tape, program
 
 _STEPS = 20  # between two samples, by Runge and Kutta's fourth order
 _LEAD = 0.5  # of a period, run before the one that counts: what the oscillator has to forget
@@ -92,12 +92,19 @@ class Oscillator:
         fine = _refined(force, 2 * _STEPS, periodic)
         lead = 2 * _STEPS * int(_LEAD * force.size) if periodic else 0
         fine = np.concatenate([fine[-1 - lead : -1], fine])
-        y = np.empty(fine.size // (2 * _STEPS) + 1)
-        bad = _march()(
-            fine, 1 / (_STEPS * sample_rate), _STEPS, y, self.m, self.c, self.k, self.alpha,
-            self.beta * self.gamma, self.beta * self.delta, self.n, _FARTHEST * (np.abs(force).max() / self.k + 1e-9),
+        record = _march(self.n == 1)
+        given = (
+            1 / (_STEPS * sample_rate), self.m, self.c, self.k, self.alpha,
+            self.beta * self.gamma, self.beta * self.delta, self.n,
         )  # fmt: skip
-        if bad >= 0:
+        derived = record.prepare(given)
+        assert derived is not None
+        found = record.along(given, derived, record.starts, (fine[:-2:2], fine[1:-1:2], fine[2::2]))
+        farthest = _FARTHEST * (np.abs(force).max() / self.k + 1e-9)
+        y = np.concatenate([[0.0], found.outputs[0, _STEPS - 1 :: _STEPS]])
+        lost = ~(np.abs(y) < farthest)
+        if lost.any() or found.failed >= 0:
+            bad = int(np.flatnonzero(lost)[0]) if lost.any() else found.failed // _STEPS
             raise StepError(
                 f"the state runs away after {bad / sample_rate:.3g} s", where="oscillator",
                 mend="lower the force: an element with beta (gamma + delta) < 0 has no bound", code="E_RUNAWAY",
@@ -209,37 +216,24 @@ def _refined(force: Floats, times: int, periodic: bool) -> Floats:
     return np.asarray(CubicSpline(np.arange(force.size), force)(places))
 
 
-def _stepped(u, h, every, y, m, c, k, alpha, gamma, delta, n, farthest):
-    """Runge–Kutta 4 from rest, u at half steps; samples into y. The step at which it ran away, or −1."""
-    x, v, z = 0.0, 0.0, 0.0
-    y[0] = 0.0
-    for i in range(1, y.size):
-        for j in range(every):
-            at = 2 * ((i - 1) * every + j)
-            dx, dv, dz = 0.0, 0.0, 0.0
-            kx, kv, kz = 0.0, 0.0, 0.0
-            for stage in range(4):
-                share = 0.0 if stage == 0 else (h if stage == 3 else 0.5 * h)
-                xs, vs, zs = x + share * kx, v + share * kv, z + share * kz
-                size = abs(zs)
-                power = 1.0 if n == 1.0 else size ** (n - 1.0)
-                kx = vs
-                kv = (u[at + (stage + 1) // 2] - c * vs - k * xs - zs) / m
-                kz = alpha * vs - power * (gamma * abs(vs) * zs + delta * vs * size)
-                weight = 1.0 if stage == 0 or stage == 3 else 2.0
-                dx, dv, dz = dx + weight * kx, dv + weight * kv, dz + weight * kz
-            x, v, z = x + h / 6 * dx, v + h / 6 * dv, z + h / 6 * dz
-        if not abs(x) < farthest:
-            return i
-        y[i] = x
-    return -1
-
-
 @cache
-def _march() -> Callable[..., int]:
-    """The stepping, compiled where numba is installed; without it, minutes instead of seconds."""
-    if importlib.util.find_spec("numba") is None:
-        return _stepped
-    from numba import njit
-
-    return njit(cache=True, error_model="numpy")(_stepped)
+def _march(plain: bool) -> RecordProgram:
+    """One step of Runge and Kutta's fourth order, from the force at its beginning, middle and end; `plain` is n = 1."""
+    tape = Tape()
+    force = [tape.input(name) for name in ("before", "between", "after")]
+    names = ("h", "m", "c", "k", "alpha", "gamma", "delta", "n")
+    h, m, c, k, alpha, gamma, delta, n = (tape.parameter(name, 1.0 if plain else 2.0) for name in names)
+    begin = [tape.remember(name) for name in "xvz"]
+    total, rates = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+    for stage, u in enumerate((force[0], force[1], force[1], force[2])):
+        share = (0.0, 0.5 * h, 0.5 * h, h)[stage]
+        x, v, z = (value + share * rate for value, rate in zip(begin, rates, strict=True))
+        size = abs(z)
+        power = 1.0 if plain else size ** (n - 1.0)
+        rates = [v, (u - c * v - k * x - z) / m, alpha * v - power * (gamma * abs(v) * z + delta * v * size)]
+        weight = 1.0 if stage in (0, 3) else 2.0
+        total = [sum_ + weight * rate for sum_, rate in zip(total, rates, strict=True)]
+    end = [value + h / 6 * sum_ for value, sum_ in zip(begin, total, strict=True)]
+    for memory, value in zip(begin, end, strict=True):
+        tape.update(memory, value)
+    return RecordProgram(program(tape, {"x": end[0]}))

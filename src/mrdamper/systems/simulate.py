@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -18,9 +17,10 @@ from mrdamper.systems.controllers import Controller
 from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.controllers.preview import Preview
 from mrdamper.systems.inputs import Input
-from mrdamper.systems.kernel import Numbers, Stage, make_walk
+from mrdamper.systems.kernel import Numbers, Stage, interpreted_walk
 from mrdamper.systems.linear import aims, linear_system
 from mrdamper.systems.links import contact_stage, damper_stage, stage_of
+from mrdamper.systems.machine import compiled_walk
 from mrdamper.systems.result import HALVING, Simulation
 from mrdamper.systems.structure import System
 
@@ -29,7 +29,7 @@ _COARSEST, _FINEST = 1e-3, 1e-5  # s
 _FALLS = 0.7  # of the change before, to which a change has to fall from the third halving on
 _MOST_HALVED = 1_000_000  # samples, beyond which a step is not halved again
 _STEPS_A_PERIOD = 40  # of the highest natural frequency, to begin with
-_LINES = 10_000_000  # that the interpreter may walk; more is worth the seconds of compilation
+_LINES = 1_000_000  # that the interpreter may walk; more is worth compiling
 _LINES_A_STEP = 60  # of the loop itself
 _MOST_STEPS = 20_000_000
 
@@ -146,11 +146,6 @@ class Loop:
         whole = self.period if self.control.program else self.source.step
         return whole / math.ceil(whole / step - 1e-9)
 
-    @property
-    def can_compile(self) -> bool:
-        """Whether numba is there."""
-        return find_spec("numba") is not None
-
     def run(self, dt: float, machine: bool | None = None, numbers: Numbers | None = None) -> Simulation:
         """The whole input at one step.
 
@@ -161,7 +156,7 @@ class Loop:
         dt : float
             [s]
         machine : bool, optional
-            In machine code. Default: where steps are many.
+            Compiled, where there is a compiler. Default: where steps are many.
         numbers : Numbers, optional
             Other parameters of the links than the dampers' own.
         """
@@ -175,7 +170,7 @@ class Loop:
             )
         if machine is None:
             lines = _LINES_A_STEP + 3 * sum(stage.lines for stage in (*self.stages, *self._controllers))
-            machine = 3 * samples * lines > _LINES and self.can_compile  # this run, and one at half
+            machine = 3 * samples * lines > _LINES  # this run, and one at half
         time: Floats = dt * np.arange(samples, dtype=np.float64)
         ground, road, road_rate = self._driven(time)
         load = self._load(ground, road, road_rate)
@@ -294,7 +289,9 @@ class Loop:
 
     def _walk(self, machine: bool) -> Any:
         if machine not in self._walks:
-            self._walks[machine] = make_walk(self.stages, next(iter(self._controllers), None), machine)
+            law = next(iter(self._controllers), None)
+            compiled = compiled_walk(self.stages, law) if machine else None
+            self._walks[machine] = compiled or interpreted_walk(self.stages, law)
         return self._walks[machine]
 
     def _energy(self, dt: float, x: Floats, v: Floats, force: Floats, load: Floats, road: Floats) -> dict[str, Floats]:

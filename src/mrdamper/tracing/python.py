@@ -1,4 +1,4 @@
-"""A program as Python source: what streams in the interpreter, and what numba compiles."""
+"""A program as Python source: what streams in the interpreter."""
 
 from __future__ import annotations
 

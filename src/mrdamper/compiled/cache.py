@@ -1,0 +1,255 @@
+"""Compiled libraries in the user's cache: published in one step, verified when loaded, bounded in size.
+
+A library's file name holds the hash of its source, compiler and flags, and the hash of the file itself. A folder
+that others can write to is not used; what cannot be kept is compiled for this process alone.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+import stat
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from mrdamper.compiled.compilers import Compiler, find_compiler
+from mrdamper.data.temporary import temporary_folder
+
+FOLDER = "MRDAMPER_CACHE"  # environment variable: where compiled libraries are kept
+_SUFFIX = ".lib"
+_LARGEST = 64 * 2**20  # bytes of all libraries
+_DAY = 86_400.0  # s
+_GIVEN_UP = 3_600.0  # s for which a compiler that failed is not tried again
+_KEY = "mrdamper_source"  # name of the constant by which a library says what it was made of
+
+_loaded: dict[str, ctypes.CDLL] = {}
+_unusable: dict[str, str] = {}  # by compiler: why it was given up in this process
+
+
+class CompilerWarning(UserWarning):
+    """Models run in the interpreter, or are compiled anew in every process; results are the same."""
+
+
+def cache_folder() -> Path:
+    """Where compiled libraries are kept."""
+    if given := os.environ.get(FOLDER, ""):
+        return Path(given)
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "mrdamper" / "compiled"
+
+
+def load(source: str, holds: Callable[[ctypes.CDLL], bool]) -> ctypes.CDLL | None:
+    """The library made of a C source, compiled when it is not in the cache; None without a usable compiler.
+
+    Parameters
+    ----------
+    source : str
+    holds : function of a library
+        Whether a library that was just compiled computes what it should.
+    """
+    compiler = find_compiler()
+    if compiler is None:
+        return None
+    key = hashlib.sha256((compiler.identity + source).encode()).hexdigest()[:32]
+    if key not in _loaded:
+        found = _kept(key) or _compiled(compiler, key, source, holds)
+        if found is None:
+            return None
+        _loaded[key] = found
+    return _loaded[key]
+
+
+def unusable_reason() -> str:
+    """Why the compiler of this machine was given up; empty if it was not."""
+    compiler = find_compiler()
+    if compiler is None:
+        return "no C compiler was found"
+    return _unusable.get(compiler.identity) or _noted(compiler)
+
+
+def clear_cache() -> int:
+    """Remove all compiled libraries; how many there were."""
+    found = [*_libraries(cache_folder()), *_notes(cache_folder())]
+    for path in found:
+        with suppress(OSError):
+            path.unlink()
+    _unusable.clear()
+    return sum(path.suffix == _SUFFIX for path in found)
+
+
+def cache_size() -> tuple[int, int]:
+    """Number of compiled libraries, and their size [bytes]."""
+    sizes = []
+    for path in _libraries(cache_folder()):
+        with suppress(OSError):
+            sizes.append(path.stat().st_size)
+    return len(sizes), sum(sizes)
+
+
+def private(folder: Path) -> bool:
+    """Whether a folder is this user's, and nobody else can write to it."""
+    try:
+        found = folder.lstat()
+    except OSError:
+        return False
+    if not stat.S_ISDIR(found.st_mode):
+        return False
+    if os.name != "posix":
+        return True
+    return found.st_uid == os.getuid() and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+
+
+def _libraries(folder: Path) -> list[Path]:
+    return sorted(folder.glob(f"*-*{_SUFFIX}"))
+
+
+def _notes(folder: Path) -> list[Path]:
+    return sorted(folder.glob("failed-*.txt"))
+
+
+def _kept(key: str) -> ctypes.CDLL | None:
+    """The library in the cache, if its file has the hash of its name and says that it was made of this source."""
+    folder = cache_folder()
+    if not private(folder):
+        return None
+    for path in folder.glob(f"{key}-*{_SUFFIX}"):
+        try:
+            content = path.read_bytes()
+            if hashlib.sha256(content).hexdigest() == path.stem.partition("-")[2]:
+                library = ctypes.CDLL(str(path))
+                if _made_of(library) == key:
+                    _touch(path)
+                    return library
+            path.unlink()  # not what was published under this name
+        except OSError:
+            continue
+    return None
+
+
+def _made_of(library: ctypes.CDLL) -> str:
+    try:
+        return ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(library, _KEY))).decode("ascii", "replace")
+    except ValueError:
+        return ""
+
+
+def _touch(path: Path) -> None:
+    """Say that a library was used, once a day: the oldest go first."""
+    with suppress(OSError):
+        if time.time() - path.stat().st_mtime > _DAY:
+            path.touch()
+
+
+def _compiled(compiler: Compiler, key: str, source: str, holds: Callable[[ctypes.CDLL], bool]) -> ctypes.CDLL | None:
+    if compiler.identity in _unusable:
+        return None
+    if reason := _noted(compiler):
+        return _give_up(compiler, reason, note=False)
+    built = compiler.compile(f'{source}\nEXPORT const char {_KEY}[] = "{key}";\n')
+    if built.library is None:
+        return _give_up(compiler, built.reason)
+    library = _tried(built.library, key, holds)
+    if library is None:
+        return _give_up(compiler, "what it compiled computes something else")
+    _publish(built.library, key)
+    return library
+
+
+def _give_up(compiler: Compiler, reason: str, note: bool = True) -> None:
+    """Use the interpreter from now on, and say so once."""
+    _unusable[compiler.identity] = reason
+    warnings.warn(
+        f"models are not compiled, {compiler.title}: {reason}; the interpreter gives the same numbers, more slowly",
+        CompilerWarning,
+        stacklevel=2,
+    )
+    folder = cache_folder()
+    if note and _usable(folder):
+        with suppress(OSError):
+            (folder / f"failed-{compiler.identity}.txt").write_text(reason, encoding="utf-8")
+
+
+def _noted(compiler: Compiler) -> str:
+    """Why another process gave this compiler up within the last hour."""
+    path = cache_folder() / f"failed-{compiler.identity}.txt"
+    try:
+        recent = private(path.parent) and time.time() - path.stat().st_mtime < _GIVEN_UP
+        return path.read_text(encoding="utf-8", errors="replace")[:200] if recent else ""
+    except OSError:
+        return ""
+
+
+def _tried(content: bytes, key: str, holds: Callable[[ctypes.CDLL], bool]) -> ctypes.CDLL | None:
+    """A library loaded from a folder of this process, if it computes what it should."""
+    with temporary_folder() as folder:
+        path = folder / f"{key}{_SUFFIX}"
+        path.write_bytes(content)
+        try:
+            library = ctypes.CDLL(str(path))
+            return library if _made_of(library) == key and holds(library) else None
+        except (OSError, AttributeError):
+            return None
+
+
+def _usable(folder: Path) -> bool:
+    """Make the folder if there is none; whether it is private."""
+    with suppress(OSError):
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    return private(folder)
+
+
+def _publish(content: bytes, key: str) -> None:
+    """Put a library into the cache, whole or not at all; a cache that cannot be written to stays as it is."""
+    folder = cache_folder()
+    if not _usable(folder):
+        if folder.exists():
+            warnings.warn(
+                f"{folder} is not used, it is not yours alone: chmod 700 it, or set {FOLDER} to a folder of your own",
+                CompilerWarning,
+                stacklevel=2,
+            )
+        return
+    try:
+        handle, name = tempfile.mkstemp(prefix=".", suffix=".partial", dir=folder)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            Path(name).replace(folder / f"{key}-{hashlib.sha256(content).hexdigest()}{_SUFFIX}")
+        except BaseException:
+            with suppress(OSError):
+                Path(name).unlink()
+            raise
+        _bound(folder)
+    except OSError:
+        return
+
+
+def _bound(folder: Path) -> None:
+    """Remove the libraries used longest ago beyond the size allowed, and what killed processes left behind."""
+    for path in folder.glob(".*.partial"):
+        with suppress(OSError):
+            if time.time() - path.stat().st_mtime > _DAY:
+                path.unlink()
+    kept = 0
+    known = []
+    for path in _libraries(folder):
+        with suppress(OSError):
+            known.append((path.stat().st_mtime, path.stat().st_size, path))
+    for _, size, path in sorted(known, key=lambda entry: entry[0], reverse=True):
+        kept += size
+        if kept > _LARGEST:
+            with suppress(OSError):
+                path.unlink()

@@ -1,0 +1,166 @@
+"""A traced program along whole records: compiled where there is a compiler, else in the interpreter."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mrdamper.compiled.cache import load
+from mrdamper.compiled.writer import record_source
+from mrdamper.tracing import Program
+from mrdamper.tracing.python import python_functions, python_source
+
+Floats = NDArray[np.float64]
+_WORTHWHILE = 1_000_000  # lines of a program walked in the interpreter, from which compiling pays
+_TRIED = 24  # samples on which a new library is compared with the interpreter
+_ALIKE = 1e-9  # relative difference allowed there
+
+
+@dataclass(frozen=True, eq=False)
+class Along:
+    """A program along a record.
+
+    Attributes
+    ----------
+    outputs : (K, N) array
+    memory : tuple of float
+        After the last sample that has an answer.
+    failed : int
+        The first sample without an answer; −1 if all have one.
+    """
+
+    outputs: Floats
+    memory: tuple[float, ...]
+    failed: int
+
+
+class RecordProgram:
+    """A program for one sample, made to run along records.
+
+    Parameters
+    ----------
+    program : Program
+    """
+
+    def __init__(self, program: Program):
+        self.program = program
+        self.starts = tuple(program.tape.starts.values())
+        self._walked = 0
+
+    def prepare(self, given: Sequence[float]) -> tuple[float, ...] | None:
+        """What follows from parameters; None where they need another program."""
+        try:
+            status, derived = self._prepare(tuple(given))
+        except (ValueError, ArithmeticError):
+            return None
+        return None if status else derived
+
+    def along(
+        self, given: Sequence[float], derived: Sequence[float], memory: Sequence[float], channels: Sequence[ArrayLike]
+    ) -> Along:
+        """Run along a record.
+
+        Parameters
+        ----------
+        given, derived : sequences of float
+            Parameters, and what `prepare` made of them.
+        memory : sequence of float
+            Before the first sample; `starts` for a damper at rest.
+        channels : sequence of (N,) arrays
+            The inputs in the program's order.
+        """
+        arrays = [np.asarray(channel, dtype=float) for channel in channels]
+        size = arrays[0].size
+        self._walked += size * self._lines
+        if self._walked > _WORTHWHILE and self._library is not None:
+            return _compiled_along(self._library, self.program, given, derived, memory, arrays)
+        return self._interpreted(given, derived, memory, arrays)
+
+    def _interpreted(
+        self, given: Sequence[float], derived: Sequence[float], memory: Sequence[float], arrays: Sequence[Floats]
+    ) -> Along:
+        outputs = np.empty((len(self.program.outputs), arrays[0].size))
+        held, given, derived = tuple(memory), tuple(given), tuple(derived)
+        for i, sample in enumerate(zip(*(channel.tolist() for channel in arrays), strict=True)):
+            try:
+                status, out, after = self._step(given, derived, held, sample)
+            except (ValueError, ArithmeticError):
+                return Along(outputs, held, i)
+            if status:
+                return Along(outputs, held, i)
+            outputs[:, i], held = out, after
+        return Along(outputs, held, -1)
+
+    @cached_property
+    def _functions(self) -> tuple[Any, Any]:
+        return python_functions(self.program)
+
+    @property
+    def _prepare(self) -> Any:
+        return self._functions[0]
+
+    @property
+    def _step(self) -> Any:
+        return self._functions[1]
+
+    @cached_property
+    def _lines(self) -> int:
+        return python_source(self.program).count("\n")
+
+    @cached_property
+    def _library(self) -> ctypes.CDLL | None:
+        return load(record_source(self.program), self._holds)
+
+    def _holds(self, library: ctypes.CDLL) -> bool:
+        """Whether a library gives what the interpreter gives, on a short motion."""
+        turns = np.linspace(0.1, 6.0, _TRIED)
+        values: Mapping[str, Floats] = {"dt": np.full(_TRIED, 1e-3), "current": 0.5 + 0.1 * turns}
+        arrays = [values.get(name, (1 + k) * 1e-2 * np.sin(turns)) for k, name in enumerate(self.program.tape.inputs)]
+        given = [float(e.value) for e in self.program.tape.parameters.values()]
+        derived = self.prepare(given)
+        if derived is None:
+            return True
+        found = _compiled_along(library, self.program, given, derived, self.starts, arrays)
+        expected = self._interpreted(given, derived, self.starts, arrays)
+        if found.failed != expected.failed:
+            return False
+        size = _TRIED if expected.failed < 0 else expected.failed
+        wanted = expected.outputs[:, :size]
+        if not np.isfinite(wanted).all():
+            return True
+        room = _ALIKE * np.abs(wanted).max(axis=1, keepdims=True, initial=0.0)
+        return bool(np.all(np.abs(found.outputs[:, :size] - wanted) <= room))
+
+
+def address(array: np.ndarray) -> ctypes.c_void_p:
+    """Where the elements of an array lie."""
+    return ctypes.c_void_p(array.ctypes.data)
+
+
+def _compiled_along(
+    library: ctypes.CDLL,
+    program: Program,
+    given: Sequence[float],
+    derived: Sequence[float],
+    memory: Sequence[float],
+    arrays: Sequence[Floats],
+) -> Along:
+    p, d, s = (np.array([*values, 0.0], dtype=float) for values in (given, derived, memory))
+    size = arrays[0].size
+    outputs = np.empty((len(program.outputs), size))
+    places = np.array([array.ctypes.data for array in arrays], dtype=np.uintp)
+    strides = np.array([array.strides[0] // 8 for array in arrays], dtype=np.int64)
+    ends = outputs.ctypes.data + 8 * size * np.arange(len(outputs), dtype=np.uintp)
+    along = library.along
+    along.restype = ctypes.c_longlong
+    failed = along(
+        address(p), address(d), address(s), ctypes.c_longlong(size), address(places), address(strides),
+        address(ends.astype(np.uintp)),
+    )  # fmt: skip
+    return Along(outputs, tuple(s[:-1].tolist()), int(failed))
