@@ -9,9 +9,10 @@ import pytest
 from support.dampers import joint_damper
 from support.fmu_files import COMPILERS, DAMPERS, FEW, fmu_bytes, unpacked
 
+from mrdamper.compiled import toolchain
 from mrdamper.compiled.toolchain import PLATFORMS, build_library, compiler_for, here
 from mrdamper.errors import InputError
-from mrdamper.export import all_exporters, toolchain
+from mrdamper.export import all_exporters
 from mrdamper.export.c import reference_motion
 from mrdamper.export.fmu import FMUExporter, reference
 from mrdamper.export.fmu_description import base_powers, parameters_of_stream

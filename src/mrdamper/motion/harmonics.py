@@ -5,6 +5,7 @@ Unlike a Fourier transform it needs neither a whole number of cycles nor uniform
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -15,6 +16,9 @@ from mrdamper.data import Floats
 from mrdamper.optimizers.linear import solve_linear
 
 _FEW = 250  # samples on which a frequency is found to begin with
+_BLOCK = 50_000  # samples whose waves are held at a time
+_ENOUGH = 16  # samples between two changes of sign that the strongest line of a long record is found with
+_PADDED = 2**20  # samples of a spectrum, at most, for the sake of finer lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +46,10 @@ class HarmonicSeries:
 
     def __call__(self, time: ArrayLike, derivative: int = 0) -> Floats:
         """The series (or a derivative with respect to time) at the given times."""
-        t = np.asarray(time, dtype=float) - self.origin
+        given = np.asarray(time, dtype=float)
+        if given.ndim == 1 and given.size > _BLOCK:
+            return np.concatenate([self(given[part], derivative) for part in _blocks(given.size)])
+        t = given - self.origin
         omega = 2 * np.pi * self.frequency
         scale = (omega * np.arange(1, self.sine.size + 1)) ** derivative
         trend = {0: self.mean + self.drift * t, 1: np.full_like(t, self.drift)}.get(derivative, np.zeros_like(t))
@@ -81,7 +88,7 @@ def fit_harmonics(time: Floats, signal: Floats, orders: int, *, frequency: float
     origin = float(time[0])
     nyquist = 0.5 * (time.size - 1) / float(time[-1] - time[0])
     orders = int(np.clip(nyquist / frequency, 1, orders))
-    coefficients = solve_linear(_rows(time - origin, frequency, orders, drift).T, signal)
+    coefficients = _solved(time.size, signal, lambda part: _rows(time[part] - origin, frequency, orders, drift))
     lead = 2 if drift else 1
     return HarmonicSeries(
         frequency=frequency,
@@ -117,17 +124,38 @@ def fundamental_frequency(time: Floats, signal: Floats, orders: int = 3) -> floa
 
 def _refined(t: Floats, signal: Floats, frequency: float, orders: int, tolerance: float) -> float:
     """Gauss–Newton on frequency and coefficients, until a step is below a share of the frequency."""
-    rows = _rows(t, frequency, orders, drift=True)
-    coefficients = solve_linear(rows.T, signal)
+
+    def waves(part: slice) -> Floats:
+        return _rows(t[part], frequency, orders, drift=True)
+
+    def with_slope(part: slice) -> Floats:
+        rows = waves(part)
+        return np.vstack([rows, _frequency_derivative(t[part], rows, coefficients, orders)])
+
+    coefficients = _solved(t.size, signal, waves)
     for _ in range(30):
-        slope = _frequency_derivative(t, rows, coefficients, orders)
-        found = solve_linear(np.vstack([rows, slope]).T, signal)
+        found = _solved(t.size, signal, with_slope)
         coefficients, step = found[:-1], float(found[-1])
         frequency += float(np.clip(step, -0.1 * frequency, 0.1 * frequency))
         if abs(step) < tolerance * frequency:
             break
-        rows = _rows(t, frequency, orders, drift=True)
     return frequency
+
+
+def _solved(size: int, signal: Floats, rows: Callable[[slice], Floats]) -> Floats:
+    """Least-squares coefficients of some rows over the samples; long records block by block, as triangles."""
+    if size <= _BLOCK:
+        return solve_linear(rows(slice(None)).T, signal)
+    triangle: Floats | None = None
+    for part in _blocks(size):
+        table = np.vstack([rows(part), signal[part]]).T
+        triangle = np.linalg.qr(table if triangle is None else np.vstack([triangle, table]), mode="r")
+    assert triangle is not None
+    return solve_linear(triangle[:, :-1], triangle[:, -1])
+
+
+def _blocks(size: int) -> Iterator[slice]:
+    return (slice(begin, begin + _BLOCK) for begin in range(0, size, _BLOCK))
 
 
 def _single_sine_costs(t: Floats, signal: Floats, frequencies: Floats) -> Floats:
@@ -141,15 +169,22 @@ def _single_sine_costs(t: Floats, signal: Floats, frequencies: Floats) -> Floats
 
 
 def _spectral_line(time: Floats, signal: Floats) -> float:
-    """Find the strongest line of the detrended, zero-padded spectrum [Hz]."""
+    """Find the strongest line of the detrended, zero-padded spectrum [Hz].
+
+    A long record is thinned to the samples its changes of sign need.
+    """
+    if time.size > _BLOCK:
+        often = _crossings(signal - float(np.mean(signal)))
+        every = max(1, time.size // max(_BLOCK, _ENOUGH * often))
+        time, signal = time[::every], signal[::every]
     size = time.size
     wave = np.interp(np.linspace(time[0], time[-1], size), time, signal)
     place = np.arange(size) - (size - 1) / 2
     wave = wave - wave.mean() - place * (place @ wave / (place @ place))
     window = np.hanning(size + 2)[1:-1] if _crossings(wave) > 4 else np.ones(size)
-    padded = 8 * size
+    padded = max(size, min(8 * size, _PADDED))
     power = np.abs(np.fft.rfft(wave * window, padded)) ** 2
-    power[: padded // size // 2] = 0.0
+    power[: max(1, padded // size // 2)] = 0.0
     peak = int(np.argmax(power))
     return max(peak, 1) * (size - 1) / (padded * float(time[-1] - time[0]))
 
