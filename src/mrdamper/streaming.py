@@ -13,7 +13,6 @@ from functools import cached_property
 
 import numpy as np
 
-from mrdamper.compiled import RecordProgram
 from mrdamper.dampers.bands import PortableBand, portable_band
 from mrdamper.dampers.base import Damper, Envelope
 from mrdamper.dampers.causal import trace
@@ -22,6 +21,7 @@ from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, ParameterError, UnknownNameError, numbers, require, series
 from mrdamper.models import Model
 from mrdamper.tracing import Program, Tape, program
+from mrdamper.tracing.compiled import RecordProgram
 from mrdamper.tracing.python import python_functions, python_source
 
 FLAGS = ("current", "amplitude", "velocity", "frequency")  # bit 0, 1, 2, 3

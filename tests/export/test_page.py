@@ -12,7 +12,6 @@ from support.browser import AUDIT
 from support.dampers import all_dampers, joint_damper, modified_damper
 from support.sessions import session_runs
 
-from mrdamper.compiled.toolchain import Built, build_webassembly
 from mrdamper.dampers.covariance import certain
 from mrdamper.dampers.joint import JointDamper
 from mrdamper.data import Condition, Run
@@ -20,6 +19,7 @@ from mrdamper.export import page as page_module
 from mrdamper.export.page import PageExporter
 from mrdamper.models import model_type
 from mrdamper.streaming import stepper
+from mrdamper.tracing.compiled.toolchain import Built, build_webassembly
 
 DAMPERS = all_dampers()
 TRANSCENDENTAL = re.compile(r"Math\.(exp|expm1|log|log1p|tan|tanh|atan|atanh|pow)\(")

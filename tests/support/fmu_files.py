@@ -8,8 +8,8 @@ from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
 
-from mrdamper.compiled.toolchain import here
 from mrdamper.export.fmu import FMUExporter
+from mrdamper.tracing.compiled.toolchain import here
 from support.dampers import all_dampers, joint_damper, modified_damper
 
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]

@@ -12,7 +12,6 @@ from support.dampers import joint_damper
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
-from mrdamper.compiled.toolchain import here
 from mrdamper.errors import InputError
 from mrdamper.export.c import program_sources
 from mrdamper.export.fmu import FMUExporter
@@ -25,6 +24,7 @@ from mrdamper.systems.inputs import load_input
 from mrdamper.systems.inverse import invert
 from mrdamper.systems.simulate import Loop
 from mrdamper.systems.structure import quarter_car
+from mrdamper.tracing.compiled.toolchain import here
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 

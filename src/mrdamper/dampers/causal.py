@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mrdamper.compiled import RecordProgram
 from mrdamper.dampers.coil import field_step
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import ExcitationError, ParameterError
 from mrdamper.tracing import Program, Tape, Traced, program
+from mrdamper.tracing.compiled import RecordProgram
 
 if TYPE_CHECKING:
     from mrdamper.dampers.base import Damper

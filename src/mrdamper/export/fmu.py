@@ -13,7 +13,6 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from mrdamper.compiled.toolchain import PLATFORMS, Platform, build_library
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.joint import damper_of
 from mrdamper.data import Floats
@@ -24,6 +23,7 @@ from mrdamper.export.fmu_description import c_bounds, description_facts, paramet
 from mrdamper.export.templates import render
 from mrdamper.models import Model
 from mrdamper.streaming import FLAGS, Stepper, Stream, stream
+from mrdamper.tracing.compiled.toolchain import PLATFORMS, Platform, build_library
 
 _SAMPLES_A_CYCLE = 200
 _INTERNAL_STEP = 2.0**-9  # s; two milliseconds, so that the usual communication step of one is taken whole

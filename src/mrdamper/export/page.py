@@ -11,7 +11,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mrdamper.compiled.toolchain import build_webassembly
 from mrdamper.dampers.base import SLACK, Damper, Envelope
 from mrdamper.dampers.joint import damper_of
 from mrdamper.export.base import Exporter, Written, identifier
@@ -20,6 +19,7 @@ from mrdamper.export.templates import render
 from mrdamper.models import Model
 from mrdamper.streaming import FLAGS, Stepper, Stream, stream
 from mrdamper.tracing.c_writer import JavaScriptWriter
+from mrdamper.tracing.compiled.toolchain import build_webassembly
 
 _VECTORS = 240  # samples of the self-test
 _STEPS = 100  # of a slider from the lowest to the highest tested value

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from mrdamper.compiled import RecordProgram
 from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, ParameterError
 from mrdamper.integrator.streamed import Rate, integrate_step
 from mrdamper.tracing import Tape, program, streamed
+from mrdamper.tracing.compiled import RecordProgram
 from mrdamper.tracing.functions import Step
 
 _RUNAWAY = 1e6  # state over its scale

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mrdamper.compiled.cache import load
-from mrdamper.compiled.record import address
-from mrdamper.compiled.writer import PREAMBLE, functions
 from mrdamper.systems.kernel import Stage, interpreted_walk
+from mrdamper.tracing.compiled.cache import load
+from mrdamper.tracing.compiled.record import address
+from mrdamper.tracing.compiled.writer import PREAMBLE, functions
 
 _LOOP = Path(__file__).with_name("loop.c")
 _TRIED = 40  # steps over which a new library is compared with the interpreter

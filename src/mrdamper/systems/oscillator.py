@@ -16,11 +16,11 @@ from functools import cache
 
 import numpy as np
 
-from mrdamper.compiled import RecordProgram
 from mrdamper.data import Floats
 from mrdamper.errors import ParameterError, RecordError, StepError
 from mrdamper.optimizers.levenberg_marquardt import least_squares
 from mrdamper.tracing import Tape, program
+from mrdamper.tracing.compiled import RecordProgram
 
 _STEPS = 20  # between two samples, by Runge and Kutta's fourth order
 _LEAD = 0.5  # of a period, run before the one that counts: what the oscillator has to forget

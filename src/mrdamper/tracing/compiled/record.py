@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mrdamper.compiled.cache import load
-from mrdamper.compiled.writer import record_source
 from mrdamper.tracing import Program
+from mrdamper.tracing.compiled.cache import load
+from mrdamper.tracing.compiled.writer import record_source
 from mrdamper.tracing.python import python_functions, python_source
 
 Floats = NDArray[np.float64]

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from mrdamper.compiled.toolchain import Built, compiled_file
 from mrdamper.data.temporary import temporary_folder
+from mrdamper.tracing.compiled.toolchain import Built, compiled_file
 
 VARIABLE = "MRDAMPER_COMPILER"  # a command, or "none": no compiler is used
 _NAMES = ("cc", "gcc", "clang", "cl")

@@ -4,6 +4,6 @@
 cache, or in the interpreter where there is no compiler. Both give the same numbers.
 """
 
-from mrdamper.compiled.record import RecordProgram
+from mrdamper.tracing.compiled.record import RecordProgram
 
 __all__ = ["RecordProgram"]

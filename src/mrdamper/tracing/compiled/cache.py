@@ -18,8 +18,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from mrdamper.compiled.compilers import Compiler, find_compiler
 from mrdamper.data.temporary import temporary_folder
+from mrdamper.tracing.compiled.compilers import Compiler, find_compiler
 
 FOLDER = "MRDAMPER_CACHE"  # environment variable: where compiled libraries are kept
 _SUFFIX = ".lib"

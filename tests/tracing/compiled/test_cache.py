@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mrdamper.compiled import RecordProgram, cache, compilers, record
-from mrdamper.compiled.writer import record_source
 from mrdamper.tracing import Tape, program
+from mrdamper.tracing.compiled import RecordProgram, cache, compilers, record
+from mrdamper.tracing.compiled.writer import record_source
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 TIME = np.linspace(0, 3, 200)
@@ -192,7 +192,8 @@ def test_clear_removes_all(own_cache):
 def test_two_processes_compile_the_same_at_once(own_cache):
     """Both get the library; one file is left."""
     code = (
-        "import sys; sys.path.insert(0, sys.argv[1]); import test_cache as t; from mrdamper.compiled import record;"
+        "import sys; sys.path.insert(0, sys.argv[1]); import test_cache as t;"
+        "from mrdamper.tracing.compiled import record;"
         "record._WORTHWHILE = 0; import hashlib; print(hashlib.sha256(t.along(t.lag()).tobytes()).hexdigest())"
     )
     command = [sys.executable, "-c", code, str(Path(__file__).parent)]
