@@ -10,7 +10,7 @@ from mrdamper.errors import MissingExtraError
 from mrdamper.export import fmu_check
 from mrdamper.export.fmu import token_of, zipped
 from mrdamper.export.fmu_check import check_fmu
-from mrdamper.tracing.compiled.toolchain import build_library, here
+from mrdamper.export.toolchain import build_library, here
 
 FMIS = (2, 3)
 pytestmark = pytest.mark.skipif(not COMPILERS or not here(), reason="no C compiler or an unknown platform")

@@ -17,9 +17,9 @@ from mrdamper.dampers.joint import JointDamper
 from mrdamper.data import Condition, Run
 from mrdamper.export import page as page_module
 from mrdamper.export.page import PageExporter
+from mrdamper.export.toolchain import Built, build_webassembly
 from mrdamper.models import model_type
 from mrdamper.streaming import stepper
-from mrdamper.tracing.compiled.toolchain import Built, build_webassembly
 
 DAMPERS = all_dampers()
 TRANSCENDENTAL = re.compile(r"Math\.(exp|expm1|log|log1p|tan|tanh|atan|atanh|pow)\(")

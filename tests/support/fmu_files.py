@@ -9,7 +9,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from mrdamper.export.fmu import FMUExporter
-from mrdamper.tracing.compiled.toolchain import here
+from mrdamper.export.toolchain import here
 from support.dampers import all_dampers, joint_damper, modified_damper
 
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]

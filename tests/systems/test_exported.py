@@ -17,6 +17,7 @@ from mrdamper.export.c import program_sources
 from mrdamper.export.fmu import FMUExporter
 from mrdamper.export.fmu_check import check_fmu
 from mrdamper.export.fmu_program import write_program_fmu
+from mrdamper.export.toolchain import here
 from mrdamper.files.model_file import save_model
 from mrdamper.streaming import stepper
 from mrdamper.systems.controllers import controller_type
@@ -24,7 +25,6 @@ from mrdamper.systems.inputs import load_input
 from mrdamper.systems.inverse import invert
 from mrdamper.systems.simulate import Loop
 from mrdamper.systems.structure import quarter_car
-from mrdamper.tracing.compiled.toolchain import here
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 

@@ -21,9 +21,9 @@ from mrdamper.export.base import Exporter, Written, identifier
 from mrdamper.export.c import c_facts, c_sources, reference_motion
 from mrdamper.export.fmu_description import c_bounds, description_facts, parameters_of_stream, serial_fields
 from mrdamper.export.templates import render
+from mrdamper.export.toolchain import PLATFORMS, Platform, build_library
 from mrdamper.models import Model
 from mrdamper.streaming import FLAGS, Stepper, Stream, stream
-from mrdamper.tracing.compiled.toolchain import PLATFORMS, Platform, build_library
 
 _SAMPLES_A_CYCLE = 200
 _INTERNAL_STEP = 2.0**-9  # s; two milliseconds, so that the usual communication step of one is taken whole

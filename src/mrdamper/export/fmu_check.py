@@ -24,7 +24,7 @@ from mrdamper.errors import MissingExtraError
 from mrdamper.export import fmu_probe
 from mrdamper.export.c import TOLERANCE
 from mrdamper.export.fmu import token_of
-from mrdamper.tracing.compiled.toolchain import build_library, here
+from mrdamper.export.toolchain import build_library, here
 
 _PATIENCE = 60  # s
 _LARGEST = 200_000_000  # bytes, unpacked

@@ -16,10 +16,10 @@ from mrdamper.dampers.joint import damper_of
 from mrdamper.export.base import Exporter, Written, identifier
 from mrdamper.export.c import TOLERANCE, c_facts, c_sources, reference_motion, shared_points
 from mrdamper.export.templates import render
+from mrdamper.export.toolchain import build_webassembly
 from mrdamper.models import Model
 from mrdamper.streaming import FLAGS, Stepper, Stream, stream
 from mrdamper.tracing.c_writer import JavaScriptWriter
-from mrdamper.tracing.compiled.toolchain import build_webassembly
 
 _VECTORS = 240  # samples of the self-test
 _STEPS = 100  # of a slider from the lowest to the highest tested value

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import os
+import shutil
 import stat
 import sys
 import tempfile
@@ -18,8 +19,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from mrdamper.data.temporary import temporary_folder
-from mrdamper.tracing.compiled.compilers import Compiler, find_compiler
+from mrdamper.tracing.compiled.compilers import SCRATCH, Compiler, find_compiler
 
 FOLDER = "MRDAMPER_CACHE"  # environment variable: where compiled libraries are kept
 _SUFFIX = ".lib"
@@ -156,7 +156,8 @@ def _compiled(compiler: Compiler, key: str, source: str, holds: Callable[[ctypes
         return None
     if reason := _noted(compiler):
         return _give_up(compiler, reason, note=False)
-    built = compiler.compile(f'{source}\nEXPORT const char {_KEY}[] = "{key}";\n')
+    folder = cache_folder()
+    built = compiler.compile(f'{source}\nEXPORT const char {_KEY}[] = "{key}";\n', folder if _usable(folder) else None)
     if built.library is None:
         return _give_up(compiler, built.reason)
     library = _tried(built.library, key, holds)
@@ -192,8 +193,8 @@ def _noted(compiler: Compiler) -> str:
 
 def _tried(content: bytes, key: str, holds: Callable[[ctypes.CDLL], bool]) -> ctypes.CDLL | None:
     """A library loaded from a folder of this process, if it computes what it should."""
-    with temporary_folder() as folder:
-        path = folder / f"{key}{_SUFFIX}"
+    with tempfile.TemporaryDirectory(prefix=SCRATCH, ignore_cleanup_errors=True) as folder:
+        path = Path(folder) / f"{key}{_SUFFIX}"
         path.write_bytes(content)
         try:
             library = ctypes.CDLL(str(path))
@@ -239,10 +240,10 @@ def _publish(content: bytes, key: str) -> None:
 
 def _bound(folder: Path) -> None:
     """Remove the libraries used longest ago beyond the size allowed, and what killed processes left behind."""
-    for path in folder.glob(".*.partial"):
+    for path in (*folder.glob(".*.partial"), *folder.glob(f"{SCRATCH}*")):
         with suppress(OSError):
             if time.time() - path.stat().st_mtime > _DAY:
-                path.unlink()
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
     kept = 0
     known = []
     for path in _libraries(folder):

@@ -7,21 +7,31 @@ import importlib.util
 import os
 import platform
 import shutil
+import signal
+import subprocess
 import sys
+import tempfile
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from mrdamper.data.temporary import temporary_folder
-from mrdamper.tracing.compiled.toolchain import Built, compiled_file
-
+SCRATCH = ".mrdamper-compiling-"  # how folders begin in which something is compiled
 VARIABLE = "MRDAMPER_COMPILER"  # a command, or "none": no compiler is used
 _NAMES = ("cc", "gcc", "clang", "cl")
 # No contraction and no unsafe mathematics: the same numbers as the interpreter's, on every processor.
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden", "-fPIC", "-shared", "-w")
 _VISUAL = ("/nologo", "/O2", "/fp:precise", "/LD", "/w")
 _PATIENCE = 60.0  # s, after which a compiler is given up
+
+
+@dataclass(frozen=True)
+class Built:
+    """A library, or why there is none."""
+
+    library: bytes | None
+    reason: str = ""
 
 
 @dataclass(frozen=True)
@@ -48,9 +58,10 @@ class Compiler:
         """The command as it is typed."""
         return " ".join(self.command)
 
-    def compile(self, source: str, patience: float = _PATIENCE) -> Built:
-        """A shared library made of one source; gives up after `patience` [s]."""
-        with temporary_folder() as folder:
+    def compile(self, source: str, parent: Path | None = None, patience: float = _PATIENCE) -> Built:
+        """A shared library made of one source in a folder beneath `parent`; gives up after `patience` [s]."""
+        with tempfile.TemporaryDirectory(prefix=SCRATCH, dir=parent, ignore_cleanup_errors=True) as name:
+            folder = Path(name)
             (folder / "program.c").write_text(source, encoding="utf-8")
             if self.is_visual:
                 command = [*self.command, *_VISUAL, "program.c", "/Fe:program.lib.dll"]
@@ -88,3 +99,43 @@ def _identity(command: Sequence[str], program: Path) -> str:
         facts = (str(program), 0, 0)
     known = (*command, *_FLAGS, *_VISUAL, platform.machine(), sys.platform, *facts)
     return hashlib.sha256("\0".join(map(str, known)).encode()).hexdigest()[:16]
+
+
+def compiled_file(command: Sequence[str], folder: Path, output: str, patience: float) -> Built:
+    """Run a compiler in a folder that holds its sources, for at most `patience` [s]; its output, or why there is none.
+
+    What the compiler prints goes to a file: a process it leaves behind cannot hold the caller by an open pipe.
+    """
+    printed = folder / "printed.txt"
+    try:
+        with printed.open("wb") as log:
+            process = subprocess.Popen(
+                command, cwd=folder, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True
+            )
+            try:
+                status = process.wait(patience)
+            except BaseException as error:
+                _end(process)
+                if not isinstance(error, subprocess.TimeoutExpired):
+                    raise
+                return Built(None, f"the compiler did not end within {patience:g} s")
+        library = folder / output
+        if status or not library.is_file():
+            return Built(None, _first_error(printed.read_text(encoding="utf-8", errors="replace")))
+        return Built(library.read_bytes())
+    except OSError as error:
+        return Built(None, str(error).splitlines()[0])
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """Kill a compiler with all processes it has started."""
+    with suppress(OSError):
+        if os.name == "posix":
+            os.killpg(process.pid, signal.SIGKILL)
+    process.kill()
+    process.wait()
+
+
+def _first_error(text: str) -> str:
+    lines = text.strip().splitlines() or ["the compiler failed"]
+    return next((line for line in lines if "error" in line.lower()), lines[0])

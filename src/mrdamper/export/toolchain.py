@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import importlib.util
-import os
 import platform
 import shutil
-import signal
-import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 
 from mrdamper.data.temporary import temporary_folder
+from mrdamper.tracing.compiled.compilers import Built, compiled_file
 
 # Results are those of the Python stepper to the last bit: no contraction, no unsafe mathematics.
 _EXACT = ("-std=c99", "-O2", "-ffp-contract=off")
@@ -40,14 +36,6 @@ PLATFORMS = (
     Platform("x86_64-darwin", "darwin64", ".dylib", "x86_64-macos"),
     Platform("aarch64-darwin", "", ".dylib", "aarch64-macos"),
 )
-
-
-@dataclass(frozen=True)
-class Built:
-    """A library, or why there is none."""
-
-    library: bytes | None
-    reason: str = ""
 
 
 def here() -> Platform | None:
@@ -97,43 +85,3 @@ def _built(sources: Mapping[str, bytes], command: Sequence[str], libraries: Sequ
             (folder / name).write_bytes(text)
         files = sorted(name for name in sources if name.endswith(".c"))
         return compiled_file([*command, *files, "-o", "library", *libraries], folder, "library", _PATIENCE)
-
-
-def compiled_file(command: Sequence[str], folder: Path, output: str, patience: float) -> Built:
-    """Run a compiler in a folder that holds its sources, for at most `patience` [s]; its output, or why there is none.
-
-    What the compiler prints goes to a file: a process it leaves behind cannot hold the caller by an open pipe.
-    """
-    printed = folder / "printed.txt"
-    try:
-        with printed.open("wb") as log:
-            process = subprocess.Popen(
-                command, cwd=folder, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True
-            )
-            try:
-                status = process.wait(patience)
-            except BaseException as error:
-                _end(process)
-                if not isinstance(error, subprocess.TimeoutExpired):
-                    raise
-                return Built(None, f"the compiler did not end within {patience:g} s")
-        library = folder / output
-        if status or not library.is_file():
-            return Built(None, _first_error(printed.read_text(encoding="utf-8", errors="replace")))
-        return Built(library.read_bytes())
-    except OSError as error:
-        return Built(None, str(error).splitlines()[0])
-
-
-def _end(process: subprocess.Popen[bytes]) -> None:
-    """Kill a compiler with all processes it has started."""
-    with suppress(OSError):
-        if os.name == "posix":
-            os.killpg(process.pid, signal.SIGKILL)
-    process.kill()
-    process.wait()
-
-
-def _first_error(text: str) -> str:
-    lines = text.strip().splitlines() or ["the compiler failed"]
-    return next((line for line in lines if "error" in line.lower()), lines[0])
