@@ -1,15 +1,15 @@
-"""What a script may import: one list, and the names of version 0.1 under where they stand now."""
+"""What a script may import: the names at the top, model classes, the version."""
 
 import ast
+import doctest
 import importlib
-import subprocess
-import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
 import mrdamper
-from mrdamper.discovery import MOVED
+from mrdamper.models import all_models
 
 
 def test_the_list_the_types_and_the_homes_agree():
@@ -22,30 +22,29 @@ def test_the_list_the_types_and_the_homes_agree():
         assert getattr(mrdamper, name) is not None
 
 
-@pytest.mark.parametrize("old", sorted(MOVED))
-def test_a_module_of_version_0_1_is_found_and_is_the_new_one(old):
-    new = importlib.import_module(f"mrdamper.{MOVED[old]}")
-    sys.modules.pop(f"mrdamper.{old}", None)
-    with pytest.warns(FutureWarning, match=f"mrdamper.{old} is now mrdamper.{MOVED[old]}"):
-        assert importlib.import_module(f"mrdamper.{old}") is new
-    assert new.__spec__.name == f"mrdamper.{MOVED[old]}"
+def test_completion_shows_every_public_name_and_the_version():
+    assert {*mrdamper.__all__, "__version__"} <= set(dir(mrdamper))
+    assert mrdamper.__version__ == version("mrdamper")
 
 
-def test_a_script_of_version_0_1_runs_and_is_told_once():
-    script = (
-        "import mrdamper\n"
-        "from mrdamper.workflow import run_study\n"
-        "for _ in range(3): from mrdamper.workflow import run_study as again; mrdamper.workflow\n"
-        "from mrdamper.io.dataset import load_dataset\n"
-        "assert run_study is mrdamper.run_study and load_dataset is mrdamper.load_dataset\n"
-    )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert done.stderr.count("mrdamper.workflow is now mrdamper.study.workflow") == 1
-    assert done.stderr.count("mrdamper.io.dataset is now mrdamper.files.dataset") == 1
+def test_model_classes_are_imported_by_their_names():
+    models = importlib.import_module("mrdamper.models")
+    for cls in all_models().values():
+        assert getattr(models, cls.__name__) is cls
+        assert getattr(mrdamper, cls.__name__) is cls
+        assert cls.__name__ in dir(models)
 
 
-def test_a_name_that_never_was_is_still_missing():
-    with pytest.raises(AttributeError, match="no attribute 'workflows'"):
-        _ = mrdamper.workflows
+def test_a_name_that_does_not_exist_is_an_attribute_error():
+    for name in ("workflows", "BoucWenn"):
+        with pytest.raises(AttributeError, match=f"no attribute '{name}'"):
+            getattr(mrdamper, name)
     with pytest.raises(ModuleNotFoundError):
         importlib.import_module("mrdamper.workflows")
+
+
+@pytest.mark.slow  # runs a whole study
+def test_the_example_of_the_package_runs():
+    failures, tried = doctest.testmod(mrdamper)
+    assert tried >= 4
+    assert failures == 0

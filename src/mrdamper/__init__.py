@@ -1,29 +1,37 @@
 """mrdamper: from magnetorheological damper test records to a validated model.
 
->>> from mrdamper import load_dataset, run_study
+>>> from mrdamper import Condition, load_dataset, run_study
 >>> study = run_study(load_dataset())
->>> study.rig("utfsm").damper.predict(Condition(0.5, 2.0, 0.01)).force
+>>> prediction = study.rig("utfsm").damper.predict(Condition(current_A=0.5, frequency_Hz=2.0, amplitude_m=0.01))
+>>> prediction.force.shape == prediction.motion.time.shape
+True
 """
 
 from __future__ import annotations
 
 # ruff: noqa: F401  type checkers take the names from the imports, everybody else from _HOME
 import importlib
-import sys
 from typing import TYPE_CHECKING, Any
 
-from mrdamper.discovery import MovedNames
-
 if TYPE_CHECKING:
+    from mrdamper.dampers.base import Damper, Prediction
     from mrdamper.data import Condition, Dataset, Run
+    from mrdamper.discovery import register
     from mrdamper.errors import InputError
+    from mrdamper.export import export_model
     from mrdamper.files.dataset import load_dataset, save_dataset
     from mrdamper.files.model_file import load_model, save_model
+    from mrdamper.fleet.line import run_fleet
     from mrdamper.gas_spring import GasSpring
     from mrdamper.identification import identify
+    from mrdamper.motion import Excitation, sine, sweep
+    from mrdamper.paper.study import reproduce
     from mrdamper.report.plots.loops import plot_force, plot_loop
+    from mrdamper.rig_files.rig_import import import_files
     from mrdamper.simulation import simulate
     from mrdamper.streaming import stepper
+    from mrdamper.study.comparison import compare
+    from mrdamper.study.plan import plan_tests
     from mrdamper.study.workflow import run_study
     from mrdamper.systems.inputs import load_input
     from mrdamper.systems.inverse import invert
@@ -33,36 +41,51 @@ if TYPE_CHECKING:
 
 _HOME = {
     "Condition": "data",
+    "Damper": "dampers.base",
     "Dataset": "data",
+    "Excitation": "motion",
     "GasSpring": "gas_spring",
     "InputError": "errors",
+    "Prediction": "dampers.base",
     "Run": "data",
+    "compare": "study.comparison",
+    "export_model": "export",
     "identify": "identification",
+    "import_files": "rig_files.rig_import",
     "invert": "systems.inverse",
     "load_dataset": "files.dataset",
     "load_input": "systems.inputs",
     "load_model": "files.model_file",
     "load_system": "systems.system_file",
+    "plan_tests": "study.plan",
     "plot_force": "report.plots.loops",
     "plot_loop": "report.plots.loops",
+    "register": "discovery",
+    "reproduce": "paper.study",
+    "run_fleet": "fleet.line",
     "run_study": "study.workflow",
     "save_dataset": "files.dataset",
     "save_model": "files.model_file",
     "simulate": "simulation",
     "simulate_system": "systems.simulate",
+    "sine": "motion",
     "stepper": "streaming",
+    "sweep": "motion",
     "validate": "validation",
 }
 __all__ = list(_HOME)  # pyright: ignore[reportUnsupportedDunderAll]
-
-_moved = MovedNames(__name__)
-sys.meta_path.insert(0, _moved)  # type: ignore[arg-type]
 
 
 def __getattr__(name: str) -> Any:
     # Names are looked up on first use: the command line's --help needs none of them.
     if name in _HOME:
         return getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)
-    if _moved.new_name(f"{__name__}.{name}"):
-        return importlib.import_module(f"{__name__}.{name}")
+    if name == "__version__":
+        return importlib.import_module("importlib.metadata").version(__name__)
+    if name[:1].isupper():  # the class of a model: from mrdamper import BoucWen
+        return getattr(importlib.import_module(f"{__name__}.models"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_HOME, "__version__"])

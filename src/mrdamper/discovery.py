@@ -1,113 +1,300 @@
-"""Finding what was dropped into a package, and modules under the names they had in version 0.1."""
+"""Extension points: the models, methods, readers and other parts that installed packages provide.
+
+A package registers one entry point a group. The entry point names a module, a package or a class;
+of a package every module is imported, so that a new part is one new file. mrdamper registers its
+own parts in the same way (pyproject.toml).
+"""
 
 from __future__ import annotations
 
 import importlib
+import inspect
 import pkgutil
 import warnings
-from collections.abc import Iterable, Mapping
-from importlib.machinery import ModuleSpec
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib.metadata import Distribution, EntryPoint, entry_points, version
 from types import MappingProxyType, ModuleType
-from typing import TypeVar
+from typing import Any, Generic, TypeVar
 
-from mrdamper.errors import UnknownNameError
+from mrdamper.errors import InputError, UnknownNameError, shown
 
-N = TypeVar("N", bound=type)
-
-# Modules above the core that hold classes of a kind: imported when these are looked up.
-EXTENSIONS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "methods": ("mrdamper.paper.paper_method", "mrdamper.paper.direct_genetic"),
-        "study methods": ("mrdamper.paper.options",),
-    }
+T = TypeVar("T")
+OWN = "mrdamper"  # the distribution whose broken parts are errors, not skipped
+GROUPS = (
+    "mrdamper.models",
+    "mrdamper.methods",
+    "mrdamper.studies",
+    "mrdamper.dampers",
+    "mrdamper.readers",
+    "mrdamper.checks",
+    "mrdamper.exporters",
+    "mrdamper.controllers",
+    "mrdamper.inputs",
+    "mrdamper.commands",
 )
 
 
-def subclasses_in(package: str, path: Iterable[str], base: N, kind: str = "") -> Mapping[str, N]:
-    """Import every module of a package and the extensions of a kind; the direct subclasses of `base` by `name`."""
-    for module in pkgutil.iter_modules(path):
-        importlib.import_module(f"{package}.{module.name}")
-    return known_subclasses(base, kind)
+HOOKS = {"mrdamper.commands": "register", "mrdamper.checks": "check"}  # groups of modules: the function each defines
 
 
-def known_subclasses(base: N, kind: str = "") -> Mapping[str, N]:
-    """Direct subclasses of `base`, those of the extensions of a kind included, by their `name`, sorted."""
-    for module in EXTENSIONS.get(kind, ()):
-        importlib.import_module(module)
-    found = sorted(base.__subclasses__(), key=lambda cls: cls.name)
-    return MappingProxyType({cls.name: cls for cls in found})
+class PluginWarning(UserWarning):
+    """A part of an installed package that could not be used and was skipped."""
 
 
-def named(kind: str, name: str, known: Mapping[str, N]) -> N:
-    """The one of that name.
+@dataclass(frozen=True)
+class Part:
+    """Something an installed package provides.
+
+    Attributes
+    ----------
+    group : str
+        One of `GROUPS`.
+    name : str
+        Of the part; of the entry point where it could not be loaded.
+    package : str
+        Distribution that provides it, with its version.
+    target : str
+        Module, or module and class.
+    problem : str
+        Why it was skipped; empty if it is used.
+    own : bool
+        It belongs to mrdamper, or to a script that registered it.
+    """
+
+    group: str
+    name: str
+    package: str
+    target: str
+    problem: str = ""
+    own: bool = False
+
+
+def package_of(distribution: Distribution | None) -> str:
+    """Name and version of a distribution."""
+    return f"{distribution.name} {distribution.version}" if distribution else "unknown package"
+
+
+@cache
+def provided_modules(group: str) -> tuple[tuple[EntryPoint, tuple[ModuleType, ...] | type], ...]:
+    """Load the entry points of a group: its own first, then by package and name.
+
+    Returns
+    -------
+    tuple of (entry point, modules or class)
+        Of a package all its modules, of a module that one.
+
+    Warns
+    -----
+    PluginWarning
+        For a package other than mrdamper that cannot be loaded; it is skipped.
+    """
+    loaded = []
+    for point in sorted(entry_points(group=group), key=_order):
+        try:
+            _require_this_version(point.dist)
+            loaded.append((point, _load(point)))
+        except Exception as error:  # whatever a package raises when it is imported
+            if _is_own(point):
+                raise
+            skip(Part(group, point.name, package_of(point.dist), point.value), error)
+    return tuple(loaded)
+
+
+def _order(point: EntryPoint) -> tuple[bool, str, str]:
+    return not _is_own(point), point.dist.name if point.dist else "", point.name
+
+
+def _is_own(point: EntryPoint) -> bool:
+    return point.dist is not None and point.dist.name == OWN
+
+
+def _require_this_version(distribution: Distribution | None) -> None:
+    """Refuse a package that is made for another version of mrdamper."""
+    from packaging.requirements import Requirement
+
+    for wanted in map(Requirement, (distribution.requires or ()) if distribution else ()):
+        if wanted.name == OWN and not wanted.specifier.contains(version(OWN), prereleases=True):
+            raise ImportError(f"it needs mrdamper {wanted.specifier}, this is {version(OWN)}")
+
+
+def _load(point: EntryPoint) -> tuple[ModuleType, ...] | type:
+    target = point.load()
+    if isinstance(target, type):
+        return target
+    if not isinstance(target, ModuleType):
+        raise TypeError(f"{point.value} is neither a module nor a class")
+    names = (module.name for module in pkgutil.iter_modules(getattr(target, "__path__", ())))
+    return (target, *(importlib.import_module(f"{target.__name__}.{name}") for name in sorted(names)))
+
+
+_skipped: list[Part] = []
+
+
+def skip(part: Part, problem: Exception | str) -> None:
+    """Note that a part of an outside package is not used, and warn once."""
+    if isinstance(problem, Exception):
+        problem = f"{type(problem).__name__}: {problem}"
+    _skipped.append(replace(part, problem=problem))
+    warnings.warn(f"{part.name} of {part.package} ({part.group}) is skipped: {problem}", PluginWarning, stacklevel=2)
+
+
+class Registry(Generic[T]):
+    """The classes of one extension point by their `name`.
+
+    Parameters
+    ----------
+    group : str
+        Entry-point group.
+    base : type
+        Every class of the group is a subclass of it that is not abstract and has a `name` of its own.
+    kind : str
+        What one of them is called in messages.
+    """
+
+    def __init__(self, group: str, base: type[T], kind: str):
+        self.group, self.base, self.kind = group, base, kind
+        self._parts: dict[str, Part] | None = None
+        self._types: dict[str, type[T]] = {}
+        _registries[group] = self
+
+    @property
+    def types(self) -> Mapping[str, type[T]]:
+        """Every class by its name, sorted."""
+        if self._parts is None:
+            self._parts = {}
+            for point, target in provided_modules(self.group):
+                for cls in self._classes(target):
+                    self._add(cls, package_of(point.dist), is_own=_is_own(point))
+        return MappingProxyType(dict(sorted(self._types.items())))
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """Every class of the group and the package it comes from, sorted by name."""
+        return tuple(part for name in self.types if (part := (self._parts or {}).get(name)))
+
+    def type_named(self, name: str) -> type[T]:
+        """The class of that name.
+
+        Raises
+        ------
+        UnknownNameError
+            With the near matches.
+        """
+        types = self.types
+        if not isinstance(name, str) or name not in types:
+            raise UnknownNameError.of(self.kind, str(name)[:100], types)
+        return types[name]
+
+    def register(self, cls: type[T]) -> None:
+        """Add a class of a script or notebook for this process; one of the same name and module is replaced."""
+        known = self.types.get(cls.name)  # type: ignore[attr-defined]
+        if known is not None and (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
+            raise InputError(
+                f"the {self.kind} {cls.name!r} exists already ({known.__module__}.{known.__qualname__})",  # type: ignore[attr-defined]
+                mend="give the class another name",
+                code="E_ARGUMENT",
+            )
+        self._types.pop(cls.name, None)  # type: ignore[attr-defined]
+        self._add(cls, cls.__module__, is_own=True)
+
+    def _classes(self, target: tuple[ModuleType, ...] | type) -> Iterator[type[T]]:
+        if isinstance(target, type):
+            yield target
+            return
+        modules = {module.__name__ for module in target}
+        yield from (cls for cls in _subclasses(self.base) if cls.__module__ in modules)
+
+    def _add(self, cls: Any, package: str, *, is_own: bool) -> None:
+        parts = self._parts if self._parts is not None else {}
+        name, target = getattr(cls, "name", cls.__name__), f"{cls.__module__}.{cls.__qualname__}"
+        problem = ""
+        if not issubclass(cls, self.base) or inspect.isabstract(cls) or not isinstance(name, str):
+            problem = f"{target} is not a complete subclass of {self.base.__module__}.{self.base.__qualname__}"
+        elif name in self._types:
+            problem = f"the {self.kind} {name!r} exists already in {parts[name].package}"
+        part = Part(self.group, str(name), package, target, own=is_own)
+        if not problem:
+            self._types[name], parts[name] = cls, part
+        elif is_own:
+            raise TypeError(problem)
+        else:
+            skip(part, problem)
+
+
+_registries: dict[str, Registry[Any]] = {}
+
+
+def _subclasses(base: type) -> Iterator[type]:
+    """Concrete subclasses with a name of their own, at any depth."""
+    for cls in base.__subclasses__():
+        if "name" in vars(cls) and not inspect.isabstract(cls):
+            yield cls
+        yield from _subclasses(cls)
+
+
+def register(cls: type[T]) -> type[T]:
+    """Make a model, method, damper, reader, exporter, controller or input of a script known by its name.
+
+    May be used as a decorator. A package registers its parts by an entry point instead.
+
+    Parameters
+    ----------
+    cls : type
+        Subclass of the base class of an extension point, with a `name`.
+
+    Returns
+    -------
+    type
+        The same class.
 
     Raises
     ------
-    UnknownNameError
-        With the near matches.
+    InputError
+        E_ARGUMENT, if it belongs to no extension point, lacks a name, or another class has its name.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass, replace
+    >>> from typing import ClassVar
+    >>> from mrdamper import register
+    >>> from mrdamper.models import Model, model_type
+    >>> from mrdamper.models.bingham import Bingham
+    >>> @register
+    ... @dataclass(frozen=True)
+    ... class Renamed(Bingham):
+    ...     name: ClassVar[str] = "renamed"
+    >>> model_type("renamed").__name__
+    'Renamed'
     """
-    if not isinstance(name, str) or name not in known:
-        raise UnknownNameError.of(kind, str(name)[:100], known)
-    return known[name]
+    registry = next((r for r in _registries.values() if isinstance(cls, type) and issubclass(cls, r.base)), None)
+    if registry is None or not isinstance(getattr(cls, "name", None), str) or inspect.isabstract(cls):
+        raise InputError(
+            f"{shown(cls)} cannot be registered",
+            mend="give a complete subclass of Model, Method, Exporter, Controller, Input or Reader with a name",
+            code="E_ARGUMENT",
+        )
+    registry.register(cls)
+    return cls
 
 
-MOVED = MappingProxyType(
-    {
-        "comparison": "study.comparison",
-        "condensed": "dampers.gram",
-        "conditioned": "dampers.published",
-        "damper": "dampers.base",
-        "datasets": "files.bundled",
-        "excitation": "motion",
-        "formulas": "export.equations",
-        "function_fitting": "functions.fitting",
-        "harmonic_balance": "identification.harmonic_balance",
-        "harmonics": "motion.harmonics",
-        "io": "rig_files",
-        "io.atomic": "files.atomic",
-        "io.dataset": "files.dataset",
-        "io.model_file": "files.model_file",
-        "io.motion": "files.motion",
-        "joint": "dampers.joint",
-        "loop_analysis": "identification.loop_analysis",
-        "modified": "dampers.modified",
-        "parameter_functions": "functions.forms",
-        "plots": "report.plots",
-        "publication": "report.study",
-        "recursion": "motion.lag",
-        "sensitivity": "paper.sensitivity",
-        "threads": "optimizers.linear",
-        "uncertainty": "identification.covariance",
-        "virtual_rig": "paper.virtual_rig",
-        "workflow": "study.workflow",
-    }
-)
+def modules_with(group: str, function: str) -> tuple[tuple[Part, ModuleType], ...]:
+    """The modules of a group that define a function of that name, as commands and checks do."""
+    found = []
+    for point, target in provided_modules(group):
+        for module in target if isinstance(target, tuple) else ():
+            if callable(getattr(module, function, None)):
+                name = module.__name__.rpartition(".")[2]
+                part = Part(group, name, package_of(point.dist), module.__name__, own=_is_own(point))
+                found.append((part, module))
+    return tuple(found)
 
 
-class MovedNames:
-    """Modules under their names of version 0.1: found in the import system's list of finders, said once each."""
-
-    def __init__(self, package: str):
-        self.package = package
-        self.spec: ModuleSpec | None = None
-
-    def new_name(self, name: str) -> str | None:
-        """Where a module of 0.1 stands now; None if it did not move."""
-        parts = name.split(".")
-        for count in range(min(len(parts), 3), 1, -1):
-            if (home := MOVED.get(".".join(parts[1:count]))) and parts[0] == self.package:
-                return ".".join([self.package, home, *parts[count:]])
-        return None
-
-    def find_spec(self, name: str, path: object = None, target: object = None) -> ModuleSpec | None:
-        new = self.new_name(name)
-        return ModuleSpec(name, self, origin=new) if new else None  # type: ignore[arg-type]
-
-    def create_module(self, spec: ModuleSpec) -> ModuleType:
-        warnings.warn(f"{spec.name} is now {spec.origin}", FutureWarning, stacklevel=2)
-        module = importlib.import_module(str(spec.origin))
-        self.spec = module.__spec__  # the import system puts the old name's there
-        return module
-
-    def exec_module(self, module: ModuleType) -> None:
-        module.__spec__ = self.spec
+def all_parts() -> tuple[Part, ...]:
+    """Everything that installed packages provide, used and skipped, by group and name."""
+    for group in GROUPS:  # importing the module that holds a group's registry creates it
+        provided_modules(group)
+    modules = [part for group, function in HOOKS.items() for part, _ in modules_with(group, function)]
+    known = [part for registry in _registries.values() for part in registry.parts]
+    return tuple(sorted((*known, *modules, *_skipped), key=lambda part: (GROUPS.index(part.group), part.name)))

@@ -6,13 +6,12 @@ and what to do); 1 internal error; 128 plus the signal number where a signal end
 
 from __future__ import annotations
 
-import importlib
 import os
-import pkgutil
 import signal
 import sys
 import threading
 import traceback
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
@@ -20,8 +19,8 @@ from typing import Any, NoReturn
 
 import typer
 
-from mrdamper.cli import commands
 from mrdamper.cli.help import CommandGroups, OptionGroups
+from mrdamper.discovery import PluginWarning, modules_with, skip
 from mrdamper.errors import InputError, ResourceError, resource_error
 
 _MIN_ADDRESS_SPACE = 2 * 2**30  # address space [bytes]; a study of the bundled data maps 1.3e9
@@ -33,6 +32,7 @@ def main() -> None:
     # whatever the number of cores.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    warnings.showwarning = _show_warning
     try:
         _require_memory()
         with _ended_by_signals():
@@ -54,6 +54,14 @@ def main() -> None:
             sys.exit(1)
         _say(str(typed))
         sys.exit(2)
+
+
+def _show_warning(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+    """Print a skipped plug-in on one line; any other warning as Python does."""
+    if issubclass(category, PluginWarning):
+        _say(str(message))
+    else:
+        print(warnings.formatwarning(message, category, *where[:2]), end="", file=sys.stderr)
 
 
 def _require_memory() -> None:
@@ -105,7 +113,7 @@ def _say(text: str) -> None:
 
 
 def application() -> typer.Typer:
-    """Build the application; every module in `commands` registers its own command."""
+    """Build the application; every module of the entry points `mrdamper.commands` registers its command."""
     app = typer.Typer(
         name="mrdamper",
         cls=CommandGroups,
@@ -116,8 +124,13 @@ def application() -> typer.Typer:
         rich_markup_mode=None,
     )
     app.callback()(_root)
-    for module in sorted(pkgutil.iter_modules(commands.__path__), key=lambda m: m.name):
-        importlib.import_module(f"{commands.__name__}.{module.name}").register(app)
+    for part, module in modules_with("mrdamper.commands", "register"):
+        try:
+            module.register(app)
+        except Exception as error:  # whatever a package's function raises
+            if part.own:
+                raise
+            skip(part, error)
     for command in app.registered_commands:
         command.cls = OptionGroups
     return app

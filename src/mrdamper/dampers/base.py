@@ -163,6 +163,16 @@ class Prediction(Shown):
         Quantities outside the tested envelope; empty inside.
     steady : bool
         One closed loop of the steady response, not a motion from rest.
+
+    Examples
+    --------
+    >>> from mrdamper import Condition, identify, load_dataset
+    >>> from mrdamper.dampers.modified import fit_modified
+    >>> runs = load_dataset().rig("utfsm").split("train")[:8]
+    >>> damper = fit_modified([identify(run, "bingham") for run in runs]).damper
+    >>> prediction = damper.predict(Condition(current_A=0.5, frequency_Hz=2.0, amplitude_m=0.01))
+    >>> prediction.force.shape == prediction.motion.time.shape
+    True
     """
 
     motion: Excitation
@@ -239,6 +249,15 @@ class Damper(Shown):
     coil : Coil or None
     certainty : Certainty or None
         How sure its numbers and predictions are, where that is known.
+
+    Examples
+    --------
+    >>> from mrdamper import Damper, identify, load_dataset
+    >>> from mrdamper.dampers.modified import fit_modified
+    >>> runs = load_dataset().rig("utfsm").split("train")[:8]
+    >>> damper = fit_modified([identify(run, "bingham") for run in runs]).damper
+    >>> isinstance(damper, Damper)
+    True
     """
 
     kind: ClassVar[str]

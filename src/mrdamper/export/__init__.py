@@ -1,25 +1,71 @@
-"""Ways a damper leaves the house, one file each. A file dropped in here is found; there is no list."""
+"""Export formats, one file each: a new file here, or a package with the entry point `mrdamper.exporters`."""
 
 from __future__ import annotations
 
-from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mrdamper.discovery import named, subclasses_in
-from mrdamper.export.base import Exporter, Written
+from mrdamper.dampers.base import Damper
+from mrdamper.discovery import Registry
+from mrdamper.errors import checked
+from mrdamper.export.base import Exporter, Written, identifier, write_export
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-__all__ = ["Exporter", "Written", "all_exporters", "exporter"]
+__all__ = ["Exporter", "Written", "all_exporters", "export_model", "exporter"]
 
 
-@cache
+_registry: Registry[Exporter] = Registry("mrdamper.exporters", Exporter, "export format")  # type: ignore[type-abstract]
+
+
 def all_exporters() -> Mapping[str, type[Exporter]]:
     """Every export format by its name."""
-    return subclasses_in(__name__, __path__, Exporter)
+    return _registry.types
 
 
 def exporter(name: str) -> type[Exporter]:
     """The export format of that name; raises `UnknownNameError` with the near matches."""
-    return named("export format", name, all_exporters())
+    return _registry.type_named(name)
+
+
+@checked()
+def export_model(damper: Damper, to: str, out: str | Path, name: str = "") -> list[Path]:
+    """Write a damper in an export format, whole or not at all.
+
+    Parameters
+    ----------
+    damper : Damper
+    to : str
+        Format: "c", "fmu", "page", "latex", "markdown", "table", "adams", or one of a plug-in.
+    out : path
+        Folder; a file where the format makes one.
+    name : str
+        Begins the names of files and symbols; the rig's name where empty.
+
+    Returns
+    -------
+    list of Path
+        What was written.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such format.
+    InputError
+        E_EXPORT_NAME, if the name makes no identifier in C; E_OUTPUT, if `out` cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import mkdtemp
+    >>> from mrdamper import export_model, identify, load_dataset
+    >>> from mrdamper.dampers.modified import fit_modified
+    >>> runs = load_dataset().rig("utfsm").split("train")[:8]
+    >>> damper = fit_modified([identify(run, "bingham") for run in runs]).damper
+    >>> [path.name for path in export_model(damper, "adams", Path(mkdtemp()) / "adams")]
+    ['utfsm_0A.dmp', 'utfsm_0.2A.dmp', 'utfsm_0.4A.dmp', 'utfsm_0.6A.dmp', 'utfsm_0.8A.dmp', 'utfsm_1A.dmp']
+    """
+    kind = exporter(to)
+    written = kind().export(damper, identifier(name or damper.rig or "damper"))
+    return write_export(written, out, kind.suffix)

@@ -25,8 +25,10 @@ from mrdamper.data import require_name
 from mrdamper.errors import InputError, ModelFileError, require
 from mrdamper.files.atomic import path_of, write_file
 from mrdamper.files.strict_json import parse_json
+from mrdamper.models import model_parts
 
 FORMAT = "mrdamper-model"
+_PACKAGE = "package of the model"  # key of the provenance
 MAJOR, MINOR = 1, 5
 _LARGEST = 64_000_000  # bytes of a file
 _MAX_DEVIATION = 1e4  # standard deviation of a parameter over its size, or of its logarithm
@@ -168,7 +170,7 @@ def dump_model(damper: Damper) -> str:
         rig=damper.rig,
         units=UNITS,
         envelope=_Envelope(**{name: getattr(damper.envelope, name) or None for name in _Envelope.model_fields}),  # type: ignore[arg-type]
-        provenance=dict(damper.provenance),
+        provenance={**damper.provenance, **_outside_package(damper)},
         coil=_describe_coil(damper.coil),
         covariance=_describe_certainty(damper.certainty),
         damper={"kind": damper.kind, **asdict(damper.to_saved())},
@@ -241,7 +243,16 @@ def parse_model(text: str, where: str = "model") -> Damper:
         damper = kind.from_saved(saved, document.rig, envelope, document.provenance, coil)
         return _with_certainty(damper, document.covariance, where) if document.covariance else damper
     except InputError as error:
-        raise ModelFileError(error.found, where=where, mend=error.mend) from error
+        package = document.provenance.get(_PACKAGE)
+        mend = f"install the package that the file names: {package!r:.80}" if package else error.mend
+        raise ModelFileError(error.found, where=where, mend=mend) from error
+
+
+def _outside_package(damper: Damper) -> dict[str, str]:
+    """The installed package that provides the model of a damper, where it is not mrdamper."""
+    name = getattr(damper.to_saved(), "model", None)
+    parts = {part.name: part for part in model_parts()}
+    return {_PACKAGE: parts[name].package} if name in parts and not parts[name].own else {}
 
 
 def _checked(schema: Any, raw: dict[str, Any], prefix: str, where: str) -> Any:

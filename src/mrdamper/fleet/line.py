@@ -92,6 +92,13 @@ def run_fleet(
         If `out` cannot be written to, or the disk is full; what was finished is safe.
     ClusterError, MissingExtraError
         If the cluster cannot be reached.
+
+    Examples
+    --------
+    >>> from mrdamper import run_fleet
+    >>> fleet = run_fleet("dampers/", "fleet/", workers=2)  # doctest: +SKIP
+    >>> fleet.table  # doctest: +SKIP
+    PosixPath('fleet/dampers.parquet')
     """
     out = Path(out).absolute()
     parameters = [info.name for info in model_type(model).parameters()]

@@ -1,23 +1,29 @@
-"""Damper models, one file each. A file dropped in here is found; there is no list."""
+"""Damper models, one file each: a new file here, or a package with the entry point `mrdamper.models`, is found."""
 
 from __future__ import annotations
 
-from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from mrdamper.discovery import named, subclasses_in
+from mrdamper.discovery import Part, Registry
 from mrdamper.models.base import Model, Scale, SearchAxis
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-__all__ = ["Model", "Scale", "SearchAxis", "all_models", "model_type"]
+__all__ = ["Model", "Scale", "SearchAxis", "all_models", "model_parts", "model_type"]
 
 
-@cache
+_registry = Registry("mrdamper.models", Model, "model")
+
+
 def all_models() -> Mapping[str, type[Model]]:
     """Every model by its name."""
-    return subclasses_in(__name__, __path__, Model)
+    return _registry.types
+
+
+def model_parts() -> tuple[Part, ...]:
+    """Every model with the package that provides it."""
+    return _registry.parts
 
 
 def model_type(name: str) -> type[Model]:
@@ -28,4 +34,17 @@ def model_type(name: str) -> type[Model]:
     UnknownNameError
         With the near matches.
     """
-    return named("model", name, all_models())
+    return _registry.type_named(name)
+
+
+def __getattr__(name: str) -> Any:
+    # `from mrdamper.models import Bingham`: every registered class, without a second list of them.
+    if name[:1].isupper():
+        for cls in all_models().values():
+            if cls.__name__ == name:
+                return cls
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, *(cls.__name__ for cls in all_models().values())])

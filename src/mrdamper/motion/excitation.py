@@ -23,7 +23,22 @@ class Excitation:
     Attributes
     ----------
     time, displacement, velocity, acceleration, current : (N,) arrays
-        [s], [m], [m/s], [m/s²], [A].
+        [s], [m], [m/s], [m/s²], [A]; all but the time may be scalars.
+
+    Raises
+    ------
+    ExcitationError
+        If an array has another number of samples than the time.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mrdamper import Excitation
+    >>> t = np.linspace(0.0, 1.0, 1001)
+    >>> v = 0.1 * np.cos(2 * np.pi * t)
+    >>> motion = Excitation(t, 0.1 * np.sin(2 * np.pi * t) / (2 * np.pi), v, np.gradient(v, t), 0.5)
+    >>> motion.current.shape
+    (1001,)
     """
 
     time: Floats

@@ -7,15 +7,38 @@ from collections.abc import Callable
 import numpy as np
 
 from mrdamper.data import Condition, Floats
-from mrdamper.errors import ExcitationError
+from mrdamper.errors import ExcitationError, checked
 from mrdamper.motion.excitation import Excitation
 
 _SAMPLES_PER_CYCLE = 1000
+_MAX_SAMPLES = 10**8  # samples of one motion
 
 
+@checked()
 def sine(condition: Condition, cycles: float = 1.0, samples_per_cycle: int = _SAMPLES_PER_CYCLE) -> Excitation:
-    """X = X sin(2πft) at constant current; the last sample closes the last cycle."""
+    """Sine x = X sin(2πft) at constant current; the last sample closes the last cycle.
+
+    Parameters
+    ----------
+    condition : Condition
+        Amplitude X [m], frequency f [Hz], current [A].
+    cycles : float
+    samples_per_cycle : int
+
+    Raises
+    ------
+    ExcitationError
+        If the frequency, the amplitude or the number of cycles is not positive.
+
+    Examples
+    --------
+    >>> from mrdamper import Condition, sine
+    >>> motion = sine(Condition(current_A=0.5, frequency_Hz=2.0, amplitude_m=0.01), cycles=2)
+    >>> len(motion), round(float(motion.velocity.max()), 4)  # [m/s]
+    (2001, 0.1257)
+    """
     _require_positive(frequency_Hz=condition.frequency_Hz, amplitude_m=condition.amplitude_m, cycles=cycles)
+    _require_samples(cycles * samples_per_cycle if samples_per_cycle < _MAX_SAMPLES else np.inf)
     omega = 2 * np.pi * condition.frequency_Hz
     time = np.arange(round(cycles * samples_per_cycle) + 1) / (samples_per_cycle * condition.frequency_Hz)
     x = condition.amplitude_m * np.sin(omega * time)
@@ -34,6 +57,7 @@ def triangle(condition: Condition, cycles: float = 1.0, samples_per_cycle: int =
     return Excitation(time, x, v, np.zeros_like(x), np.full(time.size, condition.current_A))
 
 
+@checked()
 def sweep(
     start_Hz: float,
     end_Hz: float,
@@ -42,12 +66,43 @@ def sweep(
     current: float = 0.0,
     sample_rate: float = 1000.0,
 ) -> Excitation:
-    """Linear frequency sweep [Hz] over a duration [s]; the amplitude [m] may depend on frequency."""
+    """Linear frequency sweep at constant current.
+
+    Parameters
+    ----------
+    start_Hz, end_Hz : float
+    duration : float
+        [s]
+    amplitude : float or callable
+        [m]; a function gives it for an array of frequencies [Hz].
+    current : float
+        [A]
+    sample_rate : float
+        [Hz]
+
+    Raises
+    ------
+    ExcitationError
+        If a frequency, the duration or the sample rate is not positive.
+
+    Examples
+    --------
+    >>> from mrdamper import sweep
+    >>> motion = sweep(1.0, 15.0, duration=2.0, amplitude=0.002, current=0.5)
+    >>> motion.displacement.shape
+    (2001,)
+    """
     _require_positive(start_Hz=start_Hz, end_Hz=end_Hz, duration=duration, sample_rate=sample_rate)
+    _require_samples(duration * sample_rate)
     time = np.arange(int(duration * sample_rate) + 1) / sample_rate
     frequency = start_Hz + (end_Hz - start_Hz) * time / duration
     phase = 2 * np.pi * (start_Hz * time + (end_Hz - start_Hz) * time**2 / (2 * duration))
-    envelope = amplitude(frequency) if callable(amplitude) else amplitude
+    try:
+        envelope = np.asarray(amplitude(frequency) if callable(amplitude) else amplitude, dtype=float)
+    except TypeError as error:
+        raise ExcitationError(f"amplitude: {error}", mend="give a number, or a function of the frequencies") from error
+    if envelope.shape not in ((), time.shape):
+        raise ExcitationError(f"amplitude has shape {envelope.shape}, time {time.shape}", mend="give one value or all")
     return _derived(time, envelope * np.sin(phase), current)
 
 
@@ -74,6 +129,11 @@ def random_motion(
 def _derived(time: Floats, x: Floats, current: float) -> Excitation:
     v = np.gradient(x, time, edge_order=2)
     return Excitation(time, x, v, np.gradient(v, time, edge_order=2), np.full(time.size, float(current)))
+
+
+def _require_samples(count: float) -> None:
+    if not 2 <= count <= _MAX_SAMPLES:
+        raise ExcitationError(f"a motion of {count:.3g} samples", mend=f"give between 2 and {_MAX_SAMPLES:.0e}")
 
 
 def _require_positive(**values: float) -> None:

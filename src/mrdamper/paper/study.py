@@ -80,6 +80,11 @@ def reproduce(
     ------
     IdentificationError
         If the data hold no sine runs to identify from, or allow no way at all.
+
+    Examples
+    --------
+    >>> from mrdamper import reproduce
+    >>> reproduction = reproduce()  # doctest: +SKIP
     """
     begin = time.perf_counter()
     chosen = options or PaperOptions()

@@ -225,6 +225,16 @@ def import_files(
     ------
     InputError
         If the profile or the table of tests cannot be read, or a folder holds no rig's file.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mrdamper import import_files
+    >>> t = np.arange(0.0, 4.0, 0.002)
+    >>> table = np.column_stack([t, 10 * np.sin(2 * np.pi * t), 400 * np.cos(2 * np.pi * t)])
+    >>> np.savetxt("test_0.5A.csv", table, delimiter=",", header="time_s,displacement_mm,force_N", comments="")
+    >>> [record.id for record in import_files(["test_0.5A.csv"]).records]
+    ['test_0.5A']
     """
     profile = _profile(profile)
     with unpacked(paths) as given:

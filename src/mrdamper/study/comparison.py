@@ -83,6 +83,13 @@ def compare(
         If there is no such model.
     IdentificationError
         If a rig has too few train sines, and no record of other motion.
+
+    Examples
+    --------
+    >>> from mrdamper import compare, load_dataset
+    >>> comparison = compare(load_dataset().rig("utfsm"), ["bingham"], jobs=1)
+    >>> comparison.rigs[0].rig
+    'utfsm'
     """
     begin = time.perf_counter()
     chosen = recipes(names, genetic)

@@ -63,6 +63,15 @@ def plan_tests(
         E_CERTAINTY without a covariance; E_LIMITS if the hours hold no record or nothing is allowed.
     UnknownNameError
         If the damper has no such number.
+
+    Examples
+    --------
+    >>> from mrdamper import load_dataset, plan_tests, run_study
+    >>> from mrdamper.study.limits import Limits
+    >>> damper = run_study(load_dataset().rig("labcontrol")).model
+    >>> proposals, _ = plan_tests(damper, Limits.of(damper), hours=0.5)
+    >>> len(proposals) > 0
+    True
     """
     conditions = limits.candidates(hours)
     reckoning = Reckoning.of(damper, limits, conditions, about, progress)

@@ -22,7 +22,7 @@ from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit, fit_modified, fit_modified_jointly
 from mrdamper.dampers.published import Published, all_published
 from mrdamper.data import Run
-from mrdamper.discovery import known_subclasses
+from mrdamper.discovery import Registry
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError
 from mrdamper.gas_spring import GasSpring
 from mrdamper.identification import Identification, Method, Problem, identify
@@ -414,9 +414,12 @@ class StudyMethod(ABC):
         return ()
 
 
+_study_methods: Registry[StudyMethod] = Registry("mrdamper.studies", StudyMethod, "study method")  # type: ignore[type-abstract]
+
+
 def study_methods() -> Mapping[str, type[StudyMethod]]:
     """Every study method by its name."""
-    return known_subclasses(StudyMethod, "study methods")  # type: ignore[type-abstract]
+    return _study_methods.types
 
 
 def catalogue() -> Mapping[str, Recipe]:

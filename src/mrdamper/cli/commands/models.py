@@ -17,11 +17,13 @@ def register(app: typer.Typer) -> None:
     ) -> None:
         """List the models, or show equation, parameters and source of one."""
         from mrdamper.dampers.published import all_published
-        from mrdamper.discovery import named
+        from mrdamper.errors import UnknownNameError
         from mrdamper.models import all_models
 
         known = {**all_models(), **all_published()}
-        chosen = [named("model", name, known)] if name else list(known.values())
+        if name and name not in known:
+            raise UnknownNameError.of("model", name, known)
+        chosen = [known[name]] if name else list(known.values())
         if as_json:
             print(json.dumps([_entry(model) for model in chosen], indent=1, ensure_ascii=False))
         elif name:

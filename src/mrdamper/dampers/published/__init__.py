@@ -6,12 +6,11 @@ reading of descriptions, not a reproduction.
 
 from __future__ import annotations
 
-from functools import cache
 from typing import TYPE_CHECKING
 
 from mrdamper.dampers.kernel import KernelDamper
 from mrdamper.dampers.published.base import ConditionedDamper
-from mrdamper.discovery import named, subclasses_in
+from mrdamper.discovery import Registry
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -21,10 +20,12 @@ __all__ = ["ConditionedDamper", "Published", "all_conditioned", "all_published",
 Published = type[ConditionedDamper] | type[KernelDamper]
 
 
-@cache
+_registry = Registry("mrdamper.dampers", ConditionedDamper, "condition-dependent damper")
+
+
 def all_conditioned() -> Mapping[str, type[ConditionedDamper]]:
     """Every condition-dependent damper by its name."""
-    return subclasses_in(__name__, __path__, ConditionedDamper)
+    return _registry.types
 
 
 def all_published() -> Mapping[str, Published]:
@@ -41,4 +42,4 @@ def conditioned_type(name: str) -> type[ConditionedDamper]:
     UnknownNameError
         With the near matches.
     """
-    return named("condition-dependent damper", name, all_conditioned())
+    return _registry.type_named(name)

@@ -1,11 +1,10 @@
-"""Identification methods, one file each. A file dropped in here is found; there is no list."""
+"""Identification methods, one file each: a new file here, or a package with the entry point `mrdamper.methods`."""
 
 from __future__ import annotations
 
-from functools import cache
 from typing import TYPE_CHECKING, Literal, get_args, get_origin, get_type_hints
 
-from mrdamper.discovery import named, subclasses_in
+from mrdamper.discovery import Registry
 from mrdamper.errors import InputError, UnknownNameError
 from mrdamper.identification.problem import Method
 
@@ -13,10 +12,12 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 
-@cache
+_registry = Registry("mrdamper.methods", Method, "method")
+
+
 def all_methods() -> Mapping[str, type[Method]]:
     """Every method by its name, those of other packages included."""
-    return subclasses_in(__name__, __path__, Method, "methods")
+    return _registry.types
 
 
 def method_named(name: str, settings: Mapping[str, str] | None = None) -> Method:
@@ -33,7 +34,7 @@ def method_named(name: str, settings: Mapping[str, str] | None = None) -> Method
     UnknownNameError
         If there is no such method, switch or value; with the near matches.
     """
-    chosen = named("method", name, all_methods())
+    chosen = _registry.type_named(name)
     if not settings:
         return chosen()
     kinds = {k: t for k, t in get_type_hints(chosen).items() if _is_simple(t)}

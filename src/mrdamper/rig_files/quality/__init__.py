@@ -7,12 +7,11 @@ with a function `check` is found and comes last, when everything else is made su
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 from functools import cache
 
+from mrdamper.discovery import modules_with
 from mrdamper.errors import QualityError
 from mrdamper.rig_files.quality import (
     clock,
@@ -65,8 +64,7 @@ CHECKS: tuple[Check, ...] = (
 
 @cache
 def _dropped_in() -> tuple[Check, ...]:
-    modules = (importlib.import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__))
-    return tuple(module.check for module in modules if hasattr(module, "check"))
+    return tuple(module.check for _, module in modules_with("mrdamper.checks", "check"))
 
 
 def judge(record: Record, without: Collection[Check] = ()) -> Record:

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from mrdamper.discovery import subclasses_in
+from mrdamper.discovery import Registry
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.archive import opened
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
@@ -96,10 +95,12 @@ def reader_of(source: Source) -> Reader:
     return found()
 
 
-@lru_cache(maxsize=1)
+_registry: Registry[Reader] = Registry("mrdamper.readers", Reader, "format")  # type: ignore[type-abstract]
+
+
 def all_readers() -> Mapping[str, type[Reader]]:
     """Every format by name."""
-    return subclasses_in(__name__, __path__, Reader)  # type: ignore[type-abstract]
+    return _registry.types
 
 
 def suffixes() -> tuple[str, ...]:

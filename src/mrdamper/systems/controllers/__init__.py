@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from mrdamper.discovery import named, subclasses_in
+from mrdamper.discovery import Registry
 from mrdamper.systems.controllers.base import Controller
 
 __all__ = ["Controller", "controller_type", "controller_types"]
 
 
+_registry = Registry("mrdamper.controllers", Controller, "controller")
+
+
 def controller_types() -> Mapping[str, type[Controller]]:
     """Every controller by its name."""
-    return subclasses_in(__name__, __path__, Controller)
+    return _registry.types
 
 
 def controller_type(name: str) -> type[Controller]:
     """The controller of that name; raises `UnknownNameError` with the near matches."""
-    return named("controller", name, controller_types())
+    return _registry.type_named(name)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 
-from mrdamper.discovery import named, subclasses_in
+from mrdamper.discovery import Registry
 from mrdamper.errors import RecordError, UnknownNameError, checked
 from mrdamper.files.atomic import path_of
 from mrdamper.parameters import parameters_of, with_values
@@ -15,14 +15,17 @@ from mrdamper.systems.inputs.base import Input
 __all__ = ["Input", "input_type", "input_types", "load_input"]
 
 
+_registry = Registry("mrdamper.inputs", Input, "input")
+
+
 def input_types() -> Mapping[str, type[Input]]:
     """Every input by its name."""
-    return subclasses_in(__name__, __path__, Input)
+    return _registry.types
 
 
 def input_type(name: str) -> type[Input]:
     """The input of that name; raises `UnknownNameError` with the near matches."""
-    return named("input", name, input_types())
+    return _registry.type_named(name)
 
 
 def bundled_records() -> dict[str, Path]:

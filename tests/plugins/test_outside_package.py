@@ -1,0 +1,137 @@
+"""An installed package extends every part of mrdamper; a broken one is named and skipped."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+PARTS = Path(__file__).parents[1] / "drop_in"
+GROUPS = {
+    "models": "models",
+    "methods": "identification/methods",
+    "readers": "rig_files/readers",
+    "checks": "rig_files/quality",
+    "exporters": "export",
+    "controllers": "systems/controllers",
+    "inputs": "systems/inputs",
+    "commands": "cli/commands",
+}
+PROJECT = """
+[build-system]
+requires = ["hatchling"]
+build-backend = "hatchling.build"
+[project]
+name = "{name}"
+version = "1.0"
+dependencies = [{requires}]
+[tool.hatch.build.targets.wheel]
+packages = ["{module}"]
+"""
+
+
+def install(site, source, name, entry_points, requires=""):
+    """Build a package from its source folder and install it into a folder."""
+    module = name.replace("-", "_")
+    (source / module / "__init__.py").touch()
+    text = PROJECT.format(name=name, module=module, requires=requires)
+    for group, target in entry_points:
+        text += f'[project.entry-points."mrdamper.{group}"]\n{module} = "{target}"\n'
+    (source / "pyproject.toml").write_text(text)
+    command = [sys.executable, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps", "--no-build-isolation"]
+    command += ["--disable-pip-version-check", "--target", str(site), str(source)]
+    subprocess.run(command, check=True, capture_output=True, env={**os.environ, "PIP_NO_CACHE_DIR": "1"})
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """A folder of installed packages: one that extends every group, and three that cannot be used."""
+    place, site = tmp_path_factory.mktemp("sources"), tmp_path_factory.mktemp("site")
+    whole = place / "whole" / "rig_parts"
+    for group, folder in GROUPS.items():
+        shutil.copytree(
+            PARTS / folder, whole / group, ignore=shutil.ignore_patterns("__pycache__", "methods", "readers")
+        )
+        (whole / group / "__init__.py").touch()
+    install(site, place / "whole", "rig-parts", [(group, f"rig_parts.{group}") for group in GROUPS])
+    broken = {
+        "raises": ("raise RuntimeError('no licence')", ""),
+        "takes": ("from mrdamper.models.bingham import Bingham\nclass Again(Bingham):\n    name = 'bingham'\n", ""),
+        "newer": ("", '"mrdamper>=99"'),
+        "lacks": ("Lacking = 3\n", ""),
+    }
+    for name, (code, requires) in broken.items():
+        (place / name / name).mkdir(parents=True)
+        (place / name / name / "part.py").write_text(code)
+        target = "lacks.part:Lacking" if name == "lacks" else f"{name}.part"
+        install(site, place / name, name, [("models", target)], requires)
+    return site
+
+
+@pytest.fixture(scope="module")
+def call(site):
+    def called(*arguments, installed=True, code=0):
+        environment = {**os.environ, "PYTHONPATH": str(site) if installed else ""}
+        command = [sys.executable, "-m", "mrdamper.cli", *map(str, arguments)]
+        done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+        assert done.returncode == code, done.stdout + done.stderr
+        return done
+
+    return called
+
+
+def test_every_part_is_listed_with_its_package(call):
+    parts = json.loads(call("plugins", "--json").stdout)
+    ours = {(part["group"], part["name"]) for part in parts if part["package"] == "rig-parts 1.0"}
+    assert {group.removeprefix("mrdamper.") for group, _ in ours} == set(GROUPS)
+    assert ("mrdamper.models", "rounded-coulomb") in ours
+
+
+def test_a_broken_package_is_named_with_its_reason_and_skipped(call):
+    parts = json.loads(call("plugins", "--json").stdout)
+    problems = {part["package"]: part["problem"] for part in parts if part["problem"]}
+    assert "no licence" in problems["raises 1.0"]
+    assert "'bingham' exists already in mrdamper" in problems["takes 1.0"]
+    assert "it needs mrdamper >=99" in problems["newer 1.0"]
+    assert "neither a module nor a class" in problems["lacks 1.0"]
+    done = call("models", "bingham")
+    assert done.stderr.count("is skipped") == 4
+    assert "Traceback" not in done.stderr
+
+
+FIT = """
+import sys
+from mrdamper import identify, load_dataset, save_model
+from mrdamper.dampers.modified import fit_modified
+runs = load_dataset().rig("utfsm").split("train")[:8]
+save_model(fit_modified([identify(run, "rounded-coulomb") for run in runs]).damper, sys.argv[1])
+"""
+
+
+def test_an_outside_model_is_identified_saved_loaded_and_exported(call, site, tmp_path):
+    model = tmp_path / "model.json"
+    environment = {**os.environ, "PYTHONPATH": str(site), "PYTHONWARNINGS": "ignore"}
+    subprocess.run([sys.executable, "-c", FIT, str(model)], check=True, env=environment)
+    assert json.loads(model.read_text())["provenance"]["package of the model"] == "rig-parts 1.0"
+    condition = ("--current", 0.5, "--frequency", 2, "--amplitude", 10)
+    call("predict", model, *condition, "--out", tmp_path / "force.csv")
+    call("export", model, "--to", "c", "--out", tmp_path / "c")
+    call("export", model, "--to", "peaks", "--out", tmp_path / "peaks.csv")
+    assert (tmp_path / "peaks.csv").read_text().startswith("current_A,force_N\n")
+    refused = call("predict", model, *condition, "--out", tmp_path / "force.csv", installed=False, code=2)
+    assert "rounded-coulomb" in refused.stderr
+    assert "rig-parts 1.0" in refused.stderr
+
+
+def test_an_outside_reader_check_and_command_are_used(call, tmp_path):
+    t = np.arange(3001) / 500
+    x, v = 0.01 * np.sin(2 * np.pi * t), 0.02 * np.pi * np.cos(2 * np.pi * t)
+    table = np.column_stack([t, x, 900 * v + 300 * np.tanh(v / 0.01)])
+    (tmp_path / "1A.rigx").write_bytes(b"RIGX" + table.tobytes())
+    done = call("import", tmp_path / "1A.rigx", "--out", tmp_path / "rig")
+    assert "W_ODD_COUNT" in done.stdout + done.stderr
+    assert call("rigs").stdout.split() == ["labcontrol", "utfsm"]
