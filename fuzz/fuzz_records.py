@@ -18,7 +18,7 @@ import time
 import traceback
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from fuzz.synthetic_records import clean_record
 from mrdamper.errors import InputError, QualityError
 from mrdamper.motion.harmonics import fundamental_frequency
 from mrdamper.motion.measured import smooth
-from mrdamper.rig_files.quality import judge
+from mrdamper.rig_files.quality import View, judge
 from mrdamper.rig_files.record import Record
 
 LARGE, MODERATE = 0.10, 0.05  # effects from which on faults are counted
@@ -63,13 +63,15 @@ def codes_of(record: Record) -> frozenset[str]:
 
 
 def damping_and_peak(record: Record) -> tuple[float, float]:
-    """Fit F = f0 + k x + c v + an elastic–plastic force of free yield displacement.
+    """Fit F = f0 + k x + c v + an elastic–plastic force of free yield displacement to the steady part.
 
     Returns
     -------
     (float, float)
         c [N s/m] and half the median peak-to-peak force of a cycle [N].
     """
+    start, stop = View(record).strokes.steady or (0, record.time.size)  # of the rest nothing is identified
+    record = replace(record, **{name: values[start:stop] for name, values in record.channels.items()})
     x, v, _ = smooth(record.time, record.displacement)
     amplitude = 0.5 * float(np.ptp(x))
     steps = np.diff(x, prepend=x[0])

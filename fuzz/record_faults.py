@@ -298,11 +298,6 @@ def _flipped_bit(record: Record, size: float, rng: Rng) -> Record:
     return replace(record, force=force + np.where(at, np.where(up, bit, -bit), 0.0))
 
 
-def _other_force(record: Record, size: float, rng: Rng) -> Record:
-    """The force pairs with the displacement by index, of a clock that started `size` of a period later."""
-    return _shift(1.0)(record, size, rng)
-
-
 def _stick(record: Record, size: float, rng: Rng) -> Record:
     """The displacement sensor's rod sticks: it follows with a backlash of `size` peak-to-peak."""
     x, gap = record.displacement, 0.5 * size * _span(record.displacement)
@@ -331,14 +326,13 @@ KINDS: tuple[Kind, ...] = (
     Kind("displacement clipped before a filter", "of the half range", 0.02, 0.4, _clip("displacement", "filter")),
     Kind("displacement clipped at one end before noise", "of the half range", 0.02, 0.4,
          _clip("displacement", "noise", 1)),
-    Kind("force late", OF_PERIOD, 2e-3, 0.12, _shift(1.0)),
+    Kind("force late, as by a clock of its own", OF_PERIOD, 2e-3, 0.12, _shift(1.0)),
     Kind("force early", OF_PERIOD, 2e-3, 0.12, _shift(-1.0)),
     Kind("force behind a first-order low-pass", OF_PERIOD, 2e-3, 0.12, _filter("force", 1)),
     Kind("force behind a second-order low-pass", OF_PERIOD, 2e-3, 0.1, _filter("force", 2)),
     Kind("force behind a high-pass", "of the frequency", 0.01, 0.6, _high_pass),
     Kind("force smoothed without phase", OF_PERIOD, 2e-3, 0.1, _zero_phase),
     Kind("displacement behind a first-order low-pass", OF_PERIOD, 2e-3, 0.12, _filter("displacement", 1)),
-    Kind("clock of the force started later", OF_PERIOD, 2e-3, 0.12, _other_force),
     Kind("clock of the force runs fast", OF_PERIOD, 5e-3, 0.25, _two_clocks),
     Kind("gain of the force drifts", OF_RECORD, 0.01, 0.6, _trend("force", "ramp", True)),
     Kind("force falls while warming up", OF_RECORD, 0.01, 0.5, _trend("force", "relax", True)),

@@ -16,7 +16,10 @@ from mrdamper.errors import QualityError
 from mrdamper.rig_files.quality import (
     clock,
     current,
+    disturbance,
+    filtered,
     flat,
+    flattened,
     follow,
     force_lag,
     leaps,
@@ -24,7 +27,9 @@ from mrdamper.rig_files.quality import (
     motion,
     presence,
     ranges,
+    renumbered,
     sentinel,
+    unsteady,
     velocity_lag,
 )
 from mrdamper.rig_files.quality.view import View
@@ -56,7 +61,18 @@ CHECKS: tuple[Check, ...] = (
     motion.enough_cycles,
     motion.is_a_sine,
     motion.drifts,
+    disturbance.changes_at_every_sample,
+    disturbance.motion_is_one,
+    disturbance.force_lines,
+    disturbance.force_is_fine,
+    flattened.cut_off_before_noise,
+    flattened.rests_at_its_ends,
+    renumbered.lost_or_doubled,
+    renumbered.copied,
+    unsteady.motion_is_steady,
+    unsteady.force_is_steady,
     force_lag.force_channel,
+    filtered.force_is_unfiltered,
     loop.repeats,
     current.changes,
 )
@@ -89,7 +105,7 @@ def judge(record: Record, without: Collection[Check] = ()) -> Record:
         If the record cannot be used; the code says why: E_NO_DATA, E_NONFINITE, E_SENTINEL,
         E_MISSING, E_TIME_ORDER, E_TIME_DUPLICATE, E_RANGE, E_NO_EXCITATION,
         E_SPIKE, E_LEAP, E_NOISE, E_UNRESOLVED, E_DISSIPATION_SIGN, E_RECTIFIED, E_NO_ENERGY,
-        E_UNRELATED, E_CHANNEL_LAG.
+        E_UNRELATED, E_CHANNEL_LAG, E_DISTURBED, E_SAMPLES_LOST, E_COPIED.
     """
     view = View(record)
     for check in (*CHECKS, *_dropped_in()):

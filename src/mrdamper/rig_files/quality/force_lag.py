@@ -1,16 +1,16 @@
-"""Force that is late against the motion, beyond what hysteresis explains.
+"""Force that is late or early against the motion, beyond what a damper explains.
 
-A viscous force that is late looks like a spring, a hysteretic one like more hysteresis; but
-no passive force goes on rising after the motion has turned. So the force is explained by
-springs, velocity terms and elastic–plastic elements of several yield displacements (a
-Prandtl–Ishlinskii sum, which can be any hysteresis that does not depend on rate), all
-delayed together, and the delay that explains it best is the lag.
+A viscous force that is late looks like a spring, a hysteretic one like more hysteresis; but no
+passive force goes on rising after the motion has turned, and none turns before the motion. So the mean
+cycle is explained by springs, velocity terms and elastic–plastic elements of many yield displacements
+(a Prandtl–Ishlinskii sum, which can be any hysteresis that does not depend on rate), all shifted together,
+and the delay that explains it best is the lag, with the interval of delays that explain it nearly as well.
 
-What has no corner cannot be dated: a smooth force that is late is, on one sine, exactly a
-force with a spring. So not every late force is said. Of forces of seven kinds of dampers
-that are late by 5 % of the period about seven in ten are, by 8 % nearly nine in ten, and of 900
-clean ones, a third of them with wide hysteresis, none (benchmarks/import_detection.py). The
-limits below stand where hysteresis that builds up smoothly begins to be accused.
+What has no corner cannot be dated: a smooth force that is late is, on one sine, exactly a force with a
+spring, and a first-order filter rounds a corner as hysteresis does. A smooth force that is early has a
+spring of negative stiffness, which only a moving mass has, and then in proportion to frequency squared:
+a mass no damper has is reported as a lead. The limits stand beyond what clean records of seven model
+families and of the bundled rigs show; docs/rig-procedure.md has what is found from which size on.
 """
 
 from __future__ import annotations
@@ -22,102 +22,133 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.optimizers.linear import on_one_blas_thread
-from mrdamper.rig_files.quality.flat import flagged_samples, flat_tops
-from mrdamper.rig_files.quality.view import View, sample_noise
+from mrdamper.rig_files.quality.cycles import POINTS, Cycles, steady_cycles
+from mrdamper.rig_files.quality.effects import change, damping, elastic_plastic, percent
+from mrdamper.rig_files.quality.flat import flagged_samples
+from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding
 
-LIMIT = 0.02  # of the period
-_BETTER = 0.5  # of the RMS misfit without delay: a smaller improvement may be any rate dependence
-_UNEXPLAINED = 0.03  # of the force's RMS: hysteresis that leaves less explains the force
-_GRID = np.linspace(-0.04, 0.16, 21)  # delays tried first, of the period
+LIMIT = 0.01  # of the period: shorter lags are within the samples of a cycle
+_BETTER, _BETTER_EARLY = 0.2, 0.12  # of the misfit without delay: a smaller improvement may be any rate dependence
+_MUCH_BETTER = 0.4  # of it, where hysteresis leaves much
+_NEARLY, _NEARLY_EARLY = 0.009, 0.025  # of the force's RMS: hysteresis, or relaxation, that leaves less explains it
+_UNEXPLAINED = 0.05  # of the force's RMS: much
+_GRID = np.round(np.arange(-0.12, 0.161, 0.01), 3)  # delays tried first, of the period
 _FINE = np.array([-0.005, -0.0025, 0.0025, 0.005])  # and then around the best of them
-_YIELD = np.geomspace(0.005, 1.2, 9)  # yield displacements, of the amplitude
-_SOFT = np.array([0.02, 0.05, 0.1, 0.2, 0.4])  # velocities in which a yield force builds up, of the peak
-_POINTS = 256  # of one cycle of the elements
-_ROWS = 800
-_FREE = 6  # of the elements, powers of x and v, may have either sign
+_AS_GOOD = 1.5  # times the best misfit
+_YIELD = np.geomspace(0.0005, 1.0, 30)  # yield displacements, of half the stroke
+_SOFT = np.array([0.01, 0.02, 0.05, 0.1, 0.2, 0.4])  # velocities in which a yield force builds up, of the peak
+_LEAD = 0.015  # share of the force that acts as a negative spring
+_MASS = 30.0  # [kg] that would explain it
 
 
 class ForceLag(NamedTuple):
-    """Delay of the force that explains it best; a misfit is what is left beyond sample noise, RMS over the force's."""
+    """Delay of the force that explains it best; a misfit is RMS over the force's."""
 
-    share: float  # of the period
+    share: float  # of the period; negative: early
     misfit: float  # at this delay
     without: float  # without delay
+    low: float  # of the delays that explain the force nearly as well
+    high: float
 
 
 def force_channel(view: View) -> Iterator[Finding]:
-    """Say that the force lags the motion by more than 2 % of the period."""
+    """Report a force that is late or early against the motion."""
+    cycles, motion = steady_cycles(view), view.motion
+    if cycles is None or motion is None or view.noticed("W_CLIPPED", "W_DRIFT") or _stands_still(view, cycles):
+        return
     lag = force_lag(view)
-    if lag is not None and lag.share > LIMIT and lag.without > _UNEXPLAINED and lag.misfit < _BETTER * lag.without:
-        period = 1 / view.motion.condition.frequency_Hz  # type: ignore[union-attr]
+    if lag is not None and _is_clear(lag):
+        late = 1e3 * np.array([lag.share, lag.low, lag.high]) * cycles.period
+        word, bounds = ("later", late[1:]) if lag.share > 0 else ("earlier", -late[:0:-1])
         yield Finding(
             "W_LAG",
-            f"the force is {1e3 * lag.share * period:.3g} ms ({100 * lag.share:.1f} % of the period) later than "
-            "hysteresis explains; if the channel is known to be late, say [channels.force] delay_ms in a profile",
+            f"the force is {abs(late[0]):.3g} ms ({100 * abs(lag.share):.1f} % of the period; {bounds[0]:.3g} to "
+            f"{bounds[1]:.3g} ms explain it nearly as well) {word} than hysteresis explains, which moves the damping "
+            f"by {percent(effect_of_delay(cycles, lag.share))}; if the delay is known, set delay_ms in "
+            "[channels.force] of a profile",
         )
+        return
+    share, mass = _negative_spring(cycles)
+    if share > _LEAD and mass > _MASS:
+        yield Finding(
+            "W_LAG",
+            f"{100 * share:.2g} % of the force acts as a spring of negative stiffness, for which {mass:.3g} kg would "
+            f"have to move with the rod: the force is early by about {100 * share / (2 * np.pi):.2g} % of the period "
+            "or more, or the displacement late (filter, or a high-pass in the force)",
+        )
+
+
+def _stands_still(view: View, cycles: Cycles) -> bool:
+    """Whether a channel is frozen within the cycles: flat stretches look late."""
+    if not view.noticed("W_FROZEN"):
+        return False
+    flagged = view.record.time[flagged_samples(view)]
+    return bool(np.any((flagged >= cycles.starts[0]) & (flagged <= cycles.starts[-1] + cycles.period)))
+
+
+def _is_clear(lag: ForceLag) -> bool:
+    better, nearly = (_BETTER, _NEARLY) if lag.share > 0 else (_BETTER_EARLY, _NEARLY_EARLY)
+    better = better if lag.without < _UNEXPLAINED else _MUCH_BETTER
+    return abs(lag.share) > LIMIT and lag.without > nearly and lag.misfit < better * lag.without
+
+
+def effect_of_delay(cycles: Cycles, share: float) -> float:
+    """Relative change of the damping by a force that is late by a share of the period."""
+    motion, force = cycles.displacement, cycles.force.loop
+    shifted = _read(force, np.arange(POINTS) / POINTS + share)
+    return change(damping(motion.loop, motion.slope, shifted), damping(motion.loop, motion.slope, force))
+
+
+def _negative_spring(cycles: Cycles) -> tuple[float, float]:
+    """Share of the force that is in phase with the displacement and against it, and the mass that explains it [kg]."""
+    x, force = (np.fft.rfft(channel.loop)[1] for channel in (cycles.displacement, cycles.force))
+    against = -float((force * np.conj(x)).real) / abs(x) * (2 / POINTS)  # [N]
+    amplitude = float(abs(x)) * (2 / POINTS)
+    return against / (0.5 * cycles.force.span), against / amplitude / (2 * np.pi / cycles.period) ** 2
 
 
 @on_one_blas_thread
 def force_lag(view: View) -> ForceLag | None:
-    """Best delay of the force on a sine; None where the motion is none."""
-    motion = view.motion
-    if motion is None:
-        return None
-    run = view.steady
-    first = view.run.time[view.strokes.reversals[0]] if view.strokes.reversals.size else run.time[0]
-    late = run.time >= first  # before its first reversal the damper may come from rest
-    if view.noticed("W_CLIPPED", "W_FROZEN"):  # flat stretches look late
-        if flat_tops(view, "displacement"):
-            return None
-        start = (view.strokes.steady or (0,))[0]
-        late &= ~flagged_samples(view)[view.index[start : start + late.size]]
-    rows = np.flatnonzero(late)[:: max(1, np.count_nonzero(late) // _ROWS)]
-    phase = (run.time[rows] - motion.series.origin) * motion.condition.frequency_Hz
-    columns = _elements(view)
-    ramp = (phase - phase.mean())[:, None]
-    force = run.force[rows] - np.mean(run.force[rows])
-    tried = {float(delay): _misfit(phase - delay, columns, ramp, force) for delay in _GRID}
-    near = min(tried, key=tried.__getitem__)
-    tried.update({near + float(d): _misfit(phase - near - d, columns, ramp, force) for d in _FINE})
-    best = min(tried, key=tried.__getitem__)
-    noise = sample_noise(run.force) / float(np.sqrt(np.mean(force**2)))
-    beyond = [float(np.sqrt(max(tried[d] ** 2 - noise**2, (0.2 * noise) ** 2))) for d in (best, min(tried, key=abs))]
-    return ForceLag(best, *beyond)
-
-
-def _misfit(phase: Floats, columns: Floats, ramp: Floats, force: Floats) -> float:
-    """RMS misfit over the force's RMS with the elements read at the given phases."""
+    """Best delay of the force on a sine; None where the motion is none, or is explained without."""
     from scipy.optimize import nnls
 
-    place = (phase % 1.0) * _POINTS
-    low = np.minimum(place.astype(int), _POINTS - 1)  # rounding may give a whole cycle
-    part = (place - low)[:, None]
-    free = columns[low] * (1 - part) + columns[(low + 1) % _POINTS] * part
-    table = np.column_stack([np.ones(force.size), ramp, free, force])
-    # A triangle of the size of the columns holds all that the fit needs of the rows.
-    gram = table.T @ table
-    gram[np.diag_indices_from(gram)] *= 1 + 1e-12
-    try:
-        triangle = np.linalg.cholesky(gram).T
-    except np.linalg.LinAlgError:  # the motion has too few different values, as a square wave
-        return np.inf
-    either = triangle[:, : 2 + _FREE]
-    left = nnls(np.column_stack([either, -either, triangle[:, 2 + _FREE : -1]]), triangle[:, -1])[1]
-    return float(left / np.linalg.norm(force))
+    cycles, motion = steady_cycles(view), view.motion
+    if cycles is None or motion is None:
+        return None
+    series, phase = motion.series, np.arange(POINTS) / POINTS
+    time = cycles.starts[0] + phase * cycles.period
+    x = (series(time) - series.mean - series.drift * (time - series.origin)) / motion.condition.amplitude_m
+    v = (series(time, 1) - series.drift) / (2 * np.pi * series.frequency * motion.condition.amplitude_m)
+    either = np.column_stack([np.ones(POINTS), x, x**2, x**3, v**2, np.abs(v) * v, v**3])
+    resisting = np.column_stack(
+        [v, np.tanh(v[:, None] / _SOFT), elastic_plastic(x, v > 0, _YIELD * 0.5 * float(np.ptp(x)))]
+    )
+    basis, triangle = np.linalg.qr(np.column_stack([either, resisting]))
+    free = triangle[:, : either.shape[1]]
+    table = np.column_stack([free, -free, triangle[:, either.shape[1] :]])
+    force = cycles.force.loop - np.mean(cycles.force.loop)
+    size = float(np.linalg.norm(force))
+    if size == 0:
+        return None
+
+    def misfit(delay: float) -> float:
+        shifted = _read(force, phase + delay)
+        inside = basis.T @ shifted
+        outside = max(float(shifted @ shifted - inside @ inside), 0.0)
+        return float(np.sqrt(outside + nnls(table, inside)[1] ** 2)) / size
+
+    without = misfit(0.0)
+    if without <= _NEARLY:
+        return None
+    tried = {0.0: without} | {float(delay): misfit(delay) for delay in _GRID if delay}
+    near = min(tried, key=tried.__getitem__)
+    tried |= {near + float(step): misfit(near + step) for step in _FINE}
+    best = min(tried, key=tried.__getitem__)
+    alike = [delay for delay, left in tried.items() if left <= _AS_GOOD * tried[best]]
+    return ForceLag(best, tried[best], without, min(alike), max(alike))
 
 
-def _elements(view: View) -> Floats:
-    """One steady cycle of everything that may make up the force, scaled to about one; columns."""
-    series = view.motion.series  # type: ignore[union-attr]
-    amplitude = view.motion.condition.amplitude_m  # type: ignore[union-attr]
-    time = series.origin + np.arange(_POINTS) / _POINTS / series.frequency
-    x = (series(time) - series.mean - series.drift * (time - series.origin)) / amplitude
-    v = (series(time, 1) - series.drift) / (2 * np.pi * series.frequency * amplitude)
-    steps = np.diff(np.concatenate([x, x, x[:1]]))
-    state, states = np.zeros(_YIELD.size), np.empty((steps.size, _YIELD.size))
-    for i, step in enumerate(steps):
-        state = np.clip(state + step, -_YIELD, _YIELD)
-        states[i] = state
-    steady = states[_POINTS - 1 : 2 * _POINTS - 1] / np.minimum(_YIELD, 1.0)
-    return np.column_stack([x, x**2, x**3, v**2, np.abs(v) * v, v**3, v, np.tanh(np.divide.outer(v, _SOFT)), steady])
+def _read(loop: Floats, phase: Floats) -> Floats:
+    """One cycle's values at phases in cycles, by linear interpolation."""
+    return np.interp(phase % 1.0, np.arange(POINTS + 1) / POINTS, np.append(loop, loop[0]))

@@ -8,7 +8,7 @@ from mrdamper.data import Floats
 from mrdamper.rig_files.quality.view import View
 
 _OF_RANGE = {"displacement": 0.3, "force": 0.5}  # of the channel's range: a leap that stays
-OFF_BY = {"displacement": 0.3, "force": 1.0}  # of the range without it: a sample that stands alone
+OFF_BY = {"displacement": 0.3, "force": 0.3}  # of the range without it: a sample that stands alone
 _FAR = 10.0  # times as far as the channel moves by itself between two samples
 _WIDEST = 3  # samples of a spike
 _MOST = 0.01  # of the samples
@@ -40,7 +40,10 @@ def spikes_in(values: Floats, off_by: float) -> np.ndarray:
     usual = float(np.nanquantile(np.abs(values[at] - 0.5 * (values[at - 1] + values[at + 1])), 0.95))
     far = max(off_by * float(high - low), _FAR * usual)
     steps = np.diff(values)
-    enters = np.flatnonzero(np.abs(steps) > 0.5 * far) + 1
+    enters = np.flatnonzero(np.abs(steps[:-1]) > 0.5 * far) + 1
+    # Only where the channel comes back within so many samples: a steep flank does not.
+    after = np.minimum(enters[:, None] + np.arange(1, _WIDEST + 1), values.size - 1)
+    enters = enters[np.any(np.abs(values[after] - values[enters - 1, None]) < 0.2 * far, axis=1)]
     if enters.size > _MOST * values.size + 3:
         return np.empty(0, dtype=int)  # a channel that leaps all the time
     return np.array([i for i in enters if _stands_alone(values, int(i), far)], dtype=int)

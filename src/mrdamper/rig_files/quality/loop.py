@@ -9,6 +9,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import QualityError
 from mrdamper.motion.harmonics import fit_harmonics
+from mrdamper.rig_files.quality.cycles import POINTS, steady_cycles
 from mrdamper.rig_files.quality.motion import LEAST_CYCLES, cycles_of
 from mrdamper.rig_files.quality.view import View, runs_of, sample_noise
 from mrdamper.rig_files.record import Finding
@@ -22,8 +23,7 @@ _GAIN, _EVEN = 0.3, 0.08  # natural logarithms: a leap of the force's size, and 
 _SAME_CURRENT = 0.1  # [A]
 _FEWEST = 20  # samples of a cycle
 _LONG = 0.08  # of a cycle: a stretch of the other sign that no timing makes
-POOR_REPEATABILITY = 0.05  # of the peak-to-peak force; good rigs have 0.2 to 1.5 %
-_POINTS = 200  # per cycle, at which cycles are compared
+POOR_REPEATABILITY = 0.03  # of the peak-to-peak force; good rigs have 0.2 to 1.7 %
 
 
 def dissipates(view: View) -> None:
@@ -102,7 +102,7 @@ def keeps_its_sign(view: View) -> None:
         raise _flip(view, time[flipped[0][0]], len(flipped), len(cycles))
     if len(cycles) < 3:
         return
-    phase = np.linspace(0.0, period, _POINTS, endpoint=False)
+    phase = np.linspace(0.0, period, POINTS, endpoint=False)
     folded = np.array([np.interp(start + phase, time, view.run.force) for start in starts])
     _keeps_its_scale(view, starts, folded)
     usual = np.median(folded, axis=0)
@@ -110,7 +110,7 @@ def keeps_its_sign(view: View) -> None:
     against = counts & (np.abs(folded + usual) < 0.3 * np.abs(folded - usual))
     for start, row in zip(starts, against, strict=True):
         begins, ends = runs_of(row)
-        if begins.size and np.max(ends - begins) > _LONG * _POINTS:
+        if begins.size and np.max(ends - begins) > _LONG * POINTS:
             raise _flip(view, start + phase[begins[np.argmax(ends - begins)]], 1, len(cycles))
 
 
@@ -203,23 +203,8 @@ def repeatability(view: View) -> tuple[float, float] | None:
         RMS deviation of the cycles from their mean, without the first of three or more; part
         of it that is noise from sample to sample. None under two cycles of a periodic motion.
     """
-    motion = view.motion
-    if motion is None:
+    cycles = steady_cycles(view)
+    if cycles is None or len(cycles.starts) < 2 or cycles.force.span == 0.0:
         return None
-    cycles = int(motion.cycles + 0.02)
-    if cycles < 2:
-        return None
-    cycles -= cycles > 2  # the first may hold the way in from rest
-    run, period = view.steady, 1 / motion.condition.frequency_Hz
-    end = float(run.time[-1])
-    grid = end - cycles * period + period * np.arange(cycles * _POINTS) / _POINTS
-    folded = np.interp(grid, run.time, run.force).reshape(cycles, _POINTS)
-    starts = grid[::_POINTS]
-    folded = folded[view.without_leap(starts, starts + period)]
-    if len(folded) < 2:
-        return None
-    span = float(np.ptp(folded.mean(axis=0)))
-    if span == 0.0:
-        return None
-    scatter = np.sqrt(np.mean(np.var(folded, axis=0, ddof=1)))
-    return float(scatter) / span, sample_noise(run.force) / span
+    scatter = np.sqrt(np.mean(np.var(cycles.force.values, axis=0, ddof=1)))
+    return float(scatter) / cycles.force.span, sample_noise(view.steady.force) / cycles.force.span

@@ -1,0 +1,69 @@
+"""Estimated effect of a fault on the result: the damping that a record gives with the fault and without it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mrdamper.data import Floats
+
+NOTED, WARNED, REFUSED = 0.02, 0.05, 0.30  # effect on damping or force: no finding below, and refused from there on
+_YIELD = np.geomspace(0.004, 1.0, 14)  # yield displacements tried, of half the stroke
+
+
+def elastic_plastic(x: Floats, rising: np.ndarray, yields: Floats) -> Floats:
+    """Steady states, in -1...1, of elastic–plastic elements over one cycle of two strokes.
+
+    Parameters
+    ----------
+    x : (P,) array
+        Displacement [m].
+    rising : (P,) mask
+        Where the velocity is positive.
+    yields : (Y,) array
+        Yield displacements [m]; at most half the stroke acts.
+
+    Returns
+    -------
+    (P, Y) array
+    """
+    low, high = float(np.min(x)), float(np.max(x))
+    bend = np.minimum(yields, 0.5 * (high - low))
+    state = np.where(rising[:, None], x[:, None] - low - bend, x[:, None] - high + bend)
+    return np.clip(state, -bend, bend) / bend
+
+
+def damping(x: Floats, v: Floats, force: Floats) -> float:
+    """Fit F = f0 + k x + c v + an elastic–plastic force of free yield displacement to one cycle.
+
+    Parameters
+    ----------
+    x, v, force : (P,) arrays
+        At equal phases of a cycle; in any units.
+
+    Returns
+    -------
+    float
+        c; NaN where the motion determines none.
+    """
+    half, fastest = 0.5 * float(np.ptp(x)), float(np.max(np.abs(v)))
+    if half == 0 or fastest == 0:
+        return np.nan
+    base = np.column_stack([np.ones_like(x), (x - np.mean(x)) / half, v / fastest])
+    elements = elastic_plastic(x, v > 0, _YIELD * half)
+    tables = np.concatenate([np.broadcast_to(base, (_YIELD.size, *base.shape)), elements.T[:, :, None]], axis=2)
+    normal = tables.transpose(0, 2, 1) @ tables
+    normal[:, range(4), range(4)] *= 1 + 1e-9
+    right = tables.transpose(0, 2, 1) @ force
+    found = np.linalg.solve(normal, right[..., None])[..., 0]
+    explained = np.sum(right * found, axis=1)
+    return float(found[int(np.argmax(explained)), 2]) / fastest
+
+
+def change(before: float, after: float) -> float:
+    """Relative change of a figure; infinite where there is none to begin with."""
+    return abs(after / before - 1) if before else np.inf
+
+
+def percent(share: float) -> str:
+    """Write an estimated share for a message."""
+    return "over 100 %" if not share < 1 else f"about {100 * share:.2g} %"

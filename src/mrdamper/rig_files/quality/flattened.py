@@ -1,0 +1,143 @@
+"""Channels cut off before noise or a filter: no two samples are equal, but the mean cycle has a flat top.
+
+From the flat top's edges on, a smooth extreme goes down as a parabola: at a depth four times as large
+it is twice as wide. A cut-off one is hardly wider. A force may have a plateau of its own, which ends
+where the motion turns; a plateau that begins and ends in full motion is none of a damper's. A motion may
+dwell, but then the force does not go on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from mrdamper.data import Floats
+from mrdamper.rig_files.quality.cycles import POINTS, Channel, steady_cycles
+from mrdamper.rig_files.quality.effects import NOTED, percent
+from mrdamper.rig_files.quality.view import View
+from mrdamper.rig_files.record import Finding
+
+_DEPTH = 0.006  # of the peak-to-peak value; at four times this depth the width is measured again
+_FORCE_WIDER, _WIDER, _WIDER_ONE_SIDED = 1.45, 1.3, 1.47  # times as wide there: a parabola 2, bundled rigs 1.57, 1.34
+_ROUND = 1.75  # times as wide: an end that is not cut off
+_WIDTH = (0.04, 0.6)  # of the cycle
+_REST = 0.05  # of the peak velocity: slower, a displacement rests
+_DWELL = 0.022  # of the cycle, beyond what a sine has
+_JOLT = 0.18  # of the peak velocity, two phases after the rest: a motion that dwells begins gently
+_MOVES = 0.2  # of the peak velocity, at both edges of a cut-off force
+_GOES_ON = 0.04  # of the peak-to-peak force, while a displacement that is cut off or sticks rests
+
+
+class Top(NamedTuple):
+    """One end of a channel's range in the mean cycle."""
+
+    level: float
+    width: float  # of the cycle
+    wider: float  # at four times the depth, the side that is more so
+    edges: tuple[int, int]  # phases, the first may be negative
+    beyond: float  # estimate of what is cut off
+
+
+def cut_off_before_noise(view: View) -> Iterator[Finding]:
+    """Report a force or a displacement that was cut off before noise was added or a filter acted."""
+    cycles = steady_cycles(view)
+    if cycles is None or view.noticed("W_CLIPPED", "W_FROZEN"):
+        return
+    motion, force = cycles.displacement, cycles.force
+    speed = np.abs(motion.slope)
+    tops = [top for top in ends_of(force, len(cycles.starts)) if top.wider < _FORCE_WIDER and _in_motion(top, speed)]
+    yield from _finding("force", "N", 1.0, tops, force.span)
+    ends = ends_of(motion, len(cycles.starts))
+    one_sided = max(top.wider for top in ends) > _ROUND
+    limit = _WIDER_ONE_SIDED if one_sided else _WIDER
+    tops = [top for top in ends if top.wider < limit and _force_goes_on(top, force)]
+    yield from _finding("displacement", "mm", 1e3, tops, motion.span)
+
+
+def rests_at_its_ends(view: View) -> Iterator[Finding]:
+    """Report a displacement that rests at its reversals while the force goes on: backlash, or a sensor that sticks."""
+    cycles = steady_cycles(view)
+    if cycles is None or view.noticed("W_CLIPPED", "W_FROZEN", "W_DISTURBED"):
+        return
+    motion, force = cycles.displacement, cycles.force
+    speed = np.abs(motion.slope) / np.max(np.abs(motion.slope))
+    rests = [_rest(speed, force, int(extreme)) for extreme in (np.argmax(motion.loop), np.argmin(motion.loop))]
+    if min(rests) > _DWELL:
+        lost = 0.5 * (1 - np.cos(2 * np.pi * np.mean(rests)))
+        yield Finding(
+            "W_BACKLASH",
+            f"the displacement rests for {100 * np.mean(rests):.2g} % of the cycle at either end while the force goes "
+            f"on, and leaves it with a jolt: up to {100 * lost:.2g} % of the stroke is lost in the sensor's mounting",
+        )
+
+
+def _rest(speed: Floats, force: Channel, extreme: int) -> float:
+    """Share of the cycle for which a displacement rests about a reversal, 0 where the force rests too."""
+    still = np.roll(speed < _REST, POINTS // 2 - extreme)
+    before = int(np.argmin(np.append(still[POINTS // 2 :: -1], False)))
+    after = int(np.argmin(np.append(still[POINTS // 2 :], False)))
+    jolt = max(speed[(extreme + after + 2) % POINTS], speed[(extreme - before - 2) % POINTS])
+    late = force.loop[np.arange(extreme - before + (before + after) // 2, extreme + after) % POINTS]
+    if jolt < _JOLT or late.size < 3 or float(np.ptp(late)) < _GOES_ON * force.span:
+        return 0.0
+    return (before + after) / POINTS - np.arcsin(_REST) / np.pi
+
+
+def _finding(name: str, unit: str, scale: float, tops: list[Top], span: float) -> Iterator[Finding]:
+    tops = [top for top in tops if _WIDTH[0] < top.width < _WIDTH[1] and top.beyond > 0.5 * NOTED * span]
+    if tops:
+        levels = " and ".join(f"{scale * top.level:.4g} {unit}" for top in tops)
+        beyond = max(top.beyond for top in tops)
+        yield Finding(
+            "W_CLIPPED",
+            f"{name} is cut off near {levels}, before noise was added or a filter acted: {percent(2 * beyond / span)} "
+            "of its amplitude is missing; identification leaves the record out",
+        )
+
+
+def ends_of(channel: Channel, count: int) -> tuple[Top, Top]:
+    """Measure the upper and the lower end of the mean of a number of cycles."""
+    noise = float(np.sqrt(np.mean(channel.rest**2) / count))
+    depth = max(3 * noise, _DEPTH * channel.span)
+    loop = (np.roll(channel.loop, 1) + channel.loop + np.roll(channel.loop, -1)) / 3
+    upper, lower = (_top(sign * loop, depth) for sign in (1.0, -1.0))
+    return upper, lower._replace(level=-lower.level)
+
+
+def _top(loop: Floats, depth: float) -> Top:
+    level = float(np.mean(np.sort(loop)[-4:]))
+    middle = int(np.argmax(loop))
+    turned = np.roll(loop, POINTS // 2 - middle)  # the top in the middle
+    left, right = _reach(turned[POINTS // 2 :: -1], level - depth), _reach(turned[POINTS // 2 :], level - depth)
+    far_left = _reach(turned[POINTS // 2 :: -1], level - 4 * depth)
+    far_right = _reach(turned[POINTS // 2 :], level - 4 * depth)
+    half = max(0.5 * (left + right), 0.5)
+    wider = 1 + max(far_left - left, far_right - right) / half
+    slope = 3 * depth / max(0.5 * (far_left + far_right) - half, 0.25)
+    return Top(level, 2 * half / POINTS, wider, (round(middle - left), round(middle + right)), 0.5 * slope * half)
+
+
+def _reach(values: Floats, level: float) -> float:
+    """How far a curve stays above a level, in phases, between two by interpolation."""
+    below = np.flatnonzero(values <= level)
+    if not below.size:
+        return float(values.size)
+    if below[0] == 0:
+        return 0.0
+    before, after = values[below[0] - 1] - level, level - values[below[0]]
+    return float(below[0] - 1 + before / (before + after))
+
+
+def _in_motion(top: Top, speed: Floats) -> bool:
+    start, stop = top.edges
+    beyond = np.concatenate([np.arange(start - 3, start + 1), np.arange(stop, stop + 4)]) % POINTS
+    return bool(np.min(speed[beyond]) > _MOVES * np.max(speed))
+
+
+def _force_goes_on(top: Top, force: Channel) -> bool:
+    start, stop = top.edges
+    quarter = (stop - start) // 4
+    middle = force.loop[np.arange(start + quarter, stop - quarter + 1) % POINTS]
+    return float(np.ptp(middle)) > _GOES_ON * force.span
