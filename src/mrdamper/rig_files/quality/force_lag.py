@@ -25,14 +25,14 @@ from mrdamper.optimizers.linear import on_one_blas_thread
 from mrdamper.rig_files.quality.cycles import POINTS, Cycles, steady_cycles
 from mrdamper.rig_files.quality.effects import change, damping, elastic_plastic, percent
 from mrdamper.rig_files.quality.flat import flagged_samples
-from mrdamper.rig_files.quality.view import View
+from mrdamper.rig_files.quality.view import View, sample_noise
 from mrdamper.rig_files.record import Finding
 
 LIMIT = 0.01  # of the period: shorter lags are within the samples of a cycle
-_BETTER, _BETTER_EARLY = 0.2, 0.12  # of the misfit without delay: a smaller improvement may be any rate dependence
+_BETTER, _FAR_BETTER = 0.2, 0.12  # of the misfit without delay: a smaller improvement may be any rate dependence
 _MUCH_BETTER = 0.4  # of it, where hysteresis leaves much
-_NEARLY, _NEARLY_EARLY = 0.009, 0.025  # of the force's RMS: hysteresis, or relaxation, that leaves less explains it
-_UNEXPLAINED = 0.05  # of the force's RMS: much
+_NEARLY, _NEARLY_EARLY = 0.004, 0.025  # of the force's RMS: hysteresis, or relaxation, that leaves less explains it
+_LITTLE, _UNEXPLAINED = 0.009, 0.05  # of the force's RMS: up to here little, from here on much
 _GRID = np.round(np.arange(-0.12, 0.161, 0.01), 3)  # delays tried first, of the period
 _FINE = np.array([-0.005, -0.0025, 0.0025, 0.005])  # and then around the best of them
 _AS_GOOD = 1.5  # times the best misfit
@@ -43,7 +43,7 @@ _MASS = 30.0  # [kg] that would explain it
 
 
 class ForceLag(NamedTuple):
-    """Delay of the force that explains it best; a misfit is RMS over the force's."""
+    """Delay of the force that explains it best; a misfit is RMS beyond sample noise, over the force's."""
 
     share: float  # of the period; negative: early
     misfit: float  # at this delay
@@ -88,7 +88,8 @@ def _stands_still(view: View, cycles: Cycles) -> bool:
 
 
 def _is_clear(lag: ForceLag) -> bool:
-    better, nearly = (_BETTER, _NEARLY) if lag.share > 0 else (_BETTER_EARLY, _NEARLY_EARLY)
+    nearly = _NEARLY if lag.share > 0 else _NEARLY_EARLY
+    better = _BETTER if lag.share > 0 and lag.without > _LITTLE else _FAR_BETTER
     better = better if lag.without < _UNEXPLAINED else _MUCH_BETTER
     return abs(lag.share) > LIMIT and lag.without > nearly and lag.misfit < better * lag.without
 
@@ -146,7 +147,9 @@ def force_lag(view: View) -> ForceLag | None:
     tried |= {near + float(step): misfit(near + step) for step in _FINE}
     best = min(tried, key=tried.__getitem__)
     alike = [delay for delay, left in tried.items() if left <= _AS_GOOD * tried[best]]
-    return ForceLag(best, tried[best], without, min(alike), max(alike))
+    noise = sample_noise(view.steady.force) * np.sqrt(POINTS / len(cycles.starts)) / size
+    beyond = [float(np.sqrt(max(left**2 - noise**2, (0.3 * noise) ** 2))) for left in (tried[best], without)]
+    return ForceLag(best, *beyond, min(alike), max(alike))
 
 
 def _read(loop: Floats, phase: Floats) -> Floats:
