@@ -44,7 +44,28 @@ ROOMS = (
     ),
     _room("paper.output", "paper/test_output.py"),
     _room("paper.sensitivity", "paper/test_sensitivity.py"),
-    _room("dampers.bands", "dampers/test_bands_by_hand.py"),
+    _room(
+        "dampers.bands dampers.certainty dampers.sessions data.sessions",
+        "dampers/test_bands_by_hand.py dampers/test_sessions.py data/test_sessions.py",
+    ),
+    _room(
+        "dampers.calibration dampers.random_effects",
+        "dampers/test_calibration.py dampers/test_random_effects.py",
+    ),
+    _room(
+        "dampers.covariance dampers.run_residuals identification.intervals",
+        "dampers/test_covariance_laws.py dampers/test_bands_by_hand.py identification/test_covariance.py",
+        "cover_what_they_say scatter_of_repeated",
+    ),
+    _room("study.plan", "study/test_plan.py"),
+    _room(
+        "systems.controllers.hooks systems.controllers.add systems.controllers.clipped_optimal systems.inverse"
+        " systems.measures",
+        "systems/test_control.py systems/test_loop.py",
+    ),
+    _room("systems.monte_carlo", "systems/test_uncertainty.py"),
+    _room("fleet.charts fleet.verdicts", "fleet/test_charts.py fleet/test_verdicts.py"),
+    _room("paper.options paper.assumptions paper.recipes", "paper/test_functions.py paper/test_measured.py"),
     _room("paper.virtual_rig", "paper/test_virtual_rig.py"),
     _room("report.tables study.recipe study.cross_validation", "report/test_tables.py study/test_recipe.py"),
     _room("paper.functions dampers.modified", "dampers/test_modified.py dampers/test_gram.py study/test_recipe.py"),
@@ -61,3 +82,7 @@ ROOMS = (
     ),
     _room("rig_files.quality.loop", "rig_files/test_loop_check.py rig_files/test_silent_faults.py"),
 )
+
+# A fault that no working trial lets live: the sign in the root mean square error.
+CERTAIN = _room("metrics", "test_metrics.py")
+CERTAIN_FAULT = ("return float(np.sqrt(np.mean((predicted - measured) ** 2)))", "Sub → Add")

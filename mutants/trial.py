@@ -55,6 +55,7 @@ class Trial:
             self.why = f"fail without any fault ({answer}): mend them first"
             return True
         self.seconds, self.through = answer
+        gc.unfreeze()  # what the tests' conftest froze is not among the objects otherwise
         alive = (f for f in gc.get_objects() if isinstance(f, FunctionType))
         self.functions = [f for f in alive if f.__code__.co_filename in files]
         gc.freeze()  # forks then share the pages of what is there

@@ -180,6 +180,18 @@ class Calibration:
         """Of the coverage that was found."""
         return min(REPORTED_LEVEL, self.reachable)
 
+    @property
+    def found(self) -> str:
+        """Coverage as a sentence without its full stop."""
+        force, peak, energy = (f"{100 * share:.0f} %" for share in self.coverage)
+        few = ""
+        if self.units < _ENOUGH_UNITS:
+            few = f"; {self.units} independent {self.unit}s reach {100 * self.reachable:.0f} % at most"
+        return (
+            f"{100 * self.level:.3g} % prediction intervals held {force} of the samples, {peak} of the peak forces and "
+            f"{energy} of the energies of {self.units} cross-validated {self.unit}s{few}"
+        )
+
     def factor(self, quantity: Quantity, level: float) -> float:
         """Factor on a normal interval; beyond the reachable level that of the highest one."""
         values = getattr(self, quantity)

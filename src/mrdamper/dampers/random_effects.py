@@ -47,10 +47,26 @@ class Effects:
 
 @dataclass(frozen=True, eq=False)
 class _Component:
-    """One of the four variances: its design (2R, K), and the statistic (J, 2R) that reads it."""
+    """Variance of gains (0) or offsets (1) shared by groups of runs.
 
-    design: Floats
-    statistic: Floats
+    Attributes
+    ----------
+    which : int
+    members : (K, R) array or None
+        One where a run belongs to a group; None where every run is a group of its own.
+    """
+
+    which: int
+    members: Floats | None
+
+    def sums(self, table: Floats) -> Floats:
+        """Sums of the rows (R, ·) of each group."""
+        return table if self.members is None else self.members @ table
+
+    @property
+    def sizes(self) -> Floats | float:
+        """Runs of each group, as a column."""
+        return 1.0 if self.members is None else np.maximum(self.members.sum(axis=1, keepdims=True), 1.0)
 
 
 class GainsAndOffsets:
@@ -123,33 +139,42 @@ class GainsAndOffsets:
 
     def _pair(self, groups: Sequence[Sequence[int]]) -> list[_Component]:
         """Gain and offset shared by groups of runs; empty unless the residuals still show the gain."""
-        made = []
-        for which in (0, 1):
-            design = np.zeros((2 * len(self.runs), len(groups)))
+        table = None
+        if len(groups) < len(self.runs):
+            table = np.zeros((len(groups), len(self.runs)))
             for k, members in enumerate(groups):
-                design[2 * np.array(members) + which, k] = 1.0
-            statistic = (design / np.sqrt(np.maximum(design.sum(axis=0), 1.0))).T
-            made.append(_Component(design, statistic))
+                table[k, members] = 1.0
+        made = [_Component(which, table) for which in (0, 1)]
         return made if groups and self._retained(made[0]) >= _MIN_RETAINED else []
 
-    def _moment(self, statistic: Floats, design: Floats) -> float:
-        return float(np.sum((statistic @ self._shown @ design) ** 2))
+    def _read_by(self, statistic: _Component, component: _Component) -> Floats:
+        """(J, K) effects of the groups of a component on a statistic: sums of groups over the root of their size."""
+        block = self._shown[statistic.which :: 2, component.which :: 2]
+        return statistic.sums(component.sums(block.T).T) / np.sqrt(statistic.sizes)
+
+    def _moment(self, statistic: _Component, component: _Component) -> float:
+        return float(np.sum(self._read_by(statistic, component) ** 2))
 
     def _retained(self, component: _Component) -> float:
         """Share of a component's variance that the fit has left."""
-        whole = float(np.sum((component.statistic @ component.design) ** 2))
-        return self._moment(component.statistic, component.design) / whole
+        count = len(self.runs) if component.members is None else float(component.members.sum())
+        return self._moment(component, component) / count
+
+    def _excess(self, component: _Component) -> float:
+        """The statistic of a component, less what noise alone gives it."""
+        read, noise = (values[component.which :: 2, None] for values in (self._read, self._noise))
+        return float(np.sum((component.sums(read) ** 2 - component.sums(noise)) / component.sizes))
 
     def _dof(self, component: _Component, count: int) -> float:
         """Degrees of freedom of a variance read by its statistic, at most one less than the groups it is of."""
-        shown = component.statistic @ self._shown @ component.design
+        shown = self._read_by(component, component)
         gram = shown.T @ shown
         trace, square = float(np.trace(gram)), float(np.sum(gram**2))
         return min(trace**2 / square, count - 1.0) if square > 0 else 0.0
 
     def _equations(self, components: Sequence[_Component]) -> Floats:
         """Expectation of each statistic by each variance, every row over its own diagonal."""
-        table = np.array([[self._moment(a.statistic, b.design) for b in components] for a in components])
+        table = np.array([[self._moment(a, b) for b in components] for a in components])
         return table / np.maximum(np.diag(table), np.finfo(float).tiny)[:, None]
 
     def _condition(self, components: Sequence[_Component]) -> float:
@@ -161,8 +186,8 @@ class GainsAndOffsets:
         used = [c for c in (*between, *within) if self._retained(c) >= _MIN_RETAINED]
         if not used:
             return Effects()
-        own = np.array([self._moment(c.statistic, c.design) for c in used])
-        read = np.array([np.sum((c.statistic @ self._read) ** 2) - np.sum(c.statistic**2 @ self._noise) for c in used])
+        own = np.array([self._moment(c, c) for c in used])
+        read = np.array([self._excess(c) for c in used])
         variances = dict(zip(map(id, used), nnls(self._equations(used), read / own)[0].tolist(), strict=True))
         gain, offset = (float(np.sqrt(variances.get(id(c), 0.0))) for c in between) if between else (0.0, 0.0)
         run_gain, run_offset = (float(np.sqrt(variances.get(id(c), 0.0))) for c in within) if within else (0.0, 0.0)

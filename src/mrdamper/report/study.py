@@ -52,7 +52,7 @@ def write_study(
     also: Sequence[str] = (),
     drawn: Sequence[Mapping[str, Picture]] = (),
 ) -> list[Path]:
-    """Write report.html, model files, identifications.csv, parameters.csv, validation.csv, forces.csv and figures/.
+    """Write report.html, model files, tables (identifications, parameters, validation, coverage, forces) and figures/.
 
     Parameters
     ----------
@@ -113,6 +113,8 @@ def write_study(
         )
         (work / "parameters.csv").write_text(_parameters_table(study), encoding="utf-8")
         (work / "validation.csv").write_text(_validation_table(study), encoding="utf-8")
+        covered = [{"rig": rig.rig, **rig.interval_coverage} for rig in study.rigs if rig.interval_coverage]
+        (work / "coverage.csv").write_text(csv_text(covered), encoding="utf-8")
 
     took = {rig.rig: {c.recipe.name: c.seconds for c in rig.candidates} for rig in study.rigs}
     written = publish(folder, "report.html", fill, {"seconds": {"in all": study.seconds, **took}})
@@ -314,7 +316,7 @@ def _drift(rig: RigStudy) -> str:
         f"From run to run the measured force differs from the prediction by gains of {100 * drift.gain:.1f} % and "
         f"offsets of {drift.offset:.0f} N (standard deviations): the session's, or the model's own misfit at that "
         f"condition; these tests alone do not tell which. A gain and an offset of each run's own would leave "
-        f"{100 * drift.floor:.1f} %. {_left_out(rig)}"
+        f"{100 * drift.floor:.1f} %. {_left_out(rig)}" + (f" {rig.calibration.found}." if rig.calibration else "")
     )
 
 

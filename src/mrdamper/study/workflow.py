@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.dampers.base import Damper
+from mrdamper.dampers.calibration import QUANTITIES, Calibration
 from mrdamper.dampers.covariance import certain
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
@@ -113,6 +114,19 @@ class RigStudy(Shown):
     def damper(self) -> Damper:
         """The chosen damper."""
         return self.chosen.damper
+
+    @property
+    def calibration(self) -> Calibration | None:
+        """Of the chosen damper's prediction intervals."""
+        return self.damper.certainty.calibration if self.damper.certainty else None
+
+    @property
+    def interval_coverage(self) -> dict[str, float] | None:
+        """Shares of cross-validated samples, peaks and energies inside their intervals, and the level of these."""
+        found = self.calibration
+        if found is None:
+            return None
+        return {"level": found.level, "units": found.units, **dict(zip(QUANTITIES, found.coverage, strict=True))}
 
 
 @dataclass(frozen=True, eq=False, repr=False)

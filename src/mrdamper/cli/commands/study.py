@@ -79,6 +79,8 @@ def register(app: typer.Typer) -> None:
             for candidate in rig.candidates:
                 left_out, held_out = (spread(scores) for scores in (candidate.cross_validated, candidate.validation))
                 print(f"  {candidate.title:38}{left_out:>19}{held_out:>19}{percent(candidate.per_run):>12}")
+            if rig.calibration is not None:
+                print(f"  {rig.calibration.found}")
             numbers = (f"{row['name']} {row['written']}" for row in table(rig.damper))
             print(f"  numbers, 95 %: {'; '.join(numbers)}")
             for doubt in unsure(rig.damper):
@@ -102,6 +104,7 @@ def _summary(result, written: list[str]) -> dict:
                     }
                     for c in rig.candidates
                 },
+                "interval_coverage": rig.interval_coverage,
                 "left_out_session_known": rig.session_known if isinstance(rig.session_known, float) else None,
             }
             for rig in result.rigs

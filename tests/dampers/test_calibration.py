@@ -1,0 +1,139 @@
+"""Calibrated intervals: closed forms, equivariance, exchange of labels, coverage of a known truth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from mrdamper.dampers.calibration import LEVELS, Calibration, PredictedRun, Scored, model_error
+from mrdamper.data import Run
+
+TIME = np.linspace(0.0, 1.0, 201)
+SWING = 100 * np.sin(2 * np.pi * TIME)
+
+
+def run(name, error=0.0, session=None, peak=1.0, energy=1.0):
+    return PredictedRun(name, session, SWING, SWING + error, peak, energy)
+
+
+def scored(force, peak=1.0, energy=1.0):
+    return Scored(np.atleast_1d(force), np.atleast_1d(peak), np.atleast_1d(energy))
+
+
+def calibrated(scores, sessions=None):
+    names = sessions or [None] * len(scores)
+    return Calibration.of([run(f"r{i}", session=s) for i, s in enumerate(names)], scores)
+
+
+def alike(a, b):
+    return all(getattr(a, n) == pytest.approx(getattr(b, n)) for n in ("force", "peak", "energy", "coverage"))
+
+
+def test_a_run_is_compared_inside_its_window_with_what_it_takes_out_of_the_motion():
+    velocity = np.cos(2 * np.pi * TIME)
+    force = 50 * velocity
+    record = Run("r", TIME, np.sin(2 * np.pi * TIME), 1.2 * force + 3, 0.0, window=(0.0, 0.75), notes={"session": "a"})
+    found = PredictedRun.of(record, force, velocity)
+    assert (found.run_id, found.session) == ("r", "a")
+    assert found.peak == pytest.approx(1.2)
+    inside = TIME <= 0.75
+    power = [np.trapezoid(f[inside] * velocity[inside], TIME[inside]) for f in (1.2 * force + 3, force)]
+    assert found.energy == pytest.approx(power[0] / power[1])
+    assert found.measured == pytest.approx(1.2 * found.predicted + 3)
+    assert found.gain_and_offset == pytest.approx((1.2, 3.0))
+    assert found.half == pytest.approx(50.0)
+    both = PredictedRun.joined("whole", [found, replace(found, peak=1.4, energy=0.9)])
+    assert (both.run_id, both.session, both.peak) == ("whole", "a", pytest.approx(1.3))
+    assert both.energy == pytest.approx((found.energy + 0.9) / 2)
+    assert abs(both.predicted.size - found.predicted.size) <= 1
+
+
+def test_the_model_error_is_what_gain_and_offset_leave():
+    beyond = 4 * np.cos(2 * np.pi * TIME)
+    gains, offsets = (0.9, 1.1, 1.1), (-6.0, 6.0, 6.0)
+    runs = [
+        replace(run(str(i)), measured=g * SWING + o + beyond, peak=1.05 * g, energy=0.9 * g)
+        for i, (g, o) in enumerate(zip(gains, offsets, strict=True))
+    ]
+    found = model_error(runs)
+    # A cosine sampled with both its ends is not quite at right angles to a constant.
+    assert found.force == pytest.approx(4 / np.sqrt(2) / 100, rel=0.01)
+    assert (found.peak, found.energy) == pytest.approx((0.05, 0.1), rel=0.01)
+    assert (found.gain, found.offset) == pytest.approx((1.4826 * 0.1, 1.4826 * 6), rel=0.01)
+
+
+def test_peaks_are_calibrated_as_split_conformal_prediction():
+    """The k-th smallest of n scores, k = ceil((n + 1) level)."""
+    for count in (9, 14, 39):
+        scores = np.random.default_rng(count).permutation(np.arange(1.0, count + 1))
+        found = calibrated([scored(1.0, peak=p, energy=2 * p) for p in scores])
+        for level, peak, energy in zip(LEVELS, found.peak, found.energy, strict=False):
+            k = int(np.ceil((count + 1) * level - 1e-9))
+            assert peak == pytest.approx(k / norm.ppf((1 + level) / 2))
+            assert energy == pytest.approx(2 * peak)
+        assert len(found.peak) == sum(level <= count / (count + 1) + 1e-12 for level in LEVELS)
+
+
+def test_few_units_reach_a_lower_level_and_say_so():
+    found = calibrated([scored(1.0, peak=p) for p in (1.0, 2.0, 3.0, 4.0)])
+    assert found.reachable == found.level == pytest.approx(0.8)
+    assert "4 independent runs reach 80 % at most" in found.found
+    assert found.factor("peak", 0.99) == found.factor("peak", 0.8) == pytest.approx(4 / norm.ppf(0.9))
+    assert replace(found, peak=()).factor("peak", 0.9) == 1.0
+    many = calibrated([scored(1.0, peak=p) for p in np.arange(1.0, 40)])
+    assert many.level == 0.9
+    assert "at most" not in many.found
+
+
+@pytest.mark.parametrize("size", [1.0, 0.4, 3.0])
+def test_samples_of_a_true_error_model_need_its_own_factor(size):
+    rng = np.random.default_rng(1)
+    found = calibrated([scored(size * np.abs(rng.standard_normal(400)), peak=0.0) for _ in range(60)])
+    assert found.force == pytest.approx([size] * len(found.force), rel=0.05)
+    assert found.coverage[0] == pytest.approx(0.9, abs=0.01)
+    assert found.peak == (0.0,) * len(found.peak)
+
+
+def test_what_a_unit_is_called_and_how_long_a_run_is_changes_nothing():
+    rng = np.random.default_rng(2)
+    scores = [scored(np.abs(rng.standard_normal(50)), *np.abs(rng.standard_normal(2))) for _ in range(20)]
+    plain = calibrated(scores)
+    assert alike(calibrated(scores[::-1]), plain)
+    longer = [replace(s, force=np.tile(s.force, 7)) if i % 2 else s for i, s in enumerate(scores)]
+    assert alike(calibrated(longer), plain)
+    # Every run twice in a session: units of two alike are units of one.
+    names = [f"day {i}" for i in range(20)] * 2
+    doubled = calibrated([*scores, *scores], names)
+    assert (doubled.unit, doubled.units) == ("session", 20)
+    assert alike(doubled, plain)
+    assert calibrated([*scores, *scores], [n if i % 9 else None for i, n in enumerate(names)]).unit == "run"
+    assert calibrated(scores[:16], [f"day {i // 2}" for i in range(16)]).unit == "run"  # eight sessions are too few
+    assert calibrated(scores[:18], [f"day {i // 2}" for i in range(18)]).unit == "session"
+
+
+def test_peaks_of_runs_to_come_are_covered_whatever_their_distribution():
+    rng = np.random.default_rng(3)
+    inside = []
+    for _ in range(120):
+        values = np.abs(rng.standard_t(2, 15))
+        found = calibrated([scored(1.0, peak=p) for p in values[:14]])
+        inside.append(values[14] <= found.factor("peak", 0.9) * norm.ppf(0.95))
+        assert found.coverage[1] >= 12 / 14
+    # 14 of 15 at 90 %; three standard errors of 120 are 7 points.
+    assert np.mean(inside) >= 14 / 15 - 0.07
+
+
+def test_coverage_is_found_without_the_unit_that_is_covered():
+    found = calibrated([scored(1.0, peak=1.0)] * 20 + [scored(5.0, peak=5.0, energy=0.5)])
+    assert found.coverage == pytest.approx((20 / 21, 20 / 21, 1.0))
+
+
+def test_errors_are_over_their_standard_deviations():
+    at = replace(run("r", error=np.where(TIME < 0.5, 6.0, -3.0), peak=0.9, energy=1.3), session="a")
+    found = Scored.of(at, np.full(TIME.size, 2.0), 0.05, 0.1)
+    assert found.force == pytest.approx(np.where(TIME < 0.5, 3.0, 1.5))
+    assert (found.peak, found.energy) == (pytest.approx([2.0]), pytest.approx([3.0]))
+    exact = Scored.of(run("r"), np.zeros(TIME.size), 0.0, 0.0)
+    assert not np.any([*exact.force, *exact.peak, *exact.energy])
+    assert np.isinf(Scored.of(replace(run("r"), energy=np.inf), np.ones(TIME.size), 1.0, 1.0).energy).all()

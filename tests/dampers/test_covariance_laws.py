@@ -1,0 +1,173 @@
+"""The covariance of a damper: closed forms of one parameter, scales, order, what bounds hold and what nothing shows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mrdamper.dampers.bands import band
+from mrdamper.dampers.base import UNTESTED
+from mrdamper.dampers.calibration import PredictedRun, model_error
+from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.joint import JointDamper
+from mrdamper.dampers.run_residuals import RunResiduals, normal_matrix
+from mrdamper.data import Condition, Run
+from mrdamper.models.bingham import Bingham
+from mrdamper.motion import sine
+
+
+def bingham(c, fy, f0):
+    return JointDamper("bench", Bingham(c=float(c), fy=float(fy), f0=float(f0)), ("c", "fy", "f0"), UNTESTED)
+
+
+TRUTH = bingham(2000.0, 150.0, 20.0)
+CONDITIONS = [Condition(0.5, f, a) for f in (0.5, 1.0, 2.0) for a in (0.005, 0.01, 0.02)]
+ROWS, CYCLES = 400, 4
+
+
+def runs_of(gain=0.03, session=0.0, noise=0.02, seed=0, sessions=0, conditions=CONDITIONS, size=1.0):
+    rng = np.random.default_rng(seed)
+    shared = session * rng.standard_normal(max(sessions, 1))
+    made = []
+    for i, condition in enumerate(conditions):
+        motion = sine(condition, 6, 200)
+        clean = TRUTH.force_along(motion, condition) * size
+        force = clean * (1 + gain * rng.standard_normal() + shared[i % max(sessions, 1)])
+        force = force + noise * np.ptp(clean) * rng.standard_normal(force.size)
+        notes = {"session": f"day {i % sessions}"} if sessions else {}
+        made.append(Run(f"r{i}", motion.time, motion.displacement, force, 0.5, notes=notes))
+    return made
+
+
+def fitted(runs, size=1.0):
+    """Least squares with the weights of the error estimate, which for Bingham is linear."""
+    damper = bingham(2000.0 * size, 150.0 * size, 20.0 * size)
+    for _ in range(6):
+        parts = [RunResiduals.of(damper, run) for run in runs]
+        columns = [np.column_stack([m.velocity, np.sign(m.velocity), np.ones(len(m))])[p.picked] for p in parts
+                   for m in [p.prediction.motion]]  # fmt: skip
+        normal = normal_matrix(columns, parts)
+        right = sum(c.T @ p.measured * p.weight**2 for c, p in zip(columns, parts, strict=True))
+        c, fy, f0 = np.linalg.solve(normal, right)
+        damper = bingham(c, fy, f0)
+    return damper
+
+
+def test_what_enters_of_a_run_is_its_last_cycles_thinned():
+    (run,) = runs_of(conditions=CONDITIONS[:1])
+    part = RunResiduals.of(TRUTH, run)
+    motion = part.prediction.motion
+    assert motion.time[part.picked[-1]] == pytest.approx(run.time[-1], abs=4 * (run.time[1] - run.time[0]))
+    assert motion.time[part.picked[0]] == pytest.approx(run.time[-1] - CYCLES / 0.5, abs=0.03)
+    assert ROWS <= part.picked.size < 2 * ROWS
+    assert part.scale == pytest.approx(np.ptp(run.force[run.time >= run.time[-1] - CYCLES / 0.5]), rel=0.02)
+    at = np.searchsorted(run.time, motion.time[part.picked])
+    assert part.measured == pytest.approx(run.force[at])
+    assert part.residual == pytest.approx(part.predicted - run.force[at])
+    error = np.sqrt(np.mean(part.residual**2)) / part.scale
+    assert part.weight == pytest.approx(1 / (part.scale * np.sqrt(part.picked.size) * np.sqrt(error)))
+    assert part.frequency == pytest.approx(0.5, rel=1e-3)
+    assert part.session is None
+    begin = motion.time[0]
+    assert begin == pytest.approx(motion.time[part.picked[0]] - 1.5 / 0.5, abs=0.03)
+    window = replace(run, window=(0.0, 6.0), notes={"session": "a"})
+    inside = RunResiduals.of(TRUTH, window)
+    assert inside.prediction.motion.time[inside.picked].max() <= 6.0
+    assert inside.session == "a"
+
+
+@pytest.mark.parametrize("sessions", [0, 3])
+def test_intervals_scale_with_the_force_and_forget_the_order_of_runs(sessions):
+    runs = runs_of(sessions=sessions, session=0.03)
+    damper = fitted(runs)
+    plain = certain(damper, runs).certainty
+    turned = certain(damper, runs[::-1]).certainty
+    if not sessions:  # draws of sessions belong to places in the list
+        assert np.sqrt(np.diag(turned.covariance)) == pytest.approx(np.sqrt(np.diag(plain.covariance)), rel=0.12)
+    assert turned.run_gain == pytest.approx(plain.run_gain)
+    double = [replace(run, force=2 * run.force) for run in runs]
+    twice = certain(fitted(double, 2.0), double).certainty
+    assert twice.covariance == pytest.approx(4 * plain.covariance, rel=1e-6)
+    assert (twice.run_gain, twice.run_offset) == pytest.approx((plain.run_gain, 2 * plain.run_offset), rel=1e-6)
+    assert (twice.force, twice.peak, twice.energy) == pytest.approx((plain.force, plain.peak, plain.energy), rel=1e-6)
+    assert twice.dof == pytest.approx(plain.dof, rel=1e-6)
+    assert sum(plain.taught.values()) == pytest.approx(1.0)
+    assert set(plain.effective) == set(plain.names) == {"c", "fy", "f0"}
+    assert all(1 <= n <= sum(RunResiduals.of(damper, r).picked.size for r in runs) for n in plain.effective.values())
+
+
+def test_intervals_hold_the_truth_of_gains_and_noise():
+    inside, widths = [], []
+    for seed in range(25):
+        runs = runs_of(seed=seed)
+        damper = fitted(runs)
+        made = certain(damper, runs)
+        for name in ("c", "fy"):
+            low, high = made.certainty.interval(made, name)
+            inside.append(low <= getattr(TRUTH.one_model, name) <= high)
+            widths.append((high - low) / getattr(TRUTH.one_model, name))
+    # 95 % of 50, pairs of them correlated: three standard errors are 12 points.
+    assert np.mean(inside) >= 0.83
+    assert np.median(widths) < 0.2
+
+
+def test_without_gains_the_intervals_are_those_of_the_noise():
+    runs = runs_of(gain=0.0, noise=0.01)
+    damper = fitted(runs)
+    known = certain(damper, runs).certainty
+    parts = [RunResiduals.of(damper, run) for run in runs]
+    columns = [np.column_stack([p.prediction.motion.velocity, np.sign(p.prediction.motion.velocity)])[p.picked]
+               for p in parts]  # fmt: skip
+    columns = [np.column_stack([c, np.ones(len(c))]) for c in columns]
+    inverse = np.linalg.inv(normal_matrix(columns, parts))
+    square = sum(
+        (c * p.weight**2).T @ (c * p.weight**2) * np.var(p.residual) for c, p in zip(columns, parts, strict=True)
+    )
+    assert np.sqrt(np.diag(known.covariance)) == pytest.approx(np.sqrt(np.diag(inverse @ square @ inverse)), rel=0.6)
+    few = certain(damper, runs[:3]).certainty
+    assert np.all(np.diag(few.covariance) > np.diag(known.covariance))
+
+
+def test_the_model_error_of_cross_validation_takes_the_place_of_the_residuals():
+    runs = runs_of(noise=0.002)
+    damper = fitted(runs)
+    rng = np.random.default_rng(4)
+    seen = []
+    for run in runs:
+        motion = damper.predict_run(run).motion
+        beyond = 0.1 * np.ptp(run.force) * np.sin(3 * np.pi * 2 * run.time / (run.time[-1] / 6))
+        seen.append(PredictedRun.of(run, (run.force + beyond) * (1 + 0.06 * rng.standard_normal()), motion.velocity))
+    inside, known = certain(damper, runs).certainty, certain(damper, runs, seen).certainty
+    error = model_error(seen)
+    assert (known.force, known.peak, known.energy) == (error.force, error.peak, error.energy)
+    assert known.run_gain == pytest.approx(np.sqrt(error.gain**2 - known.gain**2))
+    assert known.run_offset == pytest.approx(np.sqrt(max(error.offset**2 - known.offset**2, 0.0)))
+    assert (known.left_out, known.run_dof) == (9, 8.0)
+    assert known.force > 3 * inside.force
+    assert known.covariance == pytest.approx(inside.covariance)
+    assert (inside.left_out, inside.calibration) == (0, None)
+    # The intervals of these very runs hold the share that the level states, whatever the size of the error.
+    made = replace(damper, certainty=known)
+    shares = []
+    for run, prediction in zip(runs, seen, strict=True):
+        around = band(made, damper.predict_run(run), 0.8)
+        half = np.interp(np.arange(prediction.predicted.size), [0, prediction.predicted.size], [0, run.time.size])
+        width = (around.high - around.low)[half.astype(int)] / 2
+        shares.append(np.mean(np.abs(prediction.measured - prediction.predicted) <= width))
+    assert np.mean(shares) == pytest.approx(0.8, abs=0.1)
+    # Twice the error is a model error of twice the size, and the factor of the calibration stays.
+    wide = [replace(p, measured=p.predicted + 2 * (p.measured - p.predicted)) for p in seen]
+    double = certain(damper, runs, wide).certainty
+    assert double.force == pytest.approx(2 * known.force, rel=0.05)
+    assert double.calibration.force == pytest.approx(known.calibration.force, rel=0.1)
+
+
+def test_a_parameter_at_its_bound_is_held_and_one_the_runs_do_not_show_is_named():
+    runs = [replace(run, force=run.force - 20) for run in runs_of()]
+    held = bingham(2000.0, 0.0, 0.0)
+    known = certain(held, runs).certainty
+    assert known.one_sided == ("fy",)
+    assert "fy" not in known.names
+    assert certain(held, runs, held=["c"]).certainty.one_sided == ("c", "fy")
+    assert "fy" in certain(held, runs, bounded=False).certainty.names
+    assert certain(held, []) is held

@@ -1,0 +1,129 @@
+"""Variances of gains and offsets: closed forms of balanced tests, a known truth, exchange of labels, bounds."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mrdamper.dampers.random_effects import Effects, GainsAndOffsets
+
+PHASE = np.linspace(0.0, 2 * np.pi, 120, endpoint=False)
+FORCE = 100 * np.sin(PHASE)
+
+
+def runs_of(gains, offsets, sessions, noise=0.0, seed=0):
+    rng = np.random.default_rng(seed)
+    return [
+        SimpleNamespace(
+            session=s, predicted=FORCE, picked=np.arange(PHASE.size), scale=200.0,
+            residual=-(g * FORCE + o) + noise * rng.standard_normal(PHASE.size),
+        )
+        for g, o, s in zip(gains, offsets, sessions, strict=True)
+    ]  # fmt: skip
+
+
+def effects_of(runs, slope=None, influence=None):
+    """Of runs whose fit has absorbed nothing, unless told otherwise."""
+    slopes = [np.zeros((PHASE.size, 1)) if slope is None else slope] * len(runs)
+    shares = [np.zeros((1, PHASE.size)) if influence is None else influence] * len(runs)
+    return GainsAndOffsets(runs, slopes, shares)
+
+
+def drawn(count, each, seed=0):
+    rng = np.random.default_rng(seed)
+    names = np.repeat([f"day {i}" for i in range(count)], each)
+    shared = np.repeat(rng.standard_normal((count, 2)), each, axis=0) * [0.05, 4.0]
+    own = rng.standard_normal((count * each, 2)) * [0.02, 2.0]
+    return (shared + own).T, names.tolist()
+
+
+def test_balanced_sessions_give_the_analysis_of_variance():
+    (gains, offsets), names = drawn(8, 5)
+    found = effects_of(runs_of(gains, offsets, names)).effects()
+    for values, session, run in ((gains, found.gain, found.run_gain), (offsets, found.offset, found.run_offset)):
+        table = values.reshape(8, 5)
+        within = np.sum((table - table.mean(axis=1, keepdims=True)) ** 2) / (40 - 8)
+        between = np.mean(table.mean(axis=1) ** 2) - within / 5
+        assert run == pytest.approx(np.sqrt(within))
+        assert session == pytest.approx(np.sqrt(between))
+    assert (found.session_dof, found.run_dof) == (pytest.approx(7.0), pytest.approx(39.0))
+
+
+def test_a_truth_is_found_from_many_sessions():
+    (gains, offsets), names = drawn(120, 3, seed=1)
+    found = effects_of(runs_of(gains, offsets, names, noise=20.0)).effects()
+    assert (found.gain, found.run_gain) == pytest.approx((0.05, 0.02), rel=0.2)
+    assert (found.offset, found.run_offset) == pytest.approx((4.0, 2.0), rel=0.2)
+
+
+def test_noise_alone_is_no_scatter_of_gains():
+    names = [f"day {i // 4}" for i in range(40)]
+    squares = []
+    for seed in range(30):
+        found = effects_of(runs_of(np.zeros(40), np.zeros(40), names, noise=50.0, seed=seed)).effects()
+        squares.append([found.gain**2 + found.run_gain**2, found.offset**2 + found.run_offset**2])
+    # Of white noise of 50 N in 120 samples: (50/√120)² over the square of the force, or alone; most is taken off.
+    seen = np.array([(50 / np.sqrt(120) / (100 / np.sqrt(2))) ** 2, 50**2 / 120])
+    assert np.all(np.mean(squares, axis=0) < 0.25 * seen)
+
+
+def test_labels_and_order_change_nothing():
+    (gains, offsets), names = drawn(6, 3, seed=2)
+    plain = effects_of(runs_of(gains, offsets, names)).effects()
+    order = np.random.default_rng(0).permutation(18)
+    renamed = {f"day {i}": f"{(7 * i) % 11}" for i in range(6)}
+    mixed = effects_of(runs_of(gains[order], offsets[order], [renamed[names[i]] for i in order])).effects()
+    assert vars(mixed) == pytest.approx(vars(plain))
+    doubled = effects_of(runs_of(2 * gains, 2 * offsets, names)).effects()
+    assert (doubled.gain, doubled.run_offset) == pytest.approx((2 * plain.gain, 2 * plain.run_offset))
+
+
+@pytest.mark.parametrize("names", [["a"] * 12, ["a", "b"] * 6, [None] * 12, ["a", "b", None] * 4])
+def test_fewer_than_three_known_sessions_are_no_sessions(names):
+    (gains, offsets), _ = drawn(12, 1, seed=3)
+    found = effects_of(runs_of(gains, offsets, names)).effects()
+    assert (found.gain, found.offset, found.session_dof) == (0.0, 0.0, 0.0)
+    assert (found.run_gain, found.run_offset) == pytest.approx(
+        (np.sqrt(np.mean(gains**2)), np.sqrt(np.mean(offsets**2)))
+    )
+
+
+def test_sessions_of_one_run_each_hold_all_the_scatter():
+    (gains, offsets), names = drawn(12, 1, seed=4)
+    found = effects_of(runs_of(gains, offsets, names)).effects()
+    assert (found.run_gain, found.run_offset, found.run_dof) == (0.0, 0.0, 0.0)
+    assert (found.gain, found.offset) == pytest.approx((np.sqrt(np.mean(gains**2)), np.sqrt(np.mean(offsets**2))))
+
+
+def test_what_the_fit_has_absorbed_is_not_divided_by():
+    """A fit of the gain of one run leaves no scatter of gains; a common one leaves a share, which is scaled up."""
+    (gains, _), names = drawn(6, 3, seed=5)
+    runs, slope = runs_of(gains, np.zeros(18), names), FORCE[:, None]
+    own = slope.T / (slope.T @ slope)
+    lost = [SimpleNamespace(**{**vars(run), "residual": 1e-13 * run.residual}) for run in runs[:1]]
+    assert effects_of(lost, slope, own).effects() == Effects()
+    mean = float(np.mean(gains))
+    left = [SimpleNamespace(**{**vars(r), "residual": r.residual + mean * FORCE}) for r in runs]
+    found = effects_of(left, slope, own / 18).effects()
+    table = (gains - mean).reshape(6, 3)
+    within = np.sum((table - table.mean(axis=1, keepdims=True)) ** 2) / 12
+    between = np.sum(table.mean(axis=1) ** 2) / 5 - within / 3
+    assert found.run_gain == pytest.approx(np.sqrt(within), rel=1e-6)
+    assert found.gain == pytest.approx(np.sqrt(between), rel=1e-6)
+    assert found.session_dof == pytest.approx(5.0)
+
+
+def test_one_parameter_scatters_as_the_mean_of_gains():
+    """A common gain of R runs in S sessions: session² / S + run² / R, whatever draws say of it."""
+    names = [f"day {i // 4}" for i in range(20)]
+    slope = FORCE[:, None]
+    runs = runs_of(np.zeros(20), np.zeros(20), names, noise=60.0)  # beside which gains change no weight
+    scatter = effects_of(runs, slope, slope.T / (slope.T @ slope) / 20)
+    effects = Effects(gain=0.05, session_dof=4.0, run_gain=0.08, run_dof=19.0)
+    covariance, by_session, by_run = scatter.covariance(effects)
+    expected = 0.05**2 / 5, 0.08**2 / 20
+    assert covariance[0, 0] == pytest.approx(sum(expected), rel=0.2)  # 600 draws know a variance to 6 %
+    assert (by_session[0], by_run[0]) == pytest.approx((expected[0] / sum(expected), expected[1] / sum(expected)))
+    assert not scatter.covariance(Effects())[0].any()
+    # An offset moves a parameter of the gain nowhere.
+    assert scatter.covariance(Effects(offset=5.0, run_offset=5.0))[0][0, 0] == pytest.approx(0.0, abs=1e-20)
