@@ -6,6 +6,7 @@ import shlex
 from pathlib import Path
 
 import pytest
+from support.dampers import joint_damper
 from support.fmu_files import fmu_bytes
 from typer.testing import CliRunner
 
@@ -34,7 +35,11 @@ def _fmu():
     Path("damper.fmu").write_bytes(fmu_bytes("joint", 2))
 
 
-GIVEN = {"your-own-rig": _machine, "fmpy": _fmu}  # files that a page has from its own commands
+def _model():
+    save_model(joint_damper(), "model.json")
+
+
+GIVEN = {"your-own-rig": _machine, "fmpy": _fmu, "model-file": _model}  # files that a page has from its own commands
 
 
 def run_page(page, monkeypatch, folder, *, slow):

@@ -131,6 +131,19 @@ class _Document(_Strict):
     damper: dict[str, Any]  # its kind, and what that kind says
 
 
+def model_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a saved model, every kind of damper included."""
+    schema = _Document.model_json_schema()
+    kinds = []
+    for name, kind in all_kinds().items():
+        own = TypeAdapter(kind.saved).json_schema(ref_template="#/$defs/{model}")
+        schema.setdefault("$defs", {}).update(own.pop("$defs", {}))
+        own["properties"] = {"kind": {"const": name}, **own["properties"]}
+        kinds.append({**own, "required": ["kind", *own.get("required", ())], "additionalProperties": False})
+    schema["properties"]["damper"] = {"oneOf": kinds}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": f"{FORMAT} {MAJOR}.{MINOR}"}
+
+
 def save_model(damper: Damper, path: str | Path) -> None:
     """Write a damper as JSON, whole or not at all.
 

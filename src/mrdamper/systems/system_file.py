@@ -91,7 +91,9 @@ class _Damper(_Strict):
     model: str | None = None
 
 
-class _Document(_Strict):
+class SystemDocument(_Strict):
+    """A vehicle or building as a file states it."""
+
     title: str = ""
     source: str = ""
     building: _Building | None = None
@@ -144,13 +146,13 @@ def load_system(name: str | Path) -> SystemFile:
         if path.suffix == ".toml":
             raise StructureError("no such file", where=str(path), mend="give a system TOML file")
         raise UnknownNameError.of("system", str(name), known)
-    document = load_toml(path, _Document, StructureError, "see docs/how-to/simulate.md", 2**20)
+    document = load_toml(path, SystemDocument, StructureError, "see docs/how-to/simulate.md", 2**20)
     system = _build(document, path)
     models = {d.name: d.model for d in document.damper if d.model is not None}
     return SystemFile(system, {link: load_model(path.parent / model) for link, model in models.items()})
 
 
-def _build(document: _Document, path: Path) -> System:
+def _build(document: SystemDocument, path: Path) -> System:
     shapes = [shape for shape in ("building", "storey", "quarter_car", "half_car") if getattr(document, shape)]
     if len(shapes) != 1:
         raise StructureError(
