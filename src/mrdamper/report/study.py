@@ -35,7 +35,7 @@ from mrdamper.report.plots.style import Picture
 from mrdamper.report.tables import identification_rows, score_row
 from mrdamper.study.parallel import HERE, Processes
 from mrdamper.study.recipe import Progress, Scored
-from mrdamper.study.workflow import RigStudy, Study, study_rig
+from mrdamper.study.workflow import RigStudy, Study, require_runs, study_rig
 from mrdamper.validation import session_drift
 
 _LOOPS_SHOWN = 6
@@ -127,22 +127,26 @@ def study_and_draw(
     progress: Progress = lambda what, share: None,
     *,
     model: str | None = None,
+    keep: Sequence[str] = (),
     also: Sequence[str] = (),
     processes: Processes = HERE,
 ) -> tuple[Study, list[dict[str, Picture]]]:
     """As `run_study`, and the figures of each rig, drawn where it was studied: no rig waits for another."""
     begin = time.perf_counter()
+    require_runs(dataset, keep)
     done = processes.map(
-        partial(_studied_and_drawn, model=model, also=tuple(also)), [dataset.rig(n) for n in dataset.rigs], progress
+        partial(_studied_and_drawn, model=model, keep=tuple(keep), also=tuple(also)),
+        [dataset.rig(n) for n in dataset.rigs],
+        progress,
     )
     study = Study(dataset, tuple(rig for rig, _ in done), time.perf_counter() - begin)
     return study, [pictures for _, pictures in done]
 
 
 def _studied_and_drawn(
-    dataset: Dataset, progress: Progress, *, model: str | None, also: tuple[str, ...]
+    dataset: Dataset, progress: Progress, *, model: str | None, keep: tuple[str, ...], also: tuple[str, ...]
 ) -> tuple[RigStudy, dict[str, Picture]]:
-    rig = study_rig(dataset, lambda what, share: progress(what, 0.85 * share), model=model)
+    rig = study_rig(dataset, lambda what, share: progress(what, 0.85 * share), model=model, keep=keep)
     return rig, _draw(rig, lambda what, share: progress(what, 0.85 + 0.15 * share), also=also)
 
 
@@ -247,7 +251,10 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
             _drift(rig),
         ],
         "loops": rig.loops,
-        "not_identified": rig.not_identified,
+        "contradictions": rig.contradictions,
+        "not_identified": {
+            name: why for name, why in rig.not_identified.items() if name not in {c.run_id for c in rig.contradictions}
+        },
         "identifications": mapped.identifications if mapped else (),
         "parameter_names": _free_names(mapped.identifications[0]) if mapped else (),
         "mapped": mapped,

@@ -26,6 +26,7 @@ from mrdamper.identification import refuse_clipped
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, at_levels, dynamic_ranges
 from mrdamper.motion import analyse_motion, equivalent_sine
 from mrdamper.rig_files.quality.table import judged
+from mrdamper.study.contradictions import Contradiction, find_contradictions
 from mrdamper.study.parallel import HERE, Processes
 from mrdamper.study.recipe import (
     JOINTLY,
@@ -75,6 +76,8 @@ class RigStudy(Shown):
     session_known : float or str
         Median nrmse_pp of left-out conditions corrected by the other runs of their session, beside
         the scores, which are of sessions nobody has seen; or why there is none.
+    contradictions : tuple of Contradiction
+        Runs that were set aside because they contradict the others; `dataset` is without them.
     """
 
     rig: str
@@ -86,6 +89,7 @@ class RigStudy(Shown):
     refused: Mapping[str, str]
     asked_for: bool = False
     session_known: float | str = ""
+    contradictions: tuple[Contradiction, ...] = ()
 
     @property
     def headline(self) -> str:
@@ -181,6 +185,7 @@ def run_study(
     progress: Progress = lambda what, share: None,
     *,
     model: str | StudyMethod | None = None,
+    keep: Sequence[str] = (),
     processes: Processes = HERE,
 ) -> Study:
     """Study a dataset: identify, map, validate, rig by rig.
@@ -193,6 +198,8 @@ def run_study(
     model : str or StudyMethod, optional
         Choose the best candidate of this model instead of the best of all; or follow this published
         method with its options ("paper" with its defaults).
+    keep : sequence of str
+        Runs that are used although they contradict the others.
     processes : Processes
         Where rigs are studied; the results are the same bits.
 
@@ -202,6 +209,8 @@ def run_study(
         If no candidate is of that model.
     IdentificationError
         If a rig has too few runs to identify anything from.
+    ContradictionError
+        If more than a third of a rig's runs contradict the others.
 
     Examples
     --------
@@ -215,9 +224,22 @@ def run_study(
     True
     """
     begin = time.perf_counter()
-    rigs = processes.map(partial(study_rig, model=model), [dataset.rig(name) for name in dataset.rigs], progress)
+    require_runs(dataset, keep)
+    study = partial(study_rig, model=model, keep=tuple(keep))
+    rigs = processes.map(study, [dataset.rig(name) for name in dataset.rigs], progress)
     progress("studied", 1.0)
     return Study(dataset, tuple(rigs), time.perf_counter() - begin)
+
+
+def require_runs(dataset: Dataset, names: Iterable[str]) -> None:
+    """Refuse names of runs that a dataset does not hold.
+
+    Raises
+    ------
+    UnknownNameError
+    """
+    for name in names:
+        dataset[name]
 
 
 def study_rig(
@@ -225,6 +247,7 @@ def study_rig(
     progress: Progress = lambda what, share: None,
     *,
     model: str | StudyMethod | None = None,
+    keep: Collection[str] = (),
 ) -> RigStudy:
     """Study the runs of one rig; arguments as `run_study`."""
     methods = study_methods()
@@ -235,6 +258,9 @@ def study_rig(
     method, model = (model, model.name) if isinstance(model, StudyMethod) else (None, model)
     rig = dataset.rigs[0]
     progress(f"{rig or 'rig'}: loops", 0.0)
+    contradictions = tuple(find_contradictions(believed(dataset)[0], keep))
+    aside = {one.run_id: str(one) for one in contradictions}
+    dataset = dataset.only([run for run in dataset if run.id not in aside])
     sines, refused = usable_sines(dataset)
     loops = at_levels([analyse_loop(run) for run in sines])
     train = [run for run in sines if run.split == "train"]
@@ -242,6 +268,7 @@ def study_rig(
     everything, unusable = usable(run for run in trusted if run.split == "train")
     unusable |= distrusted
     refused = {name: unusable.get(name, f"{why}; the joint model takes it whole") for name, why in refused.items()}
+    refused = aside | refused
     if not everything:
         raise IdentificationError(
             "no train runs that can be used",
@@ -279,8 +306,9 @@ def study_rig(
     chosen = replace(chosen, damper=certain(chosen.damper, train if chosen.recipe.basis else everything, beside, held))
     candidates[0], known = _with_sessions(chosen, dataset)
     return RigStudy(
-        rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), refused, impossible, model is not None, known
-    )
+        rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), refused, impossible, model is not None, known,
+        contradictions,
+    )  # fmt: skip
 
 
 def _with_sessions(chosen: Scored, dataset: Dataset) -> tuple[Scored, float | str]:
@@ -379,9 +407,12 @@ def _of_another_size(runs: Sequence[Run]) -> dict[str, str]:
             continue
         usual = float(np.median(counted))
         for name, size in sizes.items():
+            thousandth = {"peak-to-peak force": "kN", "stroke": "m", "current": ""}[what]
+            like = f", as if in {thousandth}" if size < usual / most and thousandth else ""
+            like = ", as if in mA" if what == "current" and size > 50 * usual else like
             if size > most * usual or (what != "current" and size < usual / most):
                 found[name] = (
-                    f"run {name}: {what} of {size:.3g} {unit}, {usual:.3g} {unit} in the other runs; "
+                    f"run {name}: {what} of {size:.3g} {unit}, {usual:.3g} {unit} in the other runs{like}; "
                     "state its unit when it is imported, or take it out of the dataset [E_OTHER_SIZE]"
                 )
     return found

@@ -26,6 +26,9 @@ def register(app: typer.Typer) -> None:
         pdf: bool = typer.Option(False, "--pdf", help="Also write report.pdf and every figure as PDF."),
         png: bool = typer.Option(False, "--png", help="Also write every figure as PNG."),
         lag: bool = typer.Option(False, "--lag", help="Require tests from which the coil lag can be identified."),
+        keep: list[str] = typer.Option(
+            [], "--keep", help="Use this run although it contradicts the others; repeatable."
+        ),
         as_json: bool = typer.Option(False, "--json", help="Print the summary as JSON."),
     ) -> None:
         """Identify, validate and report a dataset in one step.
@@ -56,7 +59,12 @@ def register(app: typer.Typer) -> None:
         workers = min(os.cpu_count() or 1, len(dataset.rigs))
         with progress_on_stderr() as progress, several(workers) as processes:
             result, drawn = study_and_draw(
-                dataset, lambda what, share: progress(what, 0.97 * share), model=model, also=also, processes=processes
+                dataset,
+                lambda what, share: progress(what, 0.97 * share),
+                model=model,
+                keep=keep,
+                also=also,
+                processes=processes,
             )
             written = write_study(
                 result,
@@ -68,8 +76,9 @@ def register(app: typer.Typer) -> None:
                 drawn=drawn,
             )
         for rig in result.rigs:
+            aside = {one.run_id for one in rig.contradictions}
             for name, why in rig.not_identified.items():
-                typer.echo(f"not identified: {name}: {why}", err=True)
+                typer.echo(f"{'set aside' if name in aside else 'not identified'}: {name}: {why}", err=True)
         if as_json:
             print(json.dumps(_summary(result, [str(p) for p in written]), indent=1))
             return
@@ -105,6 +114,10 @@ def _summary(result, written: list[str]) -> dict:
                     for c in rig.candidates
                 },
                 "interval_coverage": rig.interval_coverage,
+                "set_aside": {
+                    one.run_id: {"code": one.code, "cause": one.cause, "value": one.value, "message": str(one)}
+                    for one in rig.contradictions
+                },
                 "left_out_session_known": rig.session_known if isinstance(rig.session_known, float) else None,
             }
             for rig in result.rigs

@@ -1,0 +1,187 @@
+"""What is said of a run that contradicts the others: code, explanation and remedy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mrdamper.data import Run
+from mrdamper.study.contradictions.copies import Copy
+from mrdamper.study.contradictions.explanations import Explanation
+
+CODES = {
+    "force": "E_FORCE_SCALE",
+    "offset": "E_FORCE_ZERO",
+    "current": "E_OTHER_CURRENT",
+    "displacement": "E_STROKE_SCALE",
+    "time": "E_TIME_SCALE",
+    "sign": "E_BOTH_SIGNS",
+    "damper": "E_OTHER_DAMPER",
+    "shifted": "E_SHIFTED_ROWS",
+    "copy": "E_TWICE",
+}
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """A run that contradicts the others of its rig.
+
+    Attributes
+    ----------
+    run_id : str
+    cause : str
+        "force", "offset", "current", "displacement", "time", "sign", "damper", "shifted" or "copy".
+    value : float
+        Factor that corrects force, displacement or time; force to add [N]; apparent current [A];
+        correlation of the noise of a copy.
+    evidence : float
+        Logarithm of the odds of the explanation against none.
+    explanation : str
+    remedy : str
+    """
+
+    run_id: str
+    cause: str
+    value: float
+    evidence: float
+    explanation: str
+    remedy: str
+
+    @property
+    def code(self) -> str:
+        """The stable code of the cause."""
+        return CODES[self.cause]
+
+    def __str__(self) -> str:
+        return f"{self.explanation}; {self.remedy} [{self.code}]"
+
+
+def describe(run: Run, explanation: Explanation, others: int) -> Contradiction:
+    """Say in words what explains a run.
+
+    Parameters
+    ----------
+    run : Run
+    explanation : Explanation
+    others : int
+        Number of runs it was compared with.
+    """
+    text = {
+        "force": _force, "offset": _offset, "current": _current, "displacement": _displacement, "time": _time,
+        "sign": _sign, "damper": _damper,
+    }[explanation.cause]  # fmt: skip
+    found, remedy = text(run, explanation)
+    against = f"contradicts the other {others} runs: {found} (log odds {explanation.gain:.0f})"
+    return Contradiction(run.id, explanation.cause, explanation.value, explanation.gain, against, remedy)
+
+
+def describe_copy(copy: Copy, validation: bool) -> Contradiction:
+    """Say in words that a run is a copy."""
+    found = f"a copy of run {copy.original}: their forces share the noise (correlation {copy.correlation:.2f})"
+    remedy = "a test counts once" + (", and validation needs tests of its own" if validation else "")
+    return Contradiction(copy.run_id, "copy", copy.correlation, float("inf"), found, f"{remedy}: delete the file")
+
+
+def describe_shift(run: Run, current: float, tested: float, evidence: float, first: str, down: bool) -> Contradiction:
+    """Say in words that rows of the table of tests are shifted."""
+    found = (
+        f"contradicts the others: from run {first} on, the currents are those of the rows "
+        f"{'above' if down else 'below'} (log odds {evidence:.0f}); this run looks like {_amperes(current)}, "
+        f"written down is {_amperes(tested)}"
+    )
+    return Contradiction(run.id, "shifted", current, evidence, found, f"in tests.csv, {_row(run, current)}")
+
+
+def _force(run: Run, e: Explanation) -> tuple[str, str]:
+    if e.unit.startswith("not "):
+        return (
+            f"its force is {1 / e.value:.3g} times as large, as if newtons had been read as {e.unit[4:]}",
+            _own_profile(run, '[channels.force] unit = "N"'),
+        )
+    if e.unit:
+        return (
+            f"its force is {1 / e.value:.3g} of what the others show, as if it were in {e.unit}",
+            _own_profile(run, f'[channels.force] unit = "{e.unit}"'),
+        )
+    return (
+        f"its force is {1 / e.value:.3g} times what the others show: another range of the load cell, or another damper",
+        _own_profile(run, f"[channels.force] scale = {e.value:.3g}") + f", or {_specimen(run)}",
+    )
+
+
+def _offset(run: Run, e: Explanation) -> tuple[str, str]:
+    return (
+        f"the zero of its force is off by {-e.value:.3g} N",
+        _own_profile(run, f"[channels.force] offset = {e.value:.3g}"),
+    )
+
+
+def _current(run: Run, e: Explanation) -> tuple[str, str]:
+    tested = abs(run.mean_current)
+    if e.unit == "mA":
+        return (
+            f"its current of {_amperes(tested)} looks like {1e3 * e.value:.4g} mA",
+            f'[channels.current] unit = "mA" in a profile of its own, or in tests.csv, {_row(run, e.value)}',
+        )
+    why = "an open coil, or no supply" if e.value == 0 else "a partly open coil, or another current than written down"
+    if e.value > tested:
+        why = "another current than written down"
+    return (
+        f"its force is that of {_amperes(e.value)}, not of {_amperes(tested)}: {why}",
+        f"in tests.csv, {_row(run, e.value)}, or repeat the test",
+    )
+
+
+def _displacement(run: Run, e: Explanation) -> tuple[str, str]:
+    if e.unit.startswith("not "):
+        return (
+            f"its displacement is {1 / e.value:.3g} times too large, as if millimetres had been read as {e.unit[4:]}",
+            _own_profile(run, '[channels.displacement] unit = "mm"'),
+        )
+    if e.unit:
+        unit = {"inch": "in"}.get(e.unit, e.unit)
+        return (
+            f"its displacement is {1 / e.value:.3g} of what its force shows, as if it were in {unit}, not mm",
+            _own_profile(run, f'[channels.displacement] unit = "{unit}"'),
+        )
+    return (
+        f"its displacement is about {1 / e.value:.2g} times what its force shows",
+        _own_profile(run, f"[channels.displacement] scale = {e.value:.2g}"),
+    )
+
+
+def _time(run: Run, e: Explanation) -> tuple[str, str]:
+    return (
+        f"its time runs {1 / e.value:.2g} times as long as its force shows: another sample rate",
+        _own_profile(run, f"[channels.time] scale = {e.value:.2g}"),
+    )
+
+
+def _sign(run: Run, e: Explanation) -> tuple[str, str]:
+    return (
+        "its force and displacement both count in the other direction",
+        _own_profile(run, "[channels.force] sign = -1 and [channels.displacement] sign = -1"),
+    )
+
+
+def _damper(run: Run, e: Explanation) -> tuple[str, str]:
+    return "no factor, offset or current explains its force: another damper, or another state of it", _specimen(run)
+
+
+def _own_profile(run: Run, line: str) -> str:
+    return f"import {_file(run)} on its own with {line} in the profile, then add it with import --add"
+
+
+def _specimen(run: Run) -> str:
+    return f"in tests.csv, give {_file(run)} another specimen"
+
+
+def _row(run: Run, current: float) -> str:
+    return f"set current_A of {_file(run)} to {current:.3g}"
+
+
+def _file(run: Run) -> str:
+    return run.notes.get("file", "") or run.id
+
+
+def _amperes(current: float) -> str:
+    return f"{current + 0.0:.3g} A"

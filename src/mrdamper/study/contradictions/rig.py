@@ -1,0 +1,127 @@
+"""The contradictions among the runs of one rig."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from mrdamper.data import Run
+from mrdamper.errors import InputError
+from mrdamper.optimizers.linear import on_one_blas_thread
+from mrdamper.study.contradictions.copies import find_copies
+from mrdamper.study.contradictions.findings import Contradiction, describe, describe_copy, describe_shift
+from mrdamper.study.contradictions.search import Search, best_explanation, find_shift, is_far_better, search
+from mrdamper.study.contradictions.tracks import Track, tracks_of
+
+FEWEST_RUNS = 4  # identification runs from which one can contradict the others
+_MOST_SHARE = 0.34  # share of the runs that may contradict the others; beyond, nobody knows which are right
+_INVERSE = 0.1  # logarithm of the product of two factors up to which one is the inverse of the other
+_MILLIAMPERES = 50.0  # ratio of a current to the usual one from which it is in milliamperes
+
+
+class ContradictionError(InputError):
+    """So many runs contradict each other that none can be called wrong."""
+
+    code = "E_CONTRADICTIONS"
+
+
+@on_one_blas_thread
+def find_contradictions(runs: Sequence[Run], keep: Collection[str] = ()) -> list[Contradiction]:
+    """Find the runs of one rig that contradict the others.
+
+    The comparison is of identification runs with each other. A validation run is compared with them
+    afterwards, and only what has a named cause is found; it never takes part in the comparison.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Accepted by the quality checks.
+    keep : collection of str
+        Runs that are not to be set aside.
+
+    Raises
+    ------
+    ContradictionError
+        If more than a third of the identification runs contradict the others.
+    """
+    copies = [describe_copy(copy, _split(runs, copy.run_id) == "validate") for copy in find_copies(runs)]
+    found = {one.run_id: one for one in copies if one.run_id not in keep}
+    tracks = [t for t in tracks_of([run for run in runs if run.id not in found])]
+    tracks, milliamperes = _in_amperes(tracks, keep)
+    found |= milliamperes
+    train = [track for track in tracks if track.run.split == "train"]
+    if len(train) >= FEWEST_RUNS:
+        found |= _among(train, keep)
+        trusted = [track for track in train if track.run.id not in found]
+        validation = [t for t in tracks if t.run.split != "train" and t.run.id not in keep and t.run.id not in found]
+        found |= _of_validation(validation, trusted)
+    return [found[run.id] for run in runs if run.id in found]
+
+
+def _among(train: Sequence[Track], keep: Collection[str]) -> dict[str, Contradiction]:
+    shift = find_shift(train)
+    if shift is not None:
+        shifted = [train[i] for i in shift.currents]
+        found = {
+            t.run.id: describe_shift(
+                t.run, current, abs(t.run.mean_current), shift.gain, train[shift.first].run.id, shift.down
+            )
+            for t, current in zip(shifted, shift.currents.values(), strict=True)
+        }
+    else:
+        result = search(train, int(_MOST_SHARE * len(train)))
+        found = {train[i].run.id: describe(train[i].run, e, len(train) - 1) for i, e in result.explanations.items()}
+    found = {name: one for name, one in found.items() if name not in keep}
+    if len(found) > _MOST_SHARE * len(train) or _opposed(list(found.values())):
+        raise _disagreement(train, found)
+    return found
+
+
+def _opposed(found: Sequence[Contradiction]) -> bool:
+    """Tell whether some runs need a factor and others its inverse: nobody knows which of them are right."""
+    factors = [one.value for one in found if one.cause == "force"]
+    return any(abs(np.log(a * b)) < _INVERSE for a, b in combinations(factors, 2))
+
+
+def _of_validation(validation: Sequence[Track], trusted: Sequence[Track]) -> dict[str, Contradiction]:
+    if not validation or len(trusted) < FEWEST_RUNS:
+        return {}
+    known = Search.of(trusted)
+    others = known.evidence.posterior(known.members)
+    explained = [(track.run, best_explanation(track, others)) for track in validation]
+    return {run.id: describe(run, e, len(trusted)) for run, e in explained if e.cause != "damper" and is_far_better(e)}
+
+
+def _in_amperes(tracks: Sequence[Track], keep: Collection[str]) -> tuple[list[Track], dict[str, Contradiction]]:
+    """The runs without those whose current is a thousand times the others', which are in milliamperes."""
+    sizes = [float(np.median(track.current)) for track in tracks]
+    usual = float(np.median([size for size in sizes if size > 0] or [0.0]))
+    kept, found = [], {}
+    for track, size in zip(tracks, sizes, strict=True):
+        run = track.run
+        if usual <= 0 or size < _MILLIAMPERES * usual or run.id in keep:
+            kept.append(track)
+            continue
+        text = f"its current of {size:.4g} A is {size / usual:.3g} times that of the others: it looks like milliamperes"
+        remedy = f"in tests.csv, set current_A of {run.notes.get('file', '') or run.id} to {size / 1e3:.3g}"
+        found[run.id] = Contradiction(run.id, "current", size / 1e3, float("inf"), text, remedy)
+    return kept, found
+
+
+def _split(runs: Sequence[Run], name: str) -> str:
+    return next(run.split for run in runs if run.id == name)
+
+
+def _disagreement(train: Sequence[Track], found: dict[str, Contradiction]) -> ContradictionError:
+    """The refusal, with both groups of runs."""
+    rest = [track.run.id for track in train if track.run.id not in found]
+    causes = sorted({one.code for one in found.values()})
+    first = next(iter(found.values()))
+    return ContradictionError(
+        f"{len(found)} of {len(train)} runs contradict the other {len(rest)} ({', '.join(causes)}): "
+        f"{', '.join(sorted(found))} against {', '.join(rest)}; the first, {first.run_id}, {first.explanation}",
+        where=f"rig {train[0].run.rig}" if train[0].run.rig else "the dataset",
+        mend="tests of two dampers need a column specimen in tests.csv; --keep RUN keeps a run as it is",
+    )

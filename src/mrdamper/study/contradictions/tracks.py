@@ -1,0 +1,124 @@
+"""Short versions of runs for the comparison of all runs with each other: a few hundred samples of motion and force.
+
+A sine counts with its last cycles, any other motion with its whole steady window; the samples are
+dense enough for hysteresis operators, and a part of them are the rows of the regression.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from mrdamper.data import Floats, Run
+from mrdamper.errors import InputError
+from mrdamper.motion import equivalent_sine, measured_motion
+
+_CYCLES = 3  # cycles of a sine that are compared
+_SAMPLES_PER_CYCLE = 96  # samples of the motion
+_MOST_SAMPLES = 1500  # samples of a motion that is no sine
+_ROWS = 144  # rows of the regression per run
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """The short version of a run.
+
+    Attributes
+    ----------
+    run : Run
+    displacement, velocity, acceleration : (L,) arrays
+        [m] about its mean, [m/s], [m/s²].
+    force : (L,) array
+        [N]
+    current : (L,) array
+        Magnitude [A].
+    current_changes : bool
+    rows : (R,) array of int
+        Samples that are rows of the regression.
+    half_range : float
+        Half the peak-to-peak force, without its outermost samples [N].
+    """
+
+    run: Run
+    displacement: Floats
+    velocity: Floats
+    acceleration: Floats
+    force: Floats
+    current: Floats
+    current_changes: bool
+    rows: np.ndarray
+    half_range: float
+
+    def scaled(self, motion: float = 1.0, time: float = 1.0) -> Self:
+        """The same test with displacement and time multiplied by factors; a negative one inverts the motion."""
+        return replace(
+            self,
+            displacement=self.displacement * motion,
+            velocity=self.velocity * (motion / time),
+            acceleration=self.acceleration * (motion / time**2),
+        )
+
+    def with_force(self, gain: float = 1.0, offset: float = 0.0) -> Self:
+        """The same test with another gain and offset [N] of the force."""
+        return replace(self, force=gain * self.force + offset, half_range=abs(gain) * self.half_range)
+
+    def with_current(self, current: float) -> Self:
+        """The same test at another constant current [A]."""
+        return replace(self, current=np.full(self.force.size, current), current_changes=False)
+
+
+def tracks_of(runs: Sequence[Run]) -> list[Track]:
+    """Make the short versions of the runs that move; others are left out."""
+    found = []
+    for run in runs:
+        try:
+            found.append(_track(run))
+        except InputError:
+            continue
+    return found
+
+
+def _track(run: Run) -> Track:
+    sine = equivalent_sine(run)
+    motion = measured_motion(run)
+    inside = np.flatnonzero(run.in_window)
+    if inside.size < 3:
+        inside = np.arange(run.time.size)
+    start, stop = int(inside[0]), int(inside[-1]) + 1
+    duration = float(run.time[stop - 1] - run.time[start])
+    wanted = _MOST_SAMPLES
+    if sine.is_sine:
+        cycles = min(_CYCLES, duration * sine.condition.frequency_Hz)
+        wanted = int(_SAMPLES_PER_CYCLE * max(cycles, 0.5))
+        start = int(np.searchsorted(run.time, run.time[stop - 1] - cycles / sine.condition.frequency_Hz))
+    index = np.unique(np.linspace(start, stop - 1, min(wanted, stop - start)).astype(int))
+    x = motion.displacement[index]
+    rows = np.unique(np.linspace(0, index.size - 1, min(_ROWS, index.size)).astype(int))
+    if sine.is_sine:
+        rows = rows[rows >= index.size // 3]  # the first cycle settles the hysteresis operators
+    force = _averaged(run.force, index)
+    low, high = np.percentile(force, (1, 99))
+    return Track(
+        run,
+        x - float(np.mean(x)),
+        motion.velocity[index],
+        motion.acceleration[index],
+        force,
+        np.abs(motion.current[index]),
+        run.current_changes,
+        rows,
+        float(high - low) / 2,
+    )
+
+
+def _averaged(signal: Floats, index: np.ndarray) -> Floats:
+    """Means of a signal about samples, over at most the distance between two of them."""
+    half = int(np.median(np.diff(index))) // 4 if index.size > 1 else 0
+    if half == 0:
+        return signal[index]
+    total = np.concatenate([[0.0], np.cumsum(signal)])
+    low, high = np.maximum(index - half, 0), np.minimum(index + half + 1, signal.size)
+    return (total[high] - total[low]) / (high - low)

@@ -1,0 +1,117 @@
+"""Runs that contradict the others are found with their cause; sound runs, sessions and reversed coils are not."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mrdamper.study.contradictions import ContradictionError, find_contradictions
+
+sys.path.insert(0, str(Path(__file__).parent.parent.parent))
+from benchmarks.contradicting_folders import DAMPERS, folders, full_matrix, make_run, motions, sound_folder
+
+
+@pytest.fixture(scope="module")
+def sound():
+    return full_matrix(DAMPERS[0], np.random.default_rng(11), drift=0.08)
+
+
+@pytest.fixture(scope="module")
+def cases():
+    return {folder.name: folder for folder in folders(DAMPERS[0])}
+
+
+def changed(runs, k, **channels):
+    return [*runs[:k], replace(runs[k], **channels), *runs[k + 1 :]]
+
+
+@pytest.mark.parametrize("rig", ["labcontrol", "utfsm"])
+def test_no_run_of_a_bundled_rig_is_accused(bundled, rig):
+    assert find_contradictions(list(bundled.rig(rig))) == []
+
+
+@pytest.mark.parametrize("number", [1, 4, 9, 14, 24])
+def test_no_run_of_a_sound_folder_is_accused(number):
+    assert find_contradictions(sound_folder(number)) == []
+
+
+def test_a_gain_of_sessions_is_no_contradiction(sound):
+    runs = [replace(run, force=(1.08 if k % 2 else 0.92) * run.force) for k, run in enumerate(sound)]
+    assert find_contradictions(runs) == []
+
+
+def test_a_reversed_coil_is_no_contradiction(sound):
+    runs = [replace(run, current=-run.current) if k % 3 == 0 else run for k, run in enumerate(sound)]
+    assert find_contradictions(runs) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("one run in lbf", 4.448),
+        ("one run in kgf", 9.807),
+        ("N under lbf", 1 / 4.448),
+        ("three runs in lbf", 4.448),
+        ("one run in inches", 25.4),
+        ("one run in cm", 10.0),
+        ("current in mA", 1.0),
+        ("open coil", 0.0),
+        ("half-open coil", 0.5),
+        ("both channels inverted", -1.0),
+        ("a random record in lbf", 4.448),
+    ],
+)
+def test_the_run_and_its_cause_are_named(cases, name, value):
+    folder = cases[name]
+    found = find_contradictions(folder.runs)
+    assert {one.run_id for one in found} == folder.wrong
+    assert {one.cause for one in found} <= set(folder.causes)
+    assert [one.value for one in found] == pytest.approx([value] * len(found), rel=0.01, abs=0.01)
+
+
+@pytest.mark.parametrize("name", [
+    "a copy with noise", "a copy cropped", "a copy decimated", "a copy cropped, decimated, with noise",
+    "a validation run that is a copy", "a copy under another current",
+])  # fmt: skip
+def test_a_copy_is_found_and_its_original_kept(cases, name):
+    (found,) = find_contradictions(cases[name].runs)
+    assert (found.run_id, found.code) == ("t12", "E_TWICE")
+
+
+def test_a_repeated_test_is_no_copy(sound):
+    damper, rng = DAMPERS[0], np.random.default_rng(2)
+    again = make_run(damper, "again", damper.currents[1], *motions(damper)[1], rng)
+    assert find_contradictions([*sound, again]) == []
+
+
+def test_the_units_of_all_runs_do_not_matter(sound):
+    """A factor common to all runs contradicts nothing, and the same run is found at any scale."""
+    runs = [replace(run, force=100 * run.force) for run in sound]
+    (found,) = find_contradictions(changed(runs, 4, force=runs[4].force / 4.448))
+    assert (found.run_id, found.code) == ("t04", "E_FORCE_SCALE")
+
+
+def test_a_kept_run_is_not_set_aside(cases):
+    folder = cases["one run in lbf"]
+    assert find_contradictions(folder.runs, keep=["t04"]) == []
+
+
+def test_three_runs_contradict_nothing(sound):
+    assert find_contradictions([sound[0], sound[4], replace(sound[8], force=sound[8].force / 4.448)]) == []
+
+
+def test_a_validation_run_never_takes_part_in_the_comparison(sound):
+    """Whatever validation runs hold, what is found of identification runs is the same."""
+    harmed = changed(sound, 4, force=sound[4].force / 4.448)
+    (alone,) = find_contradictions(harmed)
+    wild = [replace(run, id=f"v{run.id}", split="validate", force=3 * run.force[::-1]) for run in sound[:6]]
+    assert [one for one in find_contradictions([*harmed, *wild]) if one.run_id == "t04"] == [alone]
+
+
+def test_so_many_contradictions_are_refused_with_both_groups(sound):
+    wrong = [replace(run, force=run.force / 4.448) if k in (0, 2, 4, 6, 8) else run for k, run in enumerate(sound)]
+    with pytest.raises(ContradictionError, match=r"runs contradict the other .*E_FORCE_SCALE.* against t0") as refusal:
+        find_contradictions(wrong)
+    assert refusal.value.code == "E_CONTRADICTIONS"
