@@ -22,7 +22,7 @@ coverage: $(VENV)/.dev  ## the fast tests with the share of lines they reach
 	$(BIN)/python -m pytest -m "not slow" -n 2 --cov=mrdamper --cov-report=term:skip-covered --cov-report=xml
 
 test-all: $(VENV)/.dev  ## the tests, slow ones too
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2
 
 bench: $(VENV)/.dev  ## timings beside the peers that are installed
 	$(BIN)/python -m benchmarks
@@ -35,8 +35,9 @@ SHARE ?= 1
 attack: $(VENV)/.dev  ## hostile names, models, tables, calls; killed and starved commands: counts a kind (SHARE=0.1)
 	$(BIN)/python -m fuzz.attack --share $(SHARE)
 
-mutants: $(VENV)/.dev  ## plant faults where results are judged: the tests notice at least 95 % of them
-	$(BIN)/python -m mutants
+mutants: SHARE = 0.2
+mutants: $(VENV)/.dev  ## plant faults where results are judged: the tests notice at least 95 % of them (SHARE=1: all)
+	$(BIN)/python -m mutants --share $(SHARE)
 
 lint: $(VENV)/.dev  ## format check, lint, types, import order of the layers
 	$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/pyright --pythonpath $(BIN)/python && $(BIN)/lint-imports

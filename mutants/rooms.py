@@ -54,7 +54,8 @@ ROOMS = (
     ),
     _room(
         "dampers.covariance dampers.run_residuals identification.intervals",
-        "dampers/test_covariance_laws.py dampers/test_bands_by_hand.py identification/test_covariance.py",
+        "dampers/test_covariance_laws.py dampers/test_bands_by_hand.py dampers/test_certainty.py"
+        " identification/test_covariance.py",
         "cover_what_they_say scatter_of_repeated",
     ),
     _room("study.plan", "study/test_plan.py"),

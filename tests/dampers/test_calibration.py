@@ -46,7 +46,10 @@ def test_a_run_is_compared_inside_its_window_with_what_it_takes_out_of_the_motio
     both = PredictedRun.joined("whole", [found, replace(found, peak=1.4, energy=0.9)])
     assert (both.run_id, both.session, both.peak) == ("whole", "a", pytest.approx(1.3))
     assert both.energy == pytest.approx((found.energy + 0.9) / 2)
-    assert abs(both.predicted.size - found.predicted.size) <= 1
+    assert both.predicted == pytest.approx(np.tile(found.predicted[::2], 2))
+    assert both.measured == pytest.approx(np.tile(found.measured[::2], 2))
+    still = replace(found, predicted=np.full(5, 7.0), measured=np.full(5, 9.0))
+    assert still.gain_and_offset == pytest.approx((1.0, 2.0))  # a constant shows no gain
 
 
 def test_the_model_error_is_what_gain_and_offset_leave():

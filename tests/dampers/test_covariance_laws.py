@@ -7,7 +7,7 @@ import pytest
 
 from mrdamper.dampers.bands import band
 from mrdamper.dampers.base import UNTESTED
-from mrdamper.dampers.calibration import PredictedRun, model_error
+from mrdamper.dampers.calibration import Calibration, PredictedRun, Scored, model_error
 from mrdamper.dampers.covariance import certain
 from mrdamper.dampers.joint import JointDamper
 from mrdamper.dampers.run_residuals import RunResiduals, normal_matrix
@@ -171,3 +171,38 @@ def test_a_parameter_at_its_bound_is_held_and_one_the_runs_do_not_show_is_named(
     assert certain(held, runs, held=["c"]).certainty.one_sided == ("c", "fy")
     assert "fy" in certain(held, runs, bounded=False).certainty.names
     assert certain(held, []) is held
+
+
+def test_cross_validated_errors_are_over_the_whole_error_model():
+    """Parameters, gains and offsets of sessions and runs, and the form: their squares add up."""
+    runs = runs_of(sessions=3, session=0.05)
+    damper = fitted(runs)
+    rng = np.random.default_rng(5)
+    seen = []
+    for run in runs:
+        shifted = run.force * (1 + 0.08 * rng.standard_normal()) + 40 * rng.standard_normal()
+        seen.append(PredictedRun.of(run, shifted, damper.predict_run(run).motion.velocity))
+    known = certain(damper, runs, seen).certainty
+    assert known.of_sessions
+    assert min(known.run_gain, known.run_offset, known.force) > 0
+    scores = []
+    for run, prediction in zip(runs, seen, strict=True):
+        part = RunResiduals.of(damper, run)
+        velocity = part.prediction.motion.velocity[part.picked]
+        slopes = np.column_stack([velocity, np.sign(velocity), np.ones(velocity.size)])
+        share = np.mean(np.sum(slopes @ known.covariance * slopes, axis=1)) / (np.ptp(part.predicted) / 2) ** 2
+        gain, half = known.gain**2 + known.run_gain**2, prediction.half
+        offset = known.offset**2 + known.run_offset**2
+        force = np.sqrt(gain * prediction.predicted**2 + offset + (share + known.force**2) * half**2)
+        peak, energy = (np.sqrt(share + gain + e**2) for e in (known.peak, known.energy))
+        scores.append(Scored.of(prediction, force, peak, energy))
+    expected = Calibration.of(seen, scores)
+    for name in ("force", "peak", "energy", "coverage"):
+        assert getattr(known.calibration, name) == pytest.approx(getattr(expected, name), rel=1e-6)
+
+
+def test_the_fit_of_one_run_takes_its_gain_and_offset_up():
+    (run,) = runs_of(conditions=CONDITIONS[:1])
+    known = certain(fitted([run]), [run]).certainty
+    assert set(known.names) == {"c", "fy", "f0"}
+    assert (known.run_gain, known.run_offset, known.run_dof, known.session_dof) == (0.0, 0.0, 0.0, 0.0)

@@ -127,3 +127,24 @@ def test_one_parameter_scatters_as_the_mean_of_gains():
     assert not scatter.covariance(Effects())[0].any()
     # An offset moves a parameter of the gain nowhere.
     assert scatter.covariance(Effects(offset=5.0, run_offset=5.0))[0][0, 0] == pytest.approx(0.0, abs=1e-20)
+
+
+def test_runs_far_off_pull_less_than_their_gain_would_say():
+    """Beside small residuals runs are weighed by their distance: the common gain is nearly the median of theirs."""
+    names = [f"day {i}" for i in range(40)]
+    runs, slope = runs_of(np.zeros(40), np.zeros(40), names), FORCE[:, None]
+    scatter = effects_of(runs, slope, slope.T / (slope.T @ slope) / 40)
+    variance = scatter.covariance(Effects(run_gain=0.05, run_dof=39.0))[0][0, 0]
+    assert 1.2 < variance / (0.05**2 / 40) < 1.8  # of a median: π / 2
+
+
+def test_a_run_counts_by_its_relative_error_whatever_its_force():
+    runs = runs_of(np.zeros(20), np.zeros(20), [None] * 20, noise=60.0)
+    slopes = []
+    for k, run in enumerate(runs):
+        size = 10.0 ** (k % 3)
+        run.predicted, run.residual, run.scale = size * run.predicted, size * run.residual, size * run.scale
+        slopes.append(run.predicted[:, None])
+    scatter = GainsAndOffsets(runs, slopes, [s.T / (s.T @ s) / 20 for s in slopes])
+    variance = scatter.covariance(Effects(run_gain=0.08, run_dof=19.0))[0][0, 0]
+    assert variance == pytest.approx(0.08**2 / 20, rel=0.2)

@@ -43,12 +43,35 @@ def test_capability_of_a_sample_with_known_moments():
 
 
 def test_what_is_not_normal_goes_by_percentiles():
-    values = np.random.default_rng(0).exponential(1.0, 4000)
+    values = np.random.default_rng(0).exponential(1.0, 8000)
     found = capability(values, None, 10.0)
     assert not is_normal(values)
     assert found.way == "percentiles"
     top = -np.log(0.00135)  # the exact quantile
-    assert found.ppk == pytest.approx((10 - np.log(2)) / (top - np.log(2)), rel=0.15)
+    truth = (10 - np.log(2)) / (top - np.log(2))
+    assert found.ppk == pytest.approx(truth, rel=0.15)
+    assert found.low < truth < found.high
+    # Whatever side is limited, and in any unit; of two limits the nearer one counts.
+    turned = capability(-3 * values, -30.0, None)
+    assert (turned.ppk, turned.low, turned.high) == pytest.approx((found.ppk, found.low, found.high), rel=0.02)
+    assert capability(values, -1e3, 10.0).ppk == pytest.approx(found.ppk)
+
+
+@pytest.mark.parametrize(("count", "given"), [(50, False), (200, False), (7407, False), (7408, True)])
+def test_percentiles_that_the_sample_cannot_hold_are_refused(count, given):
+    found = capability(np.random.default_rng(1).lognormal(0.0, 1.0, count), None, 10.0)
+    assert np.isfinite([found.ppk, found.low, found.high]).all() == given
+    assert ("percentiles need 7408 values" in found.way) == (not given)
+    assert found.count == count
+
+
+def test_the_bootstrap_interval_of_percentiles_holds_the_truth():
+    rng, held = np.random.default_rng(7), 0
+    truth = (10 - np.log(2)) / (-np.log(0.00135) - np.log(2))
+    for _ in range(60):
+        found = capability(rng.exponential(1.0, 7500), None, 10.0)
+        held += found.low <= truth <= found.high
+    assert held >= 51  # of 95 %, three standard errors of 60 are 9 points
 
 
 def test_the_interval_holds_what_it_promises():
@@ -57,7 +80,7 @@ def test_the_interval_holds_what_it_promises():
     held = 0
     for _ in range(300):
         found = capability(rng.standard_normal(60), -4.0, 4.0)
-        held += found.way == "percentiles" or found.low <= truth <= found.high + 0.05
+        held += np.isnan(found.ppk) or found.low <= truth <= found.high + 0.05
     assert held > 270
 
 

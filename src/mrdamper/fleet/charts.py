@@ -4,11 +4,12 @@ References
 ----------
 NIST/SEMATECH e-Handbook of Statistical Methods, 6.1.6 (capability), 6.3.2.2 (individuals), 6.3.2.4
 (EWMA); ISO 22514-2 (percentiles of what is not normal); Bissell 1990, Applied Statistics 39, 331
-(interval of a capability index).
+(interval of a capability index); Efron and Tibshirani 1993, An Introduction to the Bootstrap, chapter 13.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,9 @@ _D2, _D4 = 1.128, 3.267  # of moving ranges of two, as printed in the tables
 _FEWEST_NORMALITY, _MOST_NORMALITY = 8, 5000
 _NOT_NORMAL = 0.005  # significance at which a distribution is taken for not normal
 _TAIL = 0.00135  # share beyond three standard deviations of a normal distribution
+FEWEST_PERCENTILES = math.ceil(10 / _TAIL)  # values, ten of which are expected beyond each percentile
+_PERCENTILES = (_TAIL, 0.5, 1 - _TAIL)
+_RESAMPLES, _SEED = 1000, 20240813  # of the bootstrap
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,10 +67,10 @@ def ewma(values: Floats, target: float, deviation: float, weight: float = 0.2, w
 class Capability:
     """How a distribution lies between its limits."""
 
-    ppk: float
-    low: float  # ends of its 95 % interval; NaN for percentiles, whose interval is not known
+    ppk: float  # NaN where the values are too few for percentiles
+    low: float  # ends of its 95 % interval
     high: float
-    way: str  # "normal" or "percentiles"
+    way: str  # "normal", "percentiles", or why there is none
     count: int
     outside: int  # values beyond a limit
 
@@ -84,26 +88,48 @@ def is_normal(values: Floats) -> bool:
 def capability(values: Floats, lower: float | None, upper: float | None) -> Capability | None:
     """Ppk from the overall mean and deviation, or from percentiles where the values are not normal.
 
-    None for under two values, or no spread. [NIST 6.1.6; interval: Bissell 1990; ISO 22514-2]
+    Percentiles of 0.135 and 99.865 % ask for 7408 values, so that ten are expected beyond each; their
+    interval is that of the bootstrap. None for under two values, or no spread.
+    [NIST 6.1.6; interval: Bissell 1990; ISO 22514-2; Efron and Tibshirani 1993]
     """
     if values.size < 2 or np.ptp(values) == 0:
         return None
     below = values < (-np.inf if lower is None else lower)
     above = values > (np.inf if upper is None else upper)
-    outside, normal = int(np.sum(below | above)), is_normal(values)
-    if normal:
-        middle, deviation = float(np.mean(values)), float(np.std(values, ddof=1))
-        reach = 3 * deviation, 3 * deviation
-    else:
-        bottom, middle, top = np.quantile(values, [_TAIL, 0.5, 1 - _TAIL]).tolist()
-        reach = max(middle - bottom, 1e-300), max(top - middle, 1e-300)
-    sides = [(middle - lower) / reach[0]] if lower is not None else []
-    sides += [(upper - middle) / reach[1]] if upper is not None else []
-    ppk, count = float(min(sides)), values.size
-    if not normal:
-        return Capability(ppk, np.nan, np.nan, "percentiles", count, outside)
-    half = 1.959963985 * float(np.sqrt(1 / (9 * count) + ppk**2 / (2 * (count - 1))))
-    return Capability(ppk, ppk - half, ppk + half, "normal", count, outside)
+    outside, count = int(np.sum(below | above)), values.size
+    if is_normal(values):
+        middle, deviation = np.mean(values), np.std(values, ddof=1)
+        ppk = float(_nearest(middle - 3 * deviation, middle, middle + 3 * deviation, lower, upper))
+        half = 1.959963985 * float(np.sqrt(1 / (9 * count) + ppk**2 / (2 * (count - 1))))
+        return Capability(ppk, ppk - half, ppk + half, "normal", count, outside)
+    if count < FEWEST_PERCENTILES:
+        why = f"not normal; percentiles need {FEWEST_PERCENTILES} values"
+        return Capability(np.nan, np.nan, np.nan, why, count, outside)
+    ppk = float(_nearest(*np.quantile(values, _PERCENTILES), lower, upper))
+    low, high = np.quantile(_nearest(*_resampled(values), lower, upper), [0.025, 0.975]).tolist()
+    return Capability(ppk, low, high, "percentiles", count, outside)
+
+
+def _resampled(values: Floats) -> Floats:
+    """(3, B) percentiles of bootstrap samples, by the ranks that ordered uniform draws have in the sample.
+
+    The draws at some ranks of n uniform ones are beta distributed, each given the one below it.
+    """
+    rng, count, below, rank = np.random.default_rng(_SEED), values.size, np.zeros(_RESAMPLES), 0
+    found = []
+    for share in _PERCENTILES:
+        at = round(share * (count - 1)) + 1
+        below = below + (1 - below) * rng.beta(at - rank, count - at + 1, _RESAMPLES)
+        found.append(np.sort(values)[np.minimum((below * count).astype(int), count - 1)])
+        rank = at
+    return np.array(found)
+
+
+def _nearest(bottom: Floats, middle: Floats, top: Floats, lower: float | None, upper: float | None) -> Floats:
+    """Distance of the nearer limit from the middle, over that of the percentile on its side."""
+    sides = [(middle - lower) / np.maximum(middle - bottom, 1e-300)] if lower is not None else []
+    sides += [(upper - middle) / np.maximum(top - middle, 1e-300)] if upper is not None else []
+    return np.min(sides, axis=0)
 
 
 @dataclass(frozen=True)
