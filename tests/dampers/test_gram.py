@@ -112,7 +112,7 @@ def test_forms_are_chosen_short(runs, identifications):
     data = condense(runs, BoucWen)
     shapes = np.array([i.model.yield_displacement for i in identifications])
     candidates = {name: ("constant", "linear-current", "quadratic-current") for name in FORMS}
-    forms, _ = choose_forms(data, candidates, same_condition(data.conditions), shapes)
+    forms = choose_forms(data, candidates, shapes).forms
     assert forms["yield_force"] == "quadratic-current"
     assert forms["k1"] == forms["f0"] == "constant"
 

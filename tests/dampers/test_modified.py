@@ -11,6 +11,7 @@ from support.dampers import modified_damper
 from mrdamper.dampers import modified
 from mrdamper.dampers.base import Envelope
 from mrdamper.dampers.causal import causal_force
+from mrdamper.dampers.gram import FormChoice
 from mrdamper.dampers.modified import ModifiedModel, fit_modified
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.data import Condition
@@ -91,12 +92,13 @@ def test_forms_are_chosen_parameter_by_parameter():
     assert [f.function.form for f in fit.functions.values()] == ["linear-current", "linear-current-speed", "constant"]
     unseen = Condition(0.7, 1.3, 0.03)
     assert fit.damper.model_at(unseen).values() == pytest.approx(linear(unseen).values(), rel=1e-6)
-    assert (fit.damper.rig, dict(fit.damper.provenance)) == ("bench", {"method": "made"})
+    assert (fit.damper.rig, fit.damper.provenance["method"]) == ("bench", "made")
+    assert fit.damper.provenance["depends on frequency and amplitude"] == "c"
     assert fit.damper.envelope == Envelope.of(CONDITIONS)
     assert fit.values["fy"] == pytest.approx(150 + 900 * CURRENT)
     assert list(fit.conditions) == CONDITIONS
     assert fit.few_motions
-    assert dict(fit_modified(identified(linear), forms).damper.provenance) == {}
+    assert "method" not in fit_modified(identified(linear), forms).damper.provenance
 
 
 def test_few_motions_are_ten_or_fewer_and_near_ones_are_one():
@@ -149,33 +151,41 @@ def test_a_joint_fit_is_made_of_forms_without_rates_but_for_the_shape(monkeypatc
     parameters = ParameterMap(BoucWen, functions)
 
     class Data:
-        shape, conditions = "yield_displacement", tuple(CONDITIONS)
+        shape, conditions, model_type = "yield_displacement", tuple(CONDITIONS), BoucWen
+        linear = ("c", "yield_force", "k1", "k3", "f0", "m")
 
         def only(self, rows):
             asked.update(rows=rows)
             return SimpleNamespace(conditions=tuple(CONDITIONS[i] for i in rows))
 
-    def chosen(data, candidates, groups, shapes):
-        asked.update(candidates=candidates, groups=groups, shapes=shapes)
-        return {"yield_displacement": "constant", "c": "constant"}, SimpleNamespace(
-            parameters=parameters, at_bounds=("c",)
-        )
+    def chosen(data, candidates, shapes, dissipating):
+        asked.update(candidates=candidates, shapes=shapes, dissipating=dissipating)
+        forms, fit = dict.fromkeys(functions, "constant"), SimpleNamespace(parameters=parameters, at_bounds=("c",))
+        return FormChoice(forms, fit, {"c: plane": "negative at 0 A"})
 
-    monkeypatch.setattr(modified, "condense", lambda runs, cls: asked.update(runs=runs, cls=cls) or Data())
+    def condensed(runs, cls, more):
+        asked.update(runs=runs, cls=cls, more=more)
+        return Data()
+
+    monkeypatch.setattr(modified, "condense", condensed)
     monkeypatch.setattr(modified, "choose_forms", chosen)
     monkeypatch.setattr(modified, "fit_jointly", lambda part, forms, start: SimpleNamespace(parameters=parameters))
     fit, refit = modified.fit_modified_jointly("runs", identified(by_the_papers_laws), {"a": "b"})
     lengths = [by_the_papers_laws(c).yield_displacement for c in CONDITIONS]
-    assert (asked["runs"], asked["cls"]) == ("runs", BoucWen)
+    assert (asked["runs"], asked["cls"], asked["more"]) == ("runs", BoucWen, ("m",))
+    assert asked["dissipating"]["yield_force"] == "N"
+    assert fit.refused == {"c: plane": "negative at 0 A"}
     assert asked["shapes"] == pytest.approx(np.array(lengths))
     for name, forms in BoucWen.map_forms().items():
         rated = [form for form in forms if FORMS[form].rate_bounds]
-        kept = [form for form in asked["candidates"][name] if FORMS[form].rate_bounds]
-        assert kept == (rated if name == "yield_displacement" else [])
+        free = [law for law in asked["candidates"][name] if isinstance(law, str) and FORMS[law].rate_bounds]
+        held = [law for law in asked["candidates"][name] if not isinstance(law, str)]
+        assert free == (rated if name == "yield_displacement" else [])
+        assert {form for form, _ in held} == ({"decaying-current"} if name in ("c", "yield_force") else set())
         assert set(forms) - set(rated) <= set(asked["candidates"][name])
     assert fit.values["c"] == pytest.approx([by_the_papers_laws(c).c for c in CONDITIONS])
     assert (fit.conditions, fit.at_bounds) == (tuple(CONDITIONS), ("c",))
-    assert (fit.damper.rig, dict(fit.damper.provenance), set(fit.functions)) == ("bench", {"a": "b"}, set(functions))
+    assert (fit.damper.rig, fit.damper.provenance["a"], set(fit.functions)) == ("bench", "b", set(functions))
     again = refit([0, 5])
     assert (asked["rows"], again.envelope) == ([0, 5], Envelope.of([CONDITIONS[0], CONDITIONS[5]]))
 

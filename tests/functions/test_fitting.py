@@ -1,6 +1,7 @@
 """Fits beside NumPy's least squares, errors at left-out conditions beside refits, forms beside their formulas."""
 
 from math import exp
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -150,24 +151,25 @@ def test_a_function_found_otherwise_is_assessed_by_the_values_beside_it():
 
 
 def fits(monkeypatch, errors):
-    """Forms whose errors at left-out conditions are given; None is refused."""
+    """The form chosen where the errors of all are given, a value a condition; None is refused."""
 
     def fit(form, *args, **more):
         if errors[form.name] is None:
             raise IdentificationError(f"no {form.name}")
-        return FunctionFit(form.name, 0.0, errors[form.name])
+        function = SimpleNamespace(form=form.name)
+        return FunctionFit(function, 0.0, 0.0, {"condition": np.array(errors[form.name])})
 
     monkeypatch.setattr(fitting, "fit_function", fit)
-    return choose_function(errors, CONDITIONS, VALUES).function
+    return choose_function(errors, CONDITIONS, VALUES).function.form
 
 
-def test_a_longer_form_must_win_by_a_tenth(monkeypatch):
-    assert fits(monkeypatch, {"quadratic-current": 0.95, "constant": 1.0}) == "constant"
-    assert fits(monkeypatch, {"quadratic-current": 0.89, "constant": 1.0}) == "quadratic-current"
-    assert fits(monkeypatch, {"plane": 0.5, "quadratic-current": 0.55, "constant": 1.0}) == "quadratic-current"
+def test_a_longer_form_must_win_by_a_standard_error(monkeypatch):
+    uneven, even = [1.0, 2.0, 3.0], [0.9, 1.9, 2.9]
+    assert fits(monkeypatch, {"quadratic-current": even, "constant": uneven}) == "quadratic-current"  # everywhere
+    assert fits(monkeypatch, {"quadratic-current": [0.5, 2.2, 3.1], "constant": uneven}) == "constant"
     # A searched rate counts as a coefficient: three against two.
-    assert fits(monkeypatch, {"decaying-current": 0.95, "linear-current": 1.0}) == "linear-current"
-    assert fits(monkeypatch, {"constant": None, "plane": 2.0}) == "plane"
+    assert fits(monkeypatch, {"decaying-current": uneven, "linear-current": uneven}) == "linear-current"
+    assert fits(monkeypatch, {"constant": None, "quadratic-current": uneven}) == "quadratic-current"
     with pytest.raises(IdentificationError, match="no plane"):
         fits(monkeypatch, {"plane": None})
     with pytest.raises(IdentificationError, match="no form to choose from"):

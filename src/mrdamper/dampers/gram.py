@@ -20,7 +20,8 @@ from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError
 from mrdamper.functions.fitting import fit_function, require_determined
-from mrdamper.functions.forms import FORMS, ParameterFunction, features
+from mrdamper.functions.forms import FORMS, Form, ParameterFunction, features
+from mrdamper.functions.selection import broken_law, fold_groups, rises, smaller_wins, supported
 from mrdamper.hysteresis import Shape
 from mrdamper.hysteresis.batch import follow_alike
 from mrdamper.identification import Problem
@@ -36,6 +37,7 @@ _SETTLED = 1e-6  # relative gain of a step at which a search ends
 _SAME_WEIGHTS = 1e-3  # change of the robust weights below which another round changes nothing
 _REACH = 6.0  # of a search, in units of a function's terms
 _BEST = 1e-4  # nrmse_pp below which a run gains no more weight
+_PASSES = 2  # over all coordinates in the choice of forms
 _RIDGE = 1e-7  # interpolated Gram matrices of nearly parallel columns may lose positivity by less
 
 
@@ -109,8 +111,15 @@ class Condensed:
 
 
 @on_one_blas_thread
-def condense(runs: Sequence[Run], model_type: type[Model]) -> Condensed:
+def condense(runs: Sequence[Run], model_type: type[Model], more: Sequence[str] = ()) -> Condensed:
     """Condense runs for a model type whose search has one axis.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    model_type : type of Model
+    more : sequence of str
+        Preset linear parameters to determine as well: one run may not tell them apart, all together may.
 
     Raises
     ------
@@ -127,7 +136,7 @@ def condense(runs: Sequence[Run], model_type: type[Model]) -> Condensed:
             f"{model_type.title} is searched along {len(axes)} axes", mend="fix all shape parameters but one"
         )
     shape = axes[0].name if axes else ""
-    linear = tuple(name for name in coordinates if name != shape)
+    linear = (*(name for name in coordinates if name != shape), *more)
     conditions = tuple(problem.analysis.condition for problem in problems)
     ladder = _ladder([c.amplitude_m for c in conditions]) if shape else np.geomspace(1.0, 8.0, 4)
     gram = np.stack([_gram(problem, linear, shape, ladder) for problem in problems])
@@ -196,6 +205,44 @@ def _gram_of_shapes(problem: Problem, table: Floats, moving: int, shape: Shape, 
     return grams / len(table)
 
 
+Law = tuple[str, tuple[float, ...]]  # a form, and the rates it is held at
+
+
+ABSENT = "absent"  # in place of a form: the coordinate stays zero
+_NO_TERMS = Form(ABSENT, ())
+
+
+def _form(law: str | Law) -> Form:
+    name = law_of(law)[0]
+    return _NO_TERMS if name == ABSENT else FORMS[name]
+
+
+def _size(law: str | Law) -> int:
+    return len(_form(law).terms) + len(_form(law).rate_bounds)
+
+
+def law_of(form: str | Law) -> Law:
+    """A form with its rates; a name alone has none."""
+    return (form, ()) if isinstance(form, str) else form
+
+
+@dataclass(frozen=True, eq=False)
+class FormChoice:
+    """Forms chosen for a joint fit.
+
+    Attributes
+    ----------
+    forms : mapping of str to str or Law
+    fit : JointFit
+    refused : mapping of str to str
+        Forms that broke a law of physics, and which.
+    """
+
+    forms: Mapping[str, str | Law]
+    fit: JointFit
+    refused: Mapping[str, str]
+
+
 @dataclass(frozen=True, eq=False)
 class JointFit:
     """A parameter map fitted to all runs at once.
@@ -217,7 +264,7 @@ class JointFit:
 @on_one_blas_thread
 def fit_jointly(
     data: Condensed,
-    forms: Mapping[str, str],
+    forms: Mapping[str, str | Law],
     start: ParameterFunction | None,
     *,
     reweightings: int = 6,
@@ -267,7 +314,7 @@ def fit_jointly(
 
 @on_one_blas_thread
 def leave_out_errors(
-    data: Condensed, fit: JointFit, groups: Sequence[Sequence[int]], forms: Mapping[str, str]
+    data: Condensed, fit: JointFit, groups: Sequence[Sequence[int]], forms: Mapping[str, str | Law]
 ) -> Floats:
     """(R,) nrmse_pp of runs whose group was left out of the linear coefficients.
 
@@ -303,10 +350,12 @@ class _Solution:
 class _Design:
     """Linear coordinates of every run as a matrix times the coefficients of all functions."""
 
-    def __init__(self, data: Condensed, forms: Mapping[str, str]):
+    def __init__(self, data: Condensed, forms: Mapping[str, str | Law]):
         self.data = data
-        self.forms = {name: FORMS[forms[name]] for name in data.linear}
-        blocks = [form.columns(*features(data.conditions), ()) for form in self.forms.values()]
+        laws = {name: law_of(forms[name]) for name in data.linear}
+        self.forms = {name: _form(law) for name, law in laws.items()}
+        self.rates = {name: rates for name, (_, rates) in laws.items()}
+        blocks = [form.columns(*features(data.conditions), self.rates[n]) for n, form in self.forms.items()]
         self.sizes = [block.shape[1] for block in blocks]
         runs, total = data.scale.size, sum(self.sizes)
         self.matrix = np.zeros((runs, len(blocks) + 1, total + 1))
@@ -407,58 +456,106 @@ def _reweighted(design: _Design, gram: Floats, reweightings: int) -> _Solution:
 def _finish(design: _Design, solution: _Solution, functions: dict[str, ParameterFunction]) -> JointFit:
     parts = np.split(solution.coefficients, np.cumsum(design.sizes)[:-1])
     for (name, form), values in zip(design.forms.items(), parts, strict=True):
-        functions[name] = ParameterFunction(form.name, tuple(values.tolist()))
-    ordered = {name: functions[name] for name in design.data.model_type.map_forms()}
+        if form.terms:
+            functions[name] = ParameterFunction(form.name, tuple(values.tolist()), design.rates[name])
+    order = [*design.data.model_type.map_forms(), *functions]
+    ordered = {name: functions[name] for name in dict.fromkeys(order) if name in functions}
     return JointFit(ParameterMap(design.data.model_type, ordered), solution.nrmse_pp)
 
 
 def choose_forms(
-    data: Condensed, candidates: Mapping[str, Sequence[str]], groups: Sequence[Sequence[int]], shape_values: Floats
-) -> tuple[dict[str, str], JointFit]:
-    """Choose every coordinate's form by how well left-out conditions are predicted.
+    data: Condensed,
+    candidates: Mapping[str, Sequence[str | Law]],
+    shape_values: Floats,
+    dissipating: Mapping[str, str] | None = None,
+) -> FormChoice:
+    """Choose every coordinate's form by cross-validation over conditions, currents and motions.
 
-    Starting from the shortest forms, one coordinate at a time tries its candidates; a change
-    must lower the mean left-out error by a fiftieth. Two passes.
+    Starting from the shortest forms, one coordinate at a time tries its candidates: of two forms
+    the smaller one is kept unless `selection.smaller_wins` denies it. Two passes.
 
     Parameters
     ----------
     data : Condensed
-    candidates : mapping of str to sequence of str
-        Forms by coordinate, shortest first.
-    groups : sequence of sequences of int
-        Runs that are left out together.
+    candidates : mapping of str to sequence of str or Law
+        Forms by coordinate, shortest first; those with too many parameters for the tests are passed over.
     shape_values : (R,) array
         Shape coordinate identified run by run, to start from.
-
-    Returns
-    -------
-    forms : dict
-    fit : JointFit
+    dissipating : mapping of str to str, optional
+        Unit of the coordinates that must not be negative: forms that break a law of physics are refused.
     """
-    forms = {name: options[0] for name, options in candidates.items()}
-    fit, best = _tried(data, forms, groups, shape_values)
-    for _ in range(2):
+    folds = fold_groups(data.conditions)
+    options = {name: _supported(laws, data.conditions) for name, laws in candidates.items()}
+    forms: dict[str, str | Law] = {name: laws[0] for name, laws in options.items()}
+    fit, errors = _tried(data, forms, folds, shape_values)
+    refused: dict[str, str] = {}
+    for _ in range(_PASSES):
         before = dict(forms)
-        for name, options in candidates.items():
-            for option in options:
-                if option == forms[name]:
+        for name, laws in options.items():
+            for law in laws:
+                if law == forms[name]:
                     continue
                 try:
-                    trial_fit, error = _tried(data, {**forms, name: option}, groups, shape_values)
+                    trial, other = _tried(data, {**forms, name: law}, folds, shape_values)
                 except IdentificationError:
                     continue  # the tests cannot tell this form's terms apart
-                if error < 0.98 * best:
-                    forms, fit, best = {**forms, name: option}, trial_fit, error
+                larger = _size(law) >= _size(forms[name])
+                better = not smaller_wins(errors, other) if larger else smaller_wins(other, errors)
+                better = _risen(fit, trial, name, data.conditions, dissipating or {}, better)
+                reason = _broken(trial, name, data.conditions, dissipating or {}) if better else ""
+                if reason:
+                    refused[f"{name}: {law_of(law)[0]}"] = reason
+                elif better:
+                    forms, fit, errors = {**forms, name: law}, trial, other
         if forms == before:
             break
-    return forms, fit_jointly(data, forms, fit.parameters.functions.get(data.shape))
+    return FormChoice(forms, fit_jointly(data, forms, fit.parameters.functions.get(data.shape)), refused)
+
+
+def _supported(laws: Sequence[str | Law], conditions: Sequence[Condition]) -> list[str | Law]:
+    kept = [law for law in laws if supported(_form(law), conditions)]
+    return kept or [laws[0]]
+
+
+def _risen(
+    fit: JointFit,
+    trial: JointFit,
+    name: str,
+    conditions: Sequence[Condition],
+    dissipating: Mapping[str, str],
+    better: bool,
+) -> bool:
+    """Whether a trial replaces a fit; a yield force that rises with the current replaces a constant at once."""
+    one, other = (each.parameters.functions.get(name) for each in (fit, trial))
+    if one is None or other is None or name not in dissipating:
+        return better
+    if rises(other, one, dissipating[name], conditions):
+        return False
+    return better or rises(one, other, dissipating[name], conditions)
+
+
+def _broken(fit: JointFit, name: str, conditions: Sequence[Condition], dissipating: Mapping[str, str]) -> str:
+    """The law of physics that the function of a coordinate breaks, if any."""
+    function = fit.parameters.functions.get(name)
+    return broken_law(function, conditions, dissipating[name]) if function and name in dissipating else ""
 
 
 def _tried(
-    data: Condensed, forms: Mapping[str, str], groups: Sequence[Sequence[int]], shape_values: Floats
-) -> tuple[JointFit, float]:
+    data: Condensed,
+    forms: Mapping[str, str | Law],
+    folds: Mapping[str, Sequence[Sequence[int]]],
+    shape_values: Floats,
+) -> tuple[JointFit, dict[str, Floats]]:
+    """A fit with some forms, and its errors by kind of fold."""
     for name in data.linear:
-        require_determined(forms[name], data.conditions)
-    start = fit_function(forms[data.shape], data.conditions, shape_values, log=True).function if data.shape else None
+        if not law_of(forms[name])[1] and _form(forms[name]).terms:
+            require_determined(law_of(forms[name])[0], data.conditions)
+    start = None
+    if data.shape:
+        start = fit_function(law_of(forms[data.shape])[0], data.conditions, shape_values, log=True).function
     fit = fit_jointly(data, forms, start, reweightings=2, most_steps=5, polish=False)
-    return fit, float(np.mean(leave_out_errors(data, fit, groups, forms)))
+    errors = {}
+    for kind, groups in folds.items():
+        members = [i for group in groups for i in group]
+        errors[kind] = leave_out_errors(data, fit, groups, forms)[members]
+    return fit, errors

@@ -16,15 +16,18 @@ import numpy as np
 from mrdamper.dampers.base import Damper, Envelope, Saved, not_held
 from mrdamper.dampers.certainty import Certainty, FittedParameter
 from mrdamper.dampers.coil import Coil
-from mrdamper.dampers.gram import Condensed, choose_forms, condense, fit_jointly
+from mrdamper.dampers.gram import ABSENT, Condensed, Law, choose_forms, condense, fit_jointly
 from mrdamper.dampers.parameter_map import ParameterMap
-from mrdamper.data import Condition, Floats, Run, same_condition, same_motion
+from mrdamper.data import Condition, Floats, Run, same_motion
 from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.functions.fitting import FunctionFit, assess, choose_function
-from mrdamper.functions.forms import FORMS, ParameterFunction
+from mrdamper.functions.forms import FORMS, ParameterFunction, features
 from mrdamper.functions.motion_hull import MotionHull
 from mrdamper.identification import Identification
 from mrdamper.models import Model, model_type
+
+_RATES = (0.4, 0.8, 1.5, 2.5, 4.0)  # of decaying laws, times the largest current [-]
+_APART = 1.2  # highest over lowest frequency from which a mass is told from a stiffness [-]
 
 
 @dataclass(frozen=True)
@@ -164,7 +167,9 @@ class ModifiedFit:
         The identified values behind each function.
     conditions : tuple of Condition
     at_bounds : tuple of str
-        Coordinates whose function leaves what was looked for.
+        Coordinates whose function leaves what was looked for, or a bound of the parameter at a test.
+    refused : mapping of str to str
+        Forms that broke a law of physics, by coordinate and name, and which.
     """
 
     damper: ModifiedModel
@@ -172,6 +177,7 @@ class ModifiedFit:
     values: Mapping[str, Floats]
     conditions: tuple[Condition, ...]
     at_bounds: tuple[str, ...] = ()
+    refused: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def few_motions(self) -> bool:
@@ -217,6 +223,7 @@ def fit_modified(
             values[name],
             log=name in model_type.log_coordinates(),
             uncertainty=_uncertainty(identifications, name, name in model_type.log_coordinates()),
+            dissipating=_dissipating(model_type).get(name, ""),
         )
         for name in candidates
     }
@@ -226,13 +233,18 @@ def fit_modified(
             model_type, {name: fit.function for name, fit in fits.items()}, MotionHull.of(conditions)
         ),
         envelope=Envelope.of(conditions),
-        provenance=dict(provenance or {}),
+        provenance={**(provenance or {}), **_about_forms({name: fit.function for name, fit in fits.items()})},
     )
-    return ModifiedFit(damper, fits, values, conditions)
+    broken = {f"{name}: {form}": why for name, fit in fits.items() for form, why in fit.refused.items()}
+    return ModifiedFit(damper, fits, values, conditions, _clipped(damper.parameters, conditions), broken)
 
 
 def fit_modified_jointly(
-    runs: Sequence[Run], identifications: Sequence[Identification], provenance: Mapping[str, str] | None = None
+    runs: Sequence[Run],
+    identifications: Sequence[Identification],
+    provenance: Mapping[str, str] | None = None,
+    *,
+    any_motion: bool = True,
 ) -> tuple[ModifiedFit, Callable[[Sequence[int]], ModifiedModel]]:
     """Fit all parameter functions to the forces of all runs at once.
 
@@ -242,6 +254,8 @@ def fit_modified_jointly(
     identifications : sequence of Identification, length R
         Of these runs, in this order: where the shape coordinate starts.
     provenance : mapping, optional
+    any_motion : bool
+        Try functions of frequency and amplitude, too; otherwise laws over the current only.
 
     Returns
     -------
@@ -255,28 +269,78 @@ def fit_modified_jointly(
         If the model has more than one shape coordinate, or there are too few runs.
     """
     model_type = type(identifications[0].model)
-    data = condense(runs, model_type)
+    conditions = [i.condition for i in identifications]
+    inertia = ("m",) if "m" not in model_type.map_forms() and _tells_inertia(model_type, conditions) else ()
+    data = condense(runs, model_type, inertia)
     shapes = np.array([_coordinate(i, data.shape) if data.shape else 1.0 for i in identifications])
-    candidates = {
-        name: [f for f in forms if name == data.shape or not FORMS[f].rate_bounds]
-        for name, forms in model_type.map_forms().items()
-    }
-    forms, joint = choose_forms(data, candidates, same_condition(data.conditions), shapes)
+    chosen = choose_forms(data, _candidates(data, any_motion), shapes, _dissipating(model_type))
+    forms, joint = chosen.forms, chosen.fit
     start = joint.parameters.functions.get(data.shape)
+    about = {**(provenance or {}), **_about_forms(joint.parameters.functions)}
 
     def model(part: Condensed, parameters: ParameterMap) -> ModifiedModel:
         held = replace(parameters, motions=MotionHull.of(part.conditions))
-        return ModifiedModel(identifications[0].rig, held, Envelope.of(part.conditions), dict(provenance or {}))
+        return ModifiedModel(identifications[0].rig, held, Envelope.of(part.conditions), dict(about))
 
     def refit(rows: Sequence[int]) -> ModifiedModel:
         part = data.only(rows)
         return model(part, fit_jointly(part, forms, start).parameters)
 
-    values = {name: np.array([_coordinate(i, name) for i in identifications]) for name in forms}
-    fits = {
-        name: assess(function, data.conditions, values[name]) for name, function in joint.parameters.functions.items()
-    }
-    return ModifiedFit(model(data, joint.parameters), fits, values, data.conditions, joint.at_bounds), refit
+    functions = joint.parameters.functions
+    values = {name: np.array([_coordinate(i, name) for i in identifications]) for name in functions}
+    fits = {name: assess(function, data.conditions, values[name]) for name, function in functions.items()}
+    at_bounds = tuple(dict.fromkeys((*joint.at_bounds, *_clipped(joint.parameters, data.conditions))))
+    fit = ModifiedFit(model(data, joint.parameters), fits, values, data.conditions, at_bounds, chosen.refused)
+    return fit, refit
+
+
+def _candidates(data: Condensed, any_motion: bool) -> dict[str, list[str | Law]]:
+    """Forms of every coordinate, shortest first; rates of laws over the current are tried on a grid."""
+    highest = max(abs(c.current_A) for c in data.conditions) or 1.0
+    decaying: list[str | Law] = [("decaying-current", (rate / highest,)) for rate in _RATES]
+    found: dict[str, list[str | Law]] = {}
+    for name, forms in data.model_type.map_forms().items():
+        laws: list[str | Law] = [
+            form
+            for form in forms
+            if (any_motion or not FORMS[form].follows_motion) and (name == data.shape or not FORMS[form].rate_bounds)
+        ]
+        if name in _dissipating(data.model_type) and len(laws) > 1 and highest:
+            laws += decaying
+        found[name] = laws
+    inertia: list[str | Law] = [ABSENT, "constant"]
+    return found | {name: list(inertia) for name in data.linear if name not in found}
+
+
+def _tells_inertia(model_type: type[Model], conditions: Sequence[Condition]) -> bool:
+    """Whether a mass can be told from a stiffness: the model has one, and the frequencies of the tests differ."""
+    frequencies = [c.frequency_Hz for c in conditions]
+    has_mass = any(info.name == "m" and info.linear for info in model_type.parameters())
+    return has_mass and max(frequencies) > _APART * min(frequencies)
+
+
+def _dissipating(model_type: type[Model]) -> dict[str, str]:
+    """Units of the linear coordinates that must not be negative."""
+    found = {i.name: i.unit for i in model_type.parameters() if i.linear and i.bounds[0] == 0}
+    return found | ({"yield_force": "N"} if "yield_force" in model_type.map_forms() else {})
+
+
+def _clipped(parameters: ParameterMap, conditions: Sequence[Condition]) -> tuple[str, ...]:
+    """Parameters whose function leaves their bounds at a test."""
+    bounds = {info.name: info.bounds for info in parameters.model_type.parameters()}
+    found = []
+    for name, function in parameters.functions.items():
+        low, high = bounds.get(name, (0.0 if name == "yield_force" else -np.inf, np.inf))
+        values = function(*features(conditions))
+        if np.any(values < low) or np.any(values > high):
+            found.append(name)
+    return tuple(found)
+
+
+def _about_forms(functions: Mapping[str, ParameterFunction]) -> dict[str, str]:
+    follows = [name for name, function in functions.items() if FORMS[function.form].follows_motion]
+    forms = "; ".join(f"{name}: {function.form}" for name, function in functions.items())
+    return {"forms": forms, "depends on frequency and amplitude": ", ".join(follows) or "no parameter"}
 
 
 def _uncertainty(identifications: Sequence[Identification], name: str, log: bool) -> Floats:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import product
 
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import IdentificationError
 from mrdamper.functions.forms import Form, ParameterFunction, features, form_named
+from mrdamper.functions.selection import broken_law, fold_groups, rises, smaller_wins, supported
 from mrdamper.optimizers.levenberg_marquardt import least_squares, polished
 from mrdamper.optimizers.linear import project_out_columns, solve_linear
 
@@ -32,11 +33,17 @@ class FunctionFit:
     left_out : float
         RMS error at a condition left out of the fit, over the parameter's spread: under 1 the
         function knows more than the mean does; infinite where a term rests on one condition alone.
+    errors : mapping of str to (N,) array
+        Error of every value when it is left out, over the spread, by kind of fold.
+    refused : mapping of str to str
+        Forms that were no candidates, and why.
     """
 
     function: ParameterFunction
     r2: float
     left_out: float
+    errors: Mapping[str, Floats] = field(default_factory=dict, compare=False)
+    refused: Mapping[str, str] = field(default_factory=dict, compare=False)
 
 
 def fit_function(
@@ -83,10 +90,15 @@ def fit_function(
     cost = float(np.sum((columns @ coefficients - target) ** 2))
     spread = float(np.sum((target - target.mean()) ** 2))
     function = ParameterFunction(chosen.name, tuple(coefficients.tolist()), tuple(float(r) for r in rates), log)
+    size = np.sqrt(spread / target.size) or 1.0
     return FunctionFit(
         function,
         r2=1.0 - cost / spread if spread > 0 else 1.0,
-        left_out=left_out / (np.sqrt(spread / target.size) or 1.0),
+        left_out=left_out / size,
+        errors={
+            kind: _fold_errors(columns, target, weight, groups, len(rates)) / size
+            for kind, groups in _folds(tuple(conditions)).items()
+        },
     )
 
 
@@ -97,11 +109,18 @@ def choose_function(
     *,
     log: bool = False,
     uncertainty: ArrayLike | None = None,
+    dissipating: str = "",
 ) -> FunctionFit:
-    """The form that predicts left-out conditions best; a longer one must win by a tenth.
+    """Choose the form by cross-validation over conditions, currents and motions (`selection.smaller_wins`).
 
-    Parameters are those of `fit_function`; forms the conditions cannot determine are passed
-    over.
+    Other parameters are those of `fit_function`; forms the conditions cannot determine are passed
+    over, and those with too many parameters for the tested currents and motions.
+
+    Parameters
+    ----------
+    dissipating : str
+        Unit of a parameter that must not be negative; forms that break a law of physics are refused
+        (`selection.broken_law`).
 
     Raises
     ------
@@ -110,17 +129,31 @@ def choose_function(
     """
     best: FunctionFit | None = None
     refusal: IdentificationError | None = None
-    for form in sorted((form_named(name) for name in forms), key=lambda f: len(f.terms) + len(f.rate_bounds)):
+    refused: dict[str, str] = {}
+    ordered = sorted((form_named(name) for name in forms), key=lambda f: len(f.terms) + len(f.rate_bounds))
+    for form in ordered:
+        if best is not None and not supported(form, conditions):
+            refused[form.name] = "too many parameters for the tested currents and motions"
+            continue
         try:
             fit = fit_function(form, conditions, values, log=log, uncertainty=uncertainty)
         except IdentificationError as error:
             refusal = error
+            refused[form.name] = str(error)
             continue
-        if best is None or fit.left_out < 0.9 * best.left_out:
+        reason = broken_law(fit.function, conditions, dissipating) if dissipating else ""
+        if reason and best is not None:
+            refused[form.name] = reason
+        elif best is None or _replaces(fit, best, dissipating, conditions):
             best = fit
     if best is None:
         raise refusal or IdentificationError("no form to choose from", mend="name at least one")
-    return best
+    return replace(best, refused=refused)
+
+
+def _replaces(longer: FunctionFit, shorter: FunctionFit, dissipating: str, conditions: Sequence[Condition]) -> bool:
+    risen = rises(shorter.function, longer.function, dissipating, conditions)
+    return risen or not smaller_wins(shorter.errors, longer.errors)
 
 
 def assess(function: ParameterFunction, conditions: Sequence[Condition], values: ArrayLike) -> FunctionFit:
@@ -206,6 +239,29 @@ def _solved(columns: Floats, target: Floats, weight: Floats, rates: int) -> tupl
         penalty = target.size / max(target.size - rates, 1)
         left_out = float(np.sqrt(np.sum(((right - q @ along) / spare) ** 2) / np.sum(weight**2)) * penalty)
     return np.linalg.solve(triangle, along) / scale, left_out
+
+
+@lru_cache(maxsize=128)
+def _folds(conditions: tuple[Condition, ...]) -> dict[str, list[list[int]]]:
+    return fold_groups(conditions)
+
+
+def _fold_errors(
+    columns: Floats, target: Floats, weight: Floats, groups: Sequence[Sequence[int]], rates: int
+) -> Floats:
+    """Weighted magnitudes of errors at values left out in groups, exact for the linear part by the hat matrix."""
+    weighted = columns * weight[:, None]
+    q = np.linalg.qr(weighted / np.linalg.norm(weighted, axis=0))[0]
+    right = target * weight
+    residual = right - q @ (q.T @ right)
+    errors: list[Floats] = []
+    for group in groups:
+        own = q[group]
+        spare = np.eye(len(group)) - own @ own.T
+        determined = np.linalg.eigvalsh(spare)[0] > _RANK_LIMIT
+        missed = np.abs(np.linalg.solve(spare, residual[group])) if determined else np.full(len(group), np.inf)
+        errors.append(missed)
+    return np.concatenate(errors) * (target.size / max(target.size - rates, 1))
 
 
 def _weights(uncertainty: ArrayLike | None, target: Floats) -> Floats:

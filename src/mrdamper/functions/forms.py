@@ -100,7 +100,7 @@ class Form:
 
     def columns(self, I: Floats, f: Floats, A: Floats, rates: Sequence[float]) -> Floats:
         """(N, terms) array of the terms."""
-        return np.column_stack([term(I, f, A, rates) for term in self.terms])
+        return np.column_stack([term(I, f, A, rates) for term in self.terms]) if self.terms else np.empty((I.size, 0))
 
     def slopes(self, columns: Floats, I: Floats, f: Floats, rates: Sequence[float]) -> Floats:
         """(rates, N, terms) derivatives of the columns by the logarithm of each rate."""

@@ -328,6 +328,13 @@ def fit_functions_jointly(runs: Sequence[Run], identifications: Sequence[Identif
     return FitResult(fit.damper, refit, fit)
 
 
+def fit_current_laws(runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
+    """Parameter functions of the current alone, fitted to the forces of all runs at once."""
+    about = _about(runs, identifications, "current laws")
+    fit, refit = fit_modified_jointly(runs, identifications, about, any_motion=False)
+    return FitResult(fit.damper, refit, fit)
+
+
 def fit_global_model(runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
     """One set of parameters for every condition, of the model that takes the current as an input."""
     choice = identify_jointly(runs)
@@ -367,6 +374,15 @@ def jointly(name: str) -> Recipe:
     apart, cls = modified(name), model_type(name)
     title = f"{cls.title}, functions fitted jointly"
     return Recipe(f"{name}:joint", apart.basis, fit_functions_jointly, "joint", title, cls.source, apart.limits)
+
+
+def current_only(name: str) -> Recipe:
+    """A model whose parameters follow the current alone, fitted to all forces at once."""
+    apart, cls = modified(name), model_type(name)
+    title = f"{cls.title}, laws over the current only"
+    return Recipe(
+        f"{name}:current", apart.basis, fit_current_laws, "current laws", title, cls.source, "the same at any motion"
+    )
 
 
 def play_and_bypass() -> Recipe:
@@ -425,7 +441,7 @@ def study_methods() -> Mapping[str, type[StudyMethod]]:
 def catalogue() -> Mapping[str, Recipe]:
     """Every recipe that can be compared, by name; models and dampers dropped in are found."""
     found = [modified(name) for name in all_models() if name != JOINTLY]
-    found += [jointly(name) for name in _closed_shapes()]
+    found += [make(name) for name in _closed_shapes() for make in (jointly, current_only)]
     found += [recipe for method in study_methods().values() for recipe in method.compared()]
     found += [play_and_bypass(), *(conditioned(cls) for cls in all_published().values())]
     return {recipe.name: recipe for recipe in found}

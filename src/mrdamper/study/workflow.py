@@ -34,6 +34,7 @@ from mrdamper.study.recipe import (
     Recipe,
     Scored,
     StudyMethod,
+    current_only,
     fit_and_score_all,
     jointly,
     modified,
@@ -450,7 +451,7 @@ def _steps(
     """The recipes of a study, and the runs each is followed on: sines run by run, everything at once."""
     steps: list[tuple[Recipe, Sequence[Run]]] = []
     if len(train) > 1:
-        steps += [(make(name), train) for name in STUDIED for make in (modified, jointly)]
+        steps += [(make(name), train) for name in STUDIED for make in (modified, jointly, current_only)]
     pure = [run for run in train if analyse_motion(run).is_sine]  # published methods take no other
     if method is not None:
         steps.append((method.recipe(pure), train))

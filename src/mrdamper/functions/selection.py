@@ -1,0 +1,141 @@
+"""One rule for every choice between a smaller and a larger model, the folds it rests on, and the laws of physics.
+
+A model, a form of a parameter function or a term of a model is chosen by cross-validation: the
+smaller one wins within one standard error of the difference [Breiman et al. 1984, §3.4.3; Hastie,
+Tibshirani and Friedman 2009, §7.10], provided that it is no worse in the kind of fold in which it
+is worst. A form is no candidate where the tests cannot support it: at most one parameter fewer
+than current levels in a law over the current, and two fewer than distinct motions over the
+motion; nor where it breaks a law of physics within the tested box or 20 % beyond it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from mrdamper.data import Condition, Floats, current_levels, same_condition, same_motion
+from mrdamper.functions.forms import Form, ParameterFunction
+from mrdamper.functions.motion_hull import MotionHull
+
+Errors = Mapping[str, Floats]  # by kind of fold: the error of every unit left out, in one order for all models
+BEYOND = 1.2  # largest current [of the largest tested] up to which a function obeys physics
+_MOTIONS = 0.05  # frequencies and amplitudes this close are one motion
+_FALL = 0.01  # fall of a yield force [of its largest value] below which it does not fall
+
+
+def mean_error(errors: Errors) -> float:
+    """Mean over the kinds of fold of the mean error in each; infinite without folds."""
+    means = [float(np.mean(values)) for values in errors.values() if len(values)]
+    return float(np.mean(means)) if means else float("inf")
+
+
+def smaller_wins(smaller: Errors, larger: Errors) -> bool:
+    """Decide between two models by their cross-validated errors.
+
+    Parameters
+    ----------
+    smaller, larger : mapping of str to (N,) array
+        Errors of the same units left out, by kind of fold. Kinds that only one of them has do not count.
+
+    Returns
+    -------
+    bool
+        Whether the smaller model is within one standard error of the larger one, over all kinds
+        and in the kind in which it is worst.
+    """
+    kinds = [kind for kind in smaller if kind in larger and len(smaller[kind])]
+    if not kinds:
+        return True
+    worst = max(kinds, key=lambda kind: float(np.mean(smaller[kind])))
+    if not np.isfinite([np.mean(larger[kind]) for kind in kinds]).all():
+        return True
+    if not np.isfinite([np.mean(smaller[kind]) for kind in kinds]).all():
+        return False
+    excess = {kind: np.asarray(smaller[kind]) - np.asarray(larger[kind]) for kind in kinds}
+    variance = {kind: _variance_of_mean(values) for kind, values in excess.items()}
+    over_kinds = float(np.mean([np.mean(values) for values in excess.values()]))
+    standard_error = float(np.sqrt(np.sum(list(variance.values())))) / len(kinds)
+    return over_kinds <= standard_error and float(np.mean(excess[worst])) <= np.sqrt(variance[worst])
+
+
+def _variance_of_mean(values: Floats) -> float:
+    """Squared standard error of a mean; of a single value there is none to tell, and zero stands for it."""
+    return float(np.var(values, ddof=1) / len(values)) if len(values) > 1 else 0.0
+
+
+def fold_groups(conditions: Sequence[Condition]) -> dict[str, list[list[int]]]:
+    """Indices of conditions that are left out together, by kind of fold: a condition, an inner current, a motion.
+
+    A form is chosen for what lies between the tested currents: a fold without the lowest or the
+    highest one would ask for an extrapolation that no law over two remaining levels supports.
+    """
+    groups = {"condition": same_condition(conditions)}
+    levels = np.array(current_levels([abs(c.current_A) for c in conditions]))
+    currents = [np.flatnonzero(levels == level).tolist() for level in np.unique(levels)]
+    motions = same_motion(conditions, _MOTIONS)
+    if len(currents) > 2:
+        groups["current"] = currents[1:-1]
+    if len(motions) > 2:
+        groups["motion"] = motions
+    return groups
+
+
+def supported(form: Form, conditions: Sequence[Condition]) -> bool:
+    """Whether a form has few enough parameters for the current levels and the distinct motions that were tested.
+
+    Two levels carry a straight line: a law over the current has a parameter fewer than there are
+    levels, but two at least where the current changes at all.
+    """
+    levels = len(set(current_levels([abs(c.current_A) for c in conditions])))
+    over_current = 1 if levels < 2 else max(levels - 1, 2)
+    return form.current_terms <= over_current and form.motion_terms <= max(
+        len(same_motion(conditions, _MOTIONS)) - 2, 0
+    )
+
+
+def broken_law(function: ParameterFunction, conditions: Sequence[Condition], unit: str) -> str:
+    """Say which law of physics a function of a dissipating parameter breaks within the tests and 20 % beyond.
+
+    Parameters
+    ----------
+    function : ParameterFunction
+        Of a parameter that must not be negative: a yield force [N], a viscous damping.
+    conditions : sequence of Condition
+        Tested.
+    unit : str
+        Unit of the parameter; one in N is a yield force and may not fall where a straight line over the
+        current does not.
+
+    Returns
+    -------
+    str
+        Empty where it breaks none.
+    """
+    tested = np.unique(current_levels([abs(c.current_A) for c in conditions]))
+    currents = np.unique(np.concatenate([np.linspace(0.0, BEYOND * tested[-1], 61), tested]))
+    motions = MotionHull.of(conditions).corners
+    values = np.array([np.broadcast_to(function(currents, *motion), currents.shape) for motion in motions])
+    if values.min() < 0:
+        where = np.unravel_index(values.argmin(), values.shape)
+        return f"negative at {currents[where[1]]:.3g} A"
+    rise = np.diff(values, axis=1)
+    slack = _FALL * np.abs(values).max()
+    for row, one in zip(rise, values, strict=True):
+        if not row.size or not (row.min() < 0 < row.max()):
+            continue
+        falls, climbs = (float(np.sum(part[part > 0])) for part in (-row, row))
+        shown = np.diff(one[np.isin(currents, tested)])
+        if unit == "N" and falls > slack:
+            return "a yield force that falls with the current"
+        if min(falls, climbs) > slack and (shown.size < 2 or not shown.min() < 0 < shown.max()):
+            return "an extremum over the current that no test shows"
+    return ""
+
+
+def rises(shorter: ParameterFunction, longer: ParameterFunction, unit: str, conditions: Sequence[Condition]) -> bool:
+    """Whether a straight law replaces a constant without a test: the yield force of an MR damper rises with current."""
+    if (shorter.form, longer.form, unit) != ("constant", "linear-current", "N"):
+        return False
+    highest = max(abs(c.current_A) for c in conditions)
+    return bool(longer.coefficients[0] > 0 and highest > 0)
