@@ -7,7 +7,6 @@ parameters that ask for a frequency and an amplitude: one definition, looking ba
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +14,8 @@ import numpy as np
 from mrdamper.dampers.coil import field_step
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import ExcitationError, ParameterError
-from mrdamper.tracing import Program, Tape, Traced, program
+from mrdamper.motion.traced import TracedMotion, TracedStep
+from mrdamper.tracing import Program, Tape, program
 from mrdamper.tracing.compiled import RecordProgram
 
 if TYPE_CHECKING:
@@ -24,30 +24,6 @@ if TYPE_CHECKING:
 
 SLACK = 0.02  # a test bench repeats a condition to a few per cent; within that nothing is extrapolated
 _STEADY = 1e-18  # mean square displacement under which nothing moves [m²]
-
-
-@dataclass(frozen=True, eq=False)
-class TracedStep(Traced):
-    """A channel that enters by its step from sample to sample only: the path, or time."""
-
-    tape: Tape
-    step: Any
-
-
-@dataclass(frozen=True, eq=False)
-class TracedMotion(Traced):
-    """What an `Excitation` is for one sample."""
-
-    tape: Tape
-    displacement: Any
-    velocity: Any
-    acceleration: Any
-    current: Any
-    time: TracedStep
-    path: TracedStep
-
-    def __len__(self) -> int:
-        return 1
 
 
 def free_name(number: str) -> str:

@@ -20,7 +20,10 @@ from mrdamper.tracing import Tape, choose, functions, streamed
 def follow_step(tape: Tape, shape: Shape, path: Any, zeta0: ArrayLike = 0.0) -> Any:
     """`follow` for one sample."""
     zeta = tape.remember("zeta", float(zeta0))  # type: ignore[arg-type]
-    reached = step(shape, zeta, path.step)
+    turned = zeta
+    for turn in path.turns:
+        turned = choose(turn == 0.0, lambda held=turned: held, lambda held=turned, dx=turn: step(shape, held, dx))
+    reached = step(shape, turned, path.step)
     tape.update(zeta, reached)
     return reached
 

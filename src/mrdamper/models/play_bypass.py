@@ -16,6 +16,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.models.base import Model, Scale, SearchAxis
+from mrdamper.models.recorded import recorded
 from mrdamper.motion import Excitation, Path
 from mrdamper.motion.lag import first_order_lag, leaking_load
 from mrdamper.motion.path import lately_along
@@ -127,6 +128,7 @@ class PlayBypass(Model):
         """fy(I) [N]."""
         return _level_law(current, self.fy0, self.fy1, self.Ic, self.si)
 
+    @recorded
     def state(self, motion: Excitation) -> Floats:
         """S (N,), the lagged share of the yield force."""
         v, seat = motion.velocity, np.minimum(self.e, self.d)
@@ -233,7 +235,10 @@ def _seated(velocity: Floats, vh: float, fading: Floats, along: Floats) -> Float
 def play_step(tape: Tape, path: Any, limit: Any, start: float = 0.0) -> Any:
     """`play_position` for one sample."""
     held = tape.remember("play", start)
-    moved = np.clip(held + path.step, -limit, limit)
+    turned = held
+    for turn in path.turns:
+        turned = tape.select(turn == 0.0, turned, np.clip(turned + turn, -limit, limit))
+    moved = np.clip(turned + path.step, -limit, limit)
     tape.update(held, moved)
     return moved
 

@@ -146,11 +146,10 @@ def _solved(size: int, signal: Floats, rows: Callable[[slice], Floats]) -> Float
     """Least-squares coefficients of some rows over the samples; long records block by block, as triangles."""
     if size <= _BLOCK:
         return solve_linear(rows(slice(None)).T, signal)
-    triangle: Floats | None = None
+    triangle: Floats = np.empty((0, rows(slice(0, 1)).shape[0] + 1))
     for part in _blocks(size):
         table = np.vstack([rows(part), signal[part]]).T
-        triangle = np.linalg.qr(table if triangle is None else np.vstack([triangle, table]), mode="r")
-    assert triangle is not None
+        triangle = np.asarray(np.linalg.qr(np.vstack([triangle, table]), mode="r"))
     return solve_linear(triangle[:, :-1], triangle[:, -1])
 
 

@@ -89,7 +89,10 @@ def _summed(spans: Iterable[Floats], value: Floats) -> Floats:
 def load_step(tape: Tape, time: Any, path: Any, length: Any, leak: Any) -> Any:
     """`leaking_load` for one sample."""
     held = tape.remember("load", 1.0)
-    built, leaked = abs(path.step) / length, time.step * leak
+    travelled = abs(path.step)
+    for turn in path.turns:
+        travelled = travelled + abs(turn)
+    built, leaked = travelled / length, time.step * leak
     both = built + leaked
     settled = choose(both > 0, lambda: built / both, lambda: 1.0)
     moved = tape.select(tape.first, 1.0, settled + (held - settled) * np.exp(-both))

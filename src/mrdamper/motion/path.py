@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import wraps
+from functools import cached_property, wraps
 from typing import Any, Literal, Self
 from weakref import ref
 
@@ -95,6 +95,23 @@ class Path:
     def travel(self) -> Floats:
         """(N,) distance travelled since the first sample, round the reversals [m]."""
         return np.cumsum([0.0, *self.lengths])[self.stroke] + self.distance
+
+    @cached_property
+    def moves(self) -> tuple[Floats, Floats, Floats]:
+        """(N,) signed moves [m] from sample to sample: to a reversal between the two, to another, and the rest.
+
+        Where the motion turns between two samples it goes on to the reversal first; noise turns it twice at most.
+        """
+        signed = self.direction * self.distance
+        turn, back, move = np.zeros_like(signed), np.zeros_like(signed), np.diff(signed, prepend=signed[0])
+        at = np.flatnonzero(np.diff(self.stroke)) + 1
+        if at.size:
+            lengths, before = np.array([*self.lengths, 0.0]), at - 1
+            turn[at] = self.direction[before] * (lengths[self.stroke[before]] - self.distance[before])
+            twice = self.stroke[at] - self.stroke[before] == 2
+            back[at] = np.where(twice, -self.direction[before] * lengths[self.stroke[before] + 1], 0.0)
+            move[at] = signed[at]
+        return turn, back, move
 
 
 def lately_along(function: Callable[..., Floats]) -> Callable[..., Floats]:

@@ -21,7 +21,7 @@ SCRATCH = ".mrdamper-compiling-"  # how folders begin in which something is comp
 VARIABLE = "MRDAMPER_COMPILER"  # a command, or "none": no compiler is used
 _NAMES = ("cc", "gcc", "clang", "cl")
 # No contraction and no unsafe mathematics: the same numbers as the interpreter's, on every processor.
-_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden", "-fPIC", "-shared", "-w")
+_FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden", "-fPIC", "-shared", "-w")
 _VISUAL = ("/nologo", "/O2", "/fp:precise", "/LD", "/w")
 _PATIENCE = 60.0  # s, after which a compiler is given up
 

@@ -78,9 +78,18 @@ class RecordProgram:
         arrays = [np.asarray(channel, dtype=float) for channel in channels]
         size = arrays[0].size
         self._walked += size * self._lines
-        if self._walked > _WORTHWHILE and self._library is not None:
-            return _compiled_along(self._library, self.program, given, derived, memory, arrays)
+        if self._walked > _WORTHWHILE and (library := self._library) is not None:
+            return _compiled_along(library, self.program, given, derived, memory, arrays)
         return self._interpreted(given, derived, memory, arrays)
+
+    def compiled_along(
+        self, given: Sequence[float], derived: Sequence[float], memory: Sequence[float], channels: Sequence[ArrayLike]
+    ) -> Along | None:
+        """The same as `along`, compiled whatever the length; None without a usable compiler."""
+        if (library := self._library) is None:
+            return None
+        arrays = [np.asarray(channel, dtype=float) for channel in channels]
+        return _compiled_along(library, self.program, given, derived, memory, arrays)
 
     def _interpreted(
         self, given: Sequence[float], derived: Sequence[float], memory: Sequence[float], arrays: Sequence[Floats]
@@ -114,8 +123,12 @@ class RecordProgram:
         return python_source(self.program).count("\n")
 
     @cached_property
+    def _source(self) -> str:
+        return record_source(self.program)
+
+    @property
     def _library(self) -> ctypes.CDLL | None:
-        return load(record_source(self.program), self._holds)
+        return load(self._source, self._holds)
 
     def _holds(self, library: ctypes.CDLL) -> bool:
         """Whether a library gives what the interpreter gives, on a short motion."""

@@ -7,6 +7,8 @@ import re
 
 from mrdamper.tracing import Expression, Program
 from mrdamper.tracing.c_writer import CWriter
+from mrdamper.tracing.expression import SAMPLE
+from mrdamper.tracing.program import postorder
 
 PREAMBLE = """\
 #include <math.h>
@@ -62,14 +64,17 @@ _RECORD = """
 EXPORT whole along(const real *p, const real *d, real *memory, whole samples, const real *const *inputs,
     const whole *strides, real *const *outputs)
 {{
-    real s[{memory}], u[{inputs}], out[{outputs}];
+    real s[{memory}], u[{inputs}], out[{outputs}], m[{kept}];
     whole i, k;
     memcpy(s, memory, sizeof s);
+    for (k = 0; k < {kept}; k++) {{
+        m[k] = NAN;
+    }}
     for (i = 0; i < samples; i++) {{
         for (k = 0; k < {inputs}; k++) {{
             u[k] = inputs[k][i * strides[k]];
         }}
-        if (!step_0(p, d, s, u, out)) {{
+        if (!step_0(p, d, s, u, out, m)) {{
             break;
         }}
         for (k = 0; k < {outputs}; k++) {{
@@ -83,17 +88,65 @@ EXPORT whole along(const real *p, const real *d, real *memory, whole samples, co
 
 
 class ArrayWriter(CWriter):
-    """C whose parameters, derived numbers, memory, inputs and outputs are elements of arrays."""
+    """C whose parameters, derived numbers, memory, inputs and outputs are elements of arrays.
+
+    Parameters
+    ----------
+    program : Program
+    keep : bool
+        Keep what hangs on the time step or the current alone until these change; step functions then take one array
+        more.
+    """
 
     member = "["
 
-    def __init__(self, program: Program):
+    def __init__(self, program: Program, keep: bool = False):
         super().__init__(program)
         tape = program.tape
         self._places = {id(e): f"p[{i}]" for i, e in enumerate(tape.parameters.values())}
         self._places |= {id(e): f"u[{i}]" for i, e in enumerate(tape.inputs.values())}
         self._places |= {id(e): f"s[{i}]" for i, e in enumerate(tape.memory.values())}
         self._places |= {id(e): f"d[{i}]" for i, e in enumerate(program.derived)}
+        self.kept = 0  # numbers that are kept
+        self.refresh = self._keep_slow() if keep else ""
+
+    def _keep_slow(self) -> str:
+        """Give places to the largest expressions of the slow inputs alone; the code that computes them anew."""
+        groups: dict[frozenset[str], list[Expression]] = {}
+        needs, users = _slow_needs(self.program)
+        for node, named in needs.items():
+            if named and _is_dear(node) and not all(needs.get(user) for user in users.get(node, [])):
+                groups.setdefault(named, []).append(node)
+        text = ""
+        for named, nodes in groups.items():
+            inputs = [self._places[id(e)] for name, e in self.program.tape.inputs.items() if name in named]
+            held = [f"m[{self.kept + i}]" for i in range(len(inputs))]
+            self.kept += len(inputs)
+            lines = [f"        {place} = {value};" for place, value in zip(held, inputs, strict=True)]
+            fresh = {}
+            for node in nodes:
+                fresh[id(node)] = f"m[{self.kept}]"
+                lines.append(f"        m[{self.kept}] = {self._expanded(node)};")
+                self.kept += 1
+            changed = " || ".join(f"{place} != {value}" for place, value in zip(held, inputs, strict=True))
+            text += f"    if ({changed}) {{\n" + "\n".join(lines) + "\n    }\n"
+            self._places |= fresh
+        return text
+
+    def _expanded(self, value: object) -> str:
+        """An expression down to what is known before any statement."""
+        if not isinstance(value, Expression):
+            return self.number(value)  # type: ignore[arg-type]
+        if id(value) in self._places:
+            return self._places[id(value)]
+        parts = [self._expanded(part) for part in value.args]
+        if value.op == "select":
+            return f"({parts[0]} ? {parts[1]} : {parts[2]})"
+        return self.formats[value.op].format(*parts)
+
+    def text(self, value: object) -> str:
+        place = self._places.get(id(value)) if isinstance(value, Expression) else None
+        return place or super().text(value)
 
     def number(self, value: float) -> str:
         if math.isnan(value):
@@ -115,10 +168,40 @@ class ArrayWriter(CWriter):
         return "".join(f"    {line}\n" for line in lines)
 
 
-def functions(program: Program, index: int = 0) -> str:
+_SLOW = frozenset({"dt", "current"})  # inputs that stay the same from sample to sample more often than not
+_DEAR = frozenset({"divide", "power", "sqrt", "exp", "expm1", "log", "log1p", "tan", "arctan", "tanh", "arctanh"})
+
+
+def _slow_needs(program: Program) -> tuple[dict[Expression, frozenset[str]], dict[Expression, list[Expression]]]:
+    """Slow inputs each expression of them alone needs, and who uses an expression."""
+    needs: dict[Expression, frozenset[str]] = {}
+    users: dict[Expression, list[Expression]] = {}
+    for node in postorder([*program.outputs.values(), *program.tape.updates.values()]):
+        if not isinstance(node, Expression) or node.op in ("memory", "carry", "result", "lookup"):
+            continue
+        if node.op == "input":
+            if node.name in _SLOW:
+                needs[node] = frozenset({node.name})
+            continue
+        parts = [part for part in node.args if isinstance(part, Expression)]
+        for part in parts:
+            users.setdefault(part, []).append(node)
+        if node.stage < SAMPLE:
+            needs[node] = frozenset()
+        elif all(part in needs for part in parts):
+            needs[node] = frozenset().union(*(needs[part] for part in parts))
+    return needs, users
+
+
+def _is_dear(node: Expression) -> bool:
+    return any(isinstance(part, Expression) and part.op in _DEAR and part.stage == SAMPLE for part in postorder([node]))
+
+
+def functions(program: Program, index: int = 0, keep: bool = False) -> str:
     """C of `prepare_INDEX(p, d)` and `step_INDEX(p, d, s, u, out)`; both return 0 where the program does not hold."""
-    writer = ArrayWriter(program)
-    setup, body = writer.setup(), writer.sample() + writer.results()
+    writer = ArrayWriter(program, keep)
+    setup, body = writer.setup(), writer.refresh + writer.sample() + writer.results()
+    kept = f", real m[{max(1, writer.kept)}]" if keep else ""
     names = [re.sub(r"\W", "_", f"table_{index}_{i}") for i in range(len(program.tape.tables))]
     tables, defined = [], []
     for i, (name, table) in enumerate(zip(names, program.tape.tables, strict=True)):
@@ -134,7 +217,7 @@ def functions(program: Program, index: int = 0) -> str:
         f"static int prepare_{index}(const real *restrict p, real *restrict d)\n{{\n"
         f"    (void)p;\n    (void)d;\n{setup}    return 1;\n}}\n\n"
         f"static inline int step_{index}(const real *restrict p, const real *restrict d, real *restrict s,\n"
-        "    const real *restrict u, real *restrict out)\n{\n"
+        f"    const real *restrict u, real *restrict out{kept})\n{{\n"
         f"    (void)p;\n    (void)d;\n    (void)s;\n    (void)u;\n{body}    return 1;\n}}\n"
     )
 
@@ -143,6 +226,7 @@ def record_source(program: Program) -> str:
     """C of a library that prepares a program and runs it along a record."""
     tape = program.tape
     sizes = {"memory": len(tape.memory), "inputs": len(tape.inputs), "outputs": len(program.outputs)}
+    sizes["kept"] = ArrayWriter(program, keep=True).kept
     prepare = "\nEXPORT int prepare(const real *p, real *d)\n{\n    return prepare_0(p, d);\n}\n"
     along = _RECORD.format(**{name: max(1, size) for name, size in sizes.items()})
-    return PREAMBLE + functions(program) + prepare + along
+    return PREAMBLE + functions(program, keep=True) + prepare + along

@@ -1,0 +1,78 @@
+"""States of models along whole records, compiled from the models' own array code."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from typing import Any
+
+import numpy as np
+
+from mrdamper.data import Floats
+from mrdamper.motion import Excitation
+from mrdamper.motion.path import lately_along
+from mrdamper.motion.traced import TracedMotion, TracedStep
+from mrdamper.tracing import Tape, program
+from mrdamper.tracing.compiled import RecordProgram
+
+_CHANNELS = ("displacement", "velocity", "acceleration", "current", "dt", "turn", "turn_back", "move")
+_WORTHWHILE = 300_000  # samples followed, from which compiling pays
+
+
+def recorded(state: Callable[[Any, Excitation], Floats]) -> Callable[[Any, Excitation], Floats]:
+    """Have a model's `state` follow records compiled, where there is a compiler.
+
+    The array code runs once on symbols; without a compiler, and for few samples, it runs as it is written. Both
+    agree to rounding. For models whose state is one number a sample.
+    """
+    known: dict[type, list[RecordProgram]] = {}
+    followed = 0
+
+    @wraps(state)
+    def along(self: Any, motion: Excitation) -> Floats:
+        nonlocal followed
+        if not isinstance(motion, Excitation):
+            return state(self, motion)
+        followed += len(motion)
+        values = self.values()
+        if followed < _WORTHWHILE or not all(isinstance(value, float | int) for value in values.values()):
+            return state(self, motion)
+        given = tuple(map(float, values.values()))
+        records = known.setdefault(type(self), [])
+        for record in records:
+            if (derived := record.prepare(given)) is not None:
+                break
+        else:
+            record = RecordProgram(_traced(type(self), values, state))
+            derived = record.prepare(given)
+            records.append(record)
+        found = derived is not None and record.compiled_along(given, derived, record.starts, channels(motion))
+        return found.outputs[0] if found and found.failed < 0 else state(self, motion)
+
+    return along
+
+
+def channels(motion: Excitation) -> tuple[Floats, ...]:
+    """The inputs of a program that follows a motion: its channels, the time steps and the moves of its path."""
+    steps = _steps(motion.time)
+    arrays = (motion.displacement, motion.velocity, motion.acceleration, motion.current)
+    return (*arrays, steps, *motion.path.moves)
+
+
+@lately_along
+def _steps(time: Floats) -> Floats:
+    """(N,) steps of time to what its rounding leaves: steps that differ by it are one, and what hangs on it is kept."""
+    if time.size < 2:
+        return np.ones(1)
+    steps = np.diff(time, prepend=2 * time[0] - time[1])
+    rounding = 4 * float(np.spacing(np.max(np.abs(time))))
+    return np.maximum(rounding * np.round(steps / rounding), rounding)
+
+
+def _traced(model: type, values: dict[str, float], state: Callable[[Any, Any], Any]) -> Any:
+    """The program of a model's state at one sample, its parameters free."""
+    tape = Tape()
+    x, v, a, current, dt, turn, back, move = (tape.input(name) for name in _CHANNELS)
+    motion = TracedMotion(tape, x, v, a, current, TracedStep(tape, dt), TracedStep(tape, move, (turn, back)))
+    free = model(**{name: tape.parameter(name, value) for name, value in values.items()})
+    return program(tape, {"state": state(free, motion)})
