@@ -49,7 +49,7 @@ def along(made: RecordProgram) -> np.ndarray:
 
 
 def interpreted(made: RecordProgram) -> np.ndarray:
-    return made._interpreted(
+    return made.interpreted_along(
         (2.0,), made.prepare((2.0,)), made.starts, (np.sin(TIME), np.full(TIME.size, 0.01))
     ).outputs[0]
 

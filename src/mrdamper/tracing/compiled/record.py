@@ -80,7 +80,7 @@ class RecordProgram:
         self._walked += size * self._lines
         if self._walked > _WORTHWHILE and (library := self._library) is not None:
             return _compiled_along(library, self.program, given, derived, memory, arrays)
-        return self._interpreted(given, derived, memory, arrays)
+        return self.interpreted_along(given, derived, memory, arrays)
 
     def compiled_along(
         self, given: Sequence[float], derived: Sequence[float], memory: Sequence[float], channels: Sequence[ArrayLike]
@@ -91,7 +91,7 @@ class RecordProgram:
         arrays = [np.asarray(channel, dtype=float) for channel in channels]
         return _compiled_along(library, self.program, given, derived, memory, arrays)
 
-    def _interpreted(
+    def interpreted_along(
         self, given: Sequence[float], derived: Sequence[float], memory: Sequence[float], arrays: Sequence[Floats]
     ) -> Along:
         outputs = np.empty((len(self.program.outputs), arrays[0].size))
@@ -140,7 +140,7 @@ class RecordProgram:
         if derived is None:
             return True
         found = _compiled_along(library, self.program, given, derived, self.starts, arrays)
-        expected = self._interpreted(given, derived, self.starts, arrays)
+        expected = self.interpreted_along(given, derived, self.starts, arrays)
         if found.failed != expected.failed:
             return False
         size = _TRIED if expected.failed < 0 else expected.failed
