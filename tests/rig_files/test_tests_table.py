@@ -51,11 +51,17 @@ def test_a_template_is_written_completed_and_used(rig, tmp_path):
     assert run("import", rig, "--write-tests", table).exit_code == 0
     lines = table.read_text().splitlines()
     assert lines[0] == "file,run,current_A,temperature_C,split,session,specimen,notes"
-    completed = [lines[0], *(line.replace(",,,train", ",0.5,,validate", 1) for line in lines[1:])]
+    completed = [lines[0]]
+    for number, line in enumerate(lines[1:]):  # three motions at each of three currents
+        completed.append(line.replace(",,,train", f",{0.5 * (number // 3)},,validate", 1))
     table.write_text("\n".join(completed) + "\n")
     done = run("import", rig, "--out", tmp_path / "ds", "--tests", table)
     assert done.exit_code == 0, done.output
-    assert {(item.current_A, item.split) for item in load_dataset(tmp_path / "ds")} == {(0.5, "validate")}
+    assert {(item.current_A, item.split) for item in load_dataset(tmp_path / "ds")} == {
+        (0.0, "validate"),
+        (0.5, "validate"),
+        (1.0, "validate"),
+    }
 
 
 @pytest.mark.parametrize(

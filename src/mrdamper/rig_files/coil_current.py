@@ -14,6 +14,7 @@ from mrdamper.rig_files.conditions import (
     Statement,
     agreed,
     contradicted,
+    contradicts,
     currents_in,
     stated_by_lines,
     stated_in_titles,
@@ -40,6 +41,7 @@ def current_of(
         contradicts the channel, E_RANGE if one is no coil current.
     """
     if profile.current is not None and profile.current.value is not None:
+        _refuse_contradiction(profile.current.value, channel, _statements(table, path), printable(table.source.name))
         return profile.current.value, {"current_from": "profile"}
     if profile.current is not None:
         found = current_in_name(path.name, profile)
@@ -49,7 +51,7 @@ def current_of(
         if not statements and channel is None:
             statements = _set_points(table, rows) or stated_in_titles(table.remarks) or _folders(table, path)
     where = printable(table.source.name)
-    mend = "correct the name or the line, or say [current] value = ... in a profile"
+    mend = "correct the name or the line that is wrong"
     try:
         stated = agreed(statements)
     except ValueError as error:
@@ -60,7 +62,7 @@ def current_of(
         if mean is not None:
             raise ColumnError(
                 printable(f"{stated.whence} gives {stated.amperes:g} A, the current channel {mean:g} A"), where=where,
-                mend=f"if the channel is right, rename; else say [current] value = {stated.amperes:g} in a profile",
+                mend="if the channel is right, rename; else leave the channel out of the export",
                 code="E_CURRENT_CONTRADICTS",
             )  # fmt: skip
     if channel is not None or stated is None:
@@ -68,11 +70,25 @@ def current_of(
     return stated.amperes, {"current_from": as_data(stated.whence)}
 
 
+def _refuse_contradiction(value: float, channel: Floats | None, statements: list[Statement], where: str) -> None:
+    """Refuse a profile's current that a channel, a name, a heading or a result of the file contradicts."""
+    mean = None if channel is None else contradicted(channel, value)
+    others = [f"the current channel gives {mean:g} A"] if mean is not None else []
+    others += [f"{s.whence} gives {s.amperes:g} A" for s in statements if contradicts(s.amperes, value)]
+    if others:
+        raise ColumnError(
+            printable(f"the profile says {value:g} A, {others[0]}"), where=where,
+            mend="leave [current] out of the profile; if the file is wrong, correct it, or rename it",
+            code="E_CURRENT_CONTRADICTS",
+        )  # fmt: skip
+
+
 def _statements(table: RawTable, path: Path) -> list[Statement]:
     """Every current that stands beside the columns, the surest place first."""
     held = held_current_of(table)
     found = [] if held is None else [Statement(held, table.stated_in or "a number in the file")]
-    found += stated_by_lines(table.remarks, table.form.get("decimal"))  # type: ignore[arg-type]
+    lines = [line for line in table.remarks if line not in table.titles]
+    found += stated_by_lines(lines, table.form.get("decimal"))  # type: ignore[arg-type]
     member = table.source.name.removeprefix(f"{path.name}:").removeprefix(f"{path.name}, sheet ")
     for text, whence in ((table.label, "the title"), (path.name, "file name"), (member, "file name")):
         stated = currents_in(text)
@@ -101,7 +117,7 @@ def _folders(table: RawTable, path: Path) -> list[Statement]:
     """The nearest folder, of a file or within an archive, whose name states a current."""
     inner = PurePosixPath(table.source.name.removeprefix(f"{path.name}:")).parent.parts
     for name in (*reversed(inner), *(folder.name for folder in list(path.parents)[:_FOLDERS])):
-        stated = currents_in(name)
+        stated = currents_in(name) or tuple(s.amperes for s in stated_by_lines([name]))
         if stated:
             return [Statement(stated[0], f"the folder {name!r}")] if len(stated) == 1 else []
     return []

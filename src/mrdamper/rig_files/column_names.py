@@ -92,6 +92,7 @@ _COIL = frozenset(
 _FACTOR = re.compile(r"[\s_][x×*·]\s?10+(?![0-9])|\bp-p\b")  # Force x10, Force p-p
 _COMPRESSION = ("compress", "jounce", "bump", "druckkraft", "druckweg", "einfeder", "compresi", "druckstufe")
 _BRACKETED = re.compile(r"^(?P<name>.*?)\s*[\[({<](?P<unit>[^\[\](){}<>]{1,40})[\])}>]\s*$", re.DOTALL)
+_INNER = re.compile(r"^(?P<name>[^\[({<]+?)\s*[\[({<](?P<unit>[^\[\](){}<>]{1,20})[\])}>]\s*[-–:,;@|/].*$", re.DOTALL)
 _SLASHED = re.compile(r"^(?P<name>.*\S)\s*(?:\s/\s*|,\s*|\s+in\s+|\s*;\s*)(?P<unit>\S{1,20})$", re.DOTALL)
 _EAST_ASIAN = re.compile("[\u3040-\u30ff\u4e00-\u9fff\uac00-\ud7af]")
 _LONGEST_NAME = 200  # beyond, it is no name, and matching it could take long
@@ -132,6 +133,9 @@ def split_name(header: str, unit: str = "") -> Header:
         match = pattern.match(text)
         if match and parse_unit(match["unit"].strip()):
             return Header(match["name"].strip(), match["unit"].strip())
+    inner = _INNER.match(text)
+    if inner and parse_unit(inner["unit"].strip()):  # Position (mm) - Mod1/ai0
+        return Header(inner["name"].strip(), inner["unit"].strip())
     # The longest tail that is a unit: velocity_m_s before velocity_m and s.
     for place in _FUSED.finditer(text):
         tail = text[place.end() :]
@@ -160,6 +164,8 @@ def role_of(name: str) -> str | None:
         return None
     if len(words) == 1 and words[0] in _SYMBOLS:
         return _SYMBOLS[words[0]]
+    if len(words) == 1 and words[0].rstrip("0123456789") in _SYMBOLS:  # t1, x1, F1
+        return _SYMBOLS[words[0].rstrip("0123456789")]
     if len(words) == 2 and _SYMBOLS.get(words[0]) == "current" and lower[1] in _COIL:  # I_coil
         return "current"
     roles = [role for role in map(_role_of_word, lower) if role is not None]

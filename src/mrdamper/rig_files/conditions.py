@@ -72,6 +72,11 @@ def currents_in(text: str) -> tuple[float, ...]:
     return tuple(dict.fromkeys(found))
 
 
+def currents_in_cells(line: str) -> list[float]:
+    """Coil currents [A] in the cells of a line, one after the other."""
+    return [value for cell in re.split(r"[\t;,|]", line) for value in currents_in(cell)]
+
+
 def without_currents(text: str) -> str:
     """A title without the currents it states."""
     return re.sub(r"\s{2,}", " ", _IN_NAME.sub(" ", text[:255])).strip() if currents_in(text) else text

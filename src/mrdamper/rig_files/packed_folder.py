@@ -13,7 +13,15 @@ from pathlib import Path, PurePosixPath
 from typing import IO
 
 from mrdamper.data.temporary import temporary_folder
-from mrdamper.rig_files.readers.archive import UNREADABLE_ZIP, as_it_is, bomb, check_member, check_sizes, opened
+from mrdamper.rig_files.readers.archive import (
+    UNREADABLE_ZIP,
+    as_it_is,
+    bomb,
+    check_member,
+    check_sizes,
+    is_junk,
+    opened,
+)
 from mrdamper.rig_files.readers.base import MOST_RATIO, MOST_UNPACKED, RigFileError, Source
 
 SUFFIXES = (".tar", ".tgz")
@@ -51,13 +59,7 @@ def is_packed_folder(path: Path) -> bool:
 
 
 def _members(members: list[zipfile.ZipInfo]) -> list[zipfile.ZipInfo]:
-    return [member for member in members if not member.is_dir() and not _is_junk(member.filename)]
-
-
-def _is_junk(name: str) -> bool:
-    """Whether a file is one that systems leave in folders: .DS_Store, __MACOSX/._run1.csv, Thumbs.db."""
-    parts = PurePosixPath(name).parts
-    return not parts or "__MACOSX" in parts or parts[-1].startswith((".", "~$")) or parts[-1] == "Thumbs.db"
+    return [member for member in members if not member.is_dir() and not is_junk(member.filename)]
 
 
 def _folder_of(path: Path, stack: contextlib.ExitStack) -> Path:
@@ -99,7 +101,7 @@ def _untar(source: Source, top: Path) -> None:
             room = _Room(source, top)
             for member in archive:
                 check_member(source, member.name, link=not (member.isfile() or member.isdir()))
-                stream = archive.extractfile(member) if member.isfile() and not _is_junk(member.name) else None
+                stream = archive.extractfile(member) if member.isfile() and not is_junk(member.name) else None
                 if stream is not None:
                     room.write(member.name, stream)
     except RigFileError:

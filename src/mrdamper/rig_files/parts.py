@@ -13,7 +13,7 @@ import numpy as np
 from mrdamper.data.pieces import pieces
 from mrdamper.errors import InputError
 from mrdamper.rig_files.column_names import role_of, words_of
-from mrdamper.rig_files.conditions import currents_in
+from mrdamper.rig_files.conditions import currents_in, currents_in_cells
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import Content, RawTable
 from mrdamper.rig_files.record import LineNumbers
@@ -120,12 +120,14 @@ def _part(
         values = {i: np.array(content.values[columns[i]][inside]) for i in wanted}
         return Content(values, _lines(content.lines, inside), content.findings)
 
+    several = tuple(line for line in table.remarks if len(set(currents_in_cells(line))) > 1) if table.over else ()
+
     def pick(values: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(values[i] for i in columns) if values else ()
 
     return replace(
         table, names=pick(table.names), units=pick(table.units), odd=pick(table.odd), over=(), read=part, words=None,
-        label="_".join(part for part in (table.label, label) if part),
+        titles=several, label="_".join(part for part in (table.label, label) if part),
     )  # fmt: skip
 
 

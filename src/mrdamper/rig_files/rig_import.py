@@ -18,6 +18,7 @@ from mrdamper.rig_files.coil_current import as_data, held_current_of
 from mrdamper.rig_files.column_names import names_compression, names_made
 from mrdamper.rig_files.columns import assign, propose, rate_of
 from mrdamper.rig_files.long_records import judge_long
+from mrdamper.rig_files.mapping.agreement import contradictions
 from mrdamper.rig_files.mapping.companions import (
     joined_parts,
     part_of,
@@ -27,8 +28,9 @@ from mrdamper.rig_files.mapping.companions import (
 )
 from mrdamper.rig_files.mapping.completion import completed
 from mrdamper.rig_files.mapping.proposals import with_channels_by_physics, with_unit_of_time
-from mrdamper.rig_files.mapping.rasters import with_one_clock
+from mrdamper.rig_files.mapping.rasters import with_joined_rasters, with_one_clock
 from mrdamper.rig_files.mapping.results import with_results
+from mrdamper.rig_files.mapping.tree import FileTree, nodes_of, problem_of
 from mrdamper.rig_files.packed_folder import is_packed_folder, unpacked
 from mrdamper.rig_files.parts import tests_of
 from mrdamper.rig_files.profile import Channel, Profile, current_pattern, load_profile, profile_hash
@@ -348,6 +350,41 @@ class _Intake:
         files = [path for path, _ in pending]
         for path, record in pending:
             self._check(path, record, [], several=files.count(path) > 1)
+        self._refuse_contradictions()
+
+    def _refuse_contradictions(self) -> None:
+        """Refuse tests of equal conditions whose forces differ several-fold."""
+        found = sorted(self._found, key=lambda entry: entry[0])
+        refused = contradictions([record for _, record in found])
+        names = {number: name for name, number in self._order.items()}
+        for i, error in refused.items():
+            number, record = found[i]
+            self.refusals.append(Refusal(names[number], error, record.id))
+        self._found = [entry for i, entry in enumerate(found) if i not in refused]
+
+
+def scan(paths: Iterable[str | Path], profile: Profile | str | Path | None = None) -> tuple[FileTree, ...]:
+    """What is in files and folders: of every file its tables, their columns, and what stands beside them."""
+    profile = _profile(profile)
+    trees = []
+    with unpacked(paths) as given:
+        for path in _files(given)[0]:
+            try:
+                with raw_tables(path, profile.file) as tables:
+                    trees.append(FileTree(path.name, nodes_of(tables)))
+            except InputError as error:
+                trees.append(FileTree(path.name, (), problem_of(error)))
+    return tuple(trees)
+
+
+def columns_of(path: str | Path, profile: Profile | str | Path | None = None) -> tuple[str, ...]:
+    """Names of the columns of a file's first table; empty if it cannot be opened."""
+    profile = _profile(profile)
+    try:
+        with raw_tables(path, profile.file) as tables:
+            return _parts(tables, profile)[0].names
+    except InputError:
+        return ()
 
 
 def found_tests(
@@ -412,7 +449,7 @@ def _unjudged(path: Path, profile: Profile) -> list[Record]:
 
 
 def _parts(tables: list[RawTable], profile: Profile) -> list[RawTable]:
-    tables = [completed(table) for table in tables]
+    tables = with_joined_rasters([completed(table) for table in tables])
     tables = [with_one_clock(table) for table in tables]
     parts = [part for table in tables for part in ([table] if table.fallback else tests_of(table, profile.file))]
     parts = [with_channels_by_physics(with_unit_of_time(table), _said(profile)) for table in with_results(parts)]

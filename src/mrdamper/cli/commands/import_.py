@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from mrdamper.rig_files.rig_import import ImportResult, Refusal
 
 
+_OF_FORM = ("W_NO_EOL", "W_FOOTER", "W_ENCODING")  # codes of notes that change nothing
+_MOST_QUESTIONS = 12  # of one import
+
+
 def register(app: typer.Typer) -> None:
     """Add the command."""
 
@@ -39,6 +43,10 @@ def register(app: typer.Typer) -> None:
             None, "--write-tests", help="Write the tests found as a table to be completed; - for standard output."
         ),
         skip_refused: bool = typer.Option(False, "--skip-refused", help="Write the good files, list the others."),
+        ask: bool | None = typer.Option(
+            None, "--ask/--no-ask", help="Ask for what the files leave open; default: on a terminal."
+        ),
+        verbose: bool = typer.Option(False, "--verbose", help="Every note, of every file."),
         quiet: bool = typer.Option(False, "--quiet", help="No progress."),
         as_json: bool = typer.Option(False, "--json", help="Print JSON a program can read."),
     ) -> None:
@@ -47,32 +55,34 @@ def register(app: typer.Typer) -> None:
         Without --skip-refused nothing is written if one test is refused.
         """
         from mrdamper.cli.progress import progress_on_stderr
-        from mrdamper.errors import InputError
         from mrdamper.rig_files.profile import Profile, load_profile
         from mrdamper.rig_files.rig_import import import_files
 
-        if out is None and write_profile is None and write_tests is None:
-            raise InputError("nothing to write", mend="give --out DATASET, --write-profile FILE or --write-tests FILE")
         _refuse_taken(out, add)
         known = load_profile(profile) if profile is not None else Profile()
         if write_profile is not None:
             _write_profile(files, known, write_profile)
         if write_tests is not None:
             _write_tests(files, known, write_tests)
-        if out is None:
+        dry = out is None
+        if dry and (write_profile is not None or write_tests is not None):
             return
+        if dry and not as_json:
+            _print_tree(files, known)
         with progress_on_stderr(quiet or as_json) as progress:
             result = import_files(files, known, tests=tests, progress=progress)
+            if (_on_terminal() if ask is None else ask) and not as_json:
+                known, result = _asked(files, known, result, tests)
         wrong = bool(result.refusals) and not skip_refused
-        written = bool(result.records) and not wrong
-        total = _write_dataset(result, known, out, add) if written else 0
+        written = bool(result.records) and not wrong and out is not None
+        total = _write_dataset(result, known, out, add) if written and out is not None else 0
         if as_json:
             import json
 
             print(json.dumps(_summary(result, out if written else None), indent=1, ensure_ascii=False))
         else:
-            _print(result, out if written else None, total)
-        if wrong or not result.records:
+            _print(result, out if written else None, total, dry=dry, verbose=verbose)
+        if not dry and (wrong or not result.records):
             raise typer.Exit(2)
 
 
@@ -173,14 +183,60 @@ def _joined(old: Dataset, new: Dataset) -> Dataset:
     return Dataset(tuple(runs), old.name)
 
 
-def _print(result: ImportResult, out: Path | None, total: int) -> None:
+def _on_terminal() -> bool:
+    import sys
+
+    return sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
+
+
+def _print_tree(files: list[Path], known: Profile) -> None:
+    from mrdamper.rig_files.mapping.tree import tree_lines
+    from mrdamper.rig_files.rig_import import scan
+
+    print("In the files:")
+    for line in tree_lines(scan(files, known)):
+        print(f"  {line}")
+
+
+def _asked(files: list[Path], known: Profile, result: ImportResult, tests: Path | None) -> tuple[Profile, ImportResult]:
+    """Ask what the refusals leave open, one question at a time, and read the files again with each answer."""
+    from mrdamper.rig_files.mapping.questions import question_of
+    from mrdamper.rig_files.profile import profile_text
+    from mrdamper.rig_files.rig_import import columns_of, import_files
+
+    before = known
+    for _ in range(_MOST_QUESTIONS):
+        questions = (question_of(refusal.error, columns_of(refusal.file, known)) for refusal in result.refusals)
+        question = next((question for question in questions if question is not None), None)
+        if question is None:
+            break
+        typer.echo(question.text)
+        for number, answer in enumerate(question.answers, 1):
+            typer.echo(f"  {number}  {answer.shown}")
+        chosen = typer.prompt("Number, 0 to stop", type=int, default=0)
+        if not 1 <= chosen <= len(question.answers):
+            break
+        known = question.answers[chosen - 1].applied(known)
+        result = import_files(files, known, tests=tests)
+    if known != before:
+        typer.echo(f"The answers as a profile:\n{profile_text(known)}")
+    return known, result
+
+
+def _print(result: ImportResult, out: Path | None, total: int, *, dry: bool = False, verbose: bool = False) -> None:
+    columns = {record.provenance["columns"] for record in result.records}
+    if dry and result.records:
+        print("Taken for tests:")
+    if len(columns) == 1 and len(result.records) > 1:
+        print(f"columns: {columns.pop()}")
     for record in result.records:
         known = record.time[~(record.time != record.time)]
         seconds = float(known[-1] - known[0])
-        current = "" if record.current is None else f"{_current(record)}, "
-        print(f"{record.id}: {record.time.size} samples, {seconds:.4g} s, {current}{record.provenance['columns']}")
-        for finding in record.findings:
-            print(f"  {finding}")
+        current = "" if record.current is None else f", {_current(record)}"
+        more = f", {record.provenance['columns']}" if columns else ""
+        print(f"{record.id}: {record.time.size} samples, {seconds:.4g} s{current}{more}")
+    for line in _finding_lines(result, verbose):
+        print(line)
     for line in _refused_lines(result):
         print(line)
     if result.left_out:
@@ -198,8 +254,30 @@ def _print(result: ImportResult, out: Path | None, total: int) -> None:
         more = f", {len(result.records)} of them new" if total > len(result.records) else ""
         whence = more or f" from {len(tests)} file{'s' * (len(tests) != 1)}"
         print(f"dataset: {out} ({total} runs{whence})")
+    elif dry:
+        count = len(result.records)
+        print(
+            f"{count} test{'s' * (count != 1)} would be written, {len(result.refusals)} refused; --out DATASET writes"
+        )
     else:
-        print("nothing written; mend or leave out the refused files, or give --skip-refused")
+        print("nothing written; correct or leave out the refused files, or give --skip-refused")
+
+
+def _finding_lines(result: ImportResult, verbose: bool) -> list[str]:
+    """What was noticed: the same once, with the number of its tests; notes on the form of files only if asked for."""
+    if verbose:
+        return [f"  {record.id}: {finding}" for record in result.records for finding in record.findings]
+    alike: dict[str, list[tuple[str, str]]] = {}
+    for record in result.records:
+        for finding in record.findings:
+            if finding.code not in _OF_FORM:
+                alike.setdefault(finding.code, []).append((record.id, finding.text))
+    lines = []
+    for code, found in alike.items():
+        first = f"{found[0][0]}: {found[0][1]} [{code}]"
+        tests = {name for name, _ in found}
+        lines.append(f"  {first}" if len(tests) == 1 else f"  {first}, in {len(tests)} tests")
+    return lines
 
 
 def _refused_lines(result: ImportResult) -> list[str]:
@@ -226,7 +304,7 @@ def _current(record: Record) -> str:
     from mrdamper.rig_files.quality.current import current_in
 
     mean, change = held_current(current := current_in(record, None))
-    return f"{current.min():.4g} to {current.max():.4g} A" if change else f"{mean:g} A"
+    return f"{current.min():.4g} to {current.max():.4g} A" if change else f"{round(mean, 3) + 0.0:g} A"
 
 
 def _summary(result: ImportResult, out: Path | None) -> dict:

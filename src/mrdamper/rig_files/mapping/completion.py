@@ -22,6 +22,9 @@ _SCALE = re.compile(
     r"(?<![\w.,])(?P<one>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>[A-Za-zµ]{1,4})\s*(?:/|=|per|pro|entspricht|->)\s*"
     r"(?P<other>[0-9]+(?:[.,][0-9]+)?)?\s*(?P<volt>[A-Za-zµ]{1,4})(?![A-Za-z0-9/])"
 )
+_TIME_UNIT = re.compile(
+    r"(?i)^[\s\"#%]*(?:horizontal|x[ -]?|h|time[ _-]?)\s*units?\"?\s*[:=,;\t]\s*\"?(?P<unit>[a-zµ]{1,12})\"?[\s,;]*$"
+)
 _MONITOR = frozenset(("mon", "monitor", "imon", "iout", "i", "current", "curr", "strom", "amp", "amplifier", "shunt"))
 _LONGEST_LINE = 300
 
@@ -31,7 +34,7 @@ def completed(table: RawTable) -> RawTable:
     if not any(table.names):
         return table
     table = _with_titles(table)
-    table = _with_listed_units(table)
+    table = _with_stated_time_unit(_with_listed_units(table))
     table = _with_clocks_and_weights(table)
     return _with_scales(table)
 
@@ -86,6 +89,20 @@ def _with_listed_units(table: RawTable) -> RawTable:
             units[i] = cells[column] if is_unit(cells[column]) else units[i]
         return replace(table, units=tuple(units))
     return table
+
+
+def _with_stated_time_unit(table: RawTable) -> RawTable:
+    """The unit of time that a line states: Horizontal Units,s; X-Unit: ms; HUnit."""
+    times = [i for i, header in enumerate(table.headers) if header.role == "time"]
+    if len(times) != 1 or table.headers[times[0]].unit:
+        return table
+    stated = {
+        m["unit"] for line in table.remarks if (m := _TIME_UNIT.match(line[:_LONGEST_LINE])) and is_unit(m["unit"])
+    }
+    units = [unit for unit in stated if (known := parse_unit(unit)) and known.dimension == "time"]
+    if len(units) != 1:
+        return table
+    return replace(table, units=tuple(units[0] if i == times[0] else u for i, u in enumerate(table.units)))
 
 
 def _with_clocks_and_weights(table: RawTable) -> RawTable:

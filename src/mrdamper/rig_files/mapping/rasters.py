@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data import Floats, held_current
 from mrdamper.errors import InputError
-from mrdamper.rig_files.column_names import Header, role_of
+from mrdamper.rig_files.column_names import Header, role_of, split_name
 from mrdamper.rig_files.readers.base import Content, RawTable
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED, Finding
 
@@ -39,6 +39,76 @@ def with_one_clock(table: RawTable) -> RawTable:
     clock = together[0] if together else owner[roles["force"][0]]
     kept = [clock, *(i for i in owner if owner[i] == clock), *(i for i in owner if owner[i] != clock)]
     return _resampled(table, clock, kept, owner)
+
+
+def with_joined_rasters(tables: list[RawTable]) -> list[RawTable]:
+    """Tables of a file, those that hold channels of one test with clocks of their own joined to one table.
+
+    Beside each other in one group lie a table of each channel, or of each sampling rate. They are joined
+    where none of them is a whole test, or where the one that is has no current and another holds it.
+    """
+    groups: dict[str, list[RawTable]] = {}
+    for table in tables:
+        if not table.fallback:
+            groups.setdefault(table.label.rpartition("/")[0], []).append(table)
+    joined: dict[int, RawTable] = {}
+    dropped: set[int] = set()
+    for label, members in groups.items():
+        timed = [table for table in members if any(header.role == "time" for header in table.headers)]
+        roles = [{h.role for h in _named(table).headers} for table in timed]
+        whole = [i for i, known in enumerate(roles) if {"displacement", "force"} <= known]
+        every = [role for known in roles for role in known if role not in ("time", None)]
+        needed = {"displacement", "force"} <= set(every) and len(set(every)) == len(every)
+        if len(timed) < 2 or len(whole) > 1 or not needed or (whole and "current" in roles[whole[0]]):
+            continue
+        if whole and "current" not in every:
+            continue
+        joined[id(timed[0])] = _joined(label, timed)
+        dropped |= {id(table) for table in timed[1:]}
+    if not joined:
+        return tables
+    kept = [table for table in tables if id(table) not in dropped and not table.fallback]
+    return [joined.get(id(table), table) for table in kept]
+
+
+def _named(table: RawTable) -> RawTable:
+    """A table of one channel with the name of its group, where its own name names nothing."""
+    title = table.label.rpartition("/")[2]
+    names = [
+        title if split_name(name).role is None and split_name(title).role is not None else name for name in table.names
+    ]
+    return replace(table, names=tuple(names)) if len(table.names) == 2 else table
+
+
+def _joined(label: str, tables: Sequence[RawTable]) -> RawTable:
+    places = [(table, i) for table in tables for i in _time_first(table)]
+    named = {id(table): _named(table) for table in tables}
+
+    def read(columns: Sequence[int]) -> Content:
+        values = {}
+        for column in columns:
+            table, i = places[column]
+            values[column] = table.read([i]).values[i]
+        return Content(values)
+
+    first = tables[0]
+    return replace(
+        first,
+        names=tuple(named[id(table)].names[i] for table, i in places),
+        units=tuple(table.units[i] for table, i in places),
+        odd=(),
+        over=(),
+        read=read,
+        words=None,
+        label=label,
+        constants={name: value for table in reversed(tables) for name, value in table.constants.items()},
+        remarks=tuple(dict.fromkeys(line for table in tables for line in table.remarks)),
+    )
+
+
+def _time_first(table: RawTable) -> list[int]:
+    times = [i for i, header in enumerate(table.headers) if header.role == "time"][:1]
+    return [*times, *(i for i in range(len(table.names)) if i not in times)]
 
 
 def _is(header: Header, role: str) -> bool:

@@ -32,7 +32,6 @@ _FOREIGN = MappingProxyType(
         b"\x28\xb5\x2f\xfd": "Zstandard",
         b"\x7fELF": "program",
         b"SQLite format 3": "SQLite",
-        b"\x93NUMPY": "NumPy array",
         b"{\\rtf": "RTF",
         b"<!DOCTYPE": "HTML",
         b"<!doctype": "HTML",

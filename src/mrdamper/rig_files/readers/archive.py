@@ -138,7 +138,7 @@ def _unzip(source: Source) -> Source:
 def _one_member(source: Source, members: list[zipfile.ZipInfo]) -> zipfile.ZipInfo:
     for member in members:
         check_member(source, member.filename, link=stat.S_ISLNK(member.external_attr >> 16))
-    files = [member for member in members if not member.is_dir()]
+    files = [member for member in members if not member.is_dir() and not is_junk(member.filename)]
     if len(files) != 1:
         raise source.refuse(
             "E_ARCHIVE", f"{len(files)} members", "read it as a folder: mrdamper import, or unpack it first"
@@ -146,6 +146,12 @@ def _one_member(source: Source, members: list[zipfile.ZipInfo]) -> zipfile.ZipIn
     if files[0].flag_bits & 1:
         raise source.refuse("E_ARCHIVE", "the member is encrypted", "unpack it first")
     return files[0]
+
+
+def is_junk(name: str) -> bool:
+    """Whether a file is one that systems leave in folders: .DS_Store, __MACOSX/._run1.csv, Thumbs.db."""
+    parts = PurePosixPath(name).parts
+    return not parts or "__MACOSX" in parts or parts[-1].startswith((".", "~$")) or parts[-1] == "Thumbs.db"
 
 
 def check_member(source: Source, name: str, *, link: bool) -> None:

@@ -128,6 +128,7 @@ class RawTable:
     odd: tuple[str, ...] = ()  # where it is known, what stands in a column instead of numbers, else empty
     remarks: tuple[str, ...] = ()  # what the file says beside the columns: lines above them, attributes, properties
     over: tuple[str, ...] = ()  # where a row of titles stands above the names of columns
+    titles: tuple[str, ...] = ()  # of `remarks` those that are titles of several tests
     words: Callable[[int], Words] | None = None  # takes the position of a column
     findings: tuple[Finding, ...] = ()  # what was decided on the way from the file to this table
     stated_in: str = ""  # where a constant that was added on that way stands

@@ -95,7 +95,7 @@ def _table(
         return unpacked(dataset.attrs, pick(array.T if turned else array, part))
 
     return array_table(
-        source, [c[0] for c in columns], [c[1] for c in columns], column_of, label=label.strip("/").replace("/", "_"),
+        source, [c[0] for c in columns], [c[1] for c in columns], column_of, label=label.strip("/"),
         title=title, fallback=fallback, constants=constants, remarks=remarks,
     )  # fmt: skip
 

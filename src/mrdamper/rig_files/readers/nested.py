@@ -9,7 +9,7 @@ its own where it has one: recordings of real-time systems, logged signals, expor
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -77,6 +77,8 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
                 inner.append((key, value))
         else:
             _tell(node, {key: value}, "")
+    if "signals" in tree and isinstance(tree.get("time"), np.ndarray):  # logged by Simulink, whose time is in seconds
+        node.columns = [replace(c, unit="s") if c.name == "time" else c for c in node.columns]
     yield node
     for key, value in inner if depth < DEEPEST else ():
         label = f"{node.label}/{key}" if node.label and key else node.label or key

@@ -24,6 +24,9 @@ Kind = Literal["number", "stamp", "text"]
 SPACES = " "  # stands for any run of spaces
 _SEPARATORS = (";", "\t", ",", "|", SPACES)
 _COMMENT = re.compile(r"^\s*(#(?!N/A|REF!|VALUE!|DIV/0|NAME\?|NULL!|NUM!)|%|//)+")  # a sheet's errors are cells
+_LISTING = re.compile(
+    r"^\s*(?:columns?|channels?|fields?|spalten|kanäle|colonnes|header|names)\s*[:=]\s*", re.IGNORECASE
+)
 _MARKS = frozenset("#%/")
 _SAMPLE = 60  # rows looked at
 _STRAY = 0.1  # of the sampled numbers: fewer with the other decimal mark are single bad cells
@@ -369,7 +372,7 @@ def _names_columns(line: str, separator: str) -> bool:
 def _fields(line: str, separator: str, width: int) -> list[str]:
     """Cells of a line of names; remark signs and one trailing separator are taken off."""
     if is_comment(line):
-        line = _COMMENT.sub("", line, count=1)
+        line = _LISTING.sub("", _COMMENT.sub("", line, count=1))
     if separator == SPACES:
         wide = re.split(r"\s{2,}|\t", line.strip())
         narrow = line.split()

@@ -1,0 +1,80 @@
+"""Tests of one set beside each other: equal conditions have equal forces, and stronger coils no weaker ones."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+
+import numpy as np
+
+from mrdamper.data import held_current
+from mrdamper.errors import QualityError
+from mrdamper.rig_files.quality.strokes import find_strokes
+from mrdamper.rig_files.record import Record
+
+_ALIKE = 0.1  # relative difference of frequency and amplitude within which two motions are one
+_ALIKE_A = 0.03  # difference of the current within which two tests have the same [A]
+_SEVERAL = 2.0  # ratio of peak-to-peak forces at equal conditions that no repetition explains
+_MOST_SAMPLES = 20_000
+
+_Point = tuple[float, float, float, float]
+
+
+def contradictions(records: Sequence[Record]) -> dict[int, QualityError]:
+    """The tests of equal conditions whose forces differ several-fold, by their place, and the refusal of each."""
+    points = [_point(record) for record in records]
+    groups: dict[tuple[str, int], list[int]] = defaultdict(list)
+    for i, point in enumerate(points):
+        if point is not None:
+            notes = records[i].provenance
+            owner = " ".join((records[i].rig, notes.get("specimen", ""), notes.get("session", "")))
+            groups[owner, round(point[2] / _ALIKE_A / 2)].append(i)
+    refused: dict[int, QualityError] = {}
+    for members in groups.values():
+        for i in members:
+            for j in members:
+                if i < j and _contradict(points[i], points[j]):
+                    refused.setdefault(i, _refusal(records, points, i, j))
+                    refused.setdefault(j, _refusal(records, points, j, i))
+    return refused
+
+
+def _contradict(one: _Point | None, other: _Point | None) -> bool:
+    if one is None or other is None or abs(one[2] - other[2]) > _ALIKE_A:
+        return False
+    near = all(abs(a - b) <= _ALIKE * max(a, b) for a, b in zip(one[:2], other[:2], strict=True))
+    return near and max(one[3], other[3]) > _SEVERAL * min(one[3], other[3])
+
+
+def _refusal(records: Sequence[Record], points: Sequence[_Point | None], i: int, j: int) -> QualityError:
+    one, other = points[i], points[j]
+    assert one is not None
+    assert other is not None
+    whence = records[i].provenance.get("current_from", "its channel")
+    return QualityError(
+        f"at {one[2]:.3g} A (from {whence}), {one[0]:.3g} Hz and {1e3 * one[1]:.3g} mm its force is {one[3]:.4g} N "
+        f"from peak to peak, that of {records[j].id} at the same condition {other[3]:.4g} N",
+        where=records[i].provenance.get("file", records[i].id),
+        mend="one of them has another current or another unit of force: state the current of each, in tests.csv, "
+        "or leave one out",
+        code="E_CONDITIONS",
+    )
+
+
+def _point(record: Record) -> _Point | None:
+    """Frequency [Hz], amplitude [m], current [A] and peak-to-peak force [N] of a record; None without a period."""
+    if record.current is None:
+        return None
+    stride = slice(None, None, max(1, record.time.size // _MOST_SAMPLES))
+    channels = [np.asarray(c[stride]) for c in (record.time, record.displacement, record.force, record.current)]
+    there = np.all([np.isfinite(c) for c in channels], axis=0)
+    time, x, force, current = (c[there] for c in channels)
+    if time.size < 20:
+        return None
+    strokes = find_strokes(time, x)
+    mean, change = held_current(current)
+    if strokes.period is None or strokes.steady is None or change:
+        return None
+    inside = slice(*strokes.steady)
+    low, high = np.percentile(force[inside], [2, 98])
+    return 1 / strokes.period, float(np.ptp(x[inside])) / 2, abs(mean), float(high - low)

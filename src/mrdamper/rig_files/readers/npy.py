@@ -1,0 +1,52 @@
+"""One NumPy array: a structured one, whose fields are channels, or a matrix whose columns a profile names."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.readers.arrays import array_table, check_unpacked, damaged, expand, pick, refusing_damage
+from mrdamper.rig_files.readers.base import RawTable, Reader, Source
+
+
+class Npy(Reader):
+    """A single array; one of Python objects is refused, as loading it runs code."""
+
+    name = "npy"
+    title = "NumPy array"
+    suffixes = (".npy",)
+
+    def recognises(self, source: Source) -> bool:
+        """By the mark at the start."""
+        return source.head(6) == b"\x93NUMPY"
+
+    def tables(self, source: Source, form: FileForm) -> list[RawTable]:
+        """The one table."""
+        with refusing_damage(source, self.title):
+            source.file.seek(0)
+            version = np.lib.format.read_magic(source.file)
+            read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+            shape, _, dtype = read(source.file)
+        if dtype.hasobject:
+            raise source.refuse("E_UNSAFE", "pickled objects, which run code when loaded", "save plain numbers")
+        size = int(np.prod(shape, dtype=object)) * dtype.itemsize
+        if size > source.size:
+            raise damaged(source, self.title, "the array is incomplete")
+        check_unpacked(source, size)
+        with refusing_damage(source, self.title):
+            source.file.seek(0)
+            array = np.lib.format.read_array(source.file, allow_pickle=False)
+        if dtype.names:
+            names, parts = list(dtype.names), list(dtype.names)
+        else:
+            across = expand("", shape)
+            names, parts = ["" for _ in across], [part for _, part in across]
+        if not names:
+            raise source.refuse("E_NO_DATA", f"an array of {shape}", "save the channels as columns of a matrix")
+
+        def load(column: int) -> np.ndarray:
+            part = parts[column]
+            return array[part] if isinstance(part, str) else pick(array, part)
+
+        units = ["s" if dtype.names and dtype[name].kind in "Mm" else "" for name in names]
+        return [array_table(source, names, units, load, title=self.title)]

@@ -1,0 +1,122 @@
+"""From what is in files to tests: clocks, units, results, groups and two files a test, as the files state them."""
+
+import numpy as np
+import pytest
+from support.foreign_labs import KINDS, campaign, put, rows
+from typer.testing import CliRunner
+
+from benchmarks.foreign_labs import faults
+from mrdamper.cli import application
+from mrdamper.errors import InputError
+from mrdamper.rig_files.mapping.proposals import damping_share
+from mrdamper.rig_files.mapping.questions import question_of
+from mrdamper.rig_files.mapping.results import results_in
+from mrdamper.rig_files.profile import Profile, parse_profile
+from mrdamper.rig_files.rig_import import import_files, to_dataset
+
+FAST = ("mts_dat", "picoscope", "timeseries_structs", "matrix_beside_files", "merged_headings", "json_lines", "uff58",
+        "controller_and_supply", "comparison_of_two_force_sensors", "parquet_partitions", "npy_structured")  # fmt: skip
+NOT_YET = ("tidy_long_table", "matrix_in_a_workbook", "pandas_multi_index", "yokogawa", "graphtec", "origin_export",
+           "session_cut_by_rests")  # fmt: skip
+KNOWN = [kind for kind in KINDS if kind not in NOT_YET]
+
+
+@pytest.fixture(scope="module")
+def tests():
+    return campaign()
+
+
+def right(kind, tests, folder):
+    KINDS[kind](tests, folder)
+    found = import_files([folder])
+    assert not found.refusals, str(found.refusals[0].error)
+    assert faults(tests, to_dataset(found.records)) == []
+
+
+@pytest.mark.parametrize("kind", FAST)
+def test_a_foreign_export_is_read_at_the_first_command(kind, tests, tmp_path):
+    right(kind, tests, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [kind for kind in KNOWN if kind not in FAST])
+def test_every_other_foreign_export_is_read_at_the_first_command(kind, tests, tmp_path):
+    right(kind, tests, tmp_path)
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in KNOWN and kind != "session_cut_by_rests"])
+def test_what_is_not_understood_is_refused(kind, tests, tmp_path):
+    KINDS[kind](tests, tmp_path)
+    found = import_files([tmp_path])
+    assert found.refusals or faults(tests, to_dataset(found.records)) == []
+
+
+def test_one_current_for_tests_of_several_is_refused(tests, tmp_path):
+    """Obeyed literally, the remedy must not give four currents one name."""
+    for k, test in enumerate(tests):
+        put(tmp_path / f"t{k}.csv", ["time_s,displacement_mm,force_N", *rows(test.t, 1e3 * test.x, test.f)])
+    found = import_files([tmp_path], parse_profile("[current]\nvalue = 0.4"))
+    assert not found.records
+    assert {refusal.error.code for refusal in found.refusals} == {"E_CONDITIONS"}
+
+
+def test_repeated_tests_of_one_current_are_no_contradiction(tmp_path):
+    for number, seed in enumerate((1, 2, 3)):
+        (test,) = campaign(seed, currents=(0.6,), motions=((1.0, 0.02),))
+        put(tmp_path / f"t{number}.csv", ["time_s,displacement_mm,force_N", *rows(test.t, 1e3 * test.x, test.f)])
+    found = import_files([tmp_path], parse_profile("[current]\nvalue = 0.6"))
+    assert (len(found.records), found.refusals) == (3, ())
+
+
+def test_a_current_of_the_profile_against_the_files_name_is_refused(tests, tmp_path):
+    test = tests[2]
+    put(tmp_path / "run_0.6A.csv", ["time_s,displacement_mm,force_N", *rows(test.t, 1e3 * test.x, test.f)])
+    found = import_files([tmp_path], parse_profile("[current]\nvalue = 1.2"))
+    assert [refusal.error.code for refusal in found.refusals] == ["E_CURRENT_CONTRADICTS"]
+
+
+def test_without_out_the_files_and_the_mapping_are_shown(tests, tmp_path):
+    KINDS["french_headings"](tests, tmp_path)
+    done = CliRunner().invoke(application(), ["import", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    assert "Temps [s]" in done.output
+    assert "force = Effort (daN) in daN" in done.output
+    assert "6 tests would be written, 0 refused" in done.output
+
+
+def test_a_unit_that_is_missing_is_asked_for(tests, tmp_path):
+    test = tests[2]
+    put(tmp_path / "run_0.6A.csv", ["time,displacement_mm,force_N", *rows(test.t, 1e3 * test.x, test.f)])
+    command = ["import", str(tmp_path), "--ask", "--out", str(tmp_path / "ds"), "--quiet"]
+    done = CliRunner().invoke(application(), command, input="1\n")
+    assert done.exit_code == 0, done.output
+    assert "Unit of the time?" in done.output
+    assert 'unit = "s"' in done.output
+
+
+def test_an_answer_changes_the_profile_as_its_lines_say():
+    error = InputError("no unit", mend='say [channels.force] unit = "..." in a profile', code="E_UNITS_MISSING")
+    question = question_of(error)
+    assert question is not None
+    for answer in question.answers:
+        assert answer.lines == f'[channels.force] unit = "{answer.shown}"'
+        assert answer.applied(Profile()).channel("force").unit == answer.shown
+
+
+def test_physics_tells_a_dampers_force_in_any_units_and_with_the_right_sign_only(tests):
+    test = tests[3]
+    share = damping_share(test.t, test.x, test.f)
+    assert share > 0.5
+    assert damping_share(1e3 * test.t, 1e3 * test.x, test.f / 4.4) == pytest.approx(share, abs=1e-9)
+    assert damping_share(test.t, test.x, -test.f) == 0.0
+    assert damping_share(test.t, test.x, 5e4 * test.x) == 0.0
+    assert damping_share(test.t, test.x, np.random.default_rng(0).normal(0, 1, test.t.size)) < 0.2
+
+
+def test_a_table_of_results_that_two_columns_tell_differently_states_nothing():
+    results = results_in(["No;Specimen;Coil current (A)", "1;S2;0.5", "2;S1;1.0"])
+    assert results is not None
+    assert results.by_test([["1"], ["2"]]) == {0: 0.5, 1: 1.0}
+    assert results.by_test([["S1"], ["S2"]]) == {0: 1.0, 1: 0.5}
+    assert results.by_test([["1", "S1"], ["2", "S2"]]) == {}
+    assert results.by_test([["S1"], ["S9"]]) == {}
