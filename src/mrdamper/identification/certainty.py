@@ -62,7 +62,11 @@ def certainty_of_run(
 
 
 def _unseen(problem: Problem, names: Sequence[str], columns: Floats, residual: Floats, found: Spread) -> list[str]:
-    """Parameters of the hysteresis where the other columns alone explain the force as well [Davies 1987]."""
+    """Parameters of the hysteresis where the other columns alone explain the force as well [Davies 1987].
+
+    Both fits determine every linear parameter anew: a method that computes some of them in closed form has a
+    larger residual, which says nothing about the motion.
+    """
     hysteretic = problem.model_type.state_column
     searched = [i.name for i in problem.model_type.parameters() if i.name in problem.free and not i.linear]
     if hysteretic is None or hysteretic not in names or not searched:
@@ -70,9 +74,14 @@ def _unseen(problem: Problem, names: Sequence[str], columns: Floats, residual: F
     linear = {info.name for info in problem.model_type.parameters() if info.linear}
     others = columns[:, [i for i, name in enumerate(names) if name in linear and name != hysteretic]]
     table = np.column_stack([others, np.ones(len(others))])
-    without = problem.force - table @ np.linalg.lstsq(table, problem.force, rcond=None)[0]
-    independent = max(float(found.effective[list(names).index(hysteretic)]), _AT_LEAST)
-    gain = float(without @ without) / max(float(residual @ residual), np.finfo(float).tiny) - 1
+    place = list(names).index(hysteretic)
+    without, whole = (
+        problem.force - some @ np.linalg.lstsq(some, problem.force, rcond=None)[0]
+        for some in (table, np.column_stack([table, columns[:, place]]))
+    )
+    independent = max(float(found.effective[place]), _AT_LEAST)
+    least = min(float(residual @ residual), float(whole @ whole))
+    gain = float(without @ without) / max(least, np.finfo(float).tiny) - 1
     return searched if gain < _WORTH * (1 + len(searched)) / independent else []
 
 

@@ -34,7 +34,7 @@ from mrdamper.report.plots.rig_tests import measured_loops, test_analysis, test_
 from mrdamper.report.plots.style import Picture
 from mrdamper.report.tables import identification_rows, score_row
 from mrdamper.study.parallel import HERE, Processes
-from mrdamper.study.recipe import Progress, Scored
+from mrdamper.study.recipe import Progress, Scored, StudyMethod
 from mrdamper.study.workflow import RigStudy, Study, require_runs, study_rig
 from mrdamper.validation import session_drift
 
@@ -126,7 +126,7 @@ def study_and_draw(
     dataset: Dataset,
     progress: Progress = lambda what, share: None,
     *,
-    model: str | None = None,
+    model: str | StudyMethod | None = None,
     keep: Sequence[str] = (),
     also: Sequence[str] = (),
     processes: Processes = HERE,
@@ -144,7 +144,12 @@ def study_and_draw(
 
 
 def _studied_and_drawn(
-    dataset: Dataset, progress: Progress, *, model: str | None, keep: tuple[str, ...], also: tuple[str, ...]
+    dataset: Dataset,
+    progress: Progress,
+    *,
+    model: str | StudyMethod | None,
+    keep: tuple[str, ...],
+    also: tuple[str, ...],
 ) -> tuple[RigStudy, dict[str, Picture]]:
     rig = study_rig(dataset, lambda what, share: progress(what, 0.85 * share), model=model, keep=keep)
     return rig, _draw(rig, lambda what, share: progress(what, 0.85 + 0.15 * share), also=also)

@@ -26,6 +26,7 @@ from mrdamper.discovery import Registry
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError
 from mrdamper.gas_spring import GasSpring
 from mrdamper.identification import Identification, Method, Problem, identify
+from mrdamper.identification.methods import values_of_fields
 from mrdamper.models import Scale, all_models, model_type
 from mrdamper.motion import analyse_motion
 from mrdamper.study.cross_validation import cross_validate, stretches
@@ -431,6 +432,27 @@ class StudyMethod(ABC):
 
 
 _study_methods: Registry[StudyMethod] = Registry("mrdamper.studies", StudyMethod, "study method")  # type: ignore[type-abstract]
+
+
+def study_method(name: str, settings: Mapping[str, str] | None = None, gas: GasSpring | None = None) -> StudyMethod:
+    """Return the study method of a name with its options from text.
+
+    Parameters
+    ----------
+    name : str
+    settings : mapping of str to str, optional
+        Options by their names.
+    gas : GasSpring, optional
+        Known gas spring of the damper.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such method, option or value; with the near matches.
+    """
+    chosen = _study_methods.type_named(name)
+    values = values_of_fields(chosen, settings or {})
+    return chosen(**values, **({} if gas is None else {"gas": gas}))
 
 
 def study_methods() -> Mapping[str, type[StudyMethod]]:

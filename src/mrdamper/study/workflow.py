@@ -449,12 +449,12 @@ def _steps(
     train: Sequence[Run], everything: Sequence[Run], method: StudyMethod | None
 ) -> list[tuple[Recipe, Sequence[Run]]]:
     """The recipes of a study, and the runs each is followed on: sines run by run, everything at once."""
+    pure = [run for run in train if analyse_motion(run).is_sine]  # published methods take no other
+    if method is not None:
+        return [(method.recipe(pure), train), *((modified(name), train) for name in STUDIED)]
     steps: list[tuple[Recipe, Sequence[Run]]] = []
     if len(train) > 1:
         steps += [(make(name), train) for name in STUDIED for make in (modified, jointly, current_only)]
-    pure = [run for run in train if analyse_motion(run).is_sine]  # published methods take no other
-    if method is not None:
-        steps.append((method.recipe(pure), train))
-    elif len(pure) > 2:
+    if len(pure) > 2:
         steps += [(cls().beside_others().recipe(pure), train) for cls in study_methods().values()]
     return [*steps, (play_and_bypass(), everything)]

@@ -16,7 +16,15 @@ def register(app: typer.Typer) -> None:
     def study(
         data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests of two dampers."),
         out: Path = typer.Option(..., "--out", help="Folder for report.html, model.json, tables and figures."),
-        model: str | None = typer.Option(None, "--model", help="Save this model instead of the best one."),
+        model: str | None = typer.Option(
+            None, "--model", help="Save this model instead of the best one; paper: the method of Qian et al. 2024."
+        ),
+        gas: str | None = typer.Option(
+            None, "--gas", help="Known gas spring for --model paper: pressure MPa, volume cm3, rod area mm2, as P,V,A."
+        ),
+        setting: list[str] = typer.Option(
+            [], "--set", help="OPTION=VALUE of --model paper (n, gamma, mass_law, search, ...); may be repeated."
+        ),
         about: Path | None = typer.Option(
             None, "--about", help="TOML file with customer, specimen, logo (mrdamper init about)."
         ),
@@ -36,16 +44,24 @@ def register(app: typer.Typer) -> None:
         Every run is identified, models of the whole damper are fitted and cross-validated, and the
         best is saved with a report.
         """
-        from mrdamper.cli.output import percent, spread
+        from mrdamper.cli.output import parse_gas, parse_pairs, percent, spread
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.dampers.certainty import table, unsure
-        from mrdamper.errors import IdentificationError
+        from mrdamper.errors import IdentificationError, InputError
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.dataset import load_dataset
         from mrdamper.report.about import load_about, load_limits
         from mrdamper.report.study import study_and_draw, write_study
         from mrdamper.study.parallel import several
+        from mrdamper.study.recipe import study_method, study_methods
 
+        chosen = model
+        if model in study_methods():
+            chosen = study_method(str(model), parse_pairs(setting, "--set"), parse_gas(gas))
+        elif gas or setting:
+            raise InputError(
+                "--gas and --set are options of a published method", mend="add --model paper, or omit them"
+            )
         head, bands = load_about(about) if about else None, load_limits(limits) if limits else ()
         also = [kind for kind, wanted in (("pdf", pdf or about is not None), ("png", png)) if wanted]
         require_writable(out)
@@ -61,7 +77,7 @@ def register(app: typer.Typer) -> None:
             result, drawn = study_and_draw(
                 dataset,
                 lambda what, share: progress(what, 0.97 * share),
-                model=model,
+                model=chosen,
                 keep=keep,
                 also=also,
                 processes=processes,
@@ -79,6 +95,8 @@ def register(app: typer.Typer) -> None:
             aside = {one.run_id for one in rig.contradictions}
             for name, why in rig.not_identified.items():
                 typer.echo(f"{'set aside' if name in aside else 'not identified'}: {name}: {why}", err=True)
+            for note in rig.chosen.recipe.notes:
+                typer.echo(f"note: {note}", err=True)
         if as_json:
             print(json.dumps(_summary(result, [str(p) for p in written]), indent=1))
             return

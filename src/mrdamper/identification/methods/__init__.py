@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, get_args, get_origin, get_type_hints
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
 
 from mrdamper.discovery import Registry
 from mrdamper.errors import InputError, UnknownNameError
 from mrdamper.identification.problem import Method
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
 
 _registry = Registry("mrdamper.methods", Method, "method")
@@ -35,22 +36,40 @@ def method_named(name: str, settings: Mapping[str, str] | None = None) -> Method
         If there is no such method, switch or value; with the near matches.
     """
     chosen = _registry.type_named(name)
-    if not settings:
-        return chosen()
-    kinds = {k: t for k, t in get_type_hints(chosen).items() if _is_simple(t)}
-    values: dict[str, object] = {}
-    for key, text in settings.items():
+    return chosen(**values_of_fields(chosen, settings)) if settings else chosen()
+
+
+def values_of_fields(cls: type, settings: Mapping[str, str]) -> dict[str, Any]:
+    """Read the values of a dataclass's fields from text: numbers, ranges LOW:HIGH and choices.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such field or choice.
+    InputError
+        If a number cannot be read.
+    """
+    kinds = {name: read for name, kind in get_type_hints(cls).items() if (read := _reader(kind))}
+    for key in settings:
         if key not in kinds:
-            raise UnknownNameError.of(f"setting of {name}", key, kinds)
-        allowed = get_args(kinds[key])
-        if allowed and text not in allowed:
-            raise UnknownNameError.of(f"value of {key}", text, allowed)
-        values[key] = text if allowed else _number(kinds[key], key, text)
-    return chosen(**values)
+            raise UnknownNameError.of(f"setting of {cls.__dict__.get('name', cls.__name__)}", key, kinds)
+    return {key: kinds[key](key, text) for key, text in settings.items()}
 
 
-def _is_simple(kind: object) -> bool:
-    return kind in (int, float) or get_origin(kind) is Literal
+def _reader(kind: Any) -> Callable[[str, str], Any] | None:
+    """Return what reads a field of a type from its name and text; None where text cannot give it."""
+    if get_origin(kind) is Literal:
+        return partial(_choice, get_args(kind))
+    if kind == tuple[float, float]:
+        return _range
+    plain = next((part for part in (kind, *get_args(kind)) if part in (int, float)), None)
+    return partial(_number, plain) if plain else None
+
+
+def _choice(allowed: tuple[str, ...], key: str, text: str) -> str:
+    if text not in allowed:
+        raise UnknownNameError.of(f"value of {key}", text, allowed)
+    return text
 
 
 def _number(kind: type, key: str, text: str) -> float:
@@ -58,3 +77,10 @@ def _number(kind: type, key: str, text: str) -> float:
         return kind(text)
     except ValueError as error:
         raise InputError(f"{key} = {text}", mend=f"give a number ({kind.__name__})") from error
+
+
+def _range(key: str, text: str) -> tuple[float, float]:
+    low, colon, high = text.partition(":")
+    if not colon:
+        raise InputError(f"{key} = {text}", mend=f"write {key}=LOW:HIGH")
+    return _number(float, key, low), _number(float, key, high)
