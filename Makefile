@@ -4,7 +4,7 @@ VENV   ?= .venv
 BIN    := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help study serve test coverage test-all bench fuzz attack mutants lint format docs release-check clean
+.PHONY: help study serve test coverage test-all bench bench-check fuzz attack mutants lint format docs release-check clean
 
 help:  ## show this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -26,6 +26,9 @@ test-all: $(VENV)/.dev  ## the tests, slow ones too
 
 bench: $(VENV)/.dev  ## timings beside the peers that are installed
 	$(BIN)/python -m benchmarks
+
+bench-check: $(VENV)/.dev  ## processor seconds against a stored commit, in turns
+	$(BIN)/python -m benchmarks.check
 
 MUTANTS ?= 20000
 fuzz: $(VENV)/.dev  ## damage rig files at random: each is read, or refused with a code (MUTANTS=200000)

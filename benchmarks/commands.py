@@ -94,7 +94,7 @@ def _cold(name: str, arguments: list[str]) -> ProcessRow:
 
 
 def _environment(caches: Path) -> dict[str, str]:
-    kept = {"NUMBA_CACHE_DIR": "numba", "PYTHONPYCACHEPREFIX": "python", "MPLCONFIGDIR": "matplotlib"}
+    kept = {"MRDAMPER_CACHE": "compiled", "PYTHONPYCACHEPREFIX": "python", "MPLCONFIGDIR": "matplotlib"}
     for folder in kept.values():
         (caches / folder).mkdir(parents=True, exist_ok=True)
     inherited = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}

@@ -68,7 +68,7 @@ def page(results: Results) -> str:
         "writes, at -O3 -march=native; its step makes velocity and acceleration of the displacement itself, checks its "
         "input and flags extrapolation. Code and tables of its object at -Os.",
         _table(
-            ("damper", "Python, one call a step", "numba, a whole motion", "C", "bytes, double", "bytes, single"),
+            ("damper", "Python, one call a step", "compiled, a whole motion", "C", "bytes, double", "bytes, single"),
             (
                 (
                     r.name,
