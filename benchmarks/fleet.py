@@ -32,7 +32,8 @@ import polars as pl
 from mrdamper.fleet import engine
 from mrdamper.fleet.generator import FAULTS, Line, write_fleet
 from mrdamper.fleet.guard import descendants
-from mrdamper.fleet.items import digest_of, find_items
+from mrdamper.fleet.item import digest_of
+from mrdamper.fleet.items import find_items
 from mrdamper.fleet.job import Settings, as_job, attempt
 from mrdamper.fleet.line import run_fleet
 from mrdamper.fleet.plan import Plan

@@ -20,7 +20,8 @@ from mrdamper.data import Dataset
 from mrdamper.errors import InputError
 from mrdamper.files.dataset import load_dataset, save_dataset
 from mrdamper.fleet.generator import Line
-from mrdamper.fleet.items import digest_of, find_items
+from mrdamper.fleet.item import digest_of
+from mrdamper.fleet.items import find_items
 from mrdamper.fleet.job import Settings, as_job, attempt, read
 from mrdamper.fleet.lake import lake_dataset
 from mrdamper.fleet.line import run_fleet

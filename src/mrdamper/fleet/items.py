@@ -1,54 +1,17 @@
-"""The dampers of a fleet: what lies in a folder of datasets, of rig files, or in a Parquet lake."""
+"""Find the dampers of a fleet in folders of datasets, of rig files, or in Parquet files."""
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
 
-from mrdamper.errors import InputError, printable
+from mrdamper.errors import InputError
 from mrdamper.files.dataset import runs_table
 from mrdamper.files.samples import SAMPLE_FILES
-from mrdamper.fleet.profile import FACTS, FleetProfile
-
-Kind = Literal["dataset", "rig files", "lake"]
-
-
-class FleetError(InputError):
-    """A fleet cannot be read, or a damper of it cannot be used; the code says why."""
-
-    code = "E_FLEET"
-
-
-@dataclass(frozen=True)
-class Item:
-    """One damper of one session: where its records lie."""
-
-    serial: str  # with the session its name: a golden damper comes again in other sessions
-    session: str = ""
-    batch: str = ""  # these two: empty where nothing states them
-    date: str = ""
-    golden: bool = False  # tested again and again to watch the rig
-    kind: Kind = "dataset"
-    paths: tuple[str, ...] = ()  # the dataset folder, the rig files, or the lake's files
-    rows: tuple[tuple[int, int], ...] = ()  # of a lake: first row and number of rows in each file
-    # column and cell of the rows that are its own, where one table holds several dampers
-    picks: tuple[tuple[str, str], ...] = ()
-    error: InputError | None = None  # why it cannot be used, known before it is read
-
-    @property
-    def name(self) -> str:
-        """Serial number, and the session where one is stated, as a terminal may show them."""
-        return printable(f"{self.serial}, session {self.session}" if self.session else self.serial)
-
-    @property
-    def facts(self) -> dict[str, Any]:
-        """What the tables say of it whatever its records hold."""
-        return {name: getattr(self, name) for name in FACTS}
+from mrdamper.fleet.item import FleetError, Item, Kind, make_item
+from mrdamper.fleet.lake import is_lake, lake_items
+from mrdamper.fleet.profile import FleetProfile
 
 
 def find_items(source: str | Path, profile: FleetProfile) -> list[Item]:
@@ -61,8 +24,6 @@ def find_items(source: str | Path, profile: FleetProfile) -> list[Item]:
     source = Path(source)
     if not source.exists():
         raise FleetError("no such folder", where=str(source), mend="give a folder of datasets", code="E_FLEET_EMPTY")
-    from mrdamper.fleet.lake import is_lake, lake_items
-
     lake = sorted(source.rglob("*.parquet")) if source.is_dir() else [source]
     results = [p for p in lake if p.name == "dampers.parquet" and _holds_results(p.parent)]
     lake = [p for p in lake if p.name not in SAMPLE_FILES and p.is_file() and p not in results]
@@ -81,31 +42,6 @@ def find_items(source: str | Path, profile: FleetProfile) -> list[Item]:
             mend="a fleet is a folder of dataset folders, of rig files, or a Parquet lake",
         )  # fmt: skip
     return _without_twins(sorted(found, key=lambda item: (item.serial, item.session, item.paths)))
-
-
-def digest_of(item: Item) -> str:
-    """Hash of the bytes of an item's files, and of what names the damper in them."""
-    seen = [(path, path.stat()) for path in _files(item)]
-    contents = [(path.name, _content(path, about.st_size, about.st_mtime_ns)) for path, about in seen]
-    return hash_of(contents, sorted(item.facts.items()), item.rows, item.picks)
-
-
-@lru_cache  # a file of a lake holds many dampers
-def _content(path: Path, size: int, changed_ns: int) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=20)).hexdigest()
-
-
-def hash_of(*parts: Any) -> str:
-    """Of anything that JSON holds."""
-    return hashlib.blake2b(json.dumps(parts, sort_keys=True).encode(), digest_size=20).hexdigest()
-
-
-def _files(item: Item) -> list[Path]:
-    if item.kind == "dataset":
-        folder = Path(item.paths[0])
-        return [folder / name for name in ("runs.csv", *SAMPLE_FILES) if (folder / name).is_file()]
-    return [Path(path) for path in item.paths]
 
 
 def _holds_results(folder: Path) -> bool:
@@ -182,20 +118,6 @@ def _of_dataset(folder: Path, profile: FleetProfile) -> Iterator[Item]:
     for key, facts in (groups or {("", ""): {}}).items():
         picks = [(c, cell) for c, cell in zip(columns, key, strict=True) if c] if len(groups) > 1 else []
         yield make_item({**known, **facts}, profile, paths=(str(folder),), picks=tuple(picks))
-
-
-def make_item(facts: dict[str, str], profile: FleetProfile, **where: Any) -> Item:
-    """An item from what names or columns state; without a session, its date is one."""
-    facts = {k: v for k, v in facts.items() if v is not None}
-    date = facts.get("date", "")
-    return Item(
-        serial=facts["serial"],
-        session=facts.get("session", date),
-        batch=facts.get("batch", ""),
-        date=date,
-        golden=profile.is_golden(facts),
-        **where,
-    )
 
 
 def _without_twins(items: Sequence[Item]) -> list[Item]:

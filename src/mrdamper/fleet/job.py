@@ -16,7 +16,7 @@ import numpy as np
 from mrdamper.dampers.joint import JointFit, JointProblem
 from mrdamper.data import Dataset, Floats, Run
 from mrdamper.errors import InputError
-from mrdamper.fleet.items import FleetError, Item, digest_of
+from mrdamper.fleet.item import FleetError, Item, digest_of
 from mrdamper.fleet.loops import (
     Test,
     by_test,

@@ -14,7 +14,7 @@ from mrdamper.data import Dataset, Run
 from mrdamper.errors import ColumnError, InputError, UnitError
 from mrdamper.files.dataset import run_of
 from mrdamper.files.samples import OPTIONAL, REQUIRED
-from mrdamper.fleet.items import FleetError, Item, make_item
+from mrdamper.fleet.item import FleetError, Item, make_item
 from mrdamper.fleet.profile import FACTS, FleetProfile
 
 if TYPE_CHECKING:

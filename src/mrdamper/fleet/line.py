@@ -14,7 +14,8 @@ from mrdamper.errors import InputError
 from mrdamper.files.atomic import require_writable
 from mrdamper.fleet.engine import Submit, cluster_engine, local_engine, outcome
 from mrdamper.fleet.guard import Limits
-from mrdamper.fleet.items import Item, digest_of, find_items, hash_of
+from mrdamper.fleet.item import Item, digest_of, hash_of
+from mrdamper.fleet.items import find_items
 from mrdamper.fleet.job import VERSION, Settings, as_job, refused
 from mrdamper.fleet.journal import FORMAT, Journal
 from mrdamper.fleet.plan import Plan, drafts, holding, settled

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.data import Condition, Floats, same_condition
-from mrdamper.fleet.items import hash_of
+from mrdamper.fleet.item import hash_of
 from mrdamper.fleet.loops import Test, by_test
 
 _SPEED_STEPS = (0.25, 0.5, 0.75, 1.0)  # of the velocity ladder, over the line's highest test speed

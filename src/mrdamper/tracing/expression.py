@@ -13,13 +13,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
-
-if TYPE_CHECKING:
-    from mrdamper.tracing.tape import Tape
 
 CONSTANT, PARAMETER, SAMPLE = 0, 1, 2  # when a value is known: always, once the parameters are, at each sample
 
@@ -28,10 +25,26 @@ class TraceError(TypeError):
     """A model's code cannot be turned into a program; our fault, not the user's."""
 
 
-class Traced:
-    """What a traced function can be given in place of arrays."""
+class Recorder(Protocol):
+    """The recorder on which the operators of expressions write what they did."""
 
-    tape: Tape
+    def settle(self, question: Expression, /) -> bool:
+        """Answer a question about parameters while tracing."""
+        ...
+
+    def apply(self, op: str, /, *args: Any) -> Any:
+        """Write down an operation and return its result."""
+        ...
+
+    def select(self, condition: Any, then: Any, otherwise: Any, /) -> Any:
+        """Write down a choice and return its result."""
+        ...
+
+
+class Traced:
+    """The objects that a traced function is given in place of arrays."""
+
+    tape: Any  # the `Recorder` that made it
 
 
 @dataclass(frozen=True)
@@ -98,7 +111,7 @@ class Expression(NDArrayOperatorsMixin, Traced):
 
     __slots__ = ("args", "name", "op", "stage", "tape", "value")
 
-    def __init__(self, tape: Tape, op: str, args: tuple[Any, ...], stage: int, value: Any = None, name: str = ""):
+    def __init__(self, tape: Recorder, op: str, args: tuple[Any, ...], stage: int, value: Any = None, name: str = ""):
         self.tape, self.op, self.args, self.stage, self.value, self.name = tape, op, args, stage, value, name
 
     def __repr__(self) -> str:
