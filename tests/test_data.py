@@ -1,8 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mrdamper.data import Condition, Dataset, Run, same_condition
 from mrdamper.errors import ConditionError, NonFiniteError, RunError, TimeOrderError, UnknownNameError
+from mrdamper.motion import analyse_motion
 
 
 def run(**changes):
@@ -84,3 +87,22 @@ def test_conditions_no_test_can_have_are_refused(values):
 
 def test_a_measured_current_may_be_negative():
     assert Condition(-0.5, 1.0, 0.01).current_A == -0.5
+
+
+@pytest.mark.parametrize(("mean", "written"), [(-0.0003, "0"), (0.4997, "0.5"), (-1.4985, "-1.5"), (0.333, "0.333")])
+def test_a_noisy_current_is_the_level_a_test_plan_would_write(mean, written):
+    t = np.arange(2000) / 500
+    noise = 0.004 * np.random.default_rng(0).standard_normal(t.size)
+    run = Run("r", t, 0.01 * np.sin(6 * t), np.cos(6 * t), mean + noise - noise.mean())
+    assert f"{run.current_A:g}" == written
+    assert str(replace(Condition(0, 1, 0.01), current_A=run.current_A)).startswith(f"{written} A")
+
+
+def test_the_direction_of_the_current_changes_nothing():
+    """A coil connected the other way is no fault: models and conditions are given the magnitude."""
+    t = np.arange(2000) / 500
+    run = Run("r", t, 0.01 * np.sin(6 * t), np.cos(6 * t), 0.5)
+    turned = replace(run, current=-run.current)
+    assert turned.current_A == -0.5
+    assert (turned.coil_current == run.coil_current).all()
+    assert analyse_motion(turned).condition == analyse_motion(run).condition

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import TransferFunction, lsim
 
 from mrdamper.errors import ParameterError, RecordError, StepError
-from mrdamper.systems.oscillator import Oscillator, identify_oscillator, multisine
+from mrdamper.systems.oscillator import BoundWarning, Oscillator, identify_oscillator, multisine
 
 RATE = 750.0
 BENCHMARK = Oscillator(m=2.0, c=10.0, k=5e4, alpha=5e4, beta=1e3, gamma=0.8, delta=-1.1)
@@ -30,6 +30,34 @@ def test_a_periodic_response_is_periodic_and_takes_energy():
     np.testing.assert_allclose(twice[: push.size], twice[push.size :], atol=1e-5 * np.ptp(twice))
     velocity = np.gradient(twice, 1 / RATE)
     assert np.mean(np.tile(push, 2) * velocity) > 1.05 * 10 * np.mean(velocity**2)  # more than the dashpot's
+
+
+def test_a_periodic_response_of_a_linear_oscillator_has_the_phase_of_its_transfer_function():
+    push = force(4)
+    omega = 2 * np.pi * np.fft.rfftfreq(push.size, 1 / RATE)
+    exact = np.fft.irfft(np.fft.rfft(push) / (6e4 - 2.0 * omega**2 + 200j * omega), push.size)
+    y = Oscillator(2.0, 200.0, 4e4, 2e4, 1.0, 0.0, 0.0).response(push, RATE, periodic=True)
+    np.testing.assert_allclose(y, exact, atol=1e-4 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("delay", [1.0, -0.4])
+def test_a_delay_between_the_channels_is_identified_and_leaves_the_damping_alone(delay):
+    push = force(1)
+    clean = BENCHMARK.response(push, RATE, periodic=True)
+    omega = 2 * np.pi * np.fft.rfftfreq(push.size)
+    late = np.fft.irfft(np.fft.rfft(clean) * np.exp(-1j * omega * delay), push.size)
+    fit = identify_oscillator(push, late, RATE)
+    assert RATE * fit.delay_s == pytest.approx(delay, abs=1e-3)
+    assert fit.oscillator.c == pytest.approx(10.0, rel=1e-2)
+    assert fit.at_bounds == ()
+
+
+def test_a_parameter_at_a_bound_is_named_and_warned_of():
+    push = force(1, size=256)
+    late = np.roll(BENCHMARK.response(push, RATE, periodic=True), 2)
+    with pytest.warns(BoundWarning, match="delay"):
+        fit = identify_oscillator(push, late, RATE, most_delay=1.0)
+    assert "delay" in fit.at_bounds
 
 
 def test_the_benchmark_is_identified_from_noisy_records_to_a_micrometre_and_better():
@@ -57,5 +85,7 @@ def test_what_cannot_be_is_refused():
     assert caught.value.code == "E_RUNAWAY"
     with pytest.raises(RecordError, match="nothing moves"):
         identify_oscillator(force(1), np.zeros(1024), RATE)
+    with pytest.raises(RecordError, match="largest delay"):
+        identify_oscillator(force(1), force(2), RATE, most_delay=-1.0)
     with pytest.raises(RecordError, match="not finite"):
         BENCHMARK.response(np.array([np.nan] * 20), RATE)

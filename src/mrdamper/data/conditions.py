@@ -70,7 +70,7 @@ class Condition:
         return 2 * np.pi * self.frequency_Hz * self.amplitude_m
 
     def __str__(self) -> str:
-        return f"{self.current_A:g} A, {self.frequency_Hz:.3g} Hz, {1e3 * self.amplitude_m:.3g} mm"
+        return f"{self.current_A + 0.0:g} A, {self.frequency_Hz:.3g} Hz, {1e3 * self.amplitude_m:.3g} mm"
 
 
 def current_levels(currents: Sequence[float]) -> list[float]:

@@ -186,10 +186,13 @@ class Run(Shown):
 
     @property
     def coil_current(self) -> Floats:
-        """(N,) current that models are given [A]: without its noise where it is constant, else the channel."""
+        """(N,) magnitude of the current [A], which models are given: without noise where it is constant.
+
+        The direction of the current in the coil does not change the force.
+        """
         if self.current_changes:
-            return self.current
-        return np.broadcast_to(np.float64(self.mean_current), self.time.shape)
+            return np.abs(self.current)
+        return np.broadcast_to(np.float64(abs(self.mean_current)), self.time.shape)
 
     @property
     def findings(self) -> tuple[str, ...]:
@@ -300,6 +303,8 @@ _BLOCKS = 64  # stretches of a record whose mean currents are compared
 _TREND_A, _TREND = 0.01, 0.03  # a current may differ by so much from begin to end: [A], and of its mean
 _SLOW_A, _SLOW = 0.016, 0.01  # RMS of its slow part: a rectifier's or a chopper's ripple, seen at a slow rate
 _FAST_A, _FAST = 0.03, 0.02  # RMS of all of it
+_LEVEL_STEP = 5e-3  # step of currents in a test plan [A]
+_LEVEL_A, _LEVEL = 5e-4, 2e-3  # measured means may differ from a level by so much: [A], and of the mean
 _COARSEST = 0.1  # [A]: a channel of such steps flickers by half a step
 _WHITE_MORE = 4  # times as much where it has no memory from sample to sample: no coil follows that
 _WHITE = 1.0  # von Neumann's ratio: two for white noise, near zero for a current that keeps its levels
@@ -311,6 +316,16 @@ def _held_current(run: Run) -> tuple[float, str]:
     start, stop = int(np.searchsorted(run.time, first)), int(np.searchsorted(run.time, last, "right"))
     start, stop = (start, stop) if stop - start >= 3 else (0, run.time.size)
     return held_current(taken(run.current, np.arange(start, stop, 1 + (stop - start) // _MOST)))
+
+
+def as_written(current: float) -> float:
+    """Round the mean of a noisy current channel as a test plan would write it [A].
+
+    Values within 0.5 mA + 0.2 % of a multiple of 5 mA are that multiple: −0.0003 A is 0 A, 0.4997 A is 0.5 A.
+    """
+    level = _LEVEL_STEP * round(current / _LEVEL_STEP)
+    near = abs(current - level) <= _LEVEL_A + _LEVEL * abs(current)
+    return round(level if near else current, 4) + 0.0
 
 
 def held_current(current: Floats) -> tuple[float, str]:
@@ -327,7 +342,7 @@ def held_current(current: Floats) -> tuple[float, str]:
     """
     low, high = float(current.min()), float(current.max())
     if low == high:
-        return round(low, 9), ""
+        return round(low, 9) + 0.0, ""
     mean, size = float(np.mean(current)), current.size
     count = min(_BLOCKS, max(3, size // 8))
     bounds = np.linspace(0, size, count, endpoint=False).astype(int)
@@ -345,8 +360,8 @@ def held_current(current: Floats) -> tuple[float, str]:
         and total <= allowed
     )
     if steady:
-        return round(mean, 4), ""
-    return round(mean, 4), f"the current changes within the run, between {low:.4g} A and {high:.4g} A"
+        return as_written(mean), ""
+    return round(mean, 4) + 0.0, f"the current changes within the run, between {low:.4g} A and {high:.4g} A"
 
 
 def _resolution(current: Floats) -> float:

@@ -25,7 +25,7 @@ class MotionAnalysis:
     Attributes
     ----------
     condition : Condition
-        Measured current, frequency and amplitude (half the peak-to-peak stroke).
+        Magnitude of the measured current, frequency and amplitude (half the peak-to-peak stroke).
     series : HarmonicSeries
         Mean, drift and harmonics of the displacement.
     cycles : float
@@ -86,7 +86,7 @@ def analyse_motion(run: Run) -> MotionAnalysis:
     power = series.sine**2 + series.cosine**2
     residual = float(np.std(run.displacement - series(run.time)))
     return MotionAnalysis(
-        condition=Condition(run.mean_current, series.frequency, series.half_peak_to_peak()),
+        condition=Condition(abs(run.mean_current), series.frequency, series.half_peak_to_peak()),
         series=series,
         cycles=cycles,
         distortion=float(np.sqrt(power[1:].sum() / power[0])),
@@ -137,7 +137,7 @@ def equivalent_sine(run: Run) -> EquivalentSine:
         return EquivalentSine(analysis.condition, analysis.series.mean, True)
     motion = measured_motion(steady)
     rms_x, rms_v = float(np.std(motion.displacement)), float(np.std(motion.velocity))
-    condition = Condition(run.mean_current, rms_v / (2 * np.pi * rms_x), float(np.sqrt(2) * rms_x))
+    condition = Condition(abs(run.mean_current), rms_v / (2 * np.pi * rms_x), float(np.sqrt(2) * rms_x))
     return EquivalentSine(condition, float(np.mean(motion.displacement)), False)
 
 

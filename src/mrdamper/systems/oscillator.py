@@ -11,6 +11,7 @@ their motion instead and need a bounded z.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from functools import cache
 
@@ -24,6 +25,7 @@ from mrdamper.tracing.compiled import RecordProgram
 
 _STEPS = 20  # between two samples, by Runge and Kutta's fourth order
 _LEAD = 0.5  # of a period, run before the one that counts: what the oscillator has to forget
+_WIDENED = 3  # times that a bound of the search is widened
 _FARTHEST = 1e6  # times the static deflection: a state beyond runs away
 
 
@@ -109,7 +111,12 @@ class Oscillator:
                 f"the state runs away after {bad / sample_rate:.3g} s", where="oscillator",
                 mend="lower the force: an element with beta (gamma + delta) < 0 has no bound", code="E_RUNAWAY",
             )  # fmt: skip
-        return y[y.size - force.size :] if periodic else y[: force.size]
+        start = lead // (2 * _STEPS)
+        return y[start : start + force.size]
+
+
+class BoundWarning(UserWarning):
+    """An identified parameter lies at a bound of its search."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,22 +126,31 @@ class OscillatorFit:
     Attributes
     ----------
     oscillator : Oscillator
-        With beta = 1: only beta gamma and beta delta can be told.
+        With beta = 1: only beta gamma and beta delta are identifiable.
+    delay_s : float
+        Time by which the displacement channel lags behind the force channel [s].
     rmse_m : float
         Of the displacement it was identified from [m].
     evaluations : int
+    at_bounds : tuple of str
+        Parameters that ended at a bound; their values are no estimates.
     """
 
     oscillator: Oscillator
+    delay_s: float
     rmse_m: float
     evaluations: int
+    at_bounds: tuple[str, ...] = ()
 
 
-def identify_oscillator(force: Floats, displacement: Floats, sample_rate: float, *, n: float = 1.0) -> OscillatorFit:
-    """Identify an oscillator from one period of force and displacement.
+def identify_oscillator(
+    force: Floats, displacement: Floats, sample_rate: float, *, n: float = 1.0, most_delay: float = 3.0
+) -> OscillatorFit:
+    """Identify an oscillator and the delay between the channels from one period of force and displacement.
 
     The linear part comes from the spectra, the rest from the least squares of the simulated
-    displacement.
+    displacement. A delay left out would be taken for negative damping: at one sample of delay the
+    damping of a lightly damped mass ends at zero.
 
     Parameters
     ----------
@@ -144,11 +160,19 @@ def identify_oscillator(force: Floats, displacement: Floats, sample_rate: float,
         [Hz]
     n : float
         Sharpness of the yield, held.
+    most_delay : float
+        Largest delay between the channels, either way [samples]; zero for channels known to be
+        sampled at once.
 
     Raises
     ------
     RecordError
-        If the records do not fit together or nothing moves.
+        If the records do not fit together or nothing moves, or the largest delay is negative.
+
+    Warns
+    -----
+    BoundWarning
+        If a parameter ends at a bound.
 
     Examples
     --------
@@ -157,40 +181,97 @@ def identify_oscillator(force: Floats, displacement: Floats, sample_rate: float,
     >>> force = multisine(np.random.default_rng(0), 1024, 750.0, (5.0, 150.0), rms=50.0)  # [N]
     >>> truth = Oscillator(m=2.0, c=10.0, k=5e4, alpha=5e4, beta=1e3, gamma=0.8, delta=-1.1)
     >>> fit = identify_oscillator(force, truth.response(force, 750.0, periodic=True), 750.0)
-    >>> round(fit.oscillator.m, 3)
-    2.0
+    >>> round(fit.oscillator.m, 3), abs(round(750.0 * fit.delay_s, 3))  # [kg], [samples]
+    (2.0, 0.0)
     """
     force, displacement = (np.asarray(a, dtype=float) for a in (force, displacement))
     if force.shape != displacement.shape or np.ptp(displacement) == 0 or not np.isfinite(displacement).all():
         raise RecordError("force and displacement differ in length, or nothing moves", mend="give one period of both")
-    size, spread = displacement.size, float(np.std(displacement))
-    omega = 2 * np.pi * np.fft.rfftfreq(size, 1 / sample_rate)
-    U, Y = np.fft.rfft(force), np.fft.rfft(displacement)
-    told = np.abs(U) > 1e-3 * np.abs(U).max()
-    table = (np.stack([-(omega**2), 1j * omega, np.ones(omega.size)], axis=1) * Y[:, None])[told]
-    linear = np.linalg.lstsq(np.vstack([table.real, table.imag]), np.append(U[told].real, U[told].imag), rcond=None)[0]
-    m, c, k = (max(float(v), 1e-6 * abs(linear[0])) for v in linear)
-    scale = np.array([m, max(c, 1e-3 * np.sqrt(m * k)), k, k, 1 / spread, 1 / spread])
-    size_of_z = (0.5 * k * spread) ** (n - 1) if n > 1 else 1.0
+    if not 0 <= most_delay < np.inf:
+        raise RecordError(f"the largest delay is {most_delay:g} samples", mend="give zero or more")
+    search = _OscillatorSearch(force, displacement, sample_rate, n, most_delay)
+    found, evaluations = search.best()
+    at_bounds = search.at_bounds(found)
+    if at_bounds:
+        warnings.warn(
+            f"{', '.join(at_bounds)} ended at a bound of the search: check the signs and units of both channels",
+            BoundWarning,
+            stacklevel=2,
+        )
+    rmse = search.spread * float(np.linalg.norm(search.residual(found)))
+    return OscillatorFit(search.oscillator(found), search.delay(found), rmse, evaluations, at_bounds)
 
-    def made(u: Floats) -> Oscillator:
-        m, c, k, alpha, gamma, delta = (u * scale).tolist()
-        return Oscillator(m, c, k, alpha, 1.0, gamma / size_of_z, delta / size_of_z, n)
 
-    def residual(u: Floats) -> Floats:
+class _OscillatorSearch:
+    """Least squares over m, c, k, alpha, beta gamma, beta delta and the delay, each divided by its scale."""
+
+    NAMES = ("m", "c", "k", "alpha", "gamma", "delta", "delay")
+
+    def __init__(self, force: Floats, displacement: Floats, sample_rate: float, n: float, most_delay: float) -> None:
+        self.force, self.displacement, self.sample_rate, self.n = force, displacement, sample_rate, n
+        self.spread = float(np.std(displacement))
+        self._omega = 2 * np.pi * np.fft.rfftfreq(displacement.size, 1 / sample_rate)
+        m, c, k = self._linear()
+        self._scale = np.array([m, max(c, 0.05 * np.sqrt(m * k)), k, k, 1 / self.spread, 1 / self.spread, 1.0])
+        self._size_of_z = (0.5 * k * self.spread) ** (n - 1) if n > 1 else 1.0
+        # The oscillator itself allows no mass, damping, stiffness or dissipation below zero.
+        self.lower = np.array([0.2, 0.0, 0.0, 0.0, 0.0, -5.0, -most_delay])
+        self.upper = np.array([5.0, 5.0, 3.0, 3.0, 5.0, 5.0, most_delay])
+
+    def best(self) -> tuple[Floats, int]:
+        """The point of least error, and the evaluations; bounds that only limit the search are widened."""
+        starts = [np.array([1.0, 0.3, share, 1 - share, 0.3, d, 0.0]) for share in (0.5, 0.2) for d in (0.0, -0.5)]
+        found = [least_squares(self.residual, start, self.lower, self.upper, 8, 1e-4) for start in starts]
+        evaluations = sum(minimum.evaluations for minimum in found)
+        point = min(found, key=lambda minimum: minimum.cost).point
+        for _ in range(_WIDENED + 1):
+            last = least_squares(self.residual, point, self.lower, self.upper, 60, 1e-10)
+            point, evaluations = last.point, evaluations + last.evaluations
+            wide = self._near(point, self.upper) & (np.array(self.NAMES) != "delay")
+            narrow = self._near(point, self.lower) & np.isin(self.NAMES, ("m", "delta"))
+            if not (wide.any() or narrow.any()):
+                break
+            self.upper[wide] *= 5
+            self.lower[narrow] = np.where(self.lower[narrow] > 0, self.lower[narrow] / 5, self.lower[narrow] * 5)
+        return point, evaluations
+
+    def at_bounds(self, point: Floats) -> tuple[str, ...]:
+        """Names of the parameters at a bound."""
+        near = (self._near(point, self.lower) | self._near(point, self.upper)) & (self.lower < self.upper)
+        return tuple(name for name, is_near in zip(self.NAMES, near, strict=True) if is_near)
+
+    def oscillator(self, point: Floats) -> Oscillator:
+        """The oscillator of a point."""
+        m, c, k, alpha, gamma, delta, _ = (point * self._scale).tolist()
+        return Oscillator(m, c, k, alpha, 1.0, gamma / self._size_of_z, delta / self._size_of_z, self.n)
+
+    def delay(self, point: Floats) -> float:
+        """The delay of a point [s]."""
+        return float(point[-1]) / self.sample_rate
+
+    def residual(self, point: Floats) -> Floats:
+        """(N,) error of the displacement over its spread and the root of its samples."""
+        size = self.displacement.size
         try:
-            return (made(u).response(force, sample_rate, periodic=True) - displacement) / (spread * np.sqrt(size))
+            response = self.oscillator(point).response(self.force, self.sample_rate, periodic=True)
         except StepError:
             return np.full(size, 1e3)
+        late = np.fft.irfft(np.fft.rfft(response) * np.exp(-1j * self._omega * self.delay(point)), size)
+        return (late - self.displacement) / (self.spread * np.sqrt(size))
 
-    lower = np.array([0.2, 0.0, 0.0, 0.0, 0.0, -5.0])
-    upper = np.array([5.0, 5.0, 3.0, 3.0, 5.0, 5.0])
-    starts = [np.array([1.0, 0.3, share, 1 - share, 0.3, delta]) for share in (0.5, 0.2) for delta in (0.0, -0.5)]
-    found = [least_squares(residual, start, lower, upper, 6, 1e-4) for start in starts]
-    best = min(found, key=lambda minimum: minimum.cost)
-    last = least_squares(residual, best.point, lower, upper, 60, 1e-10)
-    evaluations = sum(each.evaluations for each in (*found, last))
-    return OscillatorFit(made(last.point), spread * float(np.linalg.norm(residual(last.point))), evaluations)
+    def _linear(self) -> Floats:
+        """Mass, damping and stiffness of the linear oscillator nearest to the spectra."""
+        U, Y = np.fft.rfft(self.force), np.fft.rfft(self.displacement)
+        excited = np.abs(U) > 1e-3 * np.abs(U).max()
+        columns = [-(self._omega**2), 1j * self._omega, np.ones(self._omega.size)]
+        table = (np.stack(columns, axis=1) * Y[:, None])[excited]
+        forces = np.append(U[excited].real, U[excited].imag)
+        linear = np.linalg.lstsq(np.vstack([table.real, table.imag]), forces, rcond=None)[0]
+        return np.maximum(linear, 1e-6 * abs(linear[0]))
+
+    @staticmethod
+    def _near(point: Floats, bound: Floats) -> np.ndarray:
+        return np.abs(point - bound) < 1e-6 * np.maximum(1.0, np.abs(bound))
 
 
 def multisine(
