@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from mrdamper.rig_files.rig_import import import_files
     from mrdamper.simulation import simulate
     from mrdamper.streaming import stepper
+    from mrdamper.study.check import check
     from mrdamper.study.comparison import compare
     from mrdamper.study.plan import plan_tests
     from mrdamper.study.workflow import run_study
@@ -48,6 +49,7 @@ _HOME = {
     "InputError": "errors",
     "Prediction": "dampers.base",
     "Run": "data",
+    "check": "study.check",
     "compare": "study.comparison",
     "export_model": "export",
     "identify": "identification",

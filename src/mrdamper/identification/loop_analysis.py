@@ -12,7 +12,7 @@ import numpy as np
 
 from mrdamper.data import Condition, Floats, Run, current_levels, same_motion
 from mrdamper.metrics import dissipated_power
-from mrdamper.motion import MotionAnalysis, analyse_motion, measured_motion
+from mrdamper.motion import Excitation, MotionAnalysis, analyse_motion, measured_motion
 
 
 @dataclass(frozen=True)
@@ -73,6 +73,19 @@ def analyse_loop(run: Run) -> LoopAnalysis:
         dissipated_energy=energy,
         equivalent_damping=energy / (2 * np.pi**2 * frequency * amplitude**2),
     )
+
+
+def damping_share(motion: Excitation, force: Floats) -> float:
+    """Part of a force's standard deviation that opposes the velocity; negative where the loop gives energy.
+
+    The sign is that of c in F = f0 + r t + k x + c v by least squares.
+    """
+    t = motion.time - motion.time[0]
+    columns = np.column_stack([motion.velocity, motion.displacement, np.ones_like(t), t])
+    scale = np.std(columns, axis=0)
+    scale[scale == 0] = 1.0
+    coefficient = float(np.linalg.lstsq(columns / scale, force, rcond=None)[0][0])
+    return coefficient / float(np.std(force))
 
 
 def at_levels(loops: Sequence[LoopAnalysis]) -> tuple[LoopAnalysis, ...]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import QualityError
+from mrdamper.identification.loop_analysis import damping_share as share_of_damping
 from mrdamper.motion.harmonics import fit_harmonics
 from mrdamper.rig_files.quality.cycles import POINTS, steady_cycles
 from mrdamper.rig_files.quality.motion import LEAST_CYCLES, cycles_of
@@ -156,13 +157,7 @@ def damping_share(view: View) -> float:
 
 
 def _damping_share(view: View, start: int, stop: int) -> float:
-    motion, force = view.moving.part(slice(start, stop)), view.run.force[start:stop]
-    t = motion.time - motion.time[0]
-    columns = np.column_stack([motion.velocity, motion.displacement, np.ones_like(t), t])
-    scale = np.std(columns, axis=0)
-    scale[scale == 0] = 1.0
-    coefficient = float(np.linalg.lstsq(columns / scale, force, rcond=None)[0][0])
-    return coefficient / float(np.std(force))
+    return share_of_damping(view.moving.part(slice(start, stop)), view.run.force[start:stop])
 
 
 def _exchanged(view: View) -> bool:

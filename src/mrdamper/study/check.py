@@ -1,0 +1,130 @@
+"""The quality checks of the import and the comparison of runs with each other, for a dataset made from arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from mrdamper.data import Dataset, Run, Shown
+from mrdamper.errors import InputError, checked
+from mrdamper.rig_files.quality.table import judged
+from mrdamper.study.contradictions import ContradictionError, find_contradictions
+from mrdamper.study.workflow import believed
+
+Severity = Literal["refused", "set aside", "noted"]
+
+
+@dataclass(frozen=True)
+class DatasetFinding:
+    """A finding on a run of a dataset.
+
+    Attributes
+    ----------
+    run_id : str
+        Empty for a finding on a whole rig.
+    rig : str
+    code : str
+        Stable: E_DISSIPATION_SIGN, W_CLIPPED, E_FORCE_SCALE, ...
+    severity : "refused", "set aside" or "noted"
+        Refused by its own record, set aside because it contradicts other runs, or noted only.
+    text : str
+        Figures, and the remedy.
+    """
+
+    run_id: str
+    rig: str
+    code: str
+    severity: Severity
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.run_id or f'rig {self.rig}'}, {self.severity}: {self.text}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DatasetCheck(Shown):
+    """The findings on a dataset.
+
+    Attributes
+    ----------
+    dataset : Dataset
+    findings : tuple of DatasetFinding
+    """
+
+    dataset: Dataset
+    findings: tuple[DatasetFinding, ...]
+
+    @property
+    def headline(self) -> str:
+        """Number of runs and of findings of each severity."""
+        counts = {
+            kind: sum(one.severity == kind for one in self.findings) for kind in ("refused", "set aside", "noted")
+        }
+        listed = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
+        return f"check of {self.dataset.name}: {len(self.dataset)} runs, {listed or 'nothing found'}"
+
+    @property
+    def table(self) -> Mapping[str, Sequence[Any]]:
+        """A row a finding."""
+        return {
+            name: [getattr(one, name) for one in self.findings]
+            for name in ("run_id", "rig", "code", "severity", "text")
+        }
+
+    @property
+    def details(self) -> Sequence[str]:
+        """A line a finding."""
+        return [str(one) for one in self.findings]
+
+
+@checked()
+def check(dataset: Dataset) -> DatasetCheck:
+    """Check every run of a dataset as the import checks files, and the runs of each rig against each other.
+
+    Parameters
+    ----------
+    dataset : Dataset
+
+    Returns
+    -------
+    DatasetCheck
+        Findings as objects and as a table; `run_study` refuses and sets aside the same runs.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> from mrdamper import check, load_dataset
+    >>> tests = load_dataset().rig("utfsm")
+    >>> wrong = replace(tests["utf_5mm4Hz_1A"], id="again", force=-tests["utf_5mm4Hz_1A"].force)
+    >>> [finding.code for finding in check(tests.only([wrong])).findings]
+    ['E_DISSIPATION_SIGN']
+    """
+    findings: list[DatasetFinding] = []
+    for name in dataset.rigs:
+        rig = dataset.rig(name)
+        for run in rig:
+            findings += _of_run(run)
+        accepted, refused = believed(rig)
+        known = {one.run_id for one in findings if one.severity == "refused"}
+        for run_id, why in refused.items():
+            if run_id not in known:
+                findings.append(DatasetFinding(run_id, name, why.rsplit("[", 1)[-1].rstrip("]"), "set aside", why))
+        findings += _of_rig(name, accepted)
+    return DatasetCheck(dataset, tuple(findings))
+
+
+def _of_run(run: Run) -> list[DatasetFinding]:
+    refusal, noted = judged(run)
+    found = [DatasetFinding(run.id, run.rig, finding.code, "noted", str(finding)) for finding in noted]
+    if isinstance(refusal, InputError):
+        found.append(DatasetFinding(run.id, run.rig, refusal.code, "refused", str(refusal)))
+    return found
+
+
+def _of_rig(rig: str, runs: Sequence[Run]) -> list[DatasetFinding]:
+    try:
+        contradictions = find_contradictions(runs)
+    except ContradictionError as refusal:
+        return [DatasetFinding("", rig, refusal.code, "refused", str(refusal))]
+    return [DatasetFinding(one.run_id, rig, one.code, "set aside", str(one)) for one in contradictions]
