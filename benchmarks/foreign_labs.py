@@ -39,10 +39,11 @@ def faults(tests: tuple[Test, ...], dataset) -> list[str]:
 
 
 def _is(run, test: Test) -> bool:
-    time = np.asarray(run.time) - run.time[0]
-    middle = slice(time.size // 4, -time.size // 4)
-    current = float(np.mean(run.current[middle]))
-    turns = np.count_nonzero(np.diff(np.sign(run.displacement - np.mean(run.displacement)))) / 2
+    begin, end = run.window or (run.time[0], run.time[-1])
+    inside = (run.time >= begin) & (run.time <= end)
+    time, x = run.time[inside] - begin, run.displacement[inside]
+    current = float(np.mean(run.current[inside]))
+    turns = np.count_nonzero(np.diff(np.sign(x - np.mean(x)))) / 2
     return (
         abs(current - test.current) < 0.015
         and abs(np.ptp(run.displacement) / np.ptp(test.x) - 1) < 0.02

@@ -16,8 +16,7 @@ from mrdamper.rig_files.rig_import import import_files, to_dataset
 
 FAST = ("mts_dat", "picoscope", "timeseries_structs", "matrix_beside_files", "merged_headings", "json_lines", "uff58",
         "controller_and_supply", "comparison_of_two_force_sensors", "parquet_partitions", "npy_structured")  # fmt: skip
-NOT_YET = ("tidy_long_table", "matrix_in_a_workbook", "pandas_multi_index", "yokogawa", "graphtec", "origin_export",
-           "session_cut_by_rests")  # fmt: skip
+NOT_YET = ("tidy_long_table", "matrix_in_a_workbook", "pandas_multi_index", "yokogawa", "graphtec", "origin_export")
 KNOWN = [kind for kind in KINDS if kind not in NOT_YET]
 
 
@@ -44,7 +43,7 @@ def test_every_other_foreign_export_is_read_at_the_first_command(kind, tests, tm
     right(kind, tests, tmp_path)
 
 
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in KNOWN and kind != "session_cut_by_rests"])
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in KNOWN])
 def test_what_is_not_understood_is_refused(kind, tests, tmp_path):
     KINDS[kind](tests, tmp_path)
     found = import_files([tmp_path])
@@ -120,3 +119,64 @@ def test_a_table_of_results_that_two_columns_tell_differently_states_nothing():
     assert results.by_test([["S1"], ["S2"]]) == {0: 1.0, 1: 0.5}
     assert results.by_test([["1", "S1"], ["2", "S2"]]) == {}
     assert results.by_test([["S1"], ["S9"]]) == {}
+
+
+def test_a_session_is_cut_at_its_rests_and_a_pause_is_not(tests, tmp_path):
+    for folder in ("session", "pause"):
+        (tmp_path / folder).mkdir()
+    right("session_cut_by_rests", tests, tmp_path / "session")
+    KINDS["session_cut_by_rests"]((tests[2], tests[2], tests[2]), tmp_path / "pause")
+    assert len(import_files([tmp_path / "pause"]).records) == 1
+
+
+@pytest.mark.parametrize(
+    ("pattern", "folder", "name"),
+    [("*/I_{current}/*", "I_0.6", "a.csv"), ("t{run}_{current}_{frequency}Hz.csv", ".", "t7_0.6_1Hz.csv")],
+)
+def test_a_pattern_with_placeholders_finds_the_current_in_a_path(tests, tmp_path, pattern, folder, name):
+    test = tests[2]
+    (tmp_path / folder).mkdir(exist_ok=True)
+    put(tmp_path / folder / name, ["time_s,displacement_mm,force_N", *rows(test.t, 1e3 * test.x, test.f)])
+    found = import_files([tmp_path], parse_profile(f'[current]\npattern = "{pattern}"\nunit = "A"'))
+    assert [float(record.current[0]) for record in found.records] == [0.6]
+    found = import_files([tmp_path], parse_profile('[current]\npattern = "nothing_{current}A"\nunit = "A"'))
+    assert [refusal.error.code for refusal in found.refusals] == ["E_CURRENT_MISSING"]
+
+
+@pytest.mark.parametrize(
+    ("text", "near"),
+    [("[files]\n", "file"), ("[channels.force]\nuint = 'N'", "unit"), ("[curent]\nvalue = 1.0", "current")],
+)
+def test_an_unknown_key_of_a_profile_is_answered_with_the_nearest(text, near):
+    with pytest.raises(InputError, match=f"did you mean {near}"):
+        parse_profile(text)
+
+
+def test_what_the_profile_leaves_out_is_named(tests, tmp_path):
+    KINDS["daqexpress"](tests, tmp_path)
+    (tmp_path / "acq1.csv").rename(tmp_path / "warmup1.csv")
+    found = import_files([tmp_path], parse_profile('[file]\nleave_out = ["warmup*"]'))
+    assert (len(found.records), found.left_out) == (len(tests) - 1, ("warmup1.csv",))
+
+
+def test_channels_whose_clocks_do_not_overlap_are_refused(tests, tmp_path):
+    test = tests[2]
+    lines = [
+        "x [s];s [mm];x [s];F [N];x [s];I [A]",
+        *rows(test.t, 1e3 * test.x, test.t + 900, test.f, test.t, test.i, sep=";"),
+    ]
+    put(tmp_path / "apart.csv", lines)
+    found = import_files([tmp_path])
+    assert [refusal.error.code for refusal in found.refusals] == ["E_RASTER"]
+
+
+def test_a_force_that_is_held_between_slow_samples_ends_in_a_verdict(tests, tmp_path):
+    """Logged at 20 Hz and held to 200 Hz: refused or noted, never an error of the program."""
+    for k, test in enumerate(tests):
+        held = np.repeat(test.f[::10], 10)[: test.t.size]
+        put(
+            tmp_path / f"t{k}.csv",
+            ["time_s,displacement_mm,force_N,current_A", *rows(test.t, 1e3 * test.x, held, test.i)],
+        )
+    found = import_files([tmp_path])
+    assert len(found.records) + len({refusal.file for refusal in found.refusals}) == len(tests)

@@ -133,7 +133,7 @@ BAD = {
     "cut.mf4": (lambda: mf4_bytes([(SHORT["time"], MOVED)], UNITS)[:-1000], "E_TRUNCATED"),
     "rasters.mf4": (
         lambda: mf4_bytes(
-            [(SHORT["time"], {"disp": SHORT["disp"]}), (SHORT["time"] + 0.001, {"force": SHORT["force"]})], UNITS
+            [(SHORT["time"], {"disp": SHORT["disp"]}), (SHORT["time"] + 1000, {"force": SHORT["force"]})], UNITS
         ), "E_RASTER",
     ),
     "workbook.csv": (lambda: xlsx_bytes(SHEET), "E_FORMAT"),

@@ -44,8 +44,15 @@ def current_of(
         _refuse_contradiction(profile.current.value, channel, _statements(table, path), printable(table.source.name))
         return profile.current.value, {"current_from": "profile"}
     if profile.current is not None:
-        found = current_in_name(path.name, profile)
-        statements = [] if found is None else [Statement(found, "file name")]
+        places = (path.name, table.label, f"{path.name}/{table.label}", f"{path.as_posix()}/{table.label}".rstrip("/"))
+        found = next((v for place in places if place and (v := current_in_name(place, profile)) is not None), None)
+        if found is None and channel is None:
+            raise ColumnError(
+                printable(f"the pattern {profile.current.pattern!r} does not match {places[-2].rstrip('/')!r}"),
+                where=printable(table.source.name), mend="correct [current] pattern of the profile",
+                code="E_CURRENT_MISSING",
+            )  # fmt: skip
+        statements = [] if found is None else [Statement(found, "name by the profile's pattern")]
     else:
         statements = _statements(table, path)
         if not statements and channel is None:

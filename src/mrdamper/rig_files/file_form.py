@@ -33,6 +33,8 @@ class FileForm(Table):
     blocks : "join" or "split", optional
         Whether what looks like several tests (repeated headers, groups of columns beside each
         other, a column of runs, a time that starts again) is one test or several.
+    leave_out : tuple of str
+        Patterns with * of files and of tables within them that are no tests: `warmup*`, `*/calibration`.
     sample_rate_Hz : float, optional
         Of files without time stamps.
     """
@@ -47,6 +49,7 @@ class FileForm(Table):
     sheet: NAME | None = None
     run_column: NAME | Annotated[int, Field(ge=1, le=1000)] | None = None
     blocks: Literal["join", "split"] | None = None
+    leave_out: tuple[NAME, ...] = Field(default=(), max_length=100, strict=False)
     sample_rate_Hz: float | None = Field(default=None, gt=0, allow_inf_nan=False)
 
     @model_validator(mode="after")

@@ -78,7 +78,9 @@ class CurrentSource(Table):
     value : float, optional
         [A], for every file.
     pattern : str, optional
-        File name with {current} where the number stands and * for anything: `*_{current}A_*`.
+        Name of the file, of the table within it, or of both with their folders, with {current} where
+        the number stands and * for anything: `*_{current}A_*`, `*/I_{current}A/*`. {run}, {frequency}
+        and {amplitude} stand for what tells the tests apart otherwise.
     unit : "A" or "mA"
         Of the number in the file name.
     """
@@ -91,6 +93,9 @@ class CurrentSource(Table):
     def _says_one_thing(self) -> CurrentSource:
         if (self.value is None) == (self.pattern is None):
             raise ValueError("give either value or pattern")
+        unknown = set(re.findall(r"\{(.*?)\}", self.pattern or "")) - {"current", "run", "frequency", "amplitude"}
+        if unknown:
+            raise ValueError(f"no placeholder is called {{{unknown.pop()}}}; known: current, run, frequency, amplitude")
         if self.pattern is not None and (self.pattern.count("{current}") != 1 or self.pattern.count("*") > 3):
             raise ValueError("the pattern needs {current} once, and at most three *")
         return self
@@ -244,9 +249,11 @@ def current_pattern(name: str) -> CurrentSource | None:
 
 
 def _as_expression(pattern: str) -> str:
-    parts = re.split(r"(\{current\}|\*)", pattern)
+    parts = re.split(r"(\{(?:current|run|frequency|amplitude)\}|\*)", pattern)
     number = r"(?P<current>[+-]?[0-9]{1,4}(?:[.,xp][0-9]{1,4})?)"
-    inner = "".join({"{current}": number, "*": ".*?"}.get(part, re.escape(part)) for part in parts)
+    other = r"[+-]?[0-9]{1,6}(?:[.,xp][0-9]{1,4})?"
+    meant = {"{current}": number, "*": ".*?", "{run}": ".+?", "{frequency}": other, "{amplitude}": other}
+    inner = "".join(meant.get(part, re.escape(part)) for part in parts)
     return inner if re.search(r"\.[A-Za-z0-9]{1,5}$|\*$", pattern) else inner + r"(?:\..*)?"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import fnmatch
 import hashlib
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -245,6 +246,8 @@ def import_files(
             tests = beside[0]
         table = tests if tests is None or isinstance(tests, TestsTable) else load_tests(tests)
         files, left_out = _files(given)
+        left_out += [path for path in files if _is_left_out(path.name, profile)]
+        files = [path for path in files if not _is_left_out(path.name, profile)]
         intake = _Intake(profile, table)
         for number, path in enumerate(files):
             progress(path.name, number / len(files))
@@ -449,11 +452,19 @@ def _unjudged(path: Path, profile: Profile) -> list[Record]:
 
 
 def _parts(tables: list[RawTable], profile: Profile) -> list[RawTable]:
+    kept = [table for table in tables if not (table.label and _is_left_out(table.label, profile))]
+    if tables and not kept:
+        raise tables[0].source.refuse("E_NO_DATA", "every table is left out", "correct [file] leave_out of the profile")
+    tables = kept
     tables = with_joined_rasters([completed(table) for table in tables])
     tables = [with_one_clock(table) for table in tables]
     parts = [part for table in tables for part in ([table] if table.fallback else tests_of(table, profile.file))]
     parts = [with_channels_by_physics(with_unit_of_time(table), _said(profile)) for table in with_results(parts)]
     return parts
+
+
+def _is_left_out(name: str, profile: Profile) -> bool:
+    return any(fnmatch.fnmatch(name.casefold(), pattern.casefold()) for pattern in profile.file.leave_out)
 
 
 def _said(profile: Profile) -> list[str]:
@@ -503,7 +514,7 @@ def _files(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:
             for name in names
             if not name.startswith((".", "~$")) and name != TESTS
         )
-        inside = [file for file in inside if not is_packed_folder(file)]
+        inside = [file for file in inside if file.is_file() and not is_packed_folder(file)]  # no pipes
         known = [file for file in inside if file.suffix.lower() in suffixes()]
         known = known or [file for file in inside if _is_table(file)]  # suffixes of a laboratory's own: run.001
         files += known
@@ -533,8 +544,8 @@ def _with_current(record: Record) -> Record:
     raise ColumnError(
         why[0] if why else "no coil current in a column or in the file name",
         where=Path(record.provenance.get("file", record.id)).name,
-        mend='say [current] value = 0.5, [current] pattern = "*_{current}A_*" or [channels.current] column = "..." '
-        "in a profile, or write it into tests.csv (--write-tests)",
+        mend='write the currents into tests.csv (--write-tests), or say [current] pattern = "*_{current}A_*", '
+        '[channels.current] column = "..." or, if all tests have one, [current] value = 0.5 in a profile',
         code="E_CURRENT_MISSING",
     )
 

@@ -15,6 +15,7 @@ from mrdamper.motion.measured import smooth
 from mrdamper.rig_files.coil_current import as_data, constant, current_of, without_gaps
 from mrdamper.rig_files.column_names import role_of
 from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, left_out, rate_of
+from mrdamper.rig_files.mapping.session import stretches_of_session
 from mrdamper.rig_files.parts import stretches_of_time
 from mrdamper.rig_files.profile import Correction, Profile
 from mrdamper.rig_files.readers import suffixes
@@ -48,6 +49,13 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
         channels["time"], rate = _counted_time(table, profile, size)
     further = _further(table, found, size)
     stretches = [slice(0, size)] if profile.file.blocks == "join" else stretches_of_time(channels["time"])
+    if len(stretches) == 1 and profile.file.blocks != "join":
+        stretches = stretches_of_session(channels["time"], channels["displacement"], channels.get("current"))
+        if len(stretches) > 1:
+            text = (
+                f'the record rests between its tests and is cut there into {len(stretches)} (blocks = "join" keeps it)'
+            )
+            findings.append(Finding("W_CUT", text))
     remarks = {**_remarks(table, found), **({"time_from": rate} if rate else {})}
     for name, why in left_out(table, profile, found).items():
         findings.append(Finding("W_COLUMN", f"the {name} channel is left out: {why}"))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import difflib
 import re
 import tomllib
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
@@ -56,7 +57,25 @@ def parse_toml(text: str, kind: type[T], refuse: type[InputError], help: str, wh
         more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
         unknown = first["type"] == "extra_forbidden"
         found = f"unknown key {place}" if unknown else f"{place}: {first['msg'].removeprefix('Value error, ')}"
-        raise refuse(found + more, where=where, mend=help) from error
+        near = _nearest(kind, first["loc"]) if unknown else ""
+        raise refuse(found + near + more, where=where, mend=help) from error
+
+
+def _nearest(kind: type[BaseModel], place: tuple[int | str, ...]) -> str:
+    """The known key that is written most like an unknown one, as a question; empty if none is near."""
+    fields: Any = kind.model_fields
+    for part in place[:-1]:
+        types = _models(fields[part].annotation) if isinstance(part, str) and part in fields else []
+        fields = types[0].model_fields if types else fields
+    near = difflib.get_close_matches(str(place[-1]), list(fields), 1, 0.6)
+    return f" (did you mean {near[0]}?)" if near else ""
+
+
+def _models(annotation: Any) -> list[type[BaseModel]]:
+    """The schemas within a type."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for inner in get_args(annotation) for model in _models(inner)]
 
 
 def read_toml_file(path: Path) -> dict[str, Any]:

@@ -126,11 +126,11 @@ def _write_profile(files: list[Path], known: Profile, target: Path) -> None:
     from mrdamper.errors import InputError
     from mrdamper.files.atomic import write_file
     from mrdamper.rig_files.profile import profile_text
-    from mrdamper.rig_files.rig_import import first_file, guess_profile, read_runs
+    from mrdamper.rig_files.rig_import import columns_of, first_file, guess_profile, read_runs
 
     with first_file(files) as first:
         guess = guess_profile(first, known)
-        text = profile_text(guess)
+        text = profile_text(guess) + _alternatives(columns_of(first, known))
         try:
             read_runs(first, guess)
         except InputError as error:
@@ -140,6 +140,21 @@ def _write_profile(files: list[Path], known: Profile, target: Path) -> None:
         return
     with write_file(target) as path:
         path.write_text(text, encoding="utf-8")
+
+
+def _alternatives(columns: tuple[str, ...]) -> str:
+    """What else a profile may say, as comments: the columns there are, and the keys that are used most."""
+    import json
+
+    named = [f"#   {number}  {json.dumps(name, ensure_ascii=False)}" for number, name in enumerate(columns, 1) if name]
+    return "\n".join(
+        [
+            "", "# Columns of the file, for column = \"...\" or column = NUMBER:", *named,
+            "# One current for all files ([current] value), or one in their names or folders:",
+            '# pattern = "*_{current}A_*" or "*/{current}A/*"; {run}, {frequency}, {amplitude} stand for other numbers',
+            '# Files and tables that are no tests: [file] leave_out = ["warmup*"]', "",
+        ]
+    )  # fmt: skip
 
 
 def _write_dataset(result: ImportResult, profile: Profile, out: Path, add: bool) -> int:

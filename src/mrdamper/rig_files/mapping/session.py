@@ -1,0 +1,79 @@
+"""A session in one record: motions with rests between them, each at a current of its own, are tests of their own."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from mrdamper.data import Floats, held_current
+from mrdamper.rig_files.quality.strokes import find_strokes
+
+MOST_TESTS = 500  # of a record: more is a cut at noise
+_BLOCK_S = 0.1  # [s] in which a motion at rest stays within a share of its range
+_REST = 0.03  # of the motion's range
+_FEWEST_BLOCKS = 3  # of a rest
+_FEWEST_REVERSALS = 3  # of a test
+_ALIKE = 0.1  # relative difference of period and stroke of two tests at one condition
+_ALIKE_A = 0.05  # difference of current of two tests at one condition [A]
+_LONGEST = 5_000_000  # samples
+
+
+def stretches_of_session(time: Floats, displacement: Floats, current: Floats | None) -> list[slice]:
+    """The tests of a record that rests between them, with half of each rest; one stretch where it is one test.
+
+    A record is cut only if every part between two rests is a motion of several strokes at a constant
+    current, and not all parts are of one condition: a pause within a test, and the dwell of a
+    trapezoidal motion, are no borders.
+    """
+    whole = [slice(0, time.size)]
+    there = np.isfinite(time) & np.isfinite(displacement)
+    if current is None or not there.all() or not 400 <= time.size <= _LONGEST or np.any(np.diff(time) <= 0):
+        return whole
+    borders = _borders(time, displacement)
+    if not 1 <= len(borders) <= 2 * MOST_TESTS:
+        return whole
+    parts = [slice(a, b) for a, b in pairwise([0, *borders, time.size])]
+    parts = [part for part in parts if _moves(displacement[part], displacement)]
+    if not 2 <= len(parts) <= MOST_TESTS:
+        return whole
+    conditions = [_condition(time[part], displacement[part], current[part]) for part in parts]
+    if any(condition is None for condition in conditions):
+        return whole
+    first = conditions[0]
+    alike = all(_same(first, other) for other in conditions)
+    return whole if alike else parts
+
+
+def _borders(time: Floats, x: Floats) -> list[int]:
+    """Middles of the rests of a motion."""
+    step = float(np.median(np.diff(time)))
+    size = max(2, round(_BLOCK_S / step))
+    count = x.size // size
+    blocks = x[: count * size].reshape(count, size)
+    still = np.ptp(blocks, axis=1) < _REST * np.ptp(x)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
+    rests = [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= _FEWEST_BLOCKS]
+    return [int((a + b) * size // 2) for a, b in rests if a > 0 and b < count]
+
+
+def _moves(part: Floats, x: Floats) -> bool:
+    return part.size > 0 and float(np.ptp(part)) > 2 * _REST * float(np.ptp(x))
+
+
+def _condition(time: Floats, x: Floats, current: Floats) -> tuple[float, float, float] | None:
+    """Period [s], stroke [m] and current [A] of a part; None if it is no test at a constant current."""
+    strokes = find_strokes(time, x)
+    if strokes.reversals.size < _FEWEST_REVERSALS or strokes.period is None:
+        return None
+    inside = slice(int(strokes.reversals[0]), int(strokes.reversals[-1]) + 1)
+    known = current[inside][np.isfinite(current[inside])]
+    mean, change = held_current(known) if known.size >= 3 else (0.0, "no samples")
+    return None if change else (strokes.period, float(np.median(strokes.lengths)), mean)
+
+
+def _same(one: tuple[float, float, float] | None, other: tuple[float, float, float] | None) -> bool:
+    assert one is not None
+    assert other is not None
+    near = all(abs(a - b) <= _ALIKE * max(a, b) for a, b in zip(one[:2], other[:2], strict=True))
+    return near and abs(one[2] - other[2]) <= _ALIKE_A
