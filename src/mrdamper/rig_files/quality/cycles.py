@@ -83,5 +83,6 @@ def _channel(values: Floats) -> Channel:
     slope = 0.5 * POINTS * (np.roll(loop, -1) - np.roll(loop, 1))
     table = np.column_stack([np.ones(POINTS), loop - loop.mean(), -slope])
     differences = (values - loop).T
-    found = np.linalg.lstsq(table, differences, rcond=1e-9)[0]
-    return Channel(values, loop, slope, *found, (differences - table @ found).T)
+    changes = np.linalg.lstsq(table, differences, rcond=1e-9)[0]
+    offset, gain, late = changes
+    return Channel(values, loop, slope, offset, gain, late, (differences - table @ changes).T)

@@ -33,8 +33,8 @@ _BETTER, _FAR_BETTER = 0.2, 0.12  # of the misfit without delay: a smaller impro
 _MUCH_BETTER = 0.4  # of it, where hysteresis leaves much
 _NEARLY, _NEARLY_EARLY = 0.004, 0.025  # of the force's RMS: hysteresis, or relaxation, that leaves less explains it
 _LITTLE, _UNEXPLAINED = 0.009, 0.05  # of the force's RMS: up to here little, from here on much
-_GRID = np.round(np.arange(-0.12, 0.161, 0.01), 3)  # delays tried first, of the period
-_FINE = np.array([-0.005, -0.0025, 0.0025, 0.005])  # and then around the best of them
+_GRID = np.round(np.arange(-0.12, 0.161, 0.02), 3)  # delays tried first, of the period
+_FINE = np.array([-0.01, -0.005, -0.0025, 0.0025, 0.005, 0.01])  # and then around the best of them
 _AS_GOOD = 1.5  # times the best misfit
 _YIELD = np.geomspace(0.0005, 1.0, 30)  # yield displacements, of half the stroke
 _SOFT = np.array([0.01, 0.02, 0.05, 0.1, 0.2, 0.4])  # velocities in which a yield force builds up, of the peak
@@ -148,8 +148,8 @@ def force_lag(view: View) -> ForceLag | None:
     best = min(tried, key=tried.__getitem__)
     alike = [delay for delay, left in tried.items() if left <= _AS_GOOD * tried[best]]
     noise = sample_noise(view.steady.force) * np.sqrt(POINTS / len(cycles.starts)) / size
-    beyond = [float(np.sqrt(max(left**2 - noise**2, (0.3 * noise) ** 2))) for left in (tried[best], without)]
-    return ForceLag(best, *beyond, min(alike), max(alike))
+    left, unmoved = (float(np.sqrt(max(m**2 - noise**2, (0.3 * noise) ** 2))) for m in (tried[best], without))
+    return ForceLag(best, left, unmoved, min(alike), max(alike))
 
 
 def _read(loop: Floats, phase: Floats) -> Floats:
