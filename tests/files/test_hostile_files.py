@@ -1,6 +1,8 @@
 """What is read as a whole is read within bounds: files without an end, and those that unpack to a thousand times."""
 
 import gzip
+import os
+import signal
 from pathlib import Path
 
 import pytest
@@ -57,3 +59,22 @@ def test_a_record_without_an_end_in_an_old_result_is_not_read(tmp_path):
     with write_result(tmp_path) as work:
         (work / "new.txt").write_text("new")
     assert (tmp_path / "new.txt").read_text() == "new"
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+@pytest.mark.parametrize("read", READ, ids=lambda read: read.__name__)
+def test_a_pipe_is_refused_without_waiting_for_a_writer(read, tmp_path):
+    pipe = tmp_path / READ[read]
+    os.mkfifo(pipe)
+
+    def too_long(*_):
+        raise TimeoutError(f"{read.__name__} waits for a writer")
+
+    before = signal.signal(signal.SIGALRM, too_long)
+    signal.alarm(10)
+    try:
+        with pytest.raises(InputError):
+            read(pipe)
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)

@@ -1,5 +1,7 @@
 """`tests.csv`, adding to a dataset and holding runs out: by the command line, as users do."""
 
+import time
+
 import pytest
 from support import lab_exports
 from support.lab_exports import Lab, campaign
@@ -163,3 +165,12 @@ def test_the_same_refusal_of_many_files_is_one_line(tmp_path):
     refused = [line for line in done.output.splitlines() if line.startswith("refused")]
     assert len(refused) == 3  # a line a channel: all that is wrong is said at once
     assert all(line.startswith("refused 5 times (a0.csv, a1.csv, a2.csv and 2 more)") for line in refused)
+
+
+def test_a_table_of_far_too_many_rows_is_refused_at_once(tmp_path):
+    path = write(tmp_path, "tests.csv", "file,current_A\n" + "".join(f"t{i}.csv,0.5\n" for i in range(100_000)))
+    begin = time.process_time()
+    with pytest.raises(InputError, match="100000 rows") as caught:
+        load_tests(path)
+    assert caught.value.code == "E_TESTS"
+    assert time.process_time() - begin < 5.0

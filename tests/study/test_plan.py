@@ -166,3 +166,11 @@ def test_a_plan_beats_chance_and_the_factorial_grid_by_choosing_its_sessions():
     for other in ("random records, one session", "factorial grid, one session", "plan that ignores drift"):
         assert found["plan"] < 0.7 * found[other], other
     assert found["plan"] < 0.9 * found["random records, sessions as the plan"]
+
+
+def test_a_record_of_too_many_samples_is_refused_and_the_remedy_works():
+    with pytest.raises(InputError, match=r"1.2e\+08 samples") as caught:
+        replace(LIMITS, sample_rate_Hz=1e7)
+    assert caught.value.code == "E_LIMITS"
+    most = int(caught.value.mend.split("at most ")[1].split()[0].replace(",", ""))
+    assert replace(LIMITS, sample_rate_Hz=most * LIMITS.frequency_Hz[0] / LIMITS.cycles).sample_rate_Hz > 1e4

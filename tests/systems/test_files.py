@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from collections import Counter
 
 import numpy as np
@@ -131,3 +132,12 @@ def test_options_that_contradict_each_other(tmp_path):
         done = CliRunner().invoke(application(), base + extra)
         assert isinstance(done.exception, InputError)
         assert word in str(done.exception)
+
+
+def test_a_tyre_in_a_wrong_unit_is_refused_instead_of_simulated_for_ever(tmp_path):
+    text = bundled_systems()["quarter-car"].read_text()
+    stiff = tmp_path / "car.toml"
+    stiff.write_text(re.sub(r"tyre_N_m = .*", "tyre_N_m = 1e12", text))
+    with pytest.raises(InputError, match="natural frequency") as caught:
+        load_system(stiff)
+    assert "units" in caught.value.mend

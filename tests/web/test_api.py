@@ -29,6 +29,7 @@ from mrdamper.identification import identify
 from mrdamper.identification.loop_analysis import analyse_loop
 from mrdamper.identification.methods import all_methods
 from mrdamper.web.answers import frame
+from mrdamper.web.kept import DATA
 from mrdamper.web.tasks import export_name
 
 SCREEN = 1e-6  # arrays travel as 32-bit floats: 6e-8 of each value, and sums of two
@@ -281,6 +282,18 @@ def drop_kept(client, session, content):
     key = client.post(f"{session}/drops").json()["drop"]
     client.put(f"{session}/drops/{key}/files", params={"name": "kept.zip"}, content=content).raise_for_status()
     return client.post(f"{session}/drops/{key}/open")
+
+
+def test_what_is_wrong_in_a_saved_project_is_told_without_the_servers_folders(client, app, session):
+    parts = {"bench.json": {**LIST, "source": "drop"}, "bench-state.json": {}, f"{DATA}/runs.csv": "run_id\na\n"}
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        for name, part in parts.items():
+            archive.writestr(name, part if isinstance(part, str) else json.dumps(part))
+    answer = drop_kept(client, session, content.getvalue())
+    assert answer.status_code >= 400
+    assert "runs.csv" in answer.text or "samples" in answer.text
+    assert str(app.state.sessions.folder) not in answer.text
 
 
 LIST = {"format": "mrdamper-bench", "version": 1, "source": "", "name": "", "dampers": [], "current": None}

@@ -1,11 +1,14 @@
 """Who is answered, and what every answer forbids."""
 
+import asyncio
+import contextlib
 import re
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from starlette.datastructures import Headers
+from starlette.requests import ClientDisconnect
 
 from mrdamper.web.drops import FILE_LIMIT
 from mrdamper.web.security import FORM_LIMIT, HEADERS, Guard
@@ -138,7 +141,7 @@ def test_a_session_that_ended_is_gone_with_its_files(client, app, session):
     client.delete(session)
     assert not folder.exists()
     assert client.get(session).status_code == 410
-    assert client.get(session).json()["code"] == "E_SESSION"
+    assert client.get(session).json()["code"] == "E_SESSION_ENDED"
 
 
 def test_an_unused_session_is_swept(client, app, session):
@@ -196,5 +199,30 @@ def test_a_session_that_ends_while_it_is_asked_is_said_to_have_ended(client, app
     mine = app.state.sessions.find(session.rsplit("/", 1)[-1])
     monkeypatch.setattr(type(mine), "key", lambda self, kind: app.state.sessions.end(self.name) or kind)
     answer = client.post(f"{session}/drops")  # its folder is gone by now
-    assert (answer.status_code, answer.json()["code"]) == (410, "E_SESSION")
+    assert (answer.status_code, answer.json()["code"]) == (410, "E_SESSION_ENDED")
     assert "Traceback" not in capsys.readouterr().err
+
+
+def test_a_half_sent_request_opens_no_session(app):
+    """Sessions are opened when the request is whole: half-sent ones push nobody out."""
+    sent = []
+    pieces = iter([{"type": "http.request", "body": b"{", "more_body": True}, {"type": "http.disconnect"}])
+
+    async def receive():
+        return next(pieces)
+
+    async def send(message):
+        sent.append(message)
+
+    host = "bench.test:1"
+    scope = {
+        "type": "http", "asgi": {"version": "3.0"}, "http_version": "1.1", "method": "POST", "path": "/api/sessions",
+        "raw_path": b"/api/sessions", "query_string": b"", "root_path": "", "scheme": "http",
+        "headers": [(b"host", host.encode()), (b"origin", f"http://{host}".encode()), (b"content-length", b"100")],
+        "client": ("127.0.0.1", 1), "server": ("127.0.0.1", 80),
+    }  # fmt: skip
+    before = len(list(app.state.sessions))
+    with contextlib.suppress(ClientDisconnect):
+        asyncio.run(app(scope, receive, send))
+    assert len(list(app.state.sessions)) == before
+    assert all(message.get("status") != 200 for message in sent)

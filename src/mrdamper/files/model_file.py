@@ -22,6 +22,7 @@ from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.coil import Coil, Driver
 from mrdamper.dampers.sessions import Sessions
 from mrdamper.data import require_name
+from mrdamper.data.regular import open_regular
 from mrdamper.errors import InputError, ModelFileError, require
 from mrdamper.files.atomic import path_of, write_file
 from mrdamper.files.strict_json import parse_json
@@ -215,7 +216,7 @@ def load_model(path: str | Path) -> Damper:
     """
     path = path_of(path)
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             content = file.read(_LARGEST + 1)
         if len(content) > _LARGEST:
             raise ModelFileError(f"over {_LARGEST // 10**6} MB", where=str(path), mend="is this a model.json?")

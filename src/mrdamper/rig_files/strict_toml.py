@@ -10,6 +10,7 @@ from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
+from mrdamper.data.regular import open_regular
 from mrdamper.errors import InputError
 
 _LONGEST = 200_000  # characters; the profiles of the documentation have under 3,000
@@ -33,7 +34,7 @@ def load_toml(path: Path, kind: type[T], refuse: type[InputError], help: str, la
         Bytes; a profile is a page.
     """
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             content = file.read(largest + 1)  # no more, whatever it is
         if len(content) > largest:
             raise refuse(f"over {largest // 1024} KiB", where=path.name, mend=f"is this the file? {help}")
@@ -88,7 +89,7 @@ def read_toml_file(path: Path) -> dict[str, Any]:
     tomllib.TOMLDecodeError
         Also if it is no UTF-8.
     """
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         content = file.read(4 * _LONGEST + 1)
     try:
         return read_toml(content.decode("utf-8-sig"))

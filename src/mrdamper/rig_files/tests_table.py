@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePath
 
 from mrdamper.data import held_current
+from mrdamper.data.regular import open_regular
 from mrdamper.errors import CombinedError, InputError
 from mrdamper.rig_files.coil_current import constant
 from mrdamper.rig_files.column_names import split_name
@@ -20,6 +21,7 @@ from mrdamper.rig_files.units import parse_unit
 NAME = "tests.csv"
 COLUMNS = ("file", "run", "current_A", "temperature_C", "split", "session", "specimen", "notes")
 _LARGEST = 4 * 2**20  # bytes
+_MOST_ROWS = 10_000  # tests of one import
 _FILE = frozenset(("file", "filename", "file name", "datei", "dateiname", "fichier", "archivo"))
 _RUN = frozenset(("run", "run_id", "test", "versuch", "essai"))
 _Wrong = Callable[[int, str, str], None]
@@ -183,7 +185,7 @@ def tests_text(records: Sequence[Record]) -> str:
 def _cells(path: Path) -> list[tuple[int, list[str]]]:
     """Line and cells of every row that holds something."""
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             content = file.read(_LARGEST + 1)  # no more, whatever it is
         if len(content) > _LARGEST:
             raise TestsTableError("over 4 MiB", where=path.name, mend="is this a table of tests?")
@@ -199,6 +201,9 @@ def _cells(path: Path) -> list[tuple[int, list[str]]]:
         rows = [(reader.line_num, cells) for cells in reader if any(cell.strip() for cell in cells)]
     except csv.Error as error:
         raise TestsTableError(str(error), where=path.name, mend="save it as CSV again") from error
+    if len(rows) > _MOST_ROWS + 1:
+        found = f"{len(rows) - 1} rows; a table of tests has at most {_MOST_ROWS}"
+        raise TestsTableError(found, where=path.name, mend="is this a table of tests, or of samples? Import in parts")
     if len(rows) < 2:
         raise TestsTableError("no rows", where=path.name, mend=f"write one row a test: {', '.join(COLUMNS)}")
     return rows

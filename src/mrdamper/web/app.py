@@ -32,7 +32,7 @@ from mrdamper.web.work import refusal
 
 _SWEEP_SECONDS = 60.0
 _TWO_ARENAS = (-8, 2)  # M_ARENA_MAX
-_STATUS = {"E_SESSION": 410, "E_DROP_SIZE": 413}
+_STATUS = {"E_SESSION_ENDED": 410, "E_DROP_SIZE": 413}
 
 
 def create_app(

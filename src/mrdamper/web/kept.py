@@ -175,7 +175,11 @@ def _data(archive: zipfile.ZipFile, about: _List, parts: list[str], place: Path)
     place.mkdir()
     for name in parts:
         (place / PurePosixPath(name).name).write_bytes(_part(archive, name, _PART_LIMIT))
-    return Intake(Dataset(load_dataset(place).runs, about.name), "drop")
+    try:
+        return Intake(Dataset(load_dataset(place).runs, about.name), "drop")
+    except InputError as error:  # of the parts it names, not of the folder they were unpacked in
+        error.where, error.found = (text.replace(str(place), DATA) for text in (error.where, error.found))
+        raise
 
 
 def _part(archive: zipfile.ZipFile, name: str, limit: int = _SMALL_LIMIT) -> bytes:

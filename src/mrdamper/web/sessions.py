@@ -201,7 +201,7 @@ class Sessions:
         """The session of that name; raises `InputError` if it has ended."""
         session = self._open.get(name)
         if session is None:
-            raise InputError("this session has ended", mend="load the page again", code="E_SESSION")
+            raise InputError("this session has ended", mend="load the page again", code="E_SESSION_ENDED")
         session.seen = time.monotonic()
         return session
 

@@ -35,7 +35,7 @@ _NEARLY, _NEARLY_EARLY = 0.004, 0.025  # of the force's RMS: hysteresis, or rela
 _LITTLE, _UNEXPLAINED = 0.009, 0.05  # of the force's RMS: up to here little, from here on much
 _GRID = np.round(np.arange(-0.12, 0.161, 0.02), 3)  # delays tried first, of the period
 _FINE = np.array([-0.01, -0.005, -0.0025, 0.0025, 0.005, 0.01])  # and then around the best of them
-_AS_GOOD = 1.5  # times the best misfit
+_AS_GOOD, _MODEL = 1.5, 0.1  # times the best misfit, and of that without delay: what the elements' own error may be
 _YIELD = np.geomspace(0.0005, 1.0, 30)  # yield displacements, of half the stroke
 _SOFT = np.array([0.01, 0.02, 0.05, 0.1, 0.2, 0.4])  # velocities in which a yield force builds up, of the peak
 _LEAD = 0.015  # share of the force that acts as a negative spring
@@ -146,7 +146,8 @@ def force_lag(view: View) -> ForceLag | None:
     near = min(tried, key=tried.__getitem__)
     tried |= {near + float(step): misfit(near + step) for step in _FINE}
     best = min(tried, key=tried.__getitem__)
-    alike = [delay for delay, left in tried.items() if left <= _AS_GOOD * tried[best]]
+    enough = max(_AS_GOOD * tried[best], _MODEL * without)
+    alike = [delay for delay, left in tried.items() if left <= enough]
     noise = sample_noise(view.steady.force) * np.sqrt(POINTS / len(cycles.starts)) / size
     left, unmoved = (float(np.sqrt(max(m**2 - noise**2, (0.3 * noise) ** 2))) for m in (tried[best], without))
     return ForceLag(best, left, unmoved, min(alike), max(alike))

@@ -7,7 +7,7 @@ import threading
 from importlib.metadata import version
 from typing import Any
 
-from fastapi import APIRouter, HTTPException, Request
+from fastapi import APIRouter, Depends, HTTPException, Request
 
 from mrdamper.web.drops import FILE_COUNT_LIMIT, FILE_LIMIT
 from mrdamper.web.intake import bundled
@@ -17,7 +17,12 @@ from mrdamper.web.sessions import Current
 router = APIRouter(prefix="/sessions")
 
 
-@router.post("")
+async def _whole(request: Request) -> None:
+    """Wait for the end of a request: one that is half sent opens no session and ends none."""
+    await request.body()
+
+
+@router.post("", dependencies=[Depends(_whole)])
 def open_session(request: Request) -> dict[str, Any]:
     """A new session and what the page must know of the bench."""
     token, shown = request.app.state.token, request.headers.get("x-bench-token", "")

@@ -1,0 +1,130 @@
+"""The residual of the mean cycle: every kind of fault is found at a size that matters, none in clean records."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mrdamper.data import Run
+from mrdamper.rig_files.quality.cycles import POINTS, steady_cycles
+from mrdamper.rig_files.quality.effects import damping, elastic_plastic
+from mrdamper.rig_files.quality.force_lag import force_lag
+from mrdamper.rig_files.quality.view import View
+from mrdamper.rig_files.record import Record
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+from fuzz.fuzz_records import codes_of
+from fuzz.record_faults import KINDS, UNOBSERVABLE
+from fuzz.synthetic_records import FAMILIES, clean_record
+
+PHASE = 2 * np.pi * np.arange(POINTS) / POINTS
+
+
+def sine_record(force=None, cycles=8, points=200, seed=1):
+    """A sine of 20 mm and 1 Hz with the noise of a good rig; the force as a function of displacement and velocity."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(cycles * points + 1) / points
+    x, v = 0.02 * np.sin(2 * np.pi * time), 0.04 * np.pi * np.cos(2 * np.pi * time)
+    force = (1500 * v + 300 * np.tanh(v / 0.01)) if force is None else force(x, v)
+    noise = rng.standard_normal((2, time.size))
+    return Record("r", time, x + 2e-6 * noise[0], force + 2.0 * noise[1])
+
+
+# Laws
+
+
+@pytest.mark.parametrize("bend", [0.003, 0.03, 0.3, 0.9])
+def test_the_steady_elastic_plastic_loop_is_that_of_the_sequential_element(bend):
+    x, rising = np.sin(PHASE), np.cos(PHASE) > 0
+    state, states = 0.0, []
+    for step in np.diff(np.concatenate([x, x, x, x[:1]])):
+        state = min(max(state + step / bend, -1.0), 1.0)
+        states.append(state)
+    expected = np.array(states[2 * POINTS - 1 : 3 * POINTS - 1])
+    inside = np.abs(np.cos(PHASE)) > 0.1  # the reversal itself lies between two phases
+    np.testing.assert_allclose(elastic_plastic(x, rising, np.array([bend]))[inside, 0], expected[inside], atol=2e-3)
+
+
+@pytest.mark.parametrize(("c", "bend"), [(200.0, 0.05), (3000.0, 0.3), (1.0, 0.02)])
+def test_the_damping_of_a_known_loop_is_recovered(c, bend):
+    x, v = 0.02 * np.sin(PHASE), 0.12 * np.cos(PHASE)
+    loop = elastic_plastic(x, v > 0, np.array([0.02 * bend]))[:, 0]
+    assert damping(x, v, 40 + 900 * x + c * v + 500 * loop) == pytest.approx(c, rel=0.05, abs=30)
+
+
+def test_offset_gain_and_delay_of_a_cycle_are_recovered():
+    record = sine_record(cycles=6)
+    late = record.force.copy()
+    late[800:1000] = 1.1 * late[800:1000] + 50
+    cycles = steady_cycles(View(Record("r", record.time, record.displacement, late)))
+    assert cycles is not None
+    others = np.delete(cycles.force.gain, 3)
+    assert cycles.force.gain[3] - np.mean(others) == pytest.approx(0.1, rel=0.1)
+    assert cycles.force.offset[3] - np.mean(np.delete(cycles.force.offset, 3)) == pytest.approx(50, rel=0.1)
+    assert np.max(np.abs(cycles.displacement.late)) < 1e-4
+
+
+@pytest.mark.parametrize("share", [-0.08, -0.03, 0.03, 0.08])
+def test_the_delay_of_a_force_with_corners_is_recovered_within_its_interval(share):
+    record = sine_record(lambda x, v: 1500 * v + 300 * np.tanh(v / 0.001), cycles=8)
+    moved = np.interp(record.time - share, record.time, record.force)
+    lag = force_lag(View(Record("r", *(a[50:-50] for a in (record.time, record.displacement, moved)))))
+    assert lag is not None
+    assert lag.share == pytest.approx(share, abs=0.01)
+    assert lag.low - 0.0051 <= share <= lag.high + 0.0051
+
+
+# Recovery: one size of every kind that moves the result
+
+
+SEVERE = {
+    "mains hum, 50 Hz, on the displacement": 0.05, "other line on the displacement": 0.08,
+    "mains hum, 50 Hz, on the force": 0.2, "other line on the force": 0.2,
+    "force clipped before noise": 0.2, "force clipped before a filter": 0.2,
+    "displacement clipped before noise": 0.15, "displacement clipped at one end before noise": 0.15,
+    "force late, as by a clock of its own": 0.06, "force early": 0.06, "clock of the force runs fast": 0.1,
+    "gain of the force drifts": 0.3, "gain of the force steps": 0.2, "offset of the force drifts": 0.2,
+    "samples lost and renumbered": 0.05, "samples written twice": 0.05, "one cycle pasted": 10, "a stretch pasted": 1,
+    "one force sample off": 1.5, "noise on the force": 0.06, "noise on the displacement": 0.02,
+    "displacement held at a slower rate": 0.06, "force behind a second-order low-pass": 0.04,
+    "backlash in the displacement sensor": 0.05,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind.name in SEVERE], ids=lambda kind: kind.name)
+def test_a_fault_of_a_size_that_matters_is_found(kind):
+    faulty = kind.change(sine_record(), SEVERE[kind.name], np.random.default_rng(3))
+    assert codes_of(faulty) - codes_of(sine_record())
+
+
+def test_findings_state_their_effect_in_per_cent():
+    from mrdamper.rig_files.quality import judge
+
+    for name in ("mains hum, 50 Hz, on the force", "gain of the force drifts", "force clipped before noise"):
+        kind = next(kind for kind in KINDS if kind.name == name)
+        found = judge(kind.change(sine_record(), SEVERE[name], np.random.default_rng(3))).findings
+        assert any("%" in finding.text for finding in found), name
+
+
+def test_there_are_forty_kinds_and_each_changes_a_record():
+    assert len(KINDS) >= 40
+    record = clean_record(1, np.random.default_rng(0), least_cycles=4.0)
+    for kind in (*KINDS, *UNOBSERVABLE):
+        faulty = kind.change(record, float(np.sqrt(kind.low * kind.high)), np.random.default_rng(1))
+        Run("r", faulty.time, faulty.displacement, faulty.force, faulty.current)  # a record as any
+        same = faulty.time.size == record.time.size and all(
+            np.array_equal(values, getattr(record, name)) for name, values in faulty.channels.items()
+        )
+        assert not same, kind.name
+
+
+def test_clean_records_of_every_family_are_not_accused():
+    accused = [n for n in range(3 * len(FAMILIES)) if codes_of(clean_record(n, np.random.default_rng([99, n])))]
+    assert not accused
+
+
+@pytest.mark.slow
+def test_at_most_one_clean_record_in_two_hundred_is_accused():
+    accused = [n for n in range(600) if codes_of(clean_record(n, np.random.default_rng([98, n])))]
+    assert len(accused) <= 3, accused
