@@ -31,8 +31,9 @@ bench-check: $(VENV)/.dev  ## processor seconds against a stored commit, in turn
 	$(BIN)/python -m benchmarks.check
 
 MUTANTS ?= 20000
-fuzz: $(VENV)/.dev  ## damage rig files at random: each is read, or refused with a code (MUTANTS=200000)
+fuzz: $(VENV)/.dev  ## damage rig files at random (MUTANTS=200000), and put physical faults into records
 	$(BIN)/python -m fuzz.fuzz_import --mutants $(MUTANTS)
+	$(BIN)/python -m fuzz.fuzz_records
 
 SHARE ?= 1
 attack: $(VENV)/.dev  ## hostile names, models, tables, calls; killed and starved commands: counts a kind (SHARE=0.1)

@@ -157,7 +157,7 @@ def table(tried: list[Trial]) -> str:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description="Put physical faults into clean records and count what is found.")
     parser.add_argument("--records", type=int, default=20, help="of every kind")
     parser.add_argument("--clean", type=int, default=1000, help="clean synthetic records")
     parser.add_argument("--seed", type=int, default=1)

@@ -1,6 +1,7 @@
 """The residual of the mean cycle: every kind of fault is found at a size that matters, none in clean records."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from mrdamper.data import Run
 from mrdamper.rig_files.quality.cycles import POINTS, steady_cycles
 from mrdamper.rig_files.quality.effects import damping, elastic_plastic
 from mrdamper.rig_files.quality.force_lag import force_lag
+from mrdamper.rig_files.quality.names import agrees_with_its_name
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Record
 
@@ -105,6 +107,19 @@ def test_findings_state_their_effect_in_per_cent():
         kind = next(kind for kind in KINDS if kind.name == name)
         found = judge(kind.change(sine_record(), SEVERE[name], np.random.default_rng(3))).findings
         assert any("%" in finding.text for finding in found), name
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("1Hz_20mm", 0), ("1.1Hz_40mm_0.5A", 0), ("t3_20mm1Hz", 0), ("0x5Hz_20mm", 1), ("60Hz", 1), ("1Hz_0.8mm", 1),
+        ("2 Hz, 300 mm", 2), ("1-15Hz_20mm", 1), ("20mm/s", 0), ("1kHz_sampling", 0), ("5Hz and 9Hz", 0), ("0Hz", 0),
+    ],
+)  # fmt: skip
+def test_what_a_name_states_is_compared_with_the_motion(name, said):
+    """The record has 1 Hz and 20 mm; a name may state the stroke, and a machine falls short of its command."""
+    found = list(agrees_with_its_name(View(replace(sine_record(), id=name))))
+    assert [finding.code for finding in found] == ["W_NAME"] * said
 
 
 def test_there_are_forty_kinds_and_each_changes_a_record():

@@ -19,7 +19,7 @@ from mrdamper.rig_files.quality.effects import REFUSED, percent
 from mrdamper.rig_files.quality.view import View, sample_noise
 from mrdamper.rig_files.record import Finding
 
-_VELOCITY = 0.015  # power of the velocity that is no part of the motion, of all: bundled rigs reach 0.004
+_VELOCITY = 0.008  # power of the velocity that is no part of the motion, of all: bundled rigs reach 0.004
 _LINE = 0.03  # amplitude of a line in the force, of half its peak-to-peak value
 _ABOVE = 12.0  # times the median line around it; noise reaches 8
 _AROUND = 60  # lines on either side

@@ -37,6 +37,7 @@ _GRID = np.round(np.arange(-0.12, 0.161, 0.02), 3)  # delays tried first, of the
 _FINE = np.array([-0.01, -0.005, -0.0025, 0.0025, 0.005, 0.01])  # and then around the best of them
 _AS_GOOD, _MODEL = 1.5, 0.1  # times the best misfit, and of that without delay: what the elements' own error may be
 _YIELD = np.geomspace(0.0005, 1.0, 30)  # yield displacements, of half the stroke
+_DENSE_YIELD = np.geomspace(0.0005, 1.0, 150)
 _SOFT = np.array([0.01, 0.02, 0.05, 0.1, 0.2, 0.4])  # velocities in which a yield force builds up, of the peak
 _LEAD = 0.015  # share of the force that acts as a negative spring
 _MASS = 30.0  # [kg] that would explain it
@@ -112,8 +113,6 @@ def _negative_spring(cycles: Cycles) -> tuple[float, float]:
 @on_one_blas_thread
 def force_lag(view: View) -> ForceLag | None:
     """Best delay of the force on a sine; None where the motion is none, or is explained without."""
-    from scipy.optimize import nnls
-
     cycles, motion = steady_cycles(view), view.motion
     if cycles is None or motion is None:
         return None
@@ -121,36 +120,45 @@ def force_lag(view: View) -> ForceLag | None:
     time = cycles.starts[0] + phase * cycles.period
     x = (series(time) - series.mean - series.drift * (time - series.origin)) / motion.condition.amplitude_m
     v = (series(time, 1) - series.drift) / (2 * np.pi * series.frequency * motion.condition.amplitude_m)
-    either = np.column_stack([np.ones(POINTS), x, x**2, x**3, v**2, np.abs(v) * v, v**3])
-    resisting = np.column_stack(
-        [v, np.tanh(v[:, None] / _SOFT), elastic_plastic(x, v > 0, _YIELD * 0.5 * float(np.ptp(x)))]
-    )
-    basis, triangle = np.linalg.qr(np.column_stack([either, resisting]))
-    free = triangle[:, : either.shape[1]]
-    table = np.column_stack([free, -free, triangle[:, either.shape[1] :]])
     force = cycles.force.loop - np.mean(cycles.force.loop)
     size = float(np.linalg.norm(force))
     if size == 0:
         return None
-
-    def misfit(delay: float) -> float:
-        shifted = _read(force, phase + delay)
-        inside = basis.T @ shifted
-        outside = max(float(shifted @ shifted - inside @ inside), 0.0)
-        return float(np.sqrt(outside + nnls(table, inside)[1] ** 2)) / size
-
-    without = misfit(0.0)
+    elements = _Elements(x, v, _YIELD)
+    without = elements.misfit(force)
     if without <= _NEARLY:
         return None
-    tried = {0.0: without} | {float(delay): misfit(delay) for delay in _GRID if delay}
+    tried = {0.0: without} | {float(d): elements.misfit(_read(force, phase + d)) for d in _GRID if d}
     near = min(tried, key=tried.__getitem__)
-    tried |= {near + float(step): misfit(near + step) for step in _FINE}
+    tried |= {near + float(step): elements.misfit(_read(force, phase + near + step)) for step in _FINE}
     best = min(tried, key=tried.__getitem__)
+    if tried[best] < _MUCH_BETTER * without:  # one sharp element may lie between two of the grid
+        without = min(without, _Elements(x, v, _DENSE_YIELD).misfit(force))
     enough = max(_AS_GOOD * tried[best], _MODEL * without)
     alike = [delay for delay, left in tried.items() if left <= enough]
     noise = sample_noise(view.steady.force) * np.sqrt(POINTS / len(cycles.starts)) / size
     left, unmoved = (float(np.sqrt(max(m**2 - noise**2, (0.3 * noise) ** 2))) for m in (tried[best], without))
     return ForceLag(best, left, unmoved, min(alike), max(alike))
+
+
+class _Elements:
+    """Everything that may make up the force of one cycle of a motion."""
+
+    def __init__(self, x: Floats, v: Floats, yields: Floats):
+        either = np.column_stack([np.ones(x.size), x, x**2, x**3, v**2, np.abs(v) * v, v**3])
+        loops = elastic_plastic(x, v > 0, yields * 0.5 * float(np.ptp(x)))
+        resisting = np.column_stack([v, np.tanh(v[:, None] / _SOFT), loops])
+        self.basis, triangle = np.linalg.qr(np.column_stack([either, resisting]))
+        free = triangle[:, : either.shape[1]]
+        self.table = np.column_stack([free, -free, triangle[:, either.shape[1] :]])
+
+    def misfit(self, force: Floats) -> float:
+        """RMS of what the elements leave of a force, over its RMS; those that resist have no negative share."""
+        from scipy.optimize import nnls
+
+        inside = self.basis.T @ force
+        outside = max(float(force @ force - inside @ inside), 0.0)
+        return float(np.sqrt((outside + nnls(self.table, inside)[1] ** 2) / (force @ force)))
 
 
 def _read(loop: Floats, phase: Floats) -> Floats:

@@ -1,0 +1,45 @@
+"""Frequency and amplitude that a name states, against the motion that was measured."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from mrdamper.rig_files.quality.view import View
+from mrdamper.rig_files.record import Finding
+
+_NUMBER = r"(?<![\d.,x])(\d{1,4}(?:[.,x]\d{1,4})?)[ _]?"
+_FREQUENCY = re.compile(_NUMBER + r"hz(?![a-z])", re.IGNORECASE)
+_AMPLITUDE = re.compile(_NUMBER + r"mm(?![a-z/]|[ _]?s)", re.IGNORECASE)
+_SAME_FREQUENCY = 0.2  # relative difference of what is measured
+# Measured amplitude over the one stated, which may be the stroke peak to peak: a machine falls short of its command.
+_AMPLITUDES = (0.25, 1.6)
+
+
+def agrees_with_its_name(view: View) -> Iterator[Finding]:
+    """Report a motion of another frequency or amplitude than the name of its file or test states."""
+    motion = view.motion
+    if motion is None:
+        return
+    name = f"{view.record.provenance.get('file', '')} {view.record.id}"
+    measured = motion.condition
+    frequency, amplitude = _stated(_FREQUENCY, name), _stated(_AMPLITUDE, name)
+    if frequency is not None and abs(measured.frequency_Hz / frequency - 1) > _SAME_FREQUENCY:
+        yield _contradiction(f"{frequency:g} Hz", f"{measured.frequency_Hz:.3g} Hz", "time")
+    if amplitude is not None and not _AMPLITUDES[0] < 1e3 * measured.amplitude_m / amplitude < _AMPLITUDES[1]:
+        yield _contradiction(
+            f"{amplitude:g} mm", f"an amplitude of {1e3 * measured.amplitude_m:.3g} mm", "displacement"
+        )
+
+
+def _contradiction(stated: str, measured: str, channel: str) -> Finding:
+    return Finding(
+        "W_NAME",
+        f"the name states {stated} and the record has {measured}: check the unit of {channel}, or the name",
+    )
+
+
+def _stated(pattern: re.Pattern[str], name: str) -> float | None:
+    """The one value a name states; None for none, for several, and for zero."""
+    values = {float(re.sub("[,x]", ".", found.lower())) for found in pattern.findall(name)}
+    return values.pop() if len(values) == 1 and 0.0 not in values else None
