@@ -31,13 +31,12 @@ from mrdamper.rig_files.record import Finding
 LIMIT = 0.01  # of the period: shorter lags are within the samples of a cycle
 _BETTER, _FAR_BETTER = 0.2, 0.12  # of the misfit without delay: a smaller improvement may be any rate dependence
 _MUCH_BETTER = 0.4  # of it, where hysteresis leaves much
-_NEARLY, _NEARLY_EARLY = 0.004, 0.025  # of the force's RMS: hysteresis, or relaxation, that leaves less explains it
-_LITTLE, _UNEXPLAINED = 0.009, 0.05  # of the force's RMS: up to here little, from here on much
+_NEARLY, _NEARLY_EARLY = 0.005, 0.025  # of the force's RMS: hysteresis, or relaxation, that leaves less explains it
+_LITTLE, _UNEXPLAINED = 0.007, 0.05  # of the force's RMS: up to here little, from here on much
 _GRID = np.round(np.arange(-0.12, 0.161, 0.02), 3)  # delays tried first, of the period
 _FINE = np.array([-0.01, -0.005, -0.0025, 0.0025, 0.005, 0.01])  # and then around the best of them
 _AS_GOOD, _MODEL = 1.5, 0.1  # times the best misfit, and of that without delay: what the elements' own error may be
-_YIELD = np.geomspace(0.0005, 1.0, 30)  # yield displacements, of half the stroke
-_DENSE_YIELD = np.geomspace(0.0005, 1.0, 150)
+_YIELD = np.geomspace(0.0005, 1.0, 40)  # yield displacements, of half the stroke
 _SOFT = np.array([0.01, 0.02, 0.05, 0.1, 0.2, 0.4])  # velocities in which a yield force builds up, of the peak
 _LEAD = 0.015  # share of the force that acts as a negative spring
 _MASS = 30.0  # [kg] that would explain it
@@ -132,8 +131,6 @@ def force_lag(view: View) -> ForceLag | None:
     near = min(tried, key=tried.__getitem__)
     tried |= {near + float(step): elements.misfit(_read(force, phase + near + step)) for step in _FINE}
     best = min(tried, key=tried.__getitem__)
-    if tried[best] < _MUCH_BETTER * without:  # one sharp element may lie between two of the grid
-        without = min(without, _Elements(x, v, _DENSE_YIELD).misfit(force))
     enough = max(_AS_GOOD * tried[best], _MODEL * without)
     alike = [delay for delay, left in tried.items() if left <= enough]
     noise = sample_noise(view.steady.force) * np.sqrt(POINTS / len(cycles.starts)) / size
