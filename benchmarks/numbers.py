@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mrdamper.dampers.certainty import table as intervals
 from mrdamper.study.recipe import catalogue
 from mrdamper.study.workflow import RigStudy, Study
 from mrdamper.validation import Validation, session_drift
@@ -46,6 +47,8 @@ class Table:
         A line before it.
     whole : bool
         Whether these are all of its rows; else only rows of the same names are compared, and none is written.
+    share : float
+        By which every number may differ; zero: by points and counts.
     """
 
     page: str
@@ -53,6 +56,7 @@ class Table:
     rows: tuple[str, ...]
     after: str = ""
     whole: bool = True
+    share: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -106,12 +110,20 @@ def of_study(study: Study) -> list[Told]:
     gains, rest = tuple(sorted(100 * d.gain for d in drifts)), tuple(100 * d.floor for d in drifts)
     return [
         Table("README.md", "| | numbers | utfsm left out", tuple(rows)),
+        Table(page, "| parameter | utfsm | labcontrol |", _parameters(one, other), share=WORST),
         Sentence(page, r"gains of (\S+)–(\S+) % \(standard deviation\)", gains),
         Sentence(page, r"would leave (\S+) % \(labcontrol\) and (\S+) % \(utfsm\)", rest),
         Sentence(page, r"rig utfsm\): (\S+) % raw", (raw,), tolerance=3 * POINTS),
         Sentence(page, r"force zero lies (\S+) N from", (offset,), 0, 5.0),
         Sentence(page, r"own offset (\S+) % remain", (left,), tolerance=3 * POINTS),
     ]
+
+
+def _parameters(*rigs: RigStudy) -> tuple[str, ...]:
+    """Rows of the parameters of the chosen dampers with their intervals."""
+    columns = [{str(row["name"]): str(row["written"]) for row in intervals(rig.damper)} for rig in rigs]
+    names = list(dict.fromkeys(name for column in columns for name in column))
+    return tuple(f"| {n} | {' | '.join(column.get(n, '–') for column in columns)} |" for n in names)
 
 
 def of_comparison(folder: Path) -> list[Told]:
@@ -208,7 +220,7 @@ def _off(one: Told, text: str) -> list[str]:
     if len(said) != len(one.rows):
         return [f"{one.page}: {len(said)} rows under “{one.under}”, {len(one.rows)} came out"]
     pairs = zip(_sorted(said), _sorted(one.rows), strict=True)
-    return [f"{one.page}: {a}\n   came out: {b}" for a, b in pairs if not _near(a, b)]
+    return [f"{one.page}: {a}\n   came out: {b}" for a, b in pairs if not _near(a, b, one.share)]
 
 
 def _sorted(rows: Sequence[str]) -> list[str]:
@@ -221,7 +233,7 @@ def _name(row: str) -> str:
     return re.sub(r"^\d+\. ", "", row.strip("|").split("|")[0].strip(" *"))
 
 
-def _near(said: str, out: str) -> bool:
+def _near(said: str, out: str, share: float = 0.0) -> bool:
     """Whether the cells of two rows say about the same."""
     a, b = ([cell.strip(" *") for cell in row.strip("|").split("|")] for row in (said, out))
     if _name(said) != _name(out) or len(a) != len(b):
@@ -230,8 +242,12 @@ def _near(said: str, out: str) -> bool:
         if not other:
             continue
         x, y = ([float(n) for n in _NUMBER.findall(cell)] for cell in (one, other))
-        if len(x) != len(y) and "." in one + other:
+        if len(x) != len(y) and (share or "." in one + other):
             return False
+        if share:
+            if any(abs(p - q) > share * max(p, q) for p, q in zip(x, y, strict=True)):
+                return False
+            continue
         for n, (p, q) in enumerate(zip(x, y, strict=False)):
             allowed = POINTS + WORST * q * (n > 0 or q > 25) if "." in one else COUNT
             if abs(p - q) > allowed + 1e-9:

@@ -243,8 +243,9 @@ def _with_model_error(
     scores = []
     for run in cross_validated:
         share = own.get(run.run_id, usual)
-        gain = made.gain**2 + made.run_gain**2
-        force = gain * run.predicted**2 + made.offset**2 + made.run_offset**2 + (share + made.force**2) * run.half**2
+        # A fold that saw other runs of the session has taken part of its gain up: the scatter that is left counts.
+        gain = error.gain**2
+        force = gain * run.predicted**2 + error.offset**2 + (share + made.force**2) * run.half**2
         peak, energy = (np.sqrt(share + gain + e**2) for e in (made.peak, made.energy))
         scores.append(Scored.of(run, np.sqrt(force), float(peak), float(energy)))
     return replace(made, calibration=Calibration.of(cross_validated, scores))
