@@ -78,7 +78,7 @@ def record(law: Law, scale: float, condition: Condition, name: str, session: Flo
 
 def covered(rig: tuple[str, float], seed: int = 0) -> tuple[Floats, float, float]:
     """Shares of samples, peaks and energies inside; the model error; half the interval over half the peak-to-peak."""
-    (family, scale), rng = rig, np.random.default_rng(seed)
+    (family, scale), rng = rig, np.random.default_rng((RIGS.index(rig), seed))
     law = FAMILIES[family]
     sessions = rng.standard_normal((SESSIONS, 2))
     conditions = [Condition(I, f, a) for I in CURRENTS for f, a in MOTIONS]

@@ -8,6 +8,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 from benchmarks.coverage import jointly
+from benchmarks.synthetic_coverage import FAMILIES, covered
 
 
 @pytest.mark.slow
@@ -19,3 +20,13 @@ def test_joint_intervals_and_bands_hold_what_they_say(rig):
     assert np.median(found.textbook) < 0.6
     assert peak >= 0.77  # of 90 %, three standard errors
     assert force >= 0.8
+
+
+@pytest.mark.slow
+def test_intervals_widen_where_the_form_is_another():
+    (right, small, narrow), (other, large, wide) = (covered((family, 1.0)) for family in list(FAMILIES)[:2])
+    assert large > 4 * small
+    assert wide > 1.5 * narrow
+    # One draw of six sessions each: their scatter is known to a third.
+    assert np.all(right >= 0.6)
+    assert np.all(other >= 0.8)

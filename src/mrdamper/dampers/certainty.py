@@ -200,5 +200,7 @@ def table(damper: Damper, level: float = 0.95) -> list[dict[str, Any]]:
         row = {"name": name, "value": own.value, "unit": own.unit, "low": low, "high": high}
         row["effective_samples"] = known.effective.get(name, math.nan) if known and ends else math.nan
         text = written(own.value, ends, own.unit) + ("" if ends else f" ({state})")
+        if state == NOT_IDENTIFIABLE:
+            text = state  # the estimate is one of many that fit as well
         rows.append({**row, "state": state, "written": text})
     return rows
