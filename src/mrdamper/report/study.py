@@ -367,7 +367,11 @@ def _choice(rig: RigStudy) -> str:
         text += " against " + ", ".join(
             f"{o.title} with {100 * o.cross_validated.median():.1f} % and {o.damper.parameter_count}" for o in others
         )
-    return text + ". Within a tenth of the best, fewer numbers win. Held-out runs confirm; they choose nothing."
+    return (
+        text
+        + ". Within one standard error of the best, the fewest parameters win. "
+        + "Validation runs confirm; they choose nothing."
+    )
 
 
 def _tests(rig: RigStudy) -> str:

@@ -463,7 +463,7 @@ def study_methods() -> Mapping[str, type[StudyMethod]]:
 def catalogue() -> Mapping[str, Recipe]:
     """Every recipe that can be compared, by name; models and dampers dropped in are found."""
     found = [modified(name) for name in all_models() if name != JOINTLY]
-    found += [make(name) for name in _closed_shapes() for make in (jointly, current_only)]
+    found += [jointly(name) for name in _closed_shapes()]
     found += [recipe for method in study_methods().values() for recipe in method.compared()]
     found += [play_and_bypass(), *(conditioned(cls) for cls in all_published().values())]
     return {recipe.name: recipe for recipe in found}

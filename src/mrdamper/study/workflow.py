@@ -20,8 +20,9 @@ from mrdamper.dampers.covariance import certain
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.dampers.sessions import Sessions, known_errors
-from mrdamper.data import Dataset, Run, Shown
+from mrdamper.data import Dataset, Floats, Run, Shown
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError, checked
+from mrdamper.functions.selection import mean_error, smaller_wins
 from mrdamper.identification import refuse_clipped
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, at_levels, dynamic_ranges
 from mrdamper.motion import analyse_motion, equivalent_sine
@@ -52,7 +53,6 @@ _SIZES = (
     ("stroke", "m", 300, lambda run: float(np.ptp(run.displacement))),
     ("current", "A", 12, lambda run: float(np.median(np.abs(run.current)))),
 )
-_WORTH = 1.1  # more numbers must lower the left-out error by a tenth
 STUDIED = ("bouc-wen", "bingham")  # the model of the method, and the one everybody compares with
 
 
@@ -296,11 +296,12 @@ def study_rig(
             where=f"rig {rig or dataset.name}",
             mend="test more conditions, or leave this rig out of the dataset",
         )
-    errors = {id(c): _left_out(c, {run.id for run in train}) for c in candidates}
-    candidates.sort(key=lambda c: errors[id(c)])
-    least = min(errors[id(c)] for c in eligible)
-    near = [c for c in eligible if errors[id(c)] <= _WORTH * least]
-    chosen = min(near, key=lambda c: c.damper.parameter_count)
+    common = set.intersection(*({run.run_id for run in c.cross_validated.runs} for c in candidates))
+    errors = {id(c): _cross_validated(c, common, {run.id for run in train}) for c in candidates}
+    candidates.sort(key=lambda c: mean_error(errors[id(c)]))
+    best = next(c for c in candidates if c in eligible)
+    smaller = sorted(eligible, key=lambda c: c.damper.parameter_count)
+    chosen = next(c for c in smaller if c is best or smaller_wins(errors[id(c)], errors[id(best)]))
     candidates.sort(key=lambda c: c is not chosen)
     held = chosen.fit.at_bounds if isinstance(chosen.fit, JointFit | ModifiedFit) else ()
     beside = [score.predicted for score in chosen.cross_validated.runs if score.predicted is not None]
@@ -341,12 +342,12 @@ def judged_on_all(candidate: Scored, everything: Sequence[Run]) -> Scored:
     )
 
 
-def _left_out(candidate: Scored, sines: Collection[str]) -> float:
-    """Median error on left-out conditions, sines and other records alike; infinite where nothing was left out."""
-    runs = candidate.cross_validated.runs
-    kinds = [[abs(run.scores.nrmse_pp) for run in runs if (run.run_id in sines) == kind] for kind in (True, False)]
-    medians = [float(np.median(errors)) for errors in kinds if errors]
-    return float(np.mean(medians)) if medians else float("inf")
+def _cross_validated(candidate: Scored, common: Collection[str], sines: Collection[str]) -> dict[str, Floats]:
+    """Cross-validated errors of runs that all candidates have, by kind of run, in the order of their names."""
+    scores = {run.run_id: abs(run.scores.nrmse_pp) for run in candidate.cross_validated.runs if run.run_id in common}
+    kinds = {"sines": sines, "other records": scores.keys() - set(sines)}
+    found = {kind: np.array([scores[name] for name in sorted(scores.keys() & set(ids))]) for kind, ids in kinds.items()}
+    return {kind: errors for kind, errors in found.items() if errors.size}
 
 
 def usable(runs: Iterable[Run], clipped: bool = False) -> tuple[list[Run], dict[str, str]]:

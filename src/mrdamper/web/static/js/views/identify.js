@@ -104,7 +104,7 @@ class IdentifyView {
       { title: "", value: (c) => h("button", { class: "link", "aria-label": `Move ${c.title}`, onclick: () => this.bench.choose(c.damper, { view: "model" }) }, "Move it") },
     ];
     return [
-      h("p", { class: "small faint" }, `Median error as a share of the peak-to-peak force. “Left out”: train runs predicted without their condition; it chooses, and within a tenth fewer numbers win. “Held out”: runs no model has seen. “One by one”: each train run identified alone. Done in ${seconds(answer.seconds)}.`),
+      h("p", { class: "small faint" }, `Median error as a share of the peak-to-peak force. “Left out”: train runs predicted without their condition; it chooses, and within one standard error fewer parameters win. “Held out”: runs no model has seen. “One by one”: each train run identified alone. Done in ${seconds(answer.seconds)}.`),
       answer.rigs.map((rig) =>
         card(["Rig ", h("span", {}, rig.rig || this.bench.overview.name)],
           h("div", { class: "flush" }, table(columns, rig.candidates, { chosen: (c) => c.damper === rig.chosen, caption: `Candidates of rig ${rig.rig}` })))),
