@@ -16,7 +16,7 @@ from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Record
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
-from fuzz.fuzz_records import codes_of
+from fuzz.fuzz_records import codes_of, table, trials
 from fuzz.record_faults import KINDS, UNOBSERVABLE
 from fuzz.synthetic_records import FAMILIES, clean_record
 
@@ -143,3 +143,18 @@ def test_clean_records_of_every_family_are_not_accused():
 def test_at_most_one_clean_record_in_two_hundred_is_accused():
     accused = [n for n in range(600) if codes_of(clean_record(n, np.random.default_rng([98, n])))]
     assert len(accused) <= 3, accused
+
+
+def printed_table():
+    page = (Path(__file__).parents[2] / "docs" / "rig-procedure.md").read_text(encoding="utf-8")
+    return page[page.index("| Fault |") : page.index("A single record cannot show")].strip()
+
+
+def test_the_table_of_the_rig_procedure_has_every_kind():
+    rows = printed_table().splitlines()[2:]
+    assert [row.split(" | ")[0].removeprefix("| ") for row in rows] == [kind.name for kind in KINDS]
+
+
+@pytest.mark.slow
+def test_the_table_of_the_rig_procedure_is_what_the_command_prints():
+    assert printed_table() == table(list(trials(KINDS, 12, 1)))
