@@ -12,10 +12,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import ClassVar, Literal
 
 import numpy as np
-from scipy.special import ndtri
 
 from mrdamper.data import Floats, Run, session_of
 from mrdamper.metrics import dissipated_power, peak_force
@@ -241,7 +241,7 @@ def _factors(units: Sequence[Sequence[Scored]], quantity: Quantity) -> tuple[flo
     """Quantiles of the scores over those of a normal distribution, at the levels that can be reached."""
     reach = len(units) / (len(units) + 1)
     return tuple(
-        min(_quantile(units, quantity, level) / float(ndtri((1 + level) / 2)), _MAX_FACTOR)
+        min(_quantile(units, quantity, level) / NormalDist().inv_cdf((1 + level) / 2), _MAX_FACTOR)
         for level in LEVELS
         if level <= reach
     )
