@@ -127,7 +127,7 @@ def test_what_a_bound_holds_and_what_nothing_tells_apart_has_no_interval():
     assert {"fy1", "h1"} <= set(made.certainty.unknown)
     said = " ".join(unsure(made))
     assert "c1 ended at its lower limit 0" in said
-    assert "fy1 and h1 unseen without current" in said
+    assert "fy1 and h1: not identifiable without current" in said
     for name in ("c1", "fy1"):
         with pytest.raises(InputError, match="E_CERTAINTY"):
             made.certainty.interval(made, name)

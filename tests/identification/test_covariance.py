@@ -57,7 +57,7 @@ def test_beta_has_an_interval_of_its_own_though_it_is_searched_as_a_length():
 def test_a_motion_that_never_yields_says_so():
     # A tenth of the yield displacement: the hysteresis is a spring, and many a curve in it fits as well.
     found = identify(synthetic_run(Condition(0.0, 1.0, 2e-4), 1.0, model=TRUTH))
-    assert "this motion never yields: beta unseen" in found.doubts
+    assert "no yielding in this motion: beta not identifiable" in found.doubts
     assert found.interval("beta") is None
     assert identify(synthetic_run(CONDITION, 30.0, model=TRUTH)).doubts == ()
 
@@ -69,7 +69,14 @@ def test_what_the_tests_have_one_of_is_the_reason():
         "k1 and m are not both identifiable from one frequency and one current: they do the same to the force"
     ]
     still = [Condition(0.0, f, a) for f, a in ((1.0, 0.01), (2.0, 0.02))]
-    assert "fy1 unseen without current" in weaknesses(["fy1"], np.diag([np.inf]), (), still)[0]
+    assert "fy1: not identifiable without current" in weaknesses(["fy1"], np.diag([np.inf]), (), still)[0]
+
+
+def test_correlations_are_stated_once_per_group_of_parameters():
+    chain = np.array([[1.0, 0.99, 0.5, 0.0], [0.99, 1.0, -0.985, 0.0], [0.5, -0.985, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+    assert weaknesses("abcd", chain) == ["a, b and c are strongly correlated (|r| up to 0.990)"]
+    pair = np.array([[4.0, -1.99], [-1.99, 1.0]])
+    assert weaknesses("xy", pair) == ["x and y are strongly correlated (r = -0.995)"]
 
 
 def test_more_cycles_do_not_average_model_error_away():

@@ -120,6 +120,6 @@ def test_left_out_and_held_out_errors_stand_in_their_own_rows():
     rows = list(csv.DictReader(_validation_table(study).splitlines()))
     told = [(r["rig"], r["model"], r["way"], r["set"], r["run_id"], float(r["nrmse_pp"])) for r in rows]
     assert told == [
-        ("bench", "dahl", "joint", "left out", "left", 0.1),
-        ("bench", "dahl", "joint", "held out", "held", 0.2),
+        ("bench", "dahl", "joint", "cross-validation", "left", 0.1),
+        ("bench", "dahl", "joint", "validation", "held", 0.2),
     ]

@@ -123,7 +123,7 @@ def test_tables_carry_units_and_numbers(written):
     known = [row for row in numbers if row["state"] == "determined"]
     assert len(known) > 20
     assert all(float(row["low_95"]) < float(row["value"]) < float(row["high_95"]) for row in known)
-    assert all(float(row["low_left_out"]) <= float(row["high_left_out"]) for row in known)
+    assert all(float(row["low_cv"]) <= float(row["high_cv"]) for row in known)
 
 
 class _Links(HTMLParser):

@@ -23,6 +23,7 @@ from mrdamper.identification.intervals import NOT_IDENTIFIABLE, interval_about, 
 
 if TYPE_CHECKING:
     from mrdamper.dampers.base import Damper
+_MAX_LISTED = 6  # number of parameters named in one sentence
 _BADLY = 0.5  # standard error over the estimate from which a parameter is not significant
 
 
@@ -145,7 +146,7 @@ def unsure(damper: Damper) -> list[str]:
     if known is None:
         return ["The uncertainty of the parameters is not known: the model was saved without it."]
     numbers = damper.fitted_parameters
-    said = [f"{name} ended at {_limit(numbers[name])}: only one side of it is open." for name in known.one_sided]
+    said = [f"{name} ended at {_limit(numbers[name])}; its interval is one-sided." for name in known.one_sided]
     said += [f"{text}." for text in known.words]
     told = " ".join(known.words)
     if silent := [name for name in known.unknown if name not in told]:
@@ -157,7 +158,7 @@ def unsure(damper: Damper) -> list[str]:
         )
     elif known.session_dof < 2:
         said.append("The scatter between sessions rests on fewer than two degrees of freedom.")
-    apart = []
+    apart, wide, weak = [], [], []
     for i, name in enumerate(known.names):
         ends = known.ends(damper, name)
         if ends is None:
@@ -165,12 +166,23 @@ def unsure(damper: Damper) -> list[str]:
         apart.append(i)
         error = float(np.sqrt(known.covariance[i, i]))
         if known.logs[i] and error > _BADLY:
-            said.append(f"95 % interval of {name} spans a factor of {ends[1] / ends[0]:.2g}.")
+            wide.append((name, f"{ends[1] / ends[0]:.2g}"))
         elif not known.logs[i] and error > _BADLY * abs(numbers[name].value):
             about = written(numbers[name].value, ends, numbers[name].unit)
-            said.append(f"{name} is not significant ({about}).")
+            weak.append((name, about))
+    said += _grouped(weak, "{} is not significant ({})", "Not significant")
+    said += _grouped(wide, "95 % interval of {} spans a factor of {}", "95 % intervals span a factor of")
     names, block = [known.names[i] for i in apart], known.covariance[np.ix_(apart, apart)]
     return [*said, *(f"{text}." for text in weaknesses(names, block))]
+
+
+def _grouped(entries: list[tuple[str, str]], single: str, several: str) -> list[str]:
+    """State one entry in a sentence of its own, several in one sentence."""
+    if len(entries) < 2:
+        return [single.format(*entry) + "." for entry in entries]
+    listed = ", ".join(f"{name} ({value})" for name, value in entries[:_MAX_LISTED])
+    more = f" and {len(entries) - _MAX_LISTED} more" if len(entries) > _MAX_LISTED else ""
+    return [f"{several}: {listed}{more}."]
 
 
 def _limit(own: FittedParameter) -> str:

@@ -51,7 +51,7 @@ def certainty_of_run(
     shown = {name: error for name, error in errors.items() if name != DELAY}
     doubts = weaknesses(names, found.covariance, found.alike, [condition])
     if unseen := _unseen(problem, names, np.column_stack(columns), residual, found):
-        doubts = [f"this motion never yields: {', '.join(unseen)} unseen", *doubts]
+        doubts = [f"no yielding in this motion: {', '.join(unseen)} not identifiable", *doubts]
         shown |= {name: float("inf") for name in shown if name in unseen or name not in problem.free}
     if found.memory < _SHORT and np.any(residual):
         doubts.append(

@@ -132,14 +132,34 @@ def weaknesses(
     grouped = {i for group in alike for i in group}
     lost = [n for i, n in enumerate(names) if np.isinf(covariance[i, i]) and i not in grouped]
     if lost:
-        said.append(f"{_listed(lost)} unseen{reason}: the force does not depend on it")
-    known = [i for i in range(len(names)) if np.isfinite(covariance[i, i]) and covariance[i, i] > 0]
-    for a, i in enumerate(known):
-        for j in known[a + 1 :]:
-            together = covariance[i, j] / np.sqrt(covariance[i, i] * covariance[j, j])
-            if abs(together) > _ALIKE:
-                said.append(f"{names[i]} and {names[j]} are strongly correlated (r = {together:.3f})")
-    return said
+        said.append(f"{_listed(lost)}: not identifiable{reason}, the force does not depend on it")
+    return said + [
+        f"{_listed([names[i] for i in group])} are strongly correlated (|r| up to {largest:.3f})"
+        if len(group) > 2
+        else f"{names[group[0]]} and {names[group[1]]} are strongly correlated (r = {largest:.3f})"
+        for group, largest in _correlated(covariance)
+    ]
+
+
+def _correlated(covariance: Floats) -> list[tuple[list[int], float]]:
+    """Group the parameters that are linked by strong correlations, each group with its largest coefficient [-]."""
+    variances = np.diag(covariance)
+    finite = [i for i, variance in enumerate(variances) if np.isfinite(variance) and variance > 0]
+    links = {
+        (i, j): float(covariance[i, j] / np.sqrt(variances[i] * variances[j]))
+        for a, i in enumerate(finite)
+        for j in finite[a + 1 :]
+    }
+    links = {pair: r for pair, r in links.items() if abs(r) > _ALIKE}
+    groups: list[set[int]] = []
+    for pair in links:
+        joined = [group for group in groups if group & set(pair)]
+        groups = [group for group in groups if group not in joined] + [set(pair).union(*joined)]
+    found = []
+    for group in groups:
+        largest = max((r for (i, _), r in links.items() if i in group), key=abs)
+        found.append((sorted(group), largest if len(group) == 2 else abs(largest)))
+    return found
 
 
 def _both(group: Sequence[int]) -> str:

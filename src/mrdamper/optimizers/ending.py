@@ -12,7 +12,7 @@ class Ending(StrEnum):
     SETTLED = "converged: the cost changes no more"
     NO_STEP = "converged: no step lowers the cost"
     AT_BOUNDS = "every coordinate ended at a bound"
-    STEPS_SPENT = "stopped at the limit of steps, the cost still falling: start nearer or raise most_steps"
+    STEPS_SPENT = "stopped at the limit of steps, the cost still falling"
     GENERATIONS_SPENT = "ended after the given number of generations"
 
     @property

@@ -1,4 +1,4 @@
-"""A test report: what was tested and what it showed, one specimen or several side by side, no model."""
+"""Test report of one or several specimens, without a model."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from mrdamper.files.atomic import publish
 from mrdamper.files.encoding import csv_text
 from mrdamper.identification.characteristics import SIDES, Characteristics, Stroke, characterise
 from mrdamper.report.about import About, Limit
-from mrdamper.report.page import made_from, number, render_page
+from mrdamper.report.page import made_from, number, plain, render_page
 from mrdamper.report.plots.characteristics import continuous_velocity_plot, figures_over_current, peak_velocity_plot
 from mrdamper.report.plots.style import Picture
 
-_SOURCES = ("source", "file", "source_file")  # notes of a run that name where it came from
-_SAME = 0.03  # currents this close to a limit's are that current
+_SOURCES = ("source", "file", "source_file")  # keys of a run's notes that name its source
+_CURRENT_TOLERANCE = 0.03  # relative difference [-] up to which a current counts as that of a limit
 
 
 def write_test_report(
@@ -33,21 +33,24 @@ def write_test_report(
     limits: Sequence[Limit] = (),
     ladder: Sequence[float] = (),
     png: bool = False,
+    paper: str = "a4",
 ) -> list[Path]:
     """Write report.html, report.pdf, forces.csv, tests.csv and figures/ of one or several specimens.
 
     Parameters
     ----------
     specimens : mapping of str to Dataset
-        By the name they get in the report; each holds the tests of one damper.
+        Tests of one damper each, by the name in the report.
     folder : path
     about : About, optional
     limits : sequence of Limit
-        Bands the damping force must lie in; a verdict is given only against these.
+        Limits of the damping force; pass or fail is stated only against these.
     ladder : sequence of float
-        Velocities of the table of forces [m/s]; default: round values inside the first specimen's tests.
+        Velocities of the force table [m/s]; default: round values within the tests of the first specimen.
     png : bool
-        Every figure as PNG too.
+        Also write every figure as PNG.
+    paper : str
+        Size of the pages of report.pdf: "a4" or "letter".
 
     Raises
     ------
@@ -66,7 +69,7 @@ def write_test_report(
     def fill(work: Path) -> None:
         (work / "figures").mkdir()
         also = ("pdf", "png") if png else ("pdf",)
-        pictures = {key: Picture.of(figure, also) for key, figure in figures_of_tests(first, found).items()}
+        pictures = {key: Picture.of(figure, also) for key, figure in figures_of_tests(first, found, limits).items()}
         saved = {key: picture.save(work / "figures" / key) for key, picture in pictures.items()}
         page = render_page(
             "tests.html.j2",
@@ -74,32 +77,40 @@ def write_test_report(
             made_from(*specimens.values()) + ".",
             about=about,
             provenance=provenance(specimens),
-            names=", ".join(found),
+            lead=facts["summary"],
             t=facts,
             pictures=saved,
             passed_over={run: why for specimen in found.values() for run, why in specimen.passed_over.items()},
         )
         (work / "report.html").write_text(page, encoding="utf-8")
-        (work / "report.pdf").write_bytes(pdf_of(page, {key: p.files["pdf"] for key, p in pictures.items()}))
+        (work / "report.pdf").write_bytes(pdf_of(page, {key: p.files["pdf"] for key, p in pictures.items()}, paper))
         (work / "forces.csv").write_text(csv_text(force_rows(facts)), encoding="utf-8")
         (work / "tests.csv").write_text(csv_text(_test_rows(found)), encoding="utf-8")
 
     return publish(folder, "report.html", fill)
 
 
-def figures_of_tests(first: Dataset, specimens: Mapping[str, Characteristics]) -> dict[str, Figure]:
-    """The figures of a test report, by name; force through the cycle is that of the first specimen."""
+def figures_of_tests(
+    first: Dataset, specimens: Mapping[str, Characteristics], limits: Sequence[Limit] = ()
+) -> dict[str, Figure]:
+    """Draw the figures of a test report, by name; force through the cycle is that of the first specimen."""
     return {
-        "peak_velocity": peak_velocity_plot(specimens),
+        "peak_velocity": peak_velocity_plot(specimens, [_bar(limit) for limit in limits]),
         "cycle": continuous_velocity_plot(first, next(iter(specimens.values()))),
         "energy": figures_over_current(specimens),
     }
 
 
+def _bar(limit: Limit) -> tuple[float, float, float, float]:
+    """Current [A], velocity [m/s], lower and upper force [N] of a limit as drawn: compression is negative."""
+    sign = 1.0 if limit.side == "rebound" else -1.0
+    return limit.current_A, limit.velocity_m_s, sign * limit.lower_N, sign * limit.upper_N
+
+
 def facts_of_tests(
     specimens: Mapping[str, Characteristics], ladder: Sequence[float] = (), limits: Sequence[Limit] = ()
 ) -> dict[str, Any]:
-    """What the template of the tests prints: summary, ladder, forces, currents, verdicts."""
+    """Collect what the template prints: summary, set velocities, forces, currents, results against limits."""
     steps = tuple(ladder) or next(iter(specimens.values())).ladder()
     forces = [
         {
@@ -122,7 +133,7 @@ def facts_of_tests(
 
 
 def force_rows(facts: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The table of forces, one row a specimen, current, side and velocity."""
+    """Tabulate the forces, one row per specimen, current, side and velocity."""
     return [
         {
             "specimen": row["specimen"],
@@ -137,7 +148,7 @@ def force_rows(facts: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def provenance(specimens: Mapping[str, Dataset]) -> list[tuple[str, str]]:
-    """Where a report's numbers come from: runs, rates, dates, files and a hash of the samples."""
+    """List the sources of a report: runs, sampling rates, dates, files and a hash of the samples."""
     rows = []
     for name, dataset in specimens.items():
         rates = sorted({float(number(_rate(run))) for run in dataset.runs})
@@ -157,7 +168,7 @@ def _span(dates: Sequence[str]) -> str:
 
 
 def data_hash(runs: Sequence[Run]) -> str:
-    """A hash of what was measured: the same samples give the same, however they are stored."""
+    """Calculate a hash of the samples, independent of how they are stored."""
     digest = hashlib.sha256()
     for run in sorted(runs, key=lambda run: run.id):
         digest.update(run.id.encode())
@@ -187,7 +198,7 @@ def _characterised(name: str, dataset: Dataset) -> Characteristics:
 def _summary(name: str, specimen: Characteristics) -> str:
     friction = "" if np.isnan(specimen.friction) else f"{specimen.friction:.0f} N "
     return (
-        f"{name}: {len(specimen.strokes)} tests at {', '.join(f'{c:g}' for c in specimen.currents)} A. "
+        f"{name}: {len(specimen.strokes)} tests at {', '.join(plain(c) for c in specimen.currents)} A. "
         f"Gas force {specimen.gas_force:.0f} N ({specimen.gas_from}). Friction {friction}({specimen.friction_from})."
     )
 
@@ -226,7 +237,9 @@ def _both_sides(specimen: Characteristics, stroke: Stroke) -> float:
 
 
 def _verdict(name: str, specimen: Characteristics, limit: Limit) -> dict[str, Any]:
-    near = [c for c in specimen.currents if abs(c - limit.current_A) <= 5e-3 + _SAME * abs(limit.current_A)]
+    near = [
+        c for c in specimen.currents if abs(c - limit.current_A) <= 5e-3 + _CURRENT_TOLERANCE * abs(limit.current_A)
+    ]
     side = SIDES.index(limit.side)
     force = specimen.at_velocity(near[0], limit.velocity_m_s, side) if near else float("nan")
     verdict = "not tested" if np.isnan(force) else "pass" if limit.lower_N <= force <= limit.upper_N else "fail"

@@ -1,6 +1,6 @@
-"""Pages as one HTML file each: no script, no network, prints well.
+"""Pages as single HTML files without scripts or network access.
 
-Templates stand in `templates/`; each extends `base.html.j2`, which holds the frame and the style.
+Templates are in `templates/`; each extends `base.html.j2`, which holds layout and style.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from mrdamper.data import Dataset
 
 
 def render_page(template: str, title: str, footer: str, **facts: object) -> str:
-    """The HTML of a template that is given facts.
+    """Render a template.
 
     Parameters
     ----------
@@ -30,29 +30,40 @@ def render_page(template: str, title: str, footer: str, **facts: object) -> str:
 
 
 def made_from(*datasets: Dataset) -> str:
-    """How a page's footer begins: this program's version and what was studied."""
+    """Return the start of a footer: version of mrdamper and the datasets."""
     said = "; ".join(f"{dataset.name}, {len(dataset)} runs" for dataset in datasets)
     return f"mrdamper {version('mrdamper')}; dataset{'s' if len(datasets) > 1 else ''}: {said}"
 
 
 def inline_svg(picture: bytes, alt: str) -> Markup:
-    """An SVG as an image inside the page."""
+    """Embed an SVG as an image."""
     data = base64.b64encode(picture).decode("ascii")
     return Markup('<img alt="{}" src="data:image/svg+xml;base64,{}">').format(alt, data)
 
 
 def number(value: float | None, digits: int = 4) -> str:
-    """A value to some significant digits, or a dash where there is none."""
-    return "–" if value is None or not np.isfinite(value) else f"{value:.{digits}g}"
+    """Format a value to some significant digits; a dash where there is none."""
+    return "–" if value is None or not np.isfinite(value) else f"{value + 0.0:.{digits}g}"
+
+
+def plain(value: float) -> str:
+    """Format a condition as a test plan would: three significant digits, zero without a sign.
+
+    Examples
+    --------
+    >>> plain(1.5003), plain(-0.0004), plain(0.500000000013146)
+    ('1.5', '0', '0.5')
+    """
+    return number(round(value, 3), 3)
 
 
 def whole(value: float) -> str:
-    """A value without decimals, three digits where it is small, or a dash where there is none."""
+    """Format a value without decimals, three digits below 100; a dash where there is none."""
     return f"{value:.0f}" if abs(value) >= 100 else number(value, 3)
 
 
 def percent(share: float | None, digits: int = 1) -> str:
-    """A share in per cent, or a dash where there is none."""
+    """Format a share in per cent; a dash where there is none."""
     return "–" if share is None or not np.isfinite(share) else f"{100 * share:.{digits}f}"
 
 
@@ -66,6 +77,7 @@ _ENVIRONMENT = jinja2.Environment(
 _ENVIRONMENT.globals |= {
     "svg": inline_svg,
     "number": number,
+    "plain": plain,
     "whole": whole,
     "percent": percent,
     "mm": lambda v: 1e3 * v,

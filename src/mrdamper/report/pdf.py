@@ -1,8 +1,7 @@
-"""A page of ours as a PDF: the same words and tables, pages numbered, figures as vectors.
+"""PDF of a report page: the same text and tables, numbered pages, figures as vector graphics.
 
-The page is the one source: what `render_page` wrote is walked element by element, so nothing is
-said twice and nothing is folded away. fpdf2 sets the text; figures come as PDF pages of their own
-and are laid into the places kept for them.
+The HTML of `render_page` is converted element by element; folded parts are shown in full. fpdf2
+sets the text; figures are PDF pages that are placed into the space reserved for them.
 """
 
 from __future__ import annotations
@@ -19,7 +18,9 @@ from typing import Any
 
 from fpdf import FPDF, FontFace
 from fpdf.enums import Align, TableBordersLayout, TextEmphasis
-from fpdf.outline import OutlineSection
+
+from mrdamper.errors import UnknownNameError
+from mrdamper.report.fonts import Fallback, fallback_fonts
 
 _MARGIN = 18.0  # mm
 _INK, _FAINT, _RULE = (27, 31, 36), (91, 101, 112), (217, 222, 227)
@@ -31,7 +32,7 @@ _LOGO = (50.0, 14.0)  # mm, the room of a logo
 _KEEP = 42.0  # mm a heading wants below itself, so that it never ends a page
 _VOID = frozenset({"br", "img", "meta", "link", "hr", "input"})
 _INLINE = frozenset({"b", "strong", "code", "a", "span", "br", "em", "i", "sup", "sub"})
-_CONTENTS_PER_PAGE = 40
+PAPERS = ("a4", "letter")
 
 
 @dataclass
@@ -79,12 +80,17 @@ class _Tree(HTMLParser):
 
 
 class _Paper(FPDF):
-    def __init__(self, footer: str) -> None:
-        super().__init__(format="A4")
+    def __init__(self, footer: str, paper: str, fallback: Fallback) -> None:
+        super().__init__(format=paper)
         fonts = _fonts()
         for style, name in (("", "DejaVuSans.ttf"), ("B", "DejaVuSans-Bold.ttf")):
             self.add_font("text", style, str(fonts / name))
         self.add_font("code", "", str(fonts / "DejaVuSansMono.ttf"))
+        for number, (path, index) in enumerate(fallback.files):
+            self.add_font(f"fallback{number}", "", path, collection_font_number=index)
+        if fallback.files:
+            names = [f"fallback{number}" for number in range(len(fallback.files))]
+            self.set_fallback_fonts(names, exact_match=False)
         self.set_margins(_MARGIN, _MARGIN)
         self.set_auto_page_break(True, _MARGIN)
         self.alias_nb_pages()
@@ -100,8 +106,11 @@ class _Paper(FPDF):
         self.set_text_color(*_INK)
 
 
-def pdf_of(page: str, figures: Mapping[str, bytes]) -> bytes:
-    """A PDF of a page.
+def pdf_of(page: str, figures: Mapping[str, bytes], paper: str = "a4") -> bytes:
+    """Convert a page to PDF.
+
+    Characters that the bundled font does not contain are set in an installed font; those of no
+    installed font are named on the last page.
 
     Parameters
     ----------
@@ -109,30 +118,39 @@ def pdf_of(page: str, figures: Mapping[str, bytes]) -> bytes:
         HTML as `render_page` makes it.
     figures : mapping of str to bytes
         Each figure of the page as a PDF of one page, by the `id` of its `figure` element.
+    paper : str
+        "a4" or "letter".
 
     Returns
     -------
     bytes
-        A4, with a list of contents, bookmarks and numbered pages.
+        With bookmarks and numbered pages.
+
+    Raises
+    ------
+    UnknownNameError
+        If the paper size is neither "a4" nor "letter".
     """
+    if paper not in PAPERS:
+        raise UnknownNameError.of("paper size", paper, PAPERS)
     tree = _Tree()
     tree.feed(page)
     logging.getLogger("fpdf").setLevel(logging.ERROR)  # a character that no font holds is drawn as a box
     logging.getLogger("fontTools").setLevel(logging.ERROR)
     title = next(tree.root.elements("h1")).text
-    paper = _Paper(title)
-    paper.set_title(title)
-    paper.set_creation_date(datetime(1980, 1, 1, tzinfo=UTC))  # makes the identifier: the same page has the same bytes
-    paper.set_text_color(*_INK)
-    writer = _Writer(paper, figures)
-    paper.add_page()
-    headings = sum(1 for _ in tree.root.elements("h2", "h3"))
+    fallback = fallback_fonts(tree.root.text, str(_fonts() / "DejaVuSans.ttf"))
+    sheet = _Paper(title, paper, fallback)
+    sheet.set_title(title)
+    sheet.set_creation_date(datetime(1980, 1, 1, tzinfo=UTC))  # fixed date: the same page gives the same bytes
+    sheet.set_text_color(*_INK)
+    writer = _Writer(sheet, figures)
+    sheet.add_page()
     for part in ("header", "main", "footer"):
         for element in tree.root.elements(part):
             writer.block(element)
-            if part == "header" and headings > 3:
-                _reserve_contents(paper, headings)
-    return _with_figures(bytes(paper.output()), writer.places, figures)
+    if fallback.missing:
+        writer.paragraph(_Element("p", {"class": "faint"}, [fallback.sentence]))
+    return _with_figures(bytes(sheet.output()), writer.places, figures)
 
 
 class _Writer:
@@ -150,7 +168,7 @@ class _Writer:
         known |= {"figure": self.figure, "li": self.item, "p": self.paragraph, "summary": self.folded}
         known |= {"img": self.logo}
         if element.tag in known:
-            if self.turned and element.tag != "table":
+            if self.turned and element.tag != "table" and not (element.tag in ("summary", "h3") and self.wide):
                 self.paper.add_page(orientation="P")
             known[element.tag](element)
         elif "big" in (element.attributes.get("class") or ""):
@@ -160,7 +178,7 @@ class _Writer:
             if any(c.strip() if isinstance(c, str) else True for c in loose) and element.tag != "page":
                 self.paragraph(_Element("p", element.attributes, list(loose)))
             blocks = [c for c in element.children if isinstance(c, _Element) and c.tag not in _INLINE]
-            for child, following in zip(blocks, [*blocks[1:], None], strict=True):
+            for child, following in zip(blocks, [*blocks[1:], None], strict=False):
                 self.kept, self.wide = self._height(following), self._is_wide(following)
                 self.block(child)
 
@@ -170,11 +188,12 @@ class _Writer:
         return self.paper.w > self.paper.h
 
     def _is_wide(self, element: _Element | None) -> bool:
-        table = next(element.elements("table"), None) if element and element.tag == "div" else element
+        table = next(element.elements("table"), None) if element and element.tag in ("div", "details") else element
         if table is None or table.tag != "table":
             return False
         rows = _cells(table)
-        return bool(rows) and self._fitted([[cell.text for cell in row] for row in rows], rows)[0] < _SMALLEST
+        upright = min(self.paper.w, self.paper.h) - 2 * _MARGIN
+        return bool(rows) and self._fitted([[cell.text for cell in row] for row in rows], rows, upright)[0] < _SMALLEST
 
     def logo(self, element: _Element) -> None:
         """A picture that stands in the page itself, at the right margin."""
@@ -186,7 +205,9 @@ class _Writer:
     def heading(self, element: _Element) -> None:
         """A heading, with room below it for what it heads."""
         paper, size = self.paper, _SIZES[element.tag]
-        if paper.will_page_break(max(_KEEP, self.kept + 0.8 * size)) and element.tag != "h1":
+        if self.wide and element.tag == "h3":
+            paper.add_page(orientation="L")
+        elif paper.will_page_break(max(_KEEP, self.kept + 0.8 * size)) and element.tag != "h1":
             paper.add_page()
         elif paper.get_y() > _MARGIN + 1:
             paper.ln(0.35 * size)
@@ -224,7 +245,7 @@ class _Writer:
 
     def folded(self, element: _Element) -> None:
         """What a folded part of the page is called; here the part stands open."""
-        if self.wide:
+        if self.wide and not self.turned:
             self.paper.add_page(orientation="L")
         elif self.paper.will_page_break(_KEEP):
             self.paper.add_page()
@@ -304,7 +325,9 @@ class _Writer:
                     line.cell(text, align=_alignment(cell, first=cell is row[0]))
         paper.ln(2)
 
-    def _fitted(self, texts: list[list[str]], rows: list[list[_Element]]) -> tuple[float, list[float]]:
+    def _fitted(
+        self, texts: list[list[str]], rows: list[list[_Element]], width: float | None = None
+    ) -> tuple[float, list[float]]:
         """Size of type at which a table fits the page, and its columns' widths [mm]."""
         paper, size = self.paper, _SIZES["table"]
         columns = max(len(row) for row in texts)
@@ -320,7 +343,7 @@ class _Writer:
                     words[i] = max(words[i], longest + _PADDING)
             free = sum(w for w, wrap in zip(widths, wraps, strict=True) if wrap)
             kept = sum(w for w, wrap in zip(widths, wraps, strict=True) if not wrap)
-            room = paper.epw - kept
+            room = (width or paper.epw) - kept
             if free <= room:
                 return size, widths
             least = {i: max(_NARROWEST, words[i]) for i, wrap in enumerate(wraps) if wrap}
@@ -344,25 +367,6 @@ def _cells(table: _Element) -> list[list[_Element]]:
 def _alignment(cell: _Element, *, first: bool) -> str:
     kinds = (cell.attributes.get("class") or "").split()
     return "LEFT" if first or "text" in kinds or "wrap" in kinds else "RIGHT"
-
-
-def _reserve_contents(paper: _Paper, headings: int) -> None:
-    def render(pdf: FPDF, outline: list[OutlineSection]) -> None:
-        pdf.set_font("text", "B", _SIZES["h3"])
-        pdf.set_x(_MARGIN)
-        pdf.cell(0, 7, "Contents", new_x="LMARGIN", new_y="NEXT")
-        for entry in outline:
-            pdf.set_font("text", "B" if entry.level == 0 else "", 8.5)
-            link = pdf.add_link(page=entry.page_number)
-            pdf.set_x(_MARGIN + 5 * entry.level)
-            wide = pdf.epw - 5 * entry.level - 12
-            name = entry.name
-            while pdf.get_string_width(name) > wide - 2:
-                name = name[:-2] + "…"
-            pdf.cell(wide, 5.2, name, link=link)
-            pdf.cell(12, 5.2, str(entry.page_number), align="R", link=link, new_x="LMARGIN", new_y="NEXT")
-
-    paper.insert_toc_placeholder(render, pages=headings // _CONTENTS_PER_PAGE + 1)
 
 
 def _size_of(figure: bytes) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""A study as files: report.html, models, tables and figures, whole or not at all."""
+"""A study as files: report.html, models, tables and figures; all of them or none."""
 
 from __future__ import annotations
 
@@ -26,12 +26,13 @@ from mrdamper.identification.intervals import written
 from mrdamper.models import Model
 from mrdamper.report.about import About, Limit
 from mrdamper.report.damper_tests import facts_of_tests, figures_of_tests, force_rows, provenance
-from mrdamper.report.distrust import doubts
-from mrdamper.report.page import made_from, render_page
+from mrdamper.report.limitations import Limitation, by_group, limitations
+from mrdamper.report.page import made_from, plain, render_page
 from mrdamper.report.plots.model import BAND_LEVEL, parameter_curves, predicted_loops, residual_map, score_strip
 from mrdamper.report.plots.reversal import force_since_reversal
 from mrdamper.report.plots.rig_tests import measured_loops, test_analysis, test_matrix
 from mrdamper.report.plots.style import Picture
+from mrdamper.report.summary import error_sentence
 from mrdamper.report.tables import identification_rows, score_row
 from mrdamper.study.parallel import HERE, Processes
 from mrdamper.study.recipe import Progress, Scored, StudyMethod
@@ -39,7 +40,7 @@ from mrdamper.study.workflow import RigStudy, Study, require_runs, study_rig
 from mrdamper.validation import session_drift
 
 _LOOPS_SHOWN = 6
-_LEFT_OUT = ("low_left_out", "high_left_out")  # columns of a parameter's spread as conditions are left out
+_CV_RANGE = ("low_cv", "high_cv")  # columns with the range of a parameter in cross-validation
 
 
 def write_study(
@@ -51,6 +52,7 @@ def write_study(
     limits: Sequence[Limit] = (),
     also: Sequence[str] = (),
     drawn: Sequence[Mapping[str, Picture]] = (),
+    paper: str = "a4",
 ) -> list[Path]:
     """Write report.html, model files, tables (identifications, parameters, validation, coverage, forces) and figures/.
 
@@ -60,27 +62,29 @@ def write_study(
     folder : path
         Made if missing; files of the same names are replaced together at the end.
     progress : callable
-        Told what is being done and the share done.
+        Called with the name of the step and the share done, 0...1.
     about : About, optional
         Head of the report.
     limits : sequence of Limit
-        Bands the measured damping force must lie in; a verdict is given only against these.
+        Limits of the measured damping force; pass or fail is stated only against these.
     also : sequence of str
         "png" and "pdf": every figure in that format too; with "pdf" comes report.pdf.
     drawn : sequence of mapping, optional
-        The figures of each rig, as `study_and_draw` gives them.
+        The figures of each rig from `study_and_draw`.
+    paper : str
+        Size of the pages of report.pdf: "a4" or "letter".
 
     Returns
     -------
     list of Path
-        What was written, the report first.
+        Written files, the report first.
 
     Raises
     ------
     OutputError
         If the folder cannot be written to.
     """
-    drawn = drawn or HERE.map(partial(_draw, also=tuple(also)), study.rigs, progress)
+    drawn = drawn or HERE.map(partial(_draw, also=tuple(also), limits=tuple(limits)), study.rigs, progress)
 
     def fill(work: Path) -> None:
         (work / "figures").mkdir()
@@ -105,7 +109,7 @@ def write_study(
         if "pdf" in also:
             from mrdamper.report.pdf import pdf_of
 
-            (work / "report.pdf").write_bytes(pdf_of(page, vectors))
+            (work / "report.pdf").write_bytes(pdf_of(page, vectors, paper))
         if forces:
             (work / "forces.csv").write_text(csv_text(forces), encoding="utf-8")
         (work / "identifications.csv").write_text(
@@ -129,13 +133,14 @@ def study_and_draw(
     model: str | StudyMethod | None = None,
     keep: Sequence[str] = (),
     also: Sequence[str] = (),
+    limits: Sequence[Limit] = (),
     processes: Processes = HERE,
 ) -> tuple[Study, list[dict[str, Picture]]]:
-    """As `run_study`, and the figures of each rig, drawn where it was studied: no rig waits for another."""
+    """Run a study as `run_study` and draw the figures of each rig in the process that studied it."""
     begin = time.perf_counter()
     require_runs(dataset, keep)
     done = processes.map(
-        partial(_studied_and_drawn, model=model, keep=tuple(keep), also=tuple(also)),
+        partial(_studied_and_drawn, model=model, keep=tuple(keep), also=tuple(also), limits=tuple(limits)),
         [dataset.rig(n) for n in dataset.rigs],
         progress,
     )
@@ -150,14 +155,15 @@ def _studied_and_drawn(
     model: str | StudyMethod | None,
     keep: tuple[str, ...],
     also: tuple[str, ...],
+    limits: tuple[Limit, ...],
 ) -> tuple[RigStudy, dict[str, Picture]]:
     rig = study_rig(dataset, lambda what, share: progress(what, 0.85 * share), model=model, keep=keep)
-    return rig, _draw(rig, lambda what, share: progress(what, 0.85 + 0.15 * share), also=also)
+    return rig, _draw(rig, lambda what, share: progress(what, 0.85 + 0.15 * share), also=also, limits=limits)
 
 
-def _draw(rig: RigStudy, progress: Progress, *, also: tuple[str, ...]) -> dict[str, Picture]:
-    """Every figure of a rig, by name."""
-    figures = _figures(rig)
+def _draw(rig: RigStudy, progress: Progress, *, also: tuple[str, ...], limits: tuple[Limit, ...]) -> dict[str, Picture]:
+    """Draw every figure of a rig, by name."""
+    figures = _figures(rig, limits)
     pictures = {}
     for number, (name, figure) in enumerate(figures.items()):
         progress(f"{rig.rig or 'rig'}: figure {name}", number / len(figures))
@@ -166,7 +172,7 @@ def _draw(rig: RigStudy, progress: Progress, *, also: tuple[str, ...]) -> dict[s
 
 
 def _all_identifications(study: Study) -> list[Identification]:
-    """Each once: run by run and jointly are made of the same ones."""
+    """Collect every individual fit once; several candidates share them."""
     found = [i for rig in study.rigs for candidate in rig.candidates for i in candidate.identifications]
     return list({id(one): one for one in found}.values())
 
@@ -175,7 +181,10 @@ def _validation_table(study: Study) -> str:
     rows = []
     for rig in study.rigs:
         for candidate in rig.candidates:
-            for split, validation in (("left out", candidate.cross_validated), ("held out", candidate.validation)):
+            for split, validation in (
+                ("cross-validation", candidate.cross_validated),
+                ("validation", candidate.validation),
+            ):
                 for run in validation.runs:
                     rows.append(
                         {
@@ -189,17 +198,17 @@ def _validation_table(study: Study) -> str:
     return csv_text(rows)
 
 
-def _figures(rig: RigStudy) -> dict[str, Figure]:
+def _figures(rig: RigStudy, limits: Sequence[Limit]) -> dict[str, Figure]:
     chosen = rig.chosen
     scores = {}
     for candidate in rig.candidates:
-        scores[f"{candidate.title}, left out"] = candidate.cross_validated
+        scores[f"{candidate.title}, cross-validation"] = candidate.cross_validated
         if candidate.validation.runs:
-            scores[f"{candidate.title}, held out"] = candidate.validation
+            scores[f"{candidate.title}, validation"] = candidate.validation
     train = [rig.dataset[run.run_id] for run in chosen.cross_validated.runs]
     measured = _measured(rig)
     return {
-        **(figures_of_tests(rig.dataset, measured) if measured else {}),
+        **(figures_of_tests(rig.dataset, measured, limits) if measured else {}),
         **(_figures_of_loops(rig) if rig.loops else {}),
         "scores": score_strip(scores),
         **({"parameters": parameter_curves(mapped[1])} if (mapped := _mapped(rig)) else {}),
@@ -218,7 +227,7 @@ def _figures_of_loops(rig: RigStudy) -> dict[str, Figure]:
 
 
 def _shown(rig: RigStudy) -> list[Any]:
-    """Held-out sine runs where there are any, spread over the currents; else train runs."""
+    """Select validation sine runs spread over the currents; identification runs where there are none."""
     sines = {loop.run_id: loop.condition for loop in rig.loops}
     if not sines:
         return list(rig.dataset.split("validate") or rig.dataset.runs)[:_LOOPS_SHOWN]
@@ -231,7 +240,7 @@ def _shown(rig: RigStudy) -> list[Any]:
 
 
 def _measured(rig: RigStudy) -> dict[str, Characteristics]:
-    """What the tests say without a model; empty where no run holds a steady cycle."""
+    """Characterise the tests without a model; empty where no run holds a steady cycle."""
     try:
         return {rig.rig or rig.dataset.name: characterise(rig.dataset.runs)}
     except IdentificationError:
@@ -244,17 +253,14 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
     held = any(run.id in {loop.run_id for loop in rig.loops} for run in rig.dataset.split("validate"))
     return {
         "rig": rig.rig or rig.dataset.name,
-        "verdict": _verdict(rig),
+        "verdict": error_sentence(rig),
         "measured": facts_of_tests(measured, limits=limits) if (measured := _measured(rig)) else None,
         "choice": _choice(rig),
         "tests": _tests(rig),
         "chosen": chosen,
         "candidates": rig.candidates,
         "floor": float(np.median(floors)) if floors else None,
-        "doubts": [
-            *doubts(chosen, rig.loops),
-            _drift(rig),
-        ],
+        "limitations": by_group([*limitations(chosen, rig.loops), Limitation("Prediction", _scatter(rig))]),
         "loops": rig.loops,
         "contradictions": rig.contradictions,
         "not_identified": {
@@ -265,9 +271,9 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
         "mapped": mapped,
         "joint": _joint_table(chosen, chosen.fit.damper.model) if isinstance(chosen.fit, JointFit) else (),
         "predicted_caption": (
-            "Held-out runs, last cycle of the steady window: the model has seen none of them."
+            "Validation runs, last cycle of the steady window; none was used for identification."
             if held
-            else "Train runs, last cycle of the steady window: the dataset holds no validate runs."
+            else "Identification runs, last cycle of the steady window; the dataset has no validation runs."
         )
         + (
             f" Dotted: {100 * BAND_LEVEL:.0f} % prediction interval {scope(chosen.damper, BAND_LEVEL)}."
@@ -283,12 +289,12 @@ def _free_names(found: Identification) -> list[str]:
 
 
 def _mapped(rig: RigStudy) -> tuple[Scored, ModifiedFit] | None:
-    """The best candidate whose parameters are functions of the condition, if any: its curves are shown."""
+    """Return the best candidate with parameter functions, if any: its curves are drawn."""
     return next(((c, c.fit) for c in rig.candidates if isinstance(c.fit, ModifiedFit)), None)
 
 
 def _joint_table(chosen: Scored, model: Model) -> list[dict[str, Any]]:
-    """Parameters with their intervals and their spread as conditions are left out; those that were held have none."""
+    """List parameters with intervals and their range in cross-validation; fixed parameters have none."""
     known = {row["name"]: row["written"] for row in table(chosen.damper)}
     return [
         {"name": info.name, "written": known.get(info.name) or _held(getattr(model, info.name), info.unit)}
@@ -298,8 +304,8 @@ def _joint_table(chosen: Scored, model: Model) -> list[dict[str, Any]]:
 
 
 def _held(value: float, unit: str) -> str:
-    """A parameter that was not determined: a term that is zero is no part of the model."""
-    return f"{written(value, None, unit)} (held)" if value else "– (not part of this model)"
+    """Format a parameter that was not identified; a term that is zero is no part of the model."""
+    return f"{written(value, None, unit)} (fixed)" if value else "– (not part of this model)"
 
 
 def _range(ends: tuple[float, float] | None, unit: str) -> str:
@@ -307,85 +313,68 @@ def _range(ends: tuple[float, float] | None, unit: str) -> str:
 
 
 def _parameters_table(study: Study) -> str:
-    """Numbers of the chosen dampers, the ends of their 95 % intervals, and of their spread as conditions are left out.
+    """Tabulate the parameters of the chosen dampers, their 95 % intervals and their range in cross-validation.
 
-    Empty where there are none.
+    Cells are empty where there are none.
     """
     names = {"low": "low_95", "high": "high_95"}
     rows = [
         {"rig": rig.rig}
         | {names.get(k, k): "" if v != v else v for k, v in row.items() if k != "written"}
-        | dict(zip(_LEFT_OUT, rig.chosen.spread.get(row["name"], ("", "")), strict=True))
+        | dict(zip(_CV_RANGE, rig.chosen.spread.get(row["name"], ("", "")), strict=True))
         for rig in study.rigs
         for row in table(rig.damper)
     ]
     return csv_text(rows)
 
 
-def _drift(rig: RigStudy) -> str:
+def _scatter(rig: RigStudy) -> str:
     drift = session_drift(rig.damper, [rig.dataset[run.run_id] for run in rig.chosen.cross_validated.runs])
-    return (
-        f"From run to run the measured force differs from the prediction by gains of {100 * drift.gain:.1f} % and "
-        f"offsets of {drift.offset:.0f} N (standard deviations): the session's, or the model's own misfit at that "
-        f"condition; these tests alone do not tell which. A gain and an offset of each run's own would leave "
-        f"{100 * drift.floor:.1f} %. {_left_out(rig)}" + (f" {rig.calibration.found}." if rig.calibration else "")
+    known = (
+        f"the median cross-validated error corrected for the session is {100 * rig.session_known:.2f} %."
+        if isinstance(rig.session_known, float)
+        else f"a correction for the session is not possible: {rig.session_known}."
     )
-
-
-def _left_out(rig: RigStudy) -> str:
-    """What was left out, and whether sessions were known; every other score is of sessions nobody has seen."""
-    found = {k: v for k, v in rig.damper.provenance.items() if k.startswith("left out, ")}
-    text = "".join(f"Mean error with a {k.removeprefix('left out, ')} left out: {v}. " for k, v in found.items())
-    if isinstance(rig.session_known, str):
-        return f"{text}All scores are of unknown sessions: {rig.session_known}."
-    return (
-        f"{text}All scores are of unknown sessions; corrected by the other runs of their day, left-out conditions "
-        f"have a median error of {100 * rig.session_known:.2f} %."
+    omitted = "".join(
+        f"Mean error with a {name.removeprefix('left out, ')} omitted in cross-validation: {value}. "
+        for name, value in rig.damper.provenance.items()
+        if name.startswith("left out, ")
     )
-
-
-def _verdict(rig: RigStudy) -> str:
-    chosen, best = rig.chosen, rig.chosen.damper
-    train, validate = len(chosen.cross_validated.runs), len(chosen.validation.runs)
-    text = f"The model “{best.title}” was identified from {train} train runs"
-    if validate:
-        text += (
-            f" and predicts {validate} held-out runs with a median error of "
-            f"{100 * chosen.validation.median():.1f} % of the peak-to-peak force"
-        )
-    return text + "."
+    return omitted + (
+        f"Scatter between runs: gain {100 * drift.gain:.1f} %, offset {drift.offset:.0f} N (standard deviations of "
+        f"measured over predicted force). All errors are those of a future test session; {known}"
+        + (f" {rig.calibration.found}." if rig.calibration else "")
+    )
 
 
 def _choice(rig: RigStudy) -> str:
     chosen, others = rig.candidates[0], rig.candidates[1:]
-    reason = "Asked for; error on" if rig.asked_for else "Chosen by the error on"
+    reason = "Chosen by the user" if rig.asked_for else "Chosen by leave-one-condition-out cross-validation"
     text = (
-        f"{reason} conditions left out of the identification: {chosen.title} with "
-        f"{100 * chosen.cross_validated.median():.1f} % and {chosen.damper.parameter_count} numbers"
+        f"{reason}: {chosen.title}, {chosen.damper.parameter_count} parameters, "
+        f"error {100 * chosen.cross_validated.median():.1f} %"
     )
     if others:
-        text += " against " + ", ".join(
-            f"{o.title} with {100 * o.cross_validated.median():.1f} % and {o.damper.parameter_count}" for o in others
-        )
-    return (
-        text
-        + ". Within one standard error of the best, the fewest parameters win. "
-        + "Validation runs confirm; they choose nothing."
-    )
+        best = min(others, key=lambda other: other.cross_validated.median())
+        error = 100 * best.cross_validated.median()
+        text += f"; next {best.title}, {best.damper.parameter_count} parameters, {error:.1f} %"
+    return text + ". Within one standard error of the best, the model with the fewest parameters is chosen."
 
 
 def _tests(rig: RigStudy) -> str:
     others = len(rig.dataset) - len(rig.loops)
-    more = f"{others} records of other motion or of a current that changes" if others else ""
+    more = (
+        f"{others} {'record' if others == 1 else 'records'} of other motion or of a varying current" if others else ""
+    )
     if not rig.loops:
-        return f"{more}; no steady sine at one current among them."
+        return f"Tests: {more}; no steady sine at constant current."
     conditions = [loop.condition for loop in rig.loops]
-    currents = sorted({round(c.current_A, 3) for c in conditions})
+    currents = sorted({plain(c.current_A) for c in conditions}, key=float)
+    listed = ", ".join(currents) if len(currents) < 9 else f"{currents[0]} to {currents[-1]}"
     frequencies = [c.frequency_Hz for c in conditions]
     amplitudes = [1e3 * c.amplitude_m for c in conditions]
-    held = sum(loop.split == "validate" for loop in rig.loops)
     return (
-        f"{len(rig.loops)} sine runs, {held} of them held out: "
-        f"{', '.join(f'{c:g}' for c in currents)} A, {min(frequencies):.3g}–{max(frequencies):.3g} Hz, "
-        f"{min(amplitudes):.3g}–{max(amplitudes):.3g} mm, all from the measured motion."
-    ) + (f" Besides {more}." if more else "")
+        f"Tests: {len(rig.loops)} sine runs at {listed} A, {min(frequencies):.3g}–{max(frequencies):.3g} Hz and "
+        f"{min(amplitudes):.3g}–{max(amplitudes):.3g} mm{f', and {more}' if more else ''}; "
+        f"{len(rig.dataset.split('validate'))} runs for validation."
+    )

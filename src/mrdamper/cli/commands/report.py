@@ -27,6 +27,7 @@ def register(app: typer.Typer) -> None:
         velocities: str = typer.Option(
             "", "--velocities", help="Velocities of the force table [m/s], such as 0.05,0.1,0.2."
         ),
+        paper: str = typer.Option("a4", "--paper", help="Page size of report.pdf: a4 or letter."),
         png: bool = typer.Option(False, "--png", help="Also write every figure as PNG."),
     ) -> None:
         """Write a test report of one or several dampers.
@@ -47,7 +48,9 @@ def register(app: typer.Typer) -> None:
             progress("reading", 0.0)
             loaded = dict(_specimen(text) for text in specimens)
             progress("report", 0.4)
-            written = write_test_report(loaded, out, about=head, limits=bands, ladder=ladder, png=png)
+            written = write_test_report(
+                loaded, out, about=head, limits=bands, ladder=ladder, png=png, paper=paper.lower()
+            )
             progress("written", 1.0)
         print(f"report: {written[0]}")
 

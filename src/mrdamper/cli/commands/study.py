@@ -5,8 +5,12 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
+
+if TYPE_CHECKING:
+    from mrdamper.study.workflow import Study
 
 
 def register(app: typer.Typer) -> None:
@@ -32,11 +36,13 @@ def register(app: typer.Typer) -> None:
             None, "--limits", help="TOML file with force limits (mrdamper init limits)."
         ),
         pdf: bool = typer.Option(False, "--pdf", help="Also write report.pdf and every figure as PDF."),
+        paper: str = typer.Option("a4", "--paper", help="Page size of report.pdf: a4 or letter."),
         png: bool = typer.Option(False, "--png", help="Also write every figure as PNG."),
         lag: bool = typer.Option(False, "--lag", help="Require tests from which the coil lag can be identified."),
         keep: list[str] = typer.Option(
             [], "--keep", help="Use this run although it contradicts the others; repeatable."
         ),
+        verbose: bool = typer.Option(False, "--verbose", help="Print every model, parameter and limitation."),
         as_json: bool = typer.Option(False, "--json", help="Print the summary as JSON."),
     ) -> None:
         """Identify, validate and report a dataset in one step.
@@ -44,14 +50,14 @@ def register(app: typer.Typer) -> None:
         Every run is identified, models of the whole damper are fitted and cross-validated, and the
         best is saved with a report.
         """
-        from mrdamper.cli.output import parse_gas, parse_pairs, percent, spread
+        from mrdamper.cli.output import parse_gas, parse_pairs
         from mrdamper.cli.progress import progress_on_stderr
-        from mrdamper.dampers.certainty import table, unsure
         from mrdamper.errors import IdentificationError, InputError
         from mrdamper.files.atomic import require_writable
         from mrdamper.files.dataset import load_dataset
         from mrdamper.report.about import load_about, load_limits
         from mrdamper.report.study import study_and_draw, write_study
+        from mrdamper.report.summary import study_lines
         from mrdamper.study.parallel import several
         from mrdamper.study.recipe import study_method, study_methods
 
@@ -65,6 +71,7 @@ def register(app: typer.Typer) -> None:
         head, bands = load_about(about) if about else None, load_limits(limits) if limits else ()
         also = [kind for kind, wanted in (("pdf", pdf or about is not None), ("png", png)) if wanted]
         require_writable(out)
+        page_size = _paper_size(paper)
         dataset = load_dataset(data)
         if lag and not any(run.current_changes for run in dataset.split("train")):
             raise IdentificationError(
@@ -80,6 +87,7 @@ def register(app: typer.Typer) -> None:
                 model=chosen,
                 keep=keep,
                 also=also,
+                limits=bands,
                 processes=processes,
             )
             written = write_study(
@@ -90,29 +98,44 @@ def register(app: typer.Typer) -> None:
                 limits=bands,
                 also=also,
                 drawn=drawn,
+                paper=page_size,
             )
+        for line in _not_identified(result, verbose):
+            typer.echo(line, err=True)
         for rig in result.rigs:
-            aside = {one.run_id for one in rig.contradictions}
-            for name, why in rig.not_identified.items():
-                typer.echo(f"{'set aside' if name in aside else 'not identified'}: {name}: {why}", err=True)
             for note in rig.chosen.recipe.notes:
                 typer.echo(f"note: {note}", err=True)
         if as_json:
             print(json.dumps(_summary(result, [str(p) for p in written]), indent=1))
             return
-        for rig in result.rigs:
-            print(f"{rig.rig or dataset.name}: {rig.damper.title} ({rig.damper.parameter_count} numbers)")
-            print(f"  {'nrmse_pp, median (worst) of the runs':38}{'left out':>19}{'held out':>19}{'one by one':>12}")
-            for candidate in rig.candidates:
-                left_out, held_out = (spread(scores) for scores in (candidate.cross_validated, candidate.validation))
-                print(f"  {candidate.title:38}{left_out:>19}{held_out:>19}{percent(candidate.per_run):>12}")
-            if rig.calibration is not None:
-                print(f"  {rig.calibration.found}")
-            numbers = (f"{row['name']} {row['written']}" for row in table(rig.damper))
-            print(f"  numbers, 95 %: {'; '.join(numbers)}")
-            for doubt in unsure(rig.damper):
-                print(f"  {doubt}")
-        print(f"report: {written[0]}")
+        models = ", ".join(str(path) for path in written if path.name.startswith("model"))
+        files = [f"model: {models}", f"report: {written[0]}"]
+        print("\n".join(study_lines(result, files, verbose=verbose)))
+
+
+def _paper_size(name: str) -> str:
+    from mrdamper.errors import UnknownNameError
+    from mrdamper.report.pdf import PAPERS
+
+    if name.lower() not in PAPERS:
+        raise UnknownNameError.of("paper size", name, PAPERS)
+    return name.lower()
+
+
+def _not_identified(result: Study, verbose: bool) -> list[str]:
+    """List the runs without an individual fit, one line per reason."""
+    reasons: dict[str, list[str]] = {}
+    excluded = [f"excluded: {one.run_id}: {one}" for rig in result.rigs for one in rig.contradictions]
+    for rig in result.rigs:
+        aside = {one.run_id for one in rig.contradictions}
+        for run, reason in rig.not_identified.items():
+            if run not in aside:
+                reasons.setdefault(reason, []).append(run)
+    most = None if verbose else 3
+    return excluded + [
+        f"no individual fit: {', '.join(runs[:most])}{' ...' if runs[most:] and most else ''} ({reason})"
+        for reason, runs in reasons.items()
+    ]
 
 
 def _summary(result, written: list[str]) -> dict:

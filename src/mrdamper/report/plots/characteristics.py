@@ -1,8 +1,8 @@
-"""Figures test engineers read: peak force over peak velocity, force through the cycle."""
+"""Figures of the tests: peak force over peak velocity (PVP), force through the cycle (CVP)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -16,10 +16,17 @@ from mrdamper.report.plots.style import MM, current_colours, house_style, label,
 _MARKS = ("o", "s", "^", "D", "v", "P")
 
 
-def peak_velocity_plot(specimens: Mapping[str, Characteristics]) -> Figure:
-    """Peak force over peak velocity (PVP), rebound above and compression below, gas force taken away.
+def peak_velocity_plot(
+    specimens: Mapping[str, Characteristics], limits: Sequence[tuple[float, float, float, float]] = ()
+) -> Figure:
+    """Draw peak force over peak velocity (PVP), rebound above and compression below, gas force subtracted.
 
-    Colours tell currents; marks tell specimens.
+    Parameters
+    ----------
+    specimens : mapping of str to Characteristics
+        Currents are distinguished by colour, specimens by mark.
+    limits : sequence of (float, float, float, float)
+        Current [A], velocity [m/s], lower and upper force [N] of each limit, drawn as a bar.
     """
     with house_style():
         figure, (axes,) = new_figure(1, 1, 4.2, right=1.9)
@@ -39,8 +46,11 @@ def peak_velocity_plot(specimens: Mapping[str, Characteristics]) -> Figure:
                         color=colours[current],
                         label=_key(name, current, specimens) if side == 0 else None,
                     )
+        for current, velocity, lower, upper in limits:
+            near = min(colours, key=lambda level: abs(level - current))
+            axes.plot([velocity, velocity], [lower, upper], color=colours[near], marker="_", ms=9, mew=1.4, lw=1.4)
         axes.axhline(0, color="black", lw=0.6)
-        label(axes, "Peak velocity (m/s)", "Peak force, gas force off (N)")
+        label(axes, "Peak velocity (m/s)", "Peak force, gas force subtracted (N)")
         axes.set_xlim(left=0)
         axes.text(0.01, 0.98, "rebound", transform=axes.transAxes, va="top", fontsize=8)
         axes.text(0.01, 0.02, "compression", transform=axes.transAxes, va="bottom", fontsize=8)
@@ -49,7 +59,7 @@ def peak_velocity_plot(specimens: Mapping[str, Characteristics]) -> Figure:
 
 
 def continuous_velocity_plot(dataset: Dataset, specimen: Characteristics) -> Figure:
-    """Force over velocity and over displacement through the cycle (CVP) of the fastest motion at each current."""
+    """Draw force over velocity and displacement (CVP) of the fastest motion at each current."""
     with house_style():
         figure, axes = new_figure(1, 2, 3.4)
         colours = current_colours(list(specimen.currents))
@@ -75,7 +85,7 @@ def continuous_velocity_plot(dataset: Dataset, specimen: Characteristics) -> Fig
 
 
 def figures_over_current(specimens: Mapping[str, Characteristics]) -> Figure:
-    """Energy a cycle and half the loop's width over peak velocity, one line a current."""
+    """Draw mean resisting force and zero-force velocity over peak velocity, one line per current."""
     with house_style():
         figure, axes = new_figure(1, 2, 3.2, right=1.9)
         colours = current_colours([c for specimen in specimens.values() for c in specimen.currents])

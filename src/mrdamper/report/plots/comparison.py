@@ -15,7 +15,7 @@ from mrdamper.report.plots.style import MEASURED, MM, PALETTE, house_style, labe
 
 
 def ranking(scores: Mapping[str, tuple[float, float, float]]) -> Figure:
-    """Median error of every model: train, left out, held out.
+    """Draw the median error of every model: identification, cross-validation, validation runs.
 
     Parameters
     ----------
@@ -25,7 +25,9 @@ def ranking(scores: Mapping[str, tuple[float, float, float]]) -> Figure:
     with house_style():
         figure, (axes,) = new_figure(1, 1, 0.9 + 0.24 * len(scores), left=2.6, right=0.3)
         rows = np.arange(len(scores))[::-1]
-        marks = (("train", "o", PALETTE[6]), ("left out", "s", PALETTE[1]), ("held out", "D", PALETTE[2]))
+        marks = zip(
+            ("identification", "cross-validation", "validation"), "osD", (PALETTE[i] for i in (6, 1, 2)), strict=True
+        )
         for column, (name, mark, colour) in enumerate(marks):
             values = 100 * np.array([entry[column] for entry in scores.values()])
             axes.plot(values, rows, mark, ms=4.5, color=colour, label=name)

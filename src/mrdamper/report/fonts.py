@@ -1,0 +1,90 @@
+"""Installed fonts for characters that the bundled font of a PDF does not contain."""
+
+from __future__ import annotations
+
+import unicodedata
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+_MAX_FILE_BYTES = 40_000_000  # size of a font file [bytes]; larger ones are not opened
+
+
+@dataclass(frozen=True)
+class Fallback:
+    """Fonts that contain further characters.
+
+    Attributes
+    ----------
+    files : tuple of (path, int)
+        Font files, each with its index within a collection.
+    missing : str
+        Characters that no installed font contains.
+    """
+
+    files: tuple[tuple[str, int], ...] = ()
+    missing: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """State which characters are not printed, and why."""
+        shown = ", ".join(f"U+{ord(c):04X} {unicodedata.name(c, 'unnamed character')}" for c in self.missing[:3])
+        more = f" and {len(self.missing) - 3} more" if len(self.missing) > 3 else ""
+        return (
+            f"Not printed, because no installed font contains them: {shown}{more}. Install a font for this script, "
+            "for example Noto Sans, and write the report again; report.html shows them."
+        )
+
+
+def fallback_fonts(text: str, bundled: str) -> Fallback:
+    """Find installed fonts for the characters of a text that a bundled font does not contain.
+
+    Parameters
+    ----------
+    text : str
+    bundled : path
+        The font in which the text is set.
+    """
+    missing = {c for c in text if c.isprintable() and not c.isspace()} - _characters(bundled, 0)
+    files = []
+    for path in installed_fonts() if missing else ():
+        for index in range(_collection_size(path)):
+            covered = missing & _characters(path, index)
+            if covered:
+                files.append((path, index))
+                missing -= covered
+        if not missing:
+            break
+    return Fallback(tuple(files), "".join(sorted(missing)))
+
+
+def installed_fonts() -> list[str]:
+    """List the font files of this machine, fonts for many scripts first."""
+    from matplotlib.font_manager import findSystemFonts
+
+    paths = [path for path in findSystemFonts() if Path(path).suffix.lower() in (".ttf", ".otf", ".ttc")]
+    paths = [path for path in paths if Path(path).stat().st_size <= _MAX_FILE_BYTES]
+    return sorted(paths, key=lambda path: ("CJK" not in path, "Noto" not in path, "Regular" not in path, path))
+
+
+@cache
+def _characters(path: str, index: int) -> frozenset[str]:
+    from fontTools.ttLib import TTFont, TTLibError
+
+    try:
+        with TTFont(path, fontNumber=index, lazy=True) as font:
+            return frozenset(map(chr, font.getBestCmap() or ()))
+    except (TTLibError, OSError, ValueError, AssertionError):
+        return frozenset()  # a damaged or unsupported font file is not used
+
+
+def _collection_size(path: str) -> int:
+    if not path.lower().endswith(".ttc"):
+        return 1
+    from fontTools.ttLib import TTCollection, TTLibError
+
+    try:
+        with TTCollection(path, lazy=True) as collection:
+            return len(collection.fonts)
+    except (TTLibError, OSError, ValueError):
+        return 0

@@ -1,0 +1,204 @@
+"""Limitations of an identified damper and of its tests, as grouped sentences in the order of harm."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mrdamper.dampers.base import Damper
+from mrdamper.dampers.certainty import unsure
+from mrdamper.dampers.joint import JointFit
+from mrdamper.dampers.modified import ModifiedFit
+from mrdamper.identification import Identification
+from mrdamper.identification.loop_analysis import LoopAnalysis
+from mrdamper.study.recipe import Scored
+from mrdamper.validation import Validation
+
+PREDICTION, TESTS, MODEL, PARAMETERS, RANGE = "Prediction", "Tests", "Model", "Parameters", "Range of validity"
+_GROUPS = (PREDICTION, PARAMETERS, MODEL, TESTS, RANGE)
+_WORDS = frozenset({"a", "A", "I"})  # parameter names that are also words of a sentence
+_SEARCHED = {"seat_share": "elastic displacement of the series spring over the free play"}
+_MAX_FUNCTION_ERROR = 0.9  # cross-validated error of a parameter function over the parameter's spread [-]
+_MAX_ENERGY_ERROR = 0.15  # relative error of the dissipated energy [-]
+_MAX_DRIFT_M_S = 1e-4  # drift of the mean position [m/s]
+_MAX_CORRELATION = 0.85  # correlation coefficient of tested frequencies and amplitudes [-]
+_MIN_LEVELS = 4  # number of tested currents
+
+
+@dataclass(frozen=True)
+class Limitation:
+    """A limitation in one sentence.
+
+    Attributes
+    ----------
+    group : str
+        Heading under which a report lists it.
+    text : str
+    """
+
+    group: str
+    text: str
+
+
+def limitations(scored: Scored, loops: Sequence[LoopAnalysis]) -> list[Limitation]:
+    """List the limitations of a model and of the tests it was identified from, the most harmful first."""
+    found = {
+        PREDICTION: _prediction(scored.cross_validated, scored.validation),
+        TESTS: _tests(loops),
+        MODEL: [
+            *(_joint(scored.fit) if isinstance(scored.fit, JointFit) else ()),
+            *(_functions(scored.fit) if isinstance(scored.fit, ModifiedFit) else ()),
+        ],
+        PARAMETERS: [
+            *(unsure(scored.damper) if scored.damper.certainty else ()),
+            *_identifications(scored.identifications),
+        ],
+        RANGE: [validity(scored.damper)],
+    }
+    return _explained([Limitation(group, text) for group in _GROUPS for text in found[group]], scored.damper)
+
+
+def by_group(found: Sequence[Limitation]) -> Mapping[str, list[str]]:
+    """Group the sentences under their headings; headings without sentences are omitted."""
+    groups = {group: [one.text for one in found if one.group == group] for group in _GROUPS}
+    return {group: texts for group, texts in groups.items() if texts}
+
+
+def validity(damper: Damper) -> str:
+    """State the tested range of a damper."""
+    e = damper.envelope
+    return (
+        f"Tested range: {e.current_A[0] + 0.0:.3g}–{e.current_A[1]:.3g} A, "
+        f"{e.frequency_Hz[0]:.3g}–{e.frequency_Hz[1]:.3g} Hz, "
+        f"{1e3 * e.amplitude_m[0]:.3g}–{1e3 * e.amplitude_m[1]:.3g} mm, "
+        f"peak velocity {e.peak_velocity_m_s[0]:.3g}–{e.peak_velocity_m_s[1]:.3g} m/s. "
+        "Predictions outside it are marked as extrapolation."
+    )
+
+
+def _explained(found: Sequence[Limitation], damper: Damper) -> list[Limitation]:
+    """Add the meaning of each parameter where it is named first."""
+    parameters = damper.model_at(damper.envelope.middle).parameters()
+    meanings = {info.name: info.meaning for info in parameters if info.name not in _WORDS} | _SEARCHED
+    explained = list(found)
+    for name, meaning in meanings.items():
+        named = re.compile(rf"(?<![\w.^])(?<!\d ){re.escape(name)}(\.\d+)?(?![\w^])")
+        first = next((i for i, one in enumerate(explained) if named.search(one.text)), None)
+        if first is not None:
+            text = named.sub(lambda match, meaning=meaning: f"{match[0]} ({meaning})", explained[first].text, count=1)
+            explained[first] = replace(explained[first], text=text)
+    return explained
+
+
+def _prediction(cross_validated: Validation, validation: Validation) -> list[str]:
+    sentences = []
+    for scores, name in ((validation, "validation run"), (cross_validated, "cross-validated run")):
+        if not scores.runs:
+            continue
+        worst = scores.worst()
+        if worst.scores.nrmse_pp > 2 * scores.median():
+            outside = f", {', '.join(worst.extrapolation)} outside the tested range" if worst.extrapolation else ""
+            sentences.append(
+                f"Largest error of a {name}: {100 * worst.scores.nrmse_pp:.1f} % in {worst.run_id} "
+                f"({worst.condition}{outside}); median {100 * scores.median():.1f} %."
+            )
+    weak = sorted({r.run_id for r in cross_validated.runs if abs(r.scores.energy_error) > _MAX_ENERGY_ERROR})
+    if weak:
+        sentences.append(
+            f"Error of the dissipated energy above {100 * _MAX_ENERGY_ERROR:.0f} % in {len(weak)} cross-validated "
+            f"{'run' if len(weak) == 1 else 'runs'}: {_some(weak)}."
+        )
+    if not validation.runs:
+        sentences.append("No validation runs: the errors stated are those of cross-validation.")
+    return sentences
+
+
+def _functions(fit: ModifiedFit) -> list[str]:
+    sentences = []
+    middle = fit.conditions[len(fit.conditions) // 2]
+    highest = fit.damper.envelope.current_A[1]
+    for name, fitted in fit.functions.items():
+        turn = fitted.function.turning_point(highest, middle.frequency_Hz, middle.amplitude_m)
+        if turn is not None:
+            place = "within" if turn <= highest else "above"
+            sentences.append(
+                f"{name} is not monotonic (extremum at {turn:.2f} A, {place} the tested range up to {highest:.3g} A)."
+            )
+        if fitted.left_out > _MAX_FUNCTION_ERROR and fitted.function.form != "constant":
+            sentences.append(
+                f"The function of {name} predicts other conditions no better than its mean "
+                f"(cross-validated error {fitted.left_out:.2f} of the spread)."
+            )
+    if fit.at_bounds:
+        sentences.append(f"Parameter functions at a bound of the search: {', '.join(fit.at_bounds)}.")
+    levels = len({round(c.current_A, 3) for c in fit.conditions})
+    if levels < _MIN_LEVELS:
+        sentences.append(f"Only {levels} currents were tested: the form between them is an assumption.")
+    return sentences
+
+
+def _joint(fit: JointFit) -> list[str]:
+    sentences = []
+    if not fit.ending.converged:
+        sentences.append(f"The global fit did not converge: the search {fit.ending}.")
+    if (other := fit.second) is not None:
+        sentences.append(
+            f"Second local minimum of the fit: yield displacement {1e3 * other.knee:.2f} mm instead of "
+            f"{1e3 * other.chosen_knee:.2f} mm, mean error {100 * other.error:.2f} % instead of "
+            f"{100 * other.chosen_error:.2f} %"
+            + ("; chosen by cross-validation." if other.error < other.chosen_error else ".")
+        )
+    ratio = float(np.max(fit.nrmse_pp) / np.median(fit.nrmse_pp))
+    if ratio > 2:
+        sentences.append(f"Largest fitting error of a run: {ratio:.1f} times the median.")
+    if fit.at_bounds:
+        sentences.append(f"Parameters at a bound of the search (interval one-sided): {', '.join(fit.at_bounds)}.")
+    return sentences
+
+
+def _identifications(identifications: Sequence[Identification]) -> list[str]:
+    sentences = []
+    bound: dict[str, list[str]] = {}
+    for found in identifications:
+        for name in found.at_bounds:
+            bound.setdefault(name, []).append(found.run_id)
+    for name, runs in bound.items():
+        sentences.append(f"{name} at a bound of its range in {len(runs)} individual fits: {_some(runs)}.")
+    for note in dict.fromkeys(n for found in identifications for n in found.notes if n.lower().startswith("mass")):
+        sentences.append(f"{note[0].upper()}{note[1:]}.")
+    return sentences
+
+
+def _tests(loops: Sequence[LoopAnalysis]) -> list[str]:
+    sentences = []
+    amplitudes = np.array([loop.condition.amplitude_m for loop in loops])
+    frequencies = np.array([loop.condition.frequency_Hz for loop in loops])
+    if len(loops) > 3:
+        tied = float(np.corrcoef(np.log(amplitudes), np.log(frequencies))[0, 1])
+        if abs(tied) > _MAX_CORRELATION:
+            sentences.append(
+                f"Frequency and amplitude were varied together (correlation {tied:.2f}): "
+                "their separate effects are not identifiable."
+            )
+    distorted = [loop for loop in loops if not loop.motion.is_sine]
+    if distorted:
+        worst = max(loop.motion.distortion for loop in distorted)
+        sentences.append(
+            f"Distorted sine motion in {len(distorted)} of {len(loops)} runs (distortion up to {100 * worst:.0f} %); "
+            "identification uses the measured motion."
+        )
+    drifting = [loop.run_id for loop in loops if abs(loop.motion.drift) > _MAX_DRIFT_M_S]
+    if drifting:
+        fastest = max(abs(loop.motion.drift) for loop in loops)
+        sentences.append(
+            f"Drift of the mean position in {len(drifting)} runs, up to {1e3 * fastest:.2f} mm/s: {_some(drifting)}."
+        )
+    return sentences
+
+
+def _some(names: Sequence[str], most: int = 4) -> str:
+    shown = ", ".join(names[:most])
+    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"

@@ -1,0 +1,133 @@
+"""Summary of a study for the terminal and for the first page of its report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrdamper.dampers.certainty import table
+from mrdamper.report.limitations import limitations
+from mrdamper.study.workflow import RigStudy, Study
+from mrdamper.validation import Validation, peak_band
+
+LEVEL = 0.9  # coverage of the stated prediction intervals [-]
+_MAX_LINES = 20  # number of lines on a terminal
+_MAX_LIMITATIONS = 5  # number of limitations on a terminal
+_MAX_WIDTH = 160  # characters of a line on a terminal
+
+
+@dataclass(frozen=True)
+class IntervalCheck:
+    """Prediction intervals of the peak force against measured validation runs.
+
+    Attributes
+    ----------
+    inside, runs : int
+        Runs whose measured peak force lies inside its interval, of how many.
+    half_width : float
+        Median half width of the interval over the predicted peak force [-].
+    """
+
+    inside: int
+    runs: int
+    half_width: float
+
+
+def check_intervals(rig: RigStudy) -> IntervalCheck | None:
+    """Compare the prediction intervals of the peak force with the validation runs; None where there are none."""
+    rows = [peak_band(rig.damper, rig.dataset[run.run_id], LEVEL) for run in rig.chosen.validation.runs]
+    rows = [row for row in rows if "peak_force_low_N" in row]
+    if not rows:
+        return None
+    low, high, measured = (
+        np.array([row[f"peak_force_{name}_N"] for row in rows]) for name in ("low", "high", "measured")
+    )
+    half = float(np.median((high - low) / (high + low)))
+    return IntervalCheck(int(np.sum((low <= measured) & (measured <= high))), len(rows), half)
+
+
+def error_sentence(rig: RigStudy) -> str:
+    """State the prediction error and the prediction interval in one sentence."""
+    chosen = rig.chosen
+    scores, runs = (
+        (chosen.validation, "validation runs") if chosen.validation.runs else (chosen.cross_validated, "runs")
+    )
+    how = "" if chosen.validation.runs else " in leave-one-condition-out cross-validation"
+    text = (
+        f"The model predicts the force of {len(scores.runs)} {runs}{how} with a median error of "
+        f"{100 * scores.median():.1f} % of the peak-to-peak force (largest {100 * scores.worst_error():.1f} %)"
+    )
+    intervals = check_intervals(rig)
+    if intervals is None:
+        return text + "."
+    return text + (
+        f"; the {100 * LEVEL:.0f} % prediction interval of the peak force in a future test session is "
+        f"±{100 * intervals.half_width:.0f} %, and {intervals.inside} of the {intervals.runs} measured peak forces "
+        "lie inside it."
+    )
+
+
+def study_lines(study: Study, files: Sequence[str], *, verbose: bool = False) -> list[str]:
+    """Summarise a study in at most 20 lines; with `verbose` every model, parameter and limitation."""
+    runs, name = study.dataset.runs, study.dataset.name
+    validation = sum(run.split == "validate" for run in runs)
+    head = f"{name}: {len(runs)} runs, {len(runs) - validation} for identification, {validation} for validation"
+    lines = [head]
+    fixed = 1 + len(files)
+    per_rig = (_MAX_LINES - fixed) // max(len(study.rigs), 1)
+    shown = min(per_rig - 6, math.ceil(_MAX_LIMITATIONS / len(study.rigs)) if len(study.rigs) < 3 else 0)
+    left = _MAX_LIMITATIONS
+    for rig in study.rigs:
+        block, used = _rig_lines(rig, max(min(shown, left), 0), verbose=verbose)
+        left -= used
+        lines += block if verbose else block[: max(per_rig, 1)]
+    if not verbose and len(lines) + len(files) > _MAX_LINES:
+        rest = len(lines) + len(files) - _MAX_LINES + 1
+        lines = [*lines[: _MAX_LINES - len(files) - 1], f"... {rest} more lines with --verbose"]
+    lines = lines if verbose else [_cut(line) for line in lines]
+    return [*lines, *files]
+
+
+def _rig_lines(rig: RigStudy, shown: int, *, verbose: bool) -> tuple[list[str], int]:
+    chosen = rig.chosen
+    lines = [
+        f"{rig.rig or rig.dataset.name}: {chosen.title}, {chosen.damper.parameter_count} parameters, "
+        f"{len(chosen.cross_validated.runs)} identification runs",
+        f"  force error (median, worst run): cross-validation {_errors(chosen.cross_validated)}; "
+        f"validation {_errors(chosen.validation)}",
+    ]
+    if intervals := check_intervals(rig):
+        lines.append(
+            f"  {100 * LEVEL:.0f} % prediction interval of the peak force: ±{100 * intervals.half_width:.0f} %; "
+            f"{intervals.inside} of {intervals.runs} validation runs inside"
+        )
+    if rig.calibration is not None:
+        lines.append(f"  {rig.calibration.found}")
+    others = rig.candidates[1:]
+    for other in others if verbose else others[:1]:
+        lines.append(
+            f"  {'compared' if verbose else 'next best'}: {other.title}, {other.damper.parameter_count} parameters, "
+            f"cross-validation {_errors(other.cross_validated)}"
+        )
+    if verbose:
+        lines += [f"  {row['name']} = {row['written']}" for row in table(rig.damper)]
+    found = limitations(chosen, rig.loops)
+    listed = found if verbose else found[:shown]
+    if listed:
+        more = len(found) - len(listed)
+        lines.append(f"  limitations{f' ({more} more with --verbose)' if more else ''}:")
+        lines += [f"  - {one.text}" for one in listed]
+    return lines, len(listed)
+
+
+def _errors(scores: Validation) -> str:
+    if not scores.runs:
+        return "–"
+    return f"{100 * scores.median():.2f} %, {100 * scores.worst_error():.1f} %"
+
+
+def _cut(line: str) -> str:
+    return line if len(line) <= _MAX_WIDTH else f"{line[: _MAX_WIDTH - 3].rsplit(' ', 1)[0]} ..."

@@ -1,0 +1,70 @@
+"""Limitations are sentences in a fixed order, whatever the reason for which the search stopped."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.dampers import joint_damper
+
+from mrdamper.dampers.joint import JointFit, Valley
+from mrdamper.optimizers.ending import Ending
+from mrdamper.report.limitations import RANGE, by_group, limitations
+from mrdamper.study.recipe import Scored, play_and_bypass
+from mrdamper.validation import Validation
+
+NONE = Validation("none", ())
+
+
+def texts(fit):
+    return [one.text for one in limitations(scored(fit), ())]
+
+
+def scored(fit):
+    return Scored(play_and_bypass(), fit.damper, fit, (), float("nan"), NONE, NONE, NONE, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("why", "said"),
+    [
+        (Ending.SETTLED, None),
+        (Ending.AT_BOUNDS, None),  # parameters at bounds have a sentence of their own
+        (
+            Ending.STEPS_SPENT,
+            "The global fit did not converge: the search stopped at the limit of steps, the cost still falling.",
+        ),
+    ],
+)
+def test_a_search_that_did_not_converge_is_said_so_in_a_sentence(why, said):
+    fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), why, 9, 0.1)
+    sentences = [s for s in texts(fit) if "did not converge" in s]
+    assert len(sentences) == (said is not None)
+    if said:
+        assert sentences[0] == said
+
+
+def test_a_second_end_of_the_search_is_told_with_its_error():
+    fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), Ending.SETTLED, 9, 0.1)
+    worse, better = (Valley(1.4e-3, e, 4e-4, 0.0266) for e in (0.0273, 0.026))
+    start = "Second local minimum of the fit: yield displacement 1.40 mm instead of 0.40 mm, mean error"
+    assert f"{start} 2.73 % instead of 2.66 %." in texts(replace(fit, second=worse))
+    chosen = f"{start} 2.60 % instead of 2.66 %; chosen by cross-validation."
+    assert chosen in texts(replace(fit, second=better))
+    assert not any("local minimum" in s for s in texts(fit))
+
+
+def test_a_run_described_far_worse_than_the_others_is_named_by_its_factor():
+    fit = JointFit(joint_damper(), np.array([0.02, 0.02, 0.09]), ("d",), np.zeros(2), Ending.SETTLED, 9, 0.1)
+    sentences = texts(fit)
+    assert any("4.5 times the median" in s for s in sentences)
+    assert any("(interval one-sided): d (" in s for s in sentences)
+    calm = replace(fit, nrmse_pp=np.array([0.02, 0.02, 0.03]), at_bounds=())
+    assert not any("times the median" in s or "bound" in s for s in texts(calm))
+
+
+def test_limitations_are_grouped_and_the_tested_range_stands_last():
+    fit = JointFit(joint_damper(), np.array([0.02, 0.02, 0.09]), (), np.zeros(2), Ending.SETTLED, 9, 0.1)
+    found = limitations(scored(fit), ())
+    groups = by_group(found)
+    assert list(groups)[-1] == RANGE
+    assert [one.text for one in found] == [text for texts in groups.values() for text in texts]
+    assert found[0].text.startswith("No validation runs")

@@ -1,0 +1,22 @@
+"""A study on the terminal: at most 20 lines, at most five limitations."""
+
+from mrdamper.report.page import plain
+from mrdamper.report.summary import study_lines
+
+
+def test_a_study_fits_a_terminal_and_its_details_follow_with_verbose(bundled_study):
+    short = study_lines(bundled_study, ["report: r.html"])
+    assert len(short) <= 20
+    assert 1 <= sum(line.startswith("  - ") for line in short) <= 5
+    assert all(len(line) <= 160 for line in short)
+    full = study_lines(bundled_study, ["report: r.html"], verbose=True)
+    assert len(full) > len(short)
+    for rig in bundled_study.rigs:
+        median = f"cross-validation {100 * rig.chosen.cross_validated.median():.2f} %"
+        assert any(median in line for line in short)
+        for name in rig.damper.fitted_parameters:
+            assert any(line.startswith(f"  {name} = ") for line in full)
+
+
+def test_conditions_are_written_as_in_a_test_plan():
+    assert [plain(v) for v in (1.5003, -0.0004, 0.500000000013146, 12.0, 0.25)] == ["1.5", "0", "0.5", "12", "0.25"]
