@@ -99,14 +99,14 @@ def capability(values: Floats, lower: float | None, upper: float | None) -> Capa
     outside, count = int(np.sum(below | above)), values.size
     if is_normal(values):
         middle, deviation = np.mean(values), np.std(values, ddof=1)
-        ppk = float(_nearest(middle - 3 * deviation, middle, middle + 3 * deviation, lower, upper))
+        ppk = float(_nearest(np.array([middle - 3 * deviation, middle, middle + 3 * deviation]), lower, upper))
         half = 1.959963985 * float(np.sqrt(1 / (9 * count) + ppk**2 / (2 * (count - 1))))
         return Capability(ppk, ppk - half, ppk + half, "normal", count, outside)
     if count < FEWEST_PERCENTILES:
         why = f"not normal; percentiles need {FEWEST_PERCENTILES} values"
         return Capability(np.nan, np.nan, np.nan, why, count, outside)
-    ppk = float(_nearest(*np.quantile(values, _PERCENTILES), lower, upper))
-    low, high = np.quantile(_nearest(*_resampled(values), lower, upper), [0.025, 0.975]).tolist()
+    ppk = float(_nearest(np.quantile(values, _PERCENTILES), lower, upper))
+    low, high = np.quantile(_nearest(_resampled(values), lower, upper), [0.025, 0.975]).tolist()
     return Capability(ppk, low, high, "percentiles", count, outside)
 
 
@@ -125,8 +125,9 @@ def _resampled(values: Floats) -> Floats:
     return np.array(found)
 
 
-def _nearest(bottom: Floats, middle: Floats, top: Floats, lower: float | None, upper: float | None) -> Floats:
+def _nearest(percentiles: Floats, lower: float | None, upper: float | None) -> Floats:
     """Distance of the nearer limit from the middle, over that of the percentile on its side."""
+    bottom, middle, top = percentiles
     sides = [(middle - lower) / np.maximum(middle - bottom, 1e-300)] if lower is not None else []
     sides += [(upper - middle) / np.maximum(top - middle, 1e-300)] if upper is not None else []
     return np.min(sides, axis=0)
