@@ -1,0 +1,42 @@
+"""Terms of docs/words.toml do not occur in texts that a person reads, file by file as they are rewritten."""
+
+import re
+import tomllib
+
+import pytest
+from support.texts import ROOT, all_texts
+
+TERMS = tomllib.loads((ROOT / "docs" / "words.toml").read_text(encoding="utf-8"))["term"]
+REWRITTEN = (
+    "CHANGELOG.md",
+    "src/mrdamper/cli/help.py",
+    "src/mrdamper/report/damper_tests.py",
+    "src/mrdamper/report/fonts.py",
+    "src/mrdamper/report/limitations.py",
+    "src/mrdamper/report/summary.py",
+    "src/mrdamper/report/templates/_glossary.html.j2",
+    "src/mrdamper/report/templates/_tests.html.j2",
+    "src/mrdamper/report/templates/study.html.j2",
+    "src/mrdamper/report/templates/tests.html.j2",
+)
+READERS = {str(path.relative_to(ROOT)): (path, reader) for path, reader in all_texts()}
+
+
+@pytest.mark.parametrize("name", REWRITTEN)
+def test_a_rewritten_file_uses_the_terms_of_the_field(name):
+    path, reader = READERS[name]
+    hits = [
+        f"line {line}: {found[0]!r}; use {term['use']}"
+        for line, text in reader(path)
+        for term in TERMS
+        if (found := re.search(term["find"], text.lower()))
+    ]
+    assert hits == []
+
+
+def test_the_search_finds_a_term_and_leaves_ordinary_uses_alone():
+    def matches(text):
+        return [term["use"] for term in TERMS if re.search(term["find"], text.lower())]
+
+    assert matches("3 held-out runs") == ["validation runs (not used for identification)"]
+    assert matches("error on line 12: the leak of a seal") == []
