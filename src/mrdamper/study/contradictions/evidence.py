@@ -100,7 +100,7 @@ class Evidence:
     def __init__(self, tracks: Sequence[Track], misfit: float = 1.0) -> None:
         self.misfit = misfit
         self.force = float(np.median([track.half_range for track in tracks])) or 1.0
-        self._amplitude = float(np.median([np.ptp(t.displacement) / 2 for t in tracks])) or 1.0
+        self.amplitude = float(np.median([np.ptp(t.displacement) / 2 for t in tracks])) or 1.0
         self._velocity = float(np.median([np.max(np.abs(t.velocity)) for t in tracks])) or 1.0
         self._acceleration = float(np.median([np.max(np.abs(t.acceleration)) for t in tracks])) or 1.0
         self.nodes = _nodes(tracks)
@@ -147,12 +147,12 @@ class Evidence:
 
     def elements(self, tracks: Sequence[Track]) -> list[Floats]:
         """(R, E) elements of the damper at the rows of each run, before their dependence on the current."""
-        yields = np.array(_YIELDS) * self._amplitude
+        yields = np.array(_YIELDS) * self.amplitude
         stops = stop_operators([t.displacement for t in tracks], yields)
         found = []
         for track, stop in zip(tracks, stops, strict=True):
             rows = track.rows
-            x, v = track.displacement[rows] / self._amplitude, track.velocity[rows] / self._velocity
+            x, v = track.displacement[rows] / self.amplitude, track.velocity[rows] / self._velocity
             friction = [np.tanh(v / scale) for scale in _VELOCITIES]
             linear = [np.ones(rows.size), x, x * x, v, track.acceleration[rows] / self._acceleration]
             found.append(np.column_stack([*linear, *friction, stop[rows] / yields]))

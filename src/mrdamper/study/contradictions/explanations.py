@@ -141,6 +141,8 @@ class Candidate:
 
     def _is_large(self, explanation: Explanation) -> bool:
         value, size = explanation.value, self.track.half_range
+        if explanation.unit and explanation.cause == "displacement" and not self._is_nearer(value):
+            return False
         if explanation.cause in ("force", "displacement"):
             return abs(np.log(value)) > np.log(LEAST_FACTOR)
         if explanation.cause == "offset":
@@ -149,6 +151,11 @@ class Candidate:
             change = self.others.force(self.track.with_current(value), self._columns) - self.expected
             return float(np.max(np.abs(change))) > LEAST_CURRENT_EFFECT * size
         return True
+
+    def _is_nearer(self, factor: float) -> bool:
+        """Tell whether a factor brings the stroke nearer to the usual one, as the right unit does."""
+        stroke = float(np.ptp(self.track.displacement)) / 2 / self.evidence.amplitude
+        return abs(np.log(stroke * factor)) < abs(np.log(stroke))
 
 
 def _both_ways(units: dict[str, float]) -> list[tuple[str, float]]:
