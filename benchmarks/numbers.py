@@ -28,7 +28,7 @@ ROOT = Path(__file__).parent.parent
 POINTS = 0.3  # percentage points a median may differ: another machine's last bits choose other terms
 WORST = 0.2  # share by which the worst run and the time may differ
 COUNT = 2  # numbers a model may have more or fewer, for the same reason
-_MODELS, _COMPARED = "docs/models.md", "| model | one run alone"
+_MODELS, _COMPARED = "docs/models.md", "| model | individual fit"
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
@@ -86,11 +86,11 @@ def of_study(study: Study) -> list[Told]:
     rigs = {rig.rig: rig for rig in study.rigs}
     one, other = (rigs[name] for name in ("utfsm", "labcontrol"))
     names = {
-        "play-bypass": "**play and bypass, joint**",
-        "bouc-wen:joint": "modified Bouc–Wen, all runs at once",
-        "bouc-wen": "modified Bouc–Wen, run by run",
-        "bingham:joint": "modified Bingham, all runs at once",
-        "paper": "modified Bouc–Wen, the paper's recipe taken literally",
+        "play-bypass": "**play and bypass, global fit**",
+        "bouc-wen:joint": "modified Bouc–Wen, global fit",
+        "bouc-wen": "modified Bouc–Wen, individual fits",
+        "bingham:joint": "modified Bingham, global fit",
+        "paper": "modified Bouc–Wen, method of the paper (literal)",
     }
     rows = []
     for name, title in names.items():
@@ -109,7 +109,7 @@ def of_study(study: Study) -> list[Told]:
     page = "docs/play-and-bypass.md"
     gains, rest = tuple(sorted(100 * d.gain for d in drifts)), tuple(100 * d.floor for d in drifts)
     return [
-        Table("README.md", "| | numbers | utfsm left out", tuple(rows)),
+        Table("README.md", "| model | parameters | utfsm cross-validation", tuple(rows)),
         Table(page, "| parameter | utfsm | labcontrol |", _parameters(one, other), share=WORST),
         Sentence(page, r"gains of (\S+)–(\S+) % \(standard deviation\)", gains),
         Sentence(page, r"would leave (\S+) % \(labcontrol\) and (\S+) % \(utfsm\)", rest),

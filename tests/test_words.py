@@ -9,6 +9,7 @@ from support.texts import ROOT, all_texts
 TERMS = tomllib.loads((ROOT / "docs" / "words.toml").read_text(encoding="utf-8"))["term"]
 REWRITTEN = (
     "CHANGELOG.md",
+    "README.md",
     "src/mrdamper/cli/help.py",
     "src/mrdamper/report/damper_tests.py",
     "src/mrdamper/report/fonts.py",

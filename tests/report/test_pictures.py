@@ -184,7 +184,7 @@ def test_one_number_stands_everywhere(bundled, bundled_study, written, tmp_path,
             assert re.search(cells, chapter), candidate.title
             bench = _candidate(candidate, "damper1")
             assert (bench["left_out"], bench["held_out"]) == tuple(said.values())
-            if _way(candidate) == ("bingham", "run by run"):
+            if _way(candidate) == ("bingham", "individual fits"):
                 (entry,) = compared[rig.rig].entries
                 assert entry.cross_validated.median() == pytest.approx(said["cross-validation"], rel=1e-9)
                 assert entry.validation.median() == pytest.approx(said["validation"], rel=1e-9)

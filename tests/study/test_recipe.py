@@ -261,7 +261,7 @@ def test_joint_ways_hand_on_what_their_fits_make(monkeypatch):
     monkeypatch.setattr(recipes, "fit_modified_jointly", lambda *given: asked.append(given) or (fit, "refit"))
     made_ = recipes.fit_functions_jointly("ab", identifications)
     assert (made_.damper, made_.refit, made_.fit) == ("damper", "refit", fit)
-    assert asked == [("ab", identifications, {"method": "balance", "train runs": "2", "functions": "joint"})]
+    assert asked == [("ab", identifications, {"method": "balance", "train runs": "2", "functions": "global fit"})]
     problem = SimpleNamespace(refit=lambda fit, rows: SimpleNamespace(damper=(fit, rows)))
     monkeypatch.setattr(recipes, "identify_jointly", lambda runs: SimpleNamespace(problem=problem, fit=fit))
     made_ = recipes.fit_global_model("ab", [])
@@ -350,7 +350,7 @@ def test_every_recipe_says_what_it_is():
     assert not {"lugre", "spencer", "kwok"} & joint
     one, both, ali = known["dahl"], known["dahl:joint"], known["ali-type"]
     assert (one.way, both.way, one.title, both.title) == (
-        "run by run", "joint", "viscous and Dahl", "viscous and Dahl, functions fitted jointly",
+        "individual fits", "global fit", "viscous and Dahl", "viscous and Dahl, global fit",
     )  # fmt: skip
     assert one.source == both.source == model_type("dahl").source
     assert "stepped, not closed" in known["spencer"].limits
@@ -361,7 +361,7 @@ def test_every_recipe_says_what_it_is():
     assert (both.basis, both.make, one.basis) == (Basis("dahl"), recipes.fit_functions_jointly, Basis("dahl"))
     ours = known["play-bypass"]
     assert (ours.basis, ours.make, ours.way, ours.title, ours.source) == (
-        None, recipes.fit_global_model, "joint", "play and bypass", model_type("play-bypass").source,
+        None, recipes.fit_global_model, "global fit", "play and bypass", model_type("play-bypass").source,
     )  # fmt: skip
     assert (ali.make.func, ali.make.args) == (recipes.fit_published, (all_published()["ali-type"],))
     paper = PaperOptions(functions="shorter").recipe(runs_with(1400.0, 12.0, (0.5, 1.0, 2.0)))
@@ -431,5 +431,5 @@ def test_the_numbers_of_a_way_are_counted():
         patch.setattr(recipes, "ModifiedFit", SimpleNamespace)
         fitted = replace(scored, fit=SimpleNamespace(functions={"a": short, "b": function}))
         assert fitted.conditions_needed == 4
-    assert fit_and_score(Recipe("memory", None, remember, "joint"), TRAIN, [], HELD).title == "memory, joint"
+    assert fit_and_score(Recipe("memory", None, remember, "global fit"), TRAIN, [], HELD).title == "memory, global fit"
     assert fit_and_score(REMEMBER, TRAIN, [], HELD).parameters_per_run == 0

@@ -439,7 +439,7 @@ class JointProblem:
     _linearisation: tuple[JointFit, Linearised] | None = None
 
     def _damper(self, model: Model, point: Floats, parts: Sequence[Part]) -> JointDamper:
-        about = {"runs": str(len(parts)), "fit": "joint, all runs at once"}
+        about = {"runs": str(len(parts)), "fit": "global fit, all runs"}
         return JointDamper(
             self.rig,
             model,

@@ -108,7 +108,7 @@ class Recipe:
     make : callable
         Makes the damper from runs and their identifications.
     way : str
-        In words: "run by run", "joint".
+        In words: "individual fits", "global fit".
     title : str
         For tables of many models.
     source : str
@@ -318,14 +318,14 @@ def identified(
 
 def fit_per_run(runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
     """Parameter functions through the values identified from single runs."""
-    about = _about(runs, identifications, "run by run")
+    about = _about(runs, identifications, "individual fits")
     fit = fit_modified(identifications, provenance=about)
     return FitResult(fit.damper, lambda rows: fit_modified([identifications[i] for i in rows]).damper, fit)
 
 
 def fit_functions_jointly(runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
     """Parameter functions fitted to the forces of all runs at once."""
-    fit, refit = fit_modified_jointly(runs, identifications, _about(runs, identifications, "joint"))
+    fit, refit = fit_modified_jointly(runs, identifications, _about(runs, identifications, "global fit"))
     return FitResult(fit.damper, refit, fit)
 
 
@@ -363,7 +363,7 @@ def modified(name: str, method: str = "projection") -> Recipe:
         name if plain else f"{name}:{method}",
         Basis(name, method),
         fit_per_run,
-        "run by run",
+        "individual fits",
         cls.title if plain else f"{cls.title}, method {method}",
         cls.source,
         f"{stepped}parameter functions need the frequency and amplitude of a sine",
@@ -373,14 +373,14 @@ def modified(name: str, method: str = "projection") -> Recipe:
 def jointly(name: str) -> Recipe:
     """A model whose parameter functions are fitted to all forces at once."""
     apart, cls = modified(name), model_type(name)
-    title = f"{cls.title}, functions fitted jointly"
-    return Recipe(f"{name}:joint", apart.basis, fit_functions_jointly, "joint", title, cls.source, apart.limits)
+    title = f"{cls.title}, global fit"
+    return Recipe(f"{name}:joint", apart.basis, fit_functions_jointly, "global fit", title, cls.source, apart.limits)
 
 
 def current_only(name: str) -> Recipe:
     """A model whose parameters follow the current alone, fitted to all forces at once."""
     apart, cls = modified(name), model_type(name)
-    title = f"{cls.title}, laws over the current only"
+    title = f"{cls.title}, functions of the current only"
     return Recipe(
         f"{name}:current", apart.basis, fit_current_laws, "current laws", title, cls.source, "the same at any motion"
     )
@@ -390,7 +390,13 @@ def play_and_bypass() -> Recipe:
     """The model whose one set of parameters holds for every condition."""
     cls = model_type(JOINTLY)
     return Recipe(
-        JOINTLY, None, fit_global_model, "joint", cls.title, cls.source, "takes any motion and a current that varies"
+        JOINTLY,
+        None,
+        fit_global_model,
+        "global fit",
+        cls.title,
+        cls.source,
+        "takes any motion and a current that varies",
     )
 
 

@@ -127,7 +127,7 @@ def score_strip(validations: Mapping[str, Validation]) -> Figure:
     Errors beyond 25 % are arrows at the edge.
     """
     with house_style():
-        figure, (axes,) = new_figure(1, 1, 0.8 + 0.3 * len(validations), left=2.6)
+        figure, (axes,) = new_figure(1, 1, 0.8 + 0.3 * len(validations), left=3.0)
         for row, validation in enumerate(validations.values()):
             colour = PALETTE[1 + row % (len(PALETTE) - 2)]
             values = 100 * np.array([run.scores.nrmse_pp for run in validation.runs])
