@@ -8,9 +8,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, create_model, field_validator, model_validator
 
-from mrdamper.errors import InputError
+from mrdamper.rig_files.limits_file import FORCE_LIMITS, RIG_LIMITS, LimitsError
 from mrdamper.rig_files.profile import ProfileError
 from mrdamper.rig_files.strict_toml import load_toml
 
@@ -24,12 +24,6 @@ COLUMNS: dict[str, tuple[str, ...]] = {
 }
 _TRUE = ("true", "yes", "1")
 _HELP = "correct it; docs/how-to/fleet.md shows every key"
-
-
-class LimitsError(InputError):
-    """A limits file cannot be read, or a limit is impossible."""
-
-    code = "E_LIMITS"
 
 
 class _Table(BaseModel):
@@ -110,8 +104,8 @@ class Limit(_Table):
         return self
 
 
-class _Limits(_Table):
-    limits: dict[str, Limit]
+_OTHER_PARTS: dict[str, Any] = {name: (Any, None) for name in (FORCE_LIMITS, *RIG_LIMITS)}  # of other commands
+_Limits = create_model("_Limits", __base__=_Table, limits=(dict[str, Limit], ...), **_OTHER_PARTS)
 
 
 def load_fleet_profile(path: str | Path | None) -> FleetProfile:
@@ -128,8 +122,8 @@ def load_fleet_profile(path: str | Path | None) -> FleetProfile:
 
 
 def load_limits(path: str | Path) -> dict[str, Limit]:
-    """Read a limits file: a table [limits.COLUMN] with lower, upper or both.
+    """Read the column limits of a limits file: tables [limits.COLUMN] with lower, upper or both.
 
     Raises `LimitsError` if it is no TOML, a key is not known, or a lower limit is not below the upper.
     """
-    return load_toml(Path(path), _Limits, LimitsError, _HELP).limits
+    return load_toml(Path(path), _Limits, LimitsError, "mrdamper init limits shows the keys").limits  # type: ignore[attr-defined]

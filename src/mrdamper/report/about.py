@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from mrdamper.errors import InputError
+from mrdamper.rig_files.limits_file import FORCE_LIMITS, require_known_keys
 from mrdamper.rig_files.strict_toml import read_toml_file
 
 _LARGEST_LOGO = 500_000  # bytes; it stands in every page
@@ -136,18 +137,21 @@ def logo_of(text: str) -> str:
 
 
 def load_limits(path: str | Path) -> tuple[Limit, ...]:
-    """Read tolerance bands: a TOML file with one `[[limit]]` a band.
+    """Read the force limits of a limits file: one `[[limit]]` table per limit.
 
     Raises
     ------
     AboutError
-        If it cannot be read, or a band is incomplete, no number, of no side, or upside down.
+        If it cannot be read, a key is unknown, or a limit is incomplete, no number, of no side, or its
+        lower force above the upper.
     """
     path = Path(path)
     table = _toml(path)
-    entries = table.get("limit")
-    if not isinstance(entries, list) or not entries or set(table) != {"limit"}:
-        raise AboutError("no [[limit]] tables", where=str(path), mend=f"write one [[limit]] a band with {_FIELDS}")
+    require_known_keys(table, AboutError, str(path))
+    entries = table.get(FORCE_LIMITS)
+    if not isinstance(entries, list) or not entries:
+        mend = f"write one [[limit]] table per limit with {_FIELDS} (mrdamper init limits)"
+        raise AboutError("no [[limit]] tables", where=str(path), mend=mend)
     return tuple(_limit(entry, f"{path}, limit {number}") for number, entry in enumerate(entries, 1))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import tomllib
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Condition
-from mrdamper.errors import InputError
+from mrdamper.rig_files.limits_file import RIG_LIMITS, LimitsError, require_known_keys
 from mrdamper.rig_files.strict_toml import read_toml_file
 
 _MOST_SAMPLES = 500_000  # of a planned record
@@ -97,7 +97,7 @@ class Limits:
 
     @classmethod
     def read(cls, path: Path) -> Limits:
-        """From a TOML file whose keys are the attributes, units in their names.
+        """Read the rig limits of a limits file, whose keys are the attributes, units in their names.
 
         Raises
         ------
@@ -108,13 +108,10 @@ class Limits:
             given = read_toml_file(path)
         except (OSError, tomllib.TOMLDecodeError) as error:
             found = str(error).splitlines()[0]
-            raise InputError(found, where=str(path), mend="give a TOML file of limits", code="E_LIMITS") from error
-        known = [field.name for field in fields(cls)]
+            raise LimitsError(found, where=str(path), mend="give a TOML file of limits") from error
+        require_known_keys(given, LimitsError, str(path))
+        given = {name: value for name, value in given.items() if name in RIG_LIMITS}
         for name, value in given.items():
-            if name not in known:
-                near = [other for other in known if other.split("_")[0] == name.split("_")[0]]
-                mend = f"write {near[0]}: the unit is part of the name" if near else f"known: {', '.join(known)}"
-                raise bad_limits(f"key {name}", mend)
             numbers = value if isinstance(value, list) else [value]
             plain = all(isinstance(n, int | float) and not isinstance(n, bool) and math.isfinite(n) for n in numbers)
             if not plain or isinstance(value, list) != (name in _RANGES) or len(numbers) != 1 + (name in _RANGES):
@@ -122,7 +119,7 @@ class Limits:
                     f"{name} = {value!r}", "give [lowest, highest]" if name in _RANGES else "give one number"
                 )
         if missing := [name for name in _RANGES if name not in given]:
-            raise bad_limits(f"no {', '.join(missing)}", "give [lowest, highest] of each")
+            raise bad_limits(f"no {', '.join(missing)}", "give [lowest, highest] of each (mrdamper init limits)")
         values: dict[str, Any] = {n: tuple(map(float, v)) if isinstance(v, list) else v for n, v in given.items()}
         return cls(**values)
 
@@ -166,6 +163,6 @@ class Limits:
         return allowed
 
 
-def bad_limits(found: str, mend: str) -> InputError:
-    """The refusal of limits."""
-    return InputError(found, where="limits", mend=mend, code="E_LIMITS")
+def bad_limits(found: str, mend: str) -> LimitsError:
+    """Return the error for limits that cannot be used."""
+    return LimitsError(found, where="limits", mend=mend)

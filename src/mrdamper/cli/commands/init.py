@@ -1,0 +1,53 @@
+"""`mrdamper init`: template of a file that other commands read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+_FILES = {"about": "about.toml", "limits": "limits.toml", "profile": "profile.toml", "tests": "tests.csv"}
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+
+    @app.command(epilog="Example: mrdamper init limits --out limits.toml")
+    def init(
+        kind: str = typer.Argument(..., help=f"Kind of file: {', '.join(_FILES)}."),
+        out: Path | None = typer.Option(None, "--out", help="File to write; default: standard output."),
+    ) -> None:
+        """Write a commented template: about, limits, profile or tests.
+
+        about: head of a report. limits: force limits, limits of the test rig, limits of fleet columns.
+        profile: columns and units of rig files. tests: table of tests with their currents.
+        """
+        from mrdamper.errors import OutputError
+        from mrdamper.files.atomic import write_file
+
+        text = template(kind)
+        if out is None:
+            print(text, end="")
+            return
+        if out.exists():
+            raise OutputError("this file exists", where=str(out), mend="choose another name, or delete it first")
+        with write_file(out) as target:
+            target.write_text(text, encoding="utf-8")
+        typer.echo(f"template: {out}")
+
+
+def template(kind: str) -> str:
+    """Return the text of a template.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no template of that name.
+    """
+    from importlib.resources import files
+
+    from mrdamper.errors import UnknownNameError
+
+    if kind not in _FILES:
+        raise UnknownNameError.of("template", kind, _FILES)
+    return files("mrdamper.cli").joinpath("templates", _FILES[kind]).read_text(encoding="utf-8")
