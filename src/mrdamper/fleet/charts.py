@@ -99,13 +99,15 @@ def capability(values: Floats, lower: float | None, upper: float | None) -> Capa
     outside, count = int(np.sum(below | above)), values.size
     if is_normal(values):
         middle, deviation = np.mean(values), np.std(values, ddof=1)
-        ppk = float(_nearest(np.array([middle - 3 * deviation, middle, middle + 3 * deviation]), lower, upper))
+        ppk = float(
+            _nearest(np.array([middle - 3 * deviation, middle, middle + 3 * deviation], dtype=float), lower, upper)
+        )
         half = 1.959963985 * float(np.sqrt(1 / (9 * count) + ppk**2 / (2 * (count - 1))))
         return Capability(ppk, ppk - half, ppk + half, "normal", count, outside)
     if count < FEWEST_PERCENTILES:
         why = f"not normal; percentiles need {FEWEST_PERCENTILES} values"
         return Capability(np.nan, np.nan, np.nan, why, count, outside)
-    ppk = float(_nearest(np.quantile(values, _PERCENTILES), lower, upper))
+    ppk = float(_nearest(np.asarray(np.quantile(values, _PERCENTILES), dtype=float), lower, upper))
     low, high = np.quantile(_nearest(_resampled(values), lower, upper), [0.025, 0.975]).tolist()
     return Capability(ppk, low, high, "percentiles", count, outside)
 

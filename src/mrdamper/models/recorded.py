@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -16,10 +16,11 @@ from mrdamper.tracing import Tape, program
 from mrdamper.tracing.compiled import RecordProgram
 
 _CHANNELS = ("displacement", "velocity", "acceleration", "current", "dt", "turn", "turn_back", "move")
+S = TypeVar("S", bound=Callable[..., Floats])
 _WORTHWHILE = 300_000  # samples followed, from which compiling pays
 
 
-def recorded(state: Callable[[Any, Excitation], Floats]) -> Callable[[Any, Excitation], Floats]:
+def recorded(state: S) -> S:
     """Have a model's `state` follow records compiled, where there is a compiler.
 
     The array code runs once on symbols; without a compiler, and for few samples, it runs as it is written. Both
@@ -49,7 +50,7 @@ def recorded(state: Callable[[Any, Excitation], Floats]) -> Callable[[Any, Excit
         found = derived is not None and record.compiled_along(given, derived, record.starts, channels(motion))
         return found.outputs[0] if found and found.failed < 0 else state(self, motion)
 
-    return along
+    return cast(S, along)
 
 
 def channels(motion: Excitation) -> tuple[Floats, ...]:

@@ -116,12 +116,8 @@ class Session:
         if found.damper.certainty is not None:
             return self.add(found.damper, origin, note)
         runs = [self.dataset[run.run_id] for run in found.train.runs]
-        return self.add(
-            found.damper,
-            origin,
-            note,
-            partial(certain, found.damper, runs, [r.scores for r in found.cross_validated.runs]),
-        )
+        beside = [score.predicted for score in found.cross_validated.runs if score.predicted is not None]
+        return self.add(found.damper, origin, note, partial(certain, found.damper, runs, beside))
 
     def damper(self, key: str, sure: bool = False) -> Bench:
         """A damper on the bench by its key, with its covariance where that is asked for and can be known."""

@@ -152,7 +152,7 @@ class RecordProgram:
 
 
 def address(array: np.ndarray) -> ctypes.c_void_p:
-    """Where the elements of an array lie."""
+    """Return where the elements of an array are stored; the caller keeps the array until the call has ended."""
     return ctypes.c_void_p(array.ctypes.data)
 
 
@@ -169,11 +169,10 @@ def _compiled_along(
     outputs = np.empty((len(program.outputs), size))
     places = np.array([array.ctypes.data for array in arrays], dtype=np.uintp)
     strides = np.array([array.strides[0] // 8 for array in arrays], dtype=np.int64)
-    ends = outputs.ctypes.data + 8 * size * np.arange(len(outputs), dtype=np.uintp)
+    ends = np.array([row.ctypes.data for row in outputs], dtype=np.uintp)
     along = library.along
     along.restype = ctypes.c_longlong
     failed = along(
-        address(p), address(d), address(s), ctypes.c_longlong(size), address(places), address(strides),
-        address(ends.astype(np.uintp)),
+        address(p), address(d), address(s), ctypes.c_longlong(size), address(places), address(strides), address(ends)
     )  # fmt: skip
     return Along(outputs, tuple(s[:-1].tolist()), int(failed))
