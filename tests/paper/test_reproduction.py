@@ -199,7 +199,7 @@ def test_thin_data_give_what_they_allow_and_say_why_the_rest_is_missing(
         assert len(text.splitlines()) > 1, path.name
         assert "nan" not in text.lower().replace("nanm", ""), path.name
     if not held:
-        assert "No run is held out: nothing here says how the ways predict." in page
+        assert "There are no validation runs, so the prediction error is not known." in page
         assert "table4_errors is not made: no run is held out" in page
         assert found.best is None
         (generalisation,) = [c for c in unjudged if c.key == "generalisation"]

@@ -143,7 +143,7 @@ def test_the_records_are_read_back(damper, tmp_path):
     asked = ["plan", str(tmp_path / "m.json"), "--hours", "0.25", "--about", "0.5,2,8", "--out", str(tmp_path / "next")]
     got = CliRunner().invoke(application(), asked)
     assert got.exit_code == 0, got.output
-    assert "existing runs that taught least: r" in got.stdout
+    assert "least informative runs: r" in got.stdout
     assert "band of the force at 0.5 A, 2 Hz, 8 mm" in got.stdout.replace("2.00", "2").replace("8.00", "8")
     with (tmp_path / "next" / "plan.csv").open() as file:
         listed = list(csv.DictReader(file))

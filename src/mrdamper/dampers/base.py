@@ -190,7 +190,7 @@ class Prediction(Shown):
     def headline(self) -> str:
         """Condition, peak forces and what is extrapolated."""
         low, high = float(np.min(self.force)), float(np.max(self.force))
-        outside = f"; outside the tests in {', '.join(self.extrapolation)}" if self.extrapolation else ""
+        outside = f"; outside the tested range in {', '.join(self.extrapolation)}" if self.extrapolation else ""
         return f"prediction at {self.condition}: {low:.4g} to {high:.4g} N{outside}"
 
     @property
@@ -274,22 +274,23 @@ class Damper(Shown):
     @property
     @abstractmethod
     def title(self) -> str:
-        """What to call it in a report."""
+        """Title in a report."""
 
     @property
     def headline(self) -> str:
-        """What it is, whose, and how many numbers the tests determined."""
-        return f"{self.title} of rig {self.rig}: {self.parameter_count} numbers from tests"
+        """Title, rig and number of identified parameters."""
+        return f"{self.title} of rig {self.rig}: {self.parameter_count} parameters from tests"
 
     @property
     def details(self) -> Sequence[str]:
-        """Its own numbers with their 95 % intervals and units."""
+        """Its parameters with their 95 % intervals and units."""
         return [f"{row['name']} = {row['written']}" for row in table(self)]
 
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:
-        """A row a quantity: the ranges it was tested in."""
-        ranges = {name: span for name, span in vars(self.envelope).items() if isinstance(span, tuple)}
+        """One row per quantity: the tested range."""
+        names = ("current_A", "frequency_Hz", "amplitude_m", "peak_velocity_m_s")
+        ranges = {name: getattr(self.envelope, name) for name in names}
         return {
             "tested": list(ranges),
             "lowest": [low for low, _ in ranges.values()],

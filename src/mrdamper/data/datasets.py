@@ -57,9 +57,9 @@ class Dataset(Shown):
 
     @property
     def headline(self) -> str:
-        """Name, runs a rig, and how many are held out."""
+        """Name, runs per rig and number of validation runs."""
         rigs = ", ".join(f"{len(self.rig(name))} of rig {name}" for name in self.rigs)
-        return f"dataset {self.name}: {len(self)} runs, {rigs}; {len(self.split('validate'))} held out"
+        return f"dataset {self.name}: {len(self)} runs, {rigs}; {len(self.split('validate'))} validation runs"
 
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:

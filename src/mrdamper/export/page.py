@@ -127,21 +127,21 @@ def _words(damper: Damper | Model, made: Stream) -> list[str]:
     said = f"{made.title[:1].upper()}{made.title[1:]}, exported by mrdamper {version('mrdamper')}"
     if count := getattr(damper, "parameter_count", 0):  # a bare model was determined from nothing
         facts = "; ".join(f"{key}: {value}" for key, value in getattr(damper, "provenance", {}).items())
-        said += f" from a model with {count} numbers determined from tests"
+        said += f" from a model with {count} parameters identified from tests"
         said += f" ({facts})" if facts else ""
     sentences = [f"{said}.", _SIGNS]
     if made.envelope is not None:
         parts = [f"{_span(getattr(made.envelope, field), factor)} {unit}" for _, field, _, unit, factor, *_ in _KNOBS]
         top = 1e3 * made.envelope.peak_velocity_m_s[1]
         sentences.append(
-            f"Tested at {', '.join(parts)}, up to {top:.3g} mm/s; outside, curves are dashed: nobody measured there."
+            f"Tested at {', '.join(parts)}, up to {top:.3g} mm/s; dashed curves are extrapolated beyond this range."
         )
         if made.model is None:
             sentences.append(_FUNCTIONS)
         if made.band is not None:
             sentences.append(f"Shaded: {100 * made.band.level:g} % prediction interval of the force {made.band.scope}.")
     else:
-        sentences.append("A model without tests behind it.")
+        sentences.append("A model that was not identified from tests.")
     return sentences
 
 

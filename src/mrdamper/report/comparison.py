@@ -130,13 +130,13 @@ def _evaluations(entry: Scored) -> int | None:
 
 
 def _reason(entry: Scored, entries: Sequence[Scored]) -> str:
-    """Say why it stands where it stands."""
+    """Compare the error and the parameter count of an entry with those of the others."""
     own, best = entry.cross_validated.median(), entries[0]
-    text = f"{100 * own:.1f} % on left-out conditions with {entry.damper.parameter_count} numbers"
+    text = f"{100 * own:.1f} % in cross-validation with {entry.damper.parameter_count} parameters"
     if entry is best:
         text += ": the lowest error"
     else:
-        text += f", {100 * (own / best.cross_validated.median() - 1):.0f} % above the first"
+        text += f", {100 * (own / best.cross_validated.median() - 1):.0f} % above the lowest"
     leaner = [
         e
         for e in entries
@@ -144,9 +144,9 @@ def _reason(entry: Scored, entries: Sequence[Scored]) -> str:
     ]
     if leaner and entry is not best:
         fewest = min(leaner, key=lambda e: e.damper.parameter_count)
-        text += f"; {fewest.recipe.title} is no worse with {fewest.damper.parameter_count}"
+        text += f"; {fewest.recipe.title} is as accurate with {fewest.damper.parameter_count}"
     if math.isfinite(entry.per_run) and own > 1.5 * entry.per_run:
-        text += f"; a single run is described to {100 * entry.per_run:.1f} %: the rest is lost between conditions"
+        text += f"; best possible fit of a single run: {100 * entry.per_run:.1f} %"
     return text
 
 
@@ -169,7 +169,8 @@ def _chapter(rig: RigComparison, folder: Path, suffix: str, png: bool) -> dict[s
             f"peak-to-peak force, among {len(rig.entries)} models."
         ),
         "loops_caption": (
-            f"Last cycle of {'held-out' if runs[0].split == 'validate' else 'train'} runs; the best {len(best)} models."
+            f"Last cycle of the {'validation' if runs[0].split == 'validate' else 'identification'} runs; "
+            f"the best {len(best)} models."
         ),
         "figures": {
             name: save_figure(figure, folder / f"{name}{suffix}", ("png",) if png else ())
@@ -179,7 +180,7 @@ def _chapter(rig: RigComparison, folder: Path, suffix: str, png: bool) -> dict[s
 
 
 def _shown(rig: RigComparison) -> list[Run]:
-    """Held-out sines, where there are any, over the currents."""
+    """Select sine runs over the currents, from the validation runs if there are any."""
     entry = rig.entries[0]
     scored = entry.validation.only(rig.sines).runs or entry.train.runs
     ordered = sorted(scored, key=lambda run: (run.condition.current_A, run.condition.peak_velocity))
@@ -194,7 +195,7 @@ def _plain(value: float) -> float | None:
 def text_table(rows: Sequence[Mapping[str, Any]]) -> str:
     """The ranking for a terminal."""
     lines = [
-        f"{'':3} {'model':42} {'per run':>8} {'train':>6} {'left out':>8} {'worst':>6} {'held out':>8} {'worst':>6} "
+        f"{'':3} {'model':42} {'per run':>8} {'ident.':>6} {'CV':>8} {'worst':>6} {'valid.':>8} {'worst':>6} "
         f"{'parameters':>10} {'s':>6}"
     ]
     names = ("per_run", "train", "cv", "cv_worst", "validation", "validation_worst")

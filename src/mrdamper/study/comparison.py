@@ -133,7 +133,9 @@ def _seen(rig: Dataset) -> _Seen:
     others = usable(run for run in trusted if run.split == "train" and run.id not in known)[0]
     if len(train) < 3 and not others:
         raise IdentificationError(
-            "under three train runs with a steady sine", where=f"rig {rig.name}", mend="check the split column"
+            "fewer than three identification runs with a steady sine",
+            where=f"rig {rig.name}",
+            mend="check the split column",
         )
     held_out = [run for run in trusted if run.split == "validate"]
     return _Seen(rig, sines, train, [*train, *others], held_out, not_identified)
@@ -143,7 +145,9 @@ def _ranked(
     rig: _Seen, chosen: Sequence[Recipe], followed: Mapping[tuple[str, str], Scored | str], found: IdentificationCache
 ) -> RigComparison:
     name = rig.dataset.rigs[0]
-    made = {recipe.name: followed.get((name, recipe.name), "no train runs with a steady sine") for recipe in chosen}
+    made = {
+        recipe.name: followed.get((name, recipe.name), "no identification runs with a steady sine") for recipe in chosen
+    }
     refused = {recipe: why for recipe, why in made.items() if isinstance(why, str)}
     entries = [judged_on_all(one, rig.everything) for one in made.values() if isinstance(one, Scored)]
     if not entries:

@@ -96,7 +96,8 @@ class RigStudy(Shown):
     def headline(self) -> str:
         """Rig, chosen model and its errors."""
         left, held = (100 * scores.median() for scores in (self.chosen.cross_validated, self.chosen.validation))
-        return f"rig {self.rig}: {self.chosen.title}, left out {left:.2f} %, held out {held:.2f} % (median nrmse_pp)"
+        errors = f"cross-validation {left:.2f} %, validation {held:.2f} % (median nrmse_pp)"
+        return f"rig {self.rig}: {self.chosen.title}, {errors}"
 
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:
@@ -272,13 +273,13 @@ def study_rig(
     refused = aside | refused
     if not everything:
         raise IdentificationError(
-            "no train runs that can be used",
+            "no identification run passes the checks",
             where=f"rig {rig or dataset.name}",
             mend="check the split column of runs.csv" if not unusable else next(iter(unusable.values())),
         )
     if len(everything) == len(train) < 2:
         raise IdentificationError(
-            f"{len(train)} train runs with a steady sine",
+            f"{len(train)} identification runs with a steady sine",
             where=f"rig {rig or dataset.name}",
             mend="a model over conditions needs at least two, or a record of other motion; check the split column",
         )
@@ -432,7 +433,7 @@ def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], di
             rate = (run.time.size - 1) / float(run.time[-1] - run.time[0])
             if found.is_sine and rate < _SAMPLES_A_CYCLE * found.condition.frequency_Hz:
                 raise IdentificationError(
-                    f"{rate / found.condition.frequency_Hz:.1f} samples a cycle",
+                    f"{rate / found.condition.frequency_Hz:.1f} samples per cycle",
                     where=f"run {run.id}",
                     mend=f"record at least {_SAMPLES_A_CYCLE}",
                 )
@@ -442,7 +443,7 @@ def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], di
         if found.is_sine and analyse_motion(run).distortion < _DISTORTED:
             sines.append(run)
         else:
-            refused[run.id] = "the motion is no sine, which identification run by run needs"
+            refused[run.id] = "the motion is not a sine, which individual fits require"
     return sines, refused
 
 

@@ -56,7 +56,7 @@ def register(app: typer.Typer) -> None:
             print(json.dumps({"rows": rows, "files": [str(p) for p in written], "seconds": result.seconds}, indent=1))
             return
         for rig in result.rigs:
-            print(f"{rig.rig or dataset.name}: median and worst nrmse_pp in %, ranked by conditions left out")
+            print(f"{rig.rig or dataset.name}: nrmse_pp [%], median and largest; ranked by cross-validation error")
             print(text_table([row for row in rows if row["rig"] == rig.rig]))
             for name, why in rig.refused.items():
                 typer.echo(f"not determined: {name}: {why}", err=True)

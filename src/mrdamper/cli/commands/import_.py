@@ -113,7 +113,7 @@ def _write_tests(files: list[Path], known: Profile, target: Path) -> None:
     for refusal in refusals:
         typer.echo(f"not in the table: {refusal.error}", err=True)
     if not records:
-        raise InputError("no test can be read", mend="mend what is refused above, or give a profile")
+        raise InputError("no test can be read", mend="correct the files listed above, or give a profile")
     if str(target) == "-":
         print(tests_text(records), end="")
         return

@@ -35,7 +35,11 @@ def register(app: typer.Typer) -> None:
 
 def _line(model) -> str:
     if not hasattr(model, "parameters"):
-        start = f"laws over the condition, from {model.basis} run by run" if model.basis else "a regression"
+        start = (
+            f"parameter functions; starts from individual fits of {model.basis}"
+            if model.basis
+            else "regression without a physical model"
+        )
         return f"{model.name:18} {model.heading:30} {start}"
     free = [info.name for info in model.parameters() if not info.preset]
     return f"{model.name:18} {model.title:30} {len(free):2} free: {' '.join(free)}"

@@ -43,7 +43,7 @@ def register(app: typer.Typer) -> None:
         require_writable(out)
         damper = load_model(model) if model else None
         if limits is None and damper is None:
-            raise InputError("neither a model nor limits", mend="give --limits limits.toml", code="E_LIMITS")
+            raise InputError("neither a model nor limits is given", mend="give --limits limits.toml", code="E_LIMITS")
         if about is not None and damper is None:
             raise InputError("--about without a model", mend="give a model.json")
         allowed = Limits.read(limits) if limits else Limits.of(damper)  # type: ignore[arg-type]
@@ -67,14 +67,14 @@ def register(app: typer.Typer) -> None:
         minutes = sessions * allowed.opening + sum(item.minutes for item in chosen)
         typer.echo(
             f"{out / 'plan.csv'}\n{len(chosen)} records in {sessions} sessions, {minutes:.0f} of {60 * hours:.0f} "
-            "minutes; force_N in them is what to expect"
+            "minutes; force_N is the predicted force"
         )
         if damper is None or reckoning is None:
             return
         typer.echo(reckoning.said(chosen))
         if least := taught_least(damper):
             runs = ", ".join(f"{name} ({100 * share:.1f} %)" for name, share in least)
-            typer.echo(f"existing runs that taught least: {runs} of what is known")
+            typer.echo(f"least informative runs: {runs} of the information")
 
 
 def _doubt(about: str | None):

@@ -19,7 +19,7 @@ def register(app: typer.Typer) -> None:
     def reproduce(
         out: Path = typer.Option(..., "--out", help="Folder for reproduction.html, tables and figures."),
         data: Path | None = typer.Option(None, "--data", help="Dataset folder; default: the virtual rig, synthetic."),
-        rig: str | None = typer.Option(None, "--rig", help="Rig of the dataset; needed where it holds several."),
+        rig: str | None = typer.Option(None, "--rig", help="Rig of the dataset; required if it has several."),
         comparators: bool = typer.Option(
             True, "--comparators/--no-comparators", help="The direct genetic search and Ali's model (half the time)."
         ),
@@ -33,8 +33,8 @@ def register(app: typer.Typer) -> None:
         box: list[str] = typer.Option(
             [], "--box", help="alpha=LOW:HIGH or beta=LOW:HIGH of the genetic search; may be repeated."
         ),
-        jobs: int | None = typer.Option(None, "--jobs", min=1, help="Processes; default one a core."),
-        png: bool = typer.Option(False, "--png", help="Figures as PNG beside the SVG."),
+        jobs: int | None = typer.Option(None, "--jobs", min=1, help="Number of processes; default: one per core."),
+        png: bool = typer.Option(False, "--png", help="Also write the figures as PNG."),
         as_json: bool = typer.Option(False, "--json", help="Print the verdicts and claims for a program."),
     ) -> None:
         """Example: mrdamper reproduce --out result/"""
@@ -76,8 +76,8 @@ def register(app: typer.Typer) -> None:
             print(json.dumps(found | {"files": [str(p) for p in written]}, indent=1))
             return
         if study.rig is not None:
-            print("virtual rig: every number is synthetic")
-        print(f"  {'held out, nrmse_pp':52}{'median':>9}{'worst':>9}{'s':>8}")
+            print("virtual rig: all data are synthetic")
+        print(f"  {'validation runs, nrmse_pp':52}{'median':>9}{'worst':>9}{'s':>8}")
         for row, took in zip(found["verdicts"], found["times"], strict=False):
             errors = (row["nrmse_pp"], row["worst_nrmse_pp"])
             shown = "".join(f"{'–':>9}" if error is None else f"{100 * error:7.2f} %" for error in errors)

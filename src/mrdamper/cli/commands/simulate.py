@@ -223,7 +223,7 @@ def _print_bands(done: Simulation, bands: Bands | None, dampers: Mapping[str, Da
 
     found = bands.quantiles()
     low, high = ({name: rows[end] for name, rows in found.items()} for end in (0, -1))
-    typer.echo(f"5 to 95 % of {bands.count} dampers and sessions that the tests leave open:")
+    typer.echo(f"5 to 95 % of {bands.count} draws of the parameters and the session:")
     for i, name in enumerate(done.system.coordinates):
         x, a = "displacement_m", "acceleration_m_s2"
         typer.echo(
@@ -233,13 +233,16 @@ def _print_bands(done: Simulation, bands: Bands | None, dampers: Mapping[str, Da
     for i, link in enumerate(done.dampers):
         typer.echo(f"  {link.name:12} F {low['force_N'][i]:9.1f} to {high['force_N'][i]:.1f} N")
     if bands.step_change > HALVING:
-        typer.echo(f"their step of {1e3 * bands.step:.3g} ms moves a peak by {100 * bands.step_change:.2g} %", err=True)
+        typer.echo(
+            f"the step of the draws, {1e3 * bands.step:.3g} ms, changes a peak by {100 * bands.step_change:.2g} %",
+            err=True,
+        )
     if bands.lost:
-        typer.echo(f"warning: {bands.lost} draws had no solution and are left out", err=True)
+        typer.echo(f"warning: {bands.lost} draws had no solution and are omitted", err=True)
     for name, damper in dampers.items():
         if damper.certainty and damper.certainty.left_out:
             share = 100 * damper.certainty.force
-            typer.echo(f"not in them: what the form of {name} is wrong by, {share:.2g} % of half its force")
+            typer.echo(f"not included: model error of {name}, {share:.2g} % of half the peak-to-peak force")
 
 
 def _print(done: Simulation) -> None:
@@ -256,26 +259,26 @@ def _print(done: Simulation) -> None:
     for link, value in zip(done.dampers, peaks["force_N"], strict=True):
         typer.echo(f"  {link.name:12} F {value:9.1f} N")
     typer.echo(
-        f"step {1e3 * done.step:.3g} ms; halving it last changed a peak by {100 * done.halving:.2g} %; "
-        f"energy balances to {done.energy_gap:.1g}"
+        f"step {1e3 * done.step:.3g} ms; the last halving changed a peak value by {100 * done.halving:.2g} %; "
+        f"relative error of the energy balance {done.energy_gap:.1g}"
     )
     if not done.settled:
         typer.echo(
-            "warning: the peaks have not settled: this motion answers to the smallest change, as a law that switches, "
-            "wheels in the air, hard stops or too little damping make it; read them as one of many",
+            "warning: the peak values have not converged with the step size; the motion is sensitive to small changes "
+            "(switching controller, wheel lift-off, bump-stop contact or low damping)",
             err=True,
         )
     for name, shares in done.outside.items():
         for quantity, share in shares.items():
-            what = f"{quantity} outside its tests" if quantity in FLAGS else quantity
+            what = f"{quantity} outside the tested range" if quantity in FLAGS else quantity
             typer.echo(f"warning: {name}: {what} {100 * share:.3g} % of the time", err=True)
     for name, share in done.unreachable.items():
-        typer.echo(f"{name}: the force asked for was out of reach {100 * share:.3g} % of the time")
+        typer.echo(f"{name}: the force command could not be reached {100 * share:.3g} % of the time")
     if type(done.controller).calms:
         for name, timing in done.timing.items():
             if timing < 0:
                 typer.echo(
-                    f"warning: {name}: firm just when it shakes what it should calm (correlation {timing:.2f}); "
-                    "is a sign exchanged?",
+                    f"warning: {name}: damping is high when it excites the body (correlation {timing:.2f}); "
+                    "check the signs of the force and the velocities",
                     err=True,
                 )

@@ -76,7 +76,7 @@ def register(app: typer.Typer) -> None:
         if lag and not any(run.current_changes for run in dataset.split("train")):
             raise IdentificationError(
                 "the current is constant in every identification run, so the coil lag cannot be identified",
-                mend="record a run in which the current is switched, or omit --lag",
+                mend="add a run in which the current is switched, or omit --lag",
                 code="E_LAG",
             )
         workers = min(os.cpu_count() or 1, len(dataset.rigs))

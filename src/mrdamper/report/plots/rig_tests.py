@@ -51,7 +51,7 @@ def test_matrix(loops: Sequence[LoopAnalysis]) -> Figure:
                     continue
                 points = np.array([(c.frequency_Hz, MM * c.amplitude_m) for c in chosen])
                 axes.update_datalim(points)  # marks that are set aside are not counted
-                name = f"{current:g} A" + ("" if split == "train" else ", held out")
+                name = f"{current:g} A" + ("" if split == "train" else ", validation")
                 axes.plot(
                     *points.T,
                     "o",
