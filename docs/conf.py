@@ -106,6 +106,13 @@ def _models() -> None:
     (HERE / "reference" / "model-classes.md").write_text(text, encoding="utf-8")
 
 
+def _codes() -> None:
+    """One page with every error and warning code."""
+    from mrdamper.cli.commands.explain import codes_page
+
+    (HERE / "reference" / "codes.md").write_text(codes_page(), encoding="utf-8")
+
+
 def _plain_bars(app, what, name, thing, options, lines: list[str]) -> None:
     """|v| in an equation is a magnitude, not a substitution of reStructuredText."""
     lines[:] = [line if line.lstrip().startswith((">>>", "...")) else line.replace("|", "\\|") for line in lines]
@@ -117,4 +124,5 @@ def setup(app) -> None:
     (HERE / "_live").mkdir(exist_ok=True)  # Sphinx looks for it before the first page is read
     _commands()
     _models()
+    _codes()
     app.connect("builder-inited", lambda _: _live_dampers())
