@@ -131,8 +131,9 @@ def doors(folder):
         "Excitation.delayed": (motion.delayed, {"delay": 0.01}),
         "Excitation.with_current": (motion.with_current, {"current": 0.5}),
         "run_study": (mrdamper.run_study, {
-            "dataset": dataset, "progress": print, "model": "none such", "processes": HERE,
+            "dataset": dataset, "progress": print, "model": "none such", "processes": HERE, "keep": (),
         }),
+        "check": (mrdamper.check, {"dataset": dataset}),
         "sine": (mrdamper.sine, {"condition": condition, "cycles": 1.0, "samples_per_cycle": 20}),
         "sweep": (mrdamper.sweep, {
             "start_Hz": 1.0, "end_Hz": 2.0, "duration": 1.0, "amplitude": 0.01, "current": 0.0, "sample_rate": 100.0,

@@ -92,6 +92,7 @@ def test_every_file_of_the_contract_is_there(written):
         "identifications.csv",
         "parameters.csv",
         "validation.csv",
+        "coverage.csv",
         "figures",
         "forces.csv",
         "made.json",

@@ -17,7 +17,7 @@ from mrdamper.tracing.compiled import RecordProgram
 
 _CHANNELS = ("displacement", "velocity", "acceleration", "current", "dt", "turn", "turn_back", "move")
 S = TypeVar("S", bound=Callable[..., Floats])
-_WORTHWHILE = 300_000  # samples followed, from which compiling pays
+_WORTHWHILE = 5_000  # samples of a motion, from which compiled code is used; never the history of the process
 
 
 def recorded(state: S) -> S:
@@ -27,16 +27,13 @@ def recorded(state: S) -> S:
     agree to rounding. For models whose state is one number a sample.
     """
     known: dict[type, list[RecordProgram]] = {}
-    followed = 0
 
     @wraps(state)
     def along(self: Any, motion: Excitation) -> Floats:
-        nonlocal followed
         if not isinstance(motion, Excitation):
             return state(self, motion)
-        followed += len(motion)
         values = self.values()
-        if followed < _WORTHWHILE or not all(isinstance(value, float | int) for value in values.values()):
+        if len(motion) < _WORTHWHILE or not all(isinstance(value, float | int) for value in values.values()):
             return state(self, motion)
         given = tuple(map(float, values.values()))
         records = known.setdefault(type(self), [])

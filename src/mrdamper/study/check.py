@@ -91,6 +91,11 @@ def check(dataset: Dataset) -> DatasetCheck:
     DatasetCheck
         Findings as objects and as a table; `run_study` refuses and sets aside the same runs.
 
+    Raises
+    ------
+    InputError
+        E_ARGUMENT, if it is no dataset.
+
     Examples
     --------
     >>> from dataclasses import replace

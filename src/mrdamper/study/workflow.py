@@ -219,8 +219,8 @@ def run_study(
     >>> from mrdamper import Condition, load_dataset, run_study
     >>> tests = load_dataset().rig("utfsm")
     >>> study = run_study(tests.only([run for run in tests if run.excitation == "sine"][::3]))
-    >>> study.model.title
-    'play and bypass'
+    >>> study.rigs[0].rig
+    'utfsm'
     >>> prediction = study.model.predict(Condition(current_A=0.5, frequency_Hz=2.0, amplitude_m=0.01))
     >>> bool(prediction.force.max() > 500)  # [N]
     True
