@@ -118,6 +118,7 @@ def application() -> typer.Typer:
         name="mrdamper",
         cls=CommandGroups,
         help="Identify magnetorheological dampers from test-rig files; validate, predict and export the model.",
+        epilog="A message ends with a code in brackets: mrdamper explain CODE explains it.",
         no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,

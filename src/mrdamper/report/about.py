@@ -112,7 +112,7 @@ def about_of(table: Mapping[str, Any], where: str) -> About:
     for name, value in table.items():
         if name not in known:
             near = get_close_matches(name, known, n=1)
-            mend = f"did you mean {near[0]}?" if near else f"known: {', '.join(known)}"
+            mend = f"did you mean {near[0]}?" if near else "mrdamper init about shows the fields"
             raise AboutError(f"unknown field {name!r}", where=where, mend=mend)
         if isinstance(value, (dict, list, bool)):
             raise AboutError(f"{name} is no text", where=where, mend=f'write {name} = "..."')

@@ -20,7 +20,7 @@ from mrdamper.rig_files.record import OPTIONAL, REQUIRED
 from mrdamper.rig_files.strict_toml import load_toml, parse_toml
 from mrdamper.rig_files.units import DIMENSION, parse_unit
 
-_HELP = "mrdamper import FILE --write-profile - shows a profile with its keys"
+_HELP = "mrdamper init profile shows the keys"
 
 
 class ProfileError(InputError):
