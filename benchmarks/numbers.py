@@ -158,7 +158,7 @@ def of_both(study: Study) -> list[Told]:
 
 def of_reproduction(folder: Path) -> list[Told]:
     """The table and the sentences of docs/paper-method.md on the virtual rig."""
-    methods = {row["method"]: row for row in _read(folder / "tables" / "table5_methods.csv")}
+    methods = {row["method"]: row for row in _read(folder / "tables" / "methods.csv")}
     left = {r["parameter"]: r["left_after_identifying_anew"] for r in _read(folder / "tables" / "sensitivity.csv")}
     rows = tuple(
         f"| {name} | {_percent(row['nrmse_pp'])} | {_percent(row['worst_nrmse_pp'])} |" for name, row in methods.items()

@@ -15,7 +15,7 @@ from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.paper import output
 from mrdamper.paper.claims import Claim
-from mrdamper.paper.figures import TIMES
+from mrdamper.paper.figures import SECONDS
 from mrdamper.paper.options import PaperOptions
 from mrdamper.paper.output import verdicts
 from mrdamper.paper.recipes import CONSISTENT, LITERAL
@@ -46,10 +46,11 @@ def study(**more):
         contenders=(contender("one", "paper", 0.1, 3.0), contender("two", "joint", 0.3, 5.0)),
         seed_errors={"two": np.array([0.31, 0.33, 0.38])}, seed_verdicts={}, loops=(), held_out=(), genetic=(),
         ended=(), there={}, train=(), seconds=12.0,
-        sensitivity=(), sobol=None, rig=None, options=PaperOptions(), conditions=(),
+        sensitivity=(), sobol=None, rig=None, options=PaperOptions(), conditions=(), readings=(), direct={},
     )  # fmt: skip
     made = SimpleNamespace(**(given | more))
     made.contender = lambda title: next((c for c in made.contenders if c.recipe.title == title), None)
+    made.named = lambda *titles: [c for title in titles if (c := made.contender(title))]
     return made
 
 
@@ -66,13 +67,13 @@ def test_table_5_holds_the_median_and_the_worst_of_the_held_out_runs():
 
 
 def tables(**more):
-    claim = Claim("phase", "text", "Eq. 1", "holds", "recovered", "1 rad", "limit", "fig12", "20 of 20")
+    claim = Claim("phase", "text", "Eq. 1", "agrees", "recovered", "1 rad", "limit", "fig12", "20 of 20")
     return output._tables(study(**more), (claim,))
 
 
 def test_table_4_holds_every_run_of_every_method_under_its_own_name():
     made, absent = tables()
-    rows = made["table4_errors"]
+    rows = made["errors"]
     assert [(r["method"], r["run_id"], r["current_A"]) for r in rows] == [
         (title, f"h{n}", float(n)) for title in ("one", "two") for n in range(3)
     ]
@@ -83,19 +84,20 @@ def test_table_4_holds_every_run_of_every_method_under_its_own_name():
     }  # fmt: skip
     assert made["seeds"] == [{"method": "two", "seed": n, "nrmse_pp": v} for n, v in ((1, 0.31), (2, 0.33), (3, 0.38))]
     assert made["claims"][0] == {
-        "key": "phase", "text": "text", "source": "Eq. 1", "verdict": "holds", "said": "recovered", "evidence": "1 rad",
+        "key": "phase", "text": "text", "source": "Eq. 1", "verdict": "agrees", "said": "recovered",
+        "evidence": "1 rad",
         "threshold": "limit", "figure": "fig12", "seeds": "20 of 20",
     }  # fmt: skip
     assert absent["genetic"] == "no genetic search was made"
     assert absent["virtual_rig"] == "the data are not of the virtual rig"
-    assert absent["table1_tests"] == "the data allow no row of it"
-    assert absent["table3_parameters"] == "no run is held out"
+    assert absent["tests"] == "the data allow no row of it"
+    assert absent["parameters"] == "there is no validation run"
     assert not set(absent) & set(made)
-    assert made["table5_methods"] == verdicts(study())
+    assert made["methods"] == verdicts(study())
 
 
 def test_everything_is_written_and_shown_in_its_place(monkeypatch, tmp_path):
-    claim = Claim("phase", "text", "Eq. 1", "holds", "recovered", "1 rad", "limit", "fig12", "20 of 20")
+    claim = Claim("phase", "text", "Eq. 1", "agrees", "recovered", "1 rad", "limit", "fig12", "20 of 20")
     page, asked = {}, []
 
     def drawn(study, also, names, progress):
@@ -107,7 +109,7 @@ def test_everything_is_written_and_shown_in_its_place(monkeypatch, tmp_path):
         return "<p>page</p>"
 
     monkeypatch.setattr(output, "judge_all", lambda study: (claim,))
-    figures = {"fig09": ("a loop", None), "fig12": ("the phase", None), TIMES: ("times", None)}
+    figures = {"fig09": ("a loop", None), "fig12": ("the phase", None), SECONDS: ("times", None)}
     monkeypatch.setattr(output, "FIGURES", figures)
     monkeypatch.setattr(output, "pictures", drawn)
     monkeypatch.setattr(output, "render_page", render)
@@ -119,7 +121,7 @@ def test_everything_is_written_and_shown_in_its_place(monkeypatch, tmp_path):
     assert written[0].read_text(encoding="utf-8") == "<p>page</p>"
     assert (tmp_path / "out" / "figures" / "fig12.svg").is_file()
     assert (tmp_path / "out" / "tables" / "claims.csv").read_text(encoding="utf-8").startswith("key,text,source")
-    assert (tmp_path / "out" / "figures" / f"{TIMES}.svg").is_file()
+    assert (tmp_path / "out" / "figures" / f"{SECONDS}.svg").is_file()
     assert [also for also, _ in asked] == [(), ()]
     assert sorted(name for _, names in asked for name in names) == sorted(figures)
     assert page["pictures"] == {"fig12": ("the phase", b"fig12")}
@@ -130,7 +132,7 @@ def test_everything_is_written_and_shown_in_its_place(monkeypatch, tmp_path):
     assert page["notes"] == ("first", "fig09 is not drawn: one motion", *missing)
     assert (page["study"], page["best"], page["synthetic"]) == (made, "one", False)
     assert page["about"].startswith("from rig 1. Reference")
-    times = (tmp_path / "out" / "tables" / "table5_times.csv").read_text(encoding="utf-8").splitlines()
+    times = (tmp_path / "out" / "tables" / "seconds.csv").read_text(encoding="utf-8").splitlines()
     assert times[1:] == ["one,0,3.0,3.0", "two,0,5.0,5.0", "in all,0,12.4,"]
     facts = json.loads((tmp_path / "out" / "made.json").read_text(encoding="utf-8"))
     assert facts["seconds"] == {"in all": 12.4, "one": 3.0, "two": 5.0}
@@ -147,7 +149,7 @@ def test_tests_and_searches_stand_in_their_columns():
     minimum = SimpleNamespace(evaluations=123, point=np.array([4e5, 7e6]))
     check = GeneticCheck(Condition(1.0, 1.5, 0.05), minimum, 21.0, 20.0, 8.0)
     made, _ = tables(loops=(loop,), genetic=(check,), ended=(Ended("a", 3, 1.5, 0.2, 1.01, 420, 90, 0.7),))
-    assert made["table1_tests"] == [
+    assert made["tests"] == [
         {"run_id": "a", "split": "train", "current_A": 0.5, "frequency_Hz": 2.0, "amplitude_m": 0.03,
          "peak_force_N": 900.0, "dissipated_energy_J": 33.0}
     ]  # fmt: skip
@@ -221,16 +223,17 @@ def test_parameters_at_the_held_out_condition_are_listed_way_by_way(monkeypatch)
     rows = output.parameter_rows(study(contenders=ways[:2], held_out=held, there=there))
     assert [r["method"] for r in rows] == [LITERAL, LITERAL]
     _, absent = tables(contenders=ways[1:2], held_out=held)
-    assert absent["table3_parameters"] == "the data allow no row of it"
+    assert absent["parameters"] == "the data allow no row of it"
 
 
 def test_a_program_reads_verdicts_and_whether_the_data_are_synthetic(monkeypatch):
-    claim = Claim("phase", "text", "Eq. 1", "holds", "recovered", "1 rad", "limit", "fig12", "20 of 20")
+    claim = Claim("phase", "text", "Eq. 1", "agrees", "recovered", "1 rad", "limit", "fig12", "20 of 20")
     monkeypatch.setattr(output, "judge_all", lambda study: (claim,))
     made = study(notes=("one",), seconds=12.0)
     found = output.summary(made)
     assert found["claims"] == [
-        {"claim": "text", "verdict": "holds", "said": "recovered", "evidence": "1 rad", "threshold": "limit",
+        {"claim": "text", "verdict": "agrees", "said": "recovered",
+        "evidence": "1 rad", "threshold": "limit",
          "seeds": "20 of 20"}
     ]  # fmt: skip
     assert (found["synthetic"], found["notes"], found["times"][-1]["seconds"]) == (False, ["one"], 12.0)

@@ -194,3 +194,16 @@ def test_amplitudes_far_over_the_yield_displacement_are_never_called_unseen():
         found = identify(run, method=Paper(search="optimum"), gas=GAS)
         assert not [doubt for doubt in found.doubts if "never yields" in doubt]
         assert np.isfinite(found.standard_errors["beta"]) or found.at_bounds
+
+
+def test_a_damper_without_a_defect_at_the_stroke_end_does_not_show_one():
+    """After a reversal a Bouc–Wen damper's force is back after the same distance at every speed."""
+    from mrdamper.paper.claims_on_tests import lost_length
+    from mrdamper.paper.verdicts import judge
+
+    def length(amplitude, frequency):
+        stiffness = GAS.stiffnesses("extension")[0] - MASS * (2 * np.pi * frequency) ** 2
+        return lost_length(recorded(2.0, frequency, amplitude, "train"), viscosity(2.0), stiffness)
+
+    ratio = length(0.05, 1.5) / length(0.02, 1.0)
+    assert judge("stroke end", {"lost length at the fast motion over that at the slow one": ratio}) == "differs", ratio

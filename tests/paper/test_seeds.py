@@ -16,12 +16,12 @@ from mrdamper.paper.virtual_rig import VirtualRig
 @pytest.mark.parametrize(
     ("verdict", "others", "said"),
     [
-        ("holds", ["holds"] * 3, "3 of 3"),
-        ("holds", [*["does not hold"] * 2, "holds", "holds in part"], "1 of 4; 2 does not hold; 1 holds in part"),
-        ("holds in part", ["holds", "holds"], "0 of 2; 2 holds"),
-        ("holds", ["cannot be judged"] * 2, ""),
+        ("agrees", ["agrees"] * 3, "3 of 3"),
+        ("agrees", [*["differs"] * 2, "agrees", "agrees in part"], "1 of 4; 2 differs; 1 agrees in part"),
+        ("agrees in part", ["agrees", "agrees"], "0 of 2; 2 agrees"),
+        ("agrees", ["cannot be judged"] * 2, ""),
         ("cannot be judged", ["cannot be judged"] * 2, ""),
-        ("holds", [], ""),
+        ("agrees", [], ""),
     ],
 )  # fmt: skip
 def test_a_verdict_is_counted_beside_those_of_other_seeds(verdict, others, said):
@@ -43,7 +43,7 @@ def test_a_seed_is_judged_on_held_out_runs_and_with_its_own_friction_test(monkey
 
     def judged(study):
         asked.update(study=study)
-        return [SimpleNamespace(key="phase", verdict="holds")]
+        return [SimpleNamespace(key="phase", verdict="agrees")]
 
     def way(median):
         scores = {name: SimpleNamespace(median=lambda value=value: value) for name, value in median.items()}
@@ -54,7 +54,7 @@ def test_a_seed_is_judged_on_held_out_runs_and_with_its_own_friction_test(monkey
     monkeypatch.setattr(seeds, "fit_and_score_all", lambda *_, **__: ([way({"train": 0.9, "validation": 0.1})], {}))
     monkeypatch.setattr(seeds, "friction_test", lambda rig, **more: asked.update(more) or "slow")
     found = one_seed(VirtualRig(force_noise=7.0), PaperOptions(friction_test=friction), 5, lambda what, share: None)
-    assert found == Seed({"one": 0.1}, {"phase": "holds"})
+    assert found == Seed({"one": 0.1}, {"phase": "agrees"})
     assert (asked["seed"], asked["filled"], asked["study"].friction) == (5, friction == "filled", "slow")
     assert len(asked["study"].loops) == len(asked["study"].train) + len(asked["study"].held_out)
 
@@ -64,7 +64,7 @@ def test_a_seed_gives_the_errors_and_the_verdicts_of_its_own_noise(monkeypatch):
     loud = VirtualRig(force_noise=60.0)
     found = [one_seed(loud, PaperOptions(), seed, lambda what, share: None) for seed in (1, 2)]
     assert set(found[0].verdicts) == set(LIMITS)
-    assert found[0].verdicts["viscosity"] == found[1].verdicts["viscosity"] == "does not hold"
+    assert found[0].verdicts["viscosity"] == found[1].verdicts["viscosity"] == "differs"
     assert found[0].verdicts["search"] == "cannot be judged"
     for seed in found:
         assert seed.errors[CONSISTENT] < 0.6 * seed.errors[LITERAL]

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import qmc
 
 from mrdamper.data import Condition
 from mrdamper.errors import ParameterError, UnknownNameError
@@ -37,7 +38,6 @@ def test_sensitivity_does_not_depend_on_the_unit_of_length():
 
 
 def test_sobol_indices_have_intervals_and_rank_like_single_changes():
-    pytest.importorskip("SALib")
     names = ("c", "yield_force", "m")
     found = sobol(MODEL, Condition(1.0, 1.0, 0.05), names, samples=64)
     single = {s.name: s.effect for s in one_at_a_time(MODEL, Condition(1.0, 1.0, 0.05), names, refit=())}
@@ -55,25 +55,22 @@ def test_intervals_of_indices_are_drawn_the_same_every_time():
 
 
 def test_indices_are_those_of_the_change_of_the_force(monkeypatch):
-    analysis = pytest.importorskip("SALib.analyze.sobol")
-    condition, given = Condition(0.7, 1.3, 0.05), {}
-    points = np.array([[1.1, 1.0], [0.9, 1.0], [1.0, 1.05]])
+    """The RMS change of the viscous force and of the offset: of two changes the indices are those of their squares."""
+    condition, given = Condition(0.7, 1.3, 0.05), []
 
-    def sample(problem, samples, calc_second_order, seed):
-        given.update(problem=problem, samples=samples)
-        return points
+    def indices(func, n):
+        given.append(func)
+        return SimpleNamespace(first_order=np.zeros(2), total_order=np.ones(2))
 
-    def analyze(problem, changes, calc_second_order, seed):
-        given["changes"] = changes
-        return {name: np.zeros(2) for name in ("S1", "ST", "S1_conf", "ST_conf")}
-
-    monkeypatch.setattr("SALib.sample.sobol.sample", sample)
-    monkeypatch.setattr(analysis, "analyze", analyze)
-    sobol(MODEL, condition, ("c", "f0"), spread=0.1, samples=3)
-    assert given["problem"] == {"num_vars": 2, "names": ["c", "f0"], "bounds": [[0.9, 1.1]] * 2}
-    # A tenth of the viscous force, its mean square that of a cosine; a twentieth of the offset.
-    viscous = 144 * 2 * np.pi * 1.3 * 0.05 / np.sqrt(2)
-    assert given["changes"] == pytest.approx([viscous, viscous, 6.0], rel=3e-3)
+    monkeypatch.setattr("scipy.stats.sobol_indices", indices)
+    found = sobol(MODEL, condition, ("c", "f0"), spread=0.1, samples=4)
+    assert (found.first.tolist(), found.total.tolist()) == ([0, 0], [1, 1])
+    points = np.split(qmc.Sobol(4, seed=np.random.default_rng(0)).random(4).T * 0.2 + 0.9, 2)
+    viscous, offset = MODEL.c * 2 * np.pi * 1.3 * 0.05 / np.sqrt(2), MODEL.f0
+    wanted = [np.hypot((c - 1) * viscous, (f0 - 1) * offset) for c, f0 in points[0].T]
+    assert given[0]["f_A"][0] == pytest.approx(wanted, rel=5e-3)
+    swapped = [np.hypot((c - 1) * viscous, (f0 - 1) * offset) for c, f0 in zip(points[1][0], points[0][1], strict=True)]
+    assert given[0]["f_AB"][0, 0] == pytest.approx(swapped, rel=5e-3)
 
 
 def test_what_is_left_is_of_the_changed_force(monkeypatch):
@@ -167,7 +164,6 @@ def test_what_is_left_is_the_misfit_of_the_best_loop_with_the_old_preset():
 
 
 def test_first_order_indices_of_two_forces_add_up_and_follow_their_variance():
-    pytest.importorskip("SALib")
     found = sobol(MODEL, Condition(1.0, 1.0, 0.05), ("c", "f0"), spread=0.1, samples=256)
     assert (found.names, found.spread) == (("c", "f0"), 0.1)
     assert found.first.sum() == pytest.approx(1.0, abs=0.1)

@@ -1,4 +1,4 @@
-"""Every verdict is driven to holds, holds in part and does not hold by made numbers."""
+"""Every verdict is driven to holds, agrees in part and differs by made numbers."""
 
 import math
 
@@ -13,7 +13,7 @@ KEPT = {
     "friction": [("above", 25, 15), ("below", 100, 150), ("below", 0.05, 0.15)],
     "bulge": [("above", 1, 0.8)],
     "energy": [("above", 1, 0.9), ("above", 1, 0.9)],
-    "stroke end": [("above", 1.2, 1)],
+    "stroke end": [("above", 1.25, 1.15)],
     "phase": [("above", 1, 0.5), ("below", 0.02, 0.05)],
     "quadratic": [("above", 0.98, 0.9)],
     "speed shift": [("above", 0.98, 0.9)],
@@ -24,7 +24,7 @@ KEPT = {
     "beta": [("below", 0.5, 0.8), ("above", 0.9, 0.6), ("below", 0.1, 0.3)],
     "presets": [("below", 0.02, 0.05), ("below", 0.02, 0.05), ("below", 1e-6, 1e-3)],
     "search": [("below", 1.1, 2), ("below", 1.1, 2)],
-    "accuracy": [("below", 1.1, 1.5)],
+    "accuracy": [("below", 1.1, 1.5)] * 2,
     "few parameters": [("below", 1.1, 1.5), ("below", 0.99, 0.99)],
     "fast": [("below", 0.99, 1.5)],
     "generalisation": [("below", 1.5, 2.5), ("below", 0.1, 0.2)],
@@ -47,8 +47,8 @@ def test_the_thresholds_are_those_that_were_settled():
 
 @pytest.mark.parametrize("key", LIMITS)
 def test_a_claim_holds_at_its_limits_and_not_beyond_the_wider_ones(key):
-    assert judge(key, numbers(key, lambda x: x.holds)) == "holds"
-    assert judge(key, numbers(key, lambda x: beyond(x, x.near))) == "does not hold"
+    assert judge(key, numbers(key, lambda x: x.holds)) == "agrees"
+    assert judge(key, numbers(key, lambda x: beyond(x, x.near))) == "differs"
     assert judge(key, numbers(key, lambda x: math.nan)) == "cannot be judged"
     for limit in LIMITS[key]:
         assert limit.text in thresholds(key)
@@ -60,10 +60,10 @@ def test_one_number_that_misses_makes_a_claim_hold_in_part(key, place):
     good = numbers(key, lambda x: x.holds)
     limit = LIMITS[key][place]
     if limit.near != limit.holds:
-        assert judge(key, {**good, limit.number: beyond(limit, limit.holds)}) == "holds in part"
+        assert judge(key, {**good, limit.number: beyond(limit, limit.holds)}) == "agrees in part"
     far = judge(key, {**good, limit.number: beyond(limit, limit.near)})
     others = any(x.alone for x in LIMITS[key] if x is not limit)
-    assert far == ("holds in part" if others else "does not hold")
+    assert far == ("agrees in part" if others else "differs")
     missing = {name: value for name, value in good.items() if name != limit.number}
     assert judge(key, missing) == "cannot be judged"
 
@@ -90,9 +90,9 @@ def test_how_well_a_function_fits_says_nothing_by_itself():
     }  # fmt: skip
     for key in ("mass", "alpha", "beta"):
         fits = numbers(key, lambda x: beyond(x, x.near) if x.alone else x.holds)
-        assert judge(key, fits) == "does not hold"
+        assert judge(key, fits) == "differs"
         misfits = numbers(key, lambda x: x.holds if x.alone else beyond(x, x.near))
-        assert judge(key, misfits) == "holds in part"
+        assert judge(key, misfits) == "agrees in part"
 
 
 def test_a_limit_without_a_wider_one_is_its_own():

@@ -12,7 +12,7 @@ import numpy as np
 
 from mrdamper.paper import claims_on_fits, claims_on_tests
 from mrdamper.paper.results import Reproduction
-from mrdamper.paper.verdicts import RECOVERED, Measured, Verdict, judge, steadiness, thresholds
+from mrdamper.paper.verdicts import Kind, Measured, Verdict, in_words, judge, steadiness, thresholds
 
 
 @dataclass(frozen=True)
@@ -53,58 +53,60 @@ class Claim:
 def judge_all(study: Reproduction) -> tuple[Claim, ...]:
     """Measure and judge every claim; one that the data do not allow says why."""
     claims = []
-    for key, text, source, figure, built_in, measure in _CLAIMS:
+    for key, text, source, figure, kind, measure in _CLAIMS:
         found = measure(study)
         verdict = judge(key, found.numbers)
         numbers = "; ".join(
             f"{name} {value:.3g}" if np.isfinite(value) else f"{name}: not tested"
             for name, value in found.numbers.items()
         )
-        said = RECOVERED.get(verdict, verdict) if built_in and study.rig is not None else verdict
+        said = in_words(verdict, kind, virtual=study.rig is not None)
+        if kind == "damper" and study.rig is not None and verdict != "cannot be judged":
+            verdict = "not judged"
         evidence = "; ".join(part for part in (numbers, found.evidence) if part)
         seeds = steadiness(verdict, study.seed_verdicts.get(key, ()))
         claims.append(Claim(key, text, source, verdict, said, evidence, thresholds(key), figure, seeds))
     return tuple(claims)
 
 
-# Key of the limits, claim, where it stands, figure, built into the virtual rig, measurement.
-_CLAIMS: tuple[tuple[str, str, str, str, bool, Callable[[Reproduction], Measured]], ...] = (
+# Key of the limits, claim, where it stands, figure, kind, measurement.
+_CLAIMS: tuple[tuple[str, str, str, str, Kind, Callable[[Reproduction], Measured]], ...] = (
     ("gas series", "A series of third order replaces the gas force.",
-     "Eq. 3–7", "", True, claims_on_tests.gas_series),
+     "Eq. 3–7", "", "built in", claims_on_tests.gas_series),
     ("friction", "Seal friction is 25–100 N at 0.01 mm/s and may be neglected.",
-     "section 2", "fig03_friction", True, claims_on_tests.friction),
+     "section 2", "fig03", "damper", claims_on_tests.friction),
     ("bulge", "Force–displacement loops bulge at x = 0.",
-     "section 2", "fig04_loops_current", False, claims_on_tests.bulges),
+     "section 2", "fig05", "damper", claims_on_tests.bulges),
     ("energy", "The dissipated energy rises with frequency and current.",
-     "section 2", "analysis", False, claims_on_tests.energy),
+     "section 2", "analysis", "damper", claims_on_tests.energy),
     ("stroke end", "After each stroke end the force is missing for a length that grows with speed.",
-     "section 2", "fig05_loops_frequency", True, claims_on_tests.stroke_end),
+     "section 2", "fig04", "built in", claims_on_tests.stroke_end),
     ("phase", "The force leads by 1.4–1.5 rad whatever the current.",
-     "Eq. 16–19", "fig12_phase", False, claims_on_tests.phase),
+     "Eq. 16–19", "phase", "damper", claims_on_tests.phase),
     ("quadratic", "At every motion F0 is a quadratic of the current.",
-     "Eq. 23", "fig11_F0", False, claims_on_tests.quadratic),
+     "Eq. 23", "fig12", "method", claims_on_tests.quadratic),
     ("speed shift", "f · A shifts the quadratic of F0 (and so c X ω) without bending it.",
-     "Eq. 24–26", "fig14_F0_shift", False, claims_on_tests.speed_shift),
+     "Eq. 24–26", "fig14", "method", claims_on_tests.speed_shift),
     ("saturation", "The magnetic circuit saturates near 1.5 A.",
-     "section 3", "fig11_F0", True, claims_on_tests.saturation),
+     "section 2", "fig06", "built in", claims_on_tests.saturation),
     ("viscosity", "F0 sin φ/(X ω) is the viscous damping.",
-     "Eq. 19", "fig15_c", False, claims_on_fits.viscosity),
+     "Eq. 19", "function_c", "method", claims_on_fits.viscosity),
     ("mass", "The equivalent mass falls off with frequency and does not depend on the amplitude.",
-     "Eq. 27–31", "fig18_m_function", False, claims_on_fits.mass),
+     "Eq. 27–31", "function_m", "method", claims_on_fits.mass),
     ("alpha", "α rises with the frequency and falls with the amplitude, in a plane beside its current law.",
-     "Eq. 32–36", "fig20_alpha_d", False, claims_on_fits.alpha),
+     "Eq. 32–36", "fig20", "damper", claims_on_fits.alpha),
     ("beta", "β over current: curves that differ at small current merge at large current.",
-     "Eq. 37–40", "fig21_beta", False, claims_on_fits.beta),
+     "Eq. 37–40", "fig21", "method", claims_on_fits.beta),
     ("presets", "The preset parameters are insensitive.",
-     "section 3", "sensitivity", False, claims_on_fits.presets),
+     "section 4", "sensitivity", "method", claims_on_fits.presets),
     ("search", "The genetic algorithm finds α and β.",
-     "section 4.3, Eq. 21–22", "genetic", False, claims_on_fits.search),
+     "section 4.3, Eq. 21–22", "genetic", "method", claims_on_fits.search),
     ("accuracy", "The accuracy is comparable to that of the traditional Bouc–Wen model.",
-     "section 5", "fig26_accuracy_rate", False, claims_on_fits.accuracy),
+     "section 6", "fig26", "method", claims_on_fits.accuracy),
     ("few parameters", "The accuracy is close to that of Ali's model with fewer parameters.",
-     "section 5", "fig26_accuracy_rate", False, claims_on_fits.few_parameters),
+     "section 6", "fig26", "method", claims_on_fits.few_parameters),
     ("fast", "Identification is faster than that of the traditional Bouc–Wen model.",
-     "section 5", "fig26_accuracy_rate", False, claims_on_fits.fast),
+     "section 6", "fig26", "method", claims_on_fits.fast),
     ("generalisation", "The model predicts a motion that was not tested (80 mm, 1 Hz).",
-     "section 5", "fig24_predicted_displacement", False, claims_on_fits.generalisation),
+     "section 6", "fig24", "method", claims_on_fits.generalisation),
 )  # fmt: skip

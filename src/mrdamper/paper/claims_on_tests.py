@@ -56,20 +56,22 @@ def stroke_end(study: Reproduction) -> Measured:
     if consistent is None:
         return unknown("the viscous force is not known: the consistent way could not be followed")
     top = max(c.current_A for c in study.conditions)
-    damping = values(study, CONSISTENT, "c")
+    damping, k1, m = (values(study, CONSISTENT, name) for name in ("c", "k1", "m"))
     pairs = [
-        (condition.peak_velocity, run, float(c))
-        for condition, run, c in zip(study.conditions, study.train, damping, strict=True)
+        (condition.peak_velocity, run, (c, k - mass * (2 * np.pi * condition.frequency_Hz) ** 2))
+        for condition, run, c, k, mass in zip(
+            study.conditions, study.train, damping.tolist(), k1.tolist(), m.tolist(), strict=True
+        )
         if condition.current_A > top - 0.01
     ]
     slow, fast = min(pairs, key=lambda p: p[0]), max(pairs, key=lambda p: p[0])
     if fast[0] < 1.3 * slow[0]:
         return unknown("one speed at the highest current")
-    lengths = [1e3 * lost_length(run, c) for _, run, c in (slow, fast)]
+    lengths = [1e3 * lost_length(run, *linear) for _, run, linear in (slow, fast)]
     return measured(
         "stroke end",
         lengths[1] / lengths[0],
-        evidence=f"at {top:g} A 90 % of the force beyond the viscous one is back after {lengths[0]:.2f} mm at "
+        evidence=f"at {top:g} A 90 % of the hysteretic force is back after {lengths[0]:.2f} mm at "
         f"{slow[0]:.2f} m/s and after {lengths[1]:.2f} mm at {fast[0]:.2f} m/s",
     )
 
@@ -142,14 +144,16 @@ def friction_along(run: Run) -> tuple[Floats, Floats]:
     return x, direction * (np.interp(x, xa, fa) - np.interp(x, xb, fb)) / 2
 
 
-def lost_length(run: Run, damping: float) -> float:
+def lost_length(run: Run, damping: float, stiffness: float = 0.0) -> float:
     """Distance [m] after a reversal in which the force is back at 90 % of its mid-stroke value; median.
 
-    The viscous force, at a damping [N s/m], is taken out: it lags the stroke end for another reason.
+    The viscous and the in-phase force, of a damping [N s/m] and a stiffness less mass [N/m], are subtracted: they
+    differ between motions for other reasons.
     """
     steady = run.steady()
     motion, centre = measured_motion(steady), equivalent_sine(run).centre
     path, force = motion.path, steady.force - np.mean(steady.force) - damping * motion.velocity
+    force = force - stiffness * (motion.displacement - centre)
     amplitude = float(np.ptp(motion.displacement)) / 2
     middle = np.abs(motion.displacement - centre) < 0.3 * amplitude
     full = 0.9 * float(np.median((path.direction * force)[middle]))

@@ -1,7 +1,6 @@
-"""The paper's figures by their numbers, and those that only this study has.
+"""The paper's figures under their numbers, and those of this study, which have names.
 
-Figures 1, 2, 7 and 8 of the paper are photographs and sketches. Which of 13 to 23 shows which
-parameter was not seen; the order here is that of the equations.
+Figures 1, 2, 7 and 8 of the paper show its damper, its rig and two schemes.
 """
 
 from __future__ import annotations
@@ -10,22 +9,33 @@ from collections.abc import Callable, Mapping
 from functools import partial
 
 from mrdamper.identification.loop_analysis import dynamic_ranges
-from mrdamper.paper.loop_figures import Made, friction_figure, identified_over, loops_by, predicted_over
-from mrdamper.paper.parameter_figures import function_figure, over_motion, parameter_figure, readings_figure
+from mrdamper.paper.loop_figures import (
+    Made,
+    friction_figure,
+    identified_loops,
+    loops_by,
+    predicted_loops,
+    predicted_over,
+)
+from mrdamper.paper.parameter_figures import function_figure, over_motion, parameter_figure, r2_figure, readings_figure
+from mrdamper.paper.recipes import LITERAL, TRADITIONAL
 from mrdamper.paper.results import Reproduction
 from mrdamper.paper.verdict_figures import (
     accuracy_rate,
     errors_figure,
     genetic_figure,
+    methods_figure,
+    seconds_figure,
     seeds_figure,
     sensitivity_figure,
-    times,
 )
 from mrdamper.report.plots.rig_tests import test_analysis, test_matrix
 from mrdamper.report.plots.style import Picture
 from mrdamper.study.recipe import Progress
 
-TIMES = "fig26_times"  # differs from run to run; stands beside the page, not in it
+SECONDS = "seconds"  # name of the figure that differs from run to run; it stands beside the page
+
+_F0, _M, _ALPHA, _BETA, _OFFSET = "F0 (N)", "m (kg)", "α (N/m)", "β (m⁻ⁿ)", "f0 (N)"
 
 Figures = Mapping[str, tuple[str, Callable[[Reproduction], Made]]]
 
@@ -43,99 +53,101 @@ def pictures(
 
 
 FIGURES: Figures = {
-    "fig03_friction": (
+    "fig03": (
         "Fig. 3. Friction test at 0.01 mm/s: force, and half the force between the strokes.",
         friction_figure,
     ),
-    "fig04_loops_current": ("Fig. 4. Loops at several currents.", partial(loops_by, "current")),
-    "fig05_loops_frequency": ("Fig. 5. Loops at several frequencies.", partial(loops_by, "frequency")),
-    "fig06_loops_amplitude": ("Fig. 6. Loops at several amplitudes.", partial(loops_by, "amplitude")),
-    "fig09_identified_displacement": (
-        "Fig. 9. Force over displacement: tested, and identified from the same run.",
-        partial(identified_over, "displacement"),
+    "fig04": ("Fig. 4. One current and amplitude, several frequencies.", partial(loops_by, "frequency", 0)),
+    "fig05": ("Fig. 5. Several currents, the motion of the smallest amplitude.", partial(loops_by, "current", 0)),
+    "fig06": ("Fig. 6. Several currents, the motion of the largest amplitude.", partial(loops_by, "current", -1)),
+    "fig09": (
+        "Fig. 9. Identified (dashed) and tested loops at the smaller amplitude, all currents.",
+        partial(identified_loops, 0),
     ),
-    "fig10_identified_velocity": (
-        "Fig. 10. Force over velocity: tested, and identified from the same run.",
-        partial(identified_over, "velocity"),
+    "fig10": (
+        "Fig. 10. Identified (dashed) and tested loops at the larger amplitude, all currents.",
+        partial(identified_loops, -1),
     ),
-    "fig11_F0": (
-        "Fig. 11. F0, a quadratic of the current for every motion [Eq. 23].",
-        partial(readings_figure, "amplitude", "F0 (N)", "quadratic-current"),
+    "fig11": ("Fig. 11. F0 over the current, a curve a condition.", partial(readings_figure, "amplitude", _F0, "")),
+    "fig12": (
+        "Fig. 12. F0 fitted by quadratics of the current [Eq. 23].",
+        partial(readings_figure, "amplitude", _F0, "quadratic-current"),
     ),
-    "fig12_phase": (
-        "Fig. 12. Phase by which the first harmonic of the force leads the displacement.",
-        partial(readings_figure, "phase", "Phase φ (rad)", ""),
-    ),
-    "fig13_f0": (
-        "Fig. 13. Offset force f0, and its mean for every motion.",
-        partial(readings_figure, "offset", "f0 (N)", "constant"),
-    ),
-    "fig14_F0_shift": (
-        "Fig. 14. What is left of F0 beside its common current law, a quadratic of f · A [Eq. 24–25].",
+    "fig13": ("Fig. 13. R² of the fits of Fig. 12.", partial(r2_figure, "F0", "quadratic-current")),
+    "fig14": (
+        "Fig. 14. Constant term b of F0 over f · A, a quadratic [Eq. 25].",
         partial(over_motion, "F0", "speed", "b (N)", "quadratic-current-speed"),
     ),
-    "fig15_c": (
-        "Fig. 15. c by the closed form, and its function of current, frequency and amplitude [Eq. 26].",
-        partial(function_figure, "c", "c (N s/m)"),
+    "fig15": (
+        "Fig. 15. m fitted by quadratics of the current [Eq. 27].",
+        partial(parameter_figure, "m", _M, "quadratic-current"),
     ),
-    "fig16_m": (
-        "Fig. 16. m by the closed form, a quadratic of the current for every motion [Eq. 27].",
-        partial(parameter_figure, "m", "m (kg)", "quadratic-current"),
-    ),
-    "fig17_m3": (
-        "Fig. 17. What is left of m beside its common current law, falling with the frequency [Eq. 29–30].",
+    "fig16": ("Fig. 16. R² of the fits of Fig. 15.", partial(r2_figure, "m", "quadratic-current")),
+    "fig17": (
+        "Fig. 17. Constant term m3 of m over the frequency [Eq. 30].",
         partial(over_motion, "m", "frequency", "m3 (kg)", "mass-exponential"),
     ),
-    "fig18_m_function": (
-        "Fig. 18. m, and its function of current and frequency [Eq. 31].",
-        partial(function_figure, "m", "m (kg)"),
+    "fig18": (
+        "Fig. 18. α fitted by quadratics of the current [Eq. 32].",
+        partial(parameter_figure, "alpha", _ALPHA, "quadratic-current"),
     ),
-    "fig19_alpha": (
-        "Fig. 19. α, a quadratic of the current for every motion [Eq. 32].",
-        partial(parameter_figure, "alpha", "α (N/m)", "quadratic-current"),
-    ),
-    "fig20_alpha_d": (
-        "Fig. 20. What is left of α beside its common current law, a plane over frequency and amplitude [Eq. 33–35].",
+    "fig19": ("Fig. 19. R² of the fits of Fig. 18.", partial(r2_figure, "alpha", "quadratic-current")),
+    "fig20": (
+        "Fig. 20. Constant term d of α over the frequency, a line an amplitude [Eq. 34].",
         partial(over_motion, "alpha", "frequency", "d (N/m)", "plane"),
     ),
-    "fig21_beta": (
-        "Fig. 21. β, an exponential of the current for every motion [Eq. 37].",
-        partial(parameter_figure, "beta", "β (m⁻ⁿ)", "decaying-current"),
+    "fig21": (
+        "Fig. 21. β fitted by exponentials of the current [Eq. 37].",
+        partial(parameter_figure, "beta", _BETA, "decaying-current"),
     ),
-    "fig22_beta_q": (
-        "Fig. 22. What is left of ln β beside its common current law, falling with the frequency [Eq. 39–40].",
+    "fig22": ("Fig. 22. R² of the fits of Fig. 21.", partial(r2_figure, "beta", "decaying-current")),
+    "fig23": (
+        "Fig. 23. Constant term q of β over the frequency, as ln β [Eq. 39].",
         partial(over_motion, "beta", "frequency", "ln β (–)", "mass-exponential"),
     ),
-    "fig23_alpha_function": (
-        "Fig. 23. α, and its function of current, frequency and amplitude [Eq. 36].",
-        partial(function_figure, "alpha", "α (N/m)"),
+    "fig24": (
+        "Fig. 24. Modified model (dashed) and test at the prediction motion, all currents.",
+        partial(predicted_loops, LITERAL),
     ),
-    "fig23_beta_function": (
-        "Fig. 23. β, and its function of current and frequency [Eq. 40].",
-        partial(function_figure, "beta", "β (m⁻ⁿ)"),
+    "fig25": (
+        "Fig. 25. Traditional Bouc–Wen model (dashed) and test at the prediction motion, all currents.",
+        partial(predicted_loops, TRADITIONAL),
     ),
-    "fig24_predicted_displacement": (
-        "Fig. 24. Force over displacement of held-out runs: tested, and predicted.",
-        partial(predicted_over, "displacement"),
-    ),
-    "fig25_predicted_velocity": (
-        "Fig. 25. Force over velocity of held-out runs: tested, and predicted.",
-        partial(predicted_over, "velocity"),
-    ),
-    "fig26_accuracy_rate": (
-        "Fig. 26. Error on held-out runs, and forces computed to identify from one run, median; “paper, literal” by "
-        "its genetic search where that was made, else by the optimum it is after.",
+    "fig26": (
+        "Fig. 26. Accuracy and identification rate of the methods over the current at the prediction motion. "
+        "Rate: forces computed until a genetic search is within 1 % of its end; for the Ali-type model, by least "
+        "squares, until its end.",
         accuracy_rate,
     ),
-    TIMES: ("Fig. 26, in seconds.", times),
-    "matrix": ("Test matrix; hollow marks are held out.", lambda study: test_matrix(study.loops)),
+    SECONDS: ("Identification, in seconds.", seconds_figure),
+    "matrix": ("Test matrix; hollow marks are validation runs.", lambda study: test_matrix(study.loops)),
     "analysis": (
         "Peak force, energy, equivalent damping and dynamic range before any model.",
         lambda study: test_analysis(study.loops, dynamic_ranges(study.loops)),
     ),
+    "phase": (
+        "Phase by which the first harmonic of the force leads the displacement.",
+        partial(readings_figure, "phase", "Phase φ (rad)", ""),
+    ),
+    "offset": (
+        "Offset force f0, and its mean for every motion.",
+        partial(readings_figure, "offset", _OFFSET, "constant"),
+    ),
+    "function_c": ("c by the closed form, and its function [Eq. 26].", partial(function_figure, "c", "c (N s/m)")),
+    "function_m": ("m by the closed form, and its function [Eq. 31].", partial(function_figure, "m", _M)),
+    "function_alpha": ("α and its function [Eq. 36].", partial(function_figure, "alpha", _ALPHA)),
+    "function_beta": ("β and its function [Eq. 40].", partial(function_figure, "beta", _BETA)),
+    "predicted": (
+        "Validation runs: tested, and predicted by the literal, the consistent and the traditional method.",
+        predicted_over,
+    ),
     "genetic": ("Genetic search with the paper's settings, 500 generations of 100 in each box.", genetic_figure),
-    "errors": ("Error of every held-out run.", errors_figure),
-    "seeds": ("Median held-out error over noise seeds.", seeds_figure),
+    "methods": (
+        "Error on validation runs, and forces computed to identify from one run, median.",
+        methods_figure,
+    ),
+    "errors": ("Error of every validation run.", errors_figure),
+    "seeds": ("Median validation error over noise seeds.", seeds_figure),
     "sensitivity": (
         "Change of the force when one coordinate changes by a tenth: the others held (bars), or identified anew "
         "(marks; what is less stands at 1e-8). Right: total Sobol indices with 95 % intervals.",

@@ -52,8 +52,8 @@ def friction_figure(study: Reproduction) -> Made:
         return figure
 
 
-def loops_by(vary: str, study: Reproduction) -> Made:
-    """Measured loops of runs that differ in one quantity; the largest such group of the tests."""
+def loops_by(vary: str, place: int, study: Reproduction) -> Made:
+    """Draw measured loops of runs that differ in one quantity, for the motion at a place in order of amplitude."""
     runs = {run.id: run for run in (*study.train, *study.held_out)}
     groups: dict[tuple[float, ...], dict[float, tuple[Run, Condition]]] = {}
     for loop in study.loops:
@@ -61,17 +61,28 @@ def loops_by(vary: str, study: Reproduction) -> Made:
         groups.setdefault(fixed, {}).setdefault(
             _QUANTITIES[vary][0](loop.condition), (runs[loop.run_id], loop.condition)
         )
-    largest = max(groups.values(), key=lambda g: (len(g), max(c.current_A for _, c in g.values())))
-    group = [largest[key] for key in sorted(largest)][:_MOST]
-    if len(group) < 2:
+    most = max(map(len, groups.values()))
+    if most < 2:
         return f"no two runs differ in {vary} alone"
+
+    def order(group: dict[float, tuple[Run, Condition]]) -> tuple[bool, float, float, float]:
+        first = next(iter(group.values()))[1]
+        own = any(run.split == "train" for run, _ in group.values())
+        return not own, first.amplitude_m, -first.current_A, first.frequency_Hz
+
+    tested = [g for g in groups.values() if len(g) == most and not order(g)[0]] or [
+        g for g in groups.values() if len(g) == most
+    ]
+    largest = sorted(tested, key=order)[place]
+    group = [largest[key] for key in sorted(largest)][:_MOST]
     with house_style():
         figure, axes = new_figure(1, 2, 3.2, right=1.5)
         shades = current_colours([float(k) for k in range(len(group))])
         for k, (run, condition) in enumerate(group):
             x, v, force = _last_cycle(run, run.force)
-            axes[0].plot(x, force, color=shades[float(k)], lw=0.9)
-            axes[1].plot(v, force, color=shades[float(k)], lw=0.9, label=_QUANTITIES[vary][1](condition))
+            name = _QUANTITIES[vary][1](condition)
+            axes[0].plot(x, force, color=shades[float(k)], lw=0.9, label=name)
+            axes[1].plot(v, force, color=shades[float(k)], lw=0.9, label=name)
         same = ", ".join(text(group[0][1]) for name, (_, text) in _QUANTITIES.items() if name != vary)
         label(axes[0], "Displacement (mm)", "Force (N)", same)
         label(axes[1], "Velocity (m/s)", "Force (N)")
@@ -79,29 +90,60 @@ def loops_by(vary: str, study: Reproduction) -> Made:
         return figure
 
 
-def identified_over(channel: str, study: Reproduction) -> Made:
-    """Tested loops with those of the literal and the consistent identification of the same run."""
-    found = {c.recipe.title: {i.run_id: i for i in c.identifications} for c in study.named(LITERAL, CONSISTENT)}
-    shown = [run for run in _spread(study.train) if all(run.id in known for known in found.values())]
-    if not shown or not found:
-        return "no run was identified both ways"
-    return _loops_beside(
-        shown,
-        {
-            title: [simulate(known[run.id].model, measured_motion(run)).force for run in shown]
-            for title, known in found.items()
-        },
-        channel,
-    )
+def identified_loops(place: int, study: Reproduction) -> Made:
+    """Draw tested loops with the literal identification of each, at one amplitude, a column a frequency."""
+    literal = study.contender(LITERAL)
+    if literal is None:
+        return "the literal method could not be followed"
+    known = {i.run_id: i for i in literal.identifications}
+    runs = [run for run in study.amplitude_group(place) if run.id in known]
+    forces = [simulate(known[run.id].model, measured_motion(run)).force for run in runs]
+    return _tested_and_model(runs, forces) if runs else "no run was identified"
 
 
-def predicted_over(channel: str, study: Reproduction) -> Made:
-    """Held-out loops as measured, and as the literal, the consistent and the traditional model predict them."""
-    shown, ways = _spread(study.held_out), study.named(LITERAL, CONSISTENT, TRADITIONAL)
-    if not shown or not ways:
-        return "nothing predicts a held-out run"
+def predicted_loops(title: str, study: Reproduction) -> Made:
+    """Draw the loops of the validation runs with the prediction of one method, all currents."""
+    method = study.contender(title)
+    if method is None or not method.validation.runs:
+        return "nothing predicts a validation run"
+    shown = [run for run in study.held_out if run.id in {score.run_id for score in method.validation.runs}]
+    return _tested_and_model(shown, [method.damper.predict_run(run).force for run in shown])
+
+
+def _tested_and_model(runs: Sequence[Run], forces: Sequence[Floats]) -> Figure:
+    """Draw force over displacement and over velocity, a column a frequency; the model dashed."""
+    conditions = [equivalent_sine(run).condition for run in runs]
+    columns: dict[float, list[int]] = {}
+    for i in sorted(range(len(runs)), key=lambda i: conditions[i].frequency_Hz):
+        near = [f for f in columns if abs(np.log(conditions[i].frequency_Hz / f)) < SAME]
+        columns.setdefault(near[0] if near else conditions[i].frequency_Hz, []).append(i)
+    shown = list(columns.items())[:3]
+    with house_style():
+        figure, axes = new_figure(2, len(shown), 5.2, right=0.9)
+        shades = current_colours([round(c.current_A, 2) for c in conditions])
+        for k, (_, members) in enumerate(shown):
+            for i in sorted(members, key=lambda i: conditions[i].current_A):
+                colour, current = shades[round(conditions[i].current_A, 2)], f"{conditions[i].current_A:.3g} A"
+                for line, force in (("-", runs[i].force), ("--", forces[i])):
+                    x, v, seen = _last_cycle(runs[i], force)
+                    style = {"ls": line, "lw": 0.9, "color": colour, "label": current if line == "-" else None}
+                    axes[k].plot(x, seen, **style)
+                    axes[len(shown) + k].plot(v, seen, **style)
+            first = conditions[members[0]]
+            title = f"{first.frequency_Hz:.2g} Hz, {MM * first.amplitude_m:.3g} mm"
+            label(axes[k], "Displacement (mm)", "Force (N)" if k == 0 else "", title)
+            label(axes[len(shown) + k], "Velocity (m/s)", "Force (N)" if k == 0 else "")
+        axes[len(shown) - 1].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=7)
+        return figure
+
+
+def predicted_over(study: Reproduction) -> Made:
+    """Draw validation loops as measured, and as the literal, the consistent and the traditional model predict them."""
+    shown, methods = _spread(study.held_out), study.named(LITERAL, CONSISTENT, TRADITIONAL)
+    if not shown or not methods:
+        return "nothing predicts a validation run"
     return _loops_beside(
-        shown, {c.recipe.title: [c.damper.predict_run(run).force for run in shown] for c in ways}, channel
+        shown, {c.recipe.title: [c.damper.predict_run(run).force for run in shown] for c in methods}, "velocity"
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 
 import numpy as np
@@ -14,7 +15,7 @@ from mrdamper.functions.fitting import fit_function
 from mrdamper.functions.forms import ParameterFunction, features
 from mrdamper.paper.loop_figures import Made
 from mrdamper.paper.recipes import LITERAL
-from mrdamper.paper.results import Reproduction, amplitudes, function_of, motions, values
+from mrdamper.paper.results import SAME, Reproduction, amplitudes, function_of, motions, values
 from mrdamper.report.plots.style import MEASURED, MM, current_colours, house_style, label, new_figure, powered
 
 Curves = Mapping[int, tuple[Callable[[Floats], Floats] | None, str]]  # of a motion by its first run; what to say
@@ -36,6 +37,29 @@ def parameter_figure(name: str, text: str, form: str, study: Reproduction) -> Ma
     if found is None:
         return "the literal recipe could not be followed"
     return _by_motion(study, found, text, _fits(study, found, form, log=log), log=log)
+
+
+def r2_figure(name: str, form: str, study: Reproduction) -> Made:
+    """Draw R² of the function of the current at every condition of motion."""
+    values = amplitudes(study) if name == "F0" else _literal(name, study)
+    if values is None or values.size != len(study.conditions):
+        return f"{name} was not identified on every run"
+    names, shares = [], []
+    for group in motions(study):
+        with suppress(IdentificationError):
+            conditions = [study.conditions[i] for i in group]
+            shares.append(fit_function(form, conditions, values[group], log=name == "beta").r2)
+            names.append(_named(conditions[0]).replace(", ", "\n"))
+    if not shares:
+        return "too few currents at every motion"
+    with house_style():
+        figure, (axes,) = new_figure(1, 1, 2.6)
+        axes.bar(range(len(shares)), shares, color=MEASURED, alpha=0.35)
+        axes.plot(range(len(shares)), shares, "o", ms=4, color=MEASURED, label="R²")
+        axes.set_ylim(min(0.0, *shares), 1.05)
+        label(axes, "", "R² (–)")
+        axes.set_xticks(range(len(names)), names, fontsize=7)
+        return figure
 
 
 def function_figure(name: str, text: str, study: Reproduction) -> Made:
@@ -78,6 +102,14 @@ def over_motion(name: str, over: str, text: str, form: str, study: Reproduction)
         for c, value, fitted in zip(firsts, power * level, power * curve, strict=True):
             axes.plot(u(c), value, "o", ms=4, color=shades[c.peak_velocity], label=_named(c))
             axes.plot(u(c), fitted, "_", ms=11, mew=1.4, color=shades[c.peak_velocity])
+        for first in {round(np.log(c.amplitude_m) / SAME): c for c in firsts if over == "frequency"}.values():
+            ends = np.linspace(min(map(u, firsts)), max(map(u, firsts)), 40)
+            line = [float(found(0.0, f, first.amplitude_m)) for f in ends]
+            axes.plot(ends, power * np.array(line), lw=0.7, color=MEASURED, alpha=0.6)
+        if over == "speed":
+            ends = np.linspace(min(map(u, firsts)), max(map(u, firsts)), 40)
+            line = [float(found(0.0, 1.0, f / MM)) for f in ends]
+            axes.plot(ends, power * np.array(line), lw=0.7, color=MEASURED, alpha=0.6)
         axes.plot([], [], "_", ms=11, mew=1.4, color=MEASURED, label="by the function")
         label(axes, text_of_axis, text, title)
         _list_beside(axes)
@@ -128,6 +160,8 @@ def _by_motion(
             colour, (curve, said) = shades[first.peak_velocity], curves.get(group[0], (None, ""))
             currents = np.array([study.conditions[i].current_A for i in group])
             axes.plot(currents, power * values[group], "o", ms=3.5, color=colour)
+            if not curves:
+                axes.plot(currents, power * values[group], lw=0.8, color=colour)
             if curve is not None:
                 dense = np.linspace(currents.min(), currents.max(), 60)
                 axes.plot(dense, power * curve(dense) * np.ones(60), lw=0.9, color=colour)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -16,11 +17,12 @@ from mrdamper.identification.harmonic_balance import ForceReading
 from mrdamper.identification.loop_analysis import LoopAnalysis
 from mrdamper.paper.genetic import GeneticMinimum
 from mrdamper.paper.options import PaperOptions
-from mrdamper.paper.recipes import LITERAL
+from mrdamper.paper.recipes import ALI, DIRECT, LITERAL, TRADITIONAL
 from mrdamper.paper.sensitivity import OneAtATime, Sobol
 from mrdamper.paper.virtual_rig import VirtualRig
 from mrdamper.study.recipe import Scored
 
+SAME_CURRENT = 0.02  # difference within which two runs have one current [A]
 SAME = 0.08  # relative tolerance within which two runs have one motion
 
 
@@ -94,8 +96,8 @@ class Reproduction:
     genetic : tuple of GeneticCheck
     ended : tuple of Ended
         Genetic searches over all train runs, one seed each.
-    direct : tuple of int
-        Forces computed until the direct genetic searches assumptions.
+    direct : mapping of str to int
+        Forces computed until the direct genetic search of a run settled, by run id.
     seed_errors : mapping of str to (S,) array
         Median nrmse_pp over the held-out runs, one a noise seed, by contender.
     seed_verdicts : mapping of str to tuple of str
@@ -120,7 +122,7 @@ class Reproduction:
     there: Mapping[tuple[str, str], Identification | str] = field(default_factory=dict)
     genetic: tuple[GeneticCheck, ...] = ()
     ended: tuple[Ended, ...] = ()
-    direct: tuple[int, ...] = ()
+    direct: Mapping[str, int] = field(default_factory=dict)
     seed_errors: Mapping[str, Floats] = field(default_factory=dict)
     seed_verdicts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     sensitivity: tuple[OneAtATime, ...] = ()
@@ -140,6 +142,20 @@ class Reproduction:
     def named(self, *titles: str) -> list[Scored]:
         """The contenders of these titles, where the data allowed them."""
         return [c for title in titles if (c := self.contender(title))]
+
+    def amplitude_group(self, place: int) -> list[Run]:
+        """Return the identification runs of the smallest (0) or largest (-1) of the two most tested amplitudes."""
+        groups: list[list[Run]] = []
+        levels: list[float] = []
+        for run, condition in sorted(
+            zip(self.train, self.conditions, strict=True), key=lambda pair: pair[1].amplitude_m
+        ):
+            if not levels or np.log(condition.amplitude_m / levels[-1]) > SAME:
+                groups.append([])
+                levels.append(condition.amplitude_m)
+            groups[-1].append(run)
+        most = sorted(range(len(groups)), key=lambda i: -len(groups[i]))[:2]
+        return groups[sorted(most)[place]]
 
     @property
     def best(self) -> Scored | None:
@@ -178,6 +194,34 @@ def forces_a_run(study: Reproduction, way: Scored) -> float:
     if way.recipe.title == LITERAL and study.ended:
         counts = [end.forces for end in study.ended]
     return float(np.median(counts)) if counts else float("nan")
+
+
+def rate_rows(study: Reproduction) -> list[dict[str, Any]]:
+    """List accuracy and identification rate over the current at the validation runs, by method [section 6].
+
+    Rate: forces computed until a genetic search is within 1 % of its end, median of the runs identified at that
+    current; for a search by least squares, until its end.
+    """
+    current = {run.id: c.current_A for run, c in zip(study.train, study.conditions, strict=True)}
+    counts: dict[str, dict[str, int]] = {LITERAL: {end.run_id: end.to_settle for end in study.ended}}
+    counts[DIRECT] = dict(study.direct)
+    rows = []
+    for method in study.named(LITERAL, TRADITIONAL, ALI, DIRECT):
+        title = method.recipe.title
+        settled = counts.get(title) or {i.run_id: i.evaluations for i in method.identifications}
+        for score in sorted(method.validation.runs, key=lambda r: r.condition.current_A):
+            near = [n for name, n in settled.items() if abs(current[name] - score.condition.current_A) < SAME_CURRENT]
+            rows.append(
+                {
+                    "method": title,
+                    "current_A": score.condition.current_A,
+                    "nrmse_pp": score.scores.nrmse_pp,
+                    "wape": score.scores.wape,
+                    "mean_relative_error": score.scores.mean_relative_error,
+                    "forces_until_settled": float(np.median(near)) if near else None,
+                }
+            )
+    return rows
 
 
 def seconds_a_run(study: Reproduction, way: Scored) -> float:

@@ -13,11 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from mrdamper.data import Condition, Floats, Run
-from mrdamper.errors import MissingExtraError, ParameterError, UnknownNameError
+from mrdamper.errors import ParameterError, UnknownNameError
 from mrdamper.hysteresis import steady_loop
 from mrdamper.identification import identify
 from mrdamper.identification.methods.balance import Balance
@@ -27,6 +28,7 @@ from mrdamper.motion import sine
 LOOP = ("yield_force", "yield_displacement", "n", "asymmetry")
 NAMES = ("c", *LOOP, "k1", "k3", "m", "f0")
 _SAMPLES = 256  # of the loop
+_REDRAWN = 100  # bootstrap samples of the intervals of the indices
 
 
 @dataclass(frozen=True)
@@ -133,28 +135,39 @@ def sobol(
 
     Raises
     ------
-    MissingExtraError
-        If SALib is not installed.
     ParameterError
         If the spread is not within 0...1.
     """
     if not 0 < spread < 1:
         raise ParameterError(f"spread is {spread}", mend="give a share between 0 and 1")
-    try:
-        from SALib.analyze import sobol as analysis  # pyright: ignore[reportMissingImports]
-        from SALib.sample import sobol as sampling  # pyright: ignore[reportMissingImports]
-    except ModuleNotFoundError as error:
-        raise MissingExtraError("Sobol indices need SALib", mend="pip install 'mrdamper[uq]'") from error
-    problem = {"num_vars": len(names), "names": list(names), "bounds": [[1 - spread, 1 + spread]] * len(names)}
-    points = sampling.sample(problem, samples, calc_second_order=False, seed=seed)
     base = _loop(model, condition)
-    change = [
-        np.sqrt(np.mean((_loop(_varied(model, dict(zip(names, p, strict=True))), condition) - base) ** 2))
-        for p in points.tolist()
-    ]
-    # SALib takes a seed of 0 for none, and draws other intervals every time.
-    found = analysis.analyze(problem, np.array(change), calc_second_order=False, seed=seed + 1)
-    return Sobol(tuple(names), found["S1"], found["ST"], found["S1_conf"], found["ST_conf"], spread)
+
+    def change(points: Floats) -> Floats:
+        return np.array(
+            [
+                np.sqrt(np.mean((_loop(_varied(model, dict(zip(names, p, strict=True))), condition) - base) ** 2))
+                for p in points.T.tolist()
+            ]
+        )
+
+    from scipy.stats import qmc, sobol_indices
+
+    rng, count = np.random.default_rng(seed), len(names)
+    seeded: Any = {"seed": rng}  # the name that every SciPy from 1.13 on takes
+    one, two = np.split(qmc.Sobol(2 * count, **seeded).random(samples).T * 2 * spread + 1 - spread, 2)
+    mixed = np.stack([np.where(np.arange(count)[:, None] == i, two, one) for i in range(count)])
+    forces = change(one), change(two), np.stack([change(points) for points in mixed])
+
+    def indices(rows: np.ndarray) -> Floats:
+        f_A, f_B, f_AB = forces[0][rows], forces[1][rows], forces[2][:, rows]
+        found = sobol_indices(func={"f_A": f_A[None], "f_B": f_B[None], "f_AB": f_AB[:, None]}, n=samples)
+        return np.array([np.ravel(found.first_order), np.ravel(found.total_order)])
+
+    first, total = indices(np.arange(samples))
+    redrawn = [indices(rng.integers(samples, size=samples)) for _ in range(_REDRAWN)]
+    low, high = np.quantile(redrawn, (0.025, 0.975), axis=0)
+    first_half, total_half = (high - low) / 2
+    return Sobol(tuple(names), first, total, first_half, total_half, spread)
 
 
 def _varied(model: BoucWen, factors: dict[str, float]) -> BoucWen:

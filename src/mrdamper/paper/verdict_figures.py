@@ -9,12 +9,35 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from mrdamper.paper.loop_figures import Made
-from mrdamper.paper.results import Reproduction, forces_a_run, seconds_a_run
+from mrdamper.paper.results import Reproduction, forces_a_run, rate_rows, seconds_a_run
 from mrdamper.report.plots.style import PALETTE, house_style, label, new_figure
 from mrdamper.study.recipe import Scored
 
 
 def accuracy_rate(study: Reproduction) -> Made:
+    """Draw error and identification rate over the current: the paper's method, Ali's and the direct genetic search."""
+    rows = [row for row in rate_rows(study) if np.isfinite(row["nrmse_pp"])]
+    if not rows:
+        return "nothing predicts a validation run"
+    with house_style():
+        figure, axes = new_figure(1, 3, 2.9, top=0.5)
+        for title, colour in zip(dict.fromkeys(row["method"] for row in rows), PALETTE[1:], strict=False):
+            own = [row for row in rows if row["method"] == title]
+            for panel, name, scale in zip(
+                axes, ("nrmse_pp", "mean_relative_error", "forces_until_settled"), (100, 100, 1), strict=True
+            ):
+                shown = [(row["current_A"], scale * row[name]) for row in own if row[name] is not None]
+                panel.plot(*np.reshape(shown, (-1, 2)).T, "o-", ms=3, lw=0.9, color=colour, label=title)
+        axes[2].set_yscale("log")
+        for panel, text in zip(
+            axes, ("nrmse_pp (%)", "Relative error, Eq. 44 (%)", "Forces computed (–)"), strict=True
+        ):
+            label(panel, "Current (A)", text)
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="upper center", ncols=3, fontsize=7)
+        return figure
+
+
+def methods_figure(study: Reproduction) -> Made:
     """Median and worst held-out error, and forces computed for an identification, by way."""
     ways = [c for c in study.contenders if c.validation.runs]
     if not ways:
@@ -32,7 +55,7 @@ def accuracy_rate(study: Reproduction) -> Made:
         return figure
 
 
-def times(study: Reproduction) -> Made:
+def seconds_figure(study: Reproduction) -> Made:
     """Seconds an identification takes here and now, by way: the one figure that differs from run to run."""
     ways = [c for c in study.contenders if c.identifications]
     if not ways:

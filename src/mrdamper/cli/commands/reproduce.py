@@ -24,7 +24,15 @@ def register(app: typer.Typer) -> None:
             True, "--comparators/--no-comparators", help="The direct genetic search and Ali's model (half the time)."
         ),
         with_models: bool = typer.Option(False, "--with-models", help="Also the other models of the literature."),
-        seeds: int = typer.Option(20, "--seeds", min=0, help="Noise seeds of the virtual rig."),
+        seeds: int = typer.Option(
+            0, "--seeds", min=0, help="Noise seeds of the virtual rig; about 2 processor seconds each."
+        ),
+        gas: str | None = typer.Option(
+            None, "--gas", help="Known gas spring of the data: pressure MPa, volume cm3, rod area mm2, as P,V,A."
+        ),
+        setting: list[str] = typer.Option(
+            [], "--set", help="OPTION=VALUE of the method, as of study --model paper; may be repeated."
+        ),
         preset: list[str] = typer.Option(
             [], "--preset", help="A=, n= or gamma= (SI; gamma is tied to beta unless given); may be repeated."
         ),
@@ -40,6 +48,7 @@ def register(app: typer.Typer) -> None:
         """Example: mrdamper reproduce --out result/"""
         import os
 
+        from mrdamper.cli.output import parse_gas
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.errors import InputError
         from mrdamper.files.atomic import require_writable
@@ -49,7 +58,9 @@ def register(app: typer.Typer) -> None:
         from mrdamper.study.parallel import several
 
         require_writable(out)
-        options = _switches(preset, box, mass_law, friction)
+        if gas is not None and data is None:
+            raise InputError("--gas without --data: the virtual rig has its own gas spring", mend="give --data DATASET")
+        options = _options(preset, box, mass_law, friction, setting)
         dataset = None if data is None else load_dataset(data)
         if dataset is None and rig is not None:
             raise InputError("--rig without --data", mend="give --data DATASET, or leave --rig out")
@@ -61,6 +72,7 @@ def register(app: typer.Typer) -> None:
         with progress_on_stderr() as progress, several(jobs or os.cpu_count() or 1) as processes:
             study = run_reproduction(
                 dataset,
+                parse_gas(gas),
                 options=options,
                 with_comparators=comparators,
                 with_models=with_models,
@@ -83,13 +95,14 @@ def register(app: typer.Typer) -> None:
             shown = "".join(f"{'–':>9}" if error is None else f"{100 * error:7.2f} %" for error in errors)
             print(f"  {row['method']:52}{shown}{took['seconds']:8.1f}")
         for claim in found["claims"]:
-            print(f"  {claim['said']:20} {claim['claim']}")
+            print(f"  {claim['said']:50} {claim['claim']}")
         print(f"page: {written[0]}")
 
 
-def _switches(preset: list[str], box: list[str], mass_law: str, friction: str):
+def _options(preset: list[str], box: list[str], mass_law: str, friction: str, setting: list[str]):
     from mrdamper.cli.output import parse_pairs
     from mrdamper.errors import InputError, UnknownNameError
+    from mrdamper.identification.methods import values_of_fields
     from mrdamper.paper.options import PaperOptions
 
     given: dict[str, Any] = {"mass_law": mass_law, "friction_test": friction}
@@ -103,7 +116,7 @@ def _switches(preset: list[str], box: list[str], mass_law: str, friction: str):
             except ValueError as error:
                 form = "NAME=NUMBER" if option == "--preset" else "NAME=LOW:HIGH"
                 raise InputError(f"{option} {name}={text}", mend=f"write {option} {form}") from error
-    return PaperOptions(**given)
+    return PaperOptions(**(given | values_of_fields(PaperOptions, parse_pairs(setting, "--set"))))
 
 
 def _one(numbers: tuple[float, ...], option: str) -> float | tuple[float, ...]:
