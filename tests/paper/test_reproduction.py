@@ -209,7 +209,7 @@ def test_thin_data_give_what_they_allow_and_say_why_the_rest_is_missing(
     drawn = {path.stem for path in (tmp_path / "out" / "figures").glob("*.svg")}
     for number in (3, 4, 5, 6, 9, *range(10, 27)):
         name = f"fig{number:02d}"
-        assert any(stem.startswith(name) for stem in drawn) or f"{name}" in page.split("To know")[1], name
+        assert any(stem.startswith(name) for stem in drawn) or f"{name}" in page.split("<h3>Notes</h3>")[1], name
 
 
 def test_friction_and_lost_length_are_read_off_the_tests():
