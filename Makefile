@@ -12,7 +12,7 @@ help:  ## show this list
 study: $(VENV)/.core  ## set up the core and run the whole method on the bundled real data
 	$(BIN)/mrdamper study --out result
 
-serve: $(VENV)/.web  ## set up and open the live bench
+serve: $(VENV)/.web  ## set up and open the app
 	$(BIN)/mrdamper serve
 
 test: $(VENV)/.dev  ## set up and run the tests

@@ -127,7 +127,7 @@ def test_from_drop_to_report(page, small_rig, tmp_path, shoot):
     page.locator("section[aria-label='Force over velocity'] .js-line").first.wait_for(state="attached")
     assert page.locator("tbody tr").count() == 2
     shoot(page, "4-compared")
-    page.get_by_role("button", name="Move Bingham", exact=True).click()  # how sure it is is worked out now
+    page.get_by_role("button", name="Explore Bingham", exact=True).click()  # how sure it is is worked out now
     page.get_by_text("% prediction interval").wait_for()
     open_tab(page, "Compare")
 
@@ -138,12 +138,12 @@ def test_from_drop_to_report(page, small_rig, tmp_path, shoot):
         page.get_by_role("button", name="Page, tables and models as zip").click()
     assert "mrdamper-comparison/comparison.html" in zipfile.ZipFile(waiting.value.path()).namelist()
 
-    open_tab(page, "Take away")
+    open_tab(page, "Export")
     page.get_by_text("Head of the report").click()
     page.get_by_label("Customer").fill("<b>Customer & Sons</b>")
     page.get_by_label("Logo").set_input_files({"name": "logo.png", "mimeType": "image/png", "buffer": LOGO})
     page.get_by_role("img", name="The logo").wait_for()
-    page.get_by_role("button", name="Make the report").click()
+    page.get_by_role("button", name="Create the report").click()
     page.get_by_role("progressbar").wait_for()
     page.get_by_role("link", name="report.html").wait_for()
     shoot(page, "5-take-away")
@@ -327,8 +327,8 @@ def test_a_link_brings_the_state_back(on_model):
     assert number(other, "current_A") == pytest.approx(0.31)
     type_number(other, "current_A", "0.9")
     assert curve(at_rest(other), "Force over velocity") != shown
-    open_tab(page, "Take away")
-    for button, name in (("Save the state", "bench-state.json"), ("Keep this bench", "kept.zip")):
+    open_tab(page, "Export")
+    for button, name in (("Save the state", "bench-state.json"), ("Save the project", "kept.zip")):
         with page.expect_download() as waiting:
             page.get_by_role("button", name=button).click()
         drop(other, {name: waiting.value.path().read_bytes()})
@@ -386,7 +386,7 @@ def test_hostile_names_are_text(page, small_rig, tmp_path, shoot):
         page.locator(".cell").nth(i).click()
         page.get_by_role("heading", name=f"Run {HOSTILE[i]}", exact=True).wait_for()
     assert page.locator("main img, main script, main a[href^=javascript]").count() == 0
-    assert page.evaluate("document.title") == "mrdamper live bench"
+    assert page.evaluate("document.title") == "mrdamper app"
     shoot(page, "11-hostile-names")
 
 
@@ -440,7 +440,7 @@ def test_work_can_be_cancelled(on_model):
 def test_the_keyboard_reaches_everything(on_model):
     page = on_model
     page.get_by_role("tab", name="Model").focus()
-    for key, name in (("ArrowRight", "Compare"), ("ArrowLeft", "Model"), ("End", "Take away"), ("Home", "Data")):
+    for key, name in (("ArrowRight", "Compare"), ("ArrowLeft", "Model"), ("End", "Export"), ("Home", "Data")):
         page.keyboard.press(key)
         tab = page.get_by_role("tab", name=name)
         assert tab.get_attribute("aria-selected") == "true"
@@ -460,7 +460,7 @@ def test_the_keyboard_reaches_everything(on_model):
 
 def test_every_view_passes_axe(on_model):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
-    for tab in ("Model", "Data", "Identify", "Compare", "Take away"):
+    for tab in ("Model", "Data", "Identify", "Compare", "Export"):
         open_tab(on_model, tab)
         assert axe.run(on_model).response["violations"] == [], tab
 
@@ -504,14 +504,14 @@ def test_the_test_list_mends_currents_and_split_by_click(page, small_rig, shoot)
         place = tests.get_by_label(f"Current of test_{i}, ampere")
         place.fill(str(run.current_A))
         place.press("Enter")
-        tests.get_by_label(f"Hold test_{i} out").wait_for()
+        tests.get_by_label(f"Use test_{i} for validation").wait_for()
     assert tests.locator(".badge.bad").count() == 0
     shoot(page, "17-test-list")
-    tests.get_by_role("button", name="Hold test_1 out").click()
-    tests.get_by_role("button", name="Hold test_1 out", pressed=True).wait_for()
+    tests.get_by_role("button", name="Use test_1 for validation").click()
+    tests.get_by_role("button", name="Use test_1 for validation", pressed=True).wait_for()
     page.locator(".cell.validate").first.wait_for()
     tests.get_by_role("button", name="Nothing").click()
-    tests.get_by_role("button", name="Hold test_1 out", pressed=False).wait_for()
+    tests.get_by_role("button", name="Use test_1 for validation", pressed=False).wait_for()
 
 
 def test_columns_are_picked_by_eye(page, small_rig):

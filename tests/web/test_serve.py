@@ -37,7 +37,7 @@ def test_it_starts_answers_and_stops_cleanly(tmp_path, name):
     assert len(token) > 30
     assert address.startswith("http://127.0.0.1:")
     with urllib.request.urlopen(address, timeout=10) as answer:
-        assert b"live bench" in answer.read()
+        assert b"mrdamper app" in answer.read()
     # SIGHUP ends the server as SIGINT does; one of them with work under way is enough.
     with pytest.raises(urllib.error.HTTPError, match="403"):
         post(address, "", "a guess")

@@ -100,7 +100,7 @@ def plotly_script() -> Path:
     found = importlib.util.find_spec("plotly")
     script = Path(found.origin).parent / "package_data" / "plotly.min.js" if found and found.origin else None
     if script is None or not script.is_file():
-        raise MissingExtraError("the live bench needs plotly", mend="pip install 'mrdamper[web]'")
+        raise MissingExtraError("the app requires plotly", mend="pip install 'mrdamper[web]'")
     return script
 
 
@@ -176,7 +176,7 @@ class _Faults:
             traceback.print_exc(file=sys.stderr)
             if scope["type"] != "http" or begun:
                 raise
-            text = "This is our fault, not yours: the terminal shows what happened."
+            text = "Internal error (please report); the details are in the terminal."
             await JSONResponse({"text": text, "code": "E_OURS"}, status_code=500)(scope, receive, send)
 
 

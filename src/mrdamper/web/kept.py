@@ -34,7 +34,7 @@ _SMALL_LIMIT = 5_000_000  # of a part that is text
 
 
 class KeptError(InputError):
-    """A file that is no kept bench, or a damaged one."""
+    """Saved project that cannot be read."""
 
     code = "E_KEPT"
 
@@ -128,7 +128,7 @@ def open_kept(path: Path, place: Path) -> Kept:
         with zipfile.ZipFile(path) as archive:
             return _read(archive, place / "kept")
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError, zlib.error) as error:
-        raise KeptError(f"is damaged: {error}", where="the kept bench", mend="copy it again") from error
+        raise KeptError(f"is damaged: {error}", where="the saved project", mend="copy it again") from error
 
 
 def _read(archive: zipfile.ZipFile, place: Path) -> Kept:
@@ -136,12 +136,12 @@ def _read(archive: zipfile.ZipFile, place: Path) -> Kept:
     try:
         about = _List.model_validate(parse_json(_part(archive, LIST).decode("utf-8")))
     except ValueError as error:
-        raise KeptError("is none of this version", where=LIST, mend="update mrdamper, or save it again") from error
+        raise KeptError("has another version", where=LIST, mend="update mrdamper, or save it again") from error
     data = [f"{DATA}/{name}" for name in ("runs.csv", *SAMPLE_FILES)]
     known = {LIST, STATE, LOGO, *(d.file for d in about.dampers), *data}
     if len(set(names)) != len(names) or not set(names) <= known:
         odd = next((n for n in names if n not in known), "one name twice")
-        raise KeptError(f"holds {PurePosixPath(odd).name!r:.60}", where="the kept bench", mend="save it again")
+        raise KeptError(f"holds {PurePosixPath(odd).name!r:.60}", where="the saved project", mend="save it again")
     if about.current is not None and about.current >= len(about.dampers):
         raise KeptError("names a damper it does not hold", where=LIST, mend="save it again")
     dampers = [
@@ -188,7 +188,7 @@ def _part(archive: zipfile.ZipFile, name: str, limit: int = _SMALL_LIMIT) -> byt
         with archive.open(name) as part:
             content = part.read(limit + 1)
     except KeyError as error:
-        raise KeptError(f"holds no {name}", where="the kept bench", mend="save it again") from error
+        raise KeptError(f"holds no {name}", where="the saved project", mend="save it again") from error
     if len(content) > limit:
-        raise KeptError(f"{name} is over {limit / 1e6:.0f} MB", where="the kept bench", mend="save it again")
+        raise KeptError(f"{name} is over {limit / 1e6:.0f} MB", where="the saved project", mend="save it again")
     return content

@@ -112,7 +112,7 @@ class _Server(uvicorn.Server):
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets=sockets)
-        print(f"live bench: {self.address} (Ctrl-C stops it)", flush=True)
+        print(f"mrdamper app: {self.address} (Ctrl-C stops it)", flush=True)
         if self.open_browser:
             threading.Thread(target=webbrowser.open, args=(self.address,), daemon=True).start()
 

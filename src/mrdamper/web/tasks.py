@@ -86,7 +86,7 @@ def identify_rig(
     sines, refused = usable_sines(dataset)
     runs = [run for run in sines if (run.id in run_ids if run_ids else run.split == "train")]
     if not runs:
-        reason = next((refused[i] for i in run_ids if i in refused), "no train run is a steady sine")
+        reason = next((refused[i] for i in run_ids if i in refused), "no identification run is a steady sine")
         raise IdentificationError(reason, where=f"rig {dataset.name}", mend="choose other runs")
     if model == JOINTLY:
         recipe = play_and_bypass()
@@ -102,7 +102,7 @@ def identify_rig(
         if not found:
             raise
         return tuple(found), str(error), refused
-    tell("how sure it is", 0.95)
+    tell("uncertainty", 0.95)
     return tuple(found), replace(scored, damper=certain(scored.damper, runs)), refused
 
 

@@ -210,7 +210,7 @@
       return say("outside", "Give a number in each field, frequency and amplitude above zero.", "bad");
     }
     const away = outside(current, frequency, amplitude);
-    say("outside", away.length ? `Extrapolated: ${away.map((t) => t.said).join("; ")}. Nobody measured there.` : "", "warn");
+    say("outside", away.length ? `Extrapolated: ${away.map((t) => t.said).join("; ")}. The tests do not cover this range.` : "", "warn");
     const found = loop(current, frequency, amplitude);
     if (!found) return say("outside", "The model has no force at this condition: come nearer to the tests.", "bad");
     shown = found;
@@ -270,7 +270,7 @@
     }
     shown = { time, displacement, velocity, current, force };
     const named = facts.flags.filter((_, bit) => (all >> bit) & 1);
-    say("outside", named.length ? `Extrapolated in ${named.join(", ")} where the curve is dashed. Nobody measured there.` : "", "warn");
+    say("outside", named.length ? `Extrapolated in ${named.join(", ")} where the curve is dashed. The tests do not cover this range.` : "", "warn");
     const [low, high] = extremes(force), pairs = [["Peak force, extension", `${number(high)} N`], ["Peak force, compression", `${number(low)} N`], ["Dissipated energy", `${number(energy(shown))} J`], ["Duration", `${number(time[size - 1] - time[0])} s`]];
     if (measured) {
       const [a, b] = extremes(measured), squares = force.reduce((sum, f, i) => sum + (f - measured[i]) ** 2, 0);
@@ -327,7 +327,7 @@
       const cells = lines[row].split(mark);
       for (const [key, values] of Object.entries(made)) {
         const text = (cells[wanted[key]] ?? "").trim(), value = text === "" ? NaN : Number(mark === "," ? text : text.replace(",", "."));
-        if (!Number.isFinite(value)) throw new Unusable(`row ${row + 1}, column ${names[wanted[key]]}: "${text.slice(0, 30)}" is no finite number; remove or mend that row`);
+        if (!Number.isFinite(value)) throw new Unusable(`row ${row + 1}, column ${names[wanted[key]]}: "${text.slice(0, 30)}" is not a finite number; remove or correct that row`);
         values[row - 1] = value;
       }
     }
@@ -339,7 +339,7 @@
     const back = steps.findIndex((s) => !(s > 0));
     if (back >= 0) throw new Unusable(`time does not increase at row ${back + 3}: sort the rows or drop the repeated ones`);
     const median = steps.slice().sort()[steps.length >> 1], wide = steps.findIndex((s) => s > 5 * median);
-    if (wide >= 0) throw new Unusable(`a gap of ${number(steps[wide])} s after ${number(time[wide], 6)} s: the damper's state is unknown after it; give the parts one by one`);
+    if (wide >= 0) throw new Unusable(`a gap of ${number(steps[wide])} s after ${number(time[wide], 6)} s: the state of the damper is unknown after it; enter the parts separately`);
     const [low, high] = extremes(displacement);
     if (high - low < 1e-9) throw new Unusable("the displacement does not move");
     return made;

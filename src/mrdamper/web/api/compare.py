@@ -115,7 +115,7 @@ def _conclude(session: Session, choice: Choice, found: Comparison) -> dict[str, 
     keys = {row.run.id: row.key for row in table.rows}
     entries = []
     for entry in rig.entries:
-        note = f"left out {100 * entry.cross_validated.median():.1f} %"
+        note = f"cross-validation {100 * entry.cross_validated.median():.1f} %"
         entries.append(_entry(rig, entry, session.scored(entry, "comparison", note).key, keys))
     return {
         "rig": rig.rig,

@@ -134,7 +134,7 @@ def _conclude_study(session: Session, found: Study, written: list[Any]) -> dict[
     for rig in found.rigs:
         listed = []
         for candidate in rig.candidates:
-            errors = {"left out": candidate.cross_validated, "held out": candidate.validation}
+            errors = {"cross-validation": candidate.cross_validated, "validation": candidate.validation}
             note = ", ".join(f"{name} {_percent(scores)}" for name, scores in errors.items() if scores.runs)
             listed.append(_candidate(candidate, session.scored(candidate, "study", note).key))
         rigs.append({"rig": rig.rig, "chosen": listed[0]["damper"], "candidates": listed})
@@ -165,7 +165,7 @@ def _conclude_identification(
     damper, held_out, bench = None, None, None
     if isinstance(scored, Scored):
         damper, held_out = scored.damper, scored.validation
-        bench = session.add(damper, "identification", f"held out {_percent(held_out)}" if held_out.runs else "")
+        bench = session.add(damper, "identification", f"validation {_percent(held_out)}" if held_out.runs else "")
     errors = [i.scores.nrmse_pp for i in found] or _joint_fit(scored).nrmse_pp.tolist()
     return {
         "rig": session.table(choice.rig).dataset.rigs[0],

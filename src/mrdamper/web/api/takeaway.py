@@ -106,7 +106,7 @@ def exported(key: str, session: Current) -> Response:
     """What an export made: the file, or an archive of several."""
     paths: list[Path] | None = session.results.get(f"exported.{key}")
     if not paths:
-        raise InputError("no such export", mend="make it again", code="E_NAME")
+        raise InputError("no such export", mend="export again", code="E_NAME")
     if len(paths) == 1:
         return FileResponse(paths[0], filename=paths[0].name, media_type="application/octet-stream")
     return zipped({path.name: path.read_bytes() for path in paths}, f"{paths[0].parent.name}.zip")
@@ -131,7 +131,7 @@ def open_bench(key: str, session: Current) -> dict[str, Any]:
     """Bring back what such a file holds."""
     drop = session.drops.get(key)
     if drop is None or len(drop.names) != 1:
-        raise InputError("no kept bench was dropped", mend="drop it again, alone", code="E_DROP")
+        raise InputError("no saved project was dropped", mend="drop it again, alone", code="E_DROP")
     kept: Kept = open_kept(next(iter(drop.names)), drop.folder)
     if kept.intake is not None:
         session.put(kept.intake)

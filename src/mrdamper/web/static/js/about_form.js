@@ -47,7 +47,7 @@ export class AboutForm {
     this.bench.logo = btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(""));
   }
 
-  /** The logo that is taken: chosen here, or come with a kept bench. */
+  /** The logo that is taken: chosen here, or from a saved project. */
   show() {
     const { logo } = this.bench;
     if (!logo) this.logo.value = "";

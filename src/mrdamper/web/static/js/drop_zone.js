@@ -30,7 +30,7 @@ export class DropZone {
     const folder = input({ webkitdirectory: "", "aria-label": "Folder" }, (file) => file.webkitRelativePath || file.name);
     return h(
       "div", { class: "drop", id: "drop" },
-      h("strong", {}, "Drop rig files, a dataset folder, a model.json or a kept bench"),
+      h("strong", {}, "Drop rig files, a dataset folder, a model.json or a saved project"),
       h("span", { class: "small" }, `up to ${bytes(this.bench.limits.file_bytes)} a file`),
       h("div", { class: "row" }, h("button", { onclick: () => files.click() }, "Files …"), h("button", { onclick: () => folder.click() }, "Folder …")),
       files, folder,
@@ -110,7 +110,7 @@ export class DropZone {
   }
 
   read(toml, refusedOnly = false) {
-    put(this.said, h("p", { class: "small faint" }, "Judging each file …"));
+    put(this.said, h("p", { class: "small faint" }, "Checking each file …"));
     return this.bench.api.post(`/drops/${this.drop}/read`, { toml, refused_only: refusedOnly });
   }
 
@@ -122,7 +122,7 @@ export class DropZone {
       await this.send(files);
       found = await bench.api.post(`/drops/${this.drop}/open`);
       return found.data ? bench.api.get("/data") : bench.overview;
-    }, "Opening the kept bench");
+    }, "Opening the saved project");
     put(this.said);
     bench.logo = found.logo;
     await bench.refreshDampers();

@@ -16,7 +16,7 @@ export class IdentifyForm {
     this.method = h("select", { id: "method-name" });
     this.runs = h("select", { id: "which-runs" });
     this.over = h("select", { id: "over" },
-      h("option", { value: "functions" }, "functions through the values"), h("option", { value: "joint" }, "functions fitted to all forces"));
+      h("option", { value: "functions" }, "parameter functions fitted to individual fits"), h("option", { value: "joint" }, "global fit"));
     this.parameters = new ParameterChoice();
     this.rig = h("div", {});
     this.source = h("p", { class: "small faint" });
@@ -39,7 +39,7 @@ export class IdentifyForm {
       h("fieldset", { class: "group" },
         h("legend", { class: "hidden-text" }, "What to identify"),
         choice(this.whole, "Whole study", "all candidates, left-out conditions, report"),
-        choice(this.one, "One model", "run by run, with residuals")),
+        choice(this.one, "One model", "individual fits, with residuals")),
       this.details, this.button);
   }
 
@@ -60,7 +60,7 @@ export class IdentifyForm {
     const usable = found?.runs.filter((r) => !r.refused) ?? [];
     const train = usable.filter((r) => r.split === "train").length;
     const before = this.runs.value;
-    put(this.runs, h("option", { value: "" }, ["no train run can be used", "the one train run"][train] ?? `all ${train} train runs`),
+    put(this.runs, h("option", { value: "" }, ["no identification run can be used", "the only identification run"][train] ?? `all ${train} identification runs`),
       usable.map((r) => h("option", { value: r.key }, `${r.id} (${condition(r.condition)})`)));
     if (usable.some((r) => r.key === before)) this.runs.value = before;
   }

@@ -12,7 +12,7 @@ export class ModelCharts {
     this.v = new Chart({ title: "Force over velocity", x: "Velocity (m/s)", y: "Force (N)", name: "model-force-velocity" });
     this.t = new Chart({ title: "Force over time", x: "Time (s)", y: "Force (N)", name: "model-force-time" });
     this.peak = new Chart({ title: "Peak force over current", x: "Current (A)", y: "Half peak-to-peak (N)", name: "model-peak-force", zero: true, keys: true });
-    this.energy = new Chart({ title: "Energy a cycle over current", x: "Current (A)", y: "Energy (J)", name: "model-energy", zero: true });
+    this.energy = new Chart({ title: "Energy per cycle over current", x: "Current (A)", y: "Energy (J)", name: "model-energy", zero: true });
     this.all = [this.x, this.v, this.t, this.peak, this.energy];
     this.element = h("div", { class: "figures model" }, this.all.map((chart) => chart.element));
   }
@@ -83,7 +83,7 @@ export class ModelCharts {
   }
 }
 
-const heldOut = (row) => (row.split === "validate" ? " (held out)" : "");
+const heldOut = (row) => (row.split === "validate" ? " (validation)" : "");
 const shade = (current, head) => `shade ${Math.min(1, current / (head.tested_A[1] || 1)).toFixed(3)}`;
 
 /** Prediction interval of the force as two lines around the loop. */

@@ -74,7 +74,7 @@ export class ModelPanel {
     this.bench.rigTable(rig).then(({ runs }) => {
       this.tested = new Map(runs.filter((r) => r.peak_N !== null).map((r) => [r.key, r.condition]));
       put(this.runs, h("option", { value: "" }, "choose one"),
-        runs.filter((r) => this.tested.has(r.key)).map((r) => h("option", { value: r.key }, `${r.id}${r.split === "validate" ? " (held out)" : ""}`)));
+        runs.filter((r) => this.tested.has(r.key)).map((r) => h("option", { value: r.key }, `${r.id}${r.split === "validate" ? " (validation)" : ""}`)));
     }).catch((error) => this.bench.fail(error));
     return h("div", { class: "field" }, h("label", { for: "tested-run" }, "At the condition of a tested run"), this.runs);
   }

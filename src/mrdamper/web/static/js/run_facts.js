@@ -28,12 +28,12 @@ function facts(run) {
   const fact = (name, value) => h("div", {}, h("dt", {}, name), h("dd", {}, value));
   const c = run.condition;
   return h("dl", { class: "facts" },
-    fact("Set", run.split === "validate" ? "held out" : "train"),
+    fact("Set", run.split === "validate" ? "validation" : "identification"),
     c ? fact("Current", `${figures(c.current_A, 3)} A`) : null,
     c ? fact("Frequency", `${figures(c.frequency_Hz, 3)} Hz`) : null,
     c ? fact("Amplitude", `${figures(c.amplitude_mm, 3)} mm`) : null,
     run.peak_N === null ? null : fact("Half peak-to-peak", `${figures(run.peak_N)} N`),
-    run.energy_J === null ? null : fact("Energy a cycle", `${figures(run.energy_J)} J`),
+    run.energy_J === null ? null : fact("Energy per cycle", `${figures(run.energy_J)} J`),
     run.damping_Ns_m === null ? null : fact("Equiv. damping", `${figures(run.damping_Ns_m)} N s/m`),
     run.mean_N === null ? null : fact("Mean force", `${figures(run.mean_N, 3)} N`),
     run.cycles === null ? null : fact("Cycles", figures(run.cycles, 3)),

@@ -79,7 +79,7 @@ export function portable(state) {
 
 /** Check a state that came from outside, field by field; unknown fields go. */
 export function imported(raw) {
-  if (!raw || raw.format !== "mrdamper-bench-state") throw new Error("this is no state of the live bench");
+  if (!raw || raw.format !== "mrdamper-bench-state") throw new Error("this is not a saved state of the app");
   if (raw.version > VERSION) throw new Error("this state was saved by a newer mrdamper; update it");
   const state = { ...BLANK };
   if (["data", "identify", "model", "compare", "ride", "takeaway"].includes(raw.view)) state.view = raw.view;

@@ -37,7 +37,7 @@ export class TestList {
     put(this.said);
     await this.drop.load(async () => {
       const overview = await this.bench.api.post(path, body);
-      if (overview.reason) put(this.said, note("good", capital(`held out: ${overview.reason}`), "."));
+      if (overview.reason) put(this.said, note("good", capital(`validation runs: ${overview.reason}`), "."));
       return overview;
     });
   }
@@ -97,7 +97,7 @@ export class TestList {
     const others = tests.filter((t) => t.split === "validate" && t.run !== test.run).map((t) => t.run);
     const runs = out ? others : [...others, test.run];
     const toggle = () => this.change("/tests/split", runs.length ? { runs } : { none: true });
-    return h("button", { class: "link small", "aria-pressed": out ? "true" : "false", "aria-label": `Hold ${test.test} out`, onclick: toggle }, out ? "held out" : "train");
+    return h("button", { class: "link small", "aria-pressed": out ? "true" : "false", "aria-label": `Use ${test.test} for validation`, onclick: toggle }, out ? "validation" : "identification");
   }
 
   rules(tests) {

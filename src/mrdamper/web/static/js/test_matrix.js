@@ -104,14 +104,14 @@ function head() {
   return h("div", { class: "head" },
     h("h2", {}, "Test matrix"),
     h("span", { class: "faint small" }, "half the peak-to-peak force"),
-    h("span", { class: "legend" }, key("", "train"), key("dashed", "held out"), key("dot", "noted")));
+    h("span", { class: "legend" }, key("", "identification"), key("dashed", "validation"), key("dot", "noted")));
 }
 
 function title(run) {
-  return [`${run.id}, ${run.split === "validate" ? "held out" : "train"}`, run.refused].filter(Boolean).join("\n");
+  return [`${run.id}, ${run.split === "validate" ? "validation" : "identification"}`, run.refused].filter(Boolean).join("\n");
 }
 
 function spoken(run) {
   const force = run.peak_N === null ? "" : `, peak force ${figures(run.peak_N, 3)} N`;
-  return `${run.id}: ${condition(run.condition)}${force}${run.split === "validate" ? ", held out" : ""}`;
+  return `${run.id}: ${condition(run.condition)}${force}${run.split === "validate" ? ", validation" : ""}`;
 }

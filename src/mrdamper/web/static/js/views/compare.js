@@ -29,7 +29,7 @@ class CompareView {
     this.rig = h("div", {});
     this.list = h("fieldset", { class: "field" });
     this.button = h("button", { class: "primary", onclick: () => this.start() }, "Compare");
-    this.strip = new Chart({ title: "Error on held-out runs, one mark a run", x: "Error (% of the peak-to-peak force)", y: "", name: "held-out-errors", zero: true, layout: () => this.rows() });
+    this.strip = new Chart({ title: "Error of the validation runs, one mark per run", x: "Error (% of the peak-to-peak force)", y: "", name: "validation-errors", zero: true, layout: () => this.rows() });
     this.loops = {
       v: new Chart({ title: "Force over velocity", x: "Velocity (m/s)", y: "Force (N)", name: "compared-force-velocity" }),
       x: new Chart({ title: "Force over displacement", x: "Displacement (mm)", y: "Force (N)", name: "compared-force-displacement" }),
@@ -39,7 +39,7 @@ class CompareView {
     this.stage = h("div", { class: "stage" });
     const side = h("div", { class: "side" }, h("div", { class: "group" },
       h("h2", {}, "Compare models"),
-      h("p", { class: "small faint" }, "Each is identified from the train runs of the rig and predicts the held-out ones."),
+      h("p", { class: "small faint" }, "Every model is identified from the identification runs of the rig and predicts the validation runs."),
       this.rig, this.list, this.button), this.work.element);
     this.element = h("div", { class: "view" }, side, this.stage);
     document.addEventListener("bench:data", () => this.forget());
@@ -81,7 +81,7 @@ class CompareView {
     const { overview, store } = this.bench;
     if (this.comparing) return busy("Comparing …", "The other views can be used meanwhile.");
     return overview
-      ? empty("Nothing is compared yet", "Choose models and compare them. They are ranked by conditions left out; held-out runs confirm.")
+      ? empty("No comparison yet", "Choose models and compare them. They are ranked by cross-validation error (leave one condition out).")
       : empty("No data on the bench", "Open the bundled tests or drop files on the Data page first.", h("button", { class: "primary", onclick: () => store.pass({ view: "data" }) }, "Open data"));
   }
 
@@ -139,21 +139,21 @@ class CompareView {
     const known = (name, title) => (entries.some((e) => e[name] !== null) ? [{ title, number: true, value: (e) => percent(e[name]) }] : []);
     const columns = [
       { title: "Model", value: (e) => h("span", { title: e.source }, e.title) },
-      { title: "Left out", number: true, value: (e) => percent(e.left_out) },
-      ...known("held_out", "Held out"),
-      { title: "Numbers", number: true, value: (e) => String(e.numbers) },
+      { title: "Cross-validation", number: true, value: (e) => percent(e.left_out) },
+      ...known("held_out", "Validation"),
+      { title: "Parameters", number: true, value: (e) => String(e.numbers) },
       { title: "Runs needed", number: true, value: (e) => String(e.runs_needed) },
       { title: "Time", number: true, value: (e) => seconds(e.seconds) },
-      { title: "", value: (e) => h("button", { class: "link", "aria-label": `Move ${e.title}`, onclick: () => this.bench.choose(e.damper, { view: "model" }) }, "Move it") },
+      { title: "", value: (e) => h("button", { class: "link", "aria-label": `Explore ${e.title}`, onclick: () => this.bench.choose(e.damper, { view: "model" }) }, "Explore") },
     ];
     const why = Object.entries(refused).map(([name, reason]) => h("div", {}, `${name}: ${reason}`));
     const group = (label, runs) => (runs.length ? h("optgroup", { label }, runs.map((r) => h("option", { value: r.key }, r.id))) : null);
-    put(this.runs, group("Held out", heldOut), group("Train", train));
+    put(this.runs, group("Validation", heldOut), group("Identification", train));
     put(this.stage,
       card(["Rig ", h("span", {}, rig || this.bench.overview.name)], h("div", { class: "flush" }, table(columns, entries, { caption: "Models compared" }))),
       this.takeAway(),
-      why.length ? note("warn", h("b", {}, "Not determined from these data: "), why) : null,
-      heldOut.length ? this.strip.element : note("", "These data hold no held-out runs; the ranking rests on conditions left out."),
+      why.length ? note("warn", h("b", {}, "Not identifiable from these data: "), why) : null,
+      heldOut.length ? this.strip.element : note("", "These data have no validation runs; the models are ranked by cross-validation error."),
       h("div", { class: "row" }, h("label", { for: "compare-run" }, "Run"), this.runs),
       this.legend, h("div", { class: "figures" }, this.loops.v.element, this.loops.x.element));
     if (heldOut.length) this.safely(this.drawStrip());

@@ -98,7 +98,7 @@ class DataView {
   /** Verdicts come after the loops: judging looks at every sample of every run. */
   async showQuality(run, rig, current) {
     const group = (text, faint) => put(this.parts.quality, h("div", { class: "group" }, h("h2", {}, "Quality"), h("p", { class: `small ${faint}` }, text)));
-    if (!this.parts.quality.childElementCount) group("Judging the runs …", "faint");
+    if (!this.parts.quality.childElementCount) group("Checking the runs …", "faint");
     const found = await this.bench.quality(rig);
     if (!current()) return;
     group(`${Object.entries(tally(Object.values(found).map((q) => q.verdict))).map(([word, n]) => `${n} ${word}`).join(", ")}.`, "");
@@ -134,7 +134,7 @@ function welcome(bench) {
   return h("div", { class: "welcome" },
     empty("See the damper", "Drop the files of a test rig or a dataset folder anywhere on this page. Or begin with the bundled tests of two real dampers: 53 runs, ready to look at.", open),
     h("ol", { class: "path" },
-      [["Data", "what was measured, and whether it can be trusted"], ["Identify", "one model, or the whole study"], ["Model", "move current, frequency, amplitude and parameters; watch the loops"], ["Compare", "models on runs none of them has seen"], ["Take away", "report, model, code and tables"]]
+      [["Data", "measured runs and their quality"], ["Identify", "one model, or a study of all candidates"], ["Model", "loops at any current, frequency, amplitude and parameter value"], ["Compare", "errors of several models on the validation runs"], ["Export", "report, model, code and tables"]]
         .map(([what, why]) => h("li", {}, h("b", {}, what), h("span", { class: "faint small" }, why)))));
 }
 

@@ -49,7 +49,7 @@ class IdentifyView {
     const { overview } = this.bench;
     this.shown();
     put(this.stage, overview
-      ? empty("Nothing is identified yet", "The whole study identifies every candidate, predicts conditions left out, and chooses. Or identify one model by one method and look at its residuals.")
+      ? empty("No identification yet", "A study identifies all candidates and selects one by cross-validation. Alternatively identify one model by one method and examine its residuals.")
       : empty("No data on the bench", "Open the bundled tests or drop files on the Data page first.", h("button", { class: "primary", onclick: this.go("data") }, "Open data")));
   }
 
@@ -69,7 +69,7 @@ class IdentifyView {
     const { form, bench } = this;
     const { overview } = bench;
     form.working(true);
-    if (this.stage.querySelector(".empty")) put(this.stage, busy(whole ? "The study is under way …" : "Identifying …", "The other views can be used meanwhile."));
+    if (this.stage.querySelector(".empty")) put(this.stage, busy(whole ? "Study running …" : "Identifying …", "The other views can be used meanwhile."));
     const answer = await work;
     form.working(false);
     if (overview !== bench.overview) return this.work.clear(); // other data lie on the bench by now
@@ -81,7 +81,7 @@ class IdentifyView {
     await bench.refreshDampers();
     // A damper that is being moved meanwhile stays under the hand.
     if (key && (bench.state.view !== "model" || !bench.state.damper)) bench.store.settle({ damper: key, document: null, condition: null, held: {} });
-    else if (key) bench.say(note("", "What was identified now stands in the list of dampers."));
+    else if (key) bench.say(note("", "The identified damper is in the list of dampers."));
     this.show(whole, answer);
   }
 
@@ -96,21 +96,21 @@ class IdentifyView {
   studied(answer) {
     const columns = [
       { title: "Candidate", value: (c) => c.title },
-      { title: "Left out", number: true, value: (c) => percent(c.left_out) },
-      ...(answer.rigs.some((rig) => rig.candidates.some((c) => c.held_out !== null)) ? [{ title: "Held out", number: true, value: (c) => percent(c.held_out) }] : []),
-      { title: "One by one", number: true, value: (c) => percent(c.per_run) },
-      { title: "Numbers", number: true, value: (c) => String(c.numbers) },
+      { title: "Cross-validation", number: true, value: (c) => percent(c.left_out) },
+      ...(answer.rigs.some((rig) => rig.candidates.some((c) => c.held_out !== null)) ? [{ title: "Validation", number: true, value: (c) => percent(c.held_out) }] : []),
+      { title: "Individual fits", number: true, value: (c) => percent(c.per_run) },
+      { title: "Parameters", number: true, value: (c) => String(c.numbers) },
       { title: "Time", number: true, value: (c) => seconds(c.seconds) },
-      { title: "", value: (c) => h("button", { class: "link", "aria-label": `Move ${c.title}`, onclick: () => this.bench.choose(c.damper, { view: "model" }) }, "Move it") },
+      { title: "", value: (c) => h("button", { class: "link", "aria-label": `Explore ${c.title}`, onclick: () => this.bench.choose(c.damper, { view: "model" }) }, "Explore") },
     ];
     return [
-      h("p", { class: "small faint" }, `Median error as a share of the peak-to-peak force. “Left out”: train runs predicted without their condition; it chooses, and within one standard error fewer parameters win. “Held out”: runs no model has seen. “One by one”: each train run identified alone. Done in ${seconds(answer.seconds)}.`),
+      h("p", { class: "small faint" }, `Median RMS error as a percentage of the peak-to-peak force. Cross-validation: each identification run is predicted by a model identified without its condition; within one standard error of the lowest, the model with the fewest parameters is selected. Validation: runs not used for identification. Individual fits: each identification run fitted separately. Duration: ${seconds(answer.seconds)}.`),
       answer.rigs.map((rig) =>
         card(["Rig ", h("span", {}, rig.rig || this.bench.overview.name)],
           h("div", { class: "flush" }, table(columns, rig.candidates, { chosen: (c) => c.damper === rig.chosen, caption: `Candidates of rig ${rig.rig}` })))),
       h("div", { class: "row" },
-        h("button", { class: "primary", onclick: this.go("model") }, "See it move"),
-        h("button", { onclick: this.go("takeaway") }, "Take report and model away")),
+        h("button", { class: "primary", onclick: this.go("model") }, "Explore"),
+        h("button", { onclick: this.go("takeaway") }, "Export report and model")),
     ];
   }
 
@@ -127,7 +127,7 @@ class IdentifyView {
       this.caption,
       h("div", { class: "figures" }, v.element, x.element, r.element),
       notes.length ? h("ul", { class: "small faint notes" }, notes.map((text) => h("li", {}, text))) : null,
-      answer.damper ? h("div", { class: "row" }, h("button", { class: "primary", onclick: this.go("model") }, "See it move")) : null,
+      answer.damper ? h("div", { class: "row" }, h("button", { class: "primary", onclick: this.go("model") }, "Explore")) : null,
     ];
   }
 
@@ -150,12 +150,12 @@ class IdentifyView {
         const value = (run) => screen.factor * (run.values[p.name] ?? NaN);
         const { power, print } = column(runs.map(value));
         const ends = (run) => run.intervals[p.name]?.map((end) => screen.factor * end);
-        const sure = (run) => h("span", { class: "faint", title: run.states[p.name] }, ends(run) ? spread(value(run), ends(run), 10 ** power) : run.at_bounds.includes(p.name) ? "" : " (not known)");
+        const sure = (run) => h("span", { class: "faint", title: run.states[p.name] }, ends(run) ? spread(value(run), ends(run), 10 ** power) : run.at_bounds.includes(p.name) ? "" : " (no interval)");
         return { title: heading(p.name, screen.unit, power), number: true, value: (run) => [print(value(run)), sure(run), run.at_bounds.includes(p.name) ? h("span", { class: "badge warn" }, "at bound") : null] };
       }));
       columns.push({ title: "At bounds", value: (run) => run.at_bounds.join(", ") || "–" });
     }
-    const held = answer.held_out === null ? "" : `; held-out runs ${percent(answer.held_out)} with ${answer.numbers} numbers over all conditions`;
+    const held = answer.held_out === null ? "" : `; validation runs ${percent(answer.held_out)} with ${answer.numbers} parameters over all conditions`;
     const listed = table(columns, runs, { pick, caption: "Identified runs" });
     this.lines = [...listed.tBodies[0].rows];
     return h("section", { class: "card" },

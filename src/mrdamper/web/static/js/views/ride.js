@@ -124,12 +124,12 @@ class RideView {
 
   judged(head) {
     const [a, f] = [Math.max(...head.peaks.acceleration_m_s2), Math.max(0, ...head.peaks.force_N)];
-    const better = head.gain === null ? "" : ` ${head.gain >= 0 ? "Calmer" : "Rougher"} by ${percent(Math.abs(head.gain))} than without current.`;
+    const better = head.gain === null ? "" : ` RMS of the objective ${head.gain > 0 ? "−" : "+"}${percent(Math.abs(head.gain))} against passive at 0 A.`;
     const outside = Object.entries(head.outside).flatMap(([name, shares]) => Object.entries(shares).map(([what, share]) => `${name}: ${what} ${percent(share)} of the time`));
     return note(outside.length || !head.settled ? "warn" : "", h("b", {}, `${head.title}.`, better),
-      h("div", {}, `Largest acceleration ${figures(a)} m/s², damper force ${figures(f)} N; step ${figures(MM * head.step_s, 2)} ms, which changes a peak by ${percent(head.halving)}.`),
-      head.settled ? null : h("div", {}, "The peaks have not settled: this motion answers to the smallest change."),
-      outside.length ? h("div", {}, `Outside the tests, touching, or in the air: ${outside.join("; ")}.`) : null);
+      h("div", {}, `Largest acceleration ${figures(a)} m/s², damper force ${figures(f)} N; step ${figures(MM * head.step_s, 2)} ms, peak values change by ${percent(head.halving)} when it is halved.`),
+      head.settled ? null : h("div", {}, "The peak values have not converged with the step size; the motion is sensitive to small changes."),
+      outside.length ? h("div", {}, `Outside the tested range, bump-stop contact or wheel lift-off: ${outside.join("; ")}.`) : null);
   }
 
   /** All curves, and the mark of the moment on each. */

@@ -1,4 +1,4 @@
-// Take away: report, tables and models as files, and the state of the bench itself.
+// Export: report, tables and models as files, and the state of the bench itself.
 
 import { capital, card, h, note, problem, put, renew } from "../dom.js";
 import { save } from "../files.js";
@@ -8,7 +8,7 @@ import { AboutForm } from "../about_form.js";
 import { workBox } from "../work.js";
 
 export const id = "takeaway";
-export const label = "Take away";
+export const label = "Export";
 
 const MM = 1000;
 
@@ -26,7 +26,7 @@ class TakeAwayView {
     this.said = h("div", { role: "status" });
     this.about = new AboutForm(bench);
     this.element = h("div", { class: "stage" }, h("div", { class: "cards" },
-      card("Report and tables", this.about.element, this.report), card("Model", this.model), card("This bench", this.stateBody())));
+      card("Report and tables", this.about.element, this.report), card("Model", this.model), card("Project", this.stateBody())));
     for (const what of ["dampers", "data"]) document.addEventListener(`bench:${what}`, () => this.shown());
   }
 
@@ -52,10 +52,10 @@ class TakeAwayView {
       return;
     }
     const files = await this.bench.api.get("/files");
-    const button = h("button", { id: "make-report", class: files.length ? "" : "primary", disabled: this.studying.busy, onclick: () => this.safely(this.study(button)) }, files.length ? "Make it again" : "Make the report");
+    const button = h("button", { id: "make-report", class: files.length ? "" : "primary", disabled: this.studying.busy, onclick: () => this.safely(this.study(button)) }, files.length ? "Recalculate" : "Create the report");
     renew(this.report, files.length
       ? this.fileList(files)
-      : h("p", {}, "The whole study of the data on the bench: one report.html that needs nothing else, the same as report.pdf, the models, and the tables as CSV."),
+      : h("p", {}, "Study of the open data: report.html (self-contained), report.pdf, the models, and the tables as CSV."),
     h("div", {}, button), this.studying.element);
   }
 
@@ -92,9 +92,9 @@ class TakeAwayView {
     const action = (title, work, kind = "") => h("button", { class: kind, onclick: () => this.trying(work) }, title);
     renew(this.model,
       h("div", { class: "field" }, h("label", { for: "take-damper" }, "Damper"), this.chooser),
-      names.length ? note("", `Held by hand: ${names.join(", ")}.`) : null,
+      names.length ? note("", `Fixed by hand: ${names.join(", ")}.`) : null,
       h("div", { class: "row" }, action("model.json", () => this.document(), "primary"), action("Loop as CSV", () => this.csv())),
-      h("p", { class: "small faint" }, c ? `The loop is that at ${condition({ ...c, amplitude_mm: MM * c.amplitude_m })}.` : "The loop is that of the condition the Model page begins with."),
+      h("p", { class: "small faint" }, c ? `The loop is calculated at ${condition({ ...c, amplitude_mm: MM * c.amplitude_m })}.` : "The loop is calculated at the initial condition of the Model page."),
       exports.length ? h("div", { class: "forms", role: "group", "aria-label": "Export" }, exports.map((e) => action(capital(e.title), () => this.export(e), "quiet"))) : null,
       this.exporting.element, this.said);
   }
@@ -139,10 +139,10 @@ class TakeAwayView {
       save(blob, name);
     };
     return h("div", { class: "body" },
-      h("p", {}, "A kept bench holds the data, every damper, every slider and the logo in one file: drop it on any bench. A state file holds what you see without the data."),
+      h("p", {}, "A saved project contains the data, all dampers, all slider values and the logo in one file; drop it on the page to open it. A state file contains the view without the data."),
       h("div", { class: "row" },
-        h("button", { class: "primary", onclick: () => this.safely(keepAll()) }, "Keep this bench"),
+        h("button", { class: "primary", onclick: () => this.safely(keepAll()) }, "Save the project"),
         h("button", { onclick: () => this.safely(keepState()) }, "Save the state")),
-      h("p", { class: "small faint" }, "“Copy link” in the header does the same as a state file. Everything stays on this machine: the bench sends nothing anywhere, and its files go when it stops."));
+      h("p", { class: "small faint" }, "“Copy link” in the header has the same content as a state file. All data stay on this computer; the temporary files are removed when the app stops."));
   }
 }
