@@ -10,6 +10,9 @@ TERMS = tomllib.loads((ROOT / "docs" / "words.toml").read_text(encoding="utf-8")
 REWRITTEN = (
     "CHANGELOG.md",
     "README.md",
+    "docs/explanation/left-out.md",
+    "docs/index.md",
+    "docs/nomenclature.md",
     "src/mrdamper/cli/commands/compare.py",
     "src/mrdamper/cli/commands/import_.py",
     "src/mrdamper/cli/commands/models.py",
@@ -32,6 +35,13 @@ REWRITTEN = (
     "src/mrdamper/report/templates/simulation.html.j2",
     "src/mrdamper/report/templates/study.html.j2",
     "src/mrdamper/report/templates/tests.html.j2",
+    "src/mrdamper/web/api/identify.py",
+    "src/mrdamper/web/static/index.html",
+    "src/mrdamper/web/static/js/views/compare.js",
+    "src/mrdamper/web/static/js/views/data.js",
+    "src/mrdamper/web/static/js/views/identify.js",
+    "src/mrdamper/web/static/js/views/ride.js",
+    "src/mrdamper/web/static/js/views/takeaway.js",
 )
 READERS = {str(path.relative_to(ROOT)): (path, reader) for path, reader in all_texts()}
 
