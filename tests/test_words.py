@@ -11,6 +11,7 @@ REWRITTEN = (
     "CHANGELOG.md",
     "README.md",
     "docs/explanation/left-out.md",
+    "docs/how-to/live-bench.md",
     "docs/index.md",
     "docs/nomenclature.md",
     "src/mrdamper/cli/commands/compare.py",
