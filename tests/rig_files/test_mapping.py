@@ -11,6 +11,7 @@ from mrdamper.errors import InputError
 from mrdamper.rig_files.mapping.proposals import damping_share
 from mrdamper.rig_files.mapping.questions import question_of
 from mrdamper.rig_files.mapping.results import results_in
+from mrdamper.rig_files.mapping.session import stretches_of_session
 from mrdamper.rig_files.profile import Profile, parse_profile
 from mrdamper.rig_files.rig_import import import_files, to_dataset
 
@@ -127,6 +128,29 @@ def test_a_session_is_cut_at_its_rests_and_a_pause_is_not(tests, tmp_path):
     right("session_cut_by_rests", tests, tmp_path / "session")
     KINDS["session_cut_by_rests"]((tests[2], tests[2], tests[2]), tmp_path / "pause")
     assert len(import_files([tmp_path / "pause"]).records) == 1
+
+
+def test_a_session_is_cut_at_the_steps_of_its_current_and_a_response_to_a_step_is_not(tests, tmp_path):
+    for folder in ("session", "response"):
+        (tmp_path / folder).mkdir()
+    right("session_cut_by_steps_of_the_current", tests, tmp_path / "session")
+    test = tests[2]
+    stepped = np.where(test.t < 0.3, 0.0, 0.6)
+    put(
+        tmp_path / "response" / "a.csv",
+        ["time_s,displacement_mm,force_N,current_A", *rows(test.t, 1e3 * test.x, test.f, stepped)],
+    )
+    assert len(import_files([tmp_path / "response"]).records) == 1
+
+
+def test_a_cut_into_too_many_tests_is_refused(tests):
+    t = np.arange(0, 3 * 510, 0.02)
+    x = np.where(t % 3 < 2, 0.01 * np.sin(2 * np.pi * t), 0.0)
+    current = 0.5 * (np.floor(t / 3) % 2)
+    assert len(stretches_of_session(t[: t.size // 2], x[: t.size // 2], current[: t.size // 2])) == 255
+    with pytest.raises(InputError, match="510 tests") as refused:
+        stretches_of_session(t, x, current)
+    assert refused.value.code == "E_BLOCKS"
 
 
 @pytest.mark.parametrize(

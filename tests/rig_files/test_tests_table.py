@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from mrdamper.cli import application
 from mrdamper.errors import InputError
 from mrdamper.files.dataset import load_dataset
+from mrdamper.rig_files.rig_import import import_files
 from mrdamper.rig_files.tests_table import load_tests
 
 
@@ -109,6 +110,32 @@ def test_a_table_that_contradicts_the_channel_is_refused(tmp_path):
     done = run("import", tmp_path / "rig", "--out", tmp_path / "ds")
     assert done.exit_code == 2
     assert "E_CURRENT_CONTRADICTS" in done.output
+
+
+def test_a_table_against_the_files_name_is_refused_and_its_remedies_work(tmp_path):
+    (tmp_path / "rig").mkdir()
+    file = write(tmp_path / "rig", "a_0.5A.csv", text())
+    table = write(tmp_path / "rig", "tests.csv", "file,current_A\na_0.5A.csv,1\n")
+    (refusal,) = import_files([tmp_path / "rig"]).refusals
+    assert refusal.error.code == "E_CURRENT_CONTRADICTS"
+    assert "file name" in str(refusal.error)
+    for cell in ("", "0.5"):
+        table.write_text(f"file,current_A,split\na_0.5A.csv,{cell},train\n")
+        assert len(import_files([tmp_path / "rig"]).records) == 1
+    file.rename(tmp_path / "rig" / "a.csv")
+    table.write_text("file,current_A\na.csv,1\n")
+    assert import_files([tmp_path / "rig"]).records[0].current.mean() == 1
+
+
+def test_a_row_that_names_tests_of_two_files_is_refused_and_folders_tell_them_apart(tmp_path):
+    for folder in ("one", "two"):
+        (tmp_path / folder).mkdir()
+        write(tmp_path / folder, "a.csv", text())
+    table = write(tmp_path, "tests.csv", "file,current_A\na.csv,0.5\n")
+    with pytest.raises(InputError, match="tests of 2 files"):
+        import_files([tmp_path])
+    table.write_text("file,current_A\none/a.csv,0.5\ntwo/a.csv,0.5\n")
+    assert len(import_files([tmp_path]).records) == 2
 
 
 def test_files_are_added_to_a_dataset_and_never_twice(dataset, rig, tmp_path):

@@ -888,3 +888,13 @@ def apparatus_xlsx_with_units_in_cells(tests, p):
         for n, (t, x, f) in enumerate(zip(q.t, q.x, q.f)):
             sheet.append([n, float(t), float(1e3 * x), float(f)])
         book.save(p / f"T{k}.xlsx")
+
+
+@kind
+def session_cut_by_steps_of_the_current(tests, p):
+    for number, motion in enumerate(sorted({(q.frequency, q.amplitude) for q in tests})):
+        group = [q for q in tests if (q.frequency, q.amplitude) == motion]
+        size = np.count_nonzero(group[0].t < 4 / motion[0])
+        t = group[0].t[1] * np.arange(size * len(group))
+        x, f, i = (np.concatenate([getattr(q, c)[:size] for q in group]) for c in "xfi")
+        put(p / f"sweep{number}.csv", ["time_s,displacement_mm,force_N,current_A", *rows(t, 1e3 * x, f, i)])

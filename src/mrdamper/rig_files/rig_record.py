@@ -52,9 +52,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
     if len(stretches) == 1 and profile.file.blocks != "join":
         stretches = stretches_of_session(channels["time"], channels["displacement"], channels.get("current"))
         if len(stretches) > 1:
-            text = (
-                f'the record rests between its tests and is cut there into {len(stretches)} (blocks = "join" keeps it)'
-            )
+            text = f'cut at its rests or steps of the current into {len(stretches)} tests (blocks = "join" keeps it)'
             findings.append(Finding("W_CUT", text))
     remarks = {**_remarks(table, found), **({"time_from": rate} if rate else {})}
     for name, why in left_out(table, profile, found).items():

@@ -67,7 +67,7 @@ class TestsTable:
         return tuple(row for row in self.rows if _is_file(row.file, path))
 
     def require_found(self, tests: Iterable[tuple[Path, str]]) -> None:
-        """Refuse rows of files or runs that are not there.
+        """Refuse rows of files or runs that are not there, and rows of one name that several files have.
 
         Raises
         ------
@@ -75,6 +75,15 @@ class TestsTable:
             Naming every one of them.
         """
         tests = list(tests)
+        for row in self.rows:
+            fitting = {path for path, run in tests if run and _is_file(row.file, path) and row.run in ("", run)}
+            if len(fitting) > 1:
+                what = " ".join(filter(None, (row.file, row.run)))
+                shown = ", ".join(sorted("/".join(path.parts[-2:]) for path in fitting)[:4])
+                raise TestsTableError(
+                    f"{what!r} names tests of {len(fitting)} files: {shown}", where=f"{self.path.name}, line {row.line}",
+                    mend="write the file with its folder, and one row for each",
+                )  # fmt: skip
         absent = [
             row
             for row in self.rows
@@ -133,7 +142,7 @@ def load_tests(path: str | Path) -> TestsTable:
 
 
 def applied(record: Record, row: Row | None, table: TestsTable) -> Record:
-    """A record with what its row says; E_CURRENT_CONTRADICTS if its own current channel is another."""
+    """A record with what its row says; E_CURRENT_CONTRADICTS if its channel, name or heading states another current."""
     if row is None:
         return record
     if row.current is not None:
@@ -143,14 +152,15 @@ def applied(record: Record, row: Row | None, table: TestsTable) -> Record:
 
 
 def _with_current(record: Record, current: float, table: TestsTable, line: int) -> Record:
+    whence = record.provenance.get("current_from", "current channel")
+    mean = None if record.current is None else contradicted(record.current, current)
+    if mean is not None:
+        mend = "correct the cell, or leave it empty; if the file is wrong, correct or rename it"
+        raise TestsTableError(
+            f"line {line} gives {current:g} A, {record.id} by its {whence} {mean:g} A",
+            where=table.path.name, mend=mend, code="E_CURRENT_CONTRADICTS",
+        )  # fmt: skip
     if record.current is not None and "current_from" not in record.provenance:
-        mean = contradicted(record.current, current)
-        if mean is not None:
-            raise TestsTableError(
-                f"line {line} gives {current:g} A, the current channel of {record.id} {mean:g} A",
-                where=table.path.name, mend="correct the one that is wrong, or leave the cell empty",
-                code="E_CURRENT_CONTRADICTS",
-            )  # fmt: skip
         return record
     return replace(
         record,

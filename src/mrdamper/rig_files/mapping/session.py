@@ -1,4 +1,4 @@
-"""A session in one record: motions with rests between them, each at a current of its own, are tests of their own."""
+"""A session in one record: motions between rests or steps of the current are tests of their own."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from mrdamper.data import Floats, held_current
+from mrdamper.errors import ColumnError
 from mrdamper.rig_files.quality.strokes import find_strokes
 
 MOST_TESTS = 500  # of a record: more is a cut at noise
@@ -14,6 +15,8 @@ _BLOCK_S = 0.1  # [s] in which a motion at rest stays within a share of its rang
 _REST = 0.03  # of the motion's range
 _FEWEST_BLOCKS = 3  # of a rest
 _FEWEST_REVERSALS = 3  # of a test
+_FEWEST_REVERSALS_HELD = 5  # of a test at a current that steps to the next without a rest
+_SETTLED_PERIODS = 0.25  # of the motion: time over which a step of the current is looked for
 _ALIKE = 0.1  # relative difference of period and stroke of two tests at one condition
 _ALIKE_A = 0.05  # difference of current of two tests at one condition [A]
 _LONGEST = 5_000_000  # samples
@@ -24,25 +27,62 @@ def stretches_of_session(time: Floats, displacement: Floats, current: Floats | N
 
     A record is cut only if every part between two rests is a motion of several strokes at a constant
     current, and not all parts are of one condition: a pause within a test, and the dwell of a
-    trapezoidal motion, are no borders.
+    trapezoidal motion, are no borders. Without rests it is cut where the current steps.
+
+    Raises
+    ------
+    ColumnError
+        E_BLOCKS if there are more than 500 tests.
     """
     whole = [slice(0, time.size)]
     there = np.isfinite(time) & np.isfinite(displacement)
     if current is None or not there.all() or not 400 <= time.size <= _LONGEST or np.any(np.diff(time) <= 0):
         return whole
-    borders = _borders(time, displacement)
-    if not 1 <= len(borders) <= 2 * MOST_TESTS:
-        return whole
+    borders = _borders(time, displacement) or _steps(time, displacement, current)
     parts = [slice(a, b) for a, b in pairwise([0, *borders, time.size])]
     parts = [part for part in parts if _moves(displacement[part], displacement)]
-    if not 2 <= len(parts) <= MOST_TESTS:
+    if len(parts) < 2:
         return whole
-    conditions = [_condition(time[part], displacement[part], current[part]) for part in parts]
-    if any(condition is None for condition in conditions):
+    conditions = []
+    for part in parts:
+        conditions.append(_condition(time[part], displacement[part], current[part]))
+        if conditions[-1] is None:
+            return whole
+    if all(_same(conditions[0], other) for other in conditions):
         return whole
-    first = conditions[0]
-    alike = all(_same(first, other) for other in conditions)
-    return whole if alike else parts
+    if len(parts) > MOST_TESTS:
+        raise ColumnError(
+            f"rests cut the record into {len(parts)} tests of several conditions, more than {MOST_TESTS}",
+            mend='export it in parts, or say blocks = "join" under [file] of a profile to keep it whole',
+            code="E_BLOCKS",
+        )
+    return parts
+
+
+def _steps(time: Floats, x: Floats, current: Floats) -> list[int]:
+    """Where the current goes from one held value to another while the motion goes on; empty if it is never held.
+
+    Between two steps the motion turns back several times: a shorter stretch is a test of the coil's response.
+    """
+    if not np.isfinite(current).all() or not held_current(current)[1]:
+        return []
+    strokes = find_strokes(time, x)
+    if strokes.period is None:
+        return []
+    step = float(np.median(np.diff(time)))
+    size = max(1, round(_SETTLED_PERIODS * strokes.period / step))
+    if time.size < 2 * size:
+        return []
+    ahead = np.abs(current[size:] - current[:-size]) > _ALIKE_A  # two sides of a step are so far apart
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], ahead, [False]]).astype(int)))
+    found = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    if not found or any(not 0.5 * size <= b - a <= 2 * size for a, b in found):
+        return []
+    # The first sample of which the one `size` ahead differs stands `size` before the step.
+    borders = [a + size for a, _ in found]
+    bounds = [0, *borders, time.size]
+    longest = [np.count_nonzero((strokes.reversals >= a) & (strokes.reversals < b)) for a, b in pairwise(bounds)]
+    return borders if min(longest) >= _FEWEST_REVERSALS_HELD else []
 
 
 def _borders(time: Floats, x: Floats) -> list[int]:
