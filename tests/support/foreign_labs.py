@@ -898,3 +898,12 @@ def session_cut_by_steps_of_the_current(tests, p):
         t = group[0].t[1] * np.arange(size * len(group))
         x, f, i = (np.concatenate([getattr(q, c)[:size] for q in group]) for c in "xfi")
         put(p / f"sweep{number}.csv", ["time_s,displacement_mm,force_N,current_A", *rows(t, 1e3 * x, f, i)])
+
+
+@kind
+def crank_dynamometer(tests, p):
+    for k, q in enumerate(tests, 1):
+        head = [f"Drehzahl: {60 * q.frequency:g} 1/min", f"Spulenstrom: {q.current:g} A".replace(".", ",")]
+        angle = (360 * q.frequency * q.t) % 360
+        lines = rows(angle, 1e3 * q.x, q.f, sep=";", mark=",", fmt="%.4f")
+        put(p / f"kurbel{k}.csv", [*head, "Kurbelwinkel [°];Weg [mm];Kraft [N]", *lines], "cp1252")

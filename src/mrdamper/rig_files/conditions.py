@@ -24,7 +24,7 @@ _IN_NAME = re.compile(
 )
 _LINE = re.compile(
     r"^[\s#%/\"]*(?P<key>[^:=;\t]{1,60}?)[\s\"]*[:=;,\t][\s:=;,\t\"]*(?P<number>[+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]{1,2})?)"
-    r"[\s;,\t\"]*[\[(]?(?P<unit>[A-Za-zµ/]{0,9})[\])]?[\s;,\t\"]*$"
+    r"[\s;,\t\"]*[\[(]?(?P<unit>(?:1/)?[A-Za-zµ/]{0,9}(?:-1)?)[\])]?[\s;,\t\"]*$"
 )
 _LONGEST_LINE, _MOST_PARTS = 300, 20
 _OTHER_TIMES = r"previous|vorher|\blast\b|\bnext\b|before|after|\bnach\b|instead|statt"
@@ -41,11 +41,12 @@ _RATE = re.compile(
     r"sampl|abtast|messrate|^rate$|scan|acquisition|échantillon|muestreo|campion|^fs$|^f_s$", re.IGNORECASE
 )
 _STEP = re.compile(
-    r"^dt$|^d_t$|^delta[ _]?t|^[dΔ] ?t$|sampl|abtast|time ?step|step ?time|zeitschritt|increment|échantillon|muestreo",
+    r"^dt$|^d_t$|^delta[ _]?t|^[dΔ] ?t$|sampl|abtast|time ?step|step ?time|zeitschritt|increment|échantillon|muestreo"
+    r"|^[hx][ _]?(?:resolution|interval|increment|step)$",
     re.IGNORECASE,
 )
 _SPACED = re.compile(
-    r"^[\s#%/\"]*(?P<key>[^\d:=;,\t]{1,60}?)\s+(?P<number>[+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]{1,2})?)\s*(?P<unit>[A-Za-zµ/]{1,9})\s*$"
+    r"^[\s#%/\"]*(?P<key>[^\d:=;,\t]{1,60}?)\s+(?P<number>[+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]{1,2})?)\s*(?P<unit>(?:1/)?[A-Za-zµ/]{1,9}(?:-1)?)\s*$"
 )
 
 
@@ -130,6 +131,25 @@ def stated_rate(lines: Iterable[str], numbers: Mapping[str, float], decimal: str
     if rates and max(rates) > 1.001 * min(rates):
         raise ValueError(f"{min(rates):g} Hz and {max(rates):g} Hz")
     return rates[0] if rates else None
+
+
+_TURNS = re.compile(r"speed|rpm|drehzahl|crank|régime|vitesse|velocidad|giri|обороты|转速|回転", re.IGNORECASE)
+
+
+def stated_speed(lines: Iterable[str], numbers: Mapping[str, float], decimal: str | None = None) -> float | None:
+    """Speed of a crank [1/s] that lines or numbers beside the columns state; None if none does.
+
+    Raises ValueError if two of them contradict each other.
+    """
+    stated = [(key, value, known) for line in lines for key, value, known in _quantities(line, decimal)]
+    for name, number in numbers.items():
+        header = split_name(name)
+        if header.known is not None:
+            stated.append((name, header.known.factor * number, header.known))
+    speeds = [v for key, v, known in stated if known.dimension == "frequency" and v > 0 and _TURNS.search(key)]
+    if speeds and max(speeds) > 1.01 * min(speeds):
+        raise ValueError(f"{60 * min(speeds):g} rpm and {60 * max(speeds):g} rpm")
+    return speeds[0] if speeds else None
 
 
 def _quantities(line: str, decimal: str | None) -> Iterator[tuple[str, float, Unit]]:

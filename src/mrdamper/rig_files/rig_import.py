@@ -20,6 +20,7 @@ from mrdamper.rig_files.column_names import names_compression, names_made
 from mrdamper.rig_files.columns import assign, propose, rate_of
 from mrdamper.rig_files.long_records import judge_long
 from mrdamper.rig_files.mapping.agreement import contradictions
+from mrdamper.rig_files.mapping.clocks import with_time_stated
 from mrdamper.rig_files.mapping.companions import (
     joined_parts,
     part_of,
@@ -28,6 +29,7 @@ from mrdamper.rig_files.mapping.companions import (
     with_results_of,
 )
 from mrdamper.rig_files.mapping.completion import completed
+from mrdamper.rig_files.mapping.long_table import with_channels_as_columns
 from mrdamper.rig_files.mapping.proposals import with_channels_by_physics, with_unit_of_time
 from mrdamper.rig_files.mapping.rasters import with_joined_rasters, with_one_clock
 from mrdamper.rig_files.mapping.results import with_results
@@ -456,7 +458,7 @@ def _parts(tables: list[RawTable], profile: Profile) -> list[RawTable]:
     if tables and not kept:
         raise tables[0].source.refuse("E_NO_DATA", "every table is left out", "correct [file] leave_out of the profile")
     tables = kept
-    tables = with_joined_rasters([completed(table) for table in tables])
+    tables = with_joined_rasters([with_time_stated(completed(with_channels_as_columns(table))) for table in tables])
     tables = [with_one_clock(table) for table in tables]
     parts = [part for table in tables for part in ([table] if table.fallback else tests_of(table, profile.file))]
     parts = [with_channels_by_physics(with_unit_of_time(table), _said(profile)) for table in with_results(parts)]

@@ -81,7 +81,8 @@ class TestsTable:
                 what = " ".join(filter(None, (row.file, row.run)))
                 shown = ", ".join(sorted("/".join(path.parts[-2:]) for path in fitting)[:4])
                 raise TestsTableError(
-                    f"{what!r} names tests of {len(fitting)} files: {shown}", where=f"{self.path.name}, line {row.line}",
+                    f"{what!r} names tests of {len(fitting)} files: {shown}",
+                    where=f"{self.path.name}, line {row.line}",
                     mend="write the file with its folder, and one row for each",
                 )  # fmt: skip
         absent = [

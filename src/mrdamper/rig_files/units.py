@@ -50,7 +50,8 @@ _EXACT = {
     "temperature": {"°C": 1, "degC": 1, "C": 1},
     "mass": {"kg": 1, "lbm": 0.45359237},
     "pressure": {"Pa": 1, "kPa": 1e3, "MPa": 1e6, "bar": 1e5, "psi": 6894.757293168},
-    "frequency": {"Hz": 1, "kHz": 1e3, "rpm": 1 / 60, "S/s": 1, "kS/s": 1e3, "1/s": 1, "samples/s": 1},
+    "frequency": {"Hz": 1, "kHz": 1e3, "rpm": 1 / 60, "1/min": 1 / 60, "min-1": 1 / 60, "U/min": 1 / 60,
+        "tr/min": 1 / 60, "S/s": 1, "kS/s": 1e3, "1/s": 1, "samples/s": 1},
     "angle": {"rad": 1, "deg": 0.017453292519943295, "°": 0.017453292519943295},
     "count": {"%": 0.01, "segments": 1, "cycles": 1, "counts": 1, "samples": 1},
 }  # fmt: skip

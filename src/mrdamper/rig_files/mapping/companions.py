@@ -157,7 +157,8 @@ def _lines(table: RawTable) -> list[str]:
     if any(words.codes.size > _MOST_ROWS for words in columns):
         return []
     rows = zip(*([words.labels[code] for code in words.codes] for words in columns), strict=True)
-    return ["\t".join(cells) for cells in (table.names, table.units, *rows)]
+    units = (table.units,) if any(table.units) else ()
+    return ["\t".join(cells) for cells in (table.names, *units, *rows)]
 
 
 def with_results_of(pending: Sequence[tuple[Path, Record]], results: Results, path: Path) -> list[Record] | None:

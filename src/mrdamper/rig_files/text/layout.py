@@ -30,6 +30,7 @@ _LISTING = re.compile(
 _MARKS = frozenset("#%/")
 _SAMPLE = 60  # rows looked at
 _STRAY = 0.1  # of the sampled numbers: fewer with the other decimal mark are single bad cells
+_MOST_LEVELS = 4  # lines of headings
 _TELLING = 2  # columns whose names tell what they are
 _WORD = re.compile(r"[^\W\d_]{3,}")
 _NAME_AND_UNIT = re.compile(r"[^\s\[(<{]+(?:\s*\[[^\[\]]*\]|\s*\([^()]*\))?")
@@ -92,6 +93,8 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         except csv.Error as error:
             raise source.refuse("E_QUOTE", "a quote is not closed", "close or remove it", line=header + 1) from error
     names = form.names or (_cells(lines[header], separator, width) if header is not None else ("",) * width)
+    levels = [] if header is None or form.names else _levels(lines[:header], separator, width)
+    names, titles = _with_levels(names, levels)
     if len(names) != width:
         raise _mismatch(source, separator, len(names), width, first, lines)
     units = _cells(lines[unit_row], separator, width) if unit_row is not None else ("",) * width
@@ -115,11 +118,65 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         trailing,
         lines[header] if header is not None and not is_comment(lines[header]) else "",
         tuple(next(filter(None, c), "") if k == "text" else "" for c, k in zip(columns, kinds, strict=True)),
-        (*(line for line in above if line.strip()), *_notes_beside(rows)),
-        _titles(above, separator, width),
+        (
+            *(line for line in (*above, *_below_names(lines, header, unit_row, first)) if line.strip()),
+            *_stated_for_all(lines[:first], separator, width),
+            *_notes_beside(rows),
+        ),
+        titles or _titles(above, separator, width),
         _writes(rows),
         behind if any(behind) else (),
     )
+
+
+def _below_names(lines: Sequence[str], header: int | None, units: int | None, first: int) -> list[str]:
+    """The lines between the names of columns and the first row that are no units: comments of a plotting program."""
+    return [] if header is None else [lines[i] for i in range(header + 1, min(first, len(lines))) if i != units]
+
+
+def _levels(above: Sequence[str], separator: str, width: int) -> list[tuple[str, ...]]:
+    """The lines of cells right above the names of columns, one cell a column."""
+    found: list[tuple[str, ...]] = []
+    for line in reversed(above[-_MOST_LEVELS:]):
+        if not line.strip() or is_comment(line) or separator == SPACES:
+            break
+        cells = _try_split(line, separator)
+        if len(cells) != width or sum(map(bool, cells)) < 2:
+            break
+        found.append(tuple(cell.strip('"') for cell in cells))
+    return found
+
+
+def _with_levels(names: tuple[str, ...], levels: list[tuple[str, ...]]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of columns of a table with several levels of headings, and the titles of the other level.
+
+    The last line names the index alone, a line above it the channels, another their conditions.
+    """
+    empty = [i for i, name in enumerate(names) if not name]
+    if len(_roles(names)) >= _TELLING or len(empty) < _TELLING:
+        return names, ()
+    telling = [cells for cells in levels if len(_roles([cells[i] for i in empty])) >= _TELLING]
+    if len(telling) != 1:
+        return names, ()
+    filled = tuple(name or cell for name, cell in zip(names, telling[0], strict=True))
+    others = [cells for cells in levels if cells is not telling[0]]
+    return filled, others[0] if others else ()
+
+
+def _stated_for_all(above: Sequence[str], separator: str, width: int) -> list[str]:
+    """Lines of a key with one number for every column, with their unit: HResolution, 5E-3, 5E-3 and HUnit, s, s."""
+    keyed: dict[str, str] = {}
+    for line in above:
+        key, *cells = _try_split(line, separator) if width > 2 and line.strip() else [""]
+        if key and len(cells) == width - 1 and len(set(cells)) == 1 and cells[0]:
+            keyed[key.strip('"')] = cells[0].strip('"')
+    units = {key[:-4]: unit for key, unit in keyed.items() if key.casefold().endswith("unit") and is_unit(unit)}
+    return [
+        f"{key}: {number} {unit}"
+        for start, unit in units.items()
+        for key, number in keyed.items()
+        if start and key.startswith(start) and looks_numeric(number)
+    ]
 
 
 def _without_units(lines: Sequence[str]) -> Sequence[str]:
@@ -286,14 +343,30 @@ def _first_row(content: Sequence[tuple[int, str]], above: int, separator: str, s
         kind = RigFileError if named else NoTableError
         raise kind("E_NO_DATA", what, file=source.name, mend="export the file again, with its data")
     width = Counter(len(cells) for cells in rows).most_common(1)[0][0]
-    split_lines = ((i, _try_split(line, separator)) for i, line in content)
-    first, cells = next((i, cells) for i, cells in split_lines if len(cells) == width and _is_row(cells))
+    first, cells = _first_of(content, width, separator)
     trailing = width > 1 and separator != SPACES and not cells[-1] and not any(r[-1] for r in rows if len(r) == width)
     if trailing:
         over = (_try_split(line, separator) for i, line in (*before, *content) if i < first)
         header = [cells for cells in over if len(cells) in (width, width - 1)]
         trailing = not header or len(header[-1]) == width - 1 or not header[-1][-1]
     return first, width - trailing, trailing
+
+
+def _first_of(content: Sequence[tuple[int, str]], width: int, separator: str) -> tuple[int, list[str]]:
+    """Index and cells of the first row; a key with numbers behind it is none if lines of another kind follow."""
+    worded: tuple[int, list[str]] | None = None
+    keyed: tuple[int, list[str]] | None = None
+    for i, line in content:
+        cells = _try_split(line, separator)
+        if not _is_row(cells):
+            keyed = None
+        elif len(cells) == width and not _WORD.match(cells[0].strip('"')):
+            return keyed or (i, cells)
+        elif len(cells) == width:
+            keyed = keyed or (i, cells)
+            worded = worded or keyed
+    assert worded is not None
+    return worded
 
 
 def _rows(lines: Sequence[str], separator: str, width: int, trailing: bool) -> list[list[str]]:
@@ -348,7 +421,12 @@ def _header_lines(
         last = fitting[-1]
         if candidates is plain and last != plain[-1] and _names_columns(lines[plain[-1]], separator):
             break
-        units = next((i for i in reversed(fitting) if _is_units(_cells(lines[i], separator, width))), None)
+        stated = [i for i in reversed(fitting) if _is_units(_cells(lines[i], separator, width))]
+        units = next((i for i in stated if not _is_times(_cells(lines[i], separator, width))), (*stated, None)[0])
+        if units is not None and units != fitting[-1]:  # keys with one cell a column: TraceName, VUnit, HUnit
+            named = [i for i in fitting if len(_roles(_cells(lines[i], separator, width))) >= _TELLING and i < units]
+            if named and all(_is_keyed(_cells(lines[i], separator, width)) for i in fitting if i > named[-1]):
+                return named[-1], units
         naming = [i for i in fitting if i != units and (units is None or i < units)]
         if units is not None and len(fitting) > 1 and units == fitting[-2] and not naming:  # above the names
             return last, units
@@ -390,6 +468,18 @@ def _is_units(cells: Sequence[str]) -> bool:
     filled = [cell for cell in cells if cell and cell not in ("-", "--", "[-]", "(-)")]
     known = sum(is_unit(_unbracket(cell)) for cell in filled)
     return known >= 1 and 2 * known >= len(filled)
+
+
+def _is_times(cells: Sequence[str]) -> bool:
+    """Whether a line of units gives the same unit of time to several columns."""
+    units = [cell for cell in map(_unbracket, cells) if is_unit(cell)]
+    return len(units) > 1 and {split_name("", unit).dimension for unit in units} == {"time"}
+
+
+def _is_keyed(cells: Sequence[str]) -> bool:
+    """Whether a line is a key followed by units, or by one number for all columns."""
+    rest = cells[1:]
+    return _WORD.match(cells[0]) is not None and (_is_units(rest) or all(looks_numeric(cell) for cell in rest))
 
 
 def _unbracket(unit: str) -> str:

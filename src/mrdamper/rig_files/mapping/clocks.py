@@ -1,0 +1,81 @@
+"""Time that a table holds otherwise than as one column: seconds and thousandths apart, or the angle of a crank."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mrdamper.errors import InputError
+from mrdamper.rig_files.conditions import stated_speed
+from mrdamper.rig_files.readers.base import Content, RawTable
+from mrdamper.rig_files.record import Finding
+
+_THOUSANDTHS = frozenset(("ms", "msec", "millisecond", "milliseconds", "millisekunden"))
+
+
+def with_time_stated(table: RawTable) -> RawTable:
+    """The table with a column of time, where seconds stand beside thousandths, or a crank turns at a stated speed."""
+    times = [i for i, header in enumerate(table.headers) if header.role == "time"]
+    if len(times) == 1:
+        return _with_thousandths(table, times[0])
+    return table if times else _with_crank(table)
+
+
+def _with_thousandths(table: RawTable, clock: int) -> RawTable:
+    """Stamps of whole seconds, repeated, with the milliseconds beside them."""
+    beside = [i for i, name in enumerate(table.names) if name.strip().casefold() in _THOUSANDTHS]
+    if len(beside) != 1 or table.units[clock] != "s":
+        return table
+    inner, part = table.read, beside[0]
+    try:
+        values = inner([clock, part]).values
+    except InputError:
+        return table
+    seconds, thousandths = values[clock], values[part]
+    apart = np.all(seconds == np.floor(seconds)) and np.all((thousandths >= 0) & (thousandths < 1000))
+    if not apart or not np.any(np.diff(seconds) == 0):
+        return table
+
+    def read(columns: Sequence[int]) -> Content:
+        content = inner(sorted({*columns, part} if clock in columns else {*columns}))
+        found = dict(content.values)
+        if clock in found:
+            found[clock] = found[clock] + found[part] / 1000
+        return Content({i: found[i] for i in columns}, content.lines, content.findings)
+
+    return replace(table, read=read)
+
+
+def _with_crank(table: RawTable) -> RawTable:
+    """An angle of a crank as time, at the speed that a line or a number beside the columns states."""
+    angles = [i for i, header in enumerate(table.headers) if header.dimension == "angle"]
+    if len(angles) != 1:
+        return table
+    decimal = table.form.get("decimal")
+    try:
+        speed = stated_speed(table.remarks, table.constants, decimal if isinstance(decimal, str) else None)
+    except ValueError as error:
+        raise table.source.refuse(
+            "E_AMBIGUOUS", f"two speeds of the crank: {error}", "correct the line that is wrong"
+        ) from error
+    if speed is None:
+        return table
+    inner, column, known = table.read, angles[0], table.headers[angles[0]].known
+    assert known is not None
+
+    def read(columns: Sequence[int]) -> Content:
+        content = inner(columns)
+        if column not in content.values:
+            return content
+        angle = known.factor * content.values[column]
+        there = np.isfinite(angle)
+        turned = np.full(angle.shape, np.nan)
+        turned[there] = np.unwrap(angle[there]) / (2 * np.pi * speed)
+        return Content({**content.values, column: turned}, content.lines, content.findings)
+
+    text = f"time is the angle {table.names[column]!r} at {60 * speed:g} rpm"
+    names = tuple("time" if i == column else name for i, name in enumerate(table.names))
+    units = tuple("s" if i == column else unit for i, unit in enumerate(table.units))
+    return replace(table, names=names, units=units, read=read, findings=(*table.findings, Finding("W_UNITS", text)))
