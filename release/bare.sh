@@ -34,6 +34,5 @@ refused() {  # what needs an extra says which, in one line, and ends with 2
   "$bin/mrdamper" "$@" >/dev/null 2>said || rc=$?
   [ $rc = 2 ] && grep -q 'pip install .mrdamper\[' said || { cat said >&2; echo "rc $rc: mrdamper $*" >&2; exit 1; }
 }
-refused identify --run utf_5mm4Hz_1A --model lugre
 refused serve
 echo "a bare wheel installs in $size MB, imports, studies, predicts and exports; what needs an extra says which"
