@@ -20,7 +20,7 @@ from mrdamper.dampers.bands import band
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.covariance import certain
 from mrdamper.dampers.joint import JointDamper, JointFit, JointProblem
-from mrdamper.data import Condition, Floats, Run, session_of
+from mrdamper.data import SESSIONS_NEEDED, Condition, Floats, Run, session_of
 from mrdamper.files.dataset import load_dataset
 from mrdamper.identification import identify
 from mrdamper.identification.intervals import interval_about
@@ -144,11 +144,18 @@ class Rig:
         return problem, problem.fit(start=self.point, settled=_SETTLED)
 
     def draw(self, rng: np.random.Generator) -> list[Run]:
-        """The runs with a gain and an offset of every session, and noise."""
-        sessions = {session_of(run): rng.standard_normal(2) for run in self.runs}
+        """The runs with noise, and a gain and an offset of every session; of every run where sessions are too few.
+
+        Of fewer sessions than `SESSIONS_NEEDED` no scatter is estimated: intervals are for sessions like the tested
+        ones, so that only what differs from run to run is drawn.
+        """
+        groups = {run.id: session_of(run) for run in self.runs}
+        if len(set(groups.values())) < SESSIONS_NEEDED:
+            groups = {run.id: run.id for run in self.runs}
+        drawn = {group: rng.standard_normal(2) for group in dict.fromkeys(groups.values())}
         made = []
         for run in self.runs:
-            gain, offset = sessions[session_of(run)]
+            gain, offset = drawn[groups[run.id]]
             half = np.ptp(run.force[run.in_window]) / 2
             error = OFFSET * self.size * offset + NOISE * half * rng.standard_normal(run.force.size)
             made.append(replace(run, force=run.force * (1 + GAIN * gain) + error))
