@@ -127,6 +127,13 @@ def test_an_outside_model_is_identified_saved_loaded_and_exported(call, site, tm
     assert "rig-parts 1.0" in refused.stderr
 
 
+@pytest.mark.slow
+def test_an_outside_model_is_studied(call, tmp_path):
+    call("study", "--model", "rounded-coulomb", "--out", tmp_path / "result")
+    saved = json.loads((tmp_path / "result" / "model-utfsm.json").read_text())
+    assert saved["damper"]["model"] == "rounded-coulomb"
+
+
 def test_an_outside_reader_check_and_command_are_used(call, tmp_path):
     t = np.arange(3001) / 500
     x, v = 0.01 * np.sin(2 * np.pi * t), 0.02 * np.pi * np.cos(2 * np.pi * t)

@@ -25,6 +25,7 @@ from mrdamper.errors import IdentificationError, InputError, UnknownNameError, c
 from mrdamper.functions.selection import mean_error, smaller_wins
 from mrdamper.identification import refuse_clipped
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, at_levels, dynamic_ranges
+from mrdamper.models import all_models
 from mrdamper.motion import analyse_motion, equivalent_sine
 from mrdamper.rig_files.quality.table import judged
 from mrdamper.study.contradictions import Contradiction, find_contradictions
@@ -255,8 +256,8 @@ def study_rig(
     methods = study_methods()
     if isinstance(model, str) and model in methods:
         model = methods[model]()
-    if not isinstance(model, StudyMethod) and model not in (None, *STUDIED, JOINTLY):
-        raise UnknownNameError.of("studied model", str(model), (*STUDIED, JOINTLY, *methods))
+    if not isinstance(model, StudyMethod) and model is not None and model not in all_models():
+        raise UnknownNameError.of("model", str(model)[:100], (*all_models(), *methods))
     method, model = (model, model.name) if isinstance(model, StudyMethod) else (None, model)
     rig = dataset.rigs[0]
     progress(f"{rig or 'rig'}: loops", 0.0)
@@ -284,7 +285,7 @@ def study_rig(
             mend="a model over conditions needs at least two, or a record of other motion; check the split column",
         )
     candidates, impossible = fit_and_score_all(
-        _steps(train, everything, method),
+        _steps(train, everything, method, model if method is None else None),
         [run for run in trusted if run.split == "validate"],
         lambda what, share: progress(f"{rig or 'rig'}: {what}", share),
     )
@@ -448,7 +449,7 @@ def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], di
 
 
 def _steps(
-    train: Sequence[Run], everything: Sequence[Run], method: StudyMethod | None
+    train: Sequence[Run], everything: Sequence[Run], method: StudyMethod | None, model: str | None
 ) -> list[tuple[Recipe, Sequence[Run]]]:
     """The recipes of a study, and the runs each is followed on: sines run by run, everything at once."""
     pure = [run for run in train if analyse_motion(run).is_sine]  # published methods take no other
@@ -457,6 +458,7 @@ def _steps(
     steps: list[tuple[Recipe, Sequence[Run]]] = []
     if len(train) > 1:
         steps += [(make(name), train) for name in STUDIED for make in (modified, jointly, current_only)]
+        steps += [(modified(name), train) for name in (model,) if name and name not in (*STUDIED, JOINTLY)]
     if len(pure) > 2:
         steps += [(cls().beside_others().recipe(pure), train) for cls in study_methods().values()]
     return [*steps, (play_and_bypass(), everything)]
