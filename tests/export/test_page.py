@@ -218,7 +218,7 @@ UNUSABLE = [
     (b"\x00\x01PK\x03\x04" * 500, "rows"),
     ("time_s,displacement_m\n" + "0,0\n0.1,NaN\n0.2,1\n0.3,2\n", "row 3"),
     ("time_s,displacement_m\n" + "0,0\n0.1,1e999\n0.2,1\n0.3,2\n", "row 3"),
-    ("time_s,displacement_m\n" + "0,0\n0.1,\n0.2,1\n0.3,2\n", "no finite number"),
+    ("time_s,displacement_m\n" + "0,0\n0.1,\n0.2,1\n0.3,2\n", "is not a finite number"),
     ("time_s,displacement_m\n" + "0,0\n0.1,1\n0.1,1\n0.3,2\n", "does not increase at row 4"),
     ("time_s,displacement_mm\n" + "0,0\n0.1,1\n0.2,1\n0.3,2\n", "convert it to SI"),
     ("time_s,current_mA,displacement_m\n" + "0,0,0\n0.1,1,1\n0.2,1,2\n0.3,2,1\n", '"current_A" is expected'),

@@ -124,7 +124,7 @@ def test_unknown_models_are_named_with_near_ones(dataset):
 
 
 def test_too_few_runs_are_refused(dataset):
-    with pytest.raises(IdentificationError, match="under three train runs"):
+    with pytest.raises(IdentificationError, match="fewer than three identification runs"):
         compare(dataset.only(dataset.runs[:2]), ["bingham"])
 
 

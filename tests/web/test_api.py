@@ -304,8 +304,8 @@ LIST = {"format": "mrdamper-bench", "version": 1, "source": "", "name": "", "dam
     [
         ([("bench.json", LIST)], "holds no bench-state.json"),
         ([("bench.json", LIST), ("bench-state.json", {}), ("../evil", {})], "holds 'evil'"),
-        ([("bench.json", {**LIST, "version": 2}), ("bench-state.json", {})], "none of this version"),
-        ([("bench.json", {**LIST, "more": 1}), ("bench-state.json", {})], "none of this version"),
+        ([("bench.json", {**LIST, "version": 2}), ("bench-state.json", {})], "has another version"),
+        ([("bench.json", {**LIST, "more": 1}), ("bench-state.json", {})], "has another version"),
         ([("bench.json", {**LIST, "current": 0}), ("bench-state.json", {})], "names a damper"),
         ([("bench.json", LIST), ("bench-state.json", "0" * 6_000_000)], "over 5 MB"),
         ([("bench.json", {**LIST, "source": "drop"}), ("bench-state.json", {})], "runs.csv"),

@@ -55,7 +55,7 @@ def load_dataset(folder: str | Path | None = None) -> Dataset:
     --------
     >>> from mrdamper import load_dataset
     >>> load_dataset()
-    <dataset bundled tests of two dampers: 53 runs, 34 of rig labcontrol, 19 of rig utfsm; 12 held out>
+    <dataset bundled tests of two dampers: 53 runs, 34 of rig labcontrol, 19 of rig utfsm; 12 validation runs>
     """
     if folder is None:
         with as_file(files("mrdamper.files.bundled") / BUNDLED) as bundled:
