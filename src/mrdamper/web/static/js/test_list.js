@@ -9,23 +9,26 @@ const SIGNED = ["displacement", "force"];
 export class TestList {
   constructor(bench, drop) {
     Object.assign(this, { bench, drop });
+    this.turn = 0; // of several requests on their way, the newest counts
     this.said = h("div", { role: "status" });
     this.body = h("div", {});
     this.element = h("details", { class: "card", id: "tests", hidden: true }, h("summary", {}, "Tests: columns, currents, split"), this.body, this.said);
     this.element.addEventListener("toggle", () => this.element.open && this.fetch());
   }
 
-  /** Something else lies on the bench, or was refused: the list is asked for when it is looked at. */
+  /** Other data are loaded, or files were refused: the list is fetched once, when it is open; opening it fetches it. */
   async show(found) {
     this.element.hidden = !found;
     const refused = (found?.verdicts ?? []).some((v) => v.state === "refused");
-    if (refused) this.element.open = true;
     if (this.element.open) await this.fetch();
+    else if (refused) this.element.open = true;
   }
 
   async fetch() {
+    const turn = (this.turn += 1);
     try {
       const { tests, preview } = await this.bench.api.get("/tests");
+      if (turn !== this.turn) return; // choices made meanwhile belong to the newer list
       put(this.body, preview ? this.columns(preview) : null, tests.length ? this.list(tests) : null, tests.some((t) => t.run) ? this.rules(tests) : null);
     } catch (error) {
       put(this.said, problem(error));
