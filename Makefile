@@ -72,7 +72,7 @@ $(VENV)/.web: pyproject.toml constraints.txt | $(VENV)/bin/python
 
 $(VENV)/.dev: pyproject.toml constraints.txt | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt 'pip>=25.1'
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[all,compiler]' --group dev
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[all,fleet,fmu,compiler]' --group dev
 	@touch $@ $(VENV)/.core $(VENV)/.web
 
 $(VENV)/.docs: pyproject.toml constraints.txt | $(VENV)/bin/python

@@ -16,14 +16,14 @@ DEVELOPMENT = nox.project.dependency_groups(nox.project.load_toml("pyproject.tom
 @nox.session(python=["3.11", "3.12", "3.13", "3.14"])
 def tests(session: nox.Session) -> None:
     """Run the fast tests."""
-    session.install("-c", "constraints.txt", "-e", ".[all,compiler]", *DEVELOPMENT)
+    session.install("-c", "constraints.txt", "-e", ".[all,fleet,fmu,compiler]", *DEVELOPMENT)
     session.run("pytest", "-m", "not slow", "-n", "auto", *session.posargs)
 
 
 @nox.session(python="3.11")
 def lint(session: nox.Session) -> None:
     """Check format, style, types and the order of imports."""
-    session.install("-c", "constraints.txt", "-e", ".[all,compiler]", *DEVELOPMENT)
+    session.install("-c", "constraints.txt", "-e", ".[all,fleet,fmu,compiler]", *DEVELOPMENT)
     session.run("ruff", "format", "--check", ".")
     session.run("ruff", "check", ".")
     session.run("pyright")

@@ -26,7 +26,7 @@ EOF
 "$bin/mrdamper" study --out study >/dev/null 2>&1
 model=study/model-utfsm.json
 "$bin/mrdamper" predict $model --current 0.5 --frequency 2 --amplitude 10 --out force.csv
-for format in c page latex markdown table adams; do
+for format in c page latex markdown table adams tydex dyna4; do
   "$bin/mrdamper" export $model --to $format --out "$format" >/dev/null 2>&1
 done
 refused() {  # what needs an extra says which, in one line, and ends with 2

@@ -37,7 +37,8 @@ def export_model(damper: Damper, to: str, out: str | Path, name: str = "") -> li
     ----------
     damper : Damper
     to : str
-        Format: "c", "fmu", "page", "latex", "markdown", "table", "adams", or one of a plug-in.
+        Format: "c", "fmu", "page", "latex", "markdown", "table", "adams",
+        "tydex", "dyna4", or one of a plug-in.
     out : path
         Folder; a file where the format makes one.
     name : str

@@ -18,7 +18,7 @@ def register(app: typer.Typer) -> None:
     @app.command(epilog="Example: mrdamper export model.json --to fmu --out damper.fmu")
     def export(
         model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
-        to: str = typer.Option(..., "--to", help="c, fmu, page, latex, markdown, table, adams."),
+        to: str = typer.Option(..., "--to", help="c, fmu, page, latex, markdown, table, adams, tydex, dyna4."),
         out: Path = typer.Option(..., "--out", help="Folder; for fmu, page, latex and markdown a file."),
         name: str | None = typer.Option(None, "--name", help="Name of files and symbols; default: the rig."),
         inverse: bool = typer.Option(
