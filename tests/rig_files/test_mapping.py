@@ -1,6 +1,9 @@
 """From what is in files to tests: clocks, units, results, groups and two files a test, as the files state them."""
 
+import re
+
 import numpy as np
+import openpyxl
 import pytest
 from support.foreign_labs import KINDS, campaign, put, rows
 from typer.testing import CliRunner
@@ -204,3 +207,23 @@ def test_a_force_that_is_held_between_slow_samples_ends_in_a_verdict(tests, tmp_
         )
     found = import_files([tmp_path])
     assert len(found.records) + len({refusal.file for refusal in found.refusals}) == len(tests)
+
+
+def test_a_sheet_with_a_heading_of_its_own_is_refused_and_leaving_it_out_takes_the_others(tests, tmp_path):
+    """A test beside others must not be missing without a message because one heading is misspelt."""
+    book = openpyxl.Workbook()
+    for k, test in enumerate(tests[:3]):
+        sheet = book.create_sheet(f"{test.current:g} A")
+        sheet.append(["Time [s]", "Displacement [mm]", "Channel 3" if k == 1 else "Force [N]"])
+        for row in np.column_stack([test.t, 1e3 * test.x, test.f]).tolist():
+            sheet.append(row)
+    book.save(tmp_path / "tests.xlsx")
+    found = import_files([tmp_path])
+    assert len(found.records) == 2
+    (refusal,) = found.refusals
+    assert refusal.error.code == "E_COLUMN"
+    assert f"table {tests[1].current:g} A" in refusal.error.where
+    remedy = re.search(r"say \[file\] (.*) in a profile", refusal.error.mend)[1]
+    left = import_files([tmp_path], parse_profile(f"[file]\n{remedy}"))
+    assert len(left.records) == 2
+    assert not left.refusals

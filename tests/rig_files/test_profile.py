@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from support.rig_files import NAMES, channels, rows, text, write
 
 from mrdamper.errors import InputError
+from mrdamper.rig_files.preview import guess_profile
 from mrdamper.rig_files.profile import (
     Channel,
     CurrentSource,
@@ -19,7 +20,7 @@ from mrdamper.rig_files.profile import (
     profile_hash,
     profile_text,
 )
-from mrdamper.rig_files.rig_import import guess_profile, read_run
+from mrdamper.rig_files.rig_import import read_run
 
 NAME = st.text(min_size=1, max_size=20)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)

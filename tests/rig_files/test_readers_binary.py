@@ -30,10 +30,11 @@ from support.rig_files import (
 
 from mrdamper.errors import InputError, MissingExtraError
 from mrdamper.rig_files import sandbox
+from mrdamper.rig_files.preview import guess_profile
 from mrdamper.rig_files.profile import parse_profile
 from mrdamper.rig_files.readers import all_readers
 from mrdamper.rig_files.readers.hdf5 import Hdf5
-from mrdamper.rig_files.rig_import import guess_profile, read_run, read_runs
+from mrdamper.rig_files.rig_import import read_run, read_runs
 
 CLEAN = text()
 SHORT = dict(zip(("time", "disp", "force"), rows().T, strict=True))

@@ -11,7 +11,8 @@ from support.rig_records import clean_record, codes_of, random_record, with_chan
 
 from mrdamper.errors import InputError
 from mrdamper.rig_files.conditions import currents_in
-from mrdamper.rig_files.rig_import import guess_profile, read_run
+from mrdamper.rig_files.preview import guess_profile
+from mrdamper.rig_files.rig_import import read_run
 from mrdamper.rig_files.rig_record import thousands_in
 
 TRUE = channels()

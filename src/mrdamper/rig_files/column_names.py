@@ -195,7 +195,7 @@ def names_compression(name: str) -> bool:
     return any(word.casefold().startswith(_COMPRESSION) for word in words_of(name))
 
 
-def names_made(name: str) -> bool:
+def names_computed(name: str) -> bool:
     """Whether a name says that something is filtered, averaged or computed."""
     return any(word.casefold() in _MADE for word in words_of(name))
 

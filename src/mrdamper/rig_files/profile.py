@@ -168,6 +168,13 @@ def load_profile(path: str | Path) -> Profile:
     return load_toml(Path(path), Profile, ProfileError, _HELP)
 
 
+def profile_of(profile: Profile | str | Path | None) -> Profile:
+    """The profile given, read from its file where a path is given; an empty one for None."""
+    if profile is None:
+        return Profile()
+    return profile if isinstance(profile, Profile) else load_profile(profile)
+
+
 def parse_profile(text: str, where: str = "profile") -> Profile:
     """A profile from TOML text; raises as `load_profile`."""
     return parse_toml(text, Profile, ProfileError, _HELP, where)

@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 import contextlib
-import fnmatch
-import hashlib
-import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from mrdamper.data import Dataset
 from mrdamper.errors import ColumnError, CombinedError, InputError
-from mrdamper.rig_files.coil_current import as_data, held_current_of
-from mrdamper.rig_files.column_names import names_compression, names_made
-from mrdamper.rig_files.columns import assign, propose, rate_of
+from mrdamper.rig_files.file_records import records_of_file
+from mrdamper.rig_files.folder import files_in, is_left_out
 from mrdamper.rig_files.long_records import judge_long
 from mrdamper.rig_files.mapping.agreement import contradictions
-from mrdamper.rig_files.mapping.clocks import with_time_stated
 from mrdamper.rig_files.mapping.companions import (
     joined_parts,
     part_of,
@@ -28,24 +22,14 @@ from mrdamper.rig_files.mapping.companions import (
     with_currents_of,
     with_results_of,
 )
-from mrdamper.rig_files.mapping.completion import completed
-from mrdamper.rig_files.mapping.long_table import with_channels_as_columns
-from mrdamper.rig_files.mapping.proposals import with_channels_by_physics, with_unit_of_time
-from mrdamper.rig_files.mapping.rasters import with_joined_rasters, with_one_clock
-from mrdamper.rig_files.mapping.results import with_results
-from mrdamper.rig_files.mapping.tree import FileTree, nodes_of, problem_of
-from mrdamper.rig_files.packed_folder import is_packed_folder, unpacked
-from mrdamper.rig_files.parts import tests_of
-from mrdamper.rig_files.profile import Channel, Profile, current_pattern, load_profile, profile_hash
-from mrdamper.rig_files.readers import raw_tables, suffixes
-from mrdamper.rig_files.readers.base import NoTableError, RawTable, RigFileError
-from mrdamper.rig_files.record import Finding, Record
-from mrdamper.rig_files.rig_record import joined, records_of
+from mrdamper.rig_files.packed_folder import unpacked
+from mrdamper.rig_files.profile import Profile, profile_of
+from mrdamper.rig_files.readers.base import NoTableError, RigFileError
+from mrdamper.rig_files.record import Record
 from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests
 
 _MAY_BE_PARTS = ("E_COLUMN", "E_UNITS_MISSING", "E_UNITS_DIMENSION", "E_AMBIGUOUS", "E_NO_DATA", "E_NUMBER")
-_ROWS_SHOWN, _MOST_SHOWN = 6, 30  # rows and columns of a preview
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,16 +39,6 @@ class Refusal:
     file: str
     error: InputError
     run: str = ""  # of a test that could be read and not used, its name
-
-
-@dataclass(frozen=True, eq=False)
-class Preview:
-    """How a file begins, and what its columns are taken for."""
-
-    names: tuple[str, ...]  # one a column
-    units: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]  # the first, cell by cell
-    channels: Mapping[str, tuple[int | None, str, int]]  # by channel its column, unit and sign, as far as known
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,97 +87,16 @@ def read_runs(path: str | Path, profile: Profile | str | Path | None = None) -> 
     from mrdamper.rig_files.quality import judge
 
     with np.errstate(all="ignore"):  # numbers near the end of the range overflow in sums and are refused as such
-        return tuple(judge_long(record, judge) for record in _unjudged(Path(path), _profile(profile)))
-
-
-def guess_profile(path: str | Path, profile: Profile | str | Path | None = None) -> Profile:
-    """How a file is read, as a profile that can be saved, completed and used for its folder.
-
-    Reading with it gives the same record. What the file does not say is left out of it.
-
-    Raises
-    ------
-    InputError
-        If the form of the file cannot be found.
-    """
-    profile = _profile(profile)
-    with raw_tables(path, profile.file) as tables:
-        table, channels = _guess_channels(_parts(tables, profile), profile)
-    form = {**table.form, **profile.file.model_dump(exclude_defaults=True)}
-    if not any(table.names):
-        form["names"] = tuple(f"column {i + 1}" for i in range(len(table.names)))
-    stated = "current" in channels or held_current_of(table) is not None
-    rate = rate_of(table, profile) if "time" not in channels or channels["time"].column is None else None
-    if rate:
-        form["sample_rate_Hz"] = rate
-        channels.pop("time", None)
-    pattern = None if stated else current_pattern(Path(path).name)
-    update = {
-        "file": type(profile.file)(**form),  # type: ignore[arg-type]
-        "channels": {**profile.channels, **channels},
-        "current": profile.current or pattern,
-    }
-    return profile.model_copy(update=update)
-
-
-def preview(path: str | Path, profile: Profile | str | Path | None = None) -> Preview:
-    """How a file begins, for columns to be chosen by eye.
-
-    Raises
-    ------
-    InputError
-        If the form of the file cannot be found.
-    """
-    profile = _profile(profile)
-    with raw_tables(path, profile.file) as tables:
-        table, channels = _guess_channels(_parts(tables, profile), profile)
-        cells = [_first_cells(table, column) for column in range(min(len(table.names), _MOST_SHOWN))]
-        places = {
-            name: (_place(table, channel.column), channel.unit or "", channel.sign)
-            for name, channel in channels.items()
-        }
-    rows = tuple(tuple(column[i] if i < len(column) else "" for column in cells) for i in range(_ROWS_SHOWN))
-    return Preview(table.names[:_MOST_SHOWN], table.units[:_MOST_SHOWN], rows, places)
-
-
-def _first_cells(table: RawTable, column: int) -> list[str]:
-    try:
-        return [f"{value:g}" for value in table.read([column]).values[column][:_ROWS_SHOWN]]
-    except InputError:
-        return [table.odd[column]] if table.odd else []
-
-
-def _place(table: RawTable, column: str | int | None) -> int | None:
-    if isinstance(column, str):
-        return table.names.index(column) if column in table.names else None
-    return None if column is None else column - 1
-
-
-def _guess_channels(tables: list[RawTable], profile: Profile) -> tuple[RawTable, dict[str, Channel]]:
-    try:
-        table = _tables_with_channels(tables, profile)[0]
-        places = {name: (entry.column, entry.unit) for name, entry in assign(table, profile).items()}
-    except InputError:
-        table = tables[0]
-        places = {name: place for name, place in propose(table).items() if name not in profile.channels}
-    channels = {}
-    for name, (column, unit) in places.items():
-        says: dict[str, Any] = {"column": None, "unit": unit or None}
-        if column is not None:
-            header = table.names[column]
-            says["column"] = header if header and table.names.count(header) == 1 else column + 1
-            if name in ("displacement", "force") and names_compression(header):
-                says["sign"] = -1
-        stated = profile.channel(name).model_dump(exclude_unset=True, exclude_none=True)
-        channels[name] = Channel(**{**says, **stated})
-    return table, channels
+        records, problems = records_of_file(Path(path), profile_of(profile))
+        CombinedError.raise_from(problems)
+        return tuple(judge_long(record, judge) for record in records)
 
 
 @contextlib.contextmanager
 def first_file(paths: Sequence[str | Path]) -> Iterator[Path]:
     """The first file among files, folders and archives, for as long as the block goes."""
     with unpacked(paths) as given:
-        yield _files(given)[0][0]
+        yield files_in(given)[0][0]
 
 
 def import_files(
@@ -241,15 +134,15 @@ def import_files(
     >>> [record.id for record in import_files(["test_0.5A.csv"]).records]
     ['test_0.5A']
     """
-    profile = _profile(profile)
+    profile = profile_of(profile)
     with unpacked(paths) as given:
         beside = [path / TESTS for path in given if (path / TESTS).is_file()]
         if tests is None and beside:
             tests = beside[0]
         table = tests if tests is None or isinstance(tests, TestsTable) else load_tests(tests)
-        files, left_out = _files(given)
-        left_out += [path for path in files if _is_left_out(path.name, profile)]
-        files = [path for path in files if not _is_left_out(path.name, profile)]
+        files, left_out = files_in(given)
+        left_out += [path for path in files if is_left_out(path.name, profile)]
+        files = [path for path in files if not is_left_out(path.name, profile)]
         intake = _Intake(profile, table)
         for number, path in enumerate(files):
             progress(path.name, number / len(files))
@@ -287,7 +180,7 @@ class _Intake:
         self._order[str(path)] = len(self._order)
         try:
             with np.errstate(all="ignore"):  # numbers near the end of the range overflow in sums and are refused
-                records = _unjudged(path, self._profile)
+                records, problems = records_of_file(path, self._profile)
         except InputError as error:
             refusals = [Refusal(str(path), one) for one in getattr(error, "errors", (error,))]
             self.met.append((path, ""))
@@ -296,6 +189,7 @@ class _Intake:
             else:
                 self.refusals += refusals
             return
+        self.refusals += [Refusal(str(path), problem) for problem in problems]
         self.met += [(path, record.id) for record in records]
         for record in records:
             known, problems = record, []
@@ -368,30 +262,6 @@ class _Intake:
         self._found = [entry for i, entry in enumerate(found) if i not in refused]
 
 
-def scan(paths: Iterable[str | Path], profile: Profile | str | Path | None = None) -> tuple[FileTree, ...]:
-    """What is in files and folders: of every file its tables, their columns, and what stands beside them."""
-    profile = _profile(profile)
-    trees = []
-    with unpacked(paths) as given:
-        for path in _files(given)[0]:
-            try:
-                with raw_tables(path, profile.file) as tables:
-                    trees.append(FileTree(path.name, nodes_of(tables)))
-            except InputError as error:
-                trees.append(FileTree(path.name, (), problem_of(error)))
-    return tuple(trees)
-
-
-def columns_of(path: str | Path, profile: Profile | str | Path | None = None) -> tuple[str, ...]:
-    """Names of the columns of a file's first table; empty if it cannot be opened."""
-    profile = _profile(profile)
-    try:
-        with raw_tables(path, profile.file) as tables:
-            return _parts(tables, profile)[0].names
-    except InputError:
-        return ()
-
-
 def found_tests(
     paths: Iterable[str | Path], profile: Profile | str | Path | None = None
 ) -> tuple[tuple[Record, ...], tuple[Refusal, ...]]:
@@ -399,9 +269,11 @@ def found_tests(
     records: list[Record] = []
     refusals: list[Refusal] = []
     with unpacked(paths) as given:
-        for path in _files(given)[0]:
+        for path in files_in(given)[0]:
             try:
-                records += _unjudged(path, _profile(profile))
+                of_file, problems = records_of_file(path, profile_of(profile))
+                records += of_file
+                refusals += [Refusal(str(path), problem) for problem in problems]
             except NoTableError as error:
                 refusals += [Refusal(str(path), error)] if path in given else []
             except InputError as error:
@@ -420,122 +292,6 @@ def to_dataset(records: Sequence[Record], name: str = "dataset") -> Dataset:
     from mrdamper.rig_files.to_run import to_run
 
     return Dataset(tuple(to_run(_with_current(record)) for record in records), name)
-
-
-def _profile(profile: Profile | str | Path | None) -> Profile:
-    if profile is None:
-        return Profile()
-    return profile if isinstance(profile, Profile) else load_profile(profile)
-
-
-def _unjudged(path: Path, profile: Profile) -> list[Record]:
-    with raw_tables(path, profile.file) as tables:
-        tables, made = _without_made(_tables_with_channels(_parts(tables, profile), profile))
-        records: list[Record] = []
-        problems: list[InputError] = []
-        for table in tables:
-            try:
-                records += records_of(table, profile, path)
-            except InputError as error:
-                problems += getattr(error, "errors", (error,))
-        CombinedError.raise_from(problems)
-        with path.open("rb") as file:
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
-    records = joined(records, profile, tables)
-    remarks = {"file": as_data(path.name), "sha256": digest}
-    if profile != Profile():
-        remarks["profile_sha256"] = profile_hash(profile)
-    records = [replace(record, provenance={**remarks, **record.provenance}) for record in records]
-    if made:
-        records[0] = records[0].noticed(Finding("W_TABLE", f"left out as made from the others: {', '.join(made)}"))
-    if len({record.id for record in records}) < len(records):
-        records = [replace(record, id=f"{record.id}_{i}") for i, record in enumerate(records, 1)]
-    return records
-
-
-def _parts(tables: list[RawTable], profile: Profile) -> list[RawTable]:
-    kept = [table for table in tables if not (table.label and _is_left_out(table.label, profile))]
-    if tables and not kept:
-        raise tables[0].source.refuse("E_NO_DATA", "every table is left out", "correct [file] leave_out of the profile")
-    tables = kept
-    tables = with_joined_rasters([with_time_stated(completed(with_channels_as_columns(table))) for table in tables])
-    tables = [with_one_clock(table) for table in tables]
-    parts = [part for table in tables for part in ([table] if table.fallback else tests_of(table, profile.file))]
-    parts = [with_channels_by_physics(with_unit_of_time(table), _said(profile)) for table in with_results(parts)]
-    return parts
-
-
-def _is_left_out(name: str, profile: Profile) -> bool:
-    return any(fnmatch.fnmatch(name.casefold(), pattern.casefold()) for pattern in profile.file.leave_out)
-
-
-def _said(profile: Profile) -> list[str]:
-    """The channels whose column the profile names."""
-    return [name for name, channel in profile.channels.items() if channel.column is not None]
-
-
-def _tables_with_channels(tables: list[RawTable], profile: Profile) -> list[RawTable]:
-    """Leave out the tables of a file that hold something else, if one or more hold a test."""
-    if len(tables) == 1:
-        return tables
-    first = None
-    for fallback in (False, True):
-        fitting = []
-        for table in tables:
-            if table.fallback is not fallback:
-                continue
-            try:
-                assign(table, profile)
-                fitting.append(table)
-            except InputError as error:
-                first = first or error
-        if fitting:
-            return fitting
-    raise first or RigFileError("E_NO_DATA", "no table in this file")
-
-
-def _without_made(tables: list[RawTable]) -> tuple[list[RawTable], list[str]]:
-    """Leave out tables that by their name are filtered or computed, beside one that is not; and their names."""
-    measured = [table for table in tables if not names_made(table.label)]
-    if not measured or len(measured) == len(tables):
-        return tables, []
-    return measured, [table.label for table in tables if names_made(table.label)]
-
-
-def _files(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:
-    """The files to be read, and those of the folders that are of other kinds."""
-    files: list[Path] = []
-    others: list[Path] = []
-    for path in paths:
-        if not path.is_dir():
-            files.append(path)
-            continue
-        inside = sorted(
-            Path(folder) / name
-            for folder, _, names in os.walk(path)
-            for name in names
-            if not name.startswith((".", "~$")) and name != TESTS
-        )
-        inside = [file for file in inside if file.is_file() and not is_packed_folder(file)]  # no pipes
-        known = [file for file in inside if file.suffix.lower() in suffixes()]
-        known = known or [file for file in inside if _is_table(file)]  # suffixes of a laboratory's own: run.001
-        files += known
-        read = set(known)
-        others += [file for file in inside if file not in read]
-    if not files:
-        where = ", ".join(path.name for path in paths)
-        found = f"no rig's file in this folder (found {', '.join(file.name for file in others[:5]) or 'nothing'})"
-        mend = "export them as CSV, or give another folder" if others else "give another folder"
-        raise RigFileError("E_NO_DATA", found, file=where, mend=mend)
-    return files, others
-
-
-def _is_table(path: Path) -> bool:
-    try:
-        with raw_tables(path) as tables:
-            return any(table.names for table in tables)
-    except InputError:
-        return False
 
 
 def _with_current(record: Record) -> Record:

@@ -130,8 +130,8 @@ def _name(drop: Drop, count: int) -> str:
 
 def _guessed(paths: Sequence[Path]) -> str:
     """The profile of the first file whose form can be guessed; a bare one where none can."""
+    from mrdamper.rig_files.preview import guess_profile
     from mrdamper.rig_files.profile import parse_profile, profile_text
-    from mrdamper.rig_files.rig_import import guess_profile
 
     for path in paths[:_PROFILES_TRIED]:
         try:

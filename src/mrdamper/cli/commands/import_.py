@@ -125,8 +125,9 @@ def _write_tests(files: list[Path], known: Profile, target: Path) -> None:
 def _write_profile(files: list[Path], known: Profile, target: Path) -> None:
     from mrdamper.errors import InputError
     from mrdamper.files.atomic import write_file
+    from mrdamper.rig_files.preview import columns_of, guess_profile
     from mrdamper.rig_files.profile import profile_text
-    from mrdamper.rig_files.rig_import import columns_of, first_file, guess_profile, read_runs
+    from mrdamper.rig_files.rig_import import first_file, read_runs
 
     with first_file(files) as first:
         guess = guess_profile(first, known)
@@ -206,7 +207,7 @@ def _on_terminal() -> bool:
 
 def _print_tree(files: list[Path], known: Profile) -> None:
     from mrdamper.rig_files.mapping.tree import tree_lines
-    from mrdamper.rig_files.rig_import import scan
+    from mrdamper.rig_files.preview import scan
 
     print("In the files:")
     for line in tree_lines(scan(files, known)):
@@ -216,8 +217,9 @@ def _print_tree(files: list[Path], known: Profile) -> None:
 def _asked(files: list[Path], known: Profile, result: ImportResult, tests: Path | None) -> tuple[Profile, ImportResult]:
     """Ask what the refusals leave open, one question at a time, and read the files again with each answer."""
     from mrdamper.rig_files.mapping.questions import question_of
+    from mrdamper.rig_files.preview import columns_of
     from mrdamper.rig_files.profile import profile_text
-    from mrdamper.rig_files.rig_import import columns_of, import_files
+    from mrdamper.rig_files.rig_import import import_files
 
     before = known
     for _ in range(_MOST_QUESTIONS):

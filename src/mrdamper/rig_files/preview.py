@@ -1,0 +1,139 @@
+"""Views of a file before it is imported: its tree, its first rows, and the profile that reads it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mrdamper.errors import InputError
+from mrdamper.rig_files.coil_current import held_current_of
+from mrdamper.rig_files.column_names import names_compression
+from mrdamper.rig_files.columns import assign, propose, rate_of
+from mrdamper.rig_files.file_records import tables_of_tests, test_tables
+from mrdamper.rig_files.folder import files_in
+from mrdamper.rig_files.mapping.tree import FileTree, nodes_of, problem_of
+from mrdamper.rig_files.packed_folder import unpacked
+from mrdamper.rig_files.profile import Channel, Profile, current_pattern, profile_of
+from mrdamper.rig_files.readers import raw_tables
+from mrdamper.rig_files.readers.base import RawTable
+
+_ROWS_SHOWN, _MOST_SHOWN = 6, 30  # rows and columns of a preview
+
+
+@dataclass(frozen=True, eq=False)
+class Preview:
+    """How a file begins, and what its columns are taken for."""
+
+    names: tuple[str, ...]  # one a column
+    units: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]  # the first, cell by cell
+    channels: Mapping[str, tuple[int | None, str, int]]  # by channel its column, unit and sign, as far as known
+
+
+def guess_profile(path: str | Path, profile: Profile | str | Path | None = None) -> Profile:
+    """How a file is read, as a profile that can be saved, completed and used for its folder.
+
+    Reading with it gives the same record. What the file does not say is left out of it.
+
+    Raises
+    ------
+    InputError
+        If the form of the file cannot be found.
+    """
+    profile = profile_of(profile)
+    with raw_tables(path, profile.file) as tables:
+        table, channels = _guess_channels(test_tables(tables, profile), profile)
+    form = {**table.form, **profile.file.model_dump(exclude_defaults=True)}
+    if not any(table.names):
+        form["names"] = tuple(f"column {i + 1}" for i in range(len(table.names)))
+    stated = "current" in channels or held_current_of(table) is not None
+    rate = rate_of(table, profile) if "time" not in channels or channels["time"].column is None else None
+    if rate:
+        form["sample_rate_Hz"] = rate
+        channels.pop("time", None)
+    pattern = None if stated else current_pattern(Path(path).name)
+    update = {
+        "file": type(profile.file)(**form),  # type: ignore[arg-type]
+        "channels": {**profile.channels, **channels},
+        "current": profile.current or pattern,
+    }
+    return profile.model_copy(update=update)
+
+
+def preview(path: str | Path, profile: Profile | str | Path | None = None) -> Preview:
+    """How a file begins, for columns to be chosen by eye.
+
+    Raises
+    ------
+    InputError
+        If the form of the file cannot be found.
+    """
+    profile = profile_of(profile)
+    with raw_tables(path, profile.file) as tables:
+        table, channels = _guess_channels(test_tables(tables, profile), profile)
+        cells = [_first_cells(table, column) for column in range(min(len(table.names), _MOST_SHOWN))]
+        places = {
+            name: (_place(table, channel.column), channel.unit or "", channel.sign)
+            for name, channel in channels.items()
+        }
+    rows = tuple(tuple(column[i] if i < len(column) else "" for column in cells) for i in range(_ROWS_SHOWN))
+    return Preview(table.names[:_MOST_SHOWN], table.units[:_MOST_SHOWN], rows, places)
+
+
+def _first_cells(table: RawTable, column: int) -> list[str]:
+    try:
+        return [f"{value:g}" for value in table.read([column]).values[column][:_ROWS_SHOWN]]
+    except InputError:
+        return [table.odd[column]] if table.odd else []
+
+
+def _place(table: RawTable, column: str | int | None) -> int | None:
+    if isinstance(column, str):
+        return table.names.index(column) if column in table.names else None
+    return None if column is None else column - 1
+
+
+def _guess_channels(tables: list[RawTable], profile: Profile) -> tuple[RawTable, dict[str, Channel]]:
+    try:
+        table = tables_of_tests(tables, profile)[0][0]
+        places = {name: (entry.column, entry.unit) for name, entry in assign(table, profile).items()}
+    except InputError:
+        table = tables[0]
+        places = {name: place for name, place in propose(table).items() if name not in profile.channels}
+    channels = {}
+    for name, (column, unit) in places.items():
+        says: dict[str, Any] = {"column": None, "unit": unit or None}
+        if column is not None:
+            header = table.names[column]
+            says["column"] = header if header and table.names.count(header) == 1 else column + 1
+            if name in ("displacement", "force") and names_compression(header):
+                says["sign"] = -1
+        stated = profile.channel(name).model_dump(exclude_unset=True, exclude_none=True)
+        channels[name] = Channel(**{**says, **stated})
+    return table, channels
+
+
+def scan(paths: Iterable[str | Path], profile: Profile | str | Path | None = None) -> tuple[FileTree, ...]:
+    """What is in files and folders: of every file its tables, their columns, and what stands beside them."""
+    profile = profile_of(profile)
+    trees = []
+    with unpacked(paths) as given:
+        for path in files_in(given)[0]:
+            try:
+                with raw_tables(path, profile.file) as tables:
+                    trees.append(FileTree(path.name, nodes_of(tables)))
+            except InputError as error:
+                trees.append(FileTree(path.name, (), problem_of(error)))
+    return tuple(trees)
+
+
+def columns_of(path: str | Path, profile: Profile | str | Path | None = None) -> tuple[str, ...]:
+    """Names of the columns of a file's first table; empty if it cannot be opened."""
+    profile = profile_of(profile)
+    try:
+        with raw_tables(path, profile.file) as tables:
+            return test_tables(tables, profile)[0].names
+    except InputError:
+        return ()
