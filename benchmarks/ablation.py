@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from mrdamper.dampers.joint import JointProblem
-from mrdamper.files.dataset import load_dataset
-from mrdamper.validation import leave_one_condition_out, validate
+from mrdamper.rig_files.dataset_folder import load_dataset
+from mrdamper.study.validation import leave_one_condition_out, validate
 
 WITHOUT = {
     "nothing: the whole model": {},

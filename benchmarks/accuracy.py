@@ -6,8 +6,8 @@ import importlib.util
 
 import numpy as np
 
-from mrdamper.hysteresis import Shape, follow
-from mrdamper.motion import Path
+from mrdamper.physics.hysteresis import Shape, follow
+from mrdamper.physics.motion import Path
 
 PLACES = np.array([0.0, 3e-4, 2e-3, 1.1e-3, 1.4e-3, -4e-3, 2e-2, 1.9e-2, -2e-2, 5e-3])  # turning points [m]
 KAPPA = 632.0

@@ -9,13 +9,13 @@ import numpy as np
 from benchmarks import conditions
 from benchmarks.timing import growth, race
 from mrdamper.data import Run
-from mrdamper.hysteresis import Shape
-from mrdamper.hysteresis.batch import batch_cost
 from mrdamper.identification import Problem, identify
 from mrdamper.identification.methods.projection import Projection
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.motion import Path
-from mrdamper.optimizers.linear import FixedColumns
+from mrdamper.physics.hysteresis import Shape
+from mrdamper.physics.hysteresis.batch import batch_cost
+from mrdamper.physics.motion import Path
+from mrdamper.statistics.linear import FixedColumns
 
 SETS = 1000
 

@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parent.parent
 STORED = ROOT / "benchmarks" / "baseline.txt"  # the commit that is compared with
 _SLOWER = 1.15  # ratio of processor seconds from which a change has made something slower
 _MOTION = (
-    "from mrdamper.data import Condition; from mrdamper.motion import sine;"
+    "from mrdamper.data import Condition; from mrdamper.physics.motion import sine;"
     "m = sine(Condition(0.5, 1.0, 0.01), 20, 1000);"
 )
 WORK = {

@@ -15,8 +15,8 @@ import numpy as np
 from mrdamper.dampers.base import Envelope
 from mrdamper.dampers.covariance import certain
 from mrdamper.dampers.joint import JointDamper, JointProblem
-from mrdamper.files.dataset import load_dataset
 from mrdamper.models import model_type
+from mrdamper.rig_files.dataset_folder import load_dataset
 from mrdamper.systems.controllers import controller_type
 from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.inputs import load_input

@@ -8,8 +8,8 @@ import numpy as np
 
 from mrdamper.data import Condition, Run
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.motion import sine
-from mrdamper.simulation import simulate
+from mrdamper.physics.motion import sine
+from mrdamper.physics.simulation import simulate
 
 NOISE = 0.03  # standard deviation over that of the force
 SAMPLES = 1000  # a cycle; the cycle before it only sets the state

@@ -21,12 +21,12 @@ from mrdamper.dampers.base import Damper
 from mrdamper.dampers.covariance import certain
 from mrdamper.dampers.joint import JointDamper, JointFit, JointProblem
 from mrdamper.data import SESSIONS_NEEDED, Condition, Floats, Run, session_of
-from mrdamper.files.dataset import load_dataset
 from mrdamper.identification import identify
 from mrdamper.identification.intervals import interval_about
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.motion import sine
-from mrdamper.simulation import simulate
+from mrdamper.physics.motion import sine
+from mrdamper.physics.simulation import simulate
+from mrdamper.rig_files.dataset_folder import load_dataset
 
 LEVEL = 0.95
 # Correlation of neighbouring samples of the noise, cycles, and whether model error repeats with every one of them.

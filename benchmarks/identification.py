@@ -13,12 +13,12 @@ import numpy as np
 
 from benchmarks import conditions
 from benchmarks.genetic import GENERATIONS, POPULATION, plain_genetic
-from mrdamper.hysteresis import Shape, follow
-from mrdamper.hysteresis.batch import products
 from mrdamper.identification import Problem, identify
 from mrdamper.identification.methods.projection import Projection
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.optimizers.linear import FixedColumns
+from mrdamper.physics.hysteresis import Shape, follow
+from mrdamper.physics.hysteresis.batch import products
+from mrdamper.statistics.linear import FixedColumns
 
 REACHED = 1.01  # cost over the best known that counts as reached
 

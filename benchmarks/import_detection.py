@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from support import rig_detection as rig  # the records are those of the tests
 from support.rig_records import wide_damper
 
-from mrdamper.files.dataset import load_dataset
+from mrdamper.rig_files.dataset_folder import load_dataset
 
 FRESH = 100_000  # seeds from here on are of no test
 

@@ -23,7 +23,7 @@ CHILD = """
 import resource, sys, time
 begin = time.perf_counter()
 from mrdamper.rig_files.rig_import import import_files, to_dataset
-from mrdamper.files.dataset import save_dataset
+from mrdamper.rig_files.dataset_folder import save_dataset
 result = import_files([sys.argv[1]])
 read = time.perf_counter() - begin
 save_dataset(to_dataset(result.records), sys.argv[2])

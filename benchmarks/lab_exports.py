@@ -26,9 +26,9 @@ from support.lab_exports import KINDS, LOCALES, UNITS, Lab, campaign, damper, fa
 from support.stored_exports import MACHINES
 
 from mrdamper.data import Condition, Dataset
-from mrdamper.metrics import nrmse_pp
+from mrdamper.physics.simulation import steady_loop
 from mrdamper.rig_files.rig_import import import_files, to_dataset
-from mrdamper.simulation import steady_loop
+from mrdamper.statistics.metrics import nrmse_pp
 from mrdamper.study.workflow import run_study
 
 NOISES = (0.0005, 0.002, 0.005)  # of 1 kN in force; twice as many amperes in current

@@ -15,7 +15,7 @@ import numpy as np
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.choice import JointChoice, identify_jointly, levels_of
 from mrdamper.data import Dataset, Run, same_condition
-from mrdamper.files.dataset import load_dataset
+from mrdamper.rig_files.dataset_folder import load_dataset
 
 GOALS = {  # interior current, condition, whole record [-]
     "utfsm": (0.026, 0.034, 0.032),

@@ -21,8 +21,8 @@ import numpy as np
 
 from mrdamper.dampers.certainty import table as intervals
 from mrdamper.study.recipe import catalogue
+from mrdamper.study.validation import Validation, session_drift
 from mrdamper.study.workflow import RigStudy, Study
-from mrdamper.validation import Validation, session_drift
 
 ROOT = Path(__file__).parent.parent
 POINTS = 0.3  # percentage points a median may differ: another machine's last bits choose other terms
@@ -303,7 +303,7 @@ def main() -> int:
     if given.reproduce:
         told += of_reproduction(given.reproduce)
     if not told:
-        from mrdamper.files.dataset import load_dataset
+        from mrdamper.rig_files.dataset_folder import load_dataset
         from mrdamper.study.workflow import run_study
 
         study = run_study(load_dataset())

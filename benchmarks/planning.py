@@ -18,7 +18,7 @@ from mrdamper.dampers.covariance import certain
 from mrdamper.dampers.joint import JointDamper
 from mrdamper.data import Condition, Run
 from mrdamper.models.play_bypass import PlayBypass
-from mrdamper.motion import sine
+from mrdamper.physics.motion import sine
 from mrdamper.study.limits import Limits
 from mrdamper.study.plan import Reckoning
 

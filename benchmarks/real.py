@@ -6,8 +6,8 @@ import time
 from dataclasses import dataclass, replace
 
 from mrdamper.dampers.joint import JointProblem
-from mrdamper.files.dataset import load_dataset
 from mrdamper.identification import identify
+from mrdamper.rig_files.dataset_folder import load_dataset
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,11 @@ import pytest
 
 from benchmarks import batches, conditions
 from benchmarks.simulation import SHAPE, T, X
-from mrdamper.hysteresis import follow
-from mrdamper.hysteresis.batch import batch_cost
 from mrdamper.identification import identify
 from mrdamper.identification.methods.projection import Projection
-from mrdamper.motion import Path
+from mrdamper.physics.hysteresis import follow
+from mrdamper.physics.hysteresis.batch import batch_cost
+from mrdamper.physics.motion import Path
 
 MOTION = X * np.sin(2 * np.pi * T + 0.3)
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.timing import race
-from mrdamper.hysteresis import Shape, follow
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.motion import Path
+from mrdamper.physics.hysteresis import Shape, follow
+from mrdamper.physics.motion import Path
 
 X, F, BETA, PHASE = 0.02, 1.0, 2e5, 0.3  # with this phase every reversal falls between samples
 T = np.arange(3000) / 1000.0
@@ -61,7 +61,7 @@ def _ours() -> dict[str, Callable[[], np.ndarray]]:
 def _streaming(x: np.ndarray) -> dict[str, Callable[[], np.ndarray]]:
     """The state as force of a model with nothing else in it, one sample after the other."""
     try:
-        from mrdamper.streaming import stepper
+        from mrdamper.dampers.streaming import stepper
     except ModuleNotFoundError:
         return {}
     scale = float(SHAPE.yield_displacement)

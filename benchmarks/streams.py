@@ -12,11 +12,11 @@ import numpy as np
 
 from benchmarks.simulation import BETA, OMEGA, SHAPE, T, X
 from benchmarks.timing import race
+from mrdamper.dampers.streaming import stepper, stream
 from mrdamper.export.c import c_sources
 from mrdamper.models import Model
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.models.play_bypass import PlayBypass
-from mrdamper.streaming import stepper, stream
 
 # Steps through a sine that the program makes itself, and prints the least nanoseconds a step of some rounds.
 DRIVER = r"""

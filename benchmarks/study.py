@@ -10,7 +10,7 @@ from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 
-from mrdamper.files.dataset import load_dataset
+from mrdamper.rig_files.dataset_folder import load_dataset
 
 _IMPORTS = "import time; t = time.process_time(); import mrdamper.report.study; print(time.process_time() - t)"
 

@@ -18,14 +18,14 @@ import numpy as np
 from mrdamper.dampers.bands import band
 from mrdamper.dampers.covariance import certain
 from mrdamper.data import Condition, Floats, Run
-from mrdamper.metrics import dissipated_power, peak_force
 from mrdamper.models import Model
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.models.herschel_bulkley import HerschelBulkley
 from mrdamper.models.play_bypass import PlayBypass
 from mrdamper.models.smooth_bingham import SmoothBingham
-from mrdamper.motion import sine
-from mrdamper.simulation import simulate
+from mrdamper.physics.motion import sine
+from mrdamper.physics.simulation import simulate
+from mrdamper.statistics.metrics import dissipated_power, peak_force
 from mrdamper.study.recipe import fit_and_score, identified, jointly
 
 LEVEL = 0.9

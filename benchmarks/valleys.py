@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks.virtual_dampers import DAMPERS
 from mrdamper.dampers.joint import JointFit, JointProblem
 from mrdamper.data import Run
-from mrdamper.files.dataset import load_dataset
+from mrdamper.rig_files.dataset_folder import load_dataset
 
 _SAME = 1.005  # times the least error
 _TERMS = ("leak", "cq", "qb", "Ic", "si")  # free in the first search of a study too

@@ -20,10 +20,10 @@ from mrdamper.dampers.choice import JointChoice, identify_jointly
 from mrdamper.dampers.coil import Coil
 from mrdamper.data import Condition, Run
 from mrdamper.models.play_bypass import PlayBypass
-from mrdamper.motion import Excitation, measured_motion, random_motion, sine
-from mrdamper.simulation import simulate
+from mrdamper.physics.motion import Excitation, measured_motion, random_motion, sine
+from mrdamper.physics.simulation import simulate
 from mrdamper.study.cross_validation import stretches
-from mrdamper.validation import score_run
+from mrdamper.study.validation import score_run
 
 
 @dataclass(frozen=True)

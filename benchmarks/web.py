@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from mrdamper.dampers.joint import JointProblem
-from mrdamper.files.dataset import load_dataset
-from mrdamper.files.model_file import dump_model
+from mrdamper.dampers.model_file import dump_model
+from mrdamper.rig_files.dataset_folder import load_dataset
 
 CHROMIUM = os.environ.get("CHROMIUM", "/usr/bin/chromium")
 DRAG_SECONDS = 5.0

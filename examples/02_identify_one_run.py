@@ -5,7 +5,7 @@ One test, and how much of it to believe
 A Bouc–Wen model from one test, and how much of it to believe."""
 
 from mrdamper import identify, load_dataset, plot_loop
-from mrdamper.motion import measured_motion
+from mrdamper.physics.motion import measured_motion
 
 run = load_dataset()["utf_5mm4Hz_1A"]
 found = identify(run, "bouc-wen")

@@ -15,10 +15,10 @@ import numpy as np
 
 from mrdamper import Condition, run_study
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.motion import sine
+from mrdamper.physics.motion import sine
+from mrdamper.physics.simulation import simulate
 from mrdamper.rig_files.quality.table import quality_table
 from mrdamper.rig_files.rig_import import import_files, to_dataset
-from mrdamper.simulation import simulate
 
 
 def rig_test(condition: Condition, rng: np.random.Generator) -> np.ndarray:

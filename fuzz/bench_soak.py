@@ -169,7 +169,7 @@ class _User:
 
 def _saved_model(rng: random.Random, odd: object) -> str:
     from fuzz.counting import bench_damper
-    from mrdamper.files.model_file import dump_model
+    from mrdamper.dampers.model_file import dump_model
 
     document = json.loads(dump_model(bench_damper()))
     if rng.random() < 0.6:

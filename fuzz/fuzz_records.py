@@ -25,8 +25,8 @@ import numpy as np
 from fuzz.record_faults import KINDS, UNOBSERVABLE, Kind
 from fuzz.synthetic_records import clean_record
 from mrdamper.errors import InputError, QualityError
-from mrdamper.motion.harmonics import fundamental_frequency
-from mrdamper.motion.measured import smooth
+from mrdamper.physics.motion.harmonics import fundamental_frequency
+from mrdamper.physics.motion.measured import smooth
 from mrdamper.rig_files.quality import View, judge
 from mrdamper.rig_files.record import Record
 

@@ -49,8 +49,8 @@ def _mutated(document: Any, rng: random.Random) -> tuple[Any, Any]:
 
 def attack_models(share: float) -> list[Count]:
     """Saved models with anything in any place: refused with a code, or a damper that answers with one."""
+    from mrdamper.dampers.model_file import dump_model, parse_model
     from mrdamper.data import Condition
-    from mrdamper.files.model_file import dump_model, parse_model
 
     sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
     from support.dampers import conditioned_damper, joint_damper, modified_damper  # type: ignore[import-not-found]
@@ -74,8 +74,8 @@ def attack_models(share: float) -> list[Count]:
 
 def attack_datasets(share: float) -> list[Count]:
     """Dataset folders with anything in any cell: refused with a code, or studied with one."""
-    from mrdamper.files.dataset import load_dataset
     from mrdamper.identification import identify
+    from mrdamper.rig_files.dataset_folder import load_dataset
 
     count, rng = Count("dataset, changed anywhere"), random.Random(4)
     folder = Path(tempfile.mkdtemp())
@@ -127,7 +127,7 @@ def attack_datasets(share: float) -> list[Count]:
 
 def _damaged(share: float) -> Count:
     """Samples in Parquet with bytes changed anywhere, most of them where the table is described."""
-    from mrdamper.files.dataset import load_dataset, save_dataset
+    from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
 
     count, rng = Count("samples of a dataset, damaged"), random.Random(7)
     with tempfile.TemporaryDirectory() as folder:
@@ -175,7 +175,7 @@ def attack_calls(share: float) -> list[Count]:
         values = {info.name: rng.choice([1.0, 1e3, one, two, 0.0]) for info in infos}
         model = typed(count, (name, values), lambda n=name, v=values: model_type(n)(**v))
         if model is not None:
-            from mrdamper.motion import sine
+            from mrdamper.physics.motion import sine
 
             typed(
                 count,

@@ -22,8 +22,8 @@ def attack_names(share: float) -> list[Count]:
 
     from markdown_it import MarkdownIt
 
+    from mrdamper.data import encoding
     from mrdamper.errors import InputError
-    from mrdamper.files import encoding
 
     counts = {kind: Count(kind) for kind in ("name in C", "name in XML and HTML", "name in LaTeX", "name in Markdown")}
     counts |= {kind: Count(kind) for kind in ("name in CSV", "name in a file name", "name in a terminal")}

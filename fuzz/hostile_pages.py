@@ -38,8 +38,8 @@ COMMANDS = (
 
 def attack_exports(share: float) -> list[Count]:
     """Every way a damper leaves, its rig by a hostile name; and the model, saved and loaded again."""
+    from mrdamper.dampers.model_file import dump_model, parse_model
     from mrdamper.export import all_exporters
-    from mrdamper.files.model_file import dump_model, parse_model
 
     damper = bench_damper()
     count, saved, rng = Count("whole export of a named rig"), Count("model of a named rig, saved"), random.Random(2)
@@ -66,8 +66,8 @@ def attack_exports(share: float) -> list[Count]:
 def attack_pages(share: float) -> list[Count]:
     """Every command that writes pages and figures, its rig, runs, remarks, folders and dampers by hostile names."""
     from mrdamper.errors import InputError
-    from mrdamper.files.dataset import save_dataset
     from mrdamper.fleet.generator import Line
+    from mrdamper.rig_files.dataset_folder import save_dataset
 
     count, ran = Count("whole result of named runs"), Count("command on named runs")
     dataset, rng = next(iter(Line(dampers=1, sessions=1, golden=0))).dataset(), random.Random(8)

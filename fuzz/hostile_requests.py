@@ -32,7 +32,7 @@ def attack_requests(share: float) -> list[Count]:
     """Every endpoint, in one process: below 500, and nothing of another session."""
     from fastapi.testclient import TestClient
 
-    from mrdamper.files.model_file import dump_model
+    from mrdamper.dampers.model_file import dump_model
     from mrdamper.web.app import create_app
 
     held, apart = Count("request with anything: below 500"), Count("session of others, token")

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.motion.harmonics import fundamental_frequency
+from mrdamper.physics.motion.harmonics import fundamental_frequency
 from mrdamper.rig_files.record import Record
 
 Rng = np.random.Generator

@@ -57,7 +57,7 @@ _LOADED = (
     "numpy", "scipy.optimize", "scipy.special", "polars", "matplotlib.pyplot", "matplotlib.backends.backend_svg", "jinja2",
     "pydantic", "mrdamper.cli.output", "mrdamper.study.workflow", "mrdamper.study.comparison", "mrdamper.report.study",
     "mrdamper.report.comparison", "mrdamper.report.damper_tests", "mrdamper.report.simulation", "mrdamper.export",
-    "mrdamper.files.dataset", "mrdamper.files.model_file", "mrdamper.validation", "mrdamper.rig_files.rig_import",
+    "mrdamper.rig_files.dataset_folder", "mrdamper.dampers.model_file", "mrdamper.study.validation", "mrdamper.rig_files.rig_import",
     "mrdamper.systems.simulate", "mrdamper.study.plan", "mrdamper.paper.output",
 )  # fmt: skip
 _STEPS = ("os.rename", "os.link", "os.remove", "os.rmdir", "os.mkdir", "ctypes.dlsym")  # the last: before an exchange
@@ -236,9 +236,9 @@ def workplace() -> Iterator[Path]:
 def _prepare(root: Path) -> None:
     from dataclasses import replace
 
-    from mrdamper.files.dataset import save_dataset
-    from mrdamper.files.model_file import save_model
+    from mrdamper.dampers.model_file import save_model
     from mrdamper.fleet.generator import Line
+    from mrdamper.rig_files.dataset_folder import save_dataset
 
     for n, made in enumerate(Line(dampers=2, sessions=1, golden=0), start=1):
         save_dataset(made.dataset(), root / f"data{n}")

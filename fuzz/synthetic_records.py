@@ -11,9 +11,9 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.models import model_type
-from mrdamper.motion import Excitation
+from mrdamper.physics.motion import Excitation
+from mrdamper.physics.simulation import simulate
 from mrdamper.rig_files.record import Record
-from mrdamper.simulation import simulate
 
 ELASTIC_PLASTIC = "elastic-plastic"
 FAMILIES = ("bouc-wen", "smooth-bingham", "kwok", "guo", "dahl", "lugre", ELASTIC_PLASTIC)

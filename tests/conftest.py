@@ -23,7 +23,7 @@ import pytest
 from support.browser import LOGO, WIDE, launched
 
 from mrdamper.data import Condition
-from mrdamper.files.dataset import load_dataset
+from mrdamper.rig_files.dataset_folder import load_dataset
 
 # One process of several runs the files of a group, as they share what is dear to make; every other file is a group
 # of its own. The marks of pytest-xdist do not reach its scheduler under pytest 9.

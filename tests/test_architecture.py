@@ -42,7 +42,7 @@ def test_every_extra_is_imported_somewhere():
 
 def test_the_house_does_not_grow_again():
     """`python -m benchmarks.house` prints the table."""
-    assert len(house.names_at_the_top()) <= 28
+    assert len(house.names_at_the_top()) <= 18
     assert len(house.floors()) <= 13
     assert house.isinstance_over_dampers() == []
 

@@ -15,9 +15,9 @@ from benchmarks.genetic import plain_genetic
 from benchmarks.identification import Task
 from benchmarks.rk4 import rk4
 from benchmarks.timing import growth, race
-from mrdamper.hysteresis import Shape, follow
 from mrdamper.identification.methods.projection import Projection
-from mrdamper.motion import Path as Strokes
+from mrdamper.physics.hysteresis import Shape, follow
+from mrdamper.physics.motion import Path as Strokes
 
 
 def test_growth_is_the_exponent():

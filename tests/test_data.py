@@ -5,7 +5,7 @@ import pytest
 
 from mrdamper.data import Condition, Dataset, Run, same_condition
 from mrdamper.errors import ConditionError, NonFiniteError, RunError, TimeOrderError, UnknownNameError
-from mrdamper.motion import analyse_motion
+from mrdamper.physics.motion import analyse_motion
 
 
 def run(**changes):

@@ -11,7 +11,7 @@ from support.fmu_files import fmu_bytes
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
-from mrdamper.files.model_file import save_model
+from mrdamper.dampers.model_file import save_model
 
 DOCS = Path(__file__).parent.parent / "docs"
 FENCE = re.compile(r"(?P<slow><!-- slow -->\n)?^```(?P<kind>python|sh)\n(?P<body>.*?)^```", re.MULTILINE | re.DOTALL)

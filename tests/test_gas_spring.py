@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mrdamper.errors import ParameterError
-from mrdamper.gas_spring import GasSpring
+from mrdamper.physics.gas_spring import GasSpring
 
 CASES = json.loads((Path(__file__).parent / "vectors.json").read_text())["V01_gas_spring"]
 ROUNDING = 1e-12  # closed forms on both sides

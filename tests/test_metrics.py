@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from mrdamper import metrics
+from mrdamper.statistics import metrics
 
 
 def test_scores_match_the_vectors(vectors):

@@ -11,7 +11,7 @@ import mrdamper
 from mrdamper import Condition, Dataset, GasSpring, InputError, Run
 from mrdamper.errors import shown
 from mrdamper.models.bingham import Bingham
-from mrdamper.motion import sine
+from mrdamper.physics.motion import sine
 from mrdamper.study.parallel import HERE
 from mrdamper.systems.structure import Link, System
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from support.dampers import all_bare_models, all_dampers, joint_damper, modified_damper
 
+from mrdamper.dampers.streaming import stepper
 from mrdamper.data import Condition
 from mrdamper.errors import ExcitationError, ParameterError, UnknownNameError
 from mrdamper.models import model_type
-from mrdamper.motion import Excitation, Path, random_motion, sine
-from mrdamper.simulation import simulate
-from mrdamper.streaming import stepper
+from mrdamper.physics.motion import Excitation, Path, random_motion, sine
+from mrdamper.physics.simulation import simulate
 
 MODELS = all_bare_models()
 DAMPERS = all_dampers()

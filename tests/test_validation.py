@@ -8,12 +8,12 @@ import pytest
 from support.dampers import joint_damper
 from support.synthetic import synthetic_run
 
-from mrdamper import validation
 from mrdamper.data import Condition, Run
 from mrdamper.errors import InputError
-from mrdamper.metrics import dissipated_power
-from mrdamper.motion import analyse_motion, sine
-from mrdamper.validation import (
+from mrdamper.physics.motion import analyse_motion, sine
+from mrdamper.statistics.metrics import dissipated_power
+from mrdamper.study import validation
+from mrdamper.study.validation import (
     RunScore,
     Validation,
     leave_one_condition_out,

@@ -15,37 +15,37 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mrdamper.dampers.base import Damper, Prediction
+    from mrdamper.dampers.model_file import load_model, save_model
+    from mrdamper.dampers.streaming import stepper
     from mrdamper.data import Condition, Dataset, Run
     from mrdamper.discovery import register
     from mrdamper.errors import InputError
     from mrdamper.export import export_model
-    from mrdamper.files.dataset import load_dataset, save_dataset
-    from mrdamper.files.model_file import load_model, save_model
     from mrdamper.fleet.line import run_fleet
-    from mrdamper.gas_spring import GasSpring
     from mrdamper.identification import identify
-    from mrdamper.motion import Excitation, sine, sweep
     from mrdamper.paper.study import reproduce
+    from mrdamper.physics.gas_spring import GasSpring
+    from mrdamper.physics.motion import Excitation, sine, sweep
+    from mrdamper.physics.simulation import simulate
     from mrdamper.report.plots.loops import plot_force, plot_loop
+    from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
     from mrdamper.rig_files.rig_import import import_files
-    from mrdamper.simulation import simulate
-    from mrdamper.streaming import stepper
     from mrdamper.study.check import check
     from mrdamper.study.comparison import compare
     from mrdamper.study.plan import plan_tests
+    from mrdamper.study.validation import validate
     from mrdamper.study.workflow import run_study
     from mrdamper.systems.inputs import load_input
     from mrdamper.systems.inverse import invert
     from mrdamper.systems.simulate import simulate_system
     from mrdamper.systems.system_file import load_system
-    from mrdamper.validation import validate
 
 _HOME = {
     "Condition": "data",
     "Damper": "dampers.base",
     "Dataset": "data",
-    "Excitation": "motion",
-    "GasSpring": "gas_spring",
+    "Excitation": "physics.motion",
+    "GasSpring": "physics.gas_spring",
     "InputError": "errors",
     "Prediction": "dampers.base",
     "Run": "data",
@@ -55,9 +55,9 @@ _HOME = {
     "identify": "identification",
     "import_files": "rig_files.rig_import",
     "invert": "systems.inverse",
-    "load_dataset": "files.dataset",
+    "load_dataset": "rig_files.dataset_folder",
     "load_input": "systems.inputs",
-    "load_model": "files.model_file",
+    "load_model": "dampers.model_file",
     "load_system": "systems.system_file",
     "plan_tests": "study.plan",
     "plot_force": "report.plots.loops",
@@ -66,14 +66,14 @@ _HOME = {
     "reproduce": "paper.study",
     "run_fleet": "fleet.line",
     "run_study": "study.workflow",
-    "save_dataset": "files.dataset",
-    "save_model": "files.model_file",
-    "simulate": "simulation",
+    "save_dataset": "rig_files.dataset_folder",
+    "save_model": "dampers.model_file",
+    "simulate": "physics.simulation",
     "simulate_system": "systems.simulate",
-    "sine": "motion",
-    "stepper": "streaming",
-    "sweep": "motion",
-    "validate": "validation",
+    "sine": "physics.motion",
+    "stepper": "dampers.streaming",
+    "sweep": "physics.motion",
+    "validate": "study.validation",
 }
 __all__ = list(_HOME)  # pyright: ignore[reportUnsupportedDunderAll]
 

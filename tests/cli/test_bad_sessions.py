@@ -10,9 +10,9 @@ from typer.testing import CliRunner
 
 from mrdamper.cli import application
 from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.model_file import dump_model, parse_model
 from mrdamper.data import Dataset
 from mrdamper.errors import InputError, ModelFileError
-from mrdamper.files.model_file import dump_model, parse_model
 from mrdamper.study.workflow import run_study
 
 

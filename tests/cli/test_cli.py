@@ -14,11 +14,11 @@ from support.command import mrdamper
 
 from mrdamper.cli import application
 from mrdamper.dampers.base import Envelope
+from mrdamper.dampers.model_file import save_model
 from mrdamper.dampers.modified import ModifiedModel
 from mrdamper.dampers.parameter_map import ParameterMap
-from mrdamper.files.model_file import save_model
-from mrdamper.functions.forms import ParameterFunction
 from mrdamper.models.bingham import Bingham
+from mrdamper.statistics.functions.forms import ParameterFunction
 
 
 @pytest.fixture

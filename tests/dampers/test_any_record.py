@@ -10,11 +10,11 @@ import pytest
 sys.path.insert(0, str(Folder(__file__).parents[2]))
 
 from benchmarks.virtual_dampers import DAMPERS, identified
-from mrdamper.motion import Path
-from mrdamper.motion.lag import leaking_load
-from mrdamper.motion.measured import smooth, whole_clock
+from mrdamper.physics.motion import Path
+from mrdamper.physics.motion.lag import leaking_load
+from mrdamper.physics.motion.measured import smooth, whole_clock
 from mrdamper.study.cross_validation import stretches
-from mrdamper.validation import score_run
+from mrdamper.study.validation import score_run
 
 BY_NAME = {virtual.name: virtual for virtual in DAMPERS}
 

@@ -10,8 +10,8 @@ from support.sessions import session_runs
 from mrdamper.dampers.bands import band, portable_band
 from mrdamper.dampers.certainty import table
 from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.model_file import dump_model, parse_model
 from mrdamper.data import Condition
-from mrdamper.files.model_file import dump_model, parse_model
 from mrdamper.study.limits import Limits
 from mrdamper.study.plan import plan_tests
 from mrdamper.systems.monte_carlo import draw

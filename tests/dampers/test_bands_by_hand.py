@@ -16,7 +16,7 @@ from mrdamper.dampers.sessions import Expected, Sessions, Spread, When
 from mrdamper.data import Condition
 from mrdamper.errors import InputError
 from mrdamper.models.bingham import Bingham
-from mrdamper.motion import sine
+from mrdamper.physics.motion import sine
 
 CONDITION = Condition(1.0, 2.0, 0.01)
 MOTION = sine(CONDITION, 1, 80)

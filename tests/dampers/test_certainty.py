@@ -14,9 +14,9 @@ from mrdamper.dampers.bands import band, no_band, portable_band
 from mrdamper.dampers.calibration import PredictedRun
 from mrdamper.dampers.certainty import Certainty, table, unsure
 from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.model_file import dump_model, parse_model, save_model
 from mrdamper.data import Condition
 from mrdamper.errors import InputError, ModelFileError
-from mrdamper.files.model_file import dump_model, parse_model, save_model
 
 
 @pytest.fixture(scope="module")

@@ -11,12 +11,12 @@ from scipy.integrate import solve_ivp
 from support.dampers import conditioned_damper, joint_damper, modified_damper
 
 from mrdamper.dampers.coil import Coil, Driver, field_current
+from mrdamper.dampers.model_file import dump_model, parse_model
+from mrdamper.dampers.streaming import stepper
 from mrdamper.data import Run
 from mrdamper.errors import ModelFileError, ParameterError
-from mrdamper.files.model_file import dump_model, parse_model
-from mrdamper.motion import Path, random_motion
-from mrdamper.motion.lag import first_order_lag
-from mrdamper.streaming import stepper
+from mrdamper.physics.motion import Path, random_motion
+from mrdamper.physics.motion.lag import first_order_lag
 
 KINDS = {"joint": joint_damper, "modified": modified_damper, "conditioned": conditioned_damper}
 LAGS = st.floats(1e-4, 0.2)

@@ -13,7 +13,7 @@ from mrdamper.dampers.joint import JointDamper
 from mrdamper.dampers.run_residuals import RunResiduals, normal_matrix
 from mrdamper.data import Condition, Run
 from mrdamper.models.bingham import Bingham
-from mrdamper.motion import sine
+from mrdamper.physics.motion import sine
 
 
 def bingham(c, fy, f0):

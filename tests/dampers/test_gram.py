@@ -9,13 +9,13 @@ from mrdamper.dampers.gram import _Design, _ShapeSearch, choose_forms, condense,
 from mrdamper.dampers.modified import fit_modified, fit_modified_jointly
 from mrdamper.data import Condition, Run, same_condition
 from mrdamper.errors import IdentificationError
-from mrdamper.functions.forms import ParameterFunction
 from mrdamper.identification import identify
 from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.motion import sweep
-from mrdamper.simulation import simulate
-from mrdamper.validation import leave_one_condition_out, validate
+from mrdamper.physics.motion import sweep
+from mrdamper.physics.simulation import simulate
+from mrdamper.statistics.functions.forms import ParameterFunction
+from mrdamper.study.validation import leave_one_condition_out, validate
 
 MATRIX = [Condition(i, f, a) for i in (0.0, 0.5, 1.0, 1.5) for f, a in ((1.0, 0.02), (2.0, 0.02), (0.5, 0.05))]
 FORMS = {

@@ -15,18 +15,18 @@ from mrdamper.dampers.base import UNTESTED, Envelope
 from mrdamper.dampers.certainty import FittedParameter
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.joint import FALL, RISE, JointDamper, JointFit, JointProblem, damper_of
+from mrdamper.dampers.model_file import dump_model, parse_model
 from mrdamper.dampers.strung import Part, string
 from mrdamper.data import Condition, Run
 from mrdamper.errors import IdentificationError, RunError
-from mrdamper.files.model_file import dump_model, parse_model
 from mrdamper.models import Scale
 from mrdamper.models.play_bypass import PlayBypass, play_position
-from mrdamper.motion import random_motion, sine, sweep
-from mrdamper.motion.lag import first_order_lag
-from mrdamper.optimizers.ending import Ending
-from mrdamper.optimizers.levenberg_marquardt import Minimum
-from mrdamper.simulation import simulate, steady_loop
-from mrdamper.validation import validate
+from mrdamper.physics.motion import random_motion, sine, sweep
+from mrdamper.physics.motion.lag import first_order_lag
+from mrdamper.physics.simulation import simulate, steady_loop
+from mrdamper.statistics.ending import Ending
+from mrdamper.statistics.levenberg_marquardt import Minimum
+from mrdamper.study.validation import validate
 
 TRUTH = PlayBypass(
     f0=50.0, k=900.0, c0=700.0, c1=1500.0, fy0=100.0, fy1=1000.0, d=2e-4, e=2.5e-5, cb=3.5e4, h0=0.4, h1=0.4,
@@ -64,7 +64,7 @@ def test_the_stop_operator_moves_stops_and_forgets():
     expected = np.zeros(x.size)
     for i in range(1, x.size):
         expected[i] = np.clip(expected[i - 1] + x[i] - x[i - 1], -2e-3, 2e-3)
-    from mrdamper.motion import Path
+    from mrdamper.physics.motion import Path
 
     np.testing.assert_allclose(play_position(Path.of(x, peaks="samples"), 2e-3), expected, atol=1e-15)
 

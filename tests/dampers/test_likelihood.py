@@ -11,10 +11,10 @@ from typer.testing import CliRunner
 from mrdamper.cli import application
 from mrdamper.dampers.covariance import certain
 from mrdamper.dampers.likelihood import Likelihood, profile
+from mrdamper.dampers.model_file import save_model
 from mrdamper.dampers.posterior import posterior, split_rhat
 from mrdamper.errors import InputError
-from mrdamper.files.dataset import save_dataset
-from mrdamper.files.model_file import save_model
+from mrdamper.rig_files.dataset_folder import save_dataset
 
 FEW = ("f0", "c0", "fy0")
 

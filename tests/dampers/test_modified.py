@@ -17,13 +17,13 @@ from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.data import Condition
 from mrdamper.errors import IdentificationError, InputError
 from mrdamper.export.equations import equations
-from mrdamper.functions.fitting import choose_function
-from mrdamper.functions.forms import FORMS, ParameterFunction
-from mrdamper.functions.motion_hull import MotionHull
 from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.motion import sine
 from mrdamper.paper.functions import PAPER_FORMS, paper_functions
+from mrdamper.physics.motion import sine
+from mrdamper.statistics.functions.fitting import choose_function
+from mrdamper.statistics.functions.forms import FORMS, ParameterFunction
+from mrdamper.statistics.functions.motion_hull import MotionHull
 
 MOTIONS = ((0.5, 0.05), (1.0, 0.02), (1.5, 0.05), (2.0, 0.02))
 CONDITIONS = [Condition(I, f, A) for I in (0.0, 0.5, 1.2, 2.0) for f, A in MOTIONS]

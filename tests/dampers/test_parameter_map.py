@@ -6,10 +6,10 @@ from support.dampers import ENVELOPE
 
 from mrdamper.dampers.modified import ModifiedModel
 from mrdamper.dampers.parameter_map import ParameterMap
+from mrdamper.dampers.streaming import stepper
 from mrdamper.data import Condition
-from mrdamper.functions.forms import ParameterFunction
 from mrdamper.models import model_type
-from mrdamper.streaming import stepper
+from mrdamper.statistics.functions.forms import ParameterFunction
 
 FALLING = ParameterFunction("linear-current", (-1000.0, 400.0))  # below zero beyond 0.4 A
 CASES = {

@@ -14,7 +14,7 @@ from mrdamper.data import Condition, Run
 from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.models.bingham import Bingham
 from mrdamper.models.guo import Guo
-from mrdamper.motion import sine
+from mrdamper.physics.motion import sine
 
 CURRENTS = (0.0, 0.3, 0.9, 1.7)
 MOTIONS = ((0.5, 0.03), (1.1, 0.012), (2.2, 0.02), (1.1, 0.006))

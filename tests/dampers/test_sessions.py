@@ -11,9 +11,9 @@ from mrdamper.dampers.sessions import Reading, Sessions, Spread, When, known_err
 from mrdamper.data import Condition, Run
 from mrdamper.errors import InputError
 from mrdamper.models.bingham import Bingham
-from mrdamper.motion import sine
-from mrdamper.simulation import simulate
-from mrdamper.validation import validate
+from mrdamper.physics.motion import sine
+from mrdamper.physics.simulation import simulate
+from mrdamper.study.validation import validate
 
 DAMPER = damper_of(Bingham(c=9000.0, fy=1.0))
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from support.dampers import joint_damper
 
-from mrdamper.files.model_file import save_model
+from mrdamper.dampers.model_file import save_model
 
 HERE, ROOT = Path(__file__).parent, Path(__file__).parents[2]
 DROPPED = [path.relative_to(HERE) for path in HERE.rglob("*.py") if path != Path(__file__)]

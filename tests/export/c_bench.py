@@ -6,8 +6,8 @@ import subprocess
 
 import numpy as np
 
+from mrdamper.dampers.streaming import stream
 from mrdamper.export.c import c_sources
-from mrdamper.streaming import stream
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]

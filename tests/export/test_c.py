@@ -9,13 +9,13 @@ import pytest
 from export.c_bench import COMPILERS, STRICT, build, run
 from support.dampers import ENVELOPE, all_dampers, joint_damper
 
+from mrdamper.dampers.streaming import stepper
 from mrdamper.data import Condition
 from mrdamper.errors import InputError
 from mrdamper.export import all_exporters, exporter
 from mrdamper.export.base import identifier
 from mrdamper.export.c import CExporter
-from mrdamper.motion import sine
-from mrdamper.streaming import stepper
+from mrdamper.physics.motion import sine
 
 DAMPERS = all_dampers()
 needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler on this machine")

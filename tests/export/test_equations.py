@@ -11,14 +11,14 @@ from support.dampers import all_bare_models, all_dampers, joint_damper, modified
 
 from mrdamper.dampers.joint import damper_of
 from mrdamper.dampers.kernel import KernelDamper, KernelLaw
+from mrdamper.dampers.model_file import load_model
 from mrdamper.dampers.published import all_conditioned
+from mrdamper.data.parameters import latex_symbol
 from mrdamper.errors import ParameterError
 from mrdamper.export.documents import LatexExporter, MarkdownExporter
 from mrdamper.export.equations import equations, function_text, number
-from mrdamper.files.model_file import load_model
-from mrdamper.functions.forms import FORMS, ParameterFunction
 from mrdamper.models import all_models
-from mrdamper.parameters import latex_symbol
+from mrdamper.statistics.functions.forms import FORMS, ParameterFunction
 
 DAMPERS = all_dampers()
 STORED = Path(__file__).parents[1] / "files" / "stored" / "1.1"

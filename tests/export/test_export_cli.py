@@ -6,8 +6,8 @@ from support.fmu_files import COMPILERS, fmu_bytes
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
+from mrdamper.dampers.model_file import save_model
 from mrdamper.export import all_exporters
-from mrdamper.files.model_file import save_model
 
 run = CliRunner()
 

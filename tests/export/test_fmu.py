@@ -9,13 +9,13 @@ import pytest
 from support.dampers import joint_damper
 from support.fmu_files import COMPILERS, DAMPERS, FEW, fmu_bytes, unpacked
 
+from mrdamper.dampers.streaming import FLAGS, stepper, stream
 from mrdamper.errors import InputError
 from mrdamper.export import all_exporters, toolchain
 from mrdamper.export.c import reference_motion
 from mrdamper.export.fmu import FMUExporter, reference
 from mrdamper.export.fmu_description import base_powers, parameters_of_stream
 from mrdamper.export.toolchain import PLATFORMS, build_library, compiler_for, here
-from mrdamper.streaming import FLAGS, stepper, stream
 
 FMIS = (2, 3)
 needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler on this machine")

@@ -14,12 +14,12 @@ from support.sessions import session_runs
 
 from mrdamper.dampers.covariance import certain
 from mrdamper.dampers.joint import JointDamper
+from mrdamper.dampers.streaming import stepper
 from mrdamper.data import Condition, Run
 from mrdamper.export import page as page_module
 from mrdamper.export.page import PageExporter
 from mrdamper.export.toolchain import Built, build_webassembly
 from mrdamper.models import model_type
-from mrdamper.streaming import stepper
 
 DAMPERS = all_dampers()
 TRANSCENDENTAL = re.compile(r"Math\.(exp|expm1|log|log1p|tan|tanh|atan|atanh|pow)\(")

@@ -11,9 +11,9 @@ import textwrap
 import pytest
 from support.command import mrdamper
 
+from mrdamper.data import atomic
+from mrdamper.data.atomic import MADE, publish, require_writable, write_file, write_folder, write_into
 from mrdamper.errors import InputError, OutputError, ResourceError, resource_error
-from mrdamper.files import atomic
-from mrdamper.files.atomic import MADE, publish, require_writable, write_file, write_folder, write_into
 
 posix = pytest.mark.skipif(os.name != "posix", reason="kills and locks as POSIX knows them")
 
@@ -64,7 +64,7 @@ def test_an_error_leaves_what_stood_there(tmp_path):
 KILLED = textwrap.dedent("""
     import os, signal, sys
     from pathlib import Path
-    from mrdamper.files import atomic
+    from mrdamper.data import atomic
     at, calls = int(sys.argv[2]), 0
     def counted(real):
         def call(*arguments, **named):

@@ -16,7 +16,7 @@ from mrdamper.errors import (
     TimeOrderError,
     UnitError,
 )
-from mrdamper.files.dataset import load_dataset, save_dataset
+from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
 
 
 def dataset():

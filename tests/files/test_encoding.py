@@ -10,7 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
-from mrdamper.files.encoding import c_comment, csv_cell, csv_text, csv_value, file_names, latex, markdown, xml
+from mrdamper.data.encoding import c_comment, csv_cell, csv_text, csv_value, file_names, latex, markdown, xml
 
 NASTY = [
     "*\\/ int canary(void); /*", "*/", "**//", "*??/\n/", "/*/", "???/", "\\", "\u2028*/", "]]>", "&lt;b>", "<script>",

@@ -3,13 +3,13 @@ import json
 import pytest
 
 from mrdamper.dampers.base import Envelope
+from mrdamper.dampers.model_file import dump_model, load_model, parse_model, save_model
 from mrdamper.dampers.modified import ModifiedModel
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.data import Condition
 from mrdamper.errors import ModelFileError, OutputError
-from mrdamper.files.model_file import dump_model, load_model, parse_model, save_model
-from mrdamper.functions.forms import ParameterFunction
 from mrdamper.models.bingham import Bingham
+from mrdamper.statistics.functions.forms import ParameterFunction
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from support.dampers import conditioned_damper, joint_damper, modified_damper
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
-from mrdamper.files.model_file import dump_model
+from mrdamper.dampers.model_file import dump_model
 
 
 def schema(name):

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mrdamper.dampers.model_file import dump_model, load_model, parse_model
 from mrdamper.data import Condition, Run
-from mrdamper.files.model_file import dump_model, load_model, parse_model
 
 STORED = Path(__file__).parent / "stored"
 FILES = sorted(path for path in STORED.rglob("*.json") if path.name != "forces.json")

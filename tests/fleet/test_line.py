@@ -18,7 +18,6 @@ from typer.testing import CliRunner
 from mrdamper.cli import application
 from mrdamper.data import Dataset
 from mrdamper.errors import InputError
-from mrdamper.files.dataset import load_dataset, save_dataset
 from mrdamper.fleet.generator import Line
 from mrdamper.fleet.item import digest_of
 from mrdamper.fleet.items import find_items
@@ -27,6 +26,7 @@ from mrdamper.fleet.lake import lake_dataset
 from mrdamper.fleet.line import run_fleet
 from mrdamper.fleet.profile import FleetProfile
 from mrdamper.rig_files import sandbox
+from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
 
 
 def test_one_row_a_damper_and_session(identified):

@@ -8,9 +8,9 @@ import pytest
 
 from mrdamper.data import Condition
 from mrdamper.errors import IdentificationError
-from mrdamper.functions import fitting
-from mrdamper.functions.fitting import FunctionFit, assess, choose_function, fit_function, require_determined
-from mrdamper.functions.forms import FORMS, ParameterFunction
+from mrdamper.statistics.functions import fitting
+from mrdamper.statistics.functions.fitting import FunctionFit, assess, choose_function, fit_function, require_determined
+from mrdamper.statistics.functions.forms import FORMS, ParameterFunction
 
 I, f, A, r, s = 1.3, 0.7, 0.06, 0.9, 2.1  # no two products of their powers are alike
 # Every form once more, term by term.

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mrdamper.data import Condition
-from mrdamper.functions.motion_hull import MotionHull
+from mrdamper.statistics.functions.motion_hull import MotionHull
 
 TRIANGLE = [Condition(0.0, f, A) for f, A in ((0.5, 0.025), (1.0, 0.025), (2.0, 0.010))]
 

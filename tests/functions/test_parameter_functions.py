@@ -4,9 +4,9 @@ import pytest
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.data import Condition
 from mrdamper.errors import IdentificationError, UnknownNameError
-from mrdamper.functions.fitting import choose_function, fit_function
-from mrdamper.functions.forms import FORMS, ParameterFunction, features
 from mrdamper.models.bouc_wen import BoucWen
+from mrdamper.statistics.functions.fitting import choose_function, fit_function
+from mrdamper.statistics.functions.forms import FORMS, ParameterFunction, features
 
 MATRIX = [
     Condition(i, f, a)

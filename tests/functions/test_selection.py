@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mrdamper.data import Condition
-from mrdamper.functions.forms import FORMS, ParameterFunction
-from mrdamper.functions.selection import broken_law, fold_groups, mean_error, smaller_wins, supported
+from mrdamper.statistics.functions.forms import FORMS, ParameterFunction
+from mrdamper.statistics.functions.selection import broken_law, fold_groups, mean_error, smaller_wins, supported
 
 LEVELS, MOTIONS = (0.0, 0.5, 1.0, 1.5), ((0.5, 0.025), (1.0, 0.025), (2.0, 0.010))
 MATRIX = [Condition(i, f, A) for i in LEVELS for f, A in MOTIONS]

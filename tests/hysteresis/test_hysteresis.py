@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import hyp2f1, iv
 
 from mrdamper.errors import ExcitationError, ParameterError
-from mrdamper.hysteresis import (
+from mrdamper.physics.hysteresis import (
     Shape,
     dissipates,
     follow,
@@ -27,7 +27,7 @@ from mrdamper.hysteresis import (
     stroke,
     z_max,
 )
-from mrdamper.motion import Path
+from mrdamper.physics.motion import Path
 
 # Rounding of closed forms, and of tables whose own error is near 1e-14 for these n.
 ROUNDING = 1e-12

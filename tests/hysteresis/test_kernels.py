@@ -5,8 +5,6 @@ import pytest
 from support.synthetic import synthetic_run
 
 from mrdamper.data import Condition
-from mrdamper.hysteresis import Shape, follow
-from mrdamper.hysteresis.batch import batch_cost, follow_alike, follow_quickly, follow_with_slope
 from mrdamper.identification import Problem
 from mrdamper.identification.columns import linear_table
 from mrdamper.identification.elimination import Elimination, kind_of
@@ -15,11 +13,13 @@ from mrdamper.models import Scale, all_models
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.models.kwok import Kwok
 from mrdamper.models.spencer import Spencer
-from mrdamper.motion import Path, sine
-from mrdamper.optimizers.ending import Ending
-from mrdamper.optimizers.levenberg_marquardt import least_squares
-from mrdamper.optimizers.linear import FixedColumns
-from mrdamper.optimizers.one_number import least_squares_in_one
+from mrdamper.physics.hysteresis import Shape, follow
+from mrdamper.physics.hysteresis.batch import batch_cost, follow_alike, follow_quickly, follow_with_slope
+from mrdamper.physics.motion import Path, sine
+from mrdamper.statistics.ending import Ending
+from mrdamper.statistics.levenberg_marquardt import least_squares
+from mrdamper.statistics.linear import FixedColumns
+from mrdamper.statistics.one_number import least_squares_in_one
 
 X = 0.02
 RHOS = (-20.0, -1.0, -0.3, -1e-7, 0.0, 1e-6, 0.5, 0.95)  # rho = 1 forgets where it is once zeta rounds to 1

@@ -8,13 +8,13 @@ import sys
 import numpy as np
 import pytest
 
-from mrdamper.optimizers.linear import on_one_blas_thread, one_blas_thread
+from mrdamper.statistics.linear import on_one_blas_thread, one_blas_thread
 
 FIT = """
 import hashlib
 import numpy as np
 from mrdamper.identification import identify
-from mrdamper.files.dataset import load_dataset
+from mrdamper.rig_files.dataset_folder import load_dataset
 from mrdamper.dampers.joint import JointProblem
 runs = [run for run in load_dataset().rig("utfsm").split("train") if run.excitation == "sine"]
 fit = JointProblem(runs, "play-bypass").fit(rounds=1, most_steps=2)
@@ -51,7 +51,7 @@ def test_the_number_of_threads_is_given_back():
 
 
 def test_without_the_library_nothing_is_held_and_nothing_fails(monkeypatch):
-    from mrdamper.optimizers import linear
+    from mrdamper.statistics import linear
 
     monkeypatch.setitem(sys.modules, "threadpoolctl", None)
     linear._controller.cache_clear()

@@ -8,8 +8,6 @@ import pytest
 
 from mrdamper.data import Condition, Run
 from mrdamper.errors import ExcitationError, IdentificationError
-from mrdamper.gas_spring import GasSpring
-from mrdamper.hysteresis import Shape, steady_loop
 from mrdamper.identification import identify
 from mrdamper.identification.harmonic_balance import (
     HarmonicProjection,
@@ -21,7 +19,9 @@ from mrdamper.identification.harmonic_balance import (
 )
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.motion import sine
+from mrdamper.physics.gas_spring import GasSpring
+from mrdamper.physics.hysteresis import Shape, steady_loop
+from mrdamper.physics.motion import sine
 
 VECTORS = json.loads((Path(__file__).parents[1] / "vectors.json").read_text())
 GAS = GasSpring(1.5e6, 1.5e-4, np.pi * 1e-4)

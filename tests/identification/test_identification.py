@@ -7,16 +7,16 @@ from support.synthetic import TRUTH, synthetic_run
 
 from mrdamper.data import Condition, Dataset, Run
 from mrdamper.errors import IdentificationError, RunError, UnknownNameError
-from mrdamper.gas_spring import GasSpring
 from mrdamper.identification import identify
 from mrdamper.identification.covariance import spread, standard_errors
 from mrdamper.identification.methods import all_methods, projection
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.models.spencer import Spencer
-from mrdamper.motion import sine
-from mrdamper.optimizers.levenberg_marquardt import least_squares
-from mrdamper.optimizers.linear import solve_bounded
-from mrdamper.simulation import simulate
+from mrdamper.physics.gas_spring import GasSpring
+from mrdamper.physics.motion import sine
+from mrdamper.physics.simulation import simulate
+from mrdamper.statistics.levenberg_marquardt import least_squares
+from mrdamper.statistics.linear import solve_bounded
 from mrdamper.study.workflow import usable_sines
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from mrdamper.data import Condition, Run
 from mrdamper.identification.loop_analysis import analyse_loop, at_levels, dynamic_ranges, whole_cycles
-from mrdamper.motion import sine
+from mrdamper.physics.motion import sine
 
 
 def run_of(force, condition, name="one"):

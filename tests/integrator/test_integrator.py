@@ -5,11 +5,11 @@ import pytest
 
 from mrdamper.data import Condition
 from mrdamper.errors import ExcitationError, ParameterError
-from mrdamper.hysteresis import Shape, follow
-from mrdamper.integrator import integrate
 from mrdamper.models import Scale
 from mrdamper.models.spencer import Spencer
-from mrdamper.motion import sine
+from mrdamper.physics.hysteresis import Shape, follow
+from mrdamper.physics.integrator import integrate
+from mrdamper.physics.motion import sine
 
 MOTION = sine(Condition(0.0, 1.0, 0.01), 2, 200)
 CHANNELS = (MOTION.time, MOTION.displacement, MOTION.velocity, MOTION.current)

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from mrdamper.data import Condition
-from mrdamper.integrator import integrate
 from mrdamper.models import Scale
 from mrdamper.models.lugre import LuGre, bristle_rate
 from mrdamper.models.spencer import Spencer, series_rate
-from mrdamper.motion import sine
+from mrdamper.physics.integrator import integrate
+from mrdamper.physics.motion import sine
 
 AMPLITUDE = 0.01
 FINE = sine(Condition(0.0, 1.0, AMPLITUDE), 1, 400)

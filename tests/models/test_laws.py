@@ -10,8 +10,8 @@ from support.synthetic import synthetic_run
 from mrdamper.data import Condition
 from mrdamper.identification import identify
 from mrdamper.models import all_models, model_type
-from mrdamper.motion import sine
-from mrdamper.simulation import simulate, steady_loop
+from mrdamper.physics.motion import sine
+from mrdamper.physics.simulation import simulate, steady_loop
 
 ODD_WITHOUT = {"play-bypass": {"f0": 0.0, "k": 0.0}}  # the one-sided stiffness is not odd
 SLOW = Condition(0.5, 1.0, 0.01)

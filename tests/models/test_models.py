@@ -7,14 +7,14 @@ from hypothesis import strategies as st
 
 from mrdamper.data import Condition
 from mrdamper.errors import ParameterError, UnknownNameError
-from mrdamper.hysteresis import loop_area
 from mrdamper.models import all_models, model_type
 from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.models.lugre import LuGre
 from mrdamper.models.spencer import Spencer
-from mrdamper.motion import Excitation, sine
-from mrdamper.simulation import simulate, steady_loop
+from mrdamper.physics.hysteresis import loop_area
+from mrdamper.physics.motion import Excitation, sine
+from mrdamper.physics.simulation import simulate, steady_loop
 
 
 @pytest.mark.parametrize("model", all_models().values(), ids=lambda m: m.name)

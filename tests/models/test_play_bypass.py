@@ -7,8 +7,8 @@ import pytest
 
 from mrdamper.models import Scale
 from mrdamper.models.play_bypass import PlayBypass, play_position
-from mrdamper.motion import Excitation, Path
-from mrdamper.simulation import simulate
+from mrdamper.physics.motion import Excitation, Path
+from mrdamper.physics.simulation import simulate
 
 P = {"f0": 48.8, "k": 832.0, "c0": 632.0, "c1": 3622.0, "fy0": 143.0, "fy1": 1019.0, "d": 1.98e-4, "e": 2.55e-5,
      "cb": 3.74e4, "h0": 0.4, "h1": 0.35, "vh": 2.06e-3, "T": 3.4e-3, "asymmetry": 0.05, "m": 6.6}  # fmt: skip

@@ -7,7 +7,7 @@ import pytest
 
 from mrdamper.models import recorded
 from mrdamper.models.play_bypass import PlayBypass
-from mrdamper.motion.excitation import Excitation
+from mrdamper.physics.motion.excitation import Excitation
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 

@@ -14,8 +14,8 @@ from mrdamper.models.kwok import Kwok
 from mrdamper.models.lugre import LuGre
 from mrdamper.models.smooth_bingham import SmoothBingham
 from mrdamper.models.spencer import Spencer
-from mrdamper.motion import Excitation, sine
-from mrdamper.simulation import simulate, steady_loop
+from mrdamper.physics.motion import Excitation, sine
+from mrdamper.physics.simulation import simulate, steady_loop
 
 
 @pytest.fixture

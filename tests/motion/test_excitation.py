@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from mrdamper.data import Condition, Run
 from mrdamper.errors import ExcitationError
-from mrdamper.motion import (
+from mrdamper.physics.motion import (
     analyse_motion,
     equivalent_sine,
     measured,
@@ -16,7 +16,7 @@ from mrdamper.motion import (
     sweep,
     triangle,
 )
-from mrdamper.motion.harmonics import fit_harmonics
+from mrdamper.physics.motion.harmonics import fit_harmonics
 
 
 def record(frequency, amplitude, cycles, per_cycle, phase=0.3, offset=0.0, drift=0.0, noise=0.0):

@@ -4,9 +4,9 @@ import gc
 
 import numpy as np
 
-from mrdamper.motion import lag
-from mrdamper.motion.lag import first_order_lag
-from mrdamper.motion.path import lately_along
+from mrdamper.physics.motion import lag
+from mrdamper.physics.motion.lag import first_order_lag
+from mrdamper.physics.motion.path import lately_along
 
 
 def test_another_signal_or_constant_along_known_times_is_lagged_as_along_new_ones():

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mrdamper.optimizers.levenberg_marquardt import polished
+from mrdamper.statistics.levenberg_marquardt import polished
 
 NEAR = np.array([1.01, 0.7])
 

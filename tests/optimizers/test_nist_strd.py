@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from mrdamper.identification.covariance import spread
-from mrdamper.optimizers.levenberg_marquardt import Minimum, least_squares
-from mrdamper.optimizers.linear import solve_linear
+from mrdamper.statistics.levenberg_marquardt import Minimum, least_squares
+from mrdamper.statistics.linear import solve_linear
 
 SETS = {each["name"]: each for each in json.loads(Path(__file__).with_name("nist_strd.json").read_text())["sets"]}
 CASES = [(name, start) for name in SETS for start in (0, 1)]

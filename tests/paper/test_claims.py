@@ -7,12 +7,12 @@ import pytest
 
 from mrdamper.data import Condition, Run
 from mrdamper.identification.harmonic_balance import ForceReading
-from mrdamper.motion import sine
 from mrdamper.paper import claims_on_fits, claims_on_tests
 from mrdamper.paper.recipes import ALI, CONSISTENT, LITERAL, TRADITIONAL
 from mrdamper.paper.results import Ended
 from mrdamper.paper.sensitivity import OneAtATime
 from mrdamper.paper.verdicts import judge
+from mrdamper.physics.motion import sine
 
 CONDITIONS = [Condition(I, f, A) for f, A in ((1.0, 0.02), (2.0, 0.02), (0.5, 0.05), (1.0, 0.05))
               for I in (0.0, 0.5, 1.0, 1.5, 2.0)]  # fmt: skip

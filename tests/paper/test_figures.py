@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from mrdamper.data import Condition
-from mrdamper.functions.fitting import fit_function
-from mrdamper.functions.forms import ParameterFunction, features
 from mrdamper.paper.parameter_figures import beside_current_law
+from mrdamper.statistics.functions.fitting import fit_function
+from mrdamper.statistics.functions.forms import ParameterFunction, features
 
 CONDITIONS = [
     Condition(I, f, A) for f, A in ((1.0, 0.02), (2.0, 0.02), (0.5, 0.05), (1.5, 0.05)) for I in (0, 0.7, 2.0)

@@ -8,18 +8,18 @@ import pytest
 
 from mrdamper.data import Condition, Run
 from mrdamper.errors import IdentificationError, ParameterError
-from mrdamper.gas_spring import GasSpring
-from mrdamper.hysteresis import steady_loop
 from mrdamper.identification import identify
 from mrdamper.identification.harmonic_balance import SineRecord
 from mrdamper.identification.problem import Problem
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.motion import sine
-from mrdamper.optimizers import levenberg_marquardt
-from mrdamper.optimizers.ending import Ending
 from mrdamper.paper import paper_method as paper
 from mrdamper.paper.generation import GeneticSettings
 from mrdamper.paper.paper_method import Paper
+from mrdamper.physics.gas_spring import GasSpring
+from mrdamper.physics.hysteresis import steady_loop
+from mrdamper.physics.motion import sine
+from mrdamper.statistics import levenberg_marquardt
+from mrdamper.statistics.ending import Ending
 
 GAS = GasSpring(1.5e6, 1.5e-4, np.pi * 1e-4)
 READINGS = ("first-harmonic", "half-peak-to-peak")

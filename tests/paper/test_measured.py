@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from mrdamper.data import Condition, Run
-from mrdamper.motion import measured_motion, sine, triangle
 from mrdamper.paper import claims, claims_on_fits, claims_on_tests
 from mrdamper.paper import results as found_module
 from mrdamper.paper.claims import judge_all
@@ -15,6 +14,7 @@ from mrdamper.paper.claims_on_tests import friction_along, lost_length
 from mrdamper.paper.recipes import ALI, CONSISTENT, DIRECT, LITERAL
 from mrdamper.paper.results import Ended, function_of
 from mrdamper.paper.verdicts import Measured
+from mrdamper.physics.motion import measured_motion, sine, triangle
 
 
 def study_of(contenders=(), **more):

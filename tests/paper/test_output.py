@@ -8,9 +8,6 @@ import pytest
 
 from mrdamper.data import Condition
 from mrdamper.errors import ExcitationError
-from mrdamper.functions.fitting import FunctionFit
-from mrdamper.functions.forms import ParameterFunction
-from mrdamper.metrics import Scores
 from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.paper import output
@@ -23,7 +20,10 @@ from mrdamper.paper.results import Ended, GeneticCheck
 from mrdamper.paper.sensitivity import OneAtATime, Sobol
 from mrdamper.paper.virtual_rig import VirtualRig
 from mrdamper.report.plots.style import Picture
-from mrdamper.validation import RunScore, Validation
+from mrdamper.statistics.functions.fitting import FunctionFit
+from mrdamper.statistics.functions.forms import ParameterFunction
+from mrdamper.statistics.metrics import Scores
+from mrdamper.study.validation import RunScore, Validation
 
 
 def scored(name, current, start):

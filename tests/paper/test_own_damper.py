@@ -12,12 +12,12 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import curve_fit, minimize_scalar
 from support.command import mrdamper
 
+from mrdamper.dampers.model_file import load_model
 from mrdamper.data import Condition, Dataset, Run
 from mrdamper.errors import IdentificationError, ParameterError
-from mrdamper.files.dataset import save_dataset
-from mrdamper.files.model_file import load_model
-from mrdamper.gas_spring import GasSpring
 from mrdamper.paper.options import PaperOptions
+from mrdamper.physics.gas_spring import GasSpring
+from mrdamper.rig_files.dataset_folder import save_dataset
 from mrdamper.study.workflow import run_study
 
 GAS = GasSpring(1.5e6, 1.5e-4, 3.14e-4)

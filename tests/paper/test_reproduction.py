@@ -14,9 +14,6 @@ from typer.testing import CliRunner
 from mrdamper.cli import application
 from mrdamper.data import Condition
 from mrdamper.errors import IdentificationError, ParameterError, UnknownNameError
-from mrdamper.functions.fitting import fit_function
-from mrdamper.functions.forms import ParameterFunction
-from mrdamper.gas_spring import GasSpring
 from mrdamper.identification import identify
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.paper import figures, pieces
@@ -31,7 +28,10 @@ from mrdamper.paper.recipes import CONSISTENT, HALF, LITERAL, SAME_FORMS
 from mrdamper.paper.study import reproduce
 from mrdamper.paper.verdicts import LIMITS
 from mrdamper.paper.virtual_rig import VirtualRig, friction_test, virtual_dataset
+from mrdamper.physics.gas_spring import GasSpring
 from mrdamper.report.plots.style import Picture
+from mrdamper.statistics.functions.fitting import fit_function
+from mrdamper.statistics.functions.forms import ParameterFunction
 
 CURRENTS = (0.0, 0.5, 1.0, 2.0)
 
@@ -248,7 +248,7 @@ def test_the_parameter_functions_are_those_of_the_vectors(vectors):
 
 
 def test_relative_errors_are_those_of_the_vector(vectors):
-    from mrdamper import metrics
+    from mrdamper.statistics import metrics
 
     found = vectors["V15_metrics"]
     measured, predicted = np.array(found["F_exp"]), np.array(found["F_pred"])
@@ -287,7 +287,7 @@ def test_what_cannot_be_studied_is_refused_with_the_remedy():
 
 def test_the_command_refuses_several_rigs_without_a_choice(tmp_path, bundled):
     from mrdamper.errors import InputError
-    from mrdamper.files.dataset import save_dataset
+    from mrdamper.rig_files.dataset_folder import save_dataset
 
     save_dataset(bundled, tmp_path / "data")
     done = CliRunner().invoke(

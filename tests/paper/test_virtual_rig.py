@@ -7,9 +7,6 @@ import pytest
 
 from mrdamper.data import Condition
 from mrdamper.errors import ParameterError
-from mrdamper.gas_spring import GasSpring
-from mrdamper.metrics import dissipated_power
-from mrdamper.motion import sine
 from mrdamper.paper.virtual_rig import (
     MOTIONS,
     SLOW_SPEED,
@@ -20,6 +17,9 @@ from mrdamper.paper.virtual_rig import (
     true_runs,
     virtual_dataset,
 )
+from mrdamper.physics.gas_spring import GasSpring
+from mrdamper.physics.motion import sine
+from mrdamper.statistics.metrics import dissipated_power
 
 CONDITION = Condition(1.0, 1.0, 0.05)
 BARE = VirtualRig(

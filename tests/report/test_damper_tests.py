@@ -13,11 +13,11 @@ from typer.testing import CliRunner
 from mrdamper.cli import application
 from mrdamper.data import Condition, Dataset, Run, current_levels
 from mrdamper.errors import IdentificationError
-from mrdamper.files.dataset import save_dataset
 from mrdamper.identification.characteristics import characterise
-from mrdamper.motion import sine
+from mrdamper.physics.motion import sine
 from mrdamper.report.about import AboutError, load_about, load_limits, parse_ladder
 from mrdamper.report.damper_tests import facts_of_tests
+from mrdamper.rig_files.dataset_folder import save_dataset
 
 GAS, COULOMB, REBOUND, COMPRESSION = 80.0, 120.0, 3000.0, 1500.0  # N, N, N s/m, N s/m
 

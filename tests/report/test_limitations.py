@@ -7,10 +7,10 @@ import pytest
 from support.dampers import joint_damper
 
 from mrdamper.dampers.joint import JointFit, Valley
-from mrdamper.optimizers.ending import Ending
 from mrdamper.report.limitations import RANGE, by_group, limitations
+from mrdamper.statistics.ending import Ending
 from mrdamper.study.recipe import Scored, play_and_bypass
-from mrdamper.validation import Validation
+from mrdamper.study.validation import Validation
 
 NONE = Validation("none", ())
 

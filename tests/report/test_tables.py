@@ -11,16 +11,16 @@ import pytest
 from support.dampers import joint_damper
 from support.synthetic import synthetic_run
 
+from mrdamper.dampers.model_file import save_model
 from mrdamper.data import Condition
-from mrdamper.files.dataset import save_dataset
-from mrdamper.files.encoding import csv_text
-from mrdamper.files.model_file import save_model
+from mrdamper.data.encoding import csv_text
 from mrdamper.identification.problem import RunCertainty
-from mrdamper.metrics import Scores
 from mrdamper.models.bingham import Bingham
 from mrdamper.report.study import _validation_table
 from mrdamper.report.tables import identification_rows, prediction_rows, score_row
-from mrdamper.validation import RunScore, Validation
+from mrdamper.rig_files.dataset_folder import save_dataset
+from mrdamper.statistics.metrics import Scores
+from mrdamper.study.validation import RunScore, Validation
 
 PLAIN = """
 import sys

@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 
 from mrdamper.cli import application
 from mrdamper.data import Dataset
-from mrdamper.files.dataset import save_dataset
 from mrdamper.report.plots.quality import LoopPanel, quality_figure
+from mrdamper.rig_files.dataset_folder import save_dataset
 from mrdamper.rig_files.to_run import to_run
 
 

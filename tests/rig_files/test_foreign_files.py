@@ -5,7 +5,7 @@ import zipfile
 import pytest
 
 from mrdamper.errors import InputError
-from mrdamper.files.dataset import load_dataset
+from mrdamper.rig_files.dataset_folder import load_dataset
 from mrdamper.rig_files.readers import raw_tables
 
 

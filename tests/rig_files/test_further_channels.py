@@ -6,7 +6,7 @@ from support.rig_files import AMPLITUDE, FREQUENCY, channels, rows, text, write
 
 from mrdamper.data import Run
 from mrdamper.errors import RunError
-from mrdamper.files.dataset import load_dataset, save_dataset
+from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
 from mrdamper.rig_files.profile import parse_profile, profile_text
 from mrdamper.rig_files.rig_import import read_run, to_dataset
 

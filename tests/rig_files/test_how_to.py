@@ -11,7 +11,7 @@ from support.lab_exports import Lab, campaign
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
-from mrdamper.files.dataset import load_dataset
+from mrdamper.rig_files.dataset_folder import load_dataset
 
 HOUSE = Path(__file__).parents[2]
 

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from mrdamper.cli import application
 from mrdamper.errors import InputError
-from mrdamper.files.dataset import load_dataset
+from mrdamper.rig_files.dataset_folder import load_dataset
 from mrdamper.rig_files.rig_import import import_files, read_run, to_dataset
 
 

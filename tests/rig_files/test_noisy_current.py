@@ -11,7 +11,7 @@ from support.rig_records import clean_record, codes_of
 from mrdamper import identify
 from mrdamper.data import Run
 from mrdamper.errors import RunError
-from mrdamper.motion import measured_motion
+from mrdamper.physics.motion import measured_motion
 from mrdamper.rig_files.quality.sentinel import COARSEST, code_in
 from mrdamper.rig_files.to_run import to_run
 

@@ -8,7 +8,7 @@ import pytest
 from support import rig_detection as rig
 from support.rig_records import chirp_record, clean_record, codes_of, random_record, with_channel
 
-from mrdamper.motion import analyse_motion
+from mrdamper.physics.motion import analyse_motion
 from mrdamper.rig_files.quality import judge
 from mrdamper.rig_files.quality.table import record_of
 

@@ -8,9 +8,9 @@ from support.rig_records import clean_record, random_record
 
 from mrdamper.data import Dataset
 from mrdamper.errors import ColumnError, ExcitationError, QualityError
-from mrdamper.files.dataset import load_dataset, save_dataset
 from mrdamper.identification import identify
-from mrdamper.motion import analyse_motion
+from mrdamper.physics.motion import analyse_motion
+from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
 from mrdamper.rig_files.quality import judge
 from mrdamper.rig_files.quality.table import quality_table, record_of, row
 from mrdamper.rig_files.to_run import to_run

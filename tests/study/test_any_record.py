@@ -12,9 +12,9 @@ from support.command import mrdamper
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from benchmarks.virtual_dampers import DAMPERS
+from mrdamper.dampers.model_file import load_model
 from mrdamper.data import Dataset
-from mrdamper.files.dataset import save_dataset
-from mrdamper.files.model_file import load_model
+from mrdamper.rig_files.dataset_folder import save_dataset
 
 VIRTUAL = next(virtual for virtual in DAMPERS if virtual.name == "switched current")
 

@@ -10,24 +10,24 @@ from support.synthetic import synthetic_run
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
+from mrdamper.dampers.model_file import dump_model, parse_model
 from mrdamper.dampers.published import all_published, conditioned_type
+from mrdamper.dampers.streaming import stepper
 from mrdamper.data import Condition, Dataset, Run
 from mrdamper.errors import IdentificationError, ModelFileError, UnknownNameError
 from mrdamper.export.equations import equations
-from mrdamper.files.model_file import dump_model, parse_model
 from mrdamper.identification import identify
 from mrdamper.models import all_models
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.models.play_bypass import PlayBypass
 from mrdamper.models.spencer import Spencer
-from mrdamper.motion import random_motion, sine
+from mrdamper.physics.motion import random_motion, sine
+from mrdamper.physics.simulation import simulate
 from mrdamper.report.comparison import summary_rows, write_comparison
-from mrdamper.simulation import simulate
-from mrdamper.streaming import stepper
 from mrdamper.study.comparison import compare
 from mrdamper.study.parallel import shortened
 from mrdamper.study.recipe import recipes
-from mrdamper.validation import validate
+from mrdamper.study.validation import validate
 
 ALI = {  # of a plausible damper; identifying one takes a minute
     **{"c10": 2e4, "c11": 1e4, "c12": 0.0, "c1_p": -0.1, "c1_q": 0.1, "c1_floor": 1e3},

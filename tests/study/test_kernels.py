@@ -42,7 +42,7 @@ json.dump(numbers, sys.stdout)
 PLAY_AND_BYPASS = """
 import json, sys
 from mrdamper.dampers.choice import identify_jointly
-from mrdamper.files.dataset import load_dataset
+from mrdamper.rig_files.dataset_folder import load_dataset
 
 found = identify_jointly([run for run in load_dataset().rig("utfsm") if run.split == "train"]).fit
 json.dump({**found.damper.model.values(), "scores": found.nrmse_pp.tolist()}, sys.stdout)

@@ -13,10 +13,10 @@ from typer.testing import CliRunner
 
 from mrdamper.cli import application
 from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.model_file import save_model
 from mrdamper.data import Condition
 from mrdamper.errors import ConditionError, InputError
-from mrdamper.files.model_file import save_model
-from mrdamper.files.motion import load_motion
+from mrdamper.rig_files.motion_file import load_motion
 from mrdamper.study.first_matrix import first_matrix
 from mrdamper.study.limits import Limits
 from mrdamper.study.plan import Reckoning, plan_tests

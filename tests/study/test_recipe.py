@@ -12,17 +12,17 @@ from support.synthetic import synthetic_run
 from mrdamper.dampers.published import all_published
 from mrdamper.data import Condition, Run
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError
-from mrdamper.gas_spring import GasSpring
 from mrdamper.identification.methods.balance import Balance
-from mrdamper.metrics import Scores
 from mrdamper.models import model_type
 from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.motion import measured_motion, sine
 from mrdamper.paper.assumptions import PaperAssumptions
 from mrdamper.paper.functions import fit_paper_functions
 from mrdamper.paper.options import PaperOptions
 from mrdamper.paper.recipes import one_per_current, through_chosen
+from mrdamper.physics.gas_spring import GasSpring
+from mrdamper.physics.motion import measured_motion, sine
+from mrdamper.statistics.metrics import Scores
 from mrdamper.study import cross_validation
 from mrdamper.study import recipe as recipes
 from mrdamper.study.cross_validation import stretches
@@ -35,7 +35,7 @@ from mrdamper.study.recipe import (
     fit_per_run,
     identified,
 )
-from mrdamper.validation import RunScore, Validation
+from mrdamper.study.validation import RunScore, Validation
 
 
 @dataclass(frozen=True)

@@ -8,15 +8,15 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from mrdamper.dampers.model_file import dump_model, load_model
 from mrdamper.data import Dataset
 from mrdamper.errors import IdentificationError, OutputError
-from mrdamper.files.model_file import dump_model, load_model
 from mrdamper.identification.loop_analysis import analyse_loop, dynamic_ranges
 from mrdamper.report.study import study_and_draw, write_study
 from mrdamper.study import workflow
 from mrdamper.study.parallel import several
+from mrdamper.study.validation import validate
 from mrdamper.study.workflow import run_study
-from mrdamper.validation import validate
 
 HOSTILE = "<script>alert(1)</script>=cmd"
 

@@ -8,8 +8,8 @@ from mrdamper.dampers.modified import ModifiedModel
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.dampers.published import conditioned_type
 from mrdamper.data import Condition
-from mrdamper.functions.forms import ParameterFunction
 from mrdamper.models import all_models, model_type
+from mrdamper.statistics.functions.forms import ParameterFunction
 from support.models import EXAMPLES, example_values
 
 ENVELOPE = Envelope((0.0, 1.0), (0.5, 4.0), (0.004, 0.02), (0.02, 0.3))

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from mrdamper.models import model_type
-from mrdamper.motion import Excitation
-from mrdamper.simulation import simulate
+from mrdamper.physics.motion import Excitation
+from mrdamper.physics.simulation import simulate
 
 POUND, INCH, KILOPOND = 4.4482216152605, 0.0254, 9.80665
 UNITS = {

@@ -2,8 +2,8 @@
 
 from functools import cache
 
-from mrdamper.files.dataset import load_dataset
 from mrdamper.identification import identify
+from mrdamper.rig_files.dataset_folder import load_dataset
 
 EXAMPLES = {
     "bingham": {"c": 1500.0, "fy": 700.0, "f0": 60.0},

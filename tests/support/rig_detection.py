@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrdamper.errors import QualityError
-from mrdamper.motion import analyse_motion
+from mrdamper.physics.motion import analyse_motion
 from mrdamper.rig_files.quality import judge
 from mrdamper.rig_files.quality.table import record_of
 from mrdamper.rig_files.record import Record

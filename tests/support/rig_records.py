@@ -6,10 +6,10 @@ import numpy as np
 
 from mrdamper.errors import QualityError
 from mrdamper.models import model_type
-from mrdamper.motion import Excitation, random_motion, sweep
+from mrdamper.physics.motion import Excitation, random_motion, sweep
+from mrdamper.physics.simulation import simulate
 from mrdamper.rig_files.quality import judge
 from mrdamper.rig_files.record import Record
-from mrdamper.simulation import simulate
 
 
 def clean_record(seed, *, noise=10.0, cycles=None, points=None, velocity=False, sensor=0.0, damper=None, make=None):

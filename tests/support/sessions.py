@@ -3,7 +3,7 @@
 import numpy as np
 
 from mrdamper.data import Condition, Run
-from mrdamper.motion import sine
+from mrdamper.physics.motion import sine
 
 MATRIX = [Condition(i, f, a) for i in (0.0, 0.5, 1.0) for f, a in ((0.5, 0.02), (1.0, 0.01), (2.0, 0.005))]
 

@@ -4,8 +4,8 @@ import numpy as np
 
 from mrdamper.data import Run
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.motion import sine
-from mrdamper.simulation import simulate
+from mrdamper.physics.motion import sine
+from mrdamper.physics.simulation import simulate
 
 TRUTH = {"c": 1440.0, "alpha": 9e5, "beta": 2e5, "gamma": 2e5, "n": 2.0, "f0": 120.0, "k1": 1381.0, "k3": 8000.0}
 

@@ -8,9 +8,9 @@ import pytest
 from support.dampers import joint_damper, modified_damper
 
 from mrdamper.dampers.coil import Coil
+from mrdamper.dampers.streaming import stepper
 from mrdamper.errors import InputError, ParameterError
-from mrdamper.functions.forms import ParameterFunction
-from mrdamper.streaming import stepper
+from mrdamper.statistics.functions.forms import ParameterFunction
 from mrdamper.systems.controllers import controller_type, controller_types
 from mrdamper.systems.controllers.base import Controller
 from mrdamper.systems.controllers.passive import Passive

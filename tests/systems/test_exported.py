@@ -12,14 +12,14 @@ from support.dampers import joint_damper
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
+from mrdamper.dampers.model_file import save_model
+from mrdamper.dampers.streaming import stepper
 from mrdamper.errors import InputError
 from mrdamper.export.c import program_sources
 from mrdamper.export.fmu import FMUExporter
 from mrdamper.export.fmu_check import check_fmu
 from mrdamper.export.fmu_program import write_program_fmu
 from mrdamper.export.toolchain import here
-from mrdamper.files.model_file import save_model
-from mrdamper.streaming import stepper
 from mrdamper.systems.controllers import controller_type
 from mrdamper.systems.inputs import load_input
 from mrdamper.systems.inverse import invert

@@ -11,8 +11,8 @@ from support.dampers import joint_damper
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
+from mrdamper.dampers.model_file import save_model
 from mrdamper.errors import InputError
-from mrdamper.files.model_file import save_model
 from mrdamper.systems.system_file import bundled_systems, load_system
 
 TWO = """

@@ -11,12 +11,12 @@ from typer.testing import CliRunner
 from mrdamper.cli import application
 from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.coil import Coil
+from mrdamper.dampers.model_file import save_model
 from mrdamper.dampers.modified import ModifiedModel
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.errors import InputError
-from mrdamper.files.model_file import save_model
-from mrdamper.functions.forms import ParameterFunction
 from mrdamper.models import model_type
+from mrdamper.statistics.functions.forms import ParameterFunction
 from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.inputs import load_input
 from mrdamper.systems.inputs.record import record

@@ -20,11 +20,11 @@ from mrdamper.dampers.bands import band
 from mrdamper.dampers.covariance import certain
 from mrdamper.dampers.joint import JointProblem
 from mrdamper.dampers.kernel import KernelDamper
+from mrdamper.dampers.model_file import dump_model, parse_model
 from mrdamper.dampers.modified import fit_modified
 from mrdamper.data import Condition
 from mrdamper.export import exporter
 from mrdamper.export.base import identifier
-from mrdamper.files.model_file import dump_model, parse_model
 from mrdamper.identification import identify
 from mrdamper.identification.loop_analysis import analyse_loop
 from mrdamper.identification.methods import all_methods

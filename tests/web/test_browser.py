@@ -12,8 +12,8 @@ from web.rig_files import csv_of
 
 from mrdamper.dampers.covariance import certain
 from mrdamper.dampers.joint import JointProblem
-from mrdamper.files.dataset import save_dataset
-from mrdamper.files.model_file import dump_model
+from mrdamper.dampers.model_file import dump_model
+from mrdamper.rig_files.dataset_folder import save_dataset
 
 HOSTILE = [
     "<img src=x onerror=alert(1)>",

@@ -7,7 +7,7 @@ import pytest
 from web.rig_files import csv_of
 
 from mrdamper.errors import InputError
-from mrdamper.files.dataset import save_dataset
+from mrdamper.rig_files.dataset_folder import save_dataset
 from mrdamper.web.drops import FILE_COUNT_LIMIT, Drop, DropError, Intake, NothingTakenError
 from mrdamper.web.intake import bundled, read_drop
 

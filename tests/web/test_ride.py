@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support.dampers import joint_damper
 
-from mrdamper.files.model_file import dump_model
+from mrdamper.dampers.model_file import dump_model
 
 
 @pytest.fixture

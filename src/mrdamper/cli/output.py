@@ -8,12 +8,12 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mrdamper.data.atomic import write_file
 from mrdamper.errors import InputError
-from mrdamper.files.atomic import write_file
 
 if TYPE_CHECKING:
-    from mrdamper.gas_spring import GasSpring
-    from mrdamper.validation import Validation
+    from mrdamper.physics.gas_spring import GasSpring
+    from mrdamper.study.validation import Validation
 
 Rows = Sequence[Mapping[str, Any]]
 
@@ -80,7 +80,7 @@ def parse_gas(text: str | None) -> GasSpring | None:
     """P,V,A in MPa, cm³ and mm² as a gas spring; raises `InputError` if it is not three positive numbers."""
     if text is None:
         return None
-    from mrdamper.gas_spring import GasSpring
+    from mrdamper.physics.gas_spring import GasSpring
 
     try:
         pressure, volume, area = (float(part) for part in text.split(","))

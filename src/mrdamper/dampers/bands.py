@@ -14,7 +14,7 @@ from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.slopes import force_slopes
 from mrdamper.data import SESSIONS_NEEDED, Floats
 from mrdamper.identification.intervals import student
-from mrdamper.metrics import dissipated_power, peak_force
+from mrdamper.statistics.metrics import dissipated_power, peak_force
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,11 +20,11 @@ from mrdamper.dampers.certainty import Certainty, FittedParameter, table
 from mrdamper.dampers.coil import Coil
 from mrdamper.data import Condition, Floats, Run, Shown, same_condition
 from mrdamper.errors import InputError, checked
-from mrdamper.functions.forms import ParameterFunction
-from mrdamper.functions.motion_hull import MotionHull
 from mrdamper.models import Model
-from mrdamper.motion import Excitation, equivalent_sine, measured_motion
-from mrdamper.simulation import ForceLaw, Response, simulate, steady_loop
+from mrdamper.physics.motion import Excitation, equivalent_sine, measured_motion
+from mrdamper.physics.simulation import ForceLaw, Response, simulate, steady_loop
+from mrdamper.statistics.functions.forms import ParameterFunction
+from mrdamper.statistics.functions.motion_hull import MotionHull
 
 NOT_A_SINE = "not a sine"
 COARSE = "sampling"

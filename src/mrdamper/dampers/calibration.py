@@ -18,7 +18,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from mrdamper.data import Floats, Run, session_of
-from mrdamper.metrics import dissipated_power, peak_force
+from mrdamper.statistics.metrics import dissipated_power, peak_force
 
 Quantity = Literal["force", "peak", "energy"]
 QUANTITIES: tuple[Quantity, ...] = ("force", "peak", "energy")

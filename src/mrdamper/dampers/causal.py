@@ -14,13 +14,13 @@ import numpy as np
 from mrdamper.dampers.coil import field_step
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import ExcitationError, ParameterError
-from mrdamper.motion.traced import TracedMotion, TracedStep
+from mrdamper.physics.motion.traced import TracedMotion, TracedStep
 from mrdamper.tracing import Program, Tape, program
 from mrdamper.tracing.compiled import RecordProgram
 
 if TYPE_CHECKING:
     from mrdamper.dampers.base import Damper
-    from mrdamper.motion import Excitation
+    from mrdamper.physics.motion import Excitation
 
 SLACK = 0.02  # a test bench repeats a condition to a few per cent; within that nothing is extrapolated
 _STEADY = 1e-18  # mean square displacement under which nothing moves [m²]

@@ -17,7 +17,7 @@ from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.joint import FALL, RISE, JointFit, JointProblem, Valley
 from mrdamper.data import SESSIONS_NEEDED, Floats, Run, same_condition, session_of
 from mrdamper.errors import InputError
-from mrdamper.optimizers.linear import on_one_blas_thread, solve_linear
+from mrdamper.statistics.linear import on_one_blas_thread, solve_linear
 
 _ROUGHLY = 1e-4  # relative gain of a step that is enough to tell forms apart
 _WORTH = 0.985  # a term must lower the left-out error to this share of it

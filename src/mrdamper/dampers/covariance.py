@@ -16,7 +16,7 @@ from mrdamper.dampers.slopes import force_slopes
 from mrdamper.data import Floats, Run
 from mrdamper.identification.covariance import alike_groups, score_covariance
 from mrdamper.identification.intervals import interval_about, relative_width, weaknesses
-from mrdamper.metrics import dissipated_power, peak_force
+from mrdamper.statistics.metrics import dissipated_power, peak_force
 
 _ONE_RUN = 0.6  # share of the information on a parameter from which one run mainly determines it
 _MIN_EIGENVALUE = 1e-10  # of the largest of the scaled normal matrix, below which a direction is not determined

@@ -19,15 +19,15 @@ import numpy as np
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError
-from mrdamper.functions.fitting import fit_function, require_determined
-from mrdamper.functions.forms import FORMS, Form, ParameterFunction, features
-from mrdamper.functions.selection import broken_law, fold_groups, rises, smaller_wins, supported
-from mrdamper.hysteresis import Shape
-from mrdamper.hysteresis.batch import follow_alike
 from mrdamper.identification import Problem
 from mrdamper.models import Model, Scale
-from mrdamper.optimizers.levenberg_marquardt import least_squares, polished
-from mrdamper.optimizers.linear import on_one_blas_thread, project_out_columns, robust_weights, solve_linear
+from mrdamper.physics.hysteresis import Shape
+from mrdamper.physics.hysteresis.batch import follow_alike
+from mrdamper.statistics.functions.fitting import fit_function, require_determined
+from mrdamper.statistics.functions.forms import FORMS, Form, ParameterFunction, features
+from mrdamper.statistics.functions.selection import broken_law, fold_groups, rises, smaller_wins, supported
+from mrdamper.statistics.levenberg_marquardt import least_squares, polished
+from mrdamper.statistics.linear import on_one_blas_thread, project_out_columns, robust_weights, solve_linear
 
 _RUNG = 1500 ** (1 / 40)  # from one yield displacement to the next; between them Gram matrices are interpolated
 _LATTICE = 2e-6  # m, one of the rungs, whatever the data

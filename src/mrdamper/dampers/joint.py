@@ -25,9 +25,9 @@ from mrdamper.dampers.strung import Linearised, Part, Table
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, ParameterError, require
 from mrdamper.models import Model, Scale, SearchAxis, model_type
-from mrdamper.optimizers.ending import Ending
-from mrdamper.optimizers.levenberg_marquardt import Minimum, least_squares, polished
-from mrdamper.optimizers.linear import on_one_blas_thread
+from mrdamper.statistics.ending import Ending
+from mrdamper.statistics.levenberg_marquardt import Minimum, least_squares, polished
+from mrdamper.statistics.linear import on_one_blas_thread
 
 RISE, FALL = "coil.rise_s", "coil.fall_s"  # names of the coil's lags on the search axes
 _SETTLED = 1e-6  # relative gain of a step at which the search ends

@@ -13,10 +13,10 @@ from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.piece import Piece
 from mrdamper.data import Condition, Floats, Run
+from mrdamper.data.parameters import ParameterInfo
 from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.identification import Identification
-from mrdamper.motion import Excitation
-from mrdamper.parameters import ParameterInfo
+from mrdamper.physics.motion import Excitation
 
 _CENTRES = 200
 _WIDTH = 1.2  # of a kernel, in standard deviations of the inputs

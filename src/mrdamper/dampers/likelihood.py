@@ -24,7 +24,7 @@ from mrdamper.dampers.slopes import force_slopes
 from mrdamper.dampers.strung import string
 from mrdamper.data import Floats, Run
 from mrdamper.errors import InputError
-from mrdamper.motion import Excitation
+from mrdamper.physics.motion import Excitation
 
 CROSSED = 3.84  # fall of twice the logarithm at which a 95 % interval ends: chi squared of one
 _FORGETS = 20  # samples before those that count: a run has turned by then

@@ -20,11 +20,11 @@ from mrdamper.dampers.gram import ABSENT, Condensed, Law, choose_forms, condense
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.data import Condition, Floats, Run, same_motion
 from mrdamper.errors import IdentificationError, ParameterError
-from mrdamper.functions.fitting import FunctionFit, assess, choose_function
-from mrdamper.functions.forms import FORMS, ParameterFunction, features
-from mrdamper.functions.motion_hull import MotionHull
 from mrdamper.identification import Identification
 from mrdamper.models import Model, model_type
+from mrdamper.statistics.functions.fitting import FunctionFit, assess, choose_function
+from mrdamper.statistics.functions.forms import FORMS, ParameterFunction, features
+from mrdamper.statistics.functions.motion_hull import MotionHull
 
 _RATES = (0.4, 0.8, 1.5, 2.5, 4.0)  # of decaying laws, times the largest current [-]
 _APART = 1.2  # highest over lowest frequency from which a mass is told from a stiffness [-]

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from mrdamper.data import Condition
-from mrdamper.functions.forms import ParameterFunction, form_named
-from mrdamper.functions.motion_hull import MotionHull
 from mrdamper.models import Model
+from mrdamper.statistics.functions.forms import ParameterFunction, form_named
+from mrdamper.statistics.functions.motion_hull import MotionHull
 
 
 @dataclass(frozen=True, eq=False)

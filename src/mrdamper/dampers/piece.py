@@ -8,7 +8,7 @@ import numpy as np
 
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.models import Model
-from mrdamper.motion import Excitation, equivalent_sine, measured_motion
+from mrdamper.physics.motion import Excitation, equivalent_sine, measured_motion
 
 _SAMPLES = 150  # a cycle
 

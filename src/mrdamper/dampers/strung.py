@@ -20,9 +20,9 @@ from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import RunError
 from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.models import Model
-from mrdamper.motion import Excitation, equivalent_sine, measured_motion
-from mrdamper.optimizers.levenberg_marquardt import forward_differences, least_squares
-from mrdamper.optimizers.linear import robust_weights, solve_bounded
+from mrdamper.physics.motion import Excitation, equivalent_sine, measured_motion
+from mrdamper.statistics.levenberg_marquardt import forward_differences, least_squares
+from mrdamper.statistics.linear import robust_weights, solve_bounded
 
 if TYPE_CHECKING:
     from mrdamper.dampers.joint import JointProblem

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import ClassVar
 
 from mrdamper.dampers.base import Damper
+from mrdamper.data.atomic import write_file, write_into
 from mrdamper.errors import InputError
-from mrdamper.files.atomic import write_file, write_into
 from mrdamper.models import Model
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,40}", re.IGNORECASE)

@@ -12,12 +12,12 @@ import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.joint import damper_of
+from mrdamper.dampers.streaming import FLAGS, Stepper, Stream, stream
 from mrdamper.data import Floats
+from mrdamper.data.encoding import c_comment
 from mrdamper.export.base import Exporter, Written, identifier, write_export
 from mrdamper.export.templates import render
-from mrdamper.files.encoding import c_comment
 from mrdamper.models import Model
-from mrdamper.streaming import FLAGS, Stepper, Stream, stream
 from mrdamper.tracing import Program
 from mrdamper.tracing.c_writer import CWriter
 from mrdamper.tracing.tape import Table

@@ -6,12 +6,12 @@ from typing import Any, ClassVar
 
 from mrdamper.dampers.base import Damper, Envelope
 from mrdamper.dampers.joint import damper_of
+from mrdamper.data.encoding import latex, markdown
+from mrdamper.data.parameters import latex_symbol
 from mrdamper.export.base import Exporter, Written
 from mrdamper.export.equations import equations, number, unit_text
 from mrdamper.export.templates import render
-from mrdamper.files.encoding import latex, markdown
 from mrdamper.models import Model
-from mrdamper.parameters import latex_symbol
 
 _ROUNDED = ("numbers are rounded to five digits; model.json has them all",)
 

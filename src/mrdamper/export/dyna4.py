@@ -11,9 +11,9 @@ from typing import ClassVar
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.joint import damper_of
+from mrdamper.data.encoding import c_comment
 from mrdamper.export.base import Exporter, Written
 from mrdamper.export.curves import force_velocity
-from mrdamper.files.encoding import c_comment
 from mrdamper.models import Model
 
 

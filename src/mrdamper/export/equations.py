@@ -8,7 +8,7 @@ from typing import Any
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Condition
 from mrdamper.errors import ParameterError
-from mrdamper.functions.forms import ParameterFunction, form_named
+from mrdamper.statistics.functions.forms import ParameterFunction, form_named
 
 NOWHERE = Condition(0.0, 1.0, 0.01)  # any condition: a damper without ranges has one model for all
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.joint import damper_of
+from mrdamper.dampers.streaming import FLAGS, Stepper, Stream, stream
 from mrdamper.data import Floats
 from mrdamper.errors import InputError
 from mrdamper.export.base import Exporter, Written, identifier
@@ -23,7 +24,6 @@ from mrdamper.export.fmu_description import c_bounds, description_facts, paramet
 from mrdamper.export.templates import render
 from mrdamper.export.toolchain import PLATFORMS, Platform, build_library
 from mrdamper.models import Model
-from mrdamper.streaming import FLAGS, Stepper, Stream, stream
 
 _SAMPLES_A_CYCLE = 200
 _INTERNAL_STEP = 2.0**-9  # s; two milliseconds, so that the usual communication step of one is taken whole

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+from mrdamper.dampers.streaming import FLAGS, Stepper, Stream
+from mrdamper.data.parameters import ParameterInfo
 from mrdamper.errors import ParameterError
-from mrdamper.parameters import ParameterInfo
-from mrdamper.streaming import FLAGS, Stepper, Stream
 
 DRIVES = (
     ("displacement", 1, "displacement; its differences are the velocity"),

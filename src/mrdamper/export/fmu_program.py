@@ -10,11 +10,11 @@ from typing import Any, Literal
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.encoding import c_comment
 from mrdamper.export.base import Written, identifier, write_export
 from mrdamper.export.c import package_version, program_sources
 from mrdamper.export.fmu import MOST_STEPS, FMUExporter, all_texts, with_token
 from mrdamper.export.fmu_description import units_of, variable
-from mrdamper.files.encoding import c_comment
 from mrdamper.tracing import Program
 from mrdamper.tracing.python import python_functions
 

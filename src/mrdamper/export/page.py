@@ -13,12 +13,12 @@ import numpy as np
 
 from mrdamper.dampers.base import SLACK, Damper, Envelope
 from mrdamper.dampers.joint import damper_of
+from mrdamper.dampers.streaming import FLAGS, Stepper, Stream, stream
 from mrdamper.export.base import Exporter, Written, identifier
 from mrdamper.export.c import TOLERANCE, c_facts, c_sources, reference_motion, shared_points
 from mrdamper.export.templates import render
 from mrdamper.export.toolchain import build_webassembly
 from mrdamper.models import Model
-from mrdamper.streaming import FLAGS, Stepper, Stream, stream
 from mrdamper.tracing.c_writer import JavaScriptWriter
 
 _VECTORS = 240  # samples of the self-test

@@ -10,9 +10,9 @@ from typing import ClassVar
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.joint import damper_of
+from mrdamper.data.encoding import c_comment
 from mrdamper.export.base import Exporter, Written
 from mrdamper.export.curves import ForceVelocity, force_velocity
-from mrdamper.files.encoding import c_comment
 from mrdamper.models import Model
 
 _CHANNELS = (  # name, description, unit

@@ -15,9 +15,9 @@ import numpy as np
 
 from mrdamper.data import Condition, Dataset, Run
 from mrdamper.errors import UnknownNameError
-from mrdamper.files.dataset import save_dataset
-from mrdamper.motion import sine
 from mrdamper.paper.virtual_rig import SYNTHETIC, VirtualRig
+from mrdamper.physics.motion import sine
+from mrdamper.rig_files.dataset_folder import save_dataset
 
 MATRIX = tuple(Condition(current, f, 0.020) for f in (1.0, 2.0) for current in (0.0, 1.0))
 SPREAD: Mapping[str, float] = {  # of one damper from the next, relative

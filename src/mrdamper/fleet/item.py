@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from mrdamper.errors import InputError, printable
-from mrdamper.files.samples import SAMPLE_FILES
 from mrdamper.fleet.profile import FACTS, FleetProfile
+from mrdamper.rig_files.dataset_samples import SAMPLE_FILES
 
 Kind = Literal["dataset", "rig files", "lake"]
 

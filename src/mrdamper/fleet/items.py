@@ -7,11 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from mrdamper.errors import InputError
-from mrdamper.files.dataset import runs_table
-from mrdamper.files.samples import SAMPLE_FILES
 from mrdamper.fleet.item import FleetError, Item, Kind, make_item
 from mrdamper.fleet.lake import is_lake, lake_items
 from mrdamper.fleet.profile import FleetProfile
+from mrdamper.rig_files.dataset_folder import runs_table
+from mrdamper.rig_files.dataset_samples import SAMPLE_FILES
 
 
 def find_items(source: str | Path, profile: FleetProfile) -> list[Item]:

@@ -29,7 +29,7 @@ from mrdamper.fleet.loops import (
 from mrdamper.fleet.plan import Plan
 from mrdamper.identification.covariance import spread
 from mrdamper.models import Model
-from mrdamper.motion import equivalent_sine
+from mrdamper.physics.motion import equivalent_sine
 from mrdamper.study.workflow import believed, study_rig, usable
 
 VERSION = version("mrdamper")  # asked once: the answer takes a millisecond
@@ -112,7 +112,7 @@ def read(item: Item, settings: Settings) -> tuple[Dataset, tuple[str, ...]]:
 
         dataset = lake_dataset(item)
     elif item.kind == "dataset":
-        from mrdamper.files.dataset import load_dataset
+        from mrdamper.rig_files.dataset_folder import load_dataset
 
         dataset = load_dataset(item.paths[0])
         if item.picks:

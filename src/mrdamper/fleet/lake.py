@@ -12,10 +12,10 @@ import numpy as np
 
 from mrdamper.data import Dataset, Run
 from mrdamper.errors import ColumnError, InputError, UnitError
-from mrdamper.files.dataset import run_of
-from mrdamper.files.samples import OPTIONAL, REQUIRED
 from mrdamper.fleet.item import FleetError, Item, make_item
 from mrdamper.fleet.profile import FACTS, FleetProfile
+from mrdamper.rig_files.dataset_folder import run_of
+from mrdamper.rig_files.dataset_samples import OPTIONAL, REQUIRED
 
 if TYPE_CHECKING:
     import polars as pl

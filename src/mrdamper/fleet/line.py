@@ -10,8 +10,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from mrdamper.data.atomic import require_writable
 from mrdamper.errors import InputError
-from mrdamper.files.atomic import require_writable
 from mrdamper.fleet.engine import Submit, cluster_engine, local_engine, outcome
 from mrdamper.fleet.guard import Limits
 from mrdamper.fleet.item import Item, digest_of, hash_of

@@ -9,8 +9,8 @@ import numpy as np
 from mrdamper.dampers.strung import string
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.models import Model
-from mrdamper.motion import equivalent_sine, measured_motion, sine
-from mrdamper.simulation import simulate
+from mrdamper.physics.motion import equivalent_sine, measured_motion, sine
+from mrdamper.physics.simulation import simulate
 
 PHASES = 64  # points of a loop
 _SAME_CURRENT, _SAME_MOTION = 0.02, 0.08  # [A] and relative: a test of the line's matrix, though the rig missed it

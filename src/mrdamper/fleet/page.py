@@ -11,8 +11,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mrdamper.data import Floats
+from mrdamper.data.atomic import write_file
 from mrdamper.errors import ColumnError
-from mrdamper.files.atomic import write_file
 from mrdamper.fleet.charts import Gauge, capability, ewma, gauge_study, individuals
 from mrdamper.fleet.job import OTHER_RIG
 from mrdamper.fleet.plan import Plan

@@ -8,7 +8,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mrdamper.files.atomic import write_file
+from mrdamper.data.atomic import write_file
 from mrdamper.fleet.plan import Plan
 
 if TYPE_CHECKING:

@@ -9,15 +9,15 @@ import numpy as np
 
 from mrdamper.data import Run
 from mrdamper.errors import IdentificationError, QualityError, checked
-from mrdamper.gas_spring import GasSpring
 from mrdamper.identification.certainty import certainty_of_run
 from mrdamper.identification.loop_analysis import damping_share
 from mrdamper.identification.methods import all_methods, method_named
 from mrdamper.identification.problem import Identification, Method, Problem, Solution
-from mrdamper.metrics import score
 from mrdamper.models import Model, model_type
-from mrdamper.motion import measured_motion
-from mrdamper.optimizers.linear import on_one_blas_thread
+from mrdamper.physics.gas_spring import GasSpring
+from mrdamper.physics.motion import measured_motion
+from mrdamper.statistics.linear import on_one_blas_thread
+from mrdamper.statistics.metrics import score
 
 __all__ = ["Identification", "Method", "Problem", "Solution", "all_methods", "identify"]
 

@@ -13,8 +13,8 @@ from mrdamper.identification.columns import linear_table
 from mrdamper.identification.covariance import Spread, spread
 from mrdamper.identification.intervals import weaknesses
 from mrdamper.identification.problem import DELAY, Problem, RunCertainty, Solution
-from mrdamper.motion import Excitation
-from mrdamper.optimizers.linear import on_one_blas_thread
+from mrdamper.physics.motion import Excitation
+from mrdamper.statistics.linear import on_one_blas_thread
 
 _STEP = 1e-6  # of a coordinate, for derivatives
 _WORTH = 4.0  # times what noise gives away to the columns of a hysteresis that is not there

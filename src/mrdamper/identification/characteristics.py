@@ -15,7 +15,7 @@ import numpy as np
 from mrdamper.data import Condition, Floats, Run, current_levels
 from mrdamper.errors import IdentificationError, InputError
 from mrdamper.identification.loop_analysis import analyse_loop, whole_cycles
-from mrdamper.motion import equivalent_sine, measured_motion
+from mrdamper.physics.motion import equivalent_sine, measured_motion
 
 SIDES = ("rebound", "compression")
 _STEPS = 6  # velocities of a ladder nobody gave

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.parameters import ParameterInfo
 from mrdamper.models import Model
-from mrdamper.motion import Excitation
-from mrdamper.parameters import ParameterInfo
+from mrdamper.physics.motion import Excitation
 
 
 def linear_table(

@@ -15,13 +15,13 @@ from typing import Self
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.parameters import ParameterInfo
 from mrdamper.errors import ParameterError
-from mrdamper.hysteresis.batch import follow_quickly, follow_with_slope
 from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.identification.problem import DELAY, Problem
 from mrdamper.models import Model, Scale, SearchAxis
-from mrdamper.optimizers.linear import FixedColumns
-from mrdamper.parameters import ParameterInfo
+from mrdamper.physics.hysteresis.batch import follow_quickly, follow_with_slope
+from mrdamper.statistics.linear import FixedColumns
 
 _DEPENDENT = 1e-10  # share of a squared column below which the others explain all of it
 _LENGTH, _ASYMMETRY, _SHARPNESS = "yield_displacement", "asymmetry", "n"  # search coordinates of a shape

@@ -17,10 +17,10 @@ import numpy as np
 
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import ExcitationError, IdentificationError
-from mrdamper.hysteresis import Shape, loop_harmonics
-from mrdamper.motion import SINE_DISTORTION_LIMIT, STRAY_LIMIT, Excitation, analyse_motion
-from mrdamper.motion.harmonics import fit_harmonics
-from mrdamper.optimizers.linear import solve_linear
+from mrdamper.physics.hysteresis import Shape, loop_harmonics
+from mrdamper.physics.motion import SINE_DISTORTION_LIMIT, STRAY_LIMIT, Excitation, analyse_motion
+from mrdamper.physics.motion.harmonics import fit_harmonics
+from mrdamper.statistics.linear import solve_linear
 
 AmplitudeReading = Literal["first-harmonic", "half-peak-to-peak", "maximum"]
 PhaseReading = Literal["harmonic", "peaks"]

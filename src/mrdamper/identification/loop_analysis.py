@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrdamper.data import Condition, Floats, Run, current_levels, same_motion
-from mrdamper.metrics import dissipated_power
-from mrdamper.motion import Excitation, MotionAnalysis, analyse_motion, measured_motion
+from mrdamper.physics.motion import Excitation, MotionAnalysis, analyse_motion, measured_motion
+from mrdamper.statistics.metrics import dissipated_power
 
 
 @dataclass(frozen=True)

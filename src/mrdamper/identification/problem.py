@@ -13,12 +13,12 @@ import numpy as np
 
 from mrdamper.data import Condition, Floats, Run, Shown
 from mrdamper.errors import IdentificationError, UnknownNameError, checked
-from mrdamper.gas_spring import GasSpring
 from mrdamper.identification.intervals import NOT_IDENTIFIABLE, interval_about, written
-from mrdamper.metrics import Scores
 from mrdamper.models import Model
-from mrdamper.motion import Excitation, MotionAnalysis, analyse_motion, measured_motion
-from mrdamper.optimizers.ending import Ending
+from mrdamper.physics.gas_spring import GasSpring
+from mrdamper.physics.motion import Excitation, MotionAnalysis, analyse_motion, measured_motion
+from mrdamper.statistics.ending import Ending
+from mrdamper.statistics.metrics import Scores
 
 DELAY = "delay"  # name of the search coordinate
 DELAY_LIMIT = 3e-3  # a free delay between the channels runs away beyond this [s]

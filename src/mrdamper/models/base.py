@@ -18,10 +18,10 @@ from typing import ClassVar, Self
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.parameters import ParameterInfo, is_number, parameters_of
 from mrdamper.errors import ParameterError, shown
-from mrdamper.hysteresis import Shape
-from mrdamper.motion import Excitation
-from mrdamper.parameters import ParameterInfo, is_number, parameters_of
+from mrdamper.physics.hysteresis import Shape
+from mrdamper.physics.motion import Excitation
 from mrdamper.tracing import plain
 
 GENERAL_FORMS = (

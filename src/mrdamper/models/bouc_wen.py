@@ -10,11 +10,11 @@ from typing import ClassVar
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.parameters import param
 from mrdamper.errors import IdentificationError
-from mrdamper.hysteresis import Shape, follow
 from mrdamper.models.base import GENERAL_FORMS, Model, Scale, SearchAxis, require_positive
-from mrdamper.motion import Excitation
-from mrdamper.parameters import param
+from mrdamper.physics.hysteresis import Shape, follow
+from mrdamper.physics.motion import Excitation
 from mrdamper.tracing import plain
 
 

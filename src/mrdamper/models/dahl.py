@@ -9,10 +9,10 @@ from typing import ClassVar
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.hysteresis import Shape, follow
+from mrdamper.data.parameters import param
 from mrdamper.models.base import GENERAL_FORMS, Model, Scale, SearchAxis
-from mrdamper.motion import Excitation
-from mrdamper.parameters import param
+from mrdamper.physics.hysteresis import Shape, follow
+from mrdamper.physics.motion import Excitation
 
 
 @dataclass(frozen=True)

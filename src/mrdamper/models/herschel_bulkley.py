@@ -10,9 +10,9 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.parameters import param
 from mrdamper.models.base import Model, Scale, SearchAxis, require_positive
-from mrdamper.motion import Excitation
-from mrdamper.parameters import param
+from mrdamper.physics.motion import Excitation
 from mrdamper.tracing import Tape, choose, streamed
 
 _KNOTS = 4000  # of the table the flow curve is inverted with; Newton's method finishes the digits

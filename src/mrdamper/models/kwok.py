@@ -9,10 +9,10 @@ from typing import ClassVar
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.parameters import param
 from mrdamper.models.base import Model, Scale, SearchAxis
 from mrdamper.models.sides import side
-from mrdamper.motion import Excitation
-from mrdamper.parameters import param
+from mrdamper.physics.motion import Excitation
 
 
 @dataclass(frozen=True)

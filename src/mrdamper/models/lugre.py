@@ -9,10 +9,10 @@ from typing import ClassVar, Self
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.integrator import integrate
+from mrdamper.data.parameters import param
 from mrdamper.models.base import Model, Scale, SearchAxis, require_positive
-from mrdamper.motion import Excitation
-from mrdamper.parameters import param
+from mrdamper.physics.integrator import integrate
+from mrdamper.physics.motion import Excitation
 
 
 @dataclass(frozen=True)

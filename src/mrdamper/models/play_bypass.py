@@ -15,12 +15,12 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.parameters import param
 from mrdamper.models.base import Model, Scale, SearchAxis
 from mrdamper.models.recorded import recorded
-from mrdamper.motion import Excitation, Path
-from mrdamper.motion.lag import first_order_lag, leaking_load
-from mrdamper.motion.path import lately_along
-from mrdamper.parameters import param
+from mrdamper.physics.motion import Excitation, Path
+from mrdamper.physics.motion.lag import first_order_lag, leaking_load
+from mrdamper.physics.motion.path import lately_along
 from mrdamper.tracing import Tape, streamed
 
 RISE_CURRENT = 0.12  # A; where nothing else is known, the yield force starts with zero slope over this current

@@ -9,9 +9,9 @@ from typing import Any, TypeVar, cast
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.motion import Excitation
-from mrdamper.motion.path import lately_along
-from mrdamper.motion.traced import TracedMotion, TracedStep
+from mrdamper.physics.motion import Excitation
+from mrdamper.physics.motion.path import lately_along
+from mrdamper.physics.motion.traced import TracedMotion, TracedStep
 from mrdamper.tracing import Tape, program
 from mrdamper.tracing.compiled import RecordProgram
 

@@ -9,11 +9,11 @@ from typing import ClassVar, Self
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.parameters import param
 from mrdamper.errors import ParameterError
-from mrdamper.integrator import integrate
 from mrdamper.models.base import GENERAL_FORMS, Model, Scale, SearchAxis, require_positive
-from mrdamper.motion import Excitation
-from mrdamper.parameters import param
+from mrdamper.physics.integrator import integrate
+from mrdamper.physics.motion import Excitation
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,12 @@ import numpy as np
 
 from mrdamper.data import Condition, Floats, Run, same_motion
 from mrdamper.errors import IdentificationError
-from mrdamper.functions.fitting import fit_function
 from mrdamper.identification.harmonic_balance import SineRecord
-from mrdamper.motion import equivalent_sine, measured_motion
 from mrdamper.paper.recipes import CONSISTENT
 from mrdamper.paper.results import SAME, Reproduction, amplitudes, motions, values
 from mrdamper.paper.verdicts import Measured, measured, unknown
+from mrdamper.physics.motion import equivalent_sine, measured_motion
+from mrdamper.statistics.functions.fitting import fit_function
 
 
 def gas_series(study: Reproduction) -> Measured:

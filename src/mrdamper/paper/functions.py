@@ -16,9 +16,9 @@ from mrdamper.dampers.modified import ModifiedFit, ModifiedModel
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError
-from mrdamper.functions.fitting import FunctionFit, assess, fit_function
 from mrdamper.identification import Identification
 from mrdamper.models.bouc_wen import BoucWen
+from mrdamper.statistics.functions.fitting import FunctionFit, assess, fit_function
 from mrdamper.study.recipe import FitResult
 
 PAPER_FORMS = {

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mrdamper.errors import ParameterError
-from mrdamper.optimizers.linear import Floats
+from mrdamper.statistics.linear import Floats
 
 GENERATIONS_OF_MANY = 60  # of a search that is one of dozens
 

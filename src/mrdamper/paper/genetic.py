@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mrdamper.errors import ParameterError
-from mrdamper.optimizers.ending import Ending
-from mrdamper.optimizers.linear import Floats
 from mrdamper.paper.generation import GeneticSettings, next_generation
+from mrdamper.statistics.ending import Ending
+from mrdamper.statistics.linear import Floats
 
 Cost = Callable[[Floats], Floats]
 Report = Callable[[str, float], None]

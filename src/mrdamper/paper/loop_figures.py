@@ -9,10 +9,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mrdamper.data import Condition, Floats, Run
-from mrdamper.motion import equivalent_sine, measured_motion
 from mrdamper.paper.claims_on_tests import friction_along
 from mrdamper.paper.recipes import CONSISTENT, LITERAL, TRADITIONAL
 from mrdamper.paper.results import SAME, Reproduction
+from mrdamper.physics.motion import equivalent_sine, measured_motion
+from mrdamper.physics.simulation import simulate
 from mrdamper.report.plots.style import (
     MEASURED,
     MM,
@@ -24,7 +25,6 @@ from mrdamper.report.plots.style import (
     new_figure,
     thin,
 )
-from mrdamper.simulation import simulate
 
 Made = Figure | str  # or why there is none
 _MOST = 9  # loops in one panel

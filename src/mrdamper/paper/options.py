@@ -9,12 +9,12 @@ from typing import ClassVar, Literal, get_args
 
 from mrdamper.data import Run
 from mrdamper.errors import ParameterError, UnknownNameError
-from mrdamper.gas_spring import GasSpring
 from mrdamper.identification.harmonic_balance import AmplitudeReading, OffsetReading, PhaseReading
 from mrdamper.paper.assumptions import PaperAssumptions, outside_paper_range, require_paper_functions
 from mrdamper.paper.functions import fit_paper_functions
 from mrdamper.paper.generation import GeneticSettings
 from mrdamper.paper.paper_method import Paper
+from mrdamper.physics.gas_spring import GasSpring
 from mrdamper.study.recipe import Recipe, StudyMethod, modified
 
 MassLaw = Literal["exponential", "inverse-square", "power"]

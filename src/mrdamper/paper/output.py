@@ -11,9 +11,9 @@ import numpy as np
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.dampers.published import all_published
 from mrdamper.data import Condition
+from mrdamper.data.atomic import publish
+from mrdamper.data.encoding import csv_text
 from mrdamper.errors import InputError
-from mrdamper.files.atomic import publish
-from mrdamper.files.encoding import csv_text
 from mrdamper.identification.harmonic_balance import SineRecord
 from mrdamper.models import Model, model_type
 from mrdamper.models.bouc_wen import BoucWen

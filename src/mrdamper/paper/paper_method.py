@@ -16,7 +16,6 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import IdentificationError
-from mrdamper.hysteresis import Shape, steady_loop
 from mrdamper.identification.harmonic_balance import (
     AmplitudeReading,
     OffsetReading,
@@ -29,10 +28,11 @@ from mrdamper.identification.harmonic_balance import (
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.identification.problem import Method, Problem, Solution
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.optimizers.ending import Ending
-from mrdamper.optimizers.levenberg_marquardt import least_squares
 from mrdamper.paper.generation import GENERATIONS_OF_MANY, GeneticSettings
 from mrdamper.paper.genetic import GeneticMinimum, genetic
+from mrdamper.physics.hysteresis import Shape, steady_loop
+from mrdamper.statistics.ending import Ending
+from mrdamper.statistics.levenberg_marquardt import least_squares
 
 _SEARCH_SAMPLES = 400  # two numbers are searched; more samples change them by less than the search does
 _TINY = float(np.finfo(float).tiny)  # a beta above zero

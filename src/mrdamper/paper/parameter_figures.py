@@ -11,12 +11,12 @@ from matplotlib.axes import Axes
 
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import IdentificationError
-from mrdamper.functions.fitting import fit_function
-from mrdamper.functions.forms import ParameterFunction, features
 from mrdamper.paper.loop_figures import Made
 from mrdamper.paper.recipes import LITERAL
 from mrdamper.paper.results import SAME, Reproduction, amplitudes, function_of, motions, values
 from mrdamper.report.plots.style import MEASURED, MM, current_colours, house_style, label, new_figure, powered
+from mrdamper.statistics.functions.fitting import fit_function
+from mrdamper.statistics.functions.forms import ParameterFunction, features
 
 Curves = Mapping[int, tuple[Callable[[Floats], Floats] | None, str]]  # of a motion by its first run; what to say
 _OVER: Mapping[str, tuple[Callable[[Condition], float], str]] = {

@@ -10,8 +10,6 @@ import numpy as np
 
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.data import Condition, Dataset, Floats, Run, same_motion
-from mrdamper.functions.fitting import FunctionFit
-from mrdamper.gas_spring import GasSpring
 from mrdamper.identification import Identification
 from mrdamper.identification.harmonic_balance import ForceReading
 from mrdamper.identification.loop_analysis import LoopAnalysis
@@ -20,6 +18,8 @@ from mrdamper.paper.options import PaperOptions
 from mrdamper.paper.recipes import ALI, DIRECT, LITERAL, TRADITIONAL
 from mrdamper.paper.sensitivity import OneAtATime, Sobol
 from mrdamper.paper.virtual_rig import VirtualRig
+from mrdamper.physics.gas_spring import GasSpring
+from mrdamper.statistics.functions.fitting import FunctionFit
 from mrdamper.study.recipe import Scored
 
 SAME_CURRENT = 0.02  # difference within which two runs have one current [A]

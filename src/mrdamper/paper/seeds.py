@@ -11,13 +11,13 @@ import numpy as np
 from mrdamper.data import Condition, Floats
 from mrdamper.identification.harmonic_balance import SineRecord, read_force
 from mrdamper.identification.loop_analysis import analyse_loop
-from mrdamper.motion import Excitation
 from mrdamper.paper.assumptions import PaperAssumptions
 from mrdamper.paper.claims import judge_all
 from mrdamper.paper.options import PaperOptions
 from mrdamper.paper.recipes import HALF, JOINT, recipes_of_paper
 from mrdamper.paper.results import Reproduction
 from mrdamper.paper.virtual_rig import VirtualRig, friction_test, noisy_dataset, true_runs
+from mrdamper.physics.motion import Excitation
 from mrdamper.study.recipe import Progress, fit_and_score_all
 
 CURRENTS = (0.0, 0.5, 1.0, 1.5, 2.0)

@@ -19,11 +19,11 @@ import numpy as np
 
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import ParameterError, UnknownNameError
-from mrdamper.hysteresis import steady_loop
 from mrdamper.identification import identify
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.motion import sine
+from mrdamper.physics.hysteresis import steady_loop
+from mrdamper.physics.motion import sine
 
 LOOP = ("yield_force", "yield_displacement", "n", "asymmetry")
 NAMES = ("c", *LOOP, "k1", "k3", "m", "f0")

@@ -17,7 +17,6 @@ import numpy as np
 
 from mrdamper.data import Dataset, Run
 from mrdamper.errors import IdentificationError, InputError
-from mrdamper.gas_spring import GasSpring
 from mrdamper.identification.harmonic_balance import SineRecord, read_force
 from mrdamper.identification.loop_analysis import analyse_loop
 from mrdamper.paper.assumptions import PaperAssumptions, missing_functions, outside_paper_range
@@ -37,6 +36,7 @@ from mrdamper.paper.recipes import CONSISTENT, DIRECT, LITERAL, Steps, comparato
 from mrdamper.paper.results import GeneticCheck, Reproduction
 from mrdamper.paper.seeds import Seed, by_seed, one_seed
 from mrdamper.paper.virtual_rig import CURRENTS, VirtualRig, friction_test, noisy_dataset, true_runs
+from mrdamper.physics.gas_spring import GasSpring
 from mrdamper.study.parallel import HERE, Processes
 from mrdamper.study.recipe import Progress
 from mrdamper.study.workflow import usable_sines

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from mrdamper.data import Condition, Dataset, Floats, Run
+from mrdamper.data.parameters import ParameterInfo, param, parameters_of
 from mrdamper.errors import ParameterError
-from mrdamper.gas_spring import GasSpring
-from mrdamper.hysteresis import Shape, follow
-from mrdamper.motion import Excitation, Path, sine, triangle
-from mrdamper.parameters import ParameterInfo, param, parameters_of
+from mrdamper.physics.gas_spring import GasSpring
+from mrdamper.physics.hysteresis import Shape, follow
+from mrdamper.physics.motion import Excitation, Path, sine, triangle
 
 MOTIONS = ((0.020, 1.0), (0.020, 1.5), (0.020, 2.0), (0.050, 0.5), (0.050, 1.0), (0.050, 1.5))
 HELD_OUT = (0.080, 1.0)

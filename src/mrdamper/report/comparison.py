@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from mrdamper.dampers.model_file import save_model
 from mrdamper.data import Run
-from mrdamper.files.atomic import publish
-from mrdamper.files.encoding import csv_text, file_names
-from mrdamper.files.model_file import save_model
+from mrdamper.data.atomic import publish
+from mrdamper.data.encoding import csv_text, file_names
 from mrdamper.report.page import made_from, render_page
 from mrdamper.report.plots.comparison import overlaid_loops, ranking
 from mrdamper.report.plots.style import save_figure

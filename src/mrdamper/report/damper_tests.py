@@ -12,9 +12,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mrdamper.data import Dataset, Run, same_motion
+from mrdamper.data.atomic import publish
+from mrdamper.data.encoding import csv_text
 from mrdamper.errors import IdentificationError, InputError
-from mrdamper.files.atomic import publish
-from mrdamper.files.encoding import csv_text
 from mrdamper.identification.characteristics import SIDES, Characteristics, Stroke, characterise
 from mrdamper.report.about import About, Limit
 from mrdamper.report.page import made_from, number, plain, render_page

@@ -15,7 +15,7 @@ from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.identification import Identification
 from mrdamper.identification.loop_analysis import LoopAnalysis
 from mrdamper.study.recipe import Scored
-from mrdamper.validation import Validation
+from mrdamper.study.validation import Validation
 
 PREDICTION, TESTS, MODEL, PARAMETERS, RANGE = "Prediction", "Tests", "Model", "Parameters", "Range of validity"
 _GROUPS = (PREDICTION, PARAMETERS, MODEL, TESTS, RANGE)

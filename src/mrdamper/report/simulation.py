@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mrdamper.files.atomic import publish
-from mrdamper.files.encoding import csv_text
+from mrdamper.data.atomic import publish
+from mrdamper.data.encoding import csv_text
 from mrdamper.report.page import render_page
 from mrdamper.report.plots.simulation import histories, spectra
 from mrdamper.report.plots.style import save_figure

@@ -14,12 +14,12 @@ from matplotlib.figure import Figure
 from mrdamper.dampers.bands import scope
 from mrdamper.dampers.certainty import table
 from mrdamper.dampers.joint import JointFit
+from mrdamper.dampers.model_file import save_model
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.data import Dataset
+from mrdamper.data.atomic import publish
+from mrdamper.data.encoding import csv_text, file_names
 from mrdamper.errors import IdentificationError
-from mrdamper.files.atomic import publish
-from mrdamper.files.encoding import csv_text, file_names
-from mrdamper.files.model_file import save_model
 from mrdamper.identification import Identification
 from mrdamper.identification.characteristics import Characteristics, characterise
 from mrdamper.identification.intervals import written
@@ -36,8 +36,8 @@ from mrdamper.report.summary import error_sentence
 from mrdamper.report.tables import identification_rows, score_row
 from mrdamper.study.parallel import HERE, Processes
 from mrdamper.study.recipe import Progress, Scored, StudyMethod
+from mrdamper.study.validation import session_drift
 from mrdamper.study.workflow import RigStudy, Study, require_runs, study_rig
-from mrdamper.validation import session_drift
 
 _LOOPS_SHOWN = 6
 _CV_RANGE = ("low_cv", "high_cv")  # columns with the range of a parameter in cross-validation

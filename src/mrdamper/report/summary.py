@@ -10,8 +10,8 @@ import numpy as np
 
 from mrdamper.dampers.certainty import table
 from mrdamper.report.limitations import limitations
+from mrdamper.study.validation import Validation, peak_band
 from mrdamper.study.workflow import RigStudy, Study
-from mrdamper.validation import Validation, peak_band
 
 LEVEL = 0.9  # coverage of the stated prediction intervals [-]
 _MAX_LINES = 20  # number of lines on a terminal

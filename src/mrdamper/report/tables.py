@@ -11,7 +11,7 @@ from typing import Any
 from mrdamper.dampers.bands import Band
 from mrdamper.dampers.base import Prediction
 from mrdamper.identification import Identification
-from mrdamper.validation import RunScore
+from mrdamper.study.validation import RunScore
 
 
 def identification_rows(identifications: Sequence[Identification]) -> list[dict[str, Any]]:

@@ -11,7 +11,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.data.pieces import pieces
 from mrdamper.errors import ColumnError, InputError
-from mrdamper.motion.measured import smooth
+from mrdamper.physics.motion.measured import smooth
 from mrdamper.rig_files.coil_current import as_data, constant, current_of, without_gaps
 from mrdamper.rig_files.column_names import role_of
 from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, left_out, rate_of

@@ -11,8 +11,8 @@ import numpy as np
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.calibration import PredictedRun
 from mrdamper.data import Run
-from mrdamper.motion import equivalent_sine
-from mrdamper.validation import RunScore, Validation, leave_one_condition_out
+from mrdamper.physics.motion import equivalent_sine
+from mrdamper.study.validation import RunScore, Validation, leave_one_condition_out
 
 _STRETCH, _STRETCHES = 12, 8  # cycles of a long record that are left out together, at least; stretches at most
 _RECORD = "stretch of"  # note of a stretch: the record it was cut from

@@ -18,8 +18,8 @@ from mrdamper.identification import Identification, Method, Problem, conclude
 from mrdamper.identification.methods import method_named
 from mrdamper.identification.methods.projection import Projection
 from mrdamper.models import model_type
-from mrdamper.motion import analyse_motion
-from mrdamper.optimizers.linear import on_one_blas_thread
+from mrdamper.physics.motion import analyse_motion
+from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.study.processes import processes
 from mrdamper.study.recipe import Basis, IdentificationCache, Progress, Recipe, Scored, fit_and_score_all
 

@@ -22,7 +22,7 @@ from mrdamper.dampers.slopes import force_slopes
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import InputError, UnknownNameError
 from mrdamper.identification.intervals import student
-from mrdamper.motion import sine
+from mrdamper.physics.motion import sine
 from mrdamper.study.limits import Limits
 from mrdamper.study.proposal import Proposal
 from mrdamper.study.recipe import Progress

@@ -11,7 +11,7 @@ import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Condition, Floats
-from mrdamper.motion import Excitation, sine
+from mrdamper.physics.motion import Excitation, sine
 from mrdamper.study.limits import Limits
 
 

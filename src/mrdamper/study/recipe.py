@@ -24,13 +24,13 @@ from mrdamper.dampers.published import Published, all_published
 from mrdamper.data import Run
 from mrdamper.discovery import Registry
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError
-from mrdamper.gas_spring import GasSpring
 from mrdamper.identification import Identification, Method, Problem, identify
 from mrdamper.identification.methods import values_of_fields
 from mrdamper.models import Scale, all_models, model_type
-from mrdamper.motion import analyse_motion
+from mrdamper.physics.gas_spring import GasSpring
+from mrdamper.physics.motion import analyse_motion
 from mrdamper.study.cross_validation import cross_validate, stretches
-from mrdamper.validation import Validation, validate
+from mrdamper.study.validation import Validation, validate
 
 Progress = Callable[[str, float], None]
 

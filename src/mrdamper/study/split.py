@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from mrdamper.data import Condition, Dataset, Run, same_condition
 from mrdamper.errors import InputError, UnknownNameError
-from mrdamper.motion import equivalent_sine
+from mrdamper.physics.motion import equivalent_sine
 
 SHARE = 0.2  # of the conditions, by default
 _FEWEST = 2  # conditions to identify from

@@ -22,12 +22,12 @@ from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.dampers.sessions import Sessions, known_errors
 from mrdamper.data import Dataset, Floats, Run, Shown
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError, checked
-from mrdamper.functions.selection import mean_error, smaller_wins
 from mrdamper.identification import refuse_clipped
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, at_levels, dynamic_ranges
 from mrdamper.models import all_models
-from mrdamper.motion import analyse_motion, equivalent_sine
+from mrdamper.physics.motion import analyse_motion, equivalent_sine
 from mrdamper.rig_files.quality.table import judged
+from mrdamper.statistics.functions.selection import mean_error, smaller_wins
 from mrdamper.study.contradictions import Contradiction, find_contradictions
 from mrdamper.study.parallel import HERE, Processes
 from mrdamper.study.recipe import (
@@ -43,7 +43,7 @@ from mrdamper.study.recipe import (
     play_and_bypass,
     study_methods,
 )
-from mrdamper.validation import Validation, validate
+from mrdamper.study.validation import Validation, validate
 
 _SAMPLES_A_CYCLE = 8  # below, neither the velocity nor a loop can be told
 _DISTORTED = 0.35  # harmonics over the fundamental: a triangle has 0.12, a square wave 0.48

@@ -18,9 +18,9 @@ import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.coil import Coil, field_step
+from mrdamper.dampers.streaming import steps_of, stream
 from mrdamper.data import Floats
 from mrdamper.errors import ParameterError, checked, numbers, series
-from mrdamper.streaming import steps_of, stream
 from mrdamper.tracing import Program, Tape, program
 from mrdamper.tracing.graft import Graft
 from mrdamper.tracing.python import python_functions

@@ -19,7 +19,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import ParameterError, RecordError, StepError
-from mrdamper.optimizers.levenberg_marquardt import least_squares
+from mrdamper.statistics.levenberg_marquardt import least_squares
 from mrdamper.tracing import Tape, program
 from mrdamper.tracing.compiled import RecordProgram
 

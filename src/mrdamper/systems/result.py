@@ -11,9 +11,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from mrdamper.dampers.streaming import FLAGS
 from mrdamper.data import Floats
 from mrdamper.errors import UnknownNameError, checked
-from mrdamper.streaming import FLAGS
 from mrdamper.systems.controllers import Controller
 from mrdamper.systems.structure import Link, System
 

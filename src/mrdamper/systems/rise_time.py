@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrdamper.dampers.base import Damper
+from mrdamper.dampers.streaming import stepper
 from mrdamper.errors import ParameterError
-from mrdamper.streaming import stepper
 
 _SAMPLES = 4000
 _SETTLE = 12.0  # lags of the coil after which nothing changes any more

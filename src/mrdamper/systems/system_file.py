@@ -12,10 +12,10 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from mrdamper.dampers.base import Damper
+from mrdamper.dampers.model_file import load_model
 from mrdamper.data import Floats
+from mrdamper.data.atomic import path_of
 from mrdamper.errors import StructureError, UnknownNameError
-from mrdamper.files.atomic import path_of
-from mrdamper.files.model_file import load_model
 from mrdamper.rig_files.strict_toml import load_toml
 from mrdamper.systems.structure import Link, System, building, half_car, quarter_car, shear_building
 
@@ -113,7 +113,7 @@ class SystemFile:
 
 def bundled_systems() -> dict[str, Path]:
     """Systems that ship with the package, by name."""
-    folder = Path(str(files("mrdamper.files.bundled") / "systems"))
+    folder = Path(str(files("mrdamper.data.bundled") / "systems"))
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 

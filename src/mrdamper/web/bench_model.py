@@ -9,9 +9,9 @@ from typing import Any
 
 from mrdamper.dampers.base import Damper, Prediction
 from mrdamper.data import Condition
+from mrdamper.data.parameters import ParameterInfo
 from mrdamper.errors import ParameterError
-from mrdamper.parameters import ParameterInfo
-from mrdamper.simulation import ForceLaw, steady_loop
+from mrdamper.physics.simulation import ForceLaw, steady_loop
 
 _DECADES = 10.0  # a slider without bounds reaches this factor up and down, or twice the value
 

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from mrdamper.dampers.base import Damper, Prediction
 from mrdamper.data import Floats, Run
 from mrdamper.models import Model
-from mrdamper.motion import Excitation, analyse_motion, equivalent_sine, measured_motion
-from mrdamper.simulation import simulate
+from mrdamper.physics.motion import Excitation, analyse_motion, equivalent_sine, measured_motion
+from mrdamper.physics.simulation import simulate
 
 MM = 1e3
 MOST_POINTS = 1000  # of a loop on the screen

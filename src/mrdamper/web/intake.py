@@ -13,8 +13,8 @@ from pathlib import Path, PurePosixPath
 
 from mrdamper.data import Dataset
 from mrdamper.errors import InputError
-from mrdamper.files.dataset import load_dataset
-from mrdamper.files.samples import SAMPLE_FILES
+from mrdamper.rig_files.dataset_folder import load_dataset
+from mrdamper.rig_files.dataset_samples import SAMPLE_FILES
 from mrdamper.web.drops import Drop, DropError, Intake, NothingTakenError
 from mrdamper.web.rig_drop import read_rig_files
 

@@ -17,13 +17,13 @@ from pathlib import Path, PurePosixPath
 from pydantic import BaseModel, Field
 
 from mrdamper.dampers.base import Damper
+from mrdamper.dampers.model_file import dump_model, parse_model
 from mrdamper.data import Dataset
+from mrdamper.data.strict_json import parse_json
 from mrdamper.data.temporary import temporary_folder
 from mrdamper.errors import InputError
-from mrdamper.files.dataset import SAMPLE_FILES, load_dataset, save_dataset
-from mrdamper.files.model_file import dump_model, parse_model
-from mrdamper.files.strict_json import parse_json
 from mrdamper.report.about import logo_of
+from mrdamper.rig_files.dataset_folder import SAMPLE_FILES, load_dataset, save_dataset
 from mrdamper.web.drops import FILE_LIMIT, Intake
 from mrdamper.web.intake import bundled
 from mrdamper.web.sessions import MOST_DAMPERS, Session

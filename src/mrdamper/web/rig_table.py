@@ -13,7 +13,7 @@ import numpy as np
 from mrdamper.data import Condition, Dataset, Run, current_levels, same_motion
 from mrdamper.errors import InputError
 from mrdamper.identification.loop_analysis import LoopAnalysis, analyse_loop
-from mrdamper.motion import equivalent_sine
+from mrdamper.physics.motion import equivalent_sine
 from mrdamper.rig_files.quality.table import Quality, quality_table, record_of
 from mrdamper.study.workflow import usable_sines
 from mrdamper.web.answers import number

@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.parameters import param
 from mrdamper.models.base import Model
-from mrdamper.motion import Excitation
-from mrdamper.parameters import param
+from mrdamper.physics.motion import Excitation
 
 
 @dataclass(frozen=True)

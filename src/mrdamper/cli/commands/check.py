@@ -48,9 +48,9 @@ def register(app: typer.Typer) -> None:
         """
         from mrdamper.cli.output import put
         from mrdamper.cli.progress import watched
+        from mrdamper.data.atomic import require_writable
         from mrdamper.errors import InputError
-        from mrdamper.files.atomic import require_writable
-        from mrdamper.files.dataset import load_dataset
+        from mrdamper.rig_files.dataset_folder import load_dataset
         from mrdamper.rig_files.quality.table import quality_table, record_of, row
 
         if data is not None and data.suffix.lower() == ".fmu":
@@ -110,7 +110,7 @@ def _require_format(figure: Path) -> None:
 
 
 def _draw(verdicts: Sequence[Quality], path: Path) -> None:
-    from mrdamper.files.atomic import write_file
+    from mrdamper.data.atomic import write_file
     from mrdamper.report.plots.quality import LoopPanel, quality_figure
     from mrdamper.report.plots.style import HOW_SAVED, house_style
     from mrdamper.rig_files.quality.flat import flagged_samples

@@ -29,9 +29,9 @@ def register(app: typer.Typer) -> None:
         runs needed, computing time.
         """
         from mrdamper.cli.progress import progress_on_stderr
-        from mrdamper.files.atomic import require_writable
-        from mrdamper.files.dataset import load_dataset
+        from mrdamper.data.atomic import require_writable
         from mrdamper.report.comparison import summary_rows, text_table, write_comparison
+        from mrdamper.rig_files.dataset_folder import load_dataset
         from mrdamper.study import comparison as comparing
         from mrdamper.study.recipe import recipes
 

@@ -28,11 +28,11 @@ def register(app: typer.Typer) -> None:
     ) -> None:
         """Export a model as C, FMU, web page, equations or tables."""
         from mrdamper.cli.progress import progress_soon
+        from mrdamper.dampers.model_file import load_model
+        from mrdamper.data.atomic import require_writable
         from mrdamper.errors import InputError
         from mrdamper.export import exporter
         from mrdamper.export.base import identifier, write_export
-        from mrdamper.files.atomic import require_writable
-        from mrdamper.files.model_file import load_model
 
         kind = exporter(to)
         if fmi is not None and to != "fmu":

@@ -33,12 +33,12 @@ def register(app: typer.Typer) -> None:
         from mrdamper import identification
         from mrdamper.cli.output import parse_fixed, parse_gas, parse_pairs, put
         from mrdamper.cli.progress import progress_on_stderr
-        from mrdamper.files.atomic import require_writable
-        from mrdamper.files.dataset import load_dataset
-        from mrdamper.files.encoding import csv_text
+        from mrdamper.data.atomic import require_writable
+        from mrdamper.data.encoding import csv_text
         from mrdamper.identification.methods import method_named
         from mrdamper.models import model_type
         from mrdamper.report.tables import identification_rows
+        from mrdamper.rig_files.dataset_folder import load_dataset
         from mrdamper.study import workflow
 
         chosen_model, chosen_method = model_type(model), method_named(method, parse_pairs(setting, "--set"))

@@ -87,8 +87,8 @@ def register(app: typer.Typer) -> None:
 
 
 def _refuse_taken(out: Path | None, add: bool) -> None:
+    from mrdamper.data.atomic import require_writable
     from mrdamper.errors import OutputError
-    from mrdamper.files.atomic import require_writable
 
     if out is None:
         return
@@ -104,8 +104,8 @@ def _refuse_taken(out: Path | None, add: bool) -> None:
 
 def _write_tests(files: list[Path], known: Profile, target: Path) -> None:
     """Every test that can be read, also those whose current is not known yet."""
+    from mrdamper.data.atomic import write_file
     from mrdamper.errors import InputError
-    from mrdamper.files.atomic import write_file
     from mrdamper.rig_files.rig_import import found_tests
     from mrdamper.rig_files.tests_table import tests_text
 
@@ -123,8 +123,8 @@ def _write_tests(files: list[Path], known: Profile, target: Path) -> None:
 
 
 def _write_profile(files: list[Path], known: Profile, target: Path) -> None:
+    from mrdamper.data.atomic import write_file
     from mrdamper.errors import InputError
-    from mrdamper.files.atomic import write_file
     from mrdamper.rig_files.preview import columns_of, guess_profile
     from mrdamper.rig_files.profile import profile_text
     from mrdamper.rig_files.rig_import import first_file, read_runs
@@ -160,7 +160,7 @@ def _alternatives(columns: tuple[str, ...]) -> str:
 
 def _write_dataset(result: ImportResult, profile: Profile, out: Path, add: bool) -> int:
     """Write or add; the number of runs in the dataset then."""
-    from mrdamper.files.dataset import load_dataset, save_dataset
+    from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
     from mrdamper.rig_files.profile import Profile, profile_text
     from mrdamper.rig_files.rig_import import to_dataset
 

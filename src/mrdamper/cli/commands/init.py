@@ -22,8 +22,8 @@ def register(app: typer.Typer) -> None:
         about: head of a report. limits: force limits, limits of the test rig, limits of fleet columns.
         profile: columns and units of rig files. tests: table of tests with their currents.
         """
+        from mrdamper.data.atomic import write_file
         from mrdamper.errors import OutputError
-        from mrdamper.files.atomic import write_file
 
         text = template(kind)
         if out is None:

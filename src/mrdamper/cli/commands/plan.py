@@ -31,10 +31,10 @@ def register(app: typer.Typer) -> None:
         import numpy as np
 
         from mrdamper.cli.progress import progress_soon
+        from mrdamper.dampers.model_file import load_model
+        from mrdamper.data.atomic import require_writable, write_result
+        from mrdamper.data.encoding import csv_text
         from mrdamper.errors import InputError
-        from mrdamper.files.atomic import require_writable, write_result
-        from mrdamper.files.encoding import csv_text
-        from mrdamper.files.model_file import load_model
         from mrdamper.study.first_matrix import first_matrix
         from mrdamper.study.limits import Limits
         from mrdamper.study.plan import plan_tests, taught_least

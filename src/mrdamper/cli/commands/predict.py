@@ -53,14 +53,14 @@ def register(app: typer.Typer) -> None:
         from mrdamper.cli.output import put
         from mrdamper.dampers.bands import band, no_band, scope
         from mrdamper.dampers.coil import Coil
+        from mrdamper.dampers.model_file import load_model
         from mrdamper.data import Condition
+        from mrdamper.data.atomic import require_writable
+        from mrdamper.data.encoding import csv_text
         from mrdamper.errors import ConditionError, InputError
-        from mrdamper.files.atomic import require_writable
-        from mrdamper.files.encoding import csv_text
-        from mrdamper.files.model_file import load_model
-        from mrdamper.files.motion import load_motion
         from mrdamper.identification.intervals import student
         from mrdamper.report.tables import prediction_rows
+        from mrdamper.rig_files.motion_file import load_motion
 
         for name, value in (("--current", current), ("--frequency", frequency), ("--amplitude", amplitude)):
             if value is not None and not 0 <= value < math.inf:
@@ -91,7 +91,7 @@ def register(app: typer.Typer) -> None:
         known = band(damper, prediction, level)
         if check_run:
             from mrdamper.dampers.sessions import When, sessions_known
-            from mrdamper.files.dataset import load_dataset
+            from mrdamper.rig_files.dataset_folder import load_dataset
 
             dataset = load_dataset(data)
             runs = [dataset[name] for name in check_run]
@@ -111,7 +111,7 @@ def register(app: typer.Typer) -> None:
 
 def _said(prediction: Prediction, known: Band, level: float, where: str) -> str:
     """The peak force, its band, and where the band comes from."""
-    from mrdamper.metrics import dissipated_power, peak_force
+    from mrdamper.statistics.metrics import dissipated_power, peak_force
 
     parts = ", ".join(
         f"{name} {float((part**2).mean() ** 0.5):.3g} N"

@@ -36,7 +36,7 @@ def register(app: typer.Typer) -> None:
         No model is identified.
         """
         from mrdamper.cli.progress import progress_on_stderr
-        from mrdamper.files.atomic import require_writable
+        from mrdamper.data.atomic import require_writable
         from mrdamper.report.about import load_about, load_limits, parse_ladder
         from mrdamper.report.damper_tests import write_test_report
 
@@ -56,7 +56,7 @@ def register(app: typer.Typer) -> None:
 
 
 def _specimen(text: str) -> tuple[str, Dataset]:
-    from mrdamper.files.dataset import load_dataset
+    from mrdamper.rig_files.dataset_folder import load_dataset
 
     folder, _, rig = text.rpartition(":") if not Path(text).is_dir() and ":" in text else (text, "", "")
     dataset = load_dataset(folder)

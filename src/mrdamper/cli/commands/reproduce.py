@@ -50,11 +50,11 @@ def register(app: typer.Typer) -> None:
 
         from mrdamper.cli.output import parse_gas
         from mrdamper.cli.progress import progress_on_stderr
+        from mrdamper.data.atomic import require_writable
         from mrdamper.errors import InputError
-        from mrdamper.files.atomic import require_writable
-        from mrdamper.files.dataset import load_dataset
         from mrdamper.paper.output import summary, write_reproduction
         from mrdamper.paper.study import reproduce as run_reproduction
+        from mrdamper.rig_files.dataset_folder import load_dataset
         from mrdamper.study.parallel import several
 
         require_writable(out)

@@ -26,7 +26,7 @@ def register(app: typer.Typer) -> None:
 
 def _schema(name: str) -> dict:
     if name == "model":
-        from mrdamper.files.model_file import model_schema
+        from mrdamper.dampers.model_file import model_schema
 
         return model_schema()
     if name == "profile":

@@ -60,10 +60,10 @@ def register(app: typer.Typer) -> None:
         """Simulate a vehicle or building with dampers and a controller."""
         from mrdamper.cli.output import parse_named
         from mrdamper.cli.progress import progress_soon
+        from mrdamper.dampers.model_file import load_model
+        from mrdamper.data.atomic import require_writable
+        from mrdamper.data.parameters import with_values
         from mrdamper.errors import InputError
-        from mrdamper.files.atomic import require_writable
-        from mrdamper.files.model_file import load_model
-        from mrdamper.parameters import with_values
         from mrdamper.systems.controllers import controller_type
         from mrdamper.systems.inputs import load_input
         from mrdamper.systems.monte_carlo import draw, monte_carlo
@@ -150,7 +150,7 @@ def _all_of(names: list[str]) -> list[str]:
 
 def _controller(text: str) -> Controller:
     from mrdamper.cli.output import parse_named
-    from mrdamper.parameters import with_values
+    from mrdamper.data.parameters import with_values
     from mrdamper.systems.controllers import controller_type
 
     name, values = parse_named(text, "--control")
@@ -246,7 +246,7 @@ def _print_bands(done: Simulation, bands: Bands | None, dampers: Mapping[str, Da
 
 
 def _print(done: Simulation) -> None:
-    from mrdamper.streaming import FLAGS
+    from mrdamper.dampers.streaming import FLAGS
 
     peaks = done.peaks
     typer.echo(f"{done.system.title}, {type(done.controller).title}")

@@ -25,7 +25,7 @@ def register(app: typer.Typer) -> None:
         Without options a stratified fifth of the runs is chosen. Validation runs are never used for
         identification; reports state the error on them.
         """
-        from mrdamper.files.dataset import load_dataset, store_split
+        from mrdamper.rig_files.dataset_folder import load_dataset, store_split
         from mrdamper.study.split import hold_out
 
         dataset = load_dataset(data)

@@ -52,12 +52,12 @@ def register(app: typer.Typer) -> None:
         """
         from mrdamper.cli.output import parse_gas, parse_pairs
         from mrdamper.cli.progress import progress_on_stderr
+        from mrdamper.data.atomic import require_writable
         from mrdamper.errors import IdentificationError, InputError
-        from mrdamper.files.atomic import require_writable
-        from mrdamper.files.dataset import load_dataset
         from mrdamper.report.about import load_about, load_limits
         from mrdamper.report.study import study_and_draw, write_study
         from mrdamper.report.summary import study_lines
+        from mrdamper.rig_files.dataset_folder import load_dataset
         from mrdamper.study.parallel import several
         from mrdamper.study.recipe import study_method, study_methods
 

@@ -30,12 +30,12 @@ def register(app: typer.Typer) -> None:
         """
         from mrdamper.dampers.certainty import table, unsure
         from mrdamper.dampers.covariance import certain
+        from mrdamper.dampers.model_file import load_model
+        from mrdamper.data.atomic import require_writable, write_result
+        from mrdamper.data.encoding import csv_text
         from mrdamper.errors import InputError
-        from mrdamper.files.atomic import require_writable, write_result
-        from mrdamper.files.dataset import load_dataset
-        from mrdamper.files.encoding import csv_text
-        from mrdamper.files.model_file import load_model
         from mrdamper.identification.intervals import student
+        from mrdamper.rig_files.dataset_folder import load_dataset
 
         student(level, 1.0)  # refuses a level that is none
         if steps < 10:

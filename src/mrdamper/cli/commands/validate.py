@@ -34,16 +34,16 @@ def register(app: typer.Typer) -> None:
         """
         from mrdamper.cli.output import put
         from mrdamper.cli.progress import watched
+        from mrdamper.dampers.model_file import load_model
         from mrdamper.dampers.sessions import KNOWN, When, sessions_known
+        from mrdamper.data.atomic import require_writable
+        from mrdamper.data.encoding import csv_text
         from mrdamper.errors import InputError, UnknownNameError
-        from mrdamper.files.atomic import require_writable
-        from mrdamper.files.dataset import load_dataset
-        from mrdamper.files.encoding import csv_text
-        from mrdamper.files.model_file import load_model
         from mrdamper.identification.intervals import student
         from mrdamper.report.tables import score_row
-        from mrdamper.validation import peak_band
-        from mrdamper.validation import validate as score
+        from mrdamper.rig_files.dataset_folder import load_dataset
+        from mrdamper.study.validation import peak_band
+        from mrdamper.study.validation import validate as score
 
         if split not in (None, "train", "validate"):
             raise UnknownNameError.of("split", str(split), ("train", "validate"))

@@ -17,8 +17,8 @@ from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.identification import Identification
 from mrdamper.models import Model
-from mrdamper.motion import sine
-from mrdamper.optimizers.levenberg_marquardt import least_squares
+from mrdamper.physics.motion import sine
+from mrdamper.statistics.levenberg_marquardt import least_squares
 
 _STEPS = 8
 _REACH = 0.8  # a coefficient may move by this share of its start, or of one

@@ -11,7 +11,7 @@ from mrdamper.dampers.published.base import ConditionedDamper
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.identification import Identification
 from mrdamper.models.guo import Guo
-from mrdamper.optimizers.levenberg_marquardt import least_squares
+from mrdamper.statistics.levenberg_marquardt import least_squares
 
 _HIDDEN = 5
 _DECAY = 0.15  # weight of the penalty on the network's weights

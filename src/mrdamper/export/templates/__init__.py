@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from mrdamper.files.encoding import xml
+from mrdamper.data.encoding import xml
 
 
 def render(template: str, **facts: Any) -> str:

@@ -16,14 +16,14 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import IdentificationError
-from mrdamper.hysteresis import steady_loop
 from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.identification.harmonic_balance import HarmonicProjection, SineRecord
 from mrdamper.identification.problem import Method, Problem, Solution
 from mrdamper.models import Model, Scale
-from mrdamper.optimizers.ending import Ending
-from mrdamper.optimizers.levenberg_marquardt import least_squares
-from mrdamper.optimizers.linear import solve_bounded
+from mrdamper.physics.hysteresis import steady_loop
+from mrdamper.statistics.ending import Ending
+from mrdamper.statistics.levenberg_marquardt import least_squares
+from mrdamper.statistics.linear import solve_bounded
 
 _FEWEST = 3  # one harmonic gives two equations, for at least four unknowns
 

@@ -18,17 +18,17 @@ from numpy.typing import NDArray
 
 from mrdamper.data import Floats
 from mrdamper.errors import IdentificationError
-from mrdamper.hysteresis import Shape
-from mrdamper.hysteresis.batch import batch_cost
 from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.identification.elimination import Elimination
 from mrdamper.identification.problem import DELAY, DELAY_LIMIT, Method, Problem, Solution
 from mrdamper.models import Model, Scale, SearchAxis
-from mrdamper.motion import Path
-from mrdamper.optimizers.ending import Ending
-from mrdamper.optimizers.levenberg_marquardt import Minimum, least_squares
-from mrdamper.optimizers.linear import FixedColumns, on_one_blas_thread, solve_bounded
-from mrdamper.optimizers.one_number import least_squares_in_one
+from mrdamper.physics.hysteresis import Shape
+from mrdamper.physics.hysteresis.batch import batch_cost
+from mrdamper.physics.motion import Path
+from mrdamper.statistics.ending import Ending
+from mrdamper.statistics.levenberg_marquardt import Minimum, least_squares
+from mrdamper.statistics.linear import FixedColumns, on_one_blas_thread, solve_bounded
+from mrdamper.statistics.one_number import least_squares_in_one
 
 _GRID_SAMPLES = 1500  # the grid only has to find the valley
 _GRID_SAMPLES_A_CYCLE, _GRID_CYCLES = 100, 3  # where all shapes are tried at once

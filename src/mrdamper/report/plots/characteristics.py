@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator
 from mrdamper.data import Dataset
 from mrdamper.identification.characteristics import Characteristics
 from mrdamper.identification.loop_analysis import whole_cycles
-from mrdamper.motion import analyse_motion, measured_motion
+from mrdamper.physics.motion import analyse_motion, measured_motion
 from mrdamper.report.plots.style import MM, current_colours, house_style, label, new_figure, thin
 
 _MARKS = ("o", "s", "^", "D", "v", "P")

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Run
-from mrdamper.motion import equivalent_sine, measured_motion
+from mrdamper.physics.motion import equivalent_sine, measured_motion
 from mrdamper.report.plots.style import MEASURED, MM, PALETTE, house_style, label, new_figure
 
 

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from mrdamper.dampers.base import Prediction
 from mrdamper.data import Floats, Run
 from mrdamper.errors import InputError, UnknownNameError, require, shown
-from mrdamper.motion import measured_motion
+from mrdamper.physics.motion import measured_motion
 from mrdamper.report.plots.style import KN, MM, house_style, label
 
 _OVER = {"displacement": ("Displacement (mm)", MM), "velocity": ("Velocity (mm/s)", MM)}

@@ -13,7 +13,7 @@ from mrdamper.dampers.bands import band
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.data import Floats, Run, same_motion
-from mrdamper.motion import equivalent_sine
+from mrdamper.physics.motion import equivalent_sine
 from mrdamper.report.plots.style import (
     MEASURED,
     MM,
@@ -29,7 +29,7 @@ from mrdamper.report.plots.style import (
     speed_colours,
     thin,
 )
-from mrdamper.validation import Validation
+from mrdamper.study.validation import Validation
 
 BAND_LEVEL = 0.9  # level of the prediction intervals of reports
 _WORST_SHOWN = 25.0  # per cent; a run beyond is drawn as an arrow at the edge

@@ -12,7 +12,7 @@ from matplotlib.transforms import ScaledTranslation
 
 from mrdamper.data import Dataset, same_motion
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, whole_cycles
-from mrdamper.motion import measured_motion
+from mrdamper.physics.motion import measured_motion
 from mrdamper.report.plots.style import (
     KN,
     MM,

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from mrdamper.data import Floats, current_levels
-from mrdamper.files.encoding import csv_text
+from mrdamper.data.encoding import csv_text
 
 # Okabe and Ito's palette, black first.
 PALETTE = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442")

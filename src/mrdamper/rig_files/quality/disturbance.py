@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.motion import SINE_DISTORTION_LIMIT
+from mrdamper.physics.motion import SINE_DISTORTION_LIMIT
 from mrdamper.rig_files.quality.cycles import POINTS, steady_cycles
 from mrdamper.rig_files.quality.effects import REFUSED, percent
 from mrdamper.rig_files.quality.view import View, sample_noise

@@ -21,12 +21,12 @@ from typing import NamedTuple
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.optimizers.linear import on_one_blas_thread
 from mrdamper.rig_files.quality.cycles import POINTS, Cycles, steady_cycles
 from mrdamper.rig_files.quality.effects import change, damping, elastic_plastic, percent
 from mrdamper.rig_files.quality.flat import flagged_samples
 from mrdamper.rig_files.quality.view import View, sample_noise
 from mrdamper.rig_files.record import Finding
+from mrdamper.statistics.linear import on_one_blas_thread
 
 LIMIT = 0.01  # of the period: shorter lags are within the samples of a cycle
 _BETTER, _FAR_BETTER = 0.2, 0.12  # of the misfit without delay: a smaller improvement may be any rate dependence

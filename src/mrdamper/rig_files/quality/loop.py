@@ -9,7 +9,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import QualityError
 from mrdamper.identification.loop_analysis import damping_share as share_of_damping
-from mrdamper.motion.harmonics import fit_harmonics
+from mrdamper.physics.motion.harmonics import fit_harmonics
 from mrdamper.rig_files.quality.cycles import POINTS, steady_cycles
 from mrdamper.rig_files.quality.motion import LEAST_CYCLES, cycles_of
 from mrdamper.rig_files.quality.view import View, runs_of, sample_noise

@@ -15,7 +15,7 @@ import numpy as np
 from mrdamper.data import Floats, Run
 from mrdamper.data.pieces import taken
 from mrdamper.errors import ExcitationError, QualityError
-from mrdamper.motion import Excitation, MotionAnalysis, analyse_motion, measured_motion
+from mrdamper.physics.motion import Excitation, MotionAnalysis, analyse_motion, measured_motion
 from mrdamper.rig_files.quality.strokes import Strokes, find_strokes
 from mrdamper.rig_files.record import Finding, Record
 

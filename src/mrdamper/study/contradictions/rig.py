@@ -9,7 +9,7 @@ import numpy as np
 
 from mrdamper.data import Run
 from mrdamper.errors import InputError
-from mrdamper.optimizers.linear import on_one_blas_thread
+from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.study.contradictions.copies import find_copies
 from mrdamper.study.contradictions.findings import Contradiction, describe, describe_copy, describe_shift
 from mrdamper.study.contradictions.search import Search, best_explanation, find_shift, is_far_better, search

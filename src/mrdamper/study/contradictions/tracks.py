@@ -14,7 +14,7 @@ import numpy as np
 
 from mrdamper.data import Floats, Run
 from mrdamper.errors import InputError
-from mrdamper.motion import equivalent_sine, measured_motion
+from mrdamper.physics.motion import equivalent_sine, measured_motion
 
 _CYCLES = 3  # cycles of a sine that are compared
 _SAMPLES_PER_CYCLE = 96  # samples of the motion

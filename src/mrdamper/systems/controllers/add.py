@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from mrdamper.parameters import param
+from mrdamper.data.parameters import param
 from mrdamper.systems.controllers.base import Controller, Sight
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from mrdamper.dampers.base import Damper
-from mrdamper.parameters import ParameterInfo, parameters_of
+from mrdamper.data.parameters import ParameterInfo, parameters_of
 from mrdamper.systems.inverse import check_monotone, invert_on
 from mrdamper.systems.structure import Link, System
 from mrdamper.tracing import Program, Tape, program

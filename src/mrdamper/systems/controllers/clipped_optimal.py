@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.parameters import param
+from mrdamper.data.parameters import param
 from mrdamper.systems.controllers.base import Controller, Sight
 from mrdamper.systems.linear import aims, linear_system
 from mrdamper.systems.structure import Link, System

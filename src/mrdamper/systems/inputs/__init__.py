@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 
+from mrdamper.data.atomic import path_of
+from mrdamper.data.parameters import parameters_of, with_values
 from mrdamper.discovery import Registry
 from mrdamper.errors import RecordError, UnknownNameError, checked
-from mrdamper.files.atomic import path_of
-from mrdamper.parameters import parameters_of, with_values
 from mrdamper.systems.inputs.base import Input
 
 __all__ = ["Input", "input_type", "input_types", "load_input"]
@@ -30,7 +30,7 @@ def input_type(name: str) -> type[Input]:
 
 def bundled_records() -> dict[str, Path]:
     """Records that ship with the package, by name."""
-    folder = Path(str(files("mrdamper.files.bundled") / "records"))
+    folder = Path(str(files("mrdamper.data.bundled") / "records"))
     return {path.stem: path for path in sorted(folder.glob("*.csv"))}
 
 

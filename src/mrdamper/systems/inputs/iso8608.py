@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.parameters import param
+from mrdamper.data.parameters import param
 from mrdamper.systems.inputs.base import Input
 
 REFERENCE = 0.1  # cycles/m

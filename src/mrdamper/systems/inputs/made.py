@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.parameters import param
+from mrdamper.data.parameters import param
 from mrdamper.systems.inputs.base import Input
 
 _BEFORE = 0.2  # s on flat road

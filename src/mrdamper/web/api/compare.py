@@ -11,12 +11,12 @@ from fastapi.responses import Response
 from pydantic import BaseModel, Field
 
 from mrdamper.data import Dataset
-from mrdamper.files.encoding import csv_text
+from mrdamper.data.encoding import csv_text
 from mrdamper.report.comparison import summary_rows
 from mrdamper.study.comparison import Comparison, RigComparison
 from mrdamper.study.recipe import JOINTLY, Scored, recipes
+from mrdamper.study.validation import RunScore, Validation
 from mrdamper.study.workflow import STUDIED
-from mrdamper.validation import RunScore, Validation
 from mrdamper.web.answers import archive, download, frame, number
 from mrdamper.web.curves import measured_cycle, measured_window, predicted_on_run
 from mrdamper.web.rig_table import condition_on_screen

@@ -18,8 +18,8 @@ from mrdamper.identification import Identification, all_methods, identify
 from mrdamper.models import all_models
 from mrdamper.report.about import About, about_of, logo_of
 from mrdamper.study.recipe import JOINTLY, Scored
+from mrdamper.study.validation import Validation
 from mrdamper.study.workflow import Study
-from mrdamper.validation import Validation
 from mrdamper.web.answers import frame, number
 from mrdamper.web.curves import measured_cycle, modelled_cycle, predicted_on_run
 from mrdamper.web.rig_table import condition_on_screen

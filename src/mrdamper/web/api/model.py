@@ -14,7 +14,7 @@ from pydantic import BaseModel, Field
 from mrdamper.dampers.bands import band, no_band, scope
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Condition
-from mrdamper.metrics import dissipated_power, peak_force
+from mrdamper.statistics.metrics import dissipated_power, peak_force
 from mrdamper.web.answers import frame, number
 from mrdamper.web.bench_model import held_model, predict_held, sliders
 from mrdamper.web.curves import on_screen, predicted_cycle

@@ -11,8 +11,8 @@ from fastapi.responses import Response
 from pydantic import BaseModel, Field
 
 from mrdamper.data import Floats
+from mrdamper.data.parameters import with_values
 from mrdamper.errors import UnknownNameError
-from mrdamper.parameters import with_values
 from mrdamper.systems.controllers import controller_type, controller_types
 from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.inputs import Input, bundled_records, load_input, made_inputs

@@ -9,10 +9,10 @@ from fastapi import APIRouter
 from fastapi.responses import FileResponse, Response
 from pydantic import BaseModel, Field
 
+from mrdamper.dampers.model_file import dump_model, parse_model
+from mrdamper.data.encoding import csv_text
 from mrdamper.errors import InputError
 from mrdamper.export import all_exporters
-from mrdamper.files.encoding import csv_text
-from mrdamper.files.model_file import dump_model, parse_model
 from mrdamper.report.tables import prediction_rows
 from mrdamper.web.answers import archive, download, zipped
 from mrdamper.web.api.model import Ask

@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field
 
 from mrdamper.data import Run
 from mrdamper.errors import InputError, UnknownNameError
-from mrdamper.motion import equivalent_sine
+from mrdamper.physics.motion import equivalent_sine
 from mrdamper.rig_files.preview import preview
 from mrdamper.rig_files.profile import Channel, Profile, parse_profile, profile_text
 from mrdamper.study.split import hold_out

@@ -13,6 +13,6 @@ def register(app: typer.Typer) -> None:
     @app.command(epilog="Example: mrdamper rigs")
     def rigs(data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests.")) -> None:
         """List the rigs of a dataset."""
-        from mrdamper.files.dataset import load_dataset
+        from mrdamper.rig_files.dataset_folder import load_dataset
 
         print("\n".join(load_dataset(data).rigs))

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, checked
-from mrdamper.motion.path import Path
+from mrdamper.physics.motion.path import Path
 
 _STILL, _REST = 0.01, 0.1  # share of the peak speed below which a motion stands still, and for how long [s]
 

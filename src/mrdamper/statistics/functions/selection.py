@@ -15,8 +15,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from mrdamper.data import Condition, Floats, current_levels, same_condition, same_motion
-from mrdamper.functions.forms import Form, ParameterFunction
-from mrdamper.functions.motion_hull import MotionHull
+from mrdamper.statistics.functions.forms import Form, ParameterFunction
+from mrdamper.statistics.functions.motion_hull import MotionHull
 
 Errors = Mapping[str, Floats]  # by kind of fold: the error of every unit left out, in one order for all models
 BEYOND = 1.2  # largest current [of the largest tested] up to which a function obeys physics

@@ -1,10 +1,10 @@
 """Motion and current in time: measured, or made, cut into strokes, taken for a sine."""
 
-from mrdamper.motion.excitation import Excitation
-from mrdamper.motion.made import random_motion, sine, sweep, triangle
-from mrdamper.motion.measured import measured_motion, smooth
-from mrdamper.motion.path import Path
-from mrdamper.motion.sines import (
+from mrdamper.physics.motion.excitation import Excitation
+from mrdamper.physics.motion.made import random_motion, sine, sweep, triangle
+from mrdamper.physics.motion.measured import measured_motion, smooth
+from mrdamper.physics.motion.path import Path
+from mrdamper.physics.motion.sines import (
     SINE_DISTORTION_LIMIT,
     STRAY_LIMIT,
     EquivalentSine,

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, ParameterError
-from mrdamper.hysteresis.master_curve import CEILING, STEEPEST, MasterCurve, master_curve
-from mrdamper.hysteresis.shape import Shape
-from mrdamper.motion import Path
+from mrdamper.physics.hysteresis.master_curve import CEILING, STEEPEST, MasterCurve, master_curve
+from mrdamper.physics.hysteresis.shape import Shape
+from mrdamper.physics.motion import Path
 from mrdamper.tracing import Tape, choose, functions, streamed
 
 

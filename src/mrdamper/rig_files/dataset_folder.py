@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mrdamper.data import Condition, Dataset, Floats, Run
+from mrdamper.data.atomic import path_of, write_file, write_folder
+from mrdamper.data.encoding import csv_text, csv_value
 from mrdamper.data.pieces import pieces, release
 from mrdamper.errors import ColumnError, DatasetError, OutputError, checked, shown
-from mrdamper.files.atomic import path_of, write_file, write_folder
-from mrdamper.files.encoding import csv_text, csv_value
-from mrdamper.files.samples import OPTIONAL, REQUIRED, SAMPLE_FILES, Channels, missing_column, read_samples
+from mrdamper.rig_files.dataset_samples import OPTIONAL, REQUIRED, SAMPLE_FILES, Channels, missing_column, read_samples
 from mrdamper.rig_files.readers.base import MOST_COLUMNS
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def load_dataset(folder: str | Path | None = None) -> Dataset:
     <dataset bundled tests of two dampers: 53 runs, 34 of rig labcontrol, 19 of rig utfsm; 12 validation runs>
     """
     if folder is None:
-        with as_file(files("mrdamper.files.bundled") / BUNDLED) as bundled:
+        with as_file(files("mrdamper.data.bundled") / BUNDLED) as bundled:
             return _load(Path(bundled), "bundled tests of two dampers", trusted=True)
     folder = path_of(folder)
     return _load(folder, folder.name or str(folder))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mrdamper.data import Floats
-from mrdamper.optimizers.linear import solve_linear
+from mrdamper.statistics.linear import solve_linear
 
 _FEW = 250  # samples on which a frequency is found to begin with
 _BLOCK = 50_000  # samples whose waves are held at a time

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.hysteresis.master_curve import master_curve
-from mrdamper.hysteresis.response import _advance, _states, on_curve, starts_of_strokes
-from mrdamper.hysteresis.shape import Shape
-from mrdamper.motion import Path
-from mrdamper.optimizers.linear import FixedColumns
+from mrdamper.physics.hysteresis.master_curve import master_curve
+from mrdamper.physics.hysteresis.response import _advance, _states, on_curve, starts_of_strokes
+from mrdamper.physics.hysteresis.shape import Shape
+from mrdamper.physics.motion import Path
+from mrdamper.statistics.linear import FixedColumns
 
 _AT_ONCE = 2**17  # states held at a time
 

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 
 from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError
-from mrdamper.hysteresis.master_curve import SATURATED, MasterCurve, approach_rate, master_curve
-from mrdamper.hysteresis.response import on_curve
-from mrdamper.hysteresis.shape import Shape
+from mrdamper.physics.hysteresis.master_curve import SATURATED, MasterCurve, approach_rate, master_curve
+from mrdamper.physics.hysteresis.response import on_curve
+from mrdamper.physics.hysteresis.shape import Shape
 
 
 def steady_peak(shape: Shape, amplitude: ArrayLike) -> float | Floats:

@@ -16,7 +16,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, ParameterError
-from mrdamper.integrator.streamed import Rate, integrate_step
+from mrdamper.physics.integrator.streamed import Rate, integrate_step
 from mrdamper.tracing import Tape, program, streamed
 from mrdamper.tracing.compiled import RecordProgram
 from mrdamper.tracing.functions import Step

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.motion.path import LONG, Path, lately_along
+from mrdamper.physics.motion.path import LONG, Path, lately_along
 from mrdamper.tracing import Tape, choose, streamed
 
 _SHORT = 1e-4  # step over time constant below which a series loses fewer digits

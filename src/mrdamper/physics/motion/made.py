@@ -8,7 +8,7 @@ import numpy as np
 
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import ExcitationError, checked
-from mrdamper.motion.excitation import Excitation
+from mrdamper.physics.motion.excitation import Excitation
 
 _SAMPLES_PER_CYCLE = 1000
 _MAX_SAMPLES = 10**8  # samples of one motion

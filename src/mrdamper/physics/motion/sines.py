@@ -8,9 +8,9 @@ import numpy as np
 
 from mrdamper.data import Condition, Floats, Run, once_per_run
 from mrdamper.errors import ExcitationError
-from mrdamper.motion.excitation import Excitation
-from mrdamper.motion.harmonics import HarmonicSeries, fit_harmonics, fundamental_frequency
-from mrdamper.motion.measured import measured_motion
+from mrdamper.physics.motion.excitation import Excitation
+from mrdamper.physics.motion.harmonics import HarmonicSeries, fit_harmonics, fundamental_frequency
+from mrdamper.physics.motion.measured import measured_motion
 
 SINE_DISTORTION_LIMIT = 0.05  # above it a motion is no sine for harmonic balance
 STRAY_LIMIT = 0.3  # of the RMS displacement; what no harmonic explains: above it another motion runs beside the sine

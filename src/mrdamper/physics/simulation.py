@@ -8,9 +8,9 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from mrdamper.data import Condition, Floats
+from mrdamper.data.parameters import ParameterInfo
 from mrdamper.errors import ExcitationError, require
-from mrdamper.motion import Excitation, sine
-from mrdamper.parameters import ParameterInfo
+from mrdamper.physics.motion import Excitation, sine
 
 _CLOSURE = 1e-9  # relative gap at which a loop counts as closed
 _MOST_CYCLES = 512
@@ -77,13 +77,15 @@ def simulate(model: ForceLaw, excitation: Excitation) -> Response:
     --------
     >>> from mrdamper import Condition, simulate
     >>> from mrdamper.models.bingham import Bingham
-    >>> from mrdamper.motion import sine
+    >>> from mrdamper.physics.motion import sine
     >>> motion = sine(Condition(current_A=0.0, frequency_Hz=1.0, amplitude_m=0.01), 2, 200)
     >>> response = simulate(Bingham(c=1000.0, fy=300.0), motion)
     >>> round(float(response.force.max()))  # 300 N + 1000 N s/m · 0.0628 m/s
     363
     """
-    require(excitation, Excitation, "a motion", "mrdamper.motion makes them: sine, sweep, triangle, random_motion")
+    require(
+        excitation, Excitation, "a motion", "mrdamper.physics.motion makes them: sine, sweep, triangle, random_motion"
+    )
     require(model, ForceLaw, "a model")
     state = model.state(excitation)
     return Response(excitation, model.force(excitation, state), state)

@@ -9,7 +9,7 @@ import numpy as np
 
 from mrdamper.data import Floats, Run
 from mrdamper.errors import ColumnError, DatasetError, RunError, UnitError
-from mrdamper.files.samples import first_line
+from mrdamper.rig_files.dataset_samples import first_line
 from mrdamper.rig_files.readers.archive import opened
 from mrdamper.rig_files.readers.base import RigFileError
 

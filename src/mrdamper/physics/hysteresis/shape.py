@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import ParameterError
-from mrdamper.hysteresis.master_curve import STEEPEST
+from mrdamper.physics.hysteresis.master_curve import STEEPEST
 
 HIGHEST_N = 20.0  # the tabulated curves hold 1e-8 up to here (for rho >= −30)
 

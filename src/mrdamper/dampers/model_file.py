@@ -22,10 +22,10 @@ from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.coil import Coil, Driver
 from mrdamper.dampers.sessions import Sessions
 from mrdamper.data import require_name
+from mrdamper.data.atomic import path_of, write_file
 from mrdamper.data.regular import open_regular
+from mrdamper.data.strict_json import parse_json
 from mrdamper.errors import InputError, ModelFileError, require
-from mrdamper.files.atomic import path_of, write_file
-from mrdamper.files.strict_json import parse_json
 from mrdamper.models import model_parts
 
 FORMAT = "mrdamper-model"

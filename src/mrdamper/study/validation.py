@@ -14,7 +14,7 @@ from mrdamper.dampers.calibration import PredictedRun
 from mrdamper.dampers.sessions import KNOWN, UNKNOWN, Expected, Reading, Sessions, When
 from mrdamper.data import Condition, Run, Shown, same_condition
 from mrdamper.errors import InputError, RunError, UnknownNameError, checked, require
-from mrdamper.metrics import Scores, dissipated_power, peak_force, score
+from mrdamper.statistics.metrics import Scores, dissipated_power, peak_force, score
 
 _LEAST_SWING = 1e-100  # of a force, and its inverse the most [N]: their squares are numbers
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mrdamper.data import Floats, Run, once_per_run
-from mrdamper.motion.excitation import Excitation
+from mrdamper.physics.motion.excitation import Excitation
 
 _UNIFORM = 1e-8  # spread of the sampling interval, relative, up to which it counts as one
 _ROUNDING = 4 * float(np.finfo(float).eps)  # of the largest value: a slope per sample below is made of rounding

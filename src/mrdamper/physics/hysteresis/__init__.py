@@ -22,9 +22,9 @@ random vibration of hysteretic systems", J. Eng. Mech. Div. 102; Ikhouane and Ro
 "derived" was derived for this package.
 """
 
-from mrdamper.hysteresis.response import follow, step, stroke
-from mrdamper.hysteresis.shape import Shape, dissipates, z_max
-from mrdamper.hysteresis.steady import (
+from mrdamper.physics.hysteresis.response import follow, step, stroke
+from mrdamper.physics.hysteresis.shape import Shape, dissipates, z_max
+from mrdamper.physics.hysteresis.steady import (
     loop_area,
     loop_harmonics,
     saturated_area_deficit,

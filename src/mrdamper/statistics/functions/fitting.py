@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import IdentificationError
-from mrdamper.functions.forms import Form, ParameterFunction, features, form_named
-from mrdamper.functions.selection import broken_law, fold_groups, rises, smaller_wins, supported
-from mrdamper.optimizers.levenberg_marquardt import least_squares, polished
-from mrdamper.optimizers.linear import project_out_columns, solve_linear
+from mrdamper.statistics.functions.forms import Form, ParameterFunction, features, form_named
+from mrdamper.statistics.functions.selection import broken_law, fold_groups, rises, smaller_wins, supported
+from mrdamper.statistics.levenberg_marquardt import least_squares, polished
+from mrdamper.statistics.linear import project_out_columns, solve_linear
 
 # Below this share of the largest singular value the tests cannot tell the terms apart: a rig repeats a motion to 1e-6.
 _RANK_LIMIT = 1e-5

@@ -12,9 +12,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mrdamper.optimizers.ending import Ending
-from mrdamper.optimizers.levenberg_marquardt import Minimum
-from mrdamper.optimizers.linear import Floats
+from mrdamper.statistics.ending import Ending
+from mrdamper.statistics.levenberg_marquardt import Minimum
+from mrdamper.statistics.linear import Floats
 
 Evaluation = tuple[Floats, Floats]  # residual, its derivative
 

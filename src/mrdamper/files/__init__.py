@@ -1,1 +1,0 @@
-"""Datasets, saved models and motions on disk; a file or folder appears whole or not at all."""

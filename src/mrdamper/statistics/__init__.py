@@ -1,0 +1,1 @@
+"""Least squares, searches over a few nonlinear coordinates, parameter functions and scores."""
