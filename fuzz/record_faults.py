@@ -32,16 +32,23 @@ class Kind:
     cycles: float = 3.0  # a record of fewer cycles is not drawn
 
 
-def _span(values: Floats) -> float:
+def span_of(values: Floats) -> float:
+    """Return the peak-to-peak value."""
     return float(np.ptp(values))
 
 
-def _period(record: Record) -> float:
+def period_of(record: Record) -> float:
+    """Return the period of the motion [s]."""
     return 1 / fundamental_frequency(record.time, record.displacement)
 
 
-def _share(record: Record) -> Floats:
-    """Time from 0 at the record's first sample to 1 at its last."""
+def step_of(record: Record) -> float:
+    """Return the usual step of time [s]."""
+    return float(np.median(np.diff(record.time)))
+
+
+def share_of_time(record: Record) -> Floats:
+    """Return the time from 0 at the record's first sample to 1 at its last."""
     return (record.time - record.time[0]) / float(record.time[-1] - record.time[0])
 
 
@@ -55,22 +62,22 @@ def _scale(record: Record, name: str, gain: Floats) -> Record:
     return replace(record, **{name: middle + gain * (values - middle)})
 
 
-def _line(name: str, frequency: float | None) -> Change:
+def line(name: str, frequency: float | None) -> Change:
     """Build a sine of `size` peak-to-peak of a channel; no frequency stands for any of 2.3 to 40 times the motion's."""
 
     def change(record: Record, size: float, rng: Rng) -> Record:
-        f = frequency or float(np.exp(rng.uniform(np.log(2.3), np.log(40.0)))) / _period(record)
+        f = frequency or float(np.exp(rng.uniform(np.log(2.3), np.log(40.0)))) / period_of(record)
         wave = np.sin(2 * np.pi * f * record.time + rng.uniform(0, 2 * np.pi))
-        return _add(record, name, 0.5 * size * _span(getattr(record, name)) * wave)
+        return _add(record, name, 0.5 * size * span_of(getattr(record, name)) * wave)
 
     return change
 
 
 def _burst(name: str) -> Change:
     def change(record: Record, size: float, rng: Rng) -> Record:
-        share, at = _share(record), rng.uniform(0.1, 0.7)
+        share, at = share_of_time(record), rng.uniform(0.1, 0.7)
         wave = np.sin(2 * np.pi * 50.0 * record.time) * ((share > at) & (share < at + 0.25))
-        return _add(record, name, 0.5 * size * _span(getattr(record, name)) * wave)
+        return _add(record, name, 0.5 * size * span_of(getattr(record, name)) * wave)
 
     return change
 
@@ -85,7 +92,7 @@ def _clip(name: str, after: str, sides: int = 2) -> Change:
         if after == "noise":
             cut = cut + 0.002 * (high - low) * rng.standard_normal(cut.size)
         else:
-            cut = _low_pass(record.time, cut, 0.01 * _period(record))
+            cut = _low_pass(record.time, cut, 0.01 * period_of(record))
         return replace(record, **{name: cut})
 
     return change
@@ -102,40 +109,41 @@ def _low_pass(time: Floats, values: Floats, constant: float, order: int = 1) -> 
 
 def _filter(name: str, order: int) -> Change:
     def change(record: Record, size: float, rng: Rng) -> Record:
-        return replace(record, **{name: _low_pass(record.time, getattr(record, name), size * _period(record), order)})
+        return replace(record, **{name: _low_pass(record.time, getattr(record, name), size * period_of(record), order)})
 
     return change
 
 
 def _high_pass(record: Record, size: float, rng: Rng) -> Record:
     force = record.force
-    return replace(record, force=force - _low_pass(record.time, force, _period(record) / size))
+    return replace(record, force=force - _low_pass(record.time, force, period_of(record) / size))
 
 
 def _zero_phase(record: Record, size: float, rng: Rng) -> Record:
     from scipy.ndimage import gaussian_filter1d
 
-    step = float(np.median(np.diff(record.time)))
-    return replace(record, force=gaussian_filter1d(record.force, max(size * _period(record) / step, 0.3)))
+    step = step_of(record)
+    return replace(record, force=gaussian_filter1d(record.force, max(size * period_of(record) / step, 0.3)))
 
 
 def _shift(sign: float, name: str = "force") -> Change:
     def change(record: Record, size: float, rng: Rng) -> Record:
-        delay = sign * size * _period(record)
+        delay = sign * size * period_of(record)
         inside = (record.time - delay >= record.time[0]) & (record.time - delay <= record.time[-1])
         moved = np.interp(record.time - delay, record.time, getattr(record, name))
-        return _part(replace(record, **{name: moved}), inside)
+        return part(replace(record, **{name: moved}), inside)
 
     return change
 
 
-def _part(record: Record, rows: np.ndarray) -> Record:
+def part(record: Record, rows: np.ndarray) -> Record:
+    """Keep some rows of every channel."""
     return replace(record, **{name: values[rows] for name, values in record.channels.items()})
 
 
 def _two_clocks(record: Record, size: float, rng: Rng) -> Record:
     """The force's clock runs fast: at the record's end it is late by `size` of a period."""
-    late = size * _period(record) * _share(record)
+    late = size * period_of(record) * share_of_time(record)
     return replace(record, force=np.interp(record.time - late, record.time, record.force))
 
 
@@ -143,12 +151,12 @@ def _trend(name: str, shape: str, scaled: bool) -> Change:
     """Build a gain or an offset that ramps, relaxes or steps over the record."""
 
     def change(record: Record, size: float, rng: Rng) -> Record:
-        share, sign = _share(record), rng.choice([-1.0, 1.0])
+        share, sign = share_of_time(record), rng.choice([-1.0, 1.0])
         at = rng.uniform(0.3, 0.7)
         curve = {"ramp": share, "relax": 1 - np.exp(-share / 0.25), "step": (share > at).astype(float)}[shape]
         if scaled:
             return _scale(record, name, 1 + (sign if shape != "relax" else -1.0) * size * curve)
-        return _add(record, name, sign * size * _span(getattr(record, name)) * curve)
+        return _add(record, name, sign * size * span_of(getattr(record, name)) * curve)
 
     return change
 
@@ -159,7 +167,7 @@ def _wander(name: str) -> Change:
     def change(record: Record, size: float, rng: Rng) -> Record:
         walk = np.cumsum(rng.standard_normal(record.time.size))
         walk -= walk.mean()
-        return _add(record, name, size * _span(getattr(record, name)) * walk / float(np.std(walk)))
+        return _add(record, name, size * span_of(getattr(record, name)) * walk / float(np.std(walk)))
 
     return change
 
@@ -167,43 +175,43 @@ def _wander(name: str) -> Change:
 def _lost(record: Record, size: float, rng: Rng) -> Record:
     """Single samples lost, the rest numbered anew."""
     kept = np.flatnonzero(rng.random(record.time.size) > size)
-    return replace(_part(record, kept), time=record.time[: kept.size])
+    return replace(part(record, kept), time=record.time[: kept.size])
 
 
 def _lost_block(record: Record, size: float, rng: Rng) -> Record:
     """One block of a share of a period lost, the rest numbered anew."""
-    step = float(np.median(np.diff(record.time)))
-    count = max(1, round(size * _period(record) / step))
+    step = step_of(record)
+    count = max(1, round(size * period_of(record) / step))
     at = int(rng.uniform(0.25, 0.75) * record.time.size)
     kept = np.r_[0:at, at + count : record.time.size]
-    return replace(_part(record, kept), time=record.time[: kept.size])
+    return replace(part(record, kept), time=record.time[: kept.size])
 
 
 def _lost_of_one(record: Record, size: float, rng: Rng) -> Record:
     """A block lost in the force alone: from there on it is early."""
-    step = float(np.median(np.diff(record.time)))
-    count = max(1, round(size * _period(record) / step))
+    step = step_of(record)
+    count = max(1, round(size * period_of(record) / step))
     at = int(rng.uniform(0.25, 0.75) * record.time.size)
     force = np.delete(record.force, slice(at, at + count))
-    short = _part(record, np.arange(force.size))
+    short = part(record, np.arange(force.size))
     return replace(short, force=force)
 
 
 def _doubled(record: Record, size: float, rng: Rng) -> Record:
     """Single samples recorded twice, numbered anew."""
     index = np.repeat(np.arange(record.time.size), 1 + (rng.random(record.time.size) < size))[: record.time.size]
-    return replace(_part(record, index), time=record.time)
+    return replace(part(record, index), time=record.time)
 
 
 def _warped(record: Record, size: float, rng: Rng) -> Record:
     """The logger's clock speeds up by `size` over the record."""
-    share, length = _share(record), float(record.time[-1] - record.time[0])
+    share, length = share_of_time(record), float(record.time[-1] - record.time[0])
     return replace(record, time=record.time[0] + length * (share + 0.5 * size * share**2))
 
 
 def _jitter(record: Record, size: float, rng: Rng) -> Record:
     """Samples taken at other times than written, RMS `size` of a step."""
-    step = float(np.median(np.diff(record.time)))
+    step = step_of(record)
     taken = record.time + np.clip(size * step * rng.standard_normal(record.time.size), -3 * step, 3 * step)
     return replace(
         record,
@@ -214,19 +222,19 @@ def _jitter(record: Record, size: float, rng: Rng) -> Record:
 
 def _pasted(record: Record, size: float, rng: Rng) -> Record:
     """One cycle pasted `size` times: no noise differs."""
-    step = float(np.median(np.diff(record.time)))
-    count = round(_period(record) / step)
+    step = step_of(record)
+    count = round(period_of(record) / step)
     at = int(rng.uniform(0, record.time.size - count - 1))
     index = np.tile(np.arange(at, at + count), max(2, round(size)))
-    return replace(_part(record, np.arange(1)), time=step * np.arange(index.size), **{
+    return replace(part(record, np.arange(1)), time=step * np.arange(index.size), **{
         name: values[index] for name, values in record.channels.items() if name != "time"
     })  # fmt: skip
 
 
 def _patched(record: Record, size: float, rng: Rng) -> Record:
     """A stretch replaced by a copy of the one a period earlier."""
-    step = float(np.median(np.diff(record.time)))
-    period = round(_period(record) / step)
+    step = step_of(record)
+    period = round(period_of(record) / step)
     count = min(max(8, round(size * period)), record.time.size - period - 1)
     at = int(rng.uniform(period, record.time.size - count))
     index = np.r_[0:at, at - period : at - period + count, at + count : record.time.size][: record.time.size]
@@ -239,7 +247,7 @@ def _wild(name: str, count: int) -> Change:
     def change(record: Record, size: float, rng: Rng) -> Record:
         values = getattr(record, name).copy()
         at = rng.choice(np.arange(5, values.size - 5), count, replace=False)
-        values[at] += rng.choice([-1.0, 1.0], count) * size * _span(values)
+        values[at] += rng.choice([-1.0, 1.0], count) * size * span_of(values)
         return replace(record, **{name: values})
 
     return change
@@ -249,8 +257,8 @@ def _held(name: str) -> Change:
     """Recorded at a slower rate and held: steps of `size` of a period."""
 
     def change(record: Record, size: float, rng: Rng) -> Record:
-        step = float(np.median(np.diff(record.time)))
-        every = max(2, round(size * _period(record) / step))
+        step = step_of(record)
+        every = max(2, round(size * period_of(record) / step))
         index = np.arange(record.time.size) // every * every
         return replace(record, **{name: getattr(record, name)[index]})
 
@@ -261,8 +269,8 @@ def _dropouts(name: str, value: str) -> Change:
     """Stretches of a fortieth of a period that stay at zero or at the last value, `size` of the record."""
 
     def change(record: Record, size: float, rng: Rng) -> Record:
-        step = float(np.median(np.diff(record.time)))
-        width = max(2, round(_period(record) / step / 40))
+        step = step_of(record)
+        width = max(2, round(period_of(record) / step / 40))
         values = getattr(record, name).copy()
         for at in rng.integers(1, values.size - width, max(1, round(size * values.size / width))):
             values[at : at + width] = values[at - 1] if value == "last" else 0.0
@@ -274,7 +282,7 @@ def _dropouts(name: str, value: str) -> Change:
 def _noise(name: str) -> Change:
     def change(record: Record, size: float, rng: Rng) -> Record:
         values = getattr(record, name)
-        return _add(record, name, size * _span(values) * rng.standard_normal(values.size))
+        return _add(record, name, size * span_of(values) * rng.standard_normal(values.size))
 
     return change
 
@@ -284,7 +292,7 @@ def _coarse(name: str) -> Change:
 
     def change(record: Record, size: float, rng: Rng) -> Record:
         values = getattr(record, name)
-        step = size * _span(values)
+        step = size * span_of(values)
         return replace(record, **{name: np.round(values / step) * step})
 
     return change
@@ -292,7 +300,7 @@ def _coarse(name: str) -> Change:
 
 def _flipped_bit(record: Record, size: float, rng: Rng) -> Record:
     """One bit of the force's counts inverted in one sample in a hundred; the bit is worth `size` peak-to-peak."""
-    force, bit = record.force, size * _span(record.force)
+    force, bit = record.force, size * span_of(record.force)
     at = rng.random(force.size) < 0.01
     up = np.floor(force / bit) % 2 == 0
     return replace(record, force=force + np.where(at, np.where(up, bit, -bit), 0.0))
@@ -300,23 +308,23 @@ def _flipped_bit(record: Record, size: float, rng: Rng) -> Record:
 
 def _stick(record: Record, size: float, rng: Rng) -> Record:
     """The displacement sensor's rod sticks: it follows with a backlash of `size` peak-to-peak."""
-    x, gap = record.displacement, 0.5 * size * _span(record.displacement)
+    x, gap = record.displacement, 0.5 * size * span_of(record.displacement)
     seen = np.empty_like(x)
     at = x[0]
     for i, value in enumerate(x):
         at = min(max(at, value - gap), value + gap)
         seen[i] = at
-    return replace(record, displacement=seen + 1e-4 * _span(x) * rng.standard_normal(x.size))
+    return replace(record, displacement=seen + 1e-4 * span_of(x) * rng.standard_normal(x.size))
 
 
 OF_SPAN, OF_PERIOD, OF_RECORD = "of the peak-to-peak value", "of the period", "over the record"
 KINDS: tuple[Kind, ...] = (
-    Kind("mains hum, 50 Hz, on the displacement", OF_SPAN, 5e-4, 0.1, _line("displacement", 50.0)),
-    Kind("mains hum, 60 Hz, on the displacement", OF_SPAN, 5e-4, 0.1, _line("displacement", 60.0)),
-    Kind("mains hum, 50 Hz, on the force", OF_SPAN, 0.01, 0.6, _line("force", 50.0)),
-    Kind("mains hum, 60 Hz, on the force", OF_SPAN, 0.01, 0.6, _line("force", 60.0)),
-    Kind("other line on the displacement", OF_SPAN, 2e-3, 0.15, _line("displacement", None)),
-    Kind("other line on the force", OF_SPAN, 0.01, 0.6, _line("force", None)),
+    Kind("mains hum, 50 Hz, on the displacement", OF_SPAN, 5e-4, 0.1, line("displacement", 50.0)),
+    Kind("mains hum, 60 Hz, on the displacement", OF_SPAN, 5e-4, 0.1, line("displacement", 60.0)),
+    Kind("mains hum, 50 Hz, on the force", OF_SPAN, 0.01, 0.6, line("force", 50.0)),
+    Kind("mains hum, 60 Hz, on the force", OF_SPAN, 0.01, 0.6, line("force", 60.0)),
+    Kind("other line on the displacement", OF_SPAN, 2e-3, 0.15, line("displacement", None)),
+    Kind("other line on the force", OF_SPAN, 0.01, 0.6, line("force", None)),
     Kind("hum for a quarter of the record, displacement", OF_SPAN, 1e-3, 0.2, _burst("displacement")),
     Kind("hum for a quarter of the record, force", OF_SPAN, 0.02, 0.8, _burst("force")),
     Kind("force clipped before noise", "of the half range", 0.02, 0.5, _clip("force", "noise")),
@@ -372,7 +380,7 @@ KINDS: tuple[Kind, ...] = (
 def _soft(record: Record, size: float, rng: Rng) -> Record:
     """An amplifier that saturates softly, by `size` at the peak."""
     middle = 0.5 * float(np.max(record.force) + np.min(record.force))
-    half = 0.5 * _span(record.force)
+    half = 0.5 * span_of(record.force)
     share = (record.force - middle) / half
     return replace(record, force=middle + half * share * (1 - size * share**2))
 
@@ -387,6 +395,6 @@ UNOBSERVABLE: tuple[Kind, ...] = (
     Kind("amplifier saturates softly", "at the peak", 0.01, 0.3, _soft),
     Kind("current of another step", "of the yield force", 0.01, 0.5,
          lambda record, size, rng: replace(
-             record, force=record.force + size * np.sign(np.gradient(record.displacement)) * 0.3 * _span(record.force)
+             record, force=record.force + size * np.sign(np.gradient(record.displacement)) * 0.3 * span_of(record.force)
          )),
 )  # fmt: skip
