@@ -19,7 +19,7 @@ COMMANDS = (
     "check {set}", "study {set} --out study", "identify {set} --model bingham --out i.csv", "report {set} --out report",
     "identify {set} --model spencer --out s.csv", "identify {set} --model bouc-wen --method balance --out b.csv",
     "compare {set} --models bingham --models biviscous --out m", "validate model.json {set} --out v.csv",
-    "certainty model.json {set} --out sure", "split {set} --every 3 --replace", "reproduce --data {set} --jobs 1 --out claims",
+    "uncertainty model.json {set} --out sure", "split {set} --every 3 --replace", "reproduce --data {set} --jobs 1 --out claims",
 )  # fmt: skip
 FILES = "import {set} --out made"
 

@@ -71,10 +71,11 @@ CHECKS: tuple[Check, ...] = (
     flattened.rests_at_its_ends,
     renumbered.lost_or_doubled,
     renumbered.copied,
+    unsteady.stroke_steps,
     unsteady.motion_is_steady,
     unsteady.force_is_steady,
     force_lag.force_channel,
-    filtered.force_is_unfiltered,
+    filtered.channels_are_unfiltered,
     loop.repeats,
     current.changes,
 )

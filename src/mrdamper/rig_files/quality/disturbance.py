@@ -20,6 +20,9 @@ from mrdamper.rig_files.quality.view import View, sample_noise
 from mrdamper.rig_files.record import Finding
 
 _VELOCITY = 0.008  # power of the velocity that is no part of the motion, of all: bundled rigs reach 0.004
+_LINE_POWER = 0.002  # of the velocity's, in one line that is no harmonic: bundled rigs reach 0.0003
+_BURST, _BURST_STANDS_OUT = 0.003, 8.0  # of the velocity's power in an eighth of the record; times the median: 0.004, 3
+_PARTS = 8  # of the record, in which bursts are looked for
 _LINE = 0.03  # amplitude of a line in the force, of half its peak-to-peak value
 _ABOVE = 12.0  # times the median line around it; noise reaches 8
 _AROUND = 60  # lines on either side
@@ -46,15 +49,22 @@ def motion_is_one(view: View) -> Iterator[Finding]:
     velocity = view.moving.velocity[start:stop]
     rest = velocity - _periodic_velocity(view, velocity)
     inside = slice(velocity.size // 40, -(velocity.size // 40) or None)  # fits at the ends are wider of the mark
-    share = float(np.var(rest[inside]) / np.var(velocity[inside]))
-    if share < _VELOCITY:
+    size = float(np.var(velocity[inside]))
+    share = float(np.var(rest[inside])) / size
+    parts = np.array([np.mean(part**2) for part in np.array_split(rest[inside], _PARTS)]) / size
+    burst = float(np.max(parts)) > max(_BURST, _BURST_STANDS_OUT * float(np.median(parts)))
+    if share < _LINE_POWER and not burst:
         return
     line = strongest_line(view.steady.time, rest, 1.5 * motion.condition.frequency_Hz)
+    if line is not None and (line.above < _ABOVE or 0.5 * line.amplitude**2 < 0.3 * float(np.var(rest))):
+        line = None
+    if share < _VELOCITY and not burst and (line is None or 0.5 * line.amplitude**2 < _LINE_POWER * size):
+        return
     what = "the displacement is disturbed: check the sensor's cable and supply"
-    if line is not None and line.above > _ABOVE and 0.5 * line.amplitude**2 > 0.3 * float(np.var(rest)):
-        size = line.amplitude / (2 * np.pi * line.frequency)
+    if line is not None:
+        stroke = line.amplitude / (2 * np.pi * line.frequency)
         what = (
-            f"another motion of {line.frequency:.4g} Hz and {1e3 * size:.2g} mm runs on the displacement (mains hum, "
+            f"another motion of {line.frequency:.4g} Hz and {1e3 * stroke:.2g} mm runs on the displacement (mains hum, "
             "if 50 or 60 Hz): shield the sensor's cable"
         )
     found = (

@@ -1,7 +1,9 @@
-"""A force behind a low-pass filter, by the colour of its noise.
+"""A channel behind a low-pass filter, by the colour of its noise.
 
 A filter rounds the corners of a loop as hysteresis does, so the loop itself does not show it. But noise that
-passed it falls octave by octave from the filter's corner on, and noise that did not is white.
+passed it falls octave by octave from the filter's corner on, and noise that did not is white. Noise is what a
+sample differs by from the one a period earlier. The motion itself differs from cycle to cycle, and less the
+faster: a displacement counts as filtered only if its noise falls below that of any converter.
 """
 
 from __future__ import annotations
@@ -11,74 +13,80 @@ from collections.abc import Iterator
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.rig_files.quality.cycles import POINTS, steady_cycles
+from mrdamper.rig_files.quality.cycles import steady_cycles
 from mrdamper.rig_files.quality.effects import percent
 from mrdamper.rig_files.quality.force_lag import effect_of_delay
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding
 
 _FALLS, _FALLS_ON_AVERAGE = 3.0, 5.0  # [dB] from octave to octave; a first-order filter has 6, white noise 0
+_LEAKAGE = 15.0  # [dB] from octave to octave, on average: a slow change of a channel without noise has 18
 _OCTAVES = 2  # at least, over which the noise falls
-_FLOOR = 3.0  # [dB] above the noise of the converter's steps: below, its own white noise is seen
-_CORNER = 25.0  # times the frequency of the motion; a filter above it is late by under 0.7 % of the period
+_CONVERTER = -106.0  # [dB] of the peak-to-peak value: noise of the steps of 16 bits over twice the range
+_CORNER = 20.0  # times the frequency of the motion; a filter above it is late by under 0.8 % of the period
 _LOWEST = 3.0  # times that frequency: below, cycles differ by more than noise
-_FEWEST = 4  # cycles
+_FEWEST = 2  # cycles
 _COLOURED = ("W_LAG", "W_CLIPPED", "W_FROZEN", "W_DRIFT", "W_DISTURBED", "W_HELD", "W_UNSTEADY", "W_REPEATABILITY")
 _LINES = 12  # of a spectrum, in the lowest octave
+_SAMPLES = 64  # at least, that have one a period earlier
 
 
-def force_is_unfiltered(view: View) -> Iterator[Finding]:
-    """Report a force whose noise falls from a frequency on that is low enough to delay it."""
+def channels_are_unfiltered(view: View) -> Iterator[Finding]:
+    """Report a channel whose noise falls from a frequency on that is low enough to delay it."""
     cycles = steady_cycles(view)
-    if cycles is None or len(cycles.starts) < _FEWEST or len(view.segments) > 1:
+    if cycles is None or len(cycles.starts) < _FEWEST or len(view.segments) > 1 or view.noticed(*_COLOURED):
         return
-    if view.noticed(
-        "W_LAG", "W_CLIPPED", "W_FROZEN", "W_DRIFT", "W_DISTURBED", "W_HELD", "W_UNSTEADY", "W_REPEATABILITY"
-    ):
-        return
-    levels, highest = noise_by_octave(view)
-    falls = np.diff(levels)
-    count = int(np.argmin(np.append(falls >= _FALLS, False)))
-    if count < _OCTAVES or float(np.sum(falls[:count])) < _FALLS_ON_AVERAGE * count:
-        return
-    corner = highest / 2**count
-    if corner * cycles.period > _CORNER:
-        return
-    late = 1 / (2 * np.pi * corner * cycles.period)
-    yield Finding(
-        "W_FILTERED",
-        f"noise of the force falls by {float(np.mean(falls[:count])):.2g} dB an octave from about {corner:.3g} Hz "
-        f"on: a filter of this corner makes the force late by {100 * late:.2g} % of the period and moves the damping "
-        f"by {percent(effect_of_delay(cycles, late))}; filter both channels alike, or neither",
-    )
+    for name in ("force", "displacement"):
+        levels, highest = noise_by_octave(view, name)
+        falls = np.diff(levels)
+        count = int(np.argmin(np.append(falls >= _FALLS, False)))
+        average = float(np.mean(falls[:count])) if count else 0.0
+        corner = highest / 2**count
+        if count < _OCTAVES or average < _FALLS_ON_AVERAGE or levels[count] < _CONVERTER:
+            continue
+        if name == "displacement" and (levels[0] > _CONVERTER or average > _LEAKAGE):
+            continue
+        late = 1 / (2 * np.pi * corner * cycles.period)
+        effect = effect_of_delay(cycles, late if name == "force" else -late)
+        if corner * cycles.period < _CORNER:
+            yield Finding(
+                "W_FILTERED",
+                f"noise of the {name} falls by {average:.2g} dB an octave from about {corner:.3g} Hz on: a filter of "
+                f"this corner makes the {name} late by {100 * late:.2g} % of the period and moves the damping by "
+                f"{percent(effect)}; filter both channels alike, or neither",
+            )
 
 
-def noise_by_octave(view: View) -> tuple[Floats, float]:
-    """Median power of the force's noise in octaves from the highest above the converter's floor on down.
+def noise_by_octave(view: View, name: str) -> tuple[Floats, float]:
+    """Median power of a channel's noise in octaves from the highest on down.
 
     Returns
     -------
     levels : (K,) array
-        [dB]
+        RMS, if it were white, over the channel's peak-to-peak value [dB].
     highest : float
         Upper end of the first octave [Hz].
     """
-    cycles, run = steady_cycles(view), view.steady
-    assert cycles is not None
-    place = (run.time - cycles.starts[0]) / cycles.period % 1.0 * POINTS
-    loop = np.append(cycles.force.loop, cycles.force.loop[0])
-    rest = run.force - np.interp(place, np.arange(POINTS + 1), loop)
-    window = np.hanning(rest.size + 2)[1:-1]
-    power = np.abs(np.fft.rfft((rest - np.mean(rest)) * window)) ** 2
-    gaps = np.diff(np.unique(run.force))
-    step = float(np.min(gaps, initial=np.inf, where=gaps > 1e-9 * cycles.force.span)) if gaps.size else 0.0
-    floor = 10 * np.log10(step**2 / 12 * float(np.sum(window**2)) * np.log(2)) if 0 < step < np.inf else -np.inf
-    nyquist, levels, tops = 0.5 / view.step, [], []
-    high = power.size
-    while high // 2 >= _LINES and nyquist * high / power.size > _LOWEST / cycles.period:
-        level = 10 * np.log10(float(np.median(power[high // 2 : high])) + np.finfo(float).tiny)
-        if levels or level > floor + _FLOOR:
-            levels.append(level)
-            tops.append(nyquist * high / power.size)
+    motion, values = view.motion, getattr(view.steady, name)
+    assert motion is not None
+    period = 1 / motion.condition.frequency_Hz / view.step
+    lag, nyquist = int(np.ceil(period)) + 2, 0.5 / view.step
+    if values.size - lag < _SAMPLES:
+        return np.empty(0), nyquist
+    changes = values[lag:] - _between(values, np.arange(lag, values.size) - period)
+    window = np.hanning(changes.size + 2)[1:-1]
+    power = np.abs(np.fft.rfft((changes - np.mean(changes)) * window)) ** 2 / (2 * float(np.sum(window**2)))
+    power = power / float(np.ptp(values)) ** 2 + np.finfo(float).tiny
+    high, levels = power.size, []
+    while high // 2 >= _LINES and nyquist * high / power.size > _LOWEST * motion.condition.frequency_Hz:
+        levels.append(10 * np.log10(float(np.median(power[high // 2 : high])) / np.log(2)))
         high //= 2
-    return np.array(levels), tops[0] if tops else nyquist
+    return np.array(levels), nyquist
+
+
+def _between(values: Floats, place: Floats) -> Floats:
+    """Values between samples, by the cubic through a sample and its slope on either side."""
+    before = place.astype(int)
+    t = place - before
+    a, b, c, d = (values[before + shift] for shift in (-1, 0, 1, 2))
+    return b + 0.5 * t * (c - a + t * (2 * a - 5 * b + 4 * c - d + t * (3 * (b - c) + d - a)))

@@ -22,11 +22,13 @@ from mrdamper.rig_files.record import Finding
 _DEPTH = 0.006  # of the peak-to-peak value; at four times this depth the width is measured again
 _FORCE_WIDER, _WIDER, _WIDER_ONE_SIDED = 1.45, 1.3, 1.47  # times as wide there: a parabola 2, bundled rigs 1.57, 1.34
 _ROUND = 1.75  # times as wide: an end that is not cut off
+_LEVEL = 1.25  # times as wide: a plateau on which the force does not depend on velocity
 _WIDTH = (0.04, 0.6)  # of the cycle
 _REST = 0.05  # of the peak velocity: slower, a displacement rests
 _DWELL = 0.022  # of the cycle, beyond what a sine has
 _JOLT = 0.18  # of the peak velocity, two phases after the rest: a motion that dwells begins gently
-_MOVES = 0.2  # of the peak velocity, at both edges of a cut-off force
+_MOVES = 0.2  # of the peak velocity, beyond both edges of a cut-off force
+_STILL_MOVES = 0.15  # of the peak velocity, at both edges of a level one: a plateau of friction ends at the reversal
 _GOES_ON = 0.04  # of the peak-to-peak force, while a displacement that is cut off or sticks rests
 
 
@@ -47,7 +49,9 @@ def cut_off_before_noise(view: View) -> Iterator[Finding]:
         return
     motion, force = cycles.displacement, cycles.force
     speed = np.abs(motion.slope)
-    tops = [top for top in ends_of(force, len(cycles.starts)) if top.wider < _FORCE_WIDER and _in_motion(top, speed)]
+    ends = ends_of(force, len(cycles.starts))
+    one_sided = max(top.wider for top in ends) > _ROUND
+    tops = [top for top in ends if _is_cut_off(top, speed, one_sided)]
     yield from _finding("force", "N", 1.0, tops, force.span)
     ends = ends_of(motion, len(cycles.starts))
     one_sided = max(top.wider for top in ends) > _ROUND
@@ -128,6 +132,14 @@ def _reach(values: Floats, level: float) -> float:
         return 0.0
     before, after = values[below[0] - 1] - level, level - values[below[0]]
     return float(below[0] - 1 + before / (before + after))
+
+
+def _is_cut_off(top: Top, speed: Floats, one_sided: bool) -> bool:
+    """Tell an end of the force that is cut off from a plateau of the damper's own."""
+    edges = speed[np.array(top.edges) % POINTS]
+    if top.wider < _LEVEL and (one_sided or float(np.min(edges)) > _STILL_MOVES * float(np.max(speed))):
+        return True
+    return top.wider < _FORCE_WIDER and _in_motion(top, speed)
 
 
 def _in_motion(top: Top, speed: Floats) -> bool:

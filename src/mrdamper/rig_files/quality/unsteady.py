@@ -18,6 +18,7 @@ GAIN = 0.05  # of the force
 OFFSET = 0.04  # of its peak-to-peak value
 LATE = 0.012  # of the period
 STROKE = 0.06  # of the amplitude: a step that the force does not follow
+_EVEN, _FOLLOWS = 0.02, 0.1  # strokes before and after a step differ by at most so much; and the force by so much of it
 _FEWEST = 3  # cycles
 
 
@@ -48,6 +49,28 @@ def force_is_steady(view: View) -> Iterator[Finding]:
             f"the force shifts by {1e3 * late * cycles.period:+.3g} ms ({100 * late:+.2g} % of the period) against the "
             "motion over the record: the channels have clocks of their own, or samples of one are lost",
         )
+
+
+def stroke_steps(view: View) -> Iterator[Finding]:
+    """Report strokes of two lengths at one force: the displacement's gain was changed."""
+    strokes, force = view.strokes, view.run.force
+    if strokes.lengths.size < 5 or view.noticed("W_FROZEN", "W_CLIPPED"):
+        return
+    forces = np.maximum.reduceat(force, strokes.reversals)[:-1] - np.minimum.reduceat(force, strokes.reversals)[:-1]
+    for at in range(2, strokes.lengths.size - 2):
+        before, after = strokes.lengths[:at], strokes.lengths[at + 1 :]
+        after = after[1:] if after.size > 2 else after  # a stroke or two hold the step
+        step = float(np.mean(after) / np.mean(before)) - 1
+        if max(np.ptp(before) / np.mean(before), np.ptp(after) / np.mean(after)) > _EVEN or abs(step) < STROKE:
+            continue
+        change = float(np.mean(forces[-after.size :]) / np.mean(forces[:at])) - 1
+        if abs(change) < _FOLLOWS * abs(step):
+            yield Finding(
+                "W_UNSTEADY",
+                f"the stroke changes by {100 * step:+.3g} % at {view.run.time[strokes.reversals[at]]:.4g} s and the "
+                f"force does not: damping is uncertain by {percent(abs(step))}; check the displacement sensor",
+            )
+        return
 
 
 def motion_is_steady(view: View) -> Iterator[Finding]:
