@@ -25,7 +25,8 @@ _OCTAVES = 2  # at least, over which the noise falls
 _CONVERTER = -106.0  # [dB] of the peak-to-peak value: noise of the steps of 16 bits over twice the range
 _CORNER = 20.0  # times the frequency of the motion; a filter above it is late by under 0.8 % of the period
 _LOWEST = 3.0  # times that frequency: below, cycles differ by more than noise
-_FEWEST = 2  # cycles
+_FEWEST = 3  # cycles
+_UNLIKE = -0.2  # correlation of a change with the one a period later: noise has -0.5, errors of interpolation more
 _COLOURED = ("W_LAG", "W_CLIPPED", "W_FROZEN", "W_DRIFT", "W_DISTURBED", "W_HELD", "W_UNSTEADY", "W_REPEATABILITY")
 _LINES = 12  # of a spectrum, in the lowest octave
 _SAMPLES = 64  # at least, that have one a period earlier
@@ -38,6 +39,8 @@ def channels_are_unfiltered(view: View) -> Iterator[Finding]:
         return
     for name in ("force", "displacement"):
         levels, highest = noise_by_octave(view, name)
+        if levels.size <= _OCTAVES:
+            continue
         falls = np.diff(levels)
         count = int(np.argmin(np.append(falls >= _FALLS, False)))
         average = float(np.mean(falls[:count])) if count else 0.0
@@ -63,7 +66,7 @@ def noise_by_octave(view: View, name: str) -> tuple[Floats, float]:
     Returns
     -------
     levels : (K,) array
-        RMS, if it were white, over the channel's peak-to-peak value [dB].
+        RMS, if it were white, over the channel's peak-to-peak value [dB]; empty where it is no noise, or too short.
     highest : float
         Upper end of the first octave [Hz].
     """
@@ -77,8 +80,12 @@ def noise_by_octave(view: View, name: str) -> tuple[Floats, float]:
     window = np.hanning(changes.size + 2)[1:-1]
     power = np.abs(np.fft.rfft((changes - np.mean(changes)) * window)) ** 2 / (2 * float(np.sum(window**2)))
     power = power / float(np.ptp(values)) ** 2 + np.finfo(float).tiny
+    lowest = int(np.ceil(_LOWEST * motion.condition.frequency_Hz / nyquist * power.size))
+    later = np.cos(2 * np.pi * np.arange(lowest, power.size) * period / changes.size)
+    if float(power[lowest:] @ later) > _UNLIKE * float(np.sum(power[lowest:])):
+        return np.empty(0), nyquist
     high, levels = power.size, []
-    while high // 2 >= _LINES and nyquist * high / power.size > _LOWEST * motion.condition.frequency_Hz:
+    while high // 2 >= _LINES and high > lowest:
         levels.append(10 * np.log10(float(np.median(power[high // 2 : high])) / np.log(2)))
         high //= 2
     return np.array(levels), nyquist
