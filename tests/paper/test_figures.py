@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mrdamper.data import Condition
-from mrdamper.paper.parameter_figures import beside_current_law
+from mrdamper.paper.figures import beside_current_law
 from mrdamper.statistics.functions.fitting import fit_function
 from mrdamper.statistics.functions.forms import ParameterFunction, features
 

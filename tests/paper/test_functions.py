@@ -13,7 +13,7 @@ from mrdamper.identification.harmonic_balance import SineRecord
 from mrdamper.identification.problem import Problem
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.paper import paper_method as paper
-from mrdamper.paper.generation import GeneticSettings
+from mrdamper.paper.genetic import GeneticMinimum, GeneticSettings
 from mrdamper.paper.paper_method import Paper
 from mrdamper.physics.gas_spring import GasSpring
 from mrdamper.physics.hysteresis import steady_loop
@@ -131,7 +131,7 @@ def test_the_search_for_the_optimum_begins_at_the_best_of_its_grid(monkeypatch):
 
 def test_a_gamma_that_is_held_ends_where_it_leaves_nothing_for_beta():
     def longest(**fixed):
-        return paper._Rest(SimpleNamespace(fixed=fixed), None, None).longest
+        return paper._Remainder(SimpleNamespace(fixed=fixed), None, None).longest
 
     assert longest(gamma=0.5, n=2.0) == pytest.approx(0.999 * 0.5**-0.5)
     assert longest(gamma=8e3, n=3.0) == pytest.approx(0.999 / 20)
@@ -143,7 +143,8 @@ def test_a_gamma_that_is_held_ends_where_it_leaves_nothing_for_beta():
     [(10.0005, 5e6, ("alpha",)), (10.00101, 5e6, ()), (1009.9995, 1e7 - 1, ("alpha", "beta")), (500.0, 3.0, ("beta",))],
 )
 def test_a_search_ended_at_its_box_within_a_millionth_of_it(monkeypatch, alpha, beta, ended):
-    monkeypatch.setattr(Paper, "_by_optimum", lambda *_: paper._Searched(alpha, beta, 1, Ending.SETTLED))
+    minimum = GeneticMinimum(np.array([alpha, beta]), 0.0, 1, np.array([]), (), Ending.SETTLED)
+    monkeypatch.setattr(paper, "_optimum", lambda *_: minimum)
     run = steady_run(Condition(1.0, 1.0, 0.05), samples=200)
     method = Paper(search="optimum", bounds=((10.0, 1010.0), (0.0, 1e7)), explain=False)
     assert identify(run, "bouc-wen", method, gas=GAS).at_bounds == ended

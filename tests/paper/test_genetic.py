@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from mrdamper.errors import ParameterError
-from mrdamper.paper.generation import (
+from mrdamper.paper.genetic import (
     GeneticSettings,
+    genetic,
     next_generation,
     rank_scaling,
     scattered_crossover,
     stochastic_uniform,
     uniform_mutation,
 )
-from mrdamper.paper.genetic import genetic
 
 VECTOR = json.loads((Path(__file__).parents[1] / "vectors.json").read_text())["V22_sus"]
 

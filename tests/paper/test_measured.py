@@ -10,10 +10,9 @@ from mrdamper.data import Condition, Run
 from mrdamper.paper import claims, claims_on_fits, claims_on_tests
 from mrdamper.paper import results as found_module
 from mrdamper.paper.claims import judge_all
-from mrdamper.paper.claims_on_tests import friction_along, lost_length
+from mrdamper.paper.claims_on_tests import Measured, friction_along, lost_length
 from mrdamper.paper.recipes import ALI, CONSISTENT, DIRECT, LITERAL
-from mrdamper.paper.results import Ended, function_of
-from mrdamper.paper.verdicts import Measured
+from mrdamper.paper.results import GeneticEnd, function_of
 from mrdamper.physics.motion import measured_motion, sine, triangle
 
 
@@ -122,7 +121,7 @@ def test_gas_and_friction_are_measured_where_they_were_tested():
     asked = []
     gas = SimpleNamespace(taylor_error=lambda X: asked.append(X) or 0.013)
     found = claims_on_tests.gas_series(study_of(gas=gas, loops=[loop(amplitude=A) for A in (0.02, 0.08, 0.05)]))
-    assert (asked, found.numbers) == ([0.08], {"error of the series over the gas force": 0.013})
+    assert (asked, found.values) == ([0.08], (0.013,))
     assert "±80 mm" in found.evidence
     assert "not known" in claims_on_tests.gas_series(study_of(gas=None)).evidence
     with pytest.MonkeyPatch.context() as patch:
@@ -131,24 +130,24 @@ def test_gas_and_friction_are_measured_where_they_were_tested():
         found = claims_on_tests.friction(
             study_of(friction=1, loops=[loop(peak=P) for P in (900.0, 550.0)], options=options)
         )
-    assert list(found.numbers.values()) == pytest.approx([30.0, 90.0, 55.0 / 550.0])
+    assert list(found.values) == pytest.approx([30.0, 90.0, 55.0 / 550.0])
     assert found.evidence == "test with fluid"
-    assert claims_on_tests.friction(study_of(friction=None)).numbers == {}
+    assert claims_on_tests.friction(study_of(friction=None)).values == ()
 
 
 def test_shares_of_loops_and_of_steps_are_counted():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(claims_on_tests, "bulge", lambda run: run)
         found = claims_on_tests.bulges(study_of(train=[0.9, 1.1, 1.2, 1.3]))
-    assert found.numbers == {"share of loops wider at x = 0 than at 0.8 X": 0.75}
+    assert found.values == (0.75,)
     assert found.evidence == "ratio of widths 0.90–1.30"
     energies = {(0.0, 1.0): 5.0, (1.0, 1.0): 9.0, (0.0, 2.0): 7.0, (1.0, 2.0): 9.5}
     loops = [loop(I, f, energy=E) for (I, f), E in energies.items()]
     found = claims_on_tests.energy(study_of(loops=loops))
-    assert list(found.numbers.values()) == [1.0, 1.0]
-    assert found.evidence == "5–9.5 J a cycle"
+    assert list(found.values) == [1.0, 1.0]
+    assert found.evidence == "5–9.5 J per cycle"
     falling = claims_on_tests.energy(study_of(loops=[*loops, loop(2.0, 1.0, energy=1.0)][::-1]))
-    assert list(falling.numbers.values()) == pytest.approx([2 / 3, 1.0])
+    assert list(falling.values) == pytest.approx([2 / 3, 1.0])
 
 
 def test_the_phase_counts_runs_in_the_band_and_the_motion_that_changes_most():
@@ -157,9 +156,9 @@ def test_the_phase_counts_runs_in_the_band_and_the_motion_that_changes_most():
     above = claims_on_tests.phase(
         study_of(conditions=conditions, readings=[*readings[:4], SimpleNamespace(phase=1.55)])
     )
-    assert above.numbers["share of runs within 1.4–1.5 rad"] == 3 / 5
+    assert above.values[0] == 3 / 5
     found = claims_on_tests.phase(study_of(conditions=conditions, readings=readings))
-    assert list(found.numbers.values()) == pytest.approx([3 / 5, 0.15])
+    assert list(found.values) == pytest.approx([3 / 5, 0.15])
     assert found.evidence == f"1.200–1.450 rad; smallest sine {np.sin(1.2):.3f}"
 
 
@@ -173,7 +172,7 @@ def test_the_stroke_end_compares_the_fastest_with_the_slowest_motion_at_the_high
         patch.setattr(claims_on_tests, "lost_length", lambda run, c, stiffness: lengths[run, c])
         study = study_of({CONSISTENT: consistent}, conditions=conditions, train=list(speeds))
         found = claims_on_tests.stroke_end(study)
-    assert list(found.numbers.values()) == pytest.approx([2.5])
+    assert list(found.values) == pytest.approx([2.5])
     assert found.evidence.startswith("at 2 A 90 % of the hysteretic force is back after 2.00 mm at 0.06 m/s")
     assert found.evidence.endswith("after 5.00 mm at 0.25 m/s")
     alike = study_of({CONSISTENT: consistent}, conditions=[Condition(2.0, 1 + 0.05 * n, 0.02) for n in range(4)],
@@ -186,15 +185,20 @@ def test_a_claim_is_said_with_its_numbers_and_what_was_built_in_is_recovered():
 
     def measure(study):
         asked.append(study)
-        return Measured({"least R² of a motion": 0.995}, "more")
+        return Measured.of(0.995, evidence="more")
 
-    entry = ("quadratic", "the text", "Eq. 23", "fig11", "built in", measure)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(claims, "_CLAIMS", (entry, (*entry[:4], "method", measure), (*entry[:4], "damper", measure)))
-        virtual = study_of()
-        virtual.rig, virtual.seed_verdicts = "rig", {"quadratic": ("agrees", "differs")}
-        built_in, open_, values = judge_all(virtual)
-        real, *_ = judge_all(study_of())
+    limits = claims.ROWS["quadratic"].limits
+    virtual = study_of()
+    virtual.rig, virtual.seed_verdicts = "rig", {"quadratic": ("agrees", "differs")}
+
+    def judged(kind, study):
+        row = claims._Row("the text", "Eq. 23", "fig11", kind, measure, limits)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(claims, "ROWS", {"quadratic": row})
+            return judge_all(study)[0]
+
+    built_in, open_, values = (judged(kind, virtual) for kind in ("built in", "method", "damper"))
+    real = judged("built in", study_of())
     assert (built_in.verdict, built_in.said) == ("agrees", "recovered (built into the virtual damper)")
     assert open_.said == "agrees with the paper on the virtual damper"
     assert real.said == "agrees with the paper on this damper"
@@ -213,22 +217,18 @@ def test_a_claim_is_said_with_its_numbers_and_what_was_built_in_is_recovered():
 def test_every_claim_points_to_a_figure_that_is_drawn_and_stands_once():
     from mrdamper.paper.figures import FIGURES
 
-    keys = [key for key, *_ in claims._CLAIMS]
-    assert len(set(keys)) == len(keys) == 19
-    drawn = {*FIGURES, ""}
-    assert {figure for _, _, _, figure, *_ in claims._CLAIMS} <= drawn
-    assert {key for key, _, _, _, kind, _ in claims._CLAIMS if kind == "built in"} == {
+    assert len(claims.ROWS) == 19
+    assert {row.figure for row in claims.ROWS.values()} <= {*FIGURES, ""}
+    assert {key for key, row in claims.ROWS.items() if row.kind == "built in"} == {
         "gas series", "stroke end", "saturation",
     }  # fmt: skip
 
 
 def test_searches_are_judged_parameter_by_parameter_with_the_worst_beside():
     ends = ((2.0, 0.1, 1.0), (0.5, 8.0, 1.2), (3.0, 5.0, 1.1))
-    ended = [Ended(str(i), i, *end, 9, 5, 1.0) for i, end in enumerate(ends)]
+    ended = [GeneticEnd(str(i), i, *end, 9, 5, 1.0) for i, end in enumerate(ends)]
     found = claims_on_fits.search(study_of(ended=ended))
-    assert found.numbers == pytest.approx(
-        {"median factor by which α misses the optimum": 2.0, "median factor by which β misses the optimum": 8.0}
-    )
+    assert found.values == pytest.approx((2.0, 8.0))
     assert found.evidence == "3 runs, a seed each; worst factors 3 and 10; largest error over the least 1.2"
 
 
@@ -249,14 +249,14 @@ def test_a_mass_that_was_held_or_has_another_function_is_not_judged(form):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(claims_on_fits, "function_of", lambda study, name: fit)
         found = claims_on_fits.mass(study_of({LITERAL: held}, conditions=[Condition(0, 1, 1), Condition(0, 2, 1)]))
-    assert found.numbers == {}
+    assert found.values == ()
     assert "m is held" in found.evidence
 
 
 def test_time_and_accuracy_are_ratios_of_ours_to_theirs():
-    ended = [Ended(name, 0, 1, 1, 1, 99, forces, 1.0) for name, forces in (("a", 10), ("b", 30), ("c", 90))]
+    ended = [GeneticEnd(name, 0, 1, 1, 1, 99, forces, 1.0) for name, forces in (("a", 10), ("b", 30), ("c", 90))]
     found = claims_on_fits.fast(study_of(ended=ended, direct={"0": 10, "1": 15, "2": 90}))
-    assert list(found.numbers.values()) == [2.0]
+    assert list(found.values) == [2.0]
     assert found.evidence.startswith("median 30 forces computed against 15")
     worst = {"scores": SimpleNamespace(nrmse_pp=0.174), "condition": Condition(2.0, 1.0, 0.08)}
     literal = SimpleNamespace(
@@ -271,17 +271,15 @@ def test_time_and_accuracy_are_ratios_of_ours_to_theirs():
         parameters_per_run=8,
     )
     found = claims_on_fits.few_parameters(study_of({LITERAL: literal, ALI: ali}))
-    assert list(found.numbers.values()) == pytest.approx([3.9, 0.25])
-    assert found.evidence.startswith("held out 15.6 % against 4.0 %; worst 17.4 % and 9.9 %; 2 searched against 8")
+    assert list(found.values) == pytest.approx([3.9, 0.25])
+    assert found.evidence.startswith("validation 15.6 % against 4.0 %; worst 17.4 % and 9.9 %; 2 searched against 8")
     ali.parameters_per_run = 1
-    assert claims_on_fits.few_parameters(study_of({LITERAL: literal, ALI: ali})).numbers == pytest.approx(
-        {"median held-out error over the Ali-type's": 3.9, "searched parameters a run over the Ali-type's": 2.0}
-    )
+    assert claims_on_fits.few_parameters(study_of({LITERAL: literal, ALI: ali})).values == pytest.approx((3.9, 2.0))
     empty = SimpleNamespace(validation=SimpleNamespace(runs=()))
     for pair in ({LITERAL: empty, ALI: ali}, {LITERAL: literal, ALI: empty}, {LITERAL: literal}, {ALI: ali}):
-        assert "no run is held out" in claims_on_fits.few_parameters(study_of(pair)).evidence
+        assert "no validation run" in claims_on_fits.few_parameters(study_of(pair)).evidence
     found = claims_on_fits.generalisation(study_of({LITERAL: literal}))
-    assert list(found.numbers.values()) == pytest.approx([1.56, 0.174])
+    assert list(found.values) == pytest.approx([1.56, 0.174])
     assert found.evidence == "median 15.6 %, worst 17.4 % at 2 A, 1 Hz, 80 mm"
 
 
@@ -292,7 +290,7 @@ def test_slopes_of_the_saturation_are_in_newtons_an_ampere_and_motions_are_avera
         for c in conditions
     ]
     found = claims_on_tests.saturation(study_of(conditions=conditions, readings=readings))
-    assert list(found.numbers.values()) == pytest.approx([0.1])
+    assert list(found.values) == pytest.approx([0.1])
     assert found.evidence == "F0 rises by 800 N/A up to 1 A and by 80 N/A above 1.5 A"
     some = [c for c in conditions if c.current_A <= 1.0]
     assert "tested up to 1 A" in claims_on_tests.saturation(study_of(conditions=some, readings=readings[:6])).evidence
@@ -302,7 +300,7 @@ def test_two_currents_on_either_side_are_enough_for_the_saturation():
     conditions = [Condition(I, 1.0, 0.02) for I in (0.5, 1.0, 1.5, 2.0)]
     readings = [SimpleNamespace(amplitude=F) for F in (300.0, 700.0, 900.0, 980.0)]
     found = claims_on_tests.saturation(study_of(conditions=conditions, readings=readings))
-    assert list(found.numbers.values()) == pytest.approx([0.2])
+    assert list(found.values) == pytest.approx([0.2])
 
 
 def made_of(**values):
@@ -312,7 +310,7 @@ def made_of(**values):
 
 def test_the_closed_form_is_compared_where_both_balances_were_followed():
     both = {LITERAL: made_of(c=[200.0, 300.0, 900.0]), CONSISTENT: made_of(c=[100.0] * 3)}
-    assert list(claims_on_fits.viscosity(study_of(both)).numbers.values()) == [3.0]
+    assert list(claims_on_fits.viscosity(study_of(both)).values) == [3.0]
     for pair in ({LITERAL: both[LITERAL], CONSISTENT: made_of(c=[100.0])}, {CONSISTENT: both[CONSISTENT]}, {}):
         assert "could not be followed" in claims_on_fits.viscosity(study_of(pair)).evidence
 
@@ -341,17 +339,12 @@ def test_the_scatter_of_beta_is_that_of_its_logarithm(monkeypatch):
     study = study_of({LITERAL: made_of(beta=[0.1, 1.0, 10.0, 1.0, 2.0, 4.0])}, conditions=conditions)
     found = claims_on_fits.beta(study)
     ratio = np.std(np.log([1.0, 2.0, 4.0])) / np.std(np.log([0.1, 1.0, 10.0]))
-    assert list(found.numbers.values()) == pytest.approx([ratio, 0.9, 0.0])
+    assert list(found.values) == pytest.approx([ratio, 0.9, 0.0])
 
 
 def test_a_quadratic_needs_four_currents_at_a_motion():
     conditions = [Condition(I, 1.0, 0.02) for I in (0.0, 0.5, 1.0)] + [Condition(I, 3.0, 0.02) for I in (0.0, 1.0)]
-    assert (
-        claims_on_tests._tested_at(SimpleNamespace(conditions=conditions), 3)
-        == "1 of 2 motions were tested at 3 currents or more"
-    )
-    assert claims_on_tests._tested_at(SimpleNamespace(conditions=conditions), 4).startswith("0 of 2")
     readings = [SimpleNamespace(amplitude=100.0 + 50 * n) for n in range(5)]
     three = claims_on_tests.quadratic(study_of(conditions=conditions, readings=readings))
-    assert three.numbers == {}
-    assert "prove nothing" in three.evidence
+    assert three.values == ()
+    assert three.evidence.startswith("none of 2 motions was tested at 4 currents or more")

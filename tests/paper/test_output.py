@@ -12,11 +12,11 @@ from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.paper import output
 from mrdamper.paper.claims import Claim
-from mrdamper.paper.figures import SECONDS
+from mrdamper.paper.figures import SECONDS, Entry
 from mrdamper.paper.options import PaperOptions
-from mrdamper.paper.output import verdicts
+from mrdamper.paper.output import all_tables, method_rows
 from mrdamper.paper.recipes import CONSISTENT, LITERAL
-from mrdamper.paper.results import Ended, GeneticCheck
+from mrdamper.paper.results import GeneticCheck, GeneticEnd
 from mrdamper.paper.sensitivity import OneAtATime, Sobol
 from mrdamper.paper.virtual_rig import VirtualRig
 from mrdamper.report.plots.style import Picture
@@ -55,7 +55,7 @@ def study(**more):
 
 
 def test_table_5_holds_the_median_and_the_worst_of_the_held_out_runs():
-    first, second = verdicts(study())
+    first, second = method_rows(study())
     assert first == {
         "verdict": "paper (literal)", "method": "one", "parameters": 10, "nrmse_pp": pytest.approx(0.3),
         "worst_nrmse_pp": pytest.approx(0.6), "nrmse_std": pytest.approx(0.31), "wape": pytest.approx(0.32),
@@ -68,7 +68,7 @@ def test_table_5_holds_the_median_and_the_worst_of_the_held_out_runs():
 
 def tables(**more):
     claim = Claim("phase", "text", "Eq. 1", "agrees", "recovered", "1 rad", "limit", "fig12", "20 of 20")
-    return output._tables(study(**more), (claim,))
+    return all_tables(study(**more), (claim,))
 
 
 def test_table_4_holds_every_run_of_every_method_under_its_own_name():
@@ -93,7 +93,7 @@ def test_table_4_holds_every_run_of_every_method_under_its_own_name():
     assert absent["tests"] == "the data allow no row of it"
     assert absent["parameters"] == "there is no validation run"
     assert not set(absent) & set(made)
-    assert made["methods"] == verdicts(study())
+    assert made["methods"] == method_rows(study())
 
 
 def test_everything_is_written_and_shown_in_its_place(monkeypatch, tmp_path):
@@ -109,8 +109,9 @@ def test_everything_is_written_and_shown_in_its_place(monkeypatch, tmp_path):
         return "<p>page</p>"
 
     monkeypatch.setattr(output, "judge_all", lambda study: (claim,))
-    figures = {"fig09": ("a loop", None), "fig12": ("the phase", None), SECONDS: ("times", None)}
+    figures = {name: Entry(name, "Eq. 1", (), None) for name in ("fig09", "fig12", SECONDS)}
     monkeypatch.setattr(output, "FIGURES", figures)
+    monkeypatch.setattr(output, "caption", lambda name: f"caption of {name}")
     monkeypatch.setattr(output, "pictures", drawn)
     monkeypatch.setattr(output, "render_page", render)
     monkeypatch.setattr(output, "made_from", lambda dataset: f"from {dataset}")
@@ -124,8 +125,8 @@ def test_everything_is_written_and_shown_in_its_place(monkeypatch, tmp_path):
     assert (tmp_path / "out" / "figures" / f"{SECONDS}.svg").is_file()
     assert [also for also, _ in asked] == [(), ()]
     assert sorted(name for _, names in asked for name in names) == sorted(figures)
-    assert page["pictures"] == {"fig12": ("the phase", b"fig12")}
-    tables, absent = output._tables(made, (claim,))
+    assert page["pictures"] == {"fig12": ("caption of fig12", b"fig12")}
+    tables, absent = all_tables(made, (claim,))
     assert page["tables"] == tables
     assert page["claims"] == (claim,)
     missing = [f"{name} is not made: {why}" for name, why in absent.items()]
@@ -148,7 +149,7 @@ def test_tests_and_searches_stand_in_their_columns():
                            dissipated_energy=33.0)  # fmt: skip
     minimum = SimpleNamespace(evaluations=123, point=np.array([4e5, 7e6]))
     check = GeneticCheck(Condition(1.0, 1.5, 0.05), minimum, 21.0, 20.0, 8.0)
-    made, _ = tables(loops=(loop,), genetic=(check,), ended=(Ended("a", 3, 1.5, 0.2, 1.01, 420, 90, 0.7),))
+    made, _ = tables(loops=(loop,), genetic=(check,), ended=(GeneticEnd("a", 3, 1.5, 0.2, 1.01, 420, 90, 0.7),))
     assert made["tests"] == [
         {"run_id": "a", "split": "train", "current_A": 0.5, "frequency_Hz": 2.0, "amplitude_m": 0.03,
          "peak_force_N": 900.0, "dissipated_energy_J": 33.0}
@@ -237,9 +238,9 @@ def test_a_program_reads_verdicts_and_whether_the_data_are_synthetic(monkeypatch
          "seeds": "20 of 20"}
     ]  # fmt: skip
     assert (found["synthetic"], found["notes"], found["times"][-1]["seconds"]) == (False, ["one"], 12.0)
-    assert found["verdicts"] == verdicts(made)
+    assert found["verdicts"] == method_rows(made)
     made.rig = VirtualRig()
     assert output.summary(made)["synthetic"]
-    rows = {r["parameter"]: r for r in output._tables(made, ())[0]["virtual_rig"]}
+    rows = {r["parameter"]: r for r in all_tables(made, ())[0]["virtual_rig"]}
     assert rows["mass"]["value"] == 4.0
     assert (rows["mass"]["unit"], rows["mass"]["meaning"]) == ("kg", "moving mass beyond the load cell")

@@ -16,17 +16,16 @@ from mrdamper.data import Condition
 from mrdamper.errors import IdentificationError, ParameterError, UnknownNameError
 from mrdamper.identification import identify
 from mrdamper.identification.methods.balance import Balance
-from mrdamper.paper import figures, pieces
+from mrdamper.paper import figures
 from mrdamper.paper import study as study_module
-from mrdamper.paper.claims import judge_all
+from mrdamper.paper.claims import ROWS, judge_all
 from mrdamper.paper.claims_on_tests import friction_along, lost_length
 from mrdamper.paper.direct_genetic import DirectGenetic
-from mrdamper.paper.generation import GeneticSettings
+from mrdamper.paper.genetic import GeneticSettings
 from mrdamper.paper.options import PaperOptions
-from mrdamper.paper.output import parameter_rows, verdicts, write_reproduction
+from mrdamper.paper.output import method_rows, parameter_rows, write_reproduction
 from mrdamper.paper.recipes import CONSISTENT, HALF, LITERAL, SAME_FORMS
 from mrdamper.paper.study import reproduce
-from mrdamper.paper.verdicts import LIMITS
 from mrdamper.paper.virtual_rig import VirtualRig, friction_test, virtual_dataset
 from mrdamper.physics.gas_spring import GasSpring
 from mrdamper.report.plots.style import Picture
@@ -40,9 +39,9 @@ CURRENTS = (0.0, 0.5, 1.0, 2.0)
 def quick():
     """A fiftieth of the paper's generations, and fewer currents."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pieces, "GeneticSettings", lambda seed: GeneticSettings(generations=10, seed=seed))
+        patch.setattr(study_module, "GeneticSettings", lambda seed: GeneticSettings(generations=10, seed=seed))
         patch.setattr(study_module, "CURRENTS", CURRENTS)
-        patch.setattr(pieces, "SOBOL_SAMPLES", 64)
+        patch.setattr(study_module, "SOBOL_SAMPLES", 64)
         yield
 
 
@@ -64,16 +63,16 @@ def test_the_consistent_balance_predicts_what_the_literal_recipe_cannot(study):
     assert errors[SAME_FORMS] < 0.5 * errors[LITERAL]
     assert errors[CONSISTENT] < 0.05
     assert study.best.validation.median() < 0.05
-    groups = {row["verdict"] for row in verdicts(study)}
+    groups = {row["verdict"] for row in method_rows(study)}
     assert groups == {"paper (literal)", "consistent", "joint", "traditional"}
 
 
 def test_every_claim_is_judged_with_numbers_and_its_threshold_printed(study):
     claims = {c.key: c for c in judge_all(study)}
-    assert set(claims) == set(LIMITS)
+    assert set(claims) == set(ROWS)
     for claim in claims.values():
         assert claim.verdict == "cannot be judged" or any(ch.isdigit() for ch in claim.evidence), claim
-        assert all(limit.text in claim.threshold for limit in LIMITS[claim.key])
+        assert all(limit.text in claim.threshold for limit in ROWS[claim.key].limits)
     assert claims["viscosity"].verdict == "differs"
     assert claims["quadratic"].verdict == "agrees"
     # Built into the virtual rig: recovered, never confirmed.
@@ -205,7 +204,7 @@ def test_thin_data_give_what_they_allow_and_say_why_the_rest_is_missing(
         assert "errors is not made: there is no validation run" in page
         assert found.best is None
         (generalisation,) = [c for c in unjudged if c.key == "generalisation"]
-        assert "predicts no held-out run" in generalisation.evidence
+        assert "there is no validation run" in generalisation.evidence
     drawn = {path.stem for path in (tmp_path / "out" / "figures").glob("*.svg")}
     for number in (3, 4, 5, 6, 9, *range(10, 27)):
         name = f"fig{number:02d}"

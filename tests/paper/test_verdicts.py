@@ -5,7 +5,9 @@ import math
 import pytest
 
 from mrdamper.errors import UnknownNameError
-from mrdamper.paper.verdicts import LIMITS, Limit, _above, _below, judge, thresholds
+from mrdamper.paper.claims import ROWS, Limit, _above, _below, judge, steadiness, thresholds
+
+LIMITS = {key: row.limits for key, row in ROWS.items()}
 
 # Every threshold once more, so that none moves unseen: sense, limit, wider limit.
 KEPT = {
@@ -38,7 +40,7 @@ def beyond(limit, value):
 
 
 def numbers(key, pick):
-    return {limit.number: pick(limit) for limit in LIMITS[key]}
+    return [pick(limit) for limit in LIMITS[key]]
 
 
 def test_the_thresholds_are_those_that_were_settled():
@@ -60,12 +62,12 @@ def test_one_number_that_misses_makes_a_claim_hold_in_part(key, place):
     good = numbers(key, lambda x: x.holds)
     limit = LIMITS[key][place]
     if limit.near != limit.holds:
-        assert judge(key, {**good, limit.number: beyond(limit, limit.holds)}) == "agrees in part"
-    far = judge(key, {**good, limit.number: beyond(limit, limit.near)})
+        assert judge(key, [*good[:place], beyond(limit, limit.holds), *good[place + 1 :]]) == "agrees in part"
+    far = judge(key, [*good[:place], beyond(limit, limit.near), *good[place + 1 :]])
     others = any(x.alone for x in LIMITS[key] if x is not limit)
     assert far == ("agrees in part" if others else "differs")
-    missing = {name: value for name, value in good.items() if name != limit.number}
-    assert judge(key, missing) == "cannot be judged"
+    assert judge(key, [*good[:place], math.nan, *good[place + 1 :]]) == "cannot be judged"
+    assert judge(key, good[1:]) == "cannot be judged"
 
 
 @pytest.mark.parametrize(("sense", "values"), [("below", (1.0, 1.5, 2.1)), ("above", (2.1, 1.5, 0.9))])
@@ -74,19 +76,17 @@ def test_a_limit_grades_by_its_sense(sense, values):
     assert [limit.grade(v) for v in values] == [2, 1, 0]
 
 
-def test_unknown_claims_and_numbers_are_refused():
+def test_unknown_claims_are_refused():
     with pytest.raises(UnknownNameError):
-        judge("weather", {})
-    with pytest.raises(UnknownNameError):
-        judge("quadratic", {"R squared": 1.0})
+        judge("weather", [])
 
 
 def test_how_well_a_function_fits_says_nothing_by_itself():
-    quiet = {(key, x.number) for key, limits in LIMITS.items() for x in limits if not x.alone}
+    quiet = {(key, x.value) for key, limits in LIMITS.items() for x in limits if not x.alone}
     assert quiet == {
         ("mass", "R² of m over current and frequency"), ("alpha", "R²"), ("beta", "R² of ln β"),
         ("beta", "share of runs at the limit of the box"),
-        ("generalisation", "median held-out error over the median error of identification"),
+        ("generalisation", "median validation error over the median error of identification"),
     }  # fmt: skip
     for key in ("mass", "alpha", "beta"):
         fits = numbers(key, lambda x: beyond(x, x.near) if x.alone else x.holds)
@@ -99,3 +99,18 @@ def test_a_limit_without_a_wider_one_is_its_own():
     for make, sense in ((_below, "below"), (_above, "above")):
         assert make("a number", 2.0) == Limit("a number", sense, 2.0, 2.0)
         assert make("a number", 2.0, 3.0) == Limit("a number", sense, 2.0, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "others", "said"),
+    [
+        ("agrees", ["agrees"] * 3, "3 of 3"),
+        ("agrees", [*["differs"] * 2, "agrees", "agrees in part"], "1 of 4; 2 differs; 1 agrees in part"),
+        ("agrees in part", ["agrees", "agrees"], "0 of 2; 2 agrees"),
+        ("agrees", ["cannot be judged"] * 2, ""),
+        ("cannot be judged", ["cannot be judged"] * 2, ""),
+        ("agrees", [], ""),
+    ],
+)  # fmt: skip
+def test_a_verdict_is_counted_beside_those_of_other_seeds(verdict, others, said):
+    assert steadiness(verdict, others) == said

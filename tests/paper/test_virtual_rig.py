@@ -83,7 +83,7 @@ def test_the_cavity_lengthens_with_the_speed_of_the_stroke_before():
 
 
 def test_the_slow_test_shows_friction_and_no_viscosity():
-    run = friction_test()
+    run = friction_test(VirtualRig())
     speed = np.abs(np.diff(run.displacement) / np.diff(run.time))
     assert np.mean(speed) == pytest.approx(SLOW_SPEED, rel=0.6)  # gauge noise moves it too
     assert np.ptp(run.force) < 300
@@ -210,10 +210,10 @@ def test_runs_are_named_after_their_condition_and_hold_steady_cycles_after_a_run
 
 
 def test_the_dry_friction_test_holds_neither_yield_nor_viscous_force():
-    dry, filled = friction_test(), friction_test(filled=True)
+    dry, filled = friction_test(VirtualRig()), friction_test(VirtualRig(), filled=True)
     assert np.ptp(filled.force) - np.ptp(dry.force) == pytest.approx(2 * VirtualRig().yield_off, abs=15)
     assert dry.id == "friction-0.01mm-s"
     assert dry.time[-1] == pytest.approx(1.25 * 0.08 / SLOW_SPEED)
     assert dry.nominal == Condition(0.0, SLOW_SPEED / 0.08, 0.020)
-    assert np.array_equal(friction_test(seed=2).force, friction_test(seed=2).force)
-    assert not np.array_equal(friction_test(seed=2).force, dry.force)
+    assert np.array_equal(friction_test(VirtualRig(), seed=2).force, friction_test(VirtualRig(), seed=2).force)
+    assert not np.array_equal(friction_test(VirtualRig(), seed=2).force, dry.force)

@@ -19,7 +19,7 @@ from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.paper.assumptions import PaperAssumptions
 from mrdamper.paper.functions import fit_paper_functions
 from mrdamper.paper.options import PaperOptions
-from mrdamper.paper.recipes import one_per_current, through_chosen
+from mrdamper.paper.recipes import fit_chosen_functions, one_per_current
 from mrdamper.physics.gas_spring import GasSpring
 from mrdamper.physics.motion import measured_motion, sine
 from mrdamper.statistics.metrics import Scores
@@ -145,7 +145,7 @@ def tests():
     return runs, [Basis("bouc-wen", Balance()).identify(run) for run in runs]
 
 
-@pytest.mark.parametrize("make", [fit_per_run, fit_paper_functions, one_per_current, through_chosen])
+@pytest.mark.parametrize("make", [fit_per_run, fit_paper_functions, one_per_current, fit_chosen_functions])
 def test_a_refit_is_what_the_kept_runs_alone_make(tests, make):
     runs, identifications = tests
     rows = [i for i in range(len(runs)) if i not in (1, 7)]

@@ -10,6 +10,7 @@ import numpy as np
 
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import InputError
+from mrdamper.physics.hysteresis.master_curve import gauss_legendre
 
 _ALIKE = 0.98  # correlation from which two parameters are strongly correlated
 _SAME = 0.03  # frequencies and amplitudes this close are one
@@ -48,7 +49,7 @@ def _student(level: float, dof: float) -> float:
         first, second = (z**3 + z) / 4, (5 * z**5 + 16 * z**3 + 3 * z) / 96
         return z + first / dof + second / dof**2 + (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / 384 / dof**3
     whole = 0.5 * math.sqrt(math.pi) * math.exp(math.lgamma(dof / 2) - math.lgamma((dof + 1) / 2))
-    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    nodes, weights = gauss_legendre(_NODES)
     angle = 0.0
     for _ in range(_MOST_STEPS):  # the integral is concave: Newton's steps come from below
         reached = angle / 2 * float(weights @ np.cos(angle / 2 * (nodes + 1)) ** (dof - 1))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mrdamper.data import Condition, Floats, Run
+from mrdamper.data import Condition, Run
 from mrdamper.errors import IdentificationError
 from mrdamper.identification import Method, identify
 from mrdamper.identification.harmonic_balance import separate_mass
@@ -88,29 +88,19 @@ def outside_paper_range(train: Sequence[Run]) -> tuple[str, ...]:
     conditions = [analyse_motion(run).condition for run in train]
     current = max(abs(c.current_A) for c in conditions)
     frequency = max(c.frequency_Hz for c in conditions)
-    found = []
+    beyond = []
     if current > _TOLERANCE * HIGHEST_CURRENT:
-        found.append(f"currents up to {current:.3g} A (the paper: up to {HIGHEST_CURRENT:g} A)")
+        beyond.append(f"currents up to {current:.3g} A (the paper: up to {HIGHEST_CURRENT:g} A)")
     if frequency > _TOLERANCE * HIGHEST_FREQUENCY:
-        found.append(f"frequencies up to {frequency:.3g} Hz (the paper: 0.5 to {HIGHEST_FREQUENCY:g} Hz)")
-    if not found:
-        return ()
-    return (f"outside the range of the paper, where its functions were not tested: {'; '.join(found)}",)
+        beyond.append(f"frequencies up to {frequency:.3g} Hz (the paper: 0.5 to {HIGHEST_FREQUENCY:g} Hz)")
+    text = f"outside the range of the paper, where its functions were not tested: {'; '.join(beyond)}"
+    return (text,) if beyond else ()
 
 
 def missing_functions(conditions: Sequence[Condition]) -> tuple[str, ...]:
-    """Name the functions of the paper that tests at these conditions do not determine, with the levels there are."""
-    currents = np.unique(np.round([c.current_A for c in conditions], 2))
-    frequencies, amplitudes, products = (
-        _levels(np.array(values))
-        for values in (
-            [c.frequency_Hz for c in conditions],
-            [c.amplitude_m for c in conditions],
-            [c.frequency_Hz * c.amplitude_m for c in conditions],
-        )
-    )
-    levels = currents.size, frequencies, amplitudes, products
-    return tuple(name for name, least in _FUNCTIONS if any(n < m for n, m in zip(levels, least, strict=True)))
+    """Name the functions of the paper that tests at these conditions do not determine."""
+    there = _levels(conditions)
+    return tuple(name for name, least in _FUNCTIONS if any(n < m for n, m in zip(there, least, strict=True)))
 
 
 def require_paper_functions(train: Sequence[Run]) -> None:
@@ -122,25 +112,22 @@ def require_paper_functions(train: Sequence[Run]) -> None:
         E_PAPER_TESTS with the functions by name.
     """
     conditions = [analyse_motion(run).condition for run in train]
-    missing = missing_functions(conditions)
-    if not missing:
-        return
-    counts = (
-        (np.unique(np.round([c.current_A for c in conditions], 2)).size, "current"),
-        (_levels(np.array([c.frequency_Hz for c in conditions])), "frequency"),
-        (_levels(np.array([c.amplitude_m for c in conditions])), "amplitude"),
-    )
-    plural = {"current": "currents", "frequency": "frequencies", "amplitude": "amplitudes"}
-    text = ", ".join(f"{count} {name if count == 1 else plural[name]}" for count, name in counts)
-    raise IdentificationError(
-        f"the tests have {text}: the paper's functions of {'; of '.join(missing)} cannot be made",
-        mend="test at least 3 currents, 3 frequencies and 2 amplitudes, or take shorter functions in their place: "
-        "--set functions=shorter",
-        code="E_PAPER_TESTS",
-    )
+    if missing := missing_functions(conditions):
+        names = ("current", "currents"), ("frequency", "frequencies"), ("amplitude", "amplitudes")
+        levels = zip(_levels(conditions), names, strict=False)
+        text = ", ".join(f"{count} {one if count == 1 else several}" for count, (one, several) in levels)
+        raise IdentificationError(
+            f"the tests have {text}: the paper's functions of {'; of '.join(missing)} cannot be made",
+            mend="test at least 3 currents, 3 frequencies and 2 amplitudes, or take shorter functions in their place: "
+            "--set functions=shorter",
+            code="E_PAPER_TESTS",
+        )
 
 
-def _levels(values: Floats) -> int:
-    """Count values that differ by more than the repeatability of a rig."""
-    ordered = np.sort(np.log(values))
-    return 1 + int(np.count_nonzero(np.diff(ordered) > _SAME_LEVEL))
+def _levels(conditions: Sequence[Condition]) -> tuple[int, int, int, int]:
+    """Count currents, frequencies, amplitudes and their products that differ by more than a rig's repeatability."""
+    currents = np.unique(np.round([c.current_A for c in conditions], 2)).size
+    frequency, amplitude = np.log([(c.frequency_Hz, c.amplitude_m) for c in conditions]).T
+    sides = (np.diff(np.sort(values)) for values in (frequency, amplitude, frequency + amplitude))
+    counts = [1 + int(np.count_nonzero(steps > _SAME_LEVEL)) for steps in sides]
+    return currents, counts[0], counts[1], counts[2]

@@ -1,9 +1,10 @@
-"""What the tests say before any model: friction, bulge, energy, the force after a stroke end, F0 and its phase."""
+"""Measurements on the tests, before any model: friction, bulge, energy, stroke ends, F0 and its phase."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -12,126 +13,144 @@ from mrdamper.data import Condition, Floats, Run, same_motion
 from mrdamper.errors import IdentificationError
 from mrdamper.identification.harmonic_balance import SineRecord
 from mrdamper.paper.recipes import CONSISTENT
-from mrdamper.paper.results import SAME, Reproduction, amplitudes, motions, values
-from mrdamper.paper.verdicts import Measured, measured, unknown
+from mrdamper.paper.results import SAME, Reproduction, motions, values
 from mrdamper.physics.motion import equivalent_sine, measured_motion
 from mrdamper.statistics.functions.fitting import fit_function
 
+_FULL = 0.9  # share of the mid-stroke force that counts as back after a reversal
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Values that a claim rests on, in the order of its limits; none where it could not be measured.
+
+    Attributes
+    ----------
+    values : tuple of float
+    evidence : str
+        Further values, or why there are none.
+    """
+
+    values: tuple[float, ...] = ()
+    evidence: str = ""
+
+    @classmethod
+    def of(cls, *values: float | np.floating, evidence: str = "") -> Measured:
+        """Take values in the order of the limits."""
+        return cls(tuple(map(float, values)), evidence)
+
+
+def unknown(why: str) -> Measured:
+    """Return no values, and the reason."""
+    return Measured(evidence=why)
+
 
 def gas_series(study: Reproduction) -> Measured:
-    """How far the third-order series misses the gas force over the strokes tested."""
+    """Compare the third-order series with the gas force over the strokes tested."""
     if study.gas is None:
         return unknown("the gas spring of this rig is not known")
     X = max(loop.condition.amplitude_m for loop in study.loops)
-    return measured("gas series", study.gas.taylor_error(X), evidence=f"within ±{1e3 * X:.0f} mm")
+    return Measured.of(study.gas.taylor_error(X), evidence=f"within ±{1e3 * X:.0f} mm")
 
 
 def friction(study: Reproduction) -> Measured:
-    """Friction of the slow test, beside the smallest peak force."""
+    """Measure the friction of the slow test, beside the smallest peak force."""
     if study.friction is None:
         return unknown("the data hold no friction test")
-    _, found = friction_along(study.friction)
-    share = float(np.mean(found)) / min(loop.peak_force for loop in study.loops)
+    _, forces = friction_along(study.friction)
+    share = float(np.mean(forces)) / min(loop.peak_force for loop in study.loops)
     fluid = "with" if study.options.friction_test == "filled" else "without"
-    return measured("friction", found.min(), found.max(), share, evidence=f"test {fluid} fluid")
+    return Measured.of(forces.min(), forces.max(), share, evidence=f"test {fluid} fluid")
 
 
 def bulges(study: Reproduction) -> Measured:
-    """Share of loops that are widest at mid-stroke."""
+    """Return the share of loops that are widest at mid-stroke."""
     ratios = np.array([bulge(run) for run in study.train])
-    evidence = f"ratio of widths {ratios.min():.2f}–{ratios.max():.2f}"
-    return measured("bulge", np.mean(ratios > 1), evidence=evidence)
+    return Measured.of(np.mean(ratios > 1), evidence=f"ratio of widths {ratios.min():.2f}–{ratios.max():.2f}")
 
 
 def energy(study: Reproduction) -> Measured:
-    """Shares of steps in current and frequency that raise the energy of a cycle."""
+    """Return the shares of steps in current and frequency that raise the energy of a cycle."""
     energies = [loop.dissipated_energy for loop in study.loops]
     shares = rising_shares([loop.condition for loop in study.loops], energies)
-    return measured("energy", *shares, evidence=f"{min(energies):.3g}–{max(energies):.3g} J a cycle")
+    return Measured.of(*shares, evidence=f"{min(energies):.3g}–{max(energies):.3g} J per cycle")
 
 
 def stroke_end(study: Reproduction) -> Measured:
-    """Length without force after a reversal, at the fastest motion over the slowest, at the highest current."""
-    consistent = study.contender(CONSISTENT)
-    if consistent is None:
-        return unknown("the viscous force is not known: the consistent way could not be followed")
+    """Compare the lost lengths at the highest current, fastest motion over slowest."""
+    if study.contender(CONSISTENT) is None:
+        return unknown("the viscous force is not known: the consistent method could not be followed")
     top = max(c.current_A for c in study.conditions)
-    damping, k1, m = (values(study, CONSISTENT, name) for name in ("c", "k1", "m"))
-    pairs = [
-        (condition.peak_velocity, run, (c, k - mass * (2 * np.pi * condition.frequency_Hz) ** 2))
-        for condition, run, c, k, mass in zip(
-            study.conditions, study.train, damping.tolist(), k1.tolist(), m.tolist(), strict=True
-        )
+    linear = zip(*(values(study, CONSISTENT, name).tolist() for name in ("c", "k1", "m")), strict=True)
+    tests = [
+        (condition.peak_velocity, run, c, k1 - m * (2 * np.pi * condition.frequency_Hz) ** 2)
+        for condition, run, (c, k1, m) in zip(study.conditions, study.train, linear, strict=True)
         if condition.current_A > top - 0.01
     ]
-    slow, fast = min(pairs, key=lambda p: p[0]), max(pairs, key=lambda p: p[0])
-    if fast[0] < 1.3 * slow[0]:
+    ends = min(tests, key=lambda p: p[0]), max(tests, key=lambda p: p[0])
+    (slow, *_), (fast, *_) = ends
+    if fast < 1.3 * slow:
         return unknown("one speed at the highest current")
-    lengths = [1e3 * lost_length(run, *linear) for _, run, linear in (slow, fast)]
-    return measured(
-        "stroke end",
-        lengths[1] / lengths[0],
-        evidence=f"at {top:g} A 90 % of the hysteretic force is back after {lengths[0]:.2f} mm at "
-        f"{slow[0]:.2f} m/s and after {lengths[1]:.2f} mm at {fast[0]:.2f} m/s",
+    short, long = (1e3 * lost_length(*test) for _, *test in ends)
+    return Measured.of(
+        long / short,
+        evidence=f"at {top:g} A 90 % of the hysteretic force is back after {short:.2f} mm at {slow:.2f} m/s and after "
+        f"{long:.2f} mm at {fast:.2f} m/s",
     )
 
 
 def phase(study: Reproduction) -> Measured:
-    """Where the lead of the force lies, and how much the current moves it."""
-    found = np.array([r.phase for r in study.readings])
-    several = [group for group in motions(study) if len(group) > 1]
-    spread = max((float(np.ptp(found[group])) for group in several), default=float("nan"))
-    inside = np.mean((found > 1.4) & (found < 1.5))
-    evidence = f"{found.min():.3f}–{found.max():.3f} rad; smallest sine {np.sin(found).min():.3f}"
-    return measured("phase", inside, spread, evidence=evidence)
+    """Return the share of runs with a lead of 1.4–1.5 rad, and its largest change with the current."""
+    leads = np.array([r.phase for r in study.readings])
+    spread = max((float(np.ptp(leads[g])) for g in motions(study) if len(g) > 1), default=float("nan"))
+    evidence = f"{leads.min():.3f}–{leads.max():.3f} rad; smallest sine {np.sin(leads).min():.3f}"
+    return Measured.of(np.mean((leads > 1.4) & (leads < 1.5)), spread, evidence=evidence)
 
 
 def quadratic(study: Reproduction) -> Measured:
-    """The motion on which a quadratic of the current says least of F0."""
-    F0, fits = amplitudes(study), []
-    for group in motions(study):
-        if len({round(study.conditions[i].current_A, 3) for i in group}) < 4:
-            continue
-        with suppress(IdentificationError):  # currents too near each other to determine it
-            fits.append(fit_function("quadratic-current", [study.conditions[i] for i in group], F0[group]).r2)
+    """Return the lowest R² of a quadratic of the current for F0 at a motion."""
+    F0, fits, groups = values(study, "", "F0"), [], motions(study)
+    for group in groups:
+        if len({round(study.conditions[i].current_A, 3) for i in group}) > 3:
+            with suppress(IdentificationError):  # currents too near each other to determine it
+                fits.append(fit_function("quadratic-current", [study.conditions[i] for i in group], F0[group]).r2)
     if not fits:
-        return unknown(f"{_tested_at(study, 4)}: a quadratic through three of them would prove nothing")
-    return measured("quadratic", min(fits), evidence=f"up to {max(fits):.4f} over {len(fits)} motions")
+        return unknown(
+            f"none of {len(groups)} motions was tested at 4 currents or more: a quadratic through three points would "
+            "prove nothing"
+        )
+    return Measured.of(min(fits), evidence=f"up to {max(fits):.4f} over {len(fits)} motions")
 
 
 def speed_shift(study: Reproduction) -> Measured:
-    """One surface for F0 over current and f · A."""
+    """Fit one surface for F0 over current and f · A."""
     try:
-        return measured("speed shift", fit_function("quadratic-current-speed", study.conditions, amplitudes(study)).r2)
+        return Measured.of(fit_function("quadratic-current-speed", study.conditions, values(study, "", "F0")).r2)
     except IdentificationError as error:
         return unknown(str(error))
 
 
 def saturation(study: Reproduction) -> Measured:
-    """How much flatter F0 rises above 1.5 A than below 1 A."""
-    currents, F0 = np.array([c.current_A for c in study.conditions]), amplitudes(study)
+    """Compare the slopes of F0 above 1.5 A and below 1 A."""
+    currents, F0 = np.array([c.current_A for c in study.conditions]), values(study, "", "F0")
     levels = np.unique(np.round(currents, 3))
     low, high = levels[levels <= 1.0], levels[levels >= 1.5]
     if low.size < 2 or high.size < 2:
         return unknown(f"tested up to {levels.max():g} A: two currents at or above 1.5 A and two up to 1 A are needed")
-    mean = {level: float(F0[np.abs(currents - level) < 1e-3].mean()) for level in levels}
-    slopes = [float(np.polyfit(part, [mean[x] for x in part], 1)[0]) for part in (low, high)]
-    return measured(
-        "saturation",
-        slopes[1] / slopes[0],
-        evidence=f"F0 rises by {slopes[0]:.0f} N/A up to 1 A and by {slopes[1]:.0f} N/A above 1.5 A",
+    means = [[float(F0[np.abs(currents - level) < 1e-3].mean()) for level in part] for part in (low, high)]
+    below, above = (float(np.polyfit(part, mean, 1)[0]) for part, mean in zip((low, high), means, strict=True))
+    return Measured.of(
+        above / below, evidence=f"F0 rises by {below:.0f} N/A up to 1 A and by {above:.0f} N/A above 1.5 A"
     )
 
 
 def friction_along(run: Run) -> tuple[Floats, Floats]:
-    """Positions [m] and friction [N] of a slow test: half the force between out-stroke and in-stroke.
+    """Return positions [m] and friction [N] of a slow test: half the force between out-stroke and in-stroke.
 
     At one position the gas spring is the same in both strokes and drops out.
     """
-    path = measured_motion(run).path
-    longest = np.argsort(np.bincount(path.stroke))[-2:]
-    sweeps = []
-    for stroke in longest:
+    path, sweeps = measured_motion(run).path, []
+    for stroke in np.argsort(np.bincount(path.stroke))[-2:]:
         inside = path.stroke == stroke
         order = np.argsort(run.displacement[inside])
         width = max(1, order.size // 60)
@@ -145,62 +164,46 @@ def friction_along(run: Run) -> tuple[Floats, Floats]:
 
 
 def lost_length(run: Run, damping: float, stiffness: float = 0.0) -> float:
-    """Distance [m] after a reversal in which the force is back at 90 % of its mid-stroke value; median.
+    """Return the distance [m] after a reversal within which 90 % of the mid-stroke force is back; median.
 
     The viscous and the in-phase force, of a damping [N s/m] and a stiffness less mass [N/m], are subtracted: they
     differ between motions for other reasons.
     """
     steady = run.steady()
     motion, centre = measured_motion(steady), equivalent_sine(run).centre
-    path, force = motion.path, steady.force - np.mean(steady.force) - damping * motion.velocity
-    force = force - stiffness * (motion.displacement - centre)
-    amplitude = float(np.ptp(motion.displacement)) / 2
-    middle = np.abs(motion.displacement - centre) < 0.3 * amplitude
-    full = 0.9 * float(np.median((path.direction * force)[middle]))
-    found = []
+    x, path = motion.displacement - centre, motion.path
+    force = path.direction * (steady.force - np.mean(steady.force) - damping * motion.velocity - stiffness * x)
+    full = _FULL * float(np.median(force[np.abs(x) < 0.3 * float(np.ptp(x)) / 2]))
+    lengths = []
     for stroke in range(1, path.stroke[-1]):
         inside = path.stroke == stroke
-        back = np.flatnonzero(path.direction[inside] * force[inside] >= full)
+        back = np.flatnonzero(force[inside] >= full)
         if back.size:
-            found.append(path.distance[inside][back[0]])
-    return float(np.median(found)) if found else float("nan")
+            lengths.append(path.distance[inside][back[0]])
+    return float(np.median(lengths)) if lengths else float("nan")
 
 
 def rising_shares(conditions: Sequence[Condition], energies: Sequence[float]) -> tuple[float, float]:
-    """Shares of steps in current at one motion, and in frequency at one current and amplitude, that raise the energy.
-
-    NaN where there is no such step.
+    """Return the shares of steps in current at one motion, and in frequency at one current and amplitude, that raise
+    the energy; NaN where there is no such step.
     """
-    by_current: list[bool] = []
-    for group in same_motion(conditions, tolerance=SAME):
-        ordered = sorted(group, key=lambda i: conditions[i].current_A)
-        by_current += [energies[b] > energies[a] for a, b in pairwise(ordered)]
-    by_frequency: list[bool] = []
     keys = [(round(c.current_A, 2), round(np.log(c.amplitude_m) / SAME)) for c in conditions]
-    for key in sorted(set(keys)):
-        ordered = sorted((i for i, k in enumerate(keys) if k == key), key=lambda i: conditions[i].frequency_Hz)
-        by_frequency += [energies[b] > energies[a] for a, b in pairwise(ordered)]
-    return _share(by_current), _share(by_frequency)
+    alike = [[i for i, k in enumerate(keys) if k == key] for key in sorted(set(keys))]
 
+    def share(groups: Iterable[Sequence[int]], name: str) -> float:
+        ordered = (sorted(group, key=lambda i: getattr(conditions[i], name)) for group in groups)
+        steps = [energies[b] > energies[a] for group in ordered for a, b in pairwise(group)]
+        return float(np.mean(steps)) if steps else float("nan")
 
-def _share(steps: Sequence[bool]) -> float:
-    return float(np.mean(steps)) if steps else float("nan")
+    return share(same_motion(conditions, tolerance=SAME), "current_A"), share(alike, "frequency_Hz")
 
 
 def bulge(run: Run) -> float:
-    """Width of the force–displacement loop [N] at x = 0 over that at 0.8 X."""
+    """Return the width of the force–displacement loop [N] at x = 0 over that at 0.8 X."""
     record = SineRecord.of(run)
-    phase = np.degrees(record.theta)
-    width = []
+    phase, width = np.degrees(record.theta), []
     for angle in (0.0, float(np.degrees(np.arcsin(0.8)))):
         out = np.abs((phase - angle + 180) % 360 - 180) < 5
         back = np.abs((phase - (180 - angle) + 180) % 360 - 180) < 5
         width.append(float(np.mean(record.force[out]) - np.mean(record.force[back])))
     return width[0] / width[1]
-
-
-def _tested_at(study: Reproduction, least: int) -> str:
-    """How many motions were tested at how many currents, in words."""
-    counts = [len({round(study.conditions[i].current_A, 3) for i in group}) for group in motions(study)]
-    enough = sum(count >= least for count in counts)
-    return f"{enough} of {len(counts)} motions were tested at {least} currents or more"

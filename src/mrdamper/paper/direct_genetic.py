@@ -1,8 +1,8 @@
-"""Every parameter at once by the genetic algorithm: what the paper compares its method with.
+"""Every parameter at once by the genetic algorithm: the method that the paper compares its own with.
 
-[Qian et al. 2024, section 5] The box is laid from the run itself, in yield force and yield
-displacement: on [0, 1e8] for alpha and beta, with c, k and f0 free beside them, the search
-ends anywhere. A = 1: with alpha, beta and gamma free it changes no force.
+[Qian et al. 2024, section 6] The box is derived from the run itself, in yield force and yield displacement: on [0, 1e8]
+for alpha and beta, with c, k and f0 free beside them, the search ends anywhere. A = 1: with alpha, beta and gamma free
+it changes no force.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from mrdamper.identification.methods.balance import steady_state
 from mrdamper.identification.problem import Method, Problem, Solution
 from mrdamper.models import Scale
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.paper.generation import GENERATIONS_OF_MANY, GeneticSettings
-from mrdamper.paper.genetic import GeneticMinimum, genetic
+from mrdamper.paper.genetic import GENERATIONS_OF_MANY, GeneticMinimum, GeneticSettings, genetic
 
-_SAMPLES = 200
+_SAMPLES = 200  # samples of a run in the search
+_LINEAR = ("c", "f0", "k1", "k2", "k3", "m")
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,7 @@ class DirectGenetic(Method):
     ----------
     genetic : GeneticSettings
     bounds : mapping of str to (float, float)
-        Replace the box of a coordinate: c, f0, k1, k3, m, yield_force, yield_displacement, n,
-        asymmetry [SI].
+        Replace the box of a coordinate: c, f0, k1, k3, m, yield_force, yield_displacement, n, asymmetry [SI].
     """
 
     name: ClassVar[str] = "direct-genetic"
@@ -63,61 +62,58 @@ class DirectGenetic(Method):
         return self.solution(problem, self.genetic_search(problem))
 
     def genetic_search(self, problem: Problem) -> GeneticMinimum:
-        """Run the search alone; arguments and errors as `solve`."""
+        """Run the search alone; errors as `solve`."""
         if not issubclass(problem.model_type, BoucWen) or problem.with_delay:
             raise IdentificationError(
                 f"method {self.name} identifies the Bouc–Wen model, without a delay",
                 mend="use model bouc-wen, or another method",
             )
-        record = _thinned(SineRecord.of(problem.run))
-        box = self._box(problem)
-        lower, upper = zip(*box.values(), strict=True)
-        return genetic(_Errors(problem, record, box), lower, upper, self.genetic)
+        record, box = _thinned(problem), self._box(problem)
+        return genetic(_Errors(problem, record, box), *zip(*box.values(), strict=True), self.genetic)
 
-    def solution(self, problem: Problem, found: GeneticMinimum) -> Solution:
-        """What a search found of a problem."""
+    def solution(self, problem: Problem, minimum: GeneticMinimum) -> Solution:
+        """Complete the end of a search to a solution."""
         box = self._box(problem)
-        end = dict(zip(box, found.point.tolist(), strict=True))
+        end = dict(zip(box, minimum.point.tolist(), strict=True))
         at_bounds = tuple(
-            name
-            for name, value in end.items()
-            if min(value - box[name][0], box[name][1] - value) < 1e-3 * np.ptp(box[name])
+            name for name, u in end.items() if min(u - box[name][0], box[name][1] - u) < 1e-3 * np.ptp(box[name])
         )
-        model = BoucWen.build({**problem.fixed, **end})
-        searched = {name: end[name] for name in ("yield_displacement", "asymmetry", "n") if name in end}
-        return Solution(model, 0.0, at_bounds, {}, searched, found.evaluations, found.ending, self.genetic.seed)
+        shape = {name: end[name] for name in ("yield_displacement", "asymmetry", "n") if name in end}
+        model, seed = BoucWen.build({**problem.fixed, **end}), self.genetic.seed
+        return Solution(model, 0.0, at_bounds, {}, shape, minimum.evaluations, minimum.ending, seed)
 
     def _box(self, problem: Problem) -> dict[str, tuple[float, float]]:
-        return {**_box(problem, _thinned(SineRecord.of(problem.run))), **self.bounds}
+        """Allow every parameter up to twice what the largest force would take."""
+        record = _thinned(problem)
+        peak, X = 2 * float(np.max(np.abs(record.force))), record.condition.amplitude_m
+        speed = X * record.omega
+        sizes = (peak / speed, peak, peak / X, peak / X**2, peak / X**3, peak / (speed * record.omega))
+        box = {
+            name: (0.0 if name == "c" else -size, size)
+            for name, size in zip(_LINEAR, sizes, strict=True)
+            if name in problem.free
+        }
+        axes = problem.model_type.within(
+            problem.model_type.search_axes(Scale.of(record.motion, record.force, X), problem.free), problem.fixed
+        )
+        box |= {a.name: (a.lower, a.upper) for a in axes}
+        if "yield_displacement" in box:
+            # The paper searches on a linear scale; a hundredth of an amplitude is a usual yield displacement.
+            box["yield_displacement"] = (1e-4 * X, min(0.5 * X, box["yield_displacement"][1]))
+        return box | ({"yield_force": (0.0, peak)} if "alpha" in problem.free else {}) | dict(self.bounds)
 
 
-def _thinned(record: SineRecord) -> SineRecord:
+def _thinned(problem: Problem) -> SineRecord:
+    record = SineRecord.of(problem.run)
     pick = np.unique(np.linspace(0, record.theta.size - 1, _SAMPLES).round().astype(int))
-    return SineRecord(record.run_id, record.condition, record.theta[pick], record.force[pick])
-
-
-def _box(problem: Problem, record: SineRecord) -> dict[str, tuple[float, float]]:
-    """Twice what the largest force would take, parameter by parameter."""
-    peak, X = 2 * float(np.max(np.abs(record.force))), record.condition.amplitude_m
-    speed = X * record.omega
-    sizes = {"f0": peak, "k1": peak / X, "k2": peak / X**2, "k3": peak / X**3, "m": peak / (speed * record.omega)}
-    box = {"c": (0.0, peak / speed)} if "c" in problem.free else {}
-    box |= {name: (-size, size) for name, size in sizes.items() if name in problem.free}
-    axes = problem.model_type.within(
-        problem.model_type.search_axes(Scale.of(record.motion, record.force, X), problem.free), problem.fixed
-    )
-    # The paper searches on a linear scale; a hundredth of an amplitude is a usual yield displacement.
-    box |= {a.name: (a.lower, a.upper) for a in axes}
-    if "yield_displacement" in box:
-        box["yield_displacement"] = (1e-4 * X, min(0.5 * X, box["yield_displacement"][1]))
-    return box | ({"yield_force": (0.0, peak)} if "alpha" in problem.free else {})
+    return replace(record, theta=record.theta[pick], force=record.force[pick])
 
 
 class _Errors:
     """RMSE of the force of many points at once.
 
-    The error is quadratic in everything but the shape of the loop, so each shape is followed once
-    and leaves a few sums; children inherit most shapes unchanged.
+    The error is quadratic in everything but the shape of the loop, so each shape is followed once and leaves a few
+    sums; children inherit most shapes unchanged.
     """
 
     def __init__(self, problem: Problem, record: SineRecord, box: Mapping[str, tuple[float, float]]):
@@ -130,13 +126,13 @@ class _Errors:
         self.shape_names = [names[i] for i in self.shape]
         # The columns do not depend on the shape; any will do to evaluate them.
         self.zero = {**dict.fromkeys((names[i] for i in self.linear), 0.0), "yield_force": 0.0}
-        bare = self._model({**self.zero, **{name: box[name][0] for name in self.shape_names}})
-        base, self.columns = linear_table(bare, infos, record.motion, np.zeros(record.theta.size))
+        model = self._model({name: box[name][0] for name in self.shape_names})
+        base, self.columns = linear_table(model, infos, record.motion, np.zeros(record.theta.size))
         self.right = record.force - base
         self.known: dict[tuple[float, ...], Floats] = {}
 
     def __call__(self, points: Floats) -> Floats:
-        """(P, D) points -> (P,) errors [N]."""
+        """Return the errors [N] of (P, D) points."""
         rows = [tuple(row) for row in points[:, self.shape].tolist()]
         for row in [row for row in dict.fromkeys(rows) if row not in self.known]:
             self.known[row] = self._sums(row)
@@ -149,13 +145,12 @@ class _Errors:
         return np.sqrt(np.maximum(square, 0.0) / self.right.size)
 
     def _sums(self, row: tuple[float, ...]) -> Floats:
-        """Products of the hysteretic force, or its unit, with the columns, the right side and itself."""
-        shape = dict(zip(self.shape_names, row, strict=True))
-        model = self._model({**self.zero, **shape})
+        """Return products of the hysteretic force, or its unit, with the columns, the right side and itself."""
+        model = self._model(dict(zip(self.shape_names, row, strict=True)))
         scale = 1 / model.yield_displacement if self.force is not None else self.problem.fixed["alpha"]
         state = scale * steady_state(model, self.record)
         return np.array([*(state @ self.columns), state @ self.right, state @ state])
 
-    def _model(self, values: Mapping[str, float]) -> BoucWen:
-        given = {**self.problem.fixed, **values}
-        return BoucWen.build({name: value for name, value in given.items() if name != "alpha"})
+    def _model(self, shape: Mapping[str, float]) -> BoucWen:
+        values = {**self.problem.fixed, **self.zero, **shape}
+        return BoucWen.build({name: value for name, value in values.items() if name != "alpha"})

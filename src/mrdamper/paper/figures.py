@@ -1,156 +1,483 @@
-"""The paper's figures under their numbers, and those of this study, which have names.
+"""Figures of the paper under their numbers, and those of this study, which have names.
 
 Figures 1, 2, 7 and 8 of the paper show its damper, its rig and two schemes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from functools import partial
+from types import MappingProxyType
 
+import numpy as np
+from matplotlib.figure import Figure
+
+from mrdamper.data import Condition, Floats, Run
+from mrdamper.errors import IdentificationError
 from mrdamper.identification.loop_analysis import dynamic_ranges
-from mrdamper.paper.loop_figures import (
-    Made,
-    friction_figure,
-    identified_loops,
-    loops_by,
-    predicted_loops,
-    predicted_over,
-)
-from mrdamper.paper.parameter_figures import function_figure, over_motion, parameter_figure, r2_figure, readings_figure
-from mrdamper.paper.recipes import LITERAL, TRADITIONAL
-from mrdamper.paper.results import Reproduction
-from mrdamper.paper.verdict_figures import (
-    accuracy_rate,
-    errors_figure,
-    genetic_figure,
-    methods_figure,
-    seconds_figure,
-    seeds_figure,
-    sensitivity_figure,
-)
+from mrdamper.paper.charts import Chart, Line, Panel, draw
+from mrdamper.paper.claims_on_tests import friction_along
+from mrdamper.paper.recipes import CONSISTENT, LITERAL, TRADITIONAL
+from mrdamper.paper.results import SAME, Reproduction, cost_per_run, function_of, motions, rate_rows, values
+from mrdamper.physics.motion import equivalent_sine, measured_motion
+from mrdamper.physics.simulation import simulate
+from mrdamper.report.plots.comparison import overlaid_loops
 from mrdamper.report.plots.rig_tests import test_analysis, test_matrix
-from mrdamper.report.plots.style import Picture
+from mrdamper.report.plots.style import MEASURED, MM, PALETTE, Picture, current_colours, powered, thin
+from mrdamper.statistics.functions.fitting import fit_function
+from mrdamper.statistics.functions.forms import ParameterFunction, features
 from mrdamper.study.recipe import Progress
 
 SECONDS = "seconds"  # name of the figure that differs from run to run; it stands beside the page
+_MOST_LOOPS, _LOOP_POINTS = 9, 400  # loops in one panel, points of a loop
+_LIST = {"right": 2.3}  # margin for a list of motions [inches]
+_POINTS = {"marker": "o", "ms": 3.5}
 
-_F0, _M, _ALPHA, _BETA, _OFFSET = "F0 (N)", "m (kg)", "α (N/m)", "β (m⁻ⁿ)", "f0 (N)"
+Texts = Sequence[tuple[str, str]]  # of the axes of each panel
+Drawing = Chart | Figure | str  # or why there is none
 
-Figures = Mapping[str, tuple[str, Callable[[Reproduction], Made]]]
+
+@dataclass(frozen=True)
+class Entry:
+    """A figure: what it shows, where the paper has it, its axes, and the function that makes it.
+
+    Attributes
+    ----------
+    title : str
+    source : str
+        Section or equation of Qian et al. 2024; empty for figures of this study.
+    axes : sequence of (str, str)
+        Texts of the axes of each panel; of figures with several columns, those of one column.
+    make : callable
+        Of the study and the axes.
+    """
+
+    title: str
+    source: str
+    axes: Texts
+    make: Callable[[Reproduction, Texts], Drawing]
+
+
+def caption(name: str) -> str:
+    """Return the caption of a figure, with the paper's number if it has one."""
+    entry = FIGURES[name]
+    number = f"Fig. {int(name[3:])}. " if name.startswith("fig") else ""
+    return f"{number}{entry.title}{f' [{entry.source}]' if entry.source else ''}."
 
 
 def pictures(
     study: Reproduction, also: tuple[str, ...], names: tuple[str, ...], progress: Progress
 ) -> dict[str, Picture | str]:
-    """Figures by name, or why they cannot be drawn."""
-    found: dict[str, Picture | str] = {}
+    """Draw figures by name, or say why they cannot be drawn."""
+    drawn: dict[str, Picture | str] = {}
     for number, name in enumerate(names):
         progress(f"figure {name}", number / len(names))
-        made = FIGURES[name][1](study)
-        found[name] = made if isinstance(made, str) else Picture.of(made, also)
-    return found
+        made = FIGURES[name].make(study, FIGURES[name].axes)
+        drawn[name] = (
+            made if isinstance(made, str) else Picture.of(draw(made) if isinstance(made, Chart) else made, also)
+        )
+    return drawn
 
 
-FIGURES: Figures = {
-    "fig03": (
-        "Fig. 3. Friction test at 0.01 mm/s: force, and half the force between the strokes.",
-        friction_figure,
-    ),
-    "fig04": ("Fig. 4. One current and amplitude, several frequencies.", partial(loops_by, "frequency", 0)),
-    "fig05": ("Fig. 5. Several currents, the motion of the smallest amplitude.", partial(loops_by, "current", 0)),
-    "fig06": ("Fig. 6. Several currents, the motion of the largest amplitude.", partial(loops_by, "current", -1)),
-    "fig09": (
-        "Fig. 9. Identified (dashed) and tested loops at the smaller amplitude, all currents.",
-        partial(identified_loops, 0),
-    ),
-    "fig10": (
-        "Fig. 10. Identified (dashed) and tested loops at the larger amplitude, all currents.",
-        partial(identified_loops, -1),
-    ),
-    "fig11": ("Fig. 11. F0 over the current, a curve a condition.", partial(readings_figure, "amplitude", _F0, "")),
-    "fig12": (
-        "Fig. 12. F0 fitted by quadratics of the current [Eq. 23].",
-        partial(readings_figure, "amplitude", _F0, "quadratic-current"),
-    ),
-    "fig13": ("Fig. 13. R² of the fits of Fig. 12.", partial(r2_figure, "F0", "quadratic-current")),
-    "fig14": (
-        "Fig. 14. Constant term b of F0 over f · A, a quadratic [Eq. 25].",
-        partial(over_motion, "F0", "speed", "b (N)", "quadratic-current-speed"),
-    ),
-    "fig15": (
-        "Fig. 15. m fitted by quadratics of the current [Eq. 27].",
-        partial(parameter_figure, "m", _M, "quadratic-current"),
-    ),
-    "fig16": ("Fig. 16. R² of the fits of Fig. 15.", partial(r2_figure, "m", "quadratic-current")),
-    "fig17": (
-        "Fig. 17. Constant term m3 of m over the frequency [Eq. 30].",
-        partial(over_motion, "m", "frequency", "m3 (kg)", "mass-exponential"),
-    ),
-    "fig18": (
-        "Fig. 18. α fitted by quadratics of the current [Eq. 32].",
-        partial(parameter_figure, "alpha", _ALPHA, "quadratic-current"),
-    ),
-    "fig19": ("Fig. 19. R² of the fits of Fig. 18.", partial(r2_figure, "alpha", "quadratic-current")),
-    "fig20": (
-        "Fig. 20. Constant term d of α over the frequency, a line an amplitude [Eq. 34].",
-        partial(over_motion, "alpha", "frequency", "d (N/m)", "plane"),
-    ),
-    "fig21": (
-        "Fig. 21. β fitted by exponentials of the current [Eq. 37].",
-        partial(parameter_figure, "beta", _BETA, "decaying-current"),
-    ),
-    "fig22": ("Fig. 22. R² of the fits of Fig. 21.", partial(r2_figure, "beta", "decaying-current")),
-    "fig23": (
-        "Fig. 23. Constant term q of β over the frequency, as ln β [Eq. 39].",
-        partial(over_motion, "beta", "frequency", "ln β (–)", "mass-exponential"),
-    ),
-    "fig24": (
-        "Fig. 24. Modified model (dashed) and test at the prediction motion, all currents.",
-        partial(predicted_loops, LITERAL),
-    ),
-    "fig25": (
-        "Fig. 25. Traditional Bouc–Wen model (dashed) and test at the prediction motion, all currents.",
-        partial(predicted_loops, TRADITIONAL),
-    ),
-    "fig26": (
-        "Fig. 26. Accuracy and identification rate of the methods over the current at the prediction motion. "
-        "Rate: forces computed until a genetic search is within 1 % of its end; for the Ali-type model, by least "
-        "squares, until its end.",
-        accuracy_rate,
-    ),
-    SECONDS: ("Identification, in seconds.", seconds_figure),
-    "matrix": ("Test matrix; hollow marks are validation runs.", lambda study: test_matrix(study.loops)),
-    "analysis": (
-        "Peak force, energy, equivalent damping and dynamic range before any model.",
-        lambda study: test_analysis(study.loops, dynamic_ranges(study.loops)),
-    ),
-    "phase": (
-        "Phase by which the first harmonic of the force leads the displacement.",
-        partial(readings_figure, "phase", "Phase φ (rad)", ""),
-    ),
-    "offset": (
-        "Offset force f0, and its mean for every motion.",
-        partial(readings_figure, "offset", _OFFSET, "constant"),
-    ),
-    "function_c": ("c by the closed form, and its function [Eq. 26].", partial(function_figure, "c", "c (N s/m)")),
-    "function_m": ("m by the closed form, and its function [Eq. 31].", partial(function_figure, "m", _M)),
-    "function_alpha": ("α and its function [Eq. 36].", partial(function_figure, "alpha", _ALPHA)),
-    "function_beta": ("β and its function [Eq. 40].", partial(function_figure, "beta", _BETA)),
-    "predicted": (
-        "Validation runs: tested, and predicted by the literal, the consistent and the traditional method.",
-        predicted_over,
-    ),
-    "genetic": ("Genetic search with the paper's settings, 500 generations of 100 in each box.", genetic_figure),
-    "methods": (
-        "Error on validation runs, and forces computed to identify from one run, median.",
-        methods_figure,
-    ),
-    "errors": ("Error of every validation run.", errors_figure),
-    "seeds": ("Median validation error over noise seeds.", seeds_figure),
-    "sensitivity": (
-        "Change of the force when one coordinate changes by a tenth: the others held (bars), or identified anew "
-        "(marks; what is less stands at 1e-8). Right: total Sobol indices with 95 % intervals.",
-        sensitivity_figure,
-    ),
+# Loops as tested, as identified and as predicted.
+
+_QUANTITIES: Mapping[str, tuple[Callable[[Condition], float], Callable[[Condition], str]]] = {
+    "current": (lambda c: round(c.current_A, 2), lambda c: f"{c.current_A:.3g} A"),
+    "frequency": (lambda c: round(np.log(c.frequency_Hz) / SAME), lambda c: f"{c.frequency_Hz:.3g} Hz"),
+    "amplitude": (lambda c: round(np.log(c.amplitude_m) / SAME), lambda c: f"{MM * c.amplitude_m:.3g} mm"),
 }
+
+
+def _friction(study: Reproduction, axes: Texts) -> Drawing:
+    if study.friction is None:
+        return "the data hold no friction test"
+    x, force = (thin(channel, 1500) for channel in (study.friction.displacement, study.friction.force))
+    at, friction = friction_along(study.friction)
+    slow = Line(MM * x, force, style={"color": MEASURED, "lw": 0.6})
+    along = Line(MM * at, friction, style={"color": PALETTE[1]})
+    return Chart([Panel(axes[0], [slow]), Panel(axes[1], [along], low=0.0)], 2.9, "")
+
+
+def _loops_by(vary: str, place: int, study: Reproduction, axes: Texts) -> Drawing:
+    """Draw measured loops of runs that differ in one quantity, for the motion at a place in order of amplitude."""
+    groups: dict[tuple[float, ...], dict[float, tuple[Run, Condition]]] = {}
+    runs = {run.id: run for run in (*study.train, *study.held_out)}
+    for loop in study.loops:
+        fixed = tuple(key(loop.condition) for name, (key, _) in _QUANTITIES.items() if name != vary)
+        own = _QUANTITIES[vary][0](loop.condition)
+        groups.setdefault(fixed, {}).setdefault(own, (runs[loop.run_id], loop.condition))
+    most = max(map(len, groups.values()))
+    if most < 2:
+        return f"no two runs differ in {vary} alone"
+
+    def order(group: Mapping[float, tuple[Run, Condition]]) -> tuple[float, float, float]:
+        first = next(iter(group.values()))[1]
+        return first.amplitude_m, -first.current_A, first.frequency_Hz
+
+    largest = [group for group in groups.values() if len(group) == most]
+    identified = [group for group in largest if any(run.split == "train" for run, _ in group.values())]
+    chosen = sorted(identified or largest, key=order)[place]
+    group = [chosen[key] for key in sorted(chosen)][:_MOST_LOOPS]
+    same = ", ".join(text(group[0][1]) for name, (_, text) in _QUANTITIES.items() if name != vary)
+    shades = current_colours([float(k) for k in range(len(group))])
+    lines = [
+        _loop(run, run.force, {"color": shades[float(k)]}, _QUANTITIES[vary][1](condition))
+        for k, (run, condition) in enumerate(group)
+    ]
+    over_x, over_v = zip(*lines, strict=True)
+    return Chart([Panel(axes[0], over_x, same), Panel(axes[1], over_v)], margins={"right": 1.5})
+
+
+def _identified(place: int, study: Reproduction, axes: Texts) -> Drawing:
+    """Draw tested loops with the literal identification of each, at one amplitude."""
+    literal = study.contender(LITERAL)
+    models = {i.run_id: i.model for i in (literal.identifications if literal else ())}
+    runs = [run for run in study.amplitude_group(place) if run.id in models]
+    if not runs:
+        return "the literal method could not be followed"
+    return _tested_and_model(axes, runs, [simulate(models[run.id], measured_motion(run)).force for run in runs])
+
+
+def _predicted(title: str, study: Reproduction, axes: Texts) -> Drawing:
+    """Draw the loops of the validation runs with the prediction of one method."""
+    method = study.contender(title)
+    scored = {score.run_id for score in method.validation.runs} if method else set()
+    runs = [run for run in study.held_out if run.id in scored]
+    if method is None or not runs:
+        return "nothing predicts a validation run"
+    return _tested_and_model(axes, runs, [method.damper.predict_run(run).force for run in runs])
+
+
+def _tested_and_model(axes: Texts, runs: Sequence[Run], forces: Sequence[Floats]) -> Chart:
+    """Draw force over displacement and over velocity, a column a frequency, a colour a current; the model dashed."""
+    conditions = [equivalent_sine(run).condition for run in runs]
+    columns: dict[float, list[int]] = {}
+    for i in sorted(range(len(runs)), key=lambda i: conditions[i].frequency_Hz):
+        near = [f for f in columns if abs(np.log(conditions[i].frequency_Hz / f)) < SAME]
+        columns.setdefault(near[0] if near else conditions[i].frequency_Hz, []).append(i)
+    shades = current_colours([round(c.current_A, 2) for c in conditions])
+    above, below = [], []
+    for members in list(columns.values())[:3]:
+        lines: list[tuple[Line, Line]] = []
+        for i in sorted(members, key=lambda i: conditions[i].current_A):
+            style = {"color": shades[round(conditions[i].current_A, 2)]}
+            lines.append(_loop(runs[i], runs[i].force, style, f"{conditions[i].current_A:.3g} A"))
+            lines.append(_loop(runs[i], forces[i], {**style, "ls": "--"}))
+        first, name = conditions[members[0]], "" if above else "Force (N)"
+        over_x, over_v = zip(*lines, strict=True)
+        title = f"{first.frequency_Hz:.2g} Hz, {MM * first.amplitude_m:.3g} mm"
+        above.append(Panel((axes[0][0], name and axes[0][1]), over_x, title))
+        below.append(Panel((axes[1][0], name and axes[1][1]), over_v))
+    return Chart([*above, *below], 5.2, rows=2, margins={"right": 0.9})
+
+
+def _loop(run: Run, force: Floats, style: Mapping[str, object], text: str = "") -> tuple[Line, Line]:
+    """Return the last cycle of a force inside a run's steady window, over displacement and over velocity."""
+    end = run.window[1] if run.window else float(run.time[-1])
+    last = (run.time <= end) & (run.time >= end - 1.02 / equivalent_sine(run).condition.frequency_Hz)
+    motion = measured_motion(run)
+    x, v, force = (thin(channel[last], _LOOP_POINTS) for channel in (motion.displacement, motion.velocity, force))
+    return Line(MM * x, force, text, style), Line(v, force, text, style)
+
+
+def _methods_at_currents(study: Reproduction, axes: Texts) -> Drawing:
+    """Draw validation runs over the currents, as tested and as three methods predict them."""
+    runs = sorted(study.held_out, key=lambda run: float(np.mean(run.current)))
+    dampers = {c.recipe.title: c.damper for c in study.named(LITERAL, CONSISTENT, TRADITIONAL)}
+    if not runs or not dampers:
+        return "nothing predicts a validation run"
+    return overlaid_loops([runs[i] for i in sorted({0, len(runs) // 2, len(runs) - 1})], dampers)
+
+
+# Parameters over the current, motion by motion, and their functions.
+
+
+def _parameter(study: Reproduction, name: str) -> Floats:
+    """Return F0, phi or f0 of the tests, or a literal parameter as it reads with the preset A."""
+    if name in ("phase", "offset"):
+        return np.array([getattr(reading, name) for reading in study.readings])
+    return study.options.scaled(name, 1.0) * values(study, LITERAL, name)
+
+
+def _over_current(name: str, form: str, study: Reproduction, axes: Texts) -> Drawing:
+    """Draw a quantity over the current, a colour a motion; with a function of each motion, or the one of all runs."""
+    found, log, whole = _parameter(study, name), name == "beta", function_of(study, name)
+    if not found.size:
+        return "the literal method could not be followed"
+    if form == "whole" and whole is None:
+        return f"{name} has no function"
+    (x, y), power = axes[0], 1.0
+    if not log:
+        y, power = powered(y, float(np.max(np.abs(found))))
+    shades, lines = current_colours([study.conditions[g[0]].peak_velocity for g in motions(study)]), []
+    for group in motions(study):
+        conditions = [study.conditions[i] for i in group]
+        first, currents = conditions[0], np.array([c.current_A for c in conditions])
+        style = {"color": shades[first.peak_velocity]}
+        function, text = _function_at(study, name, form, conditions, found[group])
+        lines.append(Line(currents, power * found[group], style={**style, **_POINTS, "ls": "" if form else "-"}))
+        if function is not None:
+            dense = np.linspace(currents.min(), currents.max(), 60)
+            scale = power * (study.options.scaled(name, 1.0) if form == "whole" else 1.0)
+            lines.append(
+                Line(dense, scale * function(dense, first.frequency_Hz, first.amplitude_m) * np.ones(60), style=style)
+            )
+        style |= {**_POINTS, "ls": "" if function is None else "-"}
+        lines.append(Line([], [], f"{_named(first)}: {text}" if text else _named(first), style))
+    title = f"R² {whole.r2:.3f} over all runs" if whole and form == "whole" else ""
+    return Chart([Panel((x, y), lines, title, "y" if log else "")], 3.4, margins=_LIST)
+
+
+def _function_at(
+    study: Reproduction, name: str, form: str, conditions: Sequence[Condition], found: Floats
+) -> tuple[ParameterFunction | None, str]:
+    """Return the function drawn through the values of a motion, and a word on its fit."""
+    log = name == "beta"
+    if form == "whole" and (whole := function_of(study, name)):
+        curve = study.options.scaled(name, 1.0) * whole.function(*features(conditions))
+        r2 = _r2(*((np.log(found), np.log(curve)) if log else (found, curve)))
+        return whole.function, f"R² {r2:.3f}" if np.isfinite(r2) else ""
+    if not form:
+        return None, ""
+    try:
+        fit = fit_function(form, conditions, found, log=log)
+    except IdentificationError:
+        return None, "too few currents"
+    if form == "constant":  # a mean explains nothing: its value says more than an R² of zero
+        return fit.function, f"{fit.function.coefficients[0]:.4g}"
+    exact = len(fit.function.coefficients) + len(fit.function.rates) >= len(conditions)
+    return fit.function, "through its points" if exact else f"R² {fit.r2:.3f}"
+
+
+def _r2_over_motions(name: str, form: str, study: Reproduction, axes: Texts) -> Drawing:
+    """Draw R² of the function of the current at every motion."""
+    found = _parameter(study, name)
+    if found.size != len(study.conditions):
+        return f"{name} was not identified on every run"
+    shares: dict[str, float] = {}
+    for group in motions(study):
+        with suppress(IdentificationError):
+            conditions = [study.conditions[i] for i in group]
+            fit = fit_function(form, conditions, found[group], log=name == "beta")
+            shares[_named(conditions[0]).replace(", ", "\n")] = fit.r2
+    if not shares:
+        return "too few currents at every motion"
+    marks = Line(range(len(shares)), list(shares.values()), "R²", {**_POINTS, "ls": ":", "color": MEASURED})
+    return Chart([Panel(axes[0], [marks], columns=list(shares), low=min(0.0, *shares.values()))], 2.6, "")
+
+
+def _constant_term(name: str, form: str, study: Reproduction, axes: Texts) -> Drawing:
+    """Draw the remainder of a quantity beside its current law, a point a motion, over frequency or f · A."""
+    found = _parameter(study, name)
+    if found.size != len(study.conditions):
+        return f"{name} was not identified on every run"
+    found = np.log(np.maximum(found, 1e-12)) if name == "beta" else found
+    try:
+        function = fit_function(form, study.conditions, found).function
+    except IdentificationError as error:
+        return str(error)
+    firsts = [study.conditions[group[0]] for group in motions(study)]
+    left = beside_current_law(function, study.conditions, found)
+    level = np.array([float(np.mean(left[group])) for group in motions(study)])
+    fitted = np.array([float(function(0.0, c.frequency_Hz, c.amplitude_m)) for c in firsts])
+    (x, y), by_speed = axes[0], name == "F0"
+    y, power = powered(y, float(np.max(np.abs(level))))
+    u = [MM * c.frequency_Hz * c.amplitude_m if by_speed else c.frequency_Hz for c in firsts]
+    shades, dash = current_colours([c.peak_velocity for c in firsts]), {"marker": "_", "ms": 11, "mew": 1.4, "ls": ""}
+    lines = []
+    for c, at, value, curve in zip(firsts, u, power * level, power * fitted, strict=True):
+        lines.append(Line([at], [value], _named(c), {**_POINTS, "ls": "", "color": shades[c.peak_velocity]}))
+        lines.append(Line([at], [curve], style={**dash, "color": shades[c.peak_velocity]}))
+    dense = np.linspace(min(u), max(u), 40)
+    amplitudes = {round(np.log(c.amplitude_m) / SAME): c.amplitude_m for c in firsts}
+    pairs = [(np.ones(40), dense / MM)] if by_speed else [(dense, A) for A in amplitudes.values()]
+    lines += [Line(dense, power * function(0.0, f, A) * np.ones(40), style={"lw": 0.7, "color": MEASURED, "alpha": 0.6})
+              for f, A in pairs]  # fmt: skip
+    lines.append(Line([], [], "by the function", {**dash, "color": MEASURED}))
+    r2 = _r2(level, fitted)
+    title = f"R² {r2:.3f} over the motions" if np.isfinite(r2) else "one motion: no R²"
+    return Chart([Panel((x, y), lines, title)], 3.0, margins={"right": 2.0})
+
+
+def beside_current_law(function: ParameterFunction, conditions: Sequence[Condition], found: Floats) -> Floats:
+    """Return values less what the function gives to the current alone [Qian et al. 2024, Eq. 24, 28, 33, 37]."""
+    I, f, A = features(conditions)
+    return found - (function(I, f, A) - function(np.zeros(I.size), f, A))
+
+
+def _r2(found: Floats, fitted: Floats) -> float:
+    spread = float(np.sum((found - found.mean()) ** 2))
+    return 1 - float(np.sum((fitted - found) ** 2)) / spread if spread > 0 else float("nan")
+
+
+def _named(c: Condition) -> str:
+    return f"{c.frequency_Hz:.2g} Hz, {MM * c.amplitude_m:.3g} mm"
+
+
+# Methods compared, searches, noise seeds, sensitivities.
+
+
+def _accuracy_rate(study: Reproduction, axes: Texts) -> Drawing:
+    rows = [row for row in rate_rows(study) if np.isfinite(row["nrmse_pp"])]
+    if not rows:
+        return "nothing predicts a validation run"
+    panels = []
+    for text, (name, scale) in zip(
+        axes, (("nrmse_pp", 100), ("mean_relative_error", 100), ("forces_until_settled", 1)), strict=True
+    ):
+        lines = []
+        for method, colour in zip(dict.fromkeys(row["method"] for row in rows), PALETTE[1:], strict=False):
+            own = [(r["current_A"], scale * r[name]) for r in rows if r["method"] == method and r[name] is not None]
+            lines.append(Line(*np.reshape(own, (-1, 2)).T, method, {**_POINTS, "color": colour}))
+        panels.append(Panel(text, lines, log="y" if name == "forces_until_settled" else ""))
+    return Chart(panels, 2.9, "above", margins={"top": 0.5})
+
+
+def _methods(study: Reproduction, axes: Texts) -> Drawing:
+    methods = [c for c in study.contenders if c.validation.runs]
+    if not methods:
+        return "nothing predicts a validation run"
+    rows, worst = [c.recipe.title for c in methods], [100 * c.validation.worst().scores.nrmse_pp for c in methods]
+    marks = Line(worst, -np.arange(len(methods)), "worst run", {"marker": "|", "ms": 8, "ls": "", "color": MEASURED})
+    error = [100 * c.validation.median() for c in methods]
+    cost = [cost_per_run(study, c)[0] for c in methods]
+    panels = [Panel(axes[0], [marks], rows=rows, bars=error, bar_label="median"),
+              Panel(axes[1], rows=[""] * len(rows), bars=cost, log="x")]  # fmt: skip
+    return Chart(panels, 1.15 + 0.26 * len(rows), "above", margins={"left": 2.4, "top": 0.45})
+
+
+def _seconds(study: Reproduction, axes: Texts) -> Drawing:
+    methods = [c for c in study.contenders if c.identifications]
+    if not methods:
+        return "nothing was identified from single runs"
+    rows, bars = [c.recipe.title for c in methods], [cost_per_run(study, c)[1] for c in methods]
+    return Chart([Panel(axes[0], rows=rows, bars=bars)], 0.8 + 0.26 * len(rows), "", margins={"left": 2.4})
+
+
+def _errors(study: Reproduction, axes: Texts) -> Drawing:
+    lines = []
+    for number, method in enumerate(study.contenders):
+        again, place = divmod(number, 7)  # yellow is lost on white
+        runs = sorted(method.validation.runs, key=lambda r: r.condition.current_A)
+        errors = [100 * r.scores.nrmse_pp for r in runs]
+        style = {**_POINTS, "color": PALETTE[place], "ls": ("-", "--", ":")[min(again, 2)]}
+        lines.append(Line([r.condition.current_A for r in runs], errors, method.recipe.title, style))
+    if not study.held_out:
+        return "nothing predicts a validation run"
+    return Chart([Panel(axes[0], lines, log="y")], 3.4, margins={"right": 2.6})
+
+
+def _genetic(study: Reproduction, axes: Texts) -> Drawing:
+    if not study.genetic:
+        return "no genetic search was made"
+    lines = []
+    for check, colour in zip(study.genetic, PALETTE[1:], strict=False):
+        # The search sees a part of the samples; its error is carried over to all of them.
+        carried = check.minimum.history * check.reached / check.minimum.cost
+        excess = np.maximum(carried / check.optimum - 1, 1e-6)
+        lines.append(Line(np.arange(1, excess.size + 1), excess, str(check.condition), {"color": colour}))
+    return Chart([Panel(axes[0], lines, log="y")], 2.8, "above", margins={"top": 0.5})
+
+
+def _seeds(study: Reproduction, axes: Texts) -> Drawing:
+    if not study.seed_errors:
+        return "noise seeds need a virtual rig"
+    style = {"marker": "|", "ms": 9, "ls": "", "color": PALETTE[1]}
+    lines = [Line(100 * e, np.full(e.size, -row), style=style) for row, e in enumerate(study.seed_errors.values())]
+    return Chart([Panel(axes[0], lines, rows=list(study.seed_errors), low=0.0)], 2.4, "", margins={"left": 2.2})
+
+
+def _sensitivity(study: Reproduction, axes: Texts) -> Drawing:
+    effects, indices = study.sensitivity, study.sobol
+    if not effects or indices is None:
+        return "no run was identified by the consistent method"
+    rows, left = [e.name.replace("_", " ") for e in effects], [max(e.left, 1e-8) for e in effects]
+    marks = Line(left, -np.arange(len(rows)), "others identified anew", {**_POINTS, "ls": "", "color": PALETTE[2]})
+    single = Panel(axes[0], [marks], log="x", rows=rows, bars=[e.effect for e in effects], bar_label="others held")
+    names = [name.replace("_", " ") for name in indices.names]
+    total = Panel(axes[1], rows=names, bars=indices.total.tolist(), half_widths=indices.total_confidence.tolist())
+    return Chart([single, total], 3.2, "above", margins={"left": 1.3, "gap": 1.3, "top": 0.45})
+
+
+_X, _V, _F = "Displacement (mm)", "Velocity (m/s)", "Force (N)"
+_LOOPS, _I, _HZ = ((_X, _F), (_V, _F)), "Current (A)", "Frequency (Hz)"
+_MOTION = ("Motion", "R² (–)")
+FIGURES: Mapping[str, Entry] = MappingProxyType({
+    "fig03": Entry("Friction at 0.01 mm/s: force, and half the force between the strokes", "section 2",
+                   ((_X, _F), (_X, "Friction (N)")), _friction),
+    "fig04": Entry("One current and amplitude, several frequencies", "section 2", _LOOPS,
+                   partial(_loops_by, "frequency", 0)),
+    "fig05": Entry("Several currents, the motion of the smallest amplitude", "section 2", _LOOPS,
+                   partial(_loops_by, "current", 0)),
+    "fig06": Entry("Several currents, the motion of the largest amplitude", "section 2", _LOOPS,
+                   partial(_loops_by, "current", -1)),
+    "fig09": Entry("Identified (dashed) and tested loops at the smaller amplitude, all currents", "section 4.3",
+                   _LOOPS, partial(_identified, 0)),
+    "fig10": Entry("Identified (dashed) and tested loops at the larger amplitude, all currents", "section 4.3",
+                   _LOOPS, partial(_identified, -1)),
+    "fig11": Entry("F0 over the current, a curve a condition", "section 5.1", ((_I, "F0 (N)"),),
+                   partial(_over_current, "F0", "")),
+    "fig12": Entry("F0 fitted by quadratics of the current", "Eq. 23", ((_I, "F0 (N)"),),
+                   partial(_over_current, "F0", "quadratic-current")),
+    "fig13": Entry("R² of the fits of Fig. 12", "Eq. 23", (_MOTION,),
+                   partial(_r2_over_motions, "F0", "quadratic-current")),
+    "fig14": Entry("Constant term b of F0 over f · A, a quadratic", "Eq. 25", (("f · A (mm Hz)", "b (N)"),),
+                   partial(_constant_term, "F0", "quadratic-current-speed")),
+    "fig15": Entry("m fitted by quadratics of the current", "Eq. 27", ((_I, "m (kg)"),),
+                   partial(_over_current, "m", "quadratic-current")),
+    "fig16": Entry("R² of the fits of Fig. 15", "Eq. 27", (_MOTION,),
+                   partial(_r2_over_motions, "m", "quadratic-current")),
+    "fig17": Entry("Constant term m3 of m over the frequency", "Eq. 30", ((_HZ, "m3 (kg)"),),
+                   partial(_constant_term, "m", "mass-exponential")),
+    "fig18": Entry("α fitted by quadratics of the current", "Eq. 32", ((_I, "α (N/m)"),),
+                   partial(_over_current, "alpha", "quadratic-current")),
+    "fig19": Entry("R² of the fits of Fig. 18", "Eq. 32", (_MOTION,),
+                   partial(_r2_over_motions, "alpha", "quadratic-current")),
+    "fig20": Entry("Constant term d of α over the frequency, a line an amplitude", "Eq. 34", ((_HZ, "d (N/m)"),),
+                   partial(_constant_term, "alpha", "plane")),
+    "fig21": Entry("β fitted by exponentials of the current", "Eq. 37", ((_I, "β (m⁻ⁿ)"),),
+                   partial(_over_current, "beta", "decaying-current")),
+    "fig22": Entry("R² of the fits of Fig. 21", "Eq. 37", (_MOTION,),
+                   partial(_r2_over_motions, "beta", "decaying-current")),
+    "fig23": Entry("Constant term q of β over the frequency, as ln β", "Eq. 39", ((_HZ, "ln β (–)"),),
+                   partial(_constant_term, "beta", "mass-exponential")),
+    "fig24": Entry("Modified model (dashed) and test at the prediction motion, all currents", "section 6", _LOOPS,
+                   partial(_predicted, LITERAL)),
+    "fig25": Entry("Traditional Bouc–Wen model (dashed) and test at the prediction motion, all currents", "section 6",
+                   _LOOPS, partial(_predicted, TRADITIONAL)),
+    "fig26": Entry("Accuracy and identification rate of the methods over the current at the prediction motion; rate: "
+                   "forces computed until a genetic search is within 1 % of its end, for the Ali-type and the "
+                   "traditional model, by least squares, until its end", "section 6, Eq. 44",
+                   ((_I, "nrmse_pp (%)"), (_I, "Relative error, Eq. 44 (%)"), (_I, "Forces computed (–)")),
+                   _accuracy_rate),
+    SECONDS: Entry("Identification, in seconds", "", (("Identification (s per run)", ""),), _seconds),
+    "matrix": Entry("Test matrix; hollow marks are validation runs", "", (), lambda s, _: test_matrix(s.loops)),
+    "analysis": Entry("Peak force, energy, equivalent damping and dynamic range before any model", "", (),
+                      lambda s, _: test_analysis(s.loops, dynamic_ranges(s.loops))),
+    "phase": Entry("Phase by which the first harmonic of the force leads the displacement", "Eq. 16",
+                   ((_I, "Phase φ (rad)"),), partial(_over_current, "phase", "")),
+    "offset": Entry("Offset force f0, and its mean for every motion", "Eq. 20", ((_I, "f0 (N)"),),
+                    partial(_over_current, "offset", "constant")),
+    "function_c": Entry("c by the closed form, and its function", "Eq. 26", ((_I, "c (N s/m)"),),
+                        partial(_over_current, "c", "whole")),
+    "function_m": Entry("m by the closed form, and its function", "Eq. 31", ((_I, "m (kg)"),),
+                        partial(_over_current, "m", "whole")),
+    "function_alpha": Entry("α and its function", "Eq. 36", ((_I, "α (N/m)"),),
+                            partial(_over_current, "alpha", "whole")),
+    "function_beta": Entry("β and its function", "Eq. 40", ((_I, "β (m⁻ⁿ)"),),
+                           partial(_over_current, "beta", "whole")),
+    "predicted": Entry("Validation runs: tested, and predicted by three methods", "", _LOOPS, _methods_at_currents),
+    "genetic": Entry("Genetic search with the paper's settings, 500 generations of 100 in each box", "section 4.3",
+                     (("Generation", "Error above the least (–)"),), _genetic),
+    "methods": Entry("Error on validation runs, and forces computed to identify from one run, median", "",
+                     (("Validation nrmse_pp (%)", ""), ("Forces computed per run (–)", "")), _methods),
+    "errors": Entry("Error of every validation run", "", ((_I, "Validation nrmse_pp (%)"),), _errors),
+    "seeds": Entry("Median validation error over noise seeds", "",
+                   (("Median validation nrmse_pp (%), one mark a seed", ""),), _seeds),
+    "sensitivity": Entry("Change of the force when one coordinate changes by a tenth, the others held or identified "
+                         "anew (less than 1e-8 is drawn there), and total Sobol indices with 95 % intervals",
+                         "section 4", (("Change of force (of its deviation)", ""), ("Total Sobol index (–)", "")),
+                         _sensitivity),
+})  # fmt: skip

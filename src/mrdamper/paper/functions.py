@@ -1,12 +1,10 @@
-"""The paper's functions of current, frequency and amplitude, fitted to the parameters of single runs.
-
-[Qian et al. 2024, Eq. 23–43]
-"""
+"""Functions of current, frequency and amplitude [Qian et al. 2024, Eq. 23–43], fitted to parameters of single runs."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -22,26 +20,19 @@ from mrdamper.statistics.functions.fitting import FunctionFit, assess, fit_funct
 from mrdamper.study.recipe import FitResult
 
 PAPER_FORMS = {
-    "c": "viscous-paper",
-    "m": "mass-exponential",
-    "alpha": "plane",
-    "beta": "current-decay-frequency",
-    "f0": "constant",
-    "k1": "constant",
-    "k2": "constant",
-    "k3": "constant",
-}
-_SHORTER = ("quadratic-current", "linear-current", "constant")
+    "c": "viscous-paper", "m": "mass-exponential", "alpha": "plane", "beta": "current-decay-frequency",
+    "f0": "constant", "k1": "constant", "k2": "constant", "k3": "constant",
+}  # fmt: skip
+_SHORTER = ("quadratic-current", "linear-current")  # in place of a form that the tests do not determine
 
 
 def paper_functions(
     identifications: Sequence[Identification], mass_law: str = "exponential", provenance: dict[str, str] | None = None
 ) -> ModifiedFit:
-    """Fit the paper's functions [Qian et al. 2024, Eq. 23–43] by plain least squares.
+    """Fit the paper's functions by plain least squares.
 
-    Shorter ones replace those that the tests do not determine. c is fitted through the viscous part of
-    F0, as the paper does [Eq. 24–26]. beta spans decades and must stay positive: its function gives the
-    logarithm.
+    Shorter ones replace those that the tests do not determine. c is fitted through the viscous part of F0, as in the
+    paper [Eq. 24–26]. beta spans decades and must stay positive: its function gives the logarithm.
 
     Parameters
     ----------
@@ -53,16 +44,9 @@ def paper_functions(
     forms = {**PAPER_FORMS, "m": f"mass-{mass_law}"}
     conditions = tuple(i.condition for i in identifications)
     values = {name: np.array([float(getattr(i.model, name)) for i in identifications]) for name in PAPER_FORMS}
-    functions = {
-        name: _first_determined((form, *_SHORTER), conditions, values[name], log=name == "beta")
-        for name, form in forms.items()
-    }
-    damper = ModifiedModel(
-        rig=identifications[0].rig,
-        parameters=ParameterMap(BoucWen, {name: fit.function for name, fit in functions.items()}),
-        envelope=Envelope.of(conditions),
-        provenance=dict(provenance or {}),
-    )
+    functions = {name: _fit(form, conditions, values[name], log=name == "beta") for name, form in forms.items()}
+    parameters = ParameterMap(BoucWen, {name: fit.function for name, fit in functions.items()})
+    damper = ModifiedModel(identifications[0].rig, parameters, Envelope.of(conditions), dict(provenance or {}))
     return ModifiedFit(damper, functions, values, conditions)
 
 
@@ -80,23 +64,22 @@ def fit_paper_functions(
     return FitResult(fit.damper, refit, fit)
 
 
-def _first_determined(forms: Sequence[str], conditions: Sequence[Condition], values: Floats, log: bool) -> FunctionFit:
-    for form in forms[:-1]:
-        try:
+def _fit(form: str, conditions: Sequence[Condition], values: Floats, log: bool) -> FunctionFit:
+    """Fit a form, or the first shorter one that the conditions determine."""
+    for tried in (form, *_SHORTER):
+        with suppress(IdentificationError):
             return (
-                _viscous(conditions, values)
-                if form == "viscous-paper"
-                else fit_function(form, conditions, values, log=log)
+                _fit_viscous(conditions, values)
+                if tried == "viscous-paper"
+                else fit_function(tried, conditions, values, log=log)
             )
-        except IdentificationError:
-            continue
-    return fit_function(forms[-1], conditions, values, log=log)
+    return fit_function("constant", conditions, values, log=log)
 
 
-def _viscous(conditions: Sequence[Condition], c: Floats) -> FunctionFit:
+def _fit_viscous(conditions: Sequence[Condition], c: Floats) -> FunctionFit:
     """Fit F0 sin φ = 2π f A c over current and f A, and read it as the function of c [Eq. 24–26]."""
     speed = 2 * math.pi * np.array([condition.frequency_Hz * condition.amplitude_m for condition in conditions])
-    found = fit_function("quadratic-current-speed", conditions, speed * c)
-    coefficients = tuple(value / (2 * math.pi) for value in found.function.coefficients)
-    function = replace(found.function, form="viscous-paper", coefficients=coefficients)
-    return replace(assess(function, conditions, c), left_out=found.left_out)
+    fit = fit_function("quadratic-current-speed", conditions, speed * c)
+    coefficients = tuple(value / (2 * math.pi) for value in fit.function.coefficients)
+    function = replace(fit.function, form="viscous-paper", coefficients=coefficients)
+    return replace(assess(function, conditions, c), left_out=fit.left_out)

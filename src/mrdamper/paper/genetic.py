@@ -1,9 +1,8 @@
-"""The paper's genetic algorithm: generations in boxes that narrow step by step.
+"""Genetic algorithm of the paper: generations in boxes that narrow step by step.
 
-[Qian et al. 2024, section 4.3] states population, crossover fraction, mutation probability,
-selection, generations and bounds. What it leaves open follows the program whose default
-selection it names: rank scaling, five per cent elite, scattered crossover. The operators stand
-in `generation`.
+[Qian et al. 2024, section 4.3] states population, crossover fraction, mutation probability, selection, generations and
+bounds. The rest follows the program whose default selection it names: rank scaling, five per cent elite, scattered
+crossover.
 """
 
 from __future__ import annotations
@@ -15,17 +14,67 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mrdamper.errors import ParameterError
-from mrdamper.paper.generation import GeneticSettings, next_generation
 from mrdamper.statistics.ending import Ending
 from mrdamper.statistics.linear import Floats
 
-Cost = Callable[[Floats], Floats]
-Report = Callable[[str, float], None]
+GENERATIONS_OF_MANY = 60  # generations of a search that is one of dozens
+
+
+@dataclass(frozen=True)
+class GeneticSettings:
+    """Settings of the search; the defaults are the paper's.
+
+    Attributes
+    ----------
+    population, generations : int
+    crossover_fraction : float
+        Share of the children, elite apart, that are crossed; the others are mutated.
+    mutation : float
+        Probability with which each number of a mutated child is drawn anew from the box.
+    elite : float
+        Share of the population that survives unchanged.
+    narrowings : int
+        Further searches, each in a box about the best point ("progressively narrower").
+    narrow_to : float
+        Width of each box over that of the one before.
+    seed : int
+
+    Raises
+    ------
+    ParameterError
+        If a share lies outside 0...1 or a count is too small.
+    """
+
+    population: int = 100
+    generations: int = 500
+    crossover_fraction: float = 0.8
+    mutation: float = 0.2
+    elite: float = 0.05
+    narrowings: int = 6
+    narrow_to: float = 0.2
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.population < 4 or self.generations < 1 or self.narrowings < 0:
+            raise ParameterError(
+                f"population {self.population}, generations {self.generations}, narrowings {self.narrowings}",
+                mend="use a population of 4 or more, at least one generation, and no negative count",
+            )
+        for name in ("crossover_fraction", "mutation", "elite", "narrow_to"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise ParameterError(f"{name} is {getattr(self, name)}", mend="give a share between 0 and 1")
+
+    @property
+    def children(self) -> tuple[int, int, int]:
+        """Numbers of elite, crossed and mutated points in a generation."""
+        elite = max(1, round(self.elite * self.population))
+        crossed = round(self.crossover_fraction * (self.population - elite))
+        return elite, crossed, self.population - elite - crossed
 
 
 @dataclass(frozen=True, eq=False)
 class GeneticMinimum:
-    """Where the search ended.
+    """End of a search.
 
     Attributes
     ----------
@@ -44,21 +93,17 @@ class GeneticMinimum:
     evaluations: int
     history: Floats
     boxes: tuple[tuple[Floats, Floats], ...]
-    ending: Ending
+    ending: Ending = Ending.GENERATIONS_SPENT
 
     @property
     def to_settle(self) -> int:
-        """Evaluations after which no better cost by over a hundredth was found."""
+        """Evaluations until the cost is within 1 % of the final one."""
         generations = int(np.argmax(self.history <= 1.01 * self.cost)) + 1
         return generations * self.evaluations // self.history.size
 
 
 def genetic(
-    cost: Cost,
-    lower: ArrayLike,
-    upper: ArrayLike,
-    settings: GeneticSettings | None = None,
-    progress: Report = lambda what, share: None,
+    cost: Callable[[Floats], Floats], lower: ArrayLike, upper: ArrayLike, settings: GeneticSettings | None = None
 ) -> GeneticMinimum:
     """Minimise a cost inside a box, then inside ever narrower ones about the best point.
 
@@ -69,8 +114,6 @@ def genetic(
     lower, upper : (D,) arrays
         Linear scale, as the paper searches.
     settings : GeneticSettings, optional
-    progress : callable
-        Told what is being done and the share done, 0...1.
 
     Raises
     ------
@@ -79,38 +122,31 @@ def genetic(
     """
     chosen = settings or GeneticSettings()
     low, high = np.array(lower, dtype=float), np.array(upper, dtype=float)
-    reversed_at = np.flatnonzero(~(low < high))
-    if reversed_at.size:
-        i = int(reversed_at[0])
+    for i in np.flatnonzero(~(low < high)).tolist():
         raise ParameterError(
             f"bounds of coordinate {i} run from {low[i]:g} to {high[i]:g}", mend="give the lower bound first"
         )
     outer, boxes, history = (low, high), [], []
     best, best_cost = (low + high) / 2, np.inf
     rng = np.random.default_rng(chosen.seed)
-    for round_number in range(chosen.narrowings + 1):
+    for _ in range(chosen.narrowings + 1):
         boxes.append((low, high))
-        progress(
-            f"genetic search, box {round_number + 1} of {chosen.narrowings + 1}", round_number / (chosen.narrowings + 1)
-        )
-        point, found, costs = _generations(cost, low, high, chosen, int(rng.integers(2**31)))
+        point, lowest, costs = _search_box(cost, low, high, chosen, int(rng.integers(2**31)))
         history.append(np.minimum(costs, best_cost))
-        if found < best_cost:
-            best, best_cost = point, found
+        if lowest < best_cost:
+            best, best_cost = point, lowest
         half = chosen.narrow_to * (high - low) / 2
         # The box moves with the best point but stays inside the first one, at full width.
         centre = np.clip(best, outer[0] + half, outer[1] - half)
         low, high = centre - half, centre + half
     total = chosen.population * chosen.generations * len(boxes)
-    return GeneticMinimum(
-        best, float(best_cost), total, np.concatenate(history), tuple(boxes), Ending.GENERATIONS_SPENT
-    )
+    return GeneticMinimum(best, float(best_cost), total, np.concatenate(history), tuple(boxes))
 
 
-def _generations(
-    cost: Cost, lower: Floats, upper: Floats, settings: GeneticSettings, seed: int
+def _search_box(
+    cost: Callable[[Floats], Floats], lower: Floats, upper: Floats, settings: GeneticSettings, seed: int
 ) -> tuple[Floats, float, Floats]:
-    """Search one box; the best point, its cost, and the lowest cost after every generation."""
+    """Search one box; return the best point, its cost, and the lowest cost after every generation."""
     rng = np.random.default_rng(seed)
     points = rng.uniform(lower, upper, (settings.population, lower.size))
     costs = cost(points)
@@ -122,3 +158,57 @@ def _generations(
         lowest.append(np.min(costs))
     best = int(np.argmin(costs))
     return points[best], float(costs[best]), np.array(lowest)
+
+
+def next_generation(
+    points: Floats, costs: Floats, lower: Floats, upper: Floats, settings: GeneticSettings, rng: np.random.Generator
+) -> tuple[Floats, Floats]:
+    """Return the elite and the children that follow a generation, together as many as `points`."""
+    elite, crossed, mutated = settings.children
+    needed = 2 * crossed + mutated
+    parents = rng.permutation(stochastic_uniform(rank_scaling(costs, needed), needed, float(rng.random())))
+    pairs = points[parents[: 2 * crossed]]
+    children = scattered_crossover(pairs[::2], pairs[1::2], rng)
+    mutants = uniform_mutation(points[parents[2 * crossed :]], lower, upper, settings.mutation, rng)
+    return points[np.argsort(costs, kind="stable")[:elite]], np.concatenate([children, mutants])
+
+
+def rank_scaling(costs: ArrayLike, parents: int) -> Floats:
+    """Return how often each point is expected to be chosen, ∝ 1/√rank, summing to the number of parents."""
+    values = np.asarray(costs, dtype=float)
+    expectation = np.empty(values.size)
+    expectation[np.argsort(values, kind="stable")] = 1 / np.sqrt(np.arange(1, values.size + 1))
+    return parents * expectation / expectation.sum()
+
+
+def stochastic_uniform(expectation: Floats, parents: int, draw: float) -> np.ndarray:
+    """Choose parents by equal steps along a line on which each point takes its expectation.
+
+    Parameters
+    ----------
+    expectation : (P,) array
+        Summing to `parents`.
+    parents : int
+    draw : float
+        Random number in 0...1: start in the first step.
+
+    Returns
+    -------
+    (parents,) int array
+        Indices, ascending.
+    """
+    wheel = np.cumsum(expectation) / parents
+    pointers = (draw + np.arange(parents)) / parents
+    return np.minimum(np.searchsorted(wheel, pointers, side="right"), expectation.size - 1)
+
+
+def scattered_crossover(mothers: Floats, fathers: Floats, rng: np.random.Generator) -> Floats:
+    """Take every number of a child from either parent, at even odds."""
+    return np.where(rng.random(mothers.shape) < 0.5, mothers, fathers)
+
+
+def uniform_mutation(
+    points: Floats, lower: Floats, upper: Floats, probability: float, rng: np.random.Generator
+) -> Floats:
+    """Draw every number anew from the box with a probability."""
+    return np.where(rng.random(points.shape) < probability, rng.uniform(lower, upper, points.shape), points)

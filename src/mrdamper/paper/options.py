@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import ClassVar, Literal, get_args
+from typing import ClassVar, Literal, get_args, get_origin, get_type_hints
 
 from mrdamper.data import Run
 from mrdamper.errors import ParameterError, UnknownNameError
 from mrdamper.identification.harmonic_balance import AmplitudeReading, OffsetReading, PhaseReading
 from mrdamper.paper.assumptions import PaperAssumptions, outside_paper_range, require_paper_functions
 from mrdamper.paper.functions import fit_paper_functions
-from mrdamper.paper.generation import GeneticSettings
+from mrdamper.paper.genetic import GeneticSettings
 from mrdamper.paper.paper_method import Paper
 from mrdamper.physics.gas_spring import GasSpring
 from mrdamper.study.recipe import Recipe, StudyMethod, modified
@@ -35,26 +35,18 @@ class PaperOptions(StudyMethod):
         Presets of the loop [-]. A scales alpha and beta and changes no force.
     gamma : float or None
         Preset [m^-n, for A = 1]; None ties it to beta.
-    force_amplitude : {"first-harmonic", "half-peak-to-peak", "maximum"}
-        Reading of F0 [Eq. 16–19].
-    phase : {"harmonic", "peaks"}
-        Reading of phi.
-    offset : {"extremes", "mean"}
-        Reading of f0; the paper takes maximum and minimum.
-    quadratic_stiffness : {"kept", "dropped"}
-        Whether k2 is part of the gas spring [Eq. 7].
+    force_amplitude, phase, offset, quadratic_stiffness, search
+        As those of the method `Paper`.
     mass_law : {"exponential", "inverse-square", "power"}
         Reading of Eq. 29.
     functions : {"paper", "shorter"}
         Refuse tests that do not determine the paper's functions, or take shorter ones in their place.
     friction_test : {"dry", "filled"}
         Of the virtual rig: without fluid, as in the paper, or with it, which adds the yield force without current.
-    search : {"genetic", "optimum"}
-        The paper's genetic search, or the least error that it approaches.
     generations : int
         Of the genetic search, in each of its seven boxes.
     seed : int
-        Of the genetic search; every run draws its own numbers.
+        Of the genetic search.
     alpha_box, beta_box : (float, float)
         Bounds of the search [N/m, m^-n].
     """
@@ -88,16 +80,9 @@ class PaperOptions(StudyMethod):
         for name, (low, high) in (("alpha", self.alpha_box), ("beta", self.beta_box)):
             if not 0 <= low < high < float("inf"):
                 raise ParameterError(f"the box of {name} runs from {low:g} to {high:g}", mend="give 0 <= LOW < HIGH")
-        for name, allowed in (
-            ("mass_law", MassLaw),
-            ("friction_test", FrictionTest),
-            ("search", Search),
-            ("force_amplitude", AmplitudeReading),
-            ("phase", PhaseReading),
-            ("offset", OffsetReading),
-        ):
-            if getattr(self, name) not in get_args(allowed):
-                raise UnknownNameError.of(name.replace("_", " "), getattr(self, name), get_args(allowed))
+        for name, kind in get_type_hints(type(self)).items():
+            if get_origin(kind) is Literal and getattr(self, name) not in get_args(kind):
+                raise UnknownNameError.of(name.replace("_", " "), getattr(self, name), get_args(kind))
         GeneticSettings(generations=self.generations)  # refuses a count that is too small
 
     @property
@@ -117,9 +102,9 @@ class PaperOptions(StudyMethod):
         powers = {"alpha": -1.0, "beta": 1 - self.n, "gamma": 1 - self.n}
         return value * self.A ** powers.get(name, 0.0)
 
-    def method(self, search: Search | None = None, seed: int | None = None) -> Paper:
+    def method(self, search: Search | None = None) -> Paper:
         """Return the identification of single runs."""
-        genetic = GeneticSettings(generations=self.generations, seed=self.seed if seed is None else seed)
+        genetic = GeneticSettings(generations=self.generations, seed=self.seed)
         return Paper(
             self.force_amplitude, self.phase, self.offset, self.quadratic_stiffness, search or self.search, genetic,
             self.bounds,

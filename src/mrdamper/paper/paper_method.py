@@ -1,9 +1,8 @@
-"""The paper's identification, literally: c and m in closed form, alpha and beta searched.
+"""Identification of the paper, literally: c and m in closed form, alpha and beta by a search.
 
-[Qian et al. 2024, Eq. 16–22] Every point the text leaves open is a named switch. The recipe
-counts the hysteretic force twice, once inside c and m and once more as alpha z: it is here to
-be reproduced, and each result says how much of its c is not viscous. `Balance` is the
-consistent counterpart.
+[Qian et al. 2024, Eq. 16–22] Every point that the text leaves open is a named option. The method counts the hysteretic
+force twice, inside c and m and once more as alpha z; each result states how much of its c is hysteretic. `Balance` is
+the consistent counterpart.
 """
 
 from __future__ import annotations
@@ -28,15 +27,15 @@ from mrdamper.identification.harmonic_balance import (
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.identification.problem import Method, Problem, Solution
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.paper.generation import GENERATIONS_OF_MANY, GeneticSettings
-from mrdamper.paper.genetic import GeneticMinimum, genetic
+from mrdamper.paper.genetic import GENERATIONS_OF_MANY, GeneticMinimum, GeneticSettings, genetic
 from mrdamper.physics.hysteresis import Shape, steady_loop
-from mrdamper.statistics.ending import Ending
 from mrdamper.statistics.levenberg_marquardt import least_squares
 
-_SEARCH_SAMPLES = 400  # two numbers are searched; more samples change them by less than the search does
-_TINY = float(np.finfo(float).tiny)  # a beta above zero
-_SMALL = 0.05  # share of c that may be hysteretic before the reader is warned
+_SEARCH_SAMPLES = 400  # samples of a cycle in the search for two parameters
+_TINY = float(np.finfo(float).tiny)  # smallest beta [m^-n]
+_MAX_HYSTERETIC_SHARE = 0.05  # share of c that may be hysteretic without a note
+
+Box = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -46,21 +45,20 @@ class Paper(Method):
     Attributes
     ----------
     force_amplitude : {"first-harmonic", "half-peak-to-peak", "maximum"}
-        What F0 is.
+        Definition of F0.
     phase : {"harmonic", "peaks"}
-        What phi is.
+        Definition of phi.
     offset : {"extremes", "mean"}
-        What f0 is; the paper takes maximum and minimum.
+        Definition of f0; the paper takes maximum and minimum.
     quadratic_stiffness : {"kept", "dropped"}
-        Whether k2 is part of the gas spring.
+        Whether k2 is part of the gas spring [Eq. 7].
     search : {"genetic", "optimum"}
-        "genetic" is the paper's algorithm; "optimum" finds the minimum that it approaches, from
-        a grid over beta with alpha solved for.
+        The paper's algorithm, or the least error that it approaches: a grid over beta with alpha solved for.
     genetic : GeneticSettings
     bounds : ((float, float), (float, float))
         Of alpha [N/m] and beta [m^-n], the paper's [0, 1e8].
     explain : bool
-        Say how much of c is hysteretic; takes a consistent balance besides.
+        Note how much of c is hysteretic; takes a consistent balance besides.
     """
 
     name: ClassVar[str] = "paper"
@@ -72,7 +70,7 @@ class Paper(Method):
     quadratic_stiffness: Literal["kept", "dropped"] = "kept"
     search: Literal["genetic", "optimum"] = "genetic"
     genetic: GeneticSettings = field(default_factory=GeneticSettings)
-    bounds: tuple[tuple[float, float], tuple[float, float]] = ((0.0, 1e8), (0.0, 1e8))
+    bounds: tuple[Box, Box] = ((0.0, 1e8), (0.0, 1e8))
     explain: bool = True
 
     def for_many_runs(self) -> Method:
@@ -89,51 +87,36 @@ class Paper(Method):
         ExcitationError
             If the motion is no sine.
         """
-        if self.search == "genetic":
-            return self.solution(problem, self.genetic_search(problem))
-        _require_bouc_wen(problem)
-        return self._solution(problem, self._by_optimum(self._rest(problem)))
-
-    def solution(self, problem: Problem, found: GeneticMinimum) -> Solution:
-        """What a genetic search found of a problem."""
-        searched = _Searched(float(found.point[0]), float(found.point[1]), found.evaluations, found.ending)
-        return self._solution(problem, searched)
-
-    def _solution(self, problem: Problem, searched: _Searched) -> Solution:
-        known, notes = self._closed_forms(problem, SineRecord.of(problem.run))
-        values = {"alpha": searched.alpha, "beta": searched.beta}
-        return Solution(
-            model=BoucWen.build({**known, **values}),
-            delay=0.0,
-            at_bounds=tuple(
-                name
-                for (name, value), (low, high) in zip(values.items(), self.bounds, strict=True)
-                if min(value - low, high - value) < 1e-6 * (high - low)
-            ),
-            start={},
-            end={"beta": searched.beta},
-            evaluations=searched.evaluations,
-            ending=searched.ending,
-            seed=self.genetic.seed if self.search == "genetic" else None,
-            notes=(*notes, *(_counted_twice(problem, known) if self.explain else ())),
+        return self.solution(
+            problem, self.genetic_search(problem) if self.search == "genetic" else _optimum(self, problem)
         )
 
     def genetic_search(self, problem: Problem) -> GeneticMinimum:
-        """Run the genetic search alone: its history and its boxes."""
-        _require_bouc_wen(problem)
-        lower, upper = zip(*self.bounds, strict=True)
-        return genetic(self._rest(problem).thinned(_SEARCH_SAMPLES).costs, lower, upper, self.genetic)
+        """Run the genetic search alone; errors as `solve`."""
+        rest = _Remainder.of(self, problem).thinned(_SEARCH_SAMPLES)
+        return genetic(rest.costs, *zip(*self.bounds, strict=True), self.genetic)
 
     def cost(self, problem: Problem) -> Callable[[Floats], Floats]:
-        """RMS error [N] over all samples of (P, 2) points (alpha, beta), once c, m and f0 are known [Eq. 21]."""
-        return self._rest(problem).costs
+        """Return the RMS error [N] over all samples as a function of (P, 2) points (alpha, beta) [Eq. 21]."""
+        return _Remainder.of(self, problem).costs
 
-    def _rest(self, problem: Problem) -> _Rest:
-        record = SineRecord.of(problem.run)
-        return _Rest.of(problem, record, self._closed_forms(problem, record)[0])
+    def solution(self, problem: Problem, minimum: GeneticMinimum) -> Solution:
+        """Complete the end of a search to a solution."""
+        known, notes = self.closed_forms(problem, SineRecord.of(problem.run))
+        values = dict(zip(("alpha", "beta"), minimum.point.tolist(), strict=True))
+        at_bounds = tuple(
+            name
+            for (name, value), (low, high) in zip(values.items(), self.bounds, strict=True)
+            if min(value - low, high - value) < 1e-6 * (high - low)
+        )
+        return Solution(
+            BoucWen.build({**known, **values}), 0.0, at_bounds, {}, {"beta": values["beta"]},
+            minimum.evaluations, minimum.ending, self.genetic.seed if self.search == "genetic" else None,
+            notes=(*notes, *(_hysteretic_share(problem, known) if self.explain else ())),
+        )  # fmt: skip
 
-    def _closed_forms(self, problem: Problem, record: SineRecord) -> tuple[dict[str, float], tuple[str, ...]]:
-        """Every parameter but alpha and beta."""
+    def closed_forms(self, problem: Problem, record: SineRecord) -> tuple[dict[str, float], tuple[str, ...]]:
+        """Return every parameter but alpha and beta, and notes [Eq. 16–20]."""
         X, omega = record.condition.amplitude_m, record.omega
         reading = read_force(record, self.force_amplitude, self.phase, self.offset)
         known, notes = dict(problem.fixed), ()
@@ -142,51 +125,20 @@ class Paper(Method):
             # Without a gas spring the whole in-phase force is stiffness: at one frequency mass is part of it.
             _, apparent = damping_and_mass(reading, X, omega, 0.0, k3)
             known["k1"] = (known.get("m", 0.0) - apparent) * omega**2
-            notes = (
-                "no gas spring is given: k1 was taken from the in-phase force with the mass held, k2 = k3 = 0 "
-                "unless fixed",
-            )
+            notes = ("no gas spring is given: k1 was taken from the in-phase force with the mass held, k2 = k3 = 0 "
+                     "unless fixed",)  # fmt: skip
         c, m = damping_and_mass(reading, X, omega, known["k1"], k3)
         known |= {name: value for name, value in {"c": c, "m": m}.items() if name in problem.free}
         if self.quadratic_stiffness == "dropped":
             known["k2"] = 0.0
         if "f0" in problem.free:
-            lift = known.get("k2", 0.0) * X**2 / 2 if self.offset == "mean" else 0.0
-            known["f0"] = reading.offset - lift
+            known["f0"] = reading.offset - (known.get("k2", 0.0) * X**2 / 2 if self.offset == "mean" else 0.0)
         return known, notes
-
-    def _by_optimum(self, rest: _Rest) -> _Searched:
-        """Grid over the yield displacement, then refinement; alpha is linear and solved for."""
-        (low, high), (_, steepest) = self.bounds
-        X = rest.record.condition.amplitude_m
-        edge = np.log([max(rest.length(steepest), 1e-6 * X), min(20 * X, rest.longest)])
-
-        def explained(z: Floats) -> Floats:
-            return np.clip(z @ rest.force / (z @ z), low, high) * z - rest.force
-
-        def residual(u: Floats) -> Floats:
-            return explained(rest.states([rest.beta(float(np.exp(u[0])))])[0])
-
-        grid = np.linspace(edge[0], edge[1], 24)
-        costs = [float(np.sum(explained(z) ** 2)) for z in rest.states([rest.beta(float(u)) for u in np.exp(grid)])]
-        best = least_squares(residual, np.array([grid[int(np.argmin(costs))]]), edge[:1], edge[1:])
-        beta = rest.beta(float(np.exp(best.point[0])))
-        (z,) = rest.states([beta])
-        alpha = float(np.clip(z @ rest.force / (z @ z), low, high))
-        return _Searched(alpha, beta, best.evaluations + grid.size, best.ending)
-
-
-@dataclass(frozen=True)
-class _Searched:
-    alpha: float
-    beta: float
-    evaluations: int
-    ending: Ending
 
 
 @dataclass(frozen=True, eq=False)
-class _Rest:
-    """What the closed forms leave of the force, for alpha z to explain [Qian et al. 2024, Eq. 21–22]."""
+class _Remainder:
+    """Force that the closed forms leave for alpha z to explain [Qian et al. 2024, Eq. 21–22]."""
 
     problem: Problem
     record: SineRecord
@@ -194,43 +146,39 @@ class _Rest:
     _products: dict[float, tuple[float, float]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, problem: Problem, record: SineRecord, known: dict[str, float]) -> _Rest:
-        bare = BoucWen.build({**known, "alpha": 0.0, "beta": 1.0})
-        return cls(problem, record, record.force - bare.force(record.motion, np.zeros(record.theta.size)))
+    def of(cls, method: Paper, problem: Problem) -> _Remainder:
+        _require_bouc_wen(problem)
+        record = SineRecord.of(problem.run)
+        model = BoucWen.build({**method.closed_forms(problem, record)[0], "alpha": 0.0, "beta": 1.0})
+        return cls(problem, record, record.force - model.force(record.motion, np.zeros(record.theta.size)))
 
-    def thinned(self, most: int) -> _Rest:
+    def thinned(self, most: int) -> _Remainder:
         pick = np.unique(np.linspace(0, self.force.size - 1, most).round().astype(int))
-        record = SineRecord(self.record.run_id, self.record.condition, self.record.theta[pick], self.record.force[pick])
-        return _Rest(self.problem, record, self.force[pick])
+        record = replace(self.record, theta=self.record.theta[pick], force=self.record.force[pick])
+        return _Remainder(self.problem, record, self.force[pick])
 
     def states(self, betas: Sequence[float]) -> Floats:
-        """Z [m] on the exact loops of B betas, (B, N)."""
-        shape = self._shape(np.array(betas))
+        """Return z [m] on the exact loops of B betas, (B, N)."""
+        shape = self.shape(np.array(betas))
         zeta = steady_loop(shape, self.record.condition.amplitude_m, self.record.theta)
         return np.reshape(shape.yield_displacement, (-1, 1)) * zeta
 
     def costs(self, points: Floats) -> Floats:
-        """RMS error [N] of many (alpha, beta) at once.
+        """Return the RMS error [N] of many (alpha, beta) at once.
 
-        The error is quadratic in alpha, so each beta needs its loop once; children inherit
-        most betas unchanged.
+        The error is quadratic in alpha, so each beta needs its loop once; children inherit most betas unchanged.
         """
-        total = float(self.force @ self.force)
         new = [beta for beta in dict.fromkeys(points[:, 1].tolist()) if beta not in self._products]
         for beta, z in zip(new, self.states([max(beta, _TINY) for beta in new]) if new else (), strict=True):
             self._products[beta] = float(z @ self.force), float(z @ z)
         linear, square = np.array([self._products[beta] for beta in points[:, 1].tolist()]).T
-        alpha = points[:, 0]
+        alpha, total = points[:, 0], float(self.force @ self.force)
         return np.sqrt(np.maximum(total - 2 * alpha * linear + alpha**2 * square, 0.0) / self.force.size)
 
     def beta(self, length: float) -> float:
-        """Beta that gives a yield displacement [m]."""
+        """Return the beta that gives a yield displacement [m]."""
         fixed = {name: self.problem.fixed[name] for name in ("gamma", "n") if name in self.problem.fixed}
         return BoucWen.build({**fixed, "c": 0.0, "alpha": 0.0, "yield_displacement": length}).beta
-
-    def length(self, beta: float) -> float:
-        """Yield displacement [m] of a beta."""
-        return float(self._shape(beta).yield_displacement)
 
     @property
     def longest(self) -> float:
@@ -238,9 +186,32 @@ class _Rest:
         gamma = self.problem.fixed.get("gamma", 0.0)
         return 0.999 * gamma ** (-1 / self.problem.fixed["n"]) if gamma > 0 else np.inf
 
-    def _shape(self, beta: float | Floats) -> Shape:
+    def shape(self, beta: float | Floats) -> Shape:
         fixed = self.problem.fixed
         return Shape.from_bouc_wen(beta, fixed.get("gamma", beta), fixed.get("n", BoucWen.n))
+
+
+def _optimum(method: Paper, problem: Problem) -> GeneticMinimum:
+    """Search a grid over the yield displacement and refine; alpha is linear and solved for."""
+    rest = _Remainder.of(method, problem)
+    (low, high), (_, steepest) = method.bounds
+    X, shortest = rest.record.condition.amplitude_m, float(rest.shape(steepest).yield_displacement)
+    edge = np.log([max(shortest, 1e-6 * X), min(20 * X, rest.longest)])
+
+    def scale(z: Floats) -> float:
+        return float(np.clip(z @ rest.force / (z @ z), low, high))
+
+    def residual(u: Floats) -> Floats:
+        (z,) = rest.states([rest.beta(float(np.exp(u[0])))])
+        return scale(z) * z - rest.force
+
+    grid = np.linspace(edge[0], edge[1], 24)
+    states = rest.states([rest.beta(float(u)) for u in np.exp(grid)])
+    costs = [float(np.sum((scale(z) * z - rest.force) ** 2)) for z in states]
+    best = least_squares(residual, np.array([grid[int(np.argmin(costs))]]), edge[:1], edge[1:])
+    beta = rest.beta(float(np.exp(best.point[0])))
+    point = np.array([scale(rest.states([beta])[0]), beta])
+    return GeneticMinimum(point, best.cost, best.evaluations + grid.size, np.array([]), (), best.ending)
 
 
 def _require_bouc_wen(problem: Problem) -> None:
@@ -261,18 +232,17 @@ def _require_bouc_wen(problem: Problem) -> None:
             )
 
 
-def _counted_twice(problem: Problem, known: dict[str, float]) -> tuple[str, ...]:
-    """Warn if much of c is hysteretic force, judged by the consistent balance."""
-    consistent: Callable[[Problem], Solution] = Balance().solve
-    found = consistent(problem).model
-    if "c" not in problem.free or not isinstance(found, BoucWen) or not known["c"] > 0:
+def _hysteretic_share(problem: Problem, known: dict[str, float]) -> tuple[str, ...]:
+    """Note how much of c is hysteretic force according to the consistent balance, if it is much."""
+    model = Balance().solve(problem).model
+    if "c" not in problem.free or not isinstance(model, BoucWen) or not known["c"] > 0:
         return ()
     record = SineRecord.of(problem.run)
-    surplus, _ = double_counted(found.shape, found.yield_force, record.condition.amplitude_m, record.omega)
-    if surplus < _SMALL * known["c"]:
+    surplus, _ = double_counted(model.shape, model.yield_force, record.condition.amplitude_m, record.omega)
+    if surplus < _MAX_HYSTERETIC_SHARE * known["c"]:
         return ()
     return (
-        f"counted twice: {100 * min(surplus / known['c'], 1):.0f} % of c = {known['c']:.4g} N s/m is "
-        f"the first harmonic of "
-        "the hysteretic force, which alpha z holds too, and m is shifted likewise; method balance separates them",
+        f"counted twice: {100 * min(surplus / known['c'], 1):.0f} % of c = {known['c']:.4g} N s/m is the first "
+        "harmonic of the hysteretic force, which alpha z holds too, and m is shifted likewise; method balance "
+        "separates them",
     )

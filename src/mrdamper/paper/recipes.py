@@ -1,4 +1,4 @@
-"""The recipes that are compared: the paper's, its consistent counterpart, one fit of all runs, the traditional."""
+"""Recipes that are compared: the paper's, its consistent counterpart, one fit of all runs, the traditional use."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from mrdamper.identification.harmonic_balance import SineRecord
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.paper.assumptions import PaperAssumptions
+from mrdamper.paper.direct_genetic import DirectGenetic
 from mrdamper.paper.functions import fit_paper_functions
 from mrdamper.paper.options import PaperOptions
 from mrdamper.study.recipe import (
@@ -34,10 +35,9 @@ from mrdamper.study.recipe import (
 
 LITERAL, HALF, SAME_FORMS = "paper, literal", "paper, F0 half peak-to-peak", "consistent, the paper's functions"
 CONSISTENT, JOINT = "consistent", "joint"
-TRADITIONAL = "traditional, nearest speed"
-SLOWEST = "traditional, slowest motion"
-DIRECT = "direct genetic, nearest speed"
-ALI = "Ali-type (Spencer-based)"
+TRADITIONAL, SLOWEST = "traditional, nearest speed", "traditional, slowest motion"
+DIRECT, ALI = "direct genetic, nearest speed", "Ali-type (Spencer-based)"
+_MOST_CURRENTS = 5  # currents at which Ali's model is identified on every run
 
 Steps = list[tuple[Recipe, Sequence[Run]]]
 
@@ -50,7 +50,7 @@ def recipes_of_paper(
     *,
     explain: bool = True,
 ) -> Steps:
-    """Return the recipes that are compared, but for the costly ones, and the identification runs each needs.
+    """Return the recipes that are compared, but for the costly ones, and the identification runs of each.
 
     Parameters
     ----------
@@ -69,13 +69,13 @@ def recipes_of_paper(
         (Recipe("bouc-wen:literal", assumptions.basis(literal), by_paper, "paper", LITERAL), train),
         (Recipe("bouc-wen:half", assumptions.basis(half), by_paper, "paper", HALF), train),
         (Recipe("bouc-wen:same-forms", consistent, by_paper, "consistent", SAME_FORMS), train),
-        (Recipe("bouc-wen:consistent", consistent, through_chosen, "consistent", CONSISTENT), train),
+        (Recipe("bouc-wen:consistent", consistent, fit_chosen_functions, "consistent", CONSISTENT), train),
         (Recipe("bouc-wen:joint", plain, fit_functions_jointly, "joint", JOINT), train),
     ]
-    nearest = [(TRADITIONAL, peak_velocity(held_out))] if held_out else []
-    for title, speed in (*nearest, (SLOWEST, 0.0)):
-        recipe = Recipe(f"bouc-wen:{title}", consistent, one_per_current, "traditional", title)
-        steps.append((recipe, nearest_speed(train, speed)))
+    for title, speed in ((TRADITIONAL, _peak_velocity(held_out)), (SLOWEST, 0.0)):
+        if speed is not None:
+            recipe = Recipe(f"bouc-wen:{title}", consistent, one_per_current, "traditional", title)
+            steps.append((recipe, nearest_speed(train, speed)))
     return steps
 
 
@@ -84,53 +84,46 @@ def comparators(train: Sequence[Run], held_out: Sequence[Run], assumptions: Pape
 
     Ali's, whose every run is integrated thousands of times, is identified at every other current of a large matrix.
     """
-    direct = Recipe(
-        "bouc-wen:direct-genetic", assumptions.basis("direct-genetic"), one_per_current, "traditional", DIRECT
-    )
-    ali = conditioned(all_published()["ali-type"])
-    return [
-        (direct, nearest_speed(train, peak_velocity(held_out or train))),
-        (replace(ali, way="literature", title=ALI), _fewer_currents(train)),
-    ]
-
-
-def _fewer_currents(train: Sequence[Run]) -> Sequence[Run]:
-    """The runs at every other current and at the highest, where there are over five."""
-    levels = sorted({round(SineRecord.of(run).condition.current_A, 2) for run in train})
-    kept = levels[::2] if len(levels) > 5 else levels
-    return [run for run in train if round(SineRecord.of(run).condition.current_A, 2) in (*kept, levels[-1])]
+    basis = assumptions.basis(DirectGenetic.name)
+    direct = Recipe("bouc-wen:direct-genetic", basis, one_per_current, "traditional", DIRECT)
+    ali = replace(conditioned(all_published()["ali-type"]), way="literature", title=ALI)
+    levels = sorted({_level(run) for run in train})
+    kept = {*(levels[::2] if len(levels) > _MOST_CURRENTS else levels), levels[-1]}
+    nearest = nearest_speed(train, _peak_velocity(held_out or train) or 0.0)
+    return [(direct, nearest), (ali, [run for run in train if _level(run) in kept])]
 
 
 def literature(train: Sequence[Run]) -> Steps:
-    """Bingham, hyperbolic tangent, the other condition-dependent dampers of the house, and play and bypass."""
-    found = [modified("bingham"), modified("kwok"), play_and_bypass()]
-    found += [conditioned(cls) for name, cls in all_published().items() if name != "ali-type"]
-    return [(replace(recipe, way="literature"), train) for recipe in found]
+    """Return Bingham, hyperbolic tangent, play and bypass, and the published dampers but Ali's."""
+    recipes = [modified("bingham"), modified("kwok"), play_and_bypass()]
+    recipes += [conditioned(cls) for name, cls in all_published().items() if name != "ali-type"]
+    return [(replace(recipe, way="literature"), train) for recipe in recipes]
 
 
-def through_chosen(runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
-    """Functions chosen by how they predict left-out conditions."""
+def fit_chosen_functions(runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
+    """Fit functions chosen by leave-one-condition-out cross-validation."""
     fit = chosen_functions(identifications)
     return FitResult(fit.damper, lambda rows: chosen_functions([identifications[i] for i in rows]).damper, fit)
 
 
 def one_per_current(runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
-    """One set of parameters a current, used at every motion: the traditional use."""
+    """Take one set of parameters per current for every motion: the traditional use."""
     damper = OnePerCurrent.of(identifications)
     return FitResult(damper, lambda rows: OnePerCurrent.of([identifications[i] for i in rows]))
 
 
-def chosen_functions(found: Sequence[Identification]) -> ModifiedFit:
-    """Functions chosen by how they predict left-out conditions."""
+def chosen_functions(identifications: Sequence[Identification]) -> ModifiedFit:
+    """Fit functions chosen by leave-one-condition-out cross-validation; held parameters stay constant."""
     forms = {**BoucWen.map_forms(), "k2": ("constant",), "m": ("constant", "quadratic-current")}
-    # What was held has no function to find.
-    held = {name for name in forms if name in BoucWen.__dataclass_fields__ and name not in found[0].free}
-    return fit_modified(found, {name: ("constant",) if name in held else options for name, options in forms.items()})
+    held = set(BoucWen.__dataclass_fields__) - set(identifications[0].free)
+    return fit_modified(
+        identifications, {name: ("constant",) if name in held else options for name, options in forms.items()}
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class OnePerCurrent(Damper):
-    """A model with one set of parameters for each current, from one motion: the traditional use.
+    """Damper with one set of parameters for each current, from one motion: the traditional use.
 
     Attributes
     ----------
@@ -153,10 +146,10 @@ class OnePerCurrent(Damper):
     certainty: Certainty | None = None
 
     @classmethod
-    def of(cls, found: Sequence[Identification]) -> OnePerCurrent:
+    def of(cls, identifications: Sequence[Identification]) -> OnePerCurrent:
         """Take the models of identifications at different currents."""
-        models = tuple((i.condition.current_A, i.model) for i in found if isinstance(i.model, BoucWen))
-        return cls(found[0].rig, models, Envelope.of([i.condition for i in found]))
+        models = tuple((i.condition.current_A, i.model) for i in identifications if isinstance(i.model, BoucWen))
+        return cls(identifications[0].rig, models, Envelope.of([i.condition for i in identifications]))
 
     @property
     def title(self) -> str:
@@ -164,25 +157,24 @@ class OnePerCurrent(Damper):
 
     @property
     def parameter_count(self) -> int:
-        # c, f0, alpha, beta and stiffness or mass; the rest is preset
-        return 5 * len(self.models)
+        return 5 * len(self.models)  # c, f0, alpha, beta and stiffness or mass; the rest is preset
 
     def model_at(self, condition: Condition) -> BoucWen:
-        """The model at the nearest current."""
+        """Return the model at the nearest current."""
         return min(self.models, key=lambda pair: abs(pair[0] - condition.current_A))[1]
 
 
-def peak_velocity(runs: Sequence[Run]) -> float:
-    """Median peak velocity [m/s] of sine runs."""
-    return float(np.median([SineRecord.of(run).condition.peak_velocity for run in runs]))
-
-
 def nearest_speed(runs: Sequence[Run], speed: float) -> list[Run]:
-    """At every current, the sine run whose peak velocity [m/s] is nearest to a speed."""
-    nearest: dict[float, tuple[float, Run]] = {}
-    for run in runs:
-        condition = SineRecord.of(run).condition
-        key, off = round(condition.current_A, 2), abs(condition.peak_velocity - speed)
-        if key not in nearest or off < nearest[key][0]:
-            nearest[key] = off, run
-    return [nearest[key][1] for key in sorted(nearest)]
+    """Return, for every current, the sine run whose peak velocity [m/s] is nearest to a speed."""
+    nearest: dict[float, Run] = {}
+    for run in sorted(runs, key=lambda run: abs(SineRecord.of(run).condition.peak_velocity - speed)):
+        nearest.setdefault(_level(run), run)
+    return [nearest[level] for level in sorted(nearest)]
+
+
+def _peak_velocity(runs: Sequence[Run]) -> float | None:
+    return float(np.median([SineRecord.of(run).condition.peak_velocity for run in runs])) if runs else None
+
+
+def _level(run: Run) -> float:
+    return round(SineRecord.of(run).condition.current_A, 2)

@@ -1,4 +1,4 @@
-"""What the study of the paper found: results that claims judge, figures draw and tables list."""
+"""Results of the study of the paper, which claims check, figures draw and tables list."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SAME = 0.08  # relative tolerance within which two runs have one motion
 
 @dataclass(frozen=True)
 class GeneticCheck:
-    """The genetic search with the paper's settings on one run beside the optimum it is after.
+    """Genetic search with the paper's settings on one run, beside the optimum of the same error.
 
     Attributes
     ----------
@@ -47,19 +47,17 @@ class GeneticCheck:
 
 
 @dataclass(frozen=True)
-class Ended:
-    """Where a genetic search of fewer generations ended on a run, over the optimum.
+class GeneticEnd:
+    """End of a genetic search of fewer generations on a run, over the optimum.
 
     Attributes
     ----------
     run_id : str
     seed : int
-    alpha, beta : float
-        Parameter reached over that of the optimum.
-    error : float
-        RMSE reached over the lowest there is.
+    alpha, beta, error : float
+        Parameters and RMSE reached over those of the optimum.
     forces, to_settle : int
-        Computed in all, and until no error lower by over a hundredth was found.
+        Computed in all, and until the error is within 1 % of the final one.
     seconds : float
     """
 
@@ -75,35 +73,35 @@ class Ended:
 
 @dataclass(frozen=True, eq=False)
 class Reproduction:
-    """Everything the study found.
+    """Results of the study.
 
     Attributes
     ----------
     dataset : Dataset
     rig : VirtualRig or None
-        The truth, where the data are synthetic.
+        The true damper, where the data are synthetic.
     gas : GasSpring or None
     train, held_out : tuple of Run
     friction : Run or None
+        Slow test.
     loops : tuple of LoopAnalysis
     readings : tuple of ForceReading
-        F0, phi, f0 of the train runs.
-    contenders : tuple of Scored
-        Their `recipe.title` tells them apart.
+        F0, phi, f0 of the identification runs.
     options : PaperOptions
+    contenders : tuple of Scored
+        Methods compared; their `recipe.title` tells them apart.
     there : mapping of (str, str) to Identification or str
-        By title and run id: held-out runs identified the literal and the consistent way, or why not.
+        Validation runs identified by the literal and the consistent method, by title and run id, or why not.
     genetic : tuple of GeneticCheck
-    ended : tuple of Ended
-        Genetic searches over all train runs, one seed each.
+    ended : tuple of GeneticEnd
+        One for each identification run, a seed each.
     direct : mapping of str to int
-        Forces computed until the direct genetic search of a run settled, by run id.
+        Forces computed until the direct genetic search settled, by run id.
     seed_errors : mapping of str to (S,) array
-        Median nrmse_pp over the held-out runs, one a noise seed, by contender.
+        Median validation nrmse_pp by method, one a noise seed.
     seed_verdicts : mapping of str to tuple of str
-        Verdicts on a claim by its key, one a noise seed.
+        Verdicts by the key of the claim, one a noise seed.
     sensitivity : tuple of OneAtATime
-        At the run in the middle of the consistent identifications.
     sobol : Sobol or None
     notes : tuple of str
     seconds : float
@@ -117,11 +115,11 @@ class Reproduction:
     friction: Run | None
     loops: tuple[LoopAnalysis, ...]
     readings: tuple[ForceReading, ...]
-    contenders: tuple[Scored, ...]
     options: PaperOptions
+    contenders: tuple[Scored, ...] = ()
     there: Mapping[tuple[str, str], Identification | str] = field(default_factory=dict)
     genetic: tuple[GeneticCheck, ...] = ()
-    ended: tuple[Ended, ...] = ()
+    ended: tuple[GeneticEnd, ...] = ()
     direct: Mapping[str, int] = field(default_factory=dict)
     seed_errors: Mapping[str, Floats] = field(default_factory=dict)
     seed_verdicts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -132,68 +130,55 @@ class Reproduction:
 
     @property
     def conditions(self) -> tuple[Condition, ...]:
-        """Measured conditions of the train runs."""
+        """Measured conditions of the identification runs."""
         return tuple(loop.condition for loop in self.loops if loop.split == "train")
 
     def contender(self, title: str) -> Scored | None:
-        """The contender of that title, where the data allowed it."""
+        """Return the method of that title, where the data allowed it."""
         return next((c for c in self.contenders if c.recipe.title == title), None)
 
     def named(self, *titles: str) -> list[Scored]:
-        """The contenders of these titles, where the data allowed them."""
+        """Return the methods of these titles, where the data allowed them."""
         return [c for title in titles if (c := self.contender(title))]
 
+    @property
+    def best(self) -> Scored | None:
+        """Method with the lowest median validation error, where there are validation runs."""
+        scored = [c for c in self.contenders if c.validation.runs]
+        return min(scored, key=lambda c: c.validation.median(), default=None)
+
     def amplitude_group(self, place: int) -> list[Run]:
-        """Return the identification runs of the smallest (0) or largest (-1) of the two most tested amplitudes."""
+        """Return the identification runs of the smaller (0) or larger (-1) of the two most tested amplitudes."""
         groups: list[list[Run]] = []
-        levels: list[float] = []
-        for run, condition in sorted(
-            zip(self.train, self.conditions, strict=True), key=lambda pair: pair[1].amplitude_m
-        ):
-            if not levels or np.log(condition.amplitude_m / levels[-1]) > SAME:
+        level = 0.0
+        for condition, run in sorted(zip(self.conditions, self.train, strict=True), key=lambda p: p[0].amplitude_m):
+            if not groups or np.log(condition.amplitude_m / level) > SAME:
                 groups.append([])
-                levels.append(condition.amplitude_m)
+                level = condition.amplitude_m
             groups[-1].append(run)
         most = sorted(range(len(groups)), key=lambda i: -len(groups[i]))[:2]
         return groups[sorted(most)[place]]
 
-    @property
-    def best(self) -> Scored | None:
-        """The contender that predicts the held-out runs best, where there are any."""
-        judged = [c for c in self.contenders if c.validation.runs]
-        return min(judged, key=lambda c: c.validation.median(), default=None)
-
 
 def motions(study: Reproduction) -> list[list[int]]:
-    """Indices of the train runs of every motion, by rising current."""
+    """Return the indices of the identification runs of every motion, by rising current."""
     groups = same_motion(study.conditions, tolerance=SAME)
     return [sorted(group, key=lambda i: study.conditions[i].current_A) for group in groups]
 
 
-def amplitudes(study: Reproduction) -> Floats:
-    """F0 of the train runs [N]."""
-    return np.array([r.amplitude for r in study.readings])
-
-
 def values(study: Reproduction, title: str, name: str) -> Floats:
-    """A parameter of a contender's identifications [SI]; empty where there are none."""
-    contender = study.contender(title)
-    return np.array([float(getattr(i.model, name)) for i in (contender.identifications if contender else ())])
+    """Return F0 [N], or a parameter of a method's identifications [SI]; empty where there are none."""
+    if name == "F0":
+        return np.array([r.amplitude for r in study.readings])
+    method = study.contender(title)
+    return np.array([float(getattr(i.model, name)) for i in (method.identifications if method else ())])
 
 
 def function_of(study: Reproduction, name: str) -> FunctionFit | None:
-    """The function of a parameter by the literal recipe, if there is one."""
-    contender = study.contender(LITERAL)
-    fit = contender.fit if contender else None
+    """Return the function of a parameter by the literal method, if there is one."""
+    literal = study.contender(LITERAL)
+    fit = literal.fit if literal else None
     return fit.functions.get(name) if isinstance(fit, ModifiedFit) else None
-
-
-def forces_a_run(study: Reproduction, way: Scored) -> float:
-    """Forces computed to identify from one run, median; the paper's own way by its genetic search."""
-    counts = [i.evaluations for i in way.identifications]
-    if way.recipe.title == LITERAL and study.ended:
-        counts = [end.forces for end in study.ended]
-    return float(np.median(counts)) if counts else float("nan")
 
 
 def rate_rows(study: Reproduction) -> list[dict[str, Any]]:
@@ -203,29 +188,27 @@ def rate_rows(study: Reproduction) -> list[dict[str, Any]]:
     current; for a search by least squares, until its end.
     """
     current = {run.id: c.current_A for run, c in zip(study.train, study.conditions, strict=True)}
-    counts: dict[str, dict[str, int]] = {LITERAL: {end.run_id: end.to_settle for end in study.ended}}
-    counts[DIRECT] = dict(study.direct)
+    searches = {LITERAL: {end.run_id: end.to_settle for end in study.ended}, DIRECT: dict(study.direct)}
     rows = []
     for method in study.named(LITERAL, TRADITIONAL, ALI, DIRECT):
         title = method.recipe.title
-        settled = counts.get(title) or {i.run_id: i.evaluations for i in method.identifications}
+        counts = searches.get(title) or {i.run_id: i.evaluations for i in method.identifications}
         for score in sorted(method.validation.runs, key=lambda r: r.condition.current_A):
-            near = [n for name, n in settled.items() if abs(current[name] - score.condition.current_A) < SAME_CURRENT]
+            near = [n for name, n in counts.items() if abs(current[name] - score.condition.current_A) < SAME_CURRENT]
             rows.append(
-                {
-                    "method": title,
-                    "current_A": score.condition.current_A,
-                    "nrmse_pp": score.scores.nrmse_pp,
-                    "wape": score.scores.wape,
-                    "mean_relative_error": score.scores.mean_relative_error,
-                    "forces_until_settled": float(np.median(near)) if near else None,
-                }
-            )
+                {"method": title, "current_A": score.condition.current_A, "nrmse_pp": score.scores.nrmse_pp,
+                 "wape": score.scores.wape, "mean_relative_error": score.scores.mean_relative_error,
+                 "forces_until_settled": float(np.median(near)) if near else None}
+            )  # fmt: skip
     return rows
 
 
-def seconds_a_run(study: Reproduction, way: Scored) -> float:
-    """Time of an identification with its share of the fit over conditions; the paper's own by its genetic search."""
-    if way.recipe.title == LITERAL and study.ended:
-        return float(np.mean([end.seconds for end in study.ended]))
-    return way.seconds / max(len(way.identifications), 1)
+def cost_per_run(study: Reproduction, method: Scored) -> tuple[float, float]:
+    """Return forces computed (median) and seconds per identification; the paper's own by its genetic search.
+
+    Seconds include the share of the fit over conditions.
+    """
+    if method.recipe.title == LITERAL and study.ended:
+        return float(np.median([e.forces for e in study.ended])), float(np.mean([e.seconds for e in study.ended]))
+    counts = [i.evaluations for i in method.identifications]
+    return float(np.median(counts)) if counts else float("nan"), method.seconds / max(len(counts), 1)

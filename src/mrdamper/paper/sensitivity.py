@@ -1,17 +1,14 @@
-"""How much each parameter matters at a condition, and what presetting it costs.
+"""Sensitivity of the force to each parameter at a condition, and the cost of presetting one.
 
-The loop is varied in coordinates that no unit of length changes: yield force, yield
-displacement, exponent n and asymmetry (gamma − beta)/(gamma + beta). A change of n with beta
-and gamma held would move the yield displacement by a power of the unit chosen.
-
-A parameter may be preset if changing it hardly changes the force, or if the others make up
-for it when they are identified anew. The two are told apart here: the second is why A = 1
-costs nothing at all.
+The loop is varied in coordinates that no unit of length changes: yield force, yield displacement, exponent n and
+asymmetry (gamma − beta)/(gamma + beta). A change of n with beta and gamma held would move the yield displacement by a
+power of the unit chosen. A parameter may be preset if changing it hardly changes the force, or if the others make up
+for it when they are identified anew: the second is why A = 1 costs nothing at all.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,17 +20,16 @@ from mrdamper.identification import identify
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.physics.hysteresis import steady_loop
-from mrdamper.physics.motion import sine
+from mrdamper.physics.motion import Excitation, sine
 
-LOOP = ("yield_force", "yield_displacement", "n", "asymmetry")
-NAMES = ("c", *LOOP, "k1", "k3", "m", "f0")
-_SAMPLES = 256  # of the loop
-_REDRAWN = 100  # bootstrap samples of the intervals of the indices
+NAMES = ("c", "yield_force", "yield_displacement", "n", "asymmetry", "k1", "k3", "m", "f0")
+_SAMPLES = 256  # samples of the loop
+_BOOTSTRAP_SAMPLES = 100  # of the intervals of the indices
 
 
 @dataclass(frozen=True)
 class OneAtATime:
-    """What a change of one parameter does to the force.
+    """Effect of a change of one parameter on the force.
 
     Attributes
     ----------
@@ -43,8 +39,7 @@ class OneAtATime:
     effect : float
         RMS change of the force over its standard deviation, the other parameters held.
     left : float
-        The same, once the free parameters were identified anew with this one preset wrongly.
-        NaN where nothing was refitted.
+        The same, once the free parameters were identified anew with this one preset wrongly; NaN if they were not.
     """
 
     name: str
@@ -61,7 +56,7 @@ class Sobol:
     ----------
     names : tuple of str
     first, total : (P,) arrays
-        Share of the variance a parameter makes alone, and with all others [-].
+        Share of the variance due to a parameter alone, and with all others [-].
     first_confidence, total_confidence : (P,) arrays
         Half-widths at 95 %.
     spread : float
@@ -94,7 +89,7 @@ def one_at_a_time(
     change : float
         Relative change; of the asymmetry, which runs from -1 to 1, a difference.
     refit : sequence of str
-        Parameters whose change the others are given the chance to make up for.
+        Parameters whose change the others may make up for.
 
     Raises
     ------
@@ -102,14 +97,13 @@ def one_at_a_time(
         If there is no such parameter.
     """
     base = _loop(model, condition)
-    size = float(np.std(base))
-    found = []
+    effects = []
     for name in names:
         changed = _varied(model, {name: 1 + change})
-        effect = float(np.sqrt(np.mean((_loop(changed, condition) - base) ** 2)))
+        effect = float(np.sqrt(np.mean((_loop(changed, condition) - base) ** 2)) / np.std(base))
         left = _left_after_refit(model, changed, condition) if name in refit else float("nan")
-        found.append(OneAtATime(name, change, effect / size, left))
-    return tuple(found)
+        effects.append(OneAtATime(name, change, effect, left))
+    return tuple(effects)
 
 
 def sobol(
@@ -120,7 +114,7 @@ def sobol(
     samples: int = 512,
     seed: int = 0,
 ) -> Sobol:
-    """Sobol indices by Saltelli's scheme.
+    """Compute Sobol indices by Saltelli's scheme.
 
     Parameters
     ----------
@@ -140,51 +134,42 @@ def sobol(
     """
     if not 0 < spread < 1:
         raise ParameterError(f"spread is {spread}", mend="give a share between 0 and 1")
-    base = _loop(model, condition)
-
-    def change(points: Floats) -> Floats:
-        return np.array(
-            [
-                np.sqrt(np.mean((_loop(_varied(model, dict(zip(names, p, strict=True))), condition) - base) ** 2))
-                for p in points.T.tolist()
-            ]
-        )
-
     from scipy.stats import qmc, sobol_indices
 
-    rng, count = np.random.default_rng(seed), len(names)
+    rng, count, base = np.random.default_rng(seed), len(names), _loop(model, condition)
     seeded: Any = {"seed": rng}  # the name that every SciPy from 1.13 on takes
     one, two = np.split(qmc.Sobol(2 * count, **seeded).random(samples).T * 2 * spread + 1 - spread, 2)
-    mixed = np.stack([np.where(np.arange(count)[:, None] == i, two, one) for i in range(count)])
-    forces = change(one), change(two), np.stack([change(points) for points in mixed])
+    mixed = [np.where(np.arange(count)[:, None] == i, two, one) for i in range(count)]
+    points = np.concatenate([one, two, *mixed], axis=1)
+    effects = np.empty(points.shape[1])
+    # One exponent n after the other: its curve is tabulated once.
+    for i in np.argsort(points[names.index("n")] if "n" in names else points[0], kind="stable").tolist():
+        changed = _varied(model, dict(zip(names, points[:, i].tolist(), strict=True)))
+        effects[i] = np.sqrt(np.mean((_loop(changed, condition) - base) ** 2))
+    f_A, f_B, *f_AB = effects.reshape(-1, samples)
 
     def indices(rows: np.ndarray) -> Floats:
-        f_A, f_B, f_AB = forces[0][rows], forces[1][rows], forces[2][:, rows]
-        found = sobol_indices(func={"f_A": f_A[None], "f_B": f_B[None], "f_AB": f_AB[:, None]}, n=samples)
-        return np.array([np.ravel(found.first_order), np.ravel(found.total_order)])
+        func = {"f_A": f_A[rows][None], "f_B": f_B[rows][None], "f_AB": np.array(f_AB)[:, None, rows]}
+        result = sobol_indices(func=func, n=samples)
+        return np.array([np.ravel(result.first_order), np.ravel(result.total_order)])
 
     first, total = indices(np.arange(samples))
-    redrawn = [indices(rng.integers(samples, size=samples)) for _ in range(_REDRAWN)]
+    redrawn = [indices(rng.integers(samples, size=samples)) for _ in range(_BOOTSTRAP_SAMPLES)]
     low, high = np.quantile(redrawn, (0.025, 0.975), axis=0)
-    first_half, total_half = (high - low) / 2
-    return Sobol(tuple(names), first, total, first_half, total_half, spread)
+    return Sobol(tuple(names), first, total, *((high - low) / 2), spread)
 
 
-def _varied(model: BoucWen, factors: dict[str, float]) -> BoucWen:
-    """The model with coordinates multiplied, the asymmetry moved by the factor less one.
+def _varied(model: BoucWen, factors: Mapping[str, float]) -> BoucWen:
+    """Multiply coordinates of the model, and move the asymmetry by the factor less one.
 
     A factor A acts as on the printed equation with alpha, beta and gamma held.
     """
-    plain = {name: value for name, value in model.values().items() if name not in ("alpha", "beta", "gamma")}
-    values = plain | {
-        "yield_force": float(model.yield_force),
-        "yield_displacement": float(model.yield_displacement),
-        "asymmetry": float(model.shape.rho),
-    }
-    for name in factors:
+    values = {name: value for name, value in model.values().items() if name not in ("alpha", "beta", "gamma")}
+    loop = (model.yield_force, model.yield_displacement, model.shape.rho)
+    values |= dict(zip(("yield_force", "yield_displacement", "asymmetry"), map(float, loop), strict=True))
+    for name, factor in factors.items():
         if name != "A" and name not in values:
             raise UnknownNameError.of("parameter", name, (*values, "A"))
-    for name, factor in factors.items():
         if name == "asymmetry":
             values[name] = float(np.clip(values[name] + factor - 1, -0.98, 0.98))
         elif name != "A":
@@ -195,21 +180,18 @@ def _varied(model: BoucWen, factors: dict[str, float]) -> BoucWen:
     return BoucWen.build(values)
 
 
-def _loop(model: BoucWen, condition: Condition) -> Floats:
-    motion = sine(condition, 1, _SAMPLES)
+def _loop(model: BoucWen, condition: Condition, motion: Excitation | None = None) -> Floats:
+    motion = motion or sine(condition, 1, _SAMPLES)
     theta = 2 * np.pi * condition.frequency_Hz * motion.time
-    z = model.yield_displacement * steady_loop(model.shape, condition.amplitude_m, theta)
-    return model.force(motion, z)
+    return model.force(motion, model.yield_displacement * steady_loop(model.shape, condition.amplitude_m, theta))
 
 
 def _left_after_refit(model: BoucWen, changed: BoucWen, condition: Condition) -> float:
     """Identify c, yield force and displacement and f0 from the changed model with the old gamma/beta and n."""
     motion = sine(condition, 1.25, _SAMPLES).part(slice(_SAMPLES // 4, -1))
-    theta = 2 * np.pi * condition.frequency_Hz * motion.time
-    z = changed.yield_displacement * steady_loop(changed.shape, condition.amplitude_m, theta)
-    run = Run("changed", motion.time, motion.displacement, changed.force(motion, z), motion.current)
+    run = Run("changed", motion.time, motion.displacement, _loop(changed, condition, motion), motion.current)
     held = {name: getattr(model, name) for name in ("n", "k1", "k2", "k3", "m")}
-    found = identify(run, BoucWen, Balance(), fixed=held).model
-    assert isinstance(found, BoucWen)
+    refitted = identify(run, BoucWen, Balance(), fixed=held).model
+    assert isinstance(refitted, BoucWen)
     measured = _loop(changed, condition)
-    return float(np.sqrt(np.mean((_loop(found, condition) - measured) ** 2)) / np.std(measured))
+    return float(np.sqrt(np.mean((_loop(refitted, condition) - measured) ** 2)) / np.std(measured))

@@ -1,16 +1,15 @@
-"""A synthetic damper on a synthetic rig, richer than any model identified here.
+"""A synthetic damper on a synthetic rig, more complex than any model identified here.
 
-Nothing it gives is a measurement. It stands in for test data that is not public, so that a
-method can be run from the first loop to the last table against a truth that can be read:
-every parameter is a field. The test matrix is that of Qian et al. 2024, section 2; the
-numbers of the damper are ours, chosen to lie where such dampers lie.
+It stands in for test data that are not public, so that a method can be followed from the first loop to the last table
+against known parameters: every one is a field. The test matrix is that of Qian et al. 2024, section 2; the parameters
+of the damper are ours, of the size such dampers have.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -78,7 +77,7 @@ class VirtualRig:
 
     @classmethod
     def parameters(cls) -> tuple[ParameterInfo, ...]:
-        """Unit, bounds and meaning of every number."""
+        """Return unit, bounds and meaning of every parameter."""
         return parameters_of(cls)
 
     @cached_property
@@ -87,16 +86,16 @@ class VirtualRig:
         return GasSpring(self.gas_pressure, self.gas_volume, np.pi * self.rod_diameter**2 / 4)
 
     def magnetisation(self, current: Any) -> Floats:
-        """Effective current [A]: the current below saturation, the saturation current far above."""
+        """Return the effective current [A]: the current below saturation, the saturation current far above."""
         ratio = np.abs(current) / self.saturation_current
         return np.abs(current) / (1 + ratio**6) ** (1 / 6)
 
     def yield_force(self, current: Any) -> Floats:
-        """Yield force [N] at a current [A]."""
+        """Return the yield force [N] at a current [A]."""
         return self.yield_off + self.yield_per_ampere * self.magnetisation(current)
 
     def force(self, motion: Excitation) -> Floats:
-        """True force [N] along a motion from rest, before any sensor."""
+        """Return the true force [N] along a motion from rest, before any sensor."""
         x, v, a, path = motion.displacement, motion.velocity, motion.acceleration, motion.path
         viscosity = self.viscosity + self.viscosity_per_ampere * self.magnetisation(motion.current)
         viscous = viscosity * v * (1 + (v / self.thinning_speed) ** 2) ** (-self.thinning / 2)
@@ -109,18 +108,16 @@ class VirtualRig:
             + self.offset_force
         )
 
-    def record(self, motion: Excitation, rng: np.random.Generator, **labels: Any) -> Run:
-        """A run as the recorder writes it: delayed, noisy, quantised. `labels` are fields of `Run`."""
-        return self.sense(motion, self.force(motion), rng, **labels)
-
     def sense(self, motion: Excitation, force: Floats, rng: np.random.Generator, **labels: Any) -> Run:
-        """What the sensors make of a motion and its true force [N]."""
+        """Return the record of a motion and its true force [N]: delayed, noisy, quantised.
+
+        `labels` are fields of `Run`.
+        """
         late = np.interp(motion.time - self.force_delay, motion.time, force)
+        x = motion.displacement + self.displacement_noise * rng.standard_normal(len(motion))
         return Run(
             time=motion.time,
-            displacement=_quantised(
-                motion.displacement + self.displacement_noise * rng.standard_normal(len(motion)), self.displacement_step
-            ),
+            displacement=_quantised(x, self.displacement_step),
             force=_quantised(late + self.force_noise * rng.standard_normal(len(motion)), self.force_step),
             current=motion.current,
             rig="virtual",
@@ -142,12 +139,9 @@ class VirtualRig:
 
 
 def virtual_dataset(
-    rig: VirtualRig | None = None,
-    currents: Sequence[float] = CURRENTS,
-    seed: int = 0,
-    cycles: int = 4,
+    rig: VirtualRig | None = None, currents: Sequence[float] = CURRENTS, seed: int = 0, cycles: int = 4
 ) -> Dataset:
-    """The paper's test matrix on the virtual rig; synthetic, the same for the same seed.
+    """Test the paper's matrix on the virtual rig; synthetic, the same for the same seed.
 
     Parameters
     ----------
@@ -162,17 +156,26 @@ def virtual_dataset(
     Returns
     -------
     Dataset
-        20 mm at 1.0, 1.5, 2.0 Hz and 50 mm at 0.5, 1.0, 1.5 Hz as train runs, 80 mm at 1 Hz as
-        validate runs.
+        20 mm at 1.0, 1.5, 2.0 Hz and 50 mm at 0.5, 1.0, 1.5 Hz as train runs, 80 mm at 1 Hz as validate runs.
     """
     chosen = rig or VirtualRig()
-    return noisy_dataset(chosen, true_runs(chosen, currents, cycles), seed)
+    runs = []
+    for number, (c, motion, force) in enumerate(true_runs(chosen, tuple(currents), cycles)):
+        labels = {
+            "id": f"{1e3 * c.amplitude_m:g}mm-{c.frequency_Hz:g}Hz-{c.current_A:g}A",
+            "split": "validate" if (c.amplitude_m, c.frequency_Hz) == HELD_OUT else "train",
+            "nominal": c,
+            "window": (1 / c.frequency_Hz, float(motion.time[-1])),
+        }
+        runs.append(chosen.sense(motion, force, np.random.default_rng((seed, number)), **labels))
+    return Dataset(tuple(runs), "virtual rig (synthetic)")
 
 
+@lru_cache(maxsize=1)
 def true_runs(
-    rig: VirtualRig, currents: Sequence[float], cycles: int = 4
+    rig: VirtualRig, currents: tuple[float, ...], cycles: int = 4
 ) -> list[tuple[Condition, Excitation, Floats]]:
-    """Condition, motion and true force of every run of the matrix, hold-out last."""
+    """Return condition, motion and true force of every run of the matrix, the prediction motion last."""
     runs = []
     for amplitude, frequency in (*MOTIONS, HELD_OUT):
         for current in currents:
@@ -182,60 +185,36 @@ def true_runs(
     return runs
 
 
-def noisy_dataset(rig: VirtualRig, runs: Sequence[tuple[Condition, Excitation, Floats]], seed: int) -> Dataset:
-    """Record true runs with one seed of sensor noise."""
-    recorded = []
-    for number, (condition, motion, force) in enumerate(runs):
-        held = (condition.amplitude_m, condition.frequency_Hz) == HELD_OUT
-        labels = {
-            "id": f"{1e3 * condition.amplitude_m:g}mm-{condition.frequency_Hz:g}Hz-{condition.current_A:g}A",
-            "split": "validate" if held else "train",
-            "nominal": condition,
-            "window": (1 / condition.frequency_Hz, float(motion.time[-1])),
-        }
-        recorded.append(rig.sense(motion, force, np.random.default_rng((seed, number)), **labels))
-    return Dataset(tuple(recorded), "virtual rig (synthetic)")
-
-
-def friction_test(
-    rig: VirtualRig | None = None, amplitude: float = 0.020, seed: int = 0, *, filled: bool = False
-) -> Run:
-    """One cycle at 0.01 mm/s without current [Qian et al. 2024, section 2]; synthetic.
+def friction_test(rig: VirtualRig, seed: int = 0, *, filled: bool = False) -> Run:
+    """Test one cycle of 20 mm at 0.01 mm/s without current [Qian et al. 2024, section 2]; synthetic.
 
     Parameters
     ----------
-    rig : VirtualRig, optional
-    amplitude : float
-        [m]
+    rig : VirtualRig
     seed : int
     filled : bool
         With fluid in the damper. The paper's test is without: no yield and no viscous force is in it.
     """
-    chosen = rig or VirtualRig()
     if not filled:
-        chosen = replace(chosen, yield_off=0.0, yield_per_ampere=0.0, viscosity=0.0, viscosity_per_ampere=0.0)
-    condition = Condition(0.0, SLOW_SPEED / (4 * amplitude), amplitude)
+        rig = replace(rig, yield_off=0.0, yield_per_ampere=0.0, viscosity=0.0, viscosity_per_ampere=0.0)
+    condition = Condition(0.0, SLOW_SPEED / (4 * 0.020), 0.020)
     motion = triangle(condition, 1.25, 8000)
-    return chosen.record(
-        motion, np.random.default_rng((seed, 10_000)), id="friction-0.01mm-s", excitation="triangle", nominal=condition
-    )
+    rng = np.random.default_rng((seed, 10_000))
+    return rig.sense(motion, rig.force(motion), rng, id="friction-0.01mm-s", excitation="triangle", nominal=condition)
 
 
 def _follow_lag(force: Floats, time: Floats, lag: float) -> Floats:
-    """First-order lag, exact for a force that is held over each step."""
+    """Apply a first-order lag, exact for a force that is held over each step."""
     if lag == 0:
         return force
+    from scipy.signal import lfilter
+
     keep = np.exp(-float(time[1] - time[0]) / lag)
-    late = np.empty_like(force)
-    state = float(force[0])
-    for i, value in enumerate(force.tolist()):
-        state = value + (state - value) * keep
-        late[i] = state
-    return late
+    return lfilter([1 - keep], [1, -keep], force, zi=[keep * force[0]])[0]
 
 
 def _speed_before(velocity: Floats, stroke: np.ndarray) -> Floats:
-    """Peak speed [m/s] of the stroke before the one each sample lies in; zero in the first."""
+    """Return the peak speed [m/s] of the stroke before the one each sample lies in; zero in the first."""
     begins = np.searchsorted(stroke, np.arange(stroke[-1] + 1))
     peaks = np.maximum.reduceat(np.abs(velocity), begins)
     return np.concatenate([[0.0], peaks[:-1]])[stroke]

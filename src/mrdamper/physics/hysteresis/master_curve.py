@@ -53,6 +53,12 @@ def master_curve(n: float) -> MasterCurve:
     return _tabulated(settled(n))
 
 
+@lru_cache
+def gauss_legendre(points: int) -> tuple[Floats, Floats]:
+    """Return nodes and weights of a Gauss–Legendre rule on −1...1; NumPy solves an eigenvalue problem for them."""
+    return np.polynomial.legendre.leggauss(points)
+
+
 @lru_cache(maxsize=128)
 def _tabulated(n: float) -> MasterCurve:
     return _Tabulated(n)
@@ -254,7 +260,7 @@ class _Table:
     """
 
     def __init__(self, r: Floats, rate: Callable[[Floats], tuple[Floats, Floats]]):
-        node, weight = np.polynomial.legendre.leggauss(8)
+        node, weight = gauss_legendre(8)
         width = np.diff(r)
         inside = r[:-1, None] + 0.5 * width[:, None] * (1 + node)
         phi = np.concatenate([[0.0], np.cumsum(0.5 * width * ((1 / rate(inside)[0]) @ weight))])

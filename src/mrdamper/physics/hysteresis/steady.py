@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError
-from mrdamper.physics.hysteresis.master_curve import SATURATED, MasterCurve, approach_rate, master_curve
+from mrdamper.physics.hysteresis.master_curve import SATURATED, MasterCurve, approach_rate, gauss_legendre, master_curve
 from mrdamper.physics.hysteresis.response import on_curve
 from mrdamper.physics.hysteresis.shape import Shape
 
@@ -218,14 +218,9 @@ _CLIMB_PIECES = np.array([1e-4, 0.01, 0.1, 0.25, 0.5, 1, 1.5, 2, 4, 8, 16, 40])
 
 def _gauss_points(ends: Floats, points: int = 16) -> tuple[Floats, Floats]:
     """Nodes and weights of Gauss–Legendre rules on consecutive pieces."""
-    node, weight = _legendre(points)
+    node, weight = gauss_legendre(points)
     half = 0.5 * np.diff(ends)[:, None]
     return (ends[:-1, None] + half * (1 + node)).ravel(), (half * weight).ravel()
-
-
-@lru_cache
-def _legendre(points: int) -> tuple[Floats, Floats]:
-    return np.polynomial.legendre.leggauss(points)
 
 
 def _pair_shape(shape: Shape, amplitude: ArrayLike) -> tuple[int, ...]:
