@@ -1,16 +1,29 @@
-"""The built site, opened from disk: every link leads to a page and a place on it; axe finds nothing wrong.
+"""Check the built site, opened from disk: links, accessibility by axe, and what the search finds.
 
 python docs/check.py docs/_build/html
 """
 
 from __future__ import annotations
 
+import os
 import sys
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 CHROMIUM = "/usr/bin/chromium"
+SEARCHES = {  # words a reader types, and a page that must be among the first five
+    "PVP": "nomenclature",
+    "CVP": "nomenclature",
+    "dyno": "how-to/your-own-rig",
+    "shock": "how-to/your-own-rig",
+    "hysteresis": "models",
+    "prediction interval": "explanation/how-sure",
+    "FMU": "how-to/fmpy",
+}
+_SHOWN = 5  # results that a reader looks at
 
 
 class _Page(HTMLParser):
@@ -30,13 +43,16 @@ class _Page(HTMLParser):
                 self.targets.add(value)
 
 
+def pages_of(site: Path) -> list[Path]:
+    """Pages of the site, without those of the theme."""
+    return sorted(path for path in site.rglob("*.html") if "_static" not in path.parts)
+
+
 def broken_links(site: Path) -> list[str]:
-    """Links within the site that lead nowhere, and files that would be loaded from a network."""
-    pages = {path: _Page(path.read_text(encoding="utf-8")) for path in site.rglob("*.html")}
+    """Links within the site that lead nowhere."""
+    pages = {path: _Page(path.read_text(encoding="utf-8")) for path in pages_of(site)}
     broken = []
     for path, page in pages.items():
-        if "_static" in path.parts:
-            continue
         for target in sorted(page.targets):
             parts = urlsplit(target)
             if parts.scheme or parts.netloc:
@@ -48,8 +64,8 @@ def broken_links(site: Path) -> list[str]:
     return broken
 
 
-def violations(site: Path) -> list[str]:
-    """What axe says of every page in chromium, from disk and without a network; complaints on the console too."""
+def violations(site: Path, pages: Sequence[Path], searches: Sequence[str] = ()) -> list[str]:
+    """Violations that axe reports, errors on the console, and searches without their page; no network is reached."""
     from axe_playwright_python.sync_playwright import Axe
     from playwright.sync_api import sync_playwright
 
@@ -58,11 +74,17 @@ def violations(site: Path) -> list[str]:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
         tab = browser.new_context(viewport={"width": 1280, "height": 900}).new_page()
         tab.route(lambda url: url.startswith("http"), lambda route: route.abort())
+        for words in searches:
+            tab.goto(f"{(site / 'search.html').resolve().as_uri()}?q={words.replace(' ', '+')}")
+            tab.wait_for_selector("#search-results p.search-summary:not(:empty)", state="attached")
+            tab.wait_for_timeout(1000)  # results appear one after another
+            links = tab.eval_on_selector_all("#search-results li a", "all => all.map(a => a.getAttribute('href'))")
+            first = [link.partition(".html")[0] for link in links][:_SHOWN]
+            if SEARCHES[words] not in first or any(name.startswith(("decisions/", "changes")) for name in first):
+                found.append(f"search {words!r}: finds {', '.join(first) or 'nothing'}; expected {SEARCHES[words]}")
         tab.on("pageerror", lambda error: found.append(f"{tab.url}: {error}"))
         tab.on("requestfailed", lambda request: found.append(f"{tab.url}: cannot load {request.url}"))
-        for path in sorted(site.rglob("*.html")):
-            if "_static" in path.parts:
-                continue
+        for path in pages:
             tab.goto(path.resolve().as_uri())
             response = Axe().run(tab, options={"iframes": False, "preload": False}).response
             for rule in response["violations"]:
@@ -79,10 +101,13 @@ def main() -> None:
     site = Path(sys.argv[1])
     wrong = broken_links(site)
     if Path(CHROMIUM).is_file():
-        wrong += violations(site)
+        pages, searches, workers = pages_of(site), list(SEARCHES), os.cpu_count() or 1
+        with ProcessPoolExecutor(workers) as pool:
+            parts = [pool.submit(violations, site, pages[i::workers], searches[i::workers]) for i in range(workers)]
+            wrong += [line for part in parts for line in part.result()]
     else:
-        print(f"no browser at {CHROMIUM}: accessibility was not checked", file=sys.stderr)
-    print("\n".join(wrong) or "0 broken links, 0 accessibility violations")
+        print(f"no browser at {CHROMIUM}: accessibility and search were not checked", file=sys.stderr)
+    print("\n".join(wrong) or "0 broken links, 0 accessibility violations; every search finds its page")
     sys.exit(1 if wrong else 0)
 
 

@@ -52,6 +52,7 @@ html_title = "mrdamper"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_js_files = ["site.js"]
+html_search_scorer = "_static/scorer.js"
 html_extra_path = ["_live"]
 html_show_sourcelink = False
 html_theme_options = {
