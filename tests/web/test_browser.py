@@ -37,6 +37,10 @@ HOSTILE = [
 ]
 
 
+TAB_STOPS_OF_TOOL_BARS = """() => [...document.querySelectorAll(".modebar")].map(
+    (bar) => [...bar.querySelectorAll(".modebar-btn")].filter((button) => button.tabIndex === 0).length)"""
+
+
 def drop(page, files):
     """Drop files on the page as a hand would: {name: bytes}."""
     packed = [[name, base64.b64encode(content).decode()] for name, content in files.items()]
@@ -245,7 +249,7 @@ def test_sliders_move_the_loops_and_undo_takes_it_back(on_model, shoot):
 
 def test_impossible_input_is_refused_in_words_and_the_tool_bar_is_beside_the_curve(on_model, shoot):
     page = on_model
-    before = number(page, "current_A")
+    shown = {name: number(page, name) for name in ("current_A", "frequency_Hz", "amplitude_m", "d")}
     for name, typed, said in (
         ("current_A", "-1", "−1 A is refused"),
         ("current_A", "1e9", "lies between 0 A and"),
@@ -258,14 +262,15 @@ def test_impossible_input_is_refused_in_words_and_the_tool_bar_is_beside_the_cur
         wrong = page.locator(f".slider[data-name={name}] .wrong")
         wrong.wait_for()
         assert said in wrong.inner_text()
+        assert number(page, name) == shown[name]  # the field is what the picture shows
     shoot(page, "18-refused")
-    for name in ("current_A", "frequency_Hz", "amplitude_m"):
-        type_number(page, name, {"current_A": str(before), "frequency_Hz": "1", "amplitude_m": "10"}[name])
+    for name, typed in (("current_A", "0.3"), ("frequency_Hz", "1"), ("amplitude_m", "10")):
+        type_number(page, name, typed)
         assert not page.locator(f".slider[data-name={name}] .wrong").is_visible()
     chart = page.locator("section[aria-label='Force over velocity']")
     chart.locator(".plot").hover()
     bar, area = (chart.locator(part).bounding_box() for part in (".modebar", ".nsewdrag"))
-    assert bar["y"] + bar["height"] <= area["y"]
+    assert bar["x"] >= area["x"] + area["width"]
     assert chart.get_by_text("Chart Studio").count() == 0
     # Below the lowest tested current as above the highest the curve over current is dashed.
     dashes = page.locator("section[aria-label='Peak force over current'] .js-line").evaluate_all(
@@ -291,6 +296,26 @@ def test_the_band_follows_a_slider_that_is_dragged(on_model):
     assert page.get_by_text("% prediction interval").count() == 1
     page.mouse.up()
     at_rest(page)
+
+
+def test_the_bundled_tests_come_with_models_and_every_view_shows_something(page, shoot):
+    page.get_by_role("button", name="Open the bundled tests", exact=True).click()
+    page.locator(".matrix").wait_for()
+    for tab, sight in (
+        ("Model", "section[aria-label='Force over displacement'] .js-line"),
+        ("Ride", "section[aria-label='Acceleration'] .js-line"),
+        ("Export", "#take-damper option"),
+    ):
+        open_tab(page, tab)
+        page.locator(sight).first.wait_for(state="attached")
+    assert page.locator("#take-damper optgroup").count() == 2
+    open_tab(page, "Model")
+    for typed in ("90", "1e9", "-1", "0.4"):  # far outside, impossible twice, inside
+        type_number(page, "current_A", typed)
+        at_rest(page)
+    assert number(page, "current_A") == 0.4
+    assert page.evaluate(TAB_STOPS_OF_TOOL_BARS) == [1, 1, 1, 1, 1]
+    shoot(page, "19-bundled-model")
 
 
 def test_a_parameter_is_held_until_released(on_model):

@@ -9,8 +9,11 @@ import shutil
 import threading
 from collections.abc import Mapping
 from functools import cache
+from importlib.resources import files
 from pathlib import Path, PurePosixPath
 
+from mrdamper.dampers.base import Damper
+from mrdamper.dampers.model_file import parse_model
 from mrdamper.data import Dataset
 from mrdamper.errors import InputError
 from mrdamper.rig_files.dataset_folder import load_dataset
@@ -31,6 +34,14 @@ def bundled() -> Intake:
 @cache
 def _bundled() -> Intake:
     return Intake(load_dataset(), "bundled")
+
+
+@cache
+def bundled_dampers() -> tuple[Damper, ...]:
+    """Load the models that a study selects for the dampers of the bundled tests."""
+    folder = files("mrdamper.data.bundled") / "models"
+    paths = sorted((path for path in folder.iterdir() if path.name.endswith(".json")), key=lambda path: path.name)
+    return tuple(parse_model(path.read_text(encoding="utf-8"), where=path.name) for path in paths)
 
 
 def read_drop(drop: Drop, profile: str = "", refused_only: bool = False, only: Path | None = None) -> Intake:

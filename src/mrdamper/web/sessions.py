@@ -43,7 +43,9 @@ class Bench:
     key: str  # made here
     damper: Damper
     origin: str  # how it came: "study", "identification", "comparison", "file"
-    note: str = ""  # one line on how good it is, or where it came from
+    note: str = ""  # one line on its errors, or where it came from
+    error: float | None = None  # median force error in cross-validation [-]; None where none was calculated
+    selected: bool = False  # a study selected it for its rig
     # gives the damper with its covariance, where it has none yet and its runs are known
     learn: Callable[[], Damper] | None = None
 
@@ -103,21 +105,23 @@ class Session:
             return None
         return rig_table(self.dataset, rig)
 
-    def add(self, damper: Damper, origin: str, note: str = "", learn: Callable[[], Damper] | None = None) -> Bench:
-        """Put a damper on the bench; the oldest go where there are too many."""
-        bench = Bench(self.key("damper"), damper, origin, note, learn)
+    def add(self, damper: Damper, origin: str, note: str = "", **facts: Any) -> Bench:
+        """Add a damper, with further fields of `Bench`; the oldest are removed where there are too many."""
+        bench = Bench(self.key("damper"), damper, origin, note, **facts)
         self.dampers[bench.key] = bench
         while len(self.dampers) > MOST_DAMPERS:
             del self.dampers[next(iter(self.dampers))]
         return bench
 
-    def scored(self, found: Scored, origin: str, note: str) -> Bench:
-        """Put a damper on the bench that learns its covariance from its runs when that is first asked for."""
+    def scored(self, found: Scored, origin: str, note: str, selected: bool = False) -> Bench:
+        """Add a damper whose covariance is estimated from its runs when it is first asked for."""
+        error = found.cross_validated.median() if found.cross_validated.runs else None
         if found.damper.certainty is not None:
-            return self.add(found.damper, origin, note)
+            return self.add(found.damper, origin, note, error=error, selected=selected)
         runs = [self.dataset[run.run_id] for run in found.train.runs]
         beside = [score.predicted for score in found.cross_validated.runs if score.predicted is not None]
-        return self.add(found.damper, origin, note, partial(certain, found.damper, runs, beside))
+        learn = partial(certain, found.damper, runs, beside)
+        return self.add(found.damper, origin, note, error=error, selected=selected, learn=learn)
 
     def damper(self, key: str, sure: bool = False) -> Bench:
         """A damper on the bench by its key, with its covariance where that is asked for and can be known."""

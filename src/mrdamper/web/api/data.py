@@ -15,7 +15,7 @@ from mrdamper.rig_files.quality.table import Quality
 from mrdamper.web.answers import frame
 from mrdamper.web.curves import measured_cycle, measured_window, raw_record
 from mrdamper.web.drops import DROP_LIMIT, FILE_LIMIT, Drop, DropError, Intake
-from mrdamper.web.intake import bundled, read_drop
+from mrdamper.web.intake import bundled, bundled_dampers, read_drop
 from mrdamper.web.rig_table import condition_on_screen, describe
 from mrdamper.web.sessions import Current, Session
 
@@ -31,8 +31,11 @@ class Profile(BaseModel, extra="forbid"):
 
 @router.post("/bundled")
 def open_bundled(session: Current) -> dict[str, Any]:
-    """Put the bundled tests on the bench."""
+    """Open the bundled tests with the models that a study selects for them."""
     session.put(bundled())
+    if not any(bench.origin == "bundled" for bench in session.dampers.values()):
+        for damper in bundled_dampers():
+            session.add(damper, "bundled", selected=True)
     return overview(session)
 
 

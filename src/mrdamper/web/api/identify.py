@@ -136,7 +136,7 @@ def _conclude_study(session: Session, found: Study, written: list[Any]) -> dict[
         for candidate in rig.candidates:
             errors = {"cross-validation": candidate.cross_validated, "validation": candidate.validation}
             note = ", ".join(f"{name} {_percent(scores)}" for name, scores in errors.items() if scores.runs)
-            listed.append(_candidate(candidate, session.scored(candidate, "study", note).key))
+            listed.append(_candidate(candidate, session.scored(candidate, "study", note, candidate is rig.chosen).key))
         rigs.append({"rig": rig.rig, "chosen": listed[0]["damper"], "candidates": listed})
     return {"rigs": rigs, "seconds": round(found.seconds, 1)}
 

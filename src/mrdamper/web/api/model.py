@@ -175,4 +175,6 @@ def _head(bench: Bench) -> dict[str, Any]:
         "numbers": bench.damper.parameter_count,
         "origin": bench.origin,
         "note": bench.note,
+        "error": number(bench.error),
+        "selected": bench.selected,
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from threading import Lock
 from typing import Any
 
@@ -10,9 +11,11 @@ from fastapi import APIRouter
 from fastapi.responses import Response
 from pydantic import BaseModel, Field
 
+from mrdamper.dampers.base import Damper
 from mrdamper.data import Floats
 from mrdamper.data.parameters import with_values
 from mrdamper.errors import UnknownNameError
+from mrdamper.statistics.metrics import peak_force
 from mrdamper.systems.controllers import controller_type, controller_types
 from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.inputs import Input, bundled_records, load_input, made_inputs
@@ -28,6 +31,8 @@ router = APIRouter(prefix="/sessions/{session}/ride")
 _LENGTH = 8.0  # s of a road
 _SAMPLES = 2000  # of a history that travel to the page
 _TURN = Lock()  # one at a time: each takes seconds
+_FORCE_SHARE = 0.08  # force of the dampers over the weight of the body [-]
+_GRAVITY = 9.81  # acceleration of gravity [m/s²]
 _SLOWEST = 0.2  # Hz; what of the ground's motion is slower than this is left out of the picture
 
 
@@ -39,6 +44,7 @@ class Ask(BaseModel, extra="forbid", allow_inf_nan=False):
     source: str = Field(max_length=64)
     control: str = Field(max_length=64)
     current_A: float = Field(ge=0, le=1000)
+    scaled: bool = False  # masses and springs of a vehicle to the force of the damper
 
 
 @router.get("/choices")
@@ -51,7 +57,7 @@ def choices(session: Current) -> dict[str, Any]:
     systems = [(name, load_system(name).system) for name in bundled_systems()]
     return {
         "systems": [{"name": name, "title": s.title, "kind": _kind(s)} for name, s in systems],
-        "sources": {"ground": records, "road": [{"name": name, "title": name} for name in roads]},
+        "sources": {"ground": records, "road": [{"name": name, "title": _road_title(name)} for name in roads]},
         "controls": [{"name": "passive", "title": Passive.title}, *laws],
     }
 
@@ -62,6 +68,10 @@ def ride(ask: Ask, session: Current) -> Response:
     if ask.system not in bundled_systems():  # a name, never a path of this machine
         raise UnknownNameError.of("system", ask.system, bundled_systems())
     damper, system = session.damper(ask.damper).damper, load_system(ask.system).system
+    capacity, scale = _capacity(damper), 1.0
+    if ask.scaled and _kind(system) == "road":
+        scale = float(f"{capacity * len(system.dampers) / (_FORCE_SHARE * _GRAVITY * system.M[0, 0]):.2g}")
+        system = _scaled(system, scale)
     source = _source(ask.source, system)
     dampers = dict.fromkeys((link.name for link in system.dampers), damper)
     kind = controller_type(ask.control)
@@ -74,6 +84,8 @@ def ride(ask: Ask, session: Current) -> Response:
     arrays = {name: values[every] for name, values in (_histories(done, source) | unmoved).items()}
     head = {
         "kind": _kind(system),
+        "scale": scale,
+        "capacity_N": capacity,
         "title": f"{system.title}, {type(law).title}",
         "coordinates": system.coordinates,
         "channels": system.channels,
@@ -88,6 +100,27 @@ def ride(ask: Ask, session: Current) -> Response:
         "energy_gap": number(done.energy_gap),
     }
     return frame(head, arrays)
+
+
+def _road_title(name: str) -> str:
+    """Return the title of a road: "ISO 8608 road, class B" for iso8608-b."""
+    standard, _, grade = name.partition("-")
+    return f"ISO 8608 road, class {grade.upper()}" if standard == "iso8608" and grade else name
+
+
+def _capacity(damper: Damper) -> float:
+    """Predict the peak force [N] at the highest tested current and a middle motion."""
+    e = damper.envelope
+    return peak_force(damper.predict(replace(e.middle, current_A=e.current_A[1])).force)
+
+
+def _scaled(system: System, factor: float) -> System:
+    """Multiply masses, dashpots and springs; frequencies and strokes under the same road stay."""
+    links = tuple(
+        replace(link, stiffness=factor * link.stiffness, damping=factor * link.damping) for link in system.links
+    )
+    push = None if system.push is None else (factor * system.push[0], factor * system.push[1])
+    return replace(system, M=factor * system.M, C=factor * system.C, K=factor * system.K, push=push, links=links)
 
 
 def _kind(system: System) -> str:

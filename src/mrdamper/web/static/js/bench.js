@@ -2,6 +2,7 @@
 
 import { BenchError } from "./api.js";
 import { h, note, problem, put } from "./dom.js";
+import { percent } from "./format.js";
 import { forgetSession } from "./session.js";
 import { Store } from "./state.js";
 
@@ -13,6 +14,7 @@ export class Bench {
     this.store = new Store();
     this.overview = null; // of the data on the bench
     this.busy = ""; // what is being done to bring others
+    this.studying = false; // a study runs
     this.dampers = [];
     this.tables = new Map(); // rig number to its runs and matrix
     this.picture = ""; // the logo of the report's head, as base64; too large for a link
@@ -59,9 +61,36 @@ export class Bench {
     }
   }
 
-  /** Open the bundled tests. */
-  openBundled() {
-    return this.takeData(() => this.api.post("/bundled"), "Opening the bundled tests");
+  /** Open the bundled tests and the models identified from them. */
+  async openBundled() {
+    await this.takeData(() => this.api.post("/bundled"), "Opening the bundled tests");
+    await this.refreshDampers();
+  }
+
+  /** Key of the damper to show where none was chosen: selected by a study, of the rig shown, the newest. */
+  preferred() {
+    const rig = this.overview?.rigs[this.state.rig]?.name;
+    const rank = (d) => 2 * (d.rig === rig) + d.selected;
+    return this.dampers.reduce((best, d) => (best && rank(best) > rank(d) ? best : d), null)?.key ?? null;
+  }
+
+  /** Options of a list of dampers, by rig; the error stands before the name, which may be cut. */
+  damperOptions() {
+    const rigs = [...new Set(this.dampers.map((d) => d.rig))];
+    const option = (d) => h("option", { value: d.key }, `${d.error === null ? "" : `${percent(d.error)} · `}${d.title}${d.selected ? " · selected" : ""}`);
+    return rigs.map((rig) => h("optgroup", { label: rig || "rig without name" }, this.dampers.filter((d) => d.rig === rig).map(option)));
+  }
+
+  /** Mark that a study runs, until its work ends. */
+  async study(work) {
+    this.studying = true;
+    this.announce("studying");
+    try {
+      return await work;
+    } finally {
+      this.studying = false;
+      this.announce("studying");
+    }
   }
 
   async rigTable(number = this.state.rig) {

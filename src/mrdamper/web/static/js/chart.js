@@ -4,7 +4,7 @@ import { paint } from "./colours.js";
 import { h, renew } from "./dom.js";
 import { legend } from "./legend.js";
 
-const LOOK = { margin: { l: 64, r: 16, t: 36, b: 50 }, pad: 0.04, growth: 0.25 };
+const LOOK = { margin: { l: 64, r: 38, t: 10, b: 50 }, pad: 0.04, growth: 0.25 };
 let loading = null;
 
 /** Load the library once. */
@@ -102,6 +102,23 @@ export class Chart {
     this.marks = this.traces.map((t) => t.x.length);
     await Plotly.react(this.plot, data, this.layout(), this.config());
     this.drawn = true;
+    this.oneTabStop();
+  }
+
+  /** The tool bar is one stop of the Tab key; arrow keys move inside it. */
+  oneTabStop() {
+    const buttons = [...this.plot.querySelectorAll(".modebar-btn")];
+    buttons.forEach((button, i) => (button.tabIndex = i ? -1 : 0));
+    const bar = this.plot.querySelector(".modebar");
+    if (!bar || bar.dataset.keys) return;
+    bar.dataset.keys = "arrows";
+    bar.addEventListener("keydown", (event) => {
+      const all = [...bar.querySelectorAll(".modebar-btn")];
+      const step = { ArrowDown: 1, ArrowRight: 1, ArrowUp: -1, ArrowLeft: -1 }[event.key];
+      if (!step) return;
+      event.preventDefault();
+      all[(all.indexOf(document.activeElement) + step + all.length) % all.length].focus();
+    });
   }
 
   showKeys() {
@@ -125,7 +142,8 @@ export class Chart {
     const axis = (title, range) => ({
       title: { text: title, standoff: 8 }, range, gridcolor: paint("grid"), zerolinecolor: paint("line-strong"),
       linecolor: paint("line-strong"), ticks: "outside", ticklen: 4, tickcolor: paint("line-strong"),
-      automargin: false, hoverformat: ".4~g", exponentformat: "power", separatethousands: false,
+      // No powers: the library writes them as styled markup, which the content security policy refuses.
+      automargin: false, hoverformat: ".4~g", exponentformat: "none", separatethousands: false,
     });
     const size = parseFloat(getComputedStyle(document.documentElement).fontSize) / 15;
     return {
@@ -136,6 +154,7 @@ export class Chart {
       showlegend: false, // the keys stand beside the title; an image file has them inside
       legend: { orientation: "h", x: 0, y: 1, yanchor: "bottom", font: { size: 11.5 * size }, bgcolor: "rgba(0,0,0,0)" },
       hovermode: "closest", hoverlabel: { font: { size: 12 * size }, namelength: 40 }, dragmode: "zoom",
+      modebar: { orientation: "v", bgcolor: "rgba(0,0,0,0)", color: paint("faint"), activecolor: paint("accent") },
       uirevision: this.revision, autosize: true, ...this.more(),
     };
   }

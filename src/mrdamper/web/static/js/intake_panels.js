@@ -7,7 +7,7 @@ import { count } from "./format.js";
 export function fileList(found) {
   if (!found?.verdicts.length) return null;
   const [taken, others] = [true, false].map((wanted) => found.verdicts.filter((v) => (v.state === "taken") === wanted));
-  return h("div", { class: "group" }, h("h2", {}, "Files"), others.map(said), taken.length ? folded(taken, !others.length) : null);
+  return h("div", { class: "group" }, h("h2", {}, "Files"), byFinding(others), taken.length ? folded(taken, !others.length) : null);
 }
 
 /** The profile, to be corrected; open where a file was refused. */
@@ -25,11 +25,25 @@ export function profilePanel(found, drop) {
         h("button", { onclick: () => drop.readAgain(text.value) }, found.verdicts.length === 1 ? "Read again" : "Read all again"))));
 }
 
-function said(verdict) {
+/** Refused files one by one; the same note on several files once, with their names folded. */
+function byFinding(verdicts) {
+  const groups = new Map();
+  for (const verdict of verdicts) {
+    const key = verdict.state === "refused" ? verdict.name : JSON.stringify(verdict.findings);
+    groups.set(key, [...(groups.get(key) ?? []), verdict]);
+  }
+  return [...groups.values()].map((same) => {
+    if (same.length === 1) return said(same[0]);
+    const names = h("details", {}, h("summary", {}, "Names"), h("ul", { class: "names" }, same.map((v) => h("li", {}, v.name))));
+    return said({ ...same[0], name: count(same.length, "file") }, names);
+  });
+}
+
+function said(verdict, names = null) {
   const refused = verdict.state === "refused";
   return h("div", { class: `message ${refused ? "bad" : "warn"}` },
     h("div", { class: "row" }, h("b", {}, verdict.name), h("span", { class: `badge ${refused ? "bad" : "warn"}` }, verdict.state)),
-    verdict.findings.map(([code, text]) => h("div", {}, capital(text), " ", h("code", {}, code))));
+    verdict.findings.map(([code, text]) => h("div", {}, capital(text), " ", h("code", {}, code))), names);
 }
 
 function folded(verdicts, open) {

@@ -5,9 +5,9 @@ import { onScreen } from "./format.js";
 import { slider } from "./slider.js";
 
 const MM = 1000;
-const ORIGIN = { study: "from the study", identification: "identified here", comparison: "from the comparison", file: "from a file" };
+const ORIGIN = { study: "from the study", bundled: "identified by a study of the bundled tests", identification: "identified here", comparison: "from the comparison", file: "from a file" };
 const CONDITION = [
-  { name: "current_A", symbol: "I", meaning: "current", unit: "A", least: "a current counts by its magnitude, from 0 A on", bounds: ([, high]) => [0, 100 * high] },
+  { name: "current_A", symbol: "I", meaning: "current", unit: "A", least: "the magnitude of the current is used, 0 A or more", bounds: ([, high]) => [0, 100 * high] },
   { name: "frequency_Hz", symbol: "f", meaning: "frequency", unit: "Hz", scale: "log", least: "a motion has a frequency above 0 Hz", bounds: ([low, high]) => [low / 100, high * 100] },
   { name: "amplitude_m", symbol: "X", meaning: "amplitude", unit: "mm", factor: MM, least: "a motion has an amplitude above 0 mm", bounds: ([low, high]) => [low / 100, high * 100] },
 ];
@@ -17,13 +17,20 @@ export class ModelPanel {
   constructor(bench, { dragging, settled }) {
     Object.assign(this, { bench, dragging, settled, sliders: {}, damper: null });
     this.element = h("div", { class: "side" });
+    this.pending = h("p", { class: "small message", role: "status" });
+    const pending = () => {
+      this.pending.hidden = !bench.studying;
+      this.pending.textContent = bench.studying ? "A study is running. The model it selects will be added to this list." : "";
+    };
+    pending();
+    document.addEventListener("bench:studying", pending);
     this.runs = h("select", { id: "tested-run", onchange: () => this.goTo(this.runs.value) });
     this.family = h("input", { type: "checkbox", id: "family", onchange: () => bench.store.commit({ family: this.family.checked }) });
   }
 
   /** Nothing to move. */
   empty() {
-    put(this.element, h("p", { class: "faint" }, "No damper on the bench yet."));
+    put(this.element, h("p", { class: "faint" }, "No model yet."));
   }
 
   /** Sliders for a damper as the bench describes it. */
@@ -49,16 +56,16 @@ export class ModelPanel {
 
   /** The dampers to choose from. */
   list() {
-    put(this.dampers, this.bench.dampers.map((d) => h("option", { value: d.key }, `${d.title} · ${d.rig || "rig"}${d.note ? ` · ${d.note}` : ""}`)));
+    put(this.dampers, this.bench.damperOptions());
     this.dampers.value = this.damper.key;
   }
 
   chooser() {
-    const { numbers, origin, rig, note } = this.damper;
+    const { title, numbers, origin, rig, note } = this.damper;
     this.dampers = h("select", { id: "damper", onchange: () => this.bench.choose(this.dampers.value) });
     this.list();
     return h("div", { class: "field" }, h("label", { for: "damper" }, "Damper"), this.dampers,
-      h("p", { class: "small faint" }, `${numbers} numbers, ${ORIGIN[origin] ?? origin}${rig ? `, rig ${rig}` : ""}${note ? `; ${note}` : ""}.`));
+      h("p", { class: "small faint" }, `${title}: ${numbers} parameters, ${ORIGIN[origin] ?? origin}${rig ? `, rig ${rig}` : ""}${note ? `; ${note}` : ""}.`), this.pending);
   }
 
   conditions() {
@@ -94,7 +101,7 @@ export class ModelPanel {
         h("button", { class: "link small", onclick: () => this.bench.store.commit({ held: {}, condition: null }) }, "Reset all")),
       h("p", { class: "small faint" }, made.length
         ? `${this.damper.follows ? "They follow the condition" : "One set for every condition"}. A slider that is moved holds its value until released.`
-        : "This damper's laws give no parameters to move."),
+        : "This model has no parameters to change."),
       main,
       preset.length ? h("details", {}, h("summary", {}, "Held at their presets in the identification"), h("div", { class: "group" }, preset)) : null);
   }

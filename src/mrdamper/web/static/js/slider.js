@@ -53,11 +53,10 @@ export function slider(spec, { drag, settle, release }) {
     element.classList.toggle("outside", Boolean(outside));
   }
 
-  /** Say what is wrong with a number that was typed, or nothing. */
+  /** Say why a number that was typed is refused; nothing where it is accepted. */
   function say(text) {
     wrong.textContent = text;
     wrong.hidden = !text;
-    number.toggleAttribute("aria-invalid", Boolean(text));
     if (text) number.setAttribute("aria-describedby", wrong.id);
     else number.removeAttribute("aria-describedby");
   }
@@ -71,8 +70,12 @@ export function slider(spec, { drag, settle, release }) {
   range.addEventListener("change", () => settle(toValue(Number(range.value))));
   number.addEventListener("change", () => {
     const text = refusal(number.value, spec, factor);
-    say(text);
-    if (!text) settle(Number(number.value) / factor);
+    if (!text) {
+      say("");
+      return settle(Number(number.value) / factor);
+    }
+    number.value = typed(factor * last.value); // what the picture shows
+    return say(`${text.slice(0, -1)}; ${spec.symbol} stays at ${figures(factor * last.value)} ${unit(spec.unit)}.`);
   });
   set(spec.value);
   return { element, set };

@@ -40,7 +40,7 @@ class CompareView {
     const side = h("div", { class: "side" }, h("div", { class: "group" },
       h("h2", {}, "Compare models"),
       h("p", { class: "small faint" }, "Every model is identified from the identification runs of the rig and predicts the validation runs."),
-      this.rig, this.list, this.button), this.work.element);
+      this.rig, this.button, this.list), this.work.element);
     this.element = h("div", { class: "view" }, side, this.stage);
     document.addEventListener("bench:data", () => this.forget());
     this.forget();
@@ -91,7 +91,7 @@ class CompareView {
     const box = (c) => h("input", { type: "checkbox", name: "contestant", value: c.name, checked: c.studied });
     const check = (which) => () => this.list.querySelectorAll("input").forEach((input, i) => (input.checked = which(found[i])));
     const link = (text, which) => h("button", { type: "button", class: "link small", onclick: check(which) }, text);
-    put(this.list, h("legend", { class: "hidden-text" }, "Models"),
+    put(this.list, h("legend", {}, "Models"),
       h("div", { class: "row" }, link("Those of the study", (c) => c.studied), link("All but slow", (c) => !c.slow), link("None", () => false)),
       found.map((c) => h("label", { class: "check", title: c.source }, box(c), c.title, c.slow ? h("span", { class: "badge" }, "slow") : null)));
   }

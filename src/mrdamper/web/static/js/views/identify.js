@@ -50,7 +50,7 @@ class IdentifyView {
     this.shown();
     put(this.stage, overview
       ? empty("No identification yet", "A study identifies all candidates and selects one by cross-validation. Alternatively identify one model by one method and examine its residuals.")
-      : empty("No data on the bench", "Open the bundled tests or drop files on the Data page first.", h("button", { class: "primary", onclick: this.go("data") }, "Open data")));
+      : empty("No data", "Open the bundled tests or drop files on the Data page first.", h("button", { class: "primary", onclick: this.go("data") }, "Open data")));
   }
 
   start({ whole, body }) {
@@ -70,7 +70,7 @@ class IdentifyView {
     const { overview } = bench;
     form.working(true);
     if (this.stage.querySelector(".empty")) put(this.stage, busy(whole ? "Study running …" : "Identifying …", "The other views can be used meanwhile."));
-    const answer = await work;
+    const answer = await (whole ? bench.study(work) : work);
     form.working(false);
     if (overview !== bench.overview) return this.work.clear(); // other data lie on the bench by now
     if (!answer) {

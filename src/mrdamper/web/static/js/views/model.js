@@ -77,7 +77,7 @@ class ModelView {
   /** Bring the panel to the damper chosen, and ask for its loops. */
   async refresh() {
     const { state, dampers, store } = this.bench;
-    const key = state.damper ?? dampers.at(-1)?.key ?? null;
+    const key = dampers.some((d) => d.key === state.damper) ? state.damper : this.bench.preferred();
     if (key === null) {
       this.damper = null;
       this.panel.empty();
@@ -201,8 +201,8 @@ class ModelView {
     if (this.spoken !== said) this.bench.speak(said); // when it changes, not at every move
     this.spoken = said;
     const between = now.level ? ` (${Math.round(100 * now.level)} % prediction interval ${now.scope}: ${figures(now.peak_from_N, 3)} to ${figures(now.peak_to_N, 3)} N)` : "";
-    const none = now.level ? "" : ` ${capital(now.no_band ?? (this.pace > SLOW ? "no band: this model takes too long for one" : "the band follows at rest"))}.`;
-    const amounts = `Predicted: peak force ${figures(now.peak_N)} N${between}, energy ${figures(now.energy_J)} J a cycle.${none} ${nearest(head.nearest[0])}`;
+    const none = now.level ? "" : ` ${capital(now.no_band ?? (this.pace > SLOW ? "no prediction interval: this model is too slow for one" : "the prediction interval is calculated when the slider rests"))}.`;
+    const amounts = `Predicted: peak force ${figures(now.peak_N)} N${between}, energy ${figures(now.energy_J)} J per cycle.${none} ${nearest(head.nearest[0])}`;
     put(this.verdict, flags.length
       ? note("warn", h("div", {}, h("b", {}, "Extrapolation: "), `${flags.map((f) => f.join(" ")).join("; ")}. The loop is dashed.`), h("div", {}, amounts))
       : note("", h("div", {}, h("b", {}, "Inside the tested conditions.")), h("div", {}, amounts)));
@@ -227,8 +227,8 @@ function nearest(run) {
 
 function nothing(bench) {
   const go = (view) => () => bench.store.pass({ view });
-  return empty("No model to move yet",
-    "Identify one from the data, or drop a model.json. Then drag current, frequency, amplitude and every parameter, and watch the loops follow.",
+  return empty("No model yet",
+    "Identify a model from the data, or drop a model.json. Sliders of current, frequency, amplitude and every parameter then change its loops.",
     h("button", { class: "primary", onclick: go("identify") }, "Identify a model"),
     h("button", { onclick: go("data") }, "Open data"));
 }

@@ -30,7 +30,9 @@ class RideView {
     [this.source, this.sourceField] = list("source", "On");
     [this.control, this.controlField] = list("control", "Control law");
     this.current = h("input", { type: "number", id: "ride-current", min: "0", step: "any", onchange: () => this.ask() });
-    const currentField = h("div", { class: "field" }, h("label", { for: "ride-current" }, "Current, or the most a law may ask for (A)"), this.current);
+    const currentField = h("div", { class: "field" }, h("label", { for: "ride-current" }, "Current, or upper limit of the control law (A)"), this.current);
+    this.scaled = h("input", { type: "checkbox", checked: true, onchange: () => this.ask() });
+    this.scaledField = h("label", { class: "check" }, this.scaled, "Scale masses and springs of the vehicle to the force of the damper");
     this.play = h("button", { class: "primary", onclick: () => this.toggle() }, "Play");
     this.slider = h("input", { type: "range", min: "0", value: "0", "aria-label": "Moment of the ride", oninput: () => this.show(Number(this.slider.value)) });
     this.pace = h("select", { id: "ride-pace", "aria-label": "Speed" }, [["1", "real time"], ["0.25", "a quarter"], ["0.1", "a tenth"]].map(([value, text]) => h("option", { value }, text)));
@@ -45,8 +47,8 @@ class RideView {
     this.picture = h("section", { class: "card ride-card", "aria-label": "Ride" });
     this.bar = h("div", { class: "row ride-bar" }, this.play, this.slider, this.pace, this.clock);
     this.grid = h("div", { class: "ride-grid" }, this.picture, this.charts.loop.element, this.charts.a.element, this.charts.current.element);
-    const side = h("div", { class: "side" }, h("div", { class: "group" }, h("h2", {}, "A damper at work"),
-      this.damperField, this.systemField, this.sourceField, this.controlField, currentField));
+    const side = h("div", { class: "side" }, h("div", { class: "group" }, h("h2", {}, "Simulation"),
+      this.damperField, this.systemField, this.sourceField, this.controlField, currentField, this.scaledField));
     this.element = h("div", { class: "view" }, side, this.stage);
     this.latest = new Latest((ask) => bench.api.frame("/ride", ask), (found, ask) => this.draw(found, ask), (error) => put(this.stage, problem(error)));
     document.addEventListener("bench:dampers", () => this.shown());
@@ -64,7 +66,7 @@ class RideView {
     const { dampers, state } = this.bench;
     if (!dampers.length) {
       this.done = null;
-      return put(this.stage, empty("No damper on the bench", "Identify one first, or open the bundled tests.", h("button", { class: "primary", onclick: () => this.bench.store.pass({ view: "identify" }) }, "Identify")));
+      return put(this.stage, empty("No model yet", "Identify a model, or open the bundled tests on the Data page.", h("button", { class: "primary", onclick: () => this.bench.store.pass({ view: "identify" }) }, "Identify")));
     }
     if (!this.choices) {
       this.choices = await this.bench.api.get("/ride/choices");
@@ -75,15 +77,17 @@ class RideView {
       this.sources();
     }
     const known = this.damper.value;
-    fill(this.damper, dampers.map((d) => ({ name: d.key, title: `${d.title}, ${d.rig}` })));
-    this.damper.value = dampers.some((d) => d.key === known) ? known : state.damper ?? dampers.at(-1).key;
+    put(this.damper, this.bench.damperOptions());
+    this.damper.value = dampers.some((d) => d.key === known) ? known : state.damper ?? this.bench.preferred();
     if (known === this.damper.value && this.done) return undefined;
     return this.changed("damper");
   }
 
+  /** The scale of the vehicle applies to roads: a building is simulated as it is defined. */
   sources() {
     const { kind } = this.choices.systems.find((s) => s.name === this.system.value);
     fill(this.source, this.choices.sources[kind]);
+    this.scaledField.hidden = kind !== "road";
     if (kind === "road") this.source.value = "iso8608-b";
   }
 
@@ -101,7 +105,7 @@ class RideView {
     if (!(current >= 0)) return;
     this.stop();
     put(this.stage, busy("Calculating …", "The first ride of a damper takes some seconds: its equations are compiled."));
-    this.latest.want({ damper: this.damper.value, system: this.system.value, source: this.source.value, control: this.control.value, current_A: current });
+    this.latest.want({ damper: this.damper.value, system: this.system.value, source: this.source.value, control: this.control.value, current_A: current, scaled: this.scaled.checked });
   }
 
   async draw({ head, arrays }, ask) {
@@ -109,7 +113,7 @@ class RideView {
     this.done = { head, arrays, scene: scene(head, arrays) };
     put(this.picture, this.done.scene.element);
     this.slider.max = arrays.time.length - 1;
-    put(this.verdict, this.judged(head));
+    put(this.verdict, this.judged(head, arrays));
     put(this.stage, this.verdict, this.bar, this.grid);
     for (const chart of Object.values(this.charts)) {
       chart.held = false;
@@ -122,12 +126,15 @@ class RideView {
     if (!window.matchMedia("(prefers-reduced-motion: reduce)").matches) this.toggle(true);
   }
 
-  judged(head) {
-    const [a, f] = [Math.max(...head.peaks.acceleration_m_s2), Math.max(0, ...head.peaks.force_N)];
+  /** Peak values are those of the curves drawn beside them. */
+  judged(head, arrays) {
+    const peak = (values) => values.reduce((most, value) => Math.max(most, Math.abs(value)), 0);
+    const [a, f] = [peak(arrays[`a.${head.calm}`]), peak(arrays[`force.${head.dampers[0]}`])];
+    const scale = head.scale === 1 ? "" : ` Masses and springs of the vehicle are multiplied by ${figures(head.scale, 2)}, so that the damper force at the highest tested current, ${figures(head.capacity_N, 2)} N, is 8 % of the weight of the body.`;
     const better = head.gain === null ? "" : ` RMS of the objective ${head.gain > 0 ? "−" : "+"}${percent(Math.abs(head.gain))} against passive at 0 A.`;
     const outside = Object.entries(head.outside).flatMap(([name, shares]) => Object.entries(shares).map(([what, share]) => `${name}: ${what} ${percent(share)} of the time`));
     return note(outside.length || !head.settled ? "warn" : "", h("b", {}, `${head.title}.`, better),
-      h("div", {}, `Largest acceleration ${figures(a)} m/s², damper force ${figures(f)} N; step ${figures(MM * head.step_s, 2)} ms, peak values change by ${percent(head.halving)} when it is halved.`),
+      h("div", {}, `Peak acceleration of the ${head.calm} ${figures(a, 3)} m/s², peak damper force ${figures(f, 3)} N; time step ${figures(MM * head.step_s, 2)} ms, peak values change by ${percent(head.halving)} when it is halved.${scale}`),
       head.settled ? null : h("div", {}, "The peak values have not converged with the step size; the motion is sensitive to small changes."),
       outside.length ? h("div", {}, `Outside the tested range, bump-stop contact or wheel lift-off: ${outside.join("; ")}.`) : null);
   }
@@ -144,7 +151,7 @@ class RideView {
     const [a, force, current] = [arrays[`a.${head.calm}`], arrays[`force.${name}`], arrays[`current.${name}`]];
     return Promise.all([
       this.charts.a.draw([
-        { x: arrays.time, y: arrays[`idle.${head.calm}`], name: "no current", color: "faint", width: 1 },
+        { x: arrays.time, y: arrays[`idle.${head.calm}`], name: "passive at 0 A", color: "faint", width: 1 },
         { x: arrays.time, y: a, name: head.calm, color: "predicted", width: 1.4 }, mark(arrays.time, a),
       ], `Of ${head.calm}.`),
       this.charts.loop.draw([{ x: stroke, y: force, color: "predicted", width: 1, name: name }, mark(stroke, force)], `Of ${name}.`),

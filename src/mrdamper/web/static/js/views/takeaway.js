@@ -73,7 +73,7 @@ class TakeAwayView {
   async study(button) {
     button.disabled = true;
     const running = (await this.bench.api.get("/jobs")).find((job) => job.kind === "study" && ["waiting", "running"].includes(job.state));
-    const answer = await (running ? this.studying.resume(running) : this.studying.run("/study", this.bench.head));
+    const answer = await this.bench.study(running ? this.studying.resume(running) : this.studying.run("/study", this.bench.head));
     button.disabled = false;
     if (answer) await this.bench.refreshDampers();
   }
@@ -86,8 +86,8 @@ class TakeAwayView {
       return;
     }
     const exports = await bench.api.get("/exports");
-    this.chooser = h("select", { id: "take-damper", onchange: () => bench.choose(this.chooser.value) }, bench.dampers.map((d) => h("option", { value: d.key }, `${d.title} · ${d.rig || "rig"}${d.note ? ` · ${d.note}` : ""}`)));
-    this.chooser.value = damper ?? bench.dampers.at(-1).key;
+    this.chooser = h("select", { id: "take-damper", onchange: () => bench.choose(this.chooser.value) }, bench.damperOptions());
+    this.chooser.value = damper ?? bench.preferred();
     const names = Object.entries(held).map(([name, value]) => `${name} = ${figures(value)}`);
     const action = (title, work, kind = "") => h("button", { class: kind, onclick: () => this.trying(work) }, title);
     renew(this.model,
