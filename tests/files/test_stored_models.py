@@ -6,11 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mrdamper.dampers.model_file import dump_model, load_model, parse_model
+from mrdamper.dampers.model_file import MAJOR, MINOR, dump_model, load_model, parse_model
 from mrdamper.data import Condition, Run
 
 STORED = Path(__file__).parent / "stored"
 FILES = sorted(path for path in STORED.rglob("*.json") if path.name != "forces.json")
+
+
+def test_every_version_of_the_format_has_a_file():
+    assert {path.parent.name for path in FILES} == {f"{MAJOR}.{minor}" for minor in range(MINOR + 1)}
+    assert all(json.loads(path.read_text())["version"] == path.parent.name for path in FILES)
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parent.name} {path.stem}")
