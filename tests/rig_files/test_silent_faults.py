@@ -35,14 +35,29 @@ BIG = 20 * F
 
 
 @pytest.mark.parametrize(
+    ("written", "separator"),
+    [
+        (lambda v: f'"{v:,.1f}"', ","),
+        (lambda v: f"{v:,.1f}".replace(",", "'"), ";"),
+        (lambda v: f"{v:,.1f}".replace(",", "\u202f"), ";"),
+        (lambda v: f"{v:,.1f}".replace(",", " "), ";"),
+        (lambda v: f"{v:+,.1f}".replace("-", "- ").replace("+", "+ "), ";"),
+    ],
+    ids=["English", "Swiss", "French", "spaces", "signs apart"],
+)
+def test_marks_of_thousands_beside_a_decimal_mark_are_read(written, separator, tmp_path):
+    columns = {**NAMES, "force [N]": [written(v) for v in BIG]}
+    record = read_run(write(tmp_path, "a_0.5A.csv", table(columns, separator)))
+    np.testing.assert_allclose(record.force, np.round(BIG, 1), atol=1e-9)
+
+
+@pytest.mark.parametrize(
     ("columns", "separator", "codes"),
     {
-        "quoted English thousands": ({**NAMES, "force [N]": [f'"{v:,.1f}"' for v in BIG]}, ",", {"E_NUMBER"}),
         "English thousands of one column": (
             {**NAMES, "force [N]": [f"{v:,.0f}" for v in BIG]}, ";", {"E_AMBIGUOUS", "E_NUMBER"}),
         "German thousands beside points": (
             {**NAMES, "force [N]": [f"{v:,.0f}".replace(",", ".") for v in BIG]}, "\t", {"E_AMBIGUOUS"}),
-        "Swiss thousands": ({**NAMES, "force [N]": [f"{v:,.1f}".replace(",", "'") for v in BIG]}, ";", {"E_NUMBER"}),
         "RMS of the force": ({"time [s]": T, "disp [mm]": X, "force RMS [N]": np.abs(F)}, ",", {"E_COLUMN"}),
         "filtered force": ({"time [s]": T, "disp [mm]": X, "Kraft gefiltert [N]": F}, ",", {"E_COLUMN"}),
         "set point": ({"time [s]": T, "disp [mm]": X, "force setpoint [N]": F}, ",", {"E_COLUMN"}),

@@ -96,6 +96,9 @@ _INNER = re.compile(r"^(?P<name>[^\[({<]+?)\s*[\[({<](?P<unit>[^\[\](){}<>]{1,20
 _SLASHED = re.compile(r"^(?P<name>.*\S)\s*(?:\s/\s*|,\s*|\s+in\s+|\s*;\s*)(?P<unit>\S{1,20})$", re.DOTALL)
 _EAST_ASIAN = re.compile("[\u3040-\u30ff\u4e00-\u9fff\uac00-\ud7af]")
 _LONGEST_NAME = 200  # beyond, it is no name, and matching it could take long
+_RATE_GROUP = re.compile(
+    r"\s+\d*\s*-\s*(?:default|fast|slow) sample rate", re.IGNORECASE
+)  # Time  1 - default sample rate
 _FUSED = re.compile(r"[ _.:-]+")
 
 
@@ -158,6 +161,7 @@ def role_of(name: str) -> str | None:
     """The channel a name stands for, None if it says nothing or names a command."""
     if len(name) > _LONGEST_NAME:
         return None
+    name = _RATE_GROUP.sub("", name)
     words = words_of(name)
     lower = [w.casefold().rstrip("0123456789") or w for w in words]
     if any(word in _NOT_MEASURED or word in _MADE or word in _ELSEWHERE for word in lower) or _FACTOR.search(name):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
     from mrdamper.rig_files.profile import Channel, Profile
 
 ROLES = (*REQUIRED, *OPTIONAL)
+_MOST_RESTARTS = 0.05  # of the samples of a clock that counts within steps
+_TOTAL = re.compile(r"total|absolut|gesamt|cumulat|kumul", re.IGNORECASE)
 _INDEX = frozenset(("sample", "samples", "sample no", "sample number", "index", "scan", "point", "n", "no", "nr"))
 
 
@@ -216,8 +219,8 @@ def _choose(table: RawTable, role: str, taken: Collection[int]) -> int | None:
         coils = [i for i in candidates if role == "current" and names_coil(headers[i].name)]
         if len(coils) == 1:
             return coils[0]
-        if role == "time" and fitting:
-            return fitting[0]  # total and running time: refused if they run otherwise
+        if role == "time" and fitting:  # total and running time: refused if they run otherwise
+            return min(fitting, key=lambda i: _TOTAL.search(headers[i].name) is None)
         if role not in REQUIRED:
             return None
         raise _ambiguous(table, role, [table.names[i] for i in candidates])
@@ -369,6 +372,11 @@ def _second_clock(table: RawTable, time: Assigned) -> list[InputError]:
         if np.count_nonzero(there) < 3:
             continue
         one, two = one[there] - one[there][0], two[there] - two[there][0]
+        restarts = np.diff(two) < 0
+        if restarts.any() and np.mean(restarts) < _MOST_RESTARTS:  # the time within a step or a cycle
+            steps = np.abs(np.diff(one) - np.diff(two))[~restarts]
+            if np.median(steps) <= 1e-3 * float(np.median(np.diff(one))):
+                continue
         coarse = float(np.max(np.abs(np.diff(two)), initial=0.0))  # a clock that shows whole seconds
         if np.ptp(two) > 0 and np.max(np.abs(one - two)) > 1.5 * coarse + 1e-3 * float(np.ptp(one)):
             return [_ambiguous(table, "time", [table.names[time.column], table.names[other]])]

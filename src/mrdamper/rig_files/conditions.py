@@ -13,15 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrdamper.data import Floats, held_current
-from mrdamper.rig_files.column_names import names_condition, split_name
+from mrdamper.rig_files.column_names import names_coil, names_condition, split_name
 from mrdamper.rig_files.units import Unit, parse_unit
 
 LARGEST_STATED = 15.0  # [A]: more is no coil current of a damper but another number
 _AGREE_A, _AGREE = 0.05, 0.15  # a nominal and a measured current may differ by so much: [A], and of it
 _IN_NAME = re.compile(
     r"(?<![0-9A-Za-z.,])(?:[iI](?:_?(?:[cC]oil|[sS]pule))?|(?:[sS]pulen|[cC]oil)?(?:[sS]trom|[cC]urr(?:ent)?|[cC]ur))?"
-    r"([0-9]{1,4}(?:[.,xp][0-9]{1,4})?)[ _]?(m?)(?:A(?:mp(?:ere)?s?)?|amp(?:ere)?s?|(?<=m)a)(?![A-Za-z0-9])"
+    r"([0-9]{1,4}(?:[.,xp][0-9]{1,4})?)[ _]?(m?)(?:A(?:mp(?:ere)?s?)?|amp(?:ere)?s?|(?<=m)a)"
+    r"(?![A-Za-z0-9]|\s?/\s?[A-Za-z])"
 )
+_NEGATIVE = re.compile(r"[=:]\s*[-−]$")  # a dash elsewhere may stand between two parts of a name
+_NUMERIC_CELL = re.compile(r"[,;]\s*\"?[+-]?[0-9.]+\"?\s*$")
 _LINE = re.compile(
     r"^[\s#%/\"]*(?P<key>[^:=;\t]{1,60}?)[\s\"]*[:=;,\t][\s:=;,\t\"]*(?P<number>[+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]{1,2})?)"
     r"[\s;,\t\"]*[\[(]?(?P<unit>(?:1/)?[A-Za-zµ/]{0,9}(?:-1)?)[\])]?[\s;,\t\"]*$"
@@ -69,7 +72,8 @@ def currents_in(text: str) -> tuple[float, ...]:
         return ()
     # 04A may be four or 0.4 amperes; 0400mA is padded.
     stated = [match for match in _IN_NAME.finditer(text) if match[2] or not re.fullmatch("0[1-9]+", match[1])]
-    found = [amperes(match[1], f"{match[2]}A") for match in stated]
+    signs = [-1.0 if _NEGATIVE.search(text[: match.start()]) else 1.0 for match in stated]
+    found = [sign * amperes(match[1], f"{match[2]}A") + 0.0 for sign, match in zip(signs, stated, strict=True)]
     return tuple(dict.fromkeys(found))
 
 
@@ -97,7 +101,8 @@ def stated_by_lines(lines: Iterable[str], decimal: str | None = None) -> list[St
     found = []
     for line in lines:
         for key, value, known in _quantities(line, decimal):
-            if known.dimension == "current" and names_condition(key, "current") and not _OTHER_TIME.search(key):
+            coil = names_condition(key, "current") or (names_coil(key) and not _RATING.search(key))
+            if known.dimension == "current" and coil and not _OTHER_TIME.search(key):
                 found.append(Statement(value, f"the line {line.strip()[:60]!r}"))
     return found
 
@@ -159,7 +164,7 @@ def _quantities(line: str, decimal: str | None) -> Iterator[tuple[str, float, Un
     parts = [line] if match else re.split(r"[,;|]\s+|[{}\t]|\s{2,}", line)
     for part in parts[:_MOST_PARTS]:
         match = _LINE.match(part) or _SPACED.match(part)
-        if match is None:
+        if match is None or _NUMERIC_CELL.search(match["key"]):  # a range or a calibration
             continue
         key, unit = split_name(match["key"].strip().strip('"'))
         unit = match["unit"] or unit

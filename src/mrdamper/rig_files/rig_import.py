@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,6 +16,8 @@ from mrdamper.rig_files.folder import files_in, is_left_out
 from mrdamper.rig_files.long_records import judge_long
 from mrdamper.rig_files.mapping.agreement import contradictions
 from mrdamper.rig_files.mapping.companions import (
+    contradictions_with,
+    is_list,
     joined_parts,
     part_of,
     results_of,
@@ -169,6 +171,7 @@ class _Intake:
         self.refusals: list[Refusal] = []
         self.notes: list[Refusal] = []  # texts of a folder that hold no table
         self.met: list[tuple[Path, str]] = []
+        self._given: set[Path] = set()
 
     @property
     def records(self) -> list[Record]:
@@ -178,6 +181,7 @@ class _Intake:
     def read(self, path: Path, *, given: bool) -> None:
         """Read a file, and check the tests in it whose current is known."""
         self._order[str(path)] = len(self._order)
+        self._given |= {path} if given else set()
         try:
             with np.errstate(all="ignore"):  # numbers near the end of the range overflow in sums and are refused
                 records, problems = records_of_file(path, self._profile)
@@ -219,9 +223,27 @@ class _Intake:
             self._found.append((self._order[str(path)], judged))
 
     def join(self) -> None:
-        """Join tests with what other files state of them, and check what was waiting."""
+        """Join tests with what other files state of them, check what was waiting, and compare tests with each other."""
         others = [Path(refusal.file) for refusal in self.refusals if refusal.error.code in _MAY_BE_PARTS]
         others = [path for path in dict.fromkeys(others) if path.is_file()]
+        used = self._join_channels(others)
+        files = [path for path, _ in self._pending]
+        for path, record in self._pending:
+            self._check(path, record, [], several=files.count(path) > 1)
+        for path in [path for path in others if path not in used and self._found]:
+            results = results_of(path)
+            refused = contradictions_with(self._tests(), results, path) if results else None
+            if refused is not None:
+                self._refuse(refused)
+                used.add(path)
+            elif path not in self._given and is_list(path):
+                self.notes += [refusal for refusal in self.refusals if Path(refusal.file) == path][:1]
+                used.add(path)
+        self.refusals = [refusal for refusal in self.refusals if Path(refusal.file) not in used]
+        self._refuse(contradictions([record for _, record in self._tests()]))
+
+    def _join_channels(self, others: list[Path]) -> set[Path]:
+        """Join displacements and forces of two files, and currents that other files state; the files that were used."""
         parts = [part for path in others if (part := part_of(path, self._profile))]
         used: set[Path] = set()
         for record, paths in joined_parts(parts, self._profile):
@@ -233,33 +255,29 @@ class _Intake:
         pending = self._pending
         joined = with_currents_of(pending, parts) if pending and parts else None
         if joined:
-            used |= {path for _, path in joined}
-            pending = [(path, record) for (path, _), (record, _) in zip(pending, joined, strict=True)]
-        elif pending:
-            notes = [Path(note.file) for note in self.notes]
-            for path in [path for path in (*others, *notes) if path not in used]:
-                results = results_of(path)
-                stated = with_results_of(pending, results, path) if results else None
-                if stated:
-                    pending = [(file, record) for (file, _), record in zip(pending, stated, strict=True)]
-                    used.add(path)
-                    break
-        self.refusals = [refusal for refusal in self.refusals if Path(refusal.file) not in used]
-        self.notes = [note for note in self.notes if Path(note.file) not in used]
-        files = [path for path, _ in pending]
-        for path, record in pending:
-            self._check(path, record, [], several=files.count(path) > 1)
-        self._refuse_contradictions()
+            self._pending = [(path, record) for (path, _), (record, _) in zip(pending, joined, strict=True)]
+            return used | {path for _, path in joined}
+        notes = [Path(note.file) for note in self.notes]
+        for path in [path for path in (*others, *notes) if pending and path not in used]:
+            results = results_of(path)
+            stated = with_results_of(pending, results, path) if results else None
+            if stated:
+                self._pending = [(file, record) for (file, _), record in zip(pending, stated, strict=True)]
+                self.notes = [note for note in self.notes if Path(note.file) != path]
+                return used | {path}
+        return used
 
-    def _refuse_contradictions(self) -> None:
-        """Refuse tests of equal conditions whose forces differ several-fold."""
+    def _tests(self) -> list[tuple[Path, Record]]:
+        """The accepted tests with their files, in the order of these."""
+        names = {number: Path(name) for name, number in self._order.items()}
+        return [(names[number], record) for number, record in sorted(self._found, key=lambda entry: entry[0])]
+
+    def _refuse(self, errors: Mapping[int, InputError]) -> None:
+        """Refuse accepted tests, each by its place among them."""
         found = sorted(self._found, key=lambda entry: entry[0])
-        refused = contradictions([record for _, record in found])
-        names = {number: name for name, number in self._order.items()}
-        for i, error in refused.items():
-            number, record = found[i]
-            self.refusals.append(Refusal(names[number], error, record.id))
-        self._found = [entry for i, entry in enumerate(found) if i not in refused]
+        files = self._tests()
+        self.refusals += [Refusal(str(files[i][0]), error, files[i][1].id) for i, error in errors.items()]
+        self._found = [entry for i, entry in enumerate(found) if i not in errors]
 
 
 def found_tests(

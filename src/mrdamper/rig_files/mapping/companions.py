@@ -11,18 +11,17 @@ from pathlib import Path
 import numpy as np
 
 from mrdamper.data import Floats, held_current
-from mrdamper.errors import InputError
+from mrdamper.errors import ColumnError, InputError, printable
 from mrdamper.rig_files.coil_current import as_data, constant
 from mrdamper.rig_files.columns import partly_assigned
+from mrdamper.rig_files.conditions import contradicts
 from mrdamper.rig_files.mapping.completion import completed
-from mrdamper.rig_files.mapping.results import Results, results_in
+from mrdamper.rig_files.mapping.results import Results, lines_of, results_in
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers import raw_tables
-from mrdamper.rig_files.readers.base import RawTable
-from mrdamper.rig_files.record import Finding, Record
+from mrdamper.rig_files.record import REQUIRED, Finding, Record
 
-_MOST_ROWS = 2000  # of a table of results
-_MOST_COLUMNS = 60
+_FEWEST_ROWS = 50  # of a record
 _LARGEST_TEXT = 2**18  # bytes
 _TEXTS = (".csv", ".txt", ".tsv", ".dat", ".md", ".log")
 _SAME_START = 0.02  # of a record: clocks of two loggers that are one
@@ -134,7 +133,7 @@ def results_of(path: Path) -> Results | None:
                 return None
             return results_in(_decoded(content).splitlines())
         with raw_tables(path) as tables:
-            found = [results for table in tables[:20] if (results := results_in(_lines(table)))]
+            found = [results for table in tables[:20] if (results := results_in(lines_of(table)))]
             return found[0] if len(found) == 1 else None
     except (InputError, OSError, UnicodeError):
         return None
@@ -149,18 +148,6 @@ def _decoded(content: bytes) -> str:
         return content.decode("cp1252")
 
 
-def _lines(table: RawTable) -> list[str]:
-    """A small table as lines of text."""
-    if table.words is None or len(table.names) > _MOST_COLUMNS:
-        return []
-    columns = [table.words(i) for i in range(len(table.names))]
-    if any(words.codes.size > _MOST_ROWS for words in columns):
-        return []
-    rows = zip(*([words.labels[code] for code in words.codes] for words in columns), strict=True)
-    units = (table.units,) if any(table.units) else ()
-    return ["\t".join(cells) for cells in (table.names, *units, *rows)]
-
-
 def with_results_of(pending: Sequence[tuple[Path, Record]], results: Results, path: Path) -> list[Record] | None:
     """The records with the currents that a table of results states; None unless it names every one of them."""
     tests = [(record.id, file.name, file.stem) for file, record in pending]
@@ -172,3 +159,34 @@ def with_results_of(pending: Sequence[tuple[Path, Record]], results: Results, pa
         replace(record, current=constant(currents[i], record.time), provenance={**record.provenance, **said})
         for i, (_, record) in enumerate(pending)
     ]
+
+
+def contradictions_with(
+    tests: Sequence[tuple[Path, Record]], results: Results, path: Path
+) -> dict[int, InputError] | None:
+    """Refusals of tests whose current a table of results contradicts, by number; None unless it names every test."""
+    currents = results.by_test([(record.id, file.name, file.stem) for file, record in tests])
+    if len(currents) < len(tests):
+        return None
+    refused: dict[int, InputError] = {}
+    for i, (file, record) in enumerate(tests):
+        held, change = held_current(record.current) if record.current is not None else (currents[i], "")
+        if not change and contradicts(held, currents[i]):
+            refused[i] = ColumnError(
+                printable(f"the test gives {held:g} A, {path.name} {currents[i]:g} A"), where=printable(file.name),
+                mend="correct the one that is wrong, or take the table out of the folder",
+                code="E_CURRENT_CONTRADICTS",
+            )  # fmt: skip
+    return refused
+
+
+def is_list(path: Path) -> bool:
+    """Whether a file holds only short tables without a time, a displacement or a force: a plan, a list of results."""
+    try:
+        with raw_tables(path) as tables:
+            rows = [table.words(0).codes.size if table.words is not None else _FEWEST_ROWS for table in tables]
+            named = all(any(table.names) for table in tables)
+            roles = {header.role for table in tables for header in table.headers}
+    except InputError:
+        return False
+    return named and max(rows) < _FEWEST_ROWS and not roles & {*REQUIRED}

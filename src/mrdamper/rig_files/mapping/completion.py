@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-from mrdamper.rig_files.column_names import names_weight, role_of, says_nothing, split_name, words_of
+from mrdamper.rig_files.column_names import names_weight, role_of, says_nothing, split_name, unknown_unit, words_of
 from mrdamper.rig_files.conditions import currents_in, without_currents
 from mrdamper.rig_files.readers.base import Content, RawTable
 from mrdamper.rig_files.record import Finding
@@ -19,13 +19,20 @@ _CLOCKS = {"micros": "us", "millis": "ms", "microseconds": "us", "milliseconds":
            "time since start": "", "epoch ms": "ms", "timestamp ms": "ms"}  # fmt: skip
 _WEIGHTS = {"g": "gf", "kg": "kgf", "t": "tf", "gram": "gf", "grams": "gf", "G": "gf", "Kg": "kgf", "KG": "kgf"}
 _SCALE = re.compile(
-    r"(?<![\w.,])(?P<one>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>[A-Za-zµ]{1,4})\s*(?:/|=|per|pro|entspricht|->)\s*"
-    r"(?P<other>[0-9]+(?:[.,][0-9]+)?)?\s*(?P<volt>[A-Za-zµ]{1,4})(?![A-Za-z0-9/])"
+    r"(?<![\w.,])(?P<one>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>[A-Za-zµ]{1,4}|%)\s*(?:/|=|per|pro|entspricht|->)\s*"
+    r"(?P<other>[0-9]+(?:[.,][0-9]+)?)?\s*(?P<volt>[A-Za-zµ]{1,4}|%)(?![A-Za-z0-9/])"
 )
 _TIME_UNIT = re.compile(
     r"(?i)^[\s\"#%]*(?:horizontal|x[ -]?|h|time[ _-]?)\s*units?\"?\s*[:=,;\t]\s*\"?(?P<unit>[a-zµ]{1,12})\"?[\s,;]*$"
 )
+_PER_COUNT = re.compile(
+    r"(?P<number>[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]+)?)\s*(?P<unit>[A-Za-zµ/]{1,6}?)\s*(?:/|per)\s*"
+    r"(?:counts?|cnts?|cts?|digits?|bits?|lsb|incs?|increments?|inkr?|steps?|pulses?|imp)",
+    re.IGNORECASE,
+)
+_UNITS_KEY = re.compile(r"(?:vertical|channel|y|signal|data)?[ _-]*units?", re.IGNORECASE)
 _MONITOR = frozenset(("mon", "monitor", "imon", "iout", "i", "current", "curr", "strom", "amp", "amplifier", "shunt"))
+_SIGNALS = ("voltage", "count")  # what a scale leads from
 _LONGEST_LINE = 300
 
 
@@ -33,10 +40,23 @@ def completed(table: RawTable) -> RawTable:
     """The table with the names, units and scales that the file states above, below or beside its row of names."""
     if not any(table.names):
         return table
-    table = _with_titles(table)
+    table = _with_titles(_with_keyed_units(table))
     table = _with_stated_time_unit(_with_listed_units(table))
     table = _with_clocks_and_weights(table)
-    return _with_scales(table)
+    return _with_scales(_with_counts(table))
+
+
+def _with_keyed_units(table: RawTable) -> RawTable:
+    """Units of a line with a key before them, one a column: Vertical Units, V, V, V."""
+    if any(table.units):
+        return table
+    for line in table.remarks:
+        for separator in _SEPARATORS:
+            key, *cells = [cell.strip().strip('"') for cell in line[:_LONGEST_LINE].split(separator)]
+            known = [cell if is_unit(cell) else "" for cell in cells[: len(table.names) - 1]]
+            if _UNITS_KEY.fullmatch(key) and len(known) == len(table.names) - 1 and all(known):
+                return replace(table, units=("", *known))
+    return table
 
 
 def _with_titles(table: RawTable) -> RawTable:
@@ -48,6 +68,8 @@ def _with_titles(table: RawTable) -> RawTable:
         if header.dimension == "time" and header.role not in ("time", None) and len(header.name) <= 2:
             names[i] = f"{split_name(title).name} time" if title else "time"
             units[i] = units[i] or header.unit
+        elif title and header.role is None and header.dimension == "voltage" and _scales(title):
+            names[i], units[i] = _SCALE.sub("", title).strip(" ,;:@-_/()[]"), header.unit
         elif title and header.role is None and (bare := split_name(without_currents(title))).role is not None:
             if header.dimension == "time" and bare.role != "time":
                 names[i], units[i] = f"{bare.name} time", units[i] or header.unit  # an x column of its own
@@ -119,9 +141,21 @@ def _with_clocks_and_weights(table: RawTable) -> RawTable:
     return replace(table, names=tuple(names), units=tuple(units), findings=(*table.findings, *notes))
 
 
+def _with_counts(table: RawTable) -> RawTable:
+    """Channels recorded in counts, by the scale in their heading: load_cnt [0.25 N/count]."""
+    for i, name in enumerate(table.names):
+        match = _PER_COUNT.fullmatch((table.units[i] or unknown_unit(name)).strip())
+        if match and is_unit(match["unit"]):
+            factor = float(match["number"].replace(",", "."))
+            bare = re.sub(r"[\s_]*(?:counts?|cnts?|raw)$", "", table.headers[i].name, flags=re.IGNORECASE)
+            text = f"column {name!r} is scaled as its heading states"
+            table = _scaled(table, i, bare or table.headers[i].name, match["unit"], factor, text)
+    return table
+
+
 def _with_scales(table: RawTable) -> RawTable:
-    """Channels recorded in volts, by a scale the file states: amplifier monitor: 0.5 A/V."""
-    volts = [i for i, header in enumerate(table.headers) if header.dimension == "voltage"]
+    """Channels recorded in volts or per cent, by a scale the file states: amplifier monitor: 0.5 A/V; 100 % = 2 A."""
+    volts = [i for i, header in enumerate(table.headers) if header.dimension == "voltage" or header.unit == "%"]
     for i in volts:
         other = _stated_scale(table, i, volts)
         if other is None:
@@ -131,6 +165,7 @@ def _with_scales(table: RawTable) -> RawTable:
         text = f"column {table.names[i]!r} is scaled as the file states: {line.strip()[:60]!r}"
         role = next((role for role, dimension in DIMENSION.items() if dimension == parse_unit(unit).dimension), "")  # type: ignore[union-attr]
         name = header.name if header.role == role else f"{role} {header.name}"
+        name = name if role_of(name) == role else role
         table = _scaled(table, i, name, unit, factor * (header.known.factor if header.known else 1.0), text)
     return table
 
@@ -138,21 +173,30 @@ def _with_scales(table: RawTable) -> RawTable:
 def _stated_scale(table: RawTable, column: int, volts: Sequence[int]) -> tuple[str, float, str] | None:
     """Unit, its number per volt and the line of a scale that can only be meant for a column; else None."""
     name = table.headers[column].name
-    found = []
-    for line in (table.names[column], *table.remarks):
-        for unit, factor in _scales(line[:_LONGEST_LINE]):
-            known = parse_unit(unit)
-            role = next((r for r, d in DIMENSION.items() if known is not None and d == known.dimension), None)
-            if role is None or role in ("voltage", "time"):
-                continue
-            words = {word.casefold() for word in words_of(name)}
-            meant = role_of(name) == role or name.casefold() in line.casefold()
-            meant = meant or (role == "current" and bool(words & _MONITOR))
-            alone = len(volts) == 1 and role_of(name) in (None, "voltage") and role == "current"
-            has = any(header.dimension == known.dimension for header in table.headers) if known else True
-            if (meant or alone) and not has:
-                found.append((unit, factor, line))
-    return found[0] if len({entry[:2] for entry in found}) == 1 else None
+    own = [table.names[column], *table.over[column : column + 1]]
+    for lines in (own, [part for line in table.remarks for part in _parts(line[:_LONGEST_LINE])]):
+        found = []
+        for line in lines:
+            for unit, factor in _scales(line):
+                known = parse_unit(unit)
+                role = next((r for r, d in DIMENSION.items() if known is not None and d == known.dimension), None)
+                if role is None or role in ("voltage", "time"):
+                    continue
+                words = {word.casefold() for word in words_of(name)}
+                meant = role_of(name) == role or lines is own or name.casefold() in line.casefold()
+                meant = meant or (role == "current" and bool(words & _MONITOR))
+                alone = len(volts) == 1 and role_of(name) in (None, "voltage") and role == "current"
+                has = any(header.dimension == known.dimension for header in table.headers) if known else True
+                if (meant or alone) and not has:
+                    found.append((unit, factor, line))
+        if found:
+            return found[0] if len({entry[:2] for entry in found}) == 1 else None
+    return None
+
+
+def _parts(line: str) -> list[str]:
+    """A line, or its cells where it states several scales."""
+    return re.split(r"[,;|\t]\s*", line) if len(_scales(line)) > 1 else [line]
 
 
 def _scales(line: str) -> list[tuple[str, float]]:
@@ -160,12 +204,12 @@ def _scales(line: str) -> list[tuple[str, float]]:
     found = []
     for match in _SCALE.finditer(line):
         one, other = parse_unit(match["unit"]), parse_unit(match["volt"])
-        if one is None or other is None or (one.dimension == "voltage") == (other.dimension == "voltage"):
+        if one is None or other is None or (one.dimension in _SIGNALS) == (other.dimension in _SIGNALS):
             continue
         left, right = (float((match[key] or "1").replace(",", ".")) for key in ("one", "other"))
         if not left or not right:
             continue
-        if other.dimension == "voltage":
+        if other.dimension in _SIGNALS:
             found.append((match["unit"], left / (right * other.factor)))
         else:
             found.append((match["volt"], right / (left * one.factor)))

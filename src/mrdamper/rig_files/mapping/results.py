@@ -17,6 +17,7 @@ _NUMBER = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")
 _QUANTITY = re.compile(r"([+-]?[0-9]+(?:[.,][0-9]+)?)\s*(m?A)")
 _MOST_LINES, _LONGEST_LINE = 4000, 2000
 _FEWEST_ROWS = 2
+_MOST_ROWS, _MOST_COLUMNS = 2000, 60  # of a table of results
 _SPECIMEN = re.compile(
     r"(?i)^(?:specimen|probe|prüfkörper|test|versuch|run|sample|essai|éprouvette|ensayo|no|nr)\b[\s.:#]*"
 )
@@ -62,18 +63,40 @@ def with_results(tables: list[RawTable]) -> list[RawTable]:
     """Tables of a file's tests with the currents that its table of results states."""
     lines = list(dict.fromkeys(line for table in tables for line in table.remarks))
     results = results_in(lines) if len(lines) > _FEWEST_ROWS else None
+    others = tables
     if results is None:
-        return tables
+        stated = [(table, r) for table in tables if _may_be_results(table) and (r := results_in(lines_of(table)))]
+        if len(stated) != 1 or len(tables) < 2:
+            return tables
+        results = stated[0][1]
+        tables = [table for table in tables if table is not stated[0][0]]
     shared = set(tables[0].remarks).intersection(*(table.remarks for table in tables[1:])) if len(tables) > 1 else set()
     tests = [[table.label, *(_last_lines(table, shared))] for table in tables]
     currents = results.by_test(tests)
     if len(currents) < len(tables):
-        return tables
+        return others
     said = f"table of results, {results.title}"
     return [
         replace(table, constants={**_without_current(table.constants), "current [A]": currents[i]}, stated_in=said)
         for i, table in enumerate(tables)
     ]
+
+
+def _may_be_results(table: RawTable) -> bool:
+    """Whether a table names a current and is no record of a test."""
+    return any(map(_is_current, table.names)) and "time" not in {header.role for header in table.headers}
+
+
+def lines_of(table: RawTable) -> list[str]:
+    """A small table as lines of text."""
+    if table.words is None or len(table.names) > _MOST_COLUMNS:
+        return []
+    columns = [table.words(i) for i in range(len(table.names))]
+    if any(words.codes.size > _MOST_ROWS for words in columns):
+        return []
+    rows = zip(*([words.labels[code] for code in words.codes] for words in columns), strict=True)
+    units = (table.units,) if any(table.units) else ()
+    return ["\t".join(cells) for cells in (table.names, *units, *rows)]
 
 
 def _without_current(constants: Mapping[str, float]) -> dict[str, float]:
@@ -152,7 +175,7 @@ def _names(texts: Iterable[str]) -> tuple[set[str], set[str]]:
 def _key(text: str) -> str:
     """A name as it is compared: no case, spaces, or leading zeros of a plain number."""
     text = re.sub(r"\.(csv|txt|dat|asc|tra|mat|xlsx?|h5|tdms|json|parquet)$", "", text.casefold().strip())
-    text = re.sub(r"[\s_]+", " ", text)
+    text = re.sub(r"[\s_]+", " ", text).removesuffix(".0")
     return str(int(text)) if text.isascii() and text.isdigit() else text
 
 

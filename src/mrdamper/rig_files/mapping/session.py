@@ -36,7 +36,8 @@ def stretches_of_session(time: Floats, displacement: Floats, current: Floats | N
     """
     whole = [slice(0, time.size)]
     there = np.isfinite(time) & np.isfinite(displacement)
-    if current is None or not there.all() or not 400 <= time.size <= _LONGEST or np.any(np.diff(time) <= 0):
+    current = np.zeros(time.size) if current is None else current
+    if not there.all() or not 400 <= time.size <= _LONGEST or np.any(np.diff(time) <= 0):
         return whole
     borders = _borders(time, displacement) or _steps(time, displacement, current)
     parts = [slice(a, b) for a, b in pairwise([0, *borders, time.size])]

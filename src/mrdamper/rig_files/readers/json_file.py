@@ -64,7 +64,9 @@ def _parsed(source: Source, content: bytes) -> Any:
         except json.JSONDecodeError as error:
             if not error.msg.startswith("Extra data"):
                 raise
-            return [json.loads(line, object_pairs_hook=unique) for line in text.splitlines() if line.strip()]
+            return _with_header(
+                [json.loads(line, object_pairs_hook=unique) for line in text.splitlines() if line.strip()]
+            )
     except json.JSONDecodeError as error:
         early = error.pos >= len(text.rstrip()) - 1
         raise damaged(source, Json.title, "truncated" if early else f"{error.msg}, line {error.lineno}") from error
@@ -74,6 +76,16 @@ def _parsed(source: Source, content: bytes) -> Any:
         raise source.refuse(
             "E_FORMAT", "nested too deeply, or a number without end", "export the samples as lists"
         ) from error
+
+
+def _with_header(lines: list[Any]) -> Any:
+    """The records of a text with one a line; below what its first line says, where that is no record as the others."""
+    head, *records = lines
+    same = len(records) >= _FEWEST and all(isinstance(r, dict) and r.keys() == records[0].keys() for r in records)
+    if not same or not isinstance(head, dict) or head.keys() == records[0].keys() or head.keys() & records[0].keys():
+        return lines
+    columns = {key: [record[key] for record in records] for key in records[0]}
+    return {**head, **columns}
 
 
 def _tree(value: Any) -> Any:

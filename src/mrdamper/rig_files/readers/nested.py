@@ -8,6 +8,7 @@ its own where it has one: recordings of real-time systems, logged signals, expor
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -28,6 +29,8 @@ _DATA = ("data", "values", "value", "y", "samples", "ydata", "signaldata", "data
 _TIMES = ("time", "t", "x", "xdata", "timestamps", "times", "time_s", "zeit")
 _UNITS = ("unit", "units", "einheit", "yunit", "y_unit", "dataunits", "yunits")
 _TIME_UNITS = ("xunit", "x_unit", "timeunit", "timeunits", "time_unit", "xunits")
+_HEAD = re.compile(r"_?(?:header|info|properties|attributes|meta(?:data)?)$", re.IGNORECASE)
+_BODY = re.compile(r"_?(?:data|values)$", re.IGNORECASE)
 _PORTS = frozenset(("out1", "in1", "value", "out", "in", "signal", "outport", "inport", "model root", "y"))
 
 
@@ -59,7 +62,7 @@ def nested_tables(source: Source, tree: Mapping[str, Any], title: str) -> list[R
 
 def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Node]:
     inner: list[tuple[str, Any]] = []
-    for key, value in tree.items():
+    for key, value in _paired(tree).items():
         if isinstance(value, list) and all(isinstance(item, str) for item in value):
             if value and split_name(key).role is None:
                 node.lists.append(value)
@@ -83,6 +86,23 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
     for key, value in inner if depth < DEEPEST else ():
         label = f"{node.label}/{key}" if node.label and key else node.label or key
         yield from _walk(value, _Node(label, [], [], dict(node.constants), list(node.remarks)), depth + 1)
+
+
+def _paired(tree: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The mapping with arrays joined to what describes them: Channel_1_Data to Channel_1_Header, units by name."""
+    heads = {_HEAD.sub("", key): key for key, value in tree.items() if _HEAD.search(key) and isinstance(value, Mapping)}
+    pairs = {key: heads[stem] for key in tree if (stem := _BODY.sub("", key)) in heads and _BODY.search(key)}
+    units = next((v for k, v in tree.items() if k.casefold() in _UNITS and isinstance(v, Mapping)), {})
+    used = set(pairs.values())
+    found = {}
+    for key, value in tree.items():
+        if key in pairs and isinstance(value, np.ndarray):
+            found[key] = {**tree[pairs[key]], "data": value}
+        elif isinstance(value, np.ndarray) and is_unit(str(units.get(key, ""))):
+            found[key] = {"name": key, "unit": str(units[key]), "data": value}
+        elif key not in used:
+            found[key] = value
+    return found
 
 
 def _items(key: str, items: list[Any], node: _Node) -> list[tuple[str, Mapping[str, Any]]]:
@@ -132,7 +152,8 @@ def _channel(key: str, says: Mapping[str, Any]) -> list[_Column]:
         if not isinstance(data, np.ndarray):
             return []
     time = next((lower[name] for name in _TIMES if isinstance(lower.get(name), np.ndarray)), None)
-    others = [v for v in lower.values() if isinstance(v, np.ndarray) and v is not data and v is not time and v.size > 1]
+    arrays = [value for value in lower.values() if isinstance(value, np.ndarray) and value.size >= data.size]
+    others = [array for array in arrays if array is not data and array is not time]
     stated = next((lower[name] for name in _NAMES if isinstance(lower.get(name), str) and lower[name].strip()), "")
     if others or not (stated or key):
         return []

@@ -59,7 +59,7 @@ def find_blocks(stream: TextStream, layout: Layout, start: int, stop: int) -> li
 
 def _units_below(stream: TextStream, layout: Layout, start: int, header_line: int) -> tuple[int, int]:
     """Bytes and lines between a repeated header and its rows: those of units, which must be the file's."""
-    usual = layout.units_line - layout.header_line if layout.units_line and layout.header_line else 0
+    usual = layout.data_line - 1 - layout.header_line if layout.header_line else 0
     size = lines = 0
     for raw in stream.lines_at(start, max(0, usual)):
         text = stream.decode(raw).rstrip("\r\n")

@@ -31,18 +31,21 @@ def stated_form(lines: Sequence[str], form: FileForm) -> FileForm:
 
 
 def named(layout: Layout, lines: Sequence[str]) -> Layout:
-    """The layout with the time's name for X_Value, and the units of the second header."""
-    if not layout.names or layout.names[0] != _NAMES:
+    """The layout with the time's name for every X_Value, and the units of the second header."""
+    above = [line.split(layout.separator) for line in lines[: layout.header_line]]
+    units = next((cells for cells in reversed(above) if cells[0] == "Y_Unit_Label"), [])
+    dimension = next((cells[1:2] for cells in reversed(above) if cells[0] == "X_Dimension"), [])
+    if dimension and dimension[0].strip() not in ("Time", ""):
         return layout
-    above = lines[: layout.header_line]
-    units = next((line.split(layout.separator) for line in reversed(above) if line.startswith("Y_Unit_Label")), [])
-    dimension = next((line.split(layout.separator)[1:2] for line in reversed(above) if line.startswith("X_Dim")), [])
-    timed = not dimension or dimension[0].strip() in ("Time", "")
-    stated = [unit.strip() for unit in units[1:]] + [""] * layout.width
+    stated = [unit.strip() for unit in units] + [""] * layout.width
+    clocks = [name == _NAMES for name in layout.names]
     return replace(
         layout,
-        names=(("Time" if timed else _NAMES), *layout.names[1:]),
-        units=("s" if timed else "", *(unit or own for unit, own in zip(stated, layout.units[1:], strict=False))),
+        names=tuple("Time" if clock else name for name, clock in zip(layout.names, clocks, strict=True)),
+        units=tuple(
+            "s" if clock else (stated[i] if i else "") or own
+            for i, (clock, own) in enumerate(zip(clocks, layout.units, strict=True))
+        ),
     )
 
 

@@ -28,6 +28,7 @@ _LISTING = re.compile(
     r"^\s*(?:columns?|channels?|fields?|spalten|kanäle|colonnes|header|names)\s*[:=]\s*", re.IGNORECASE
 )
 _MARKS = frozenset("#%/")
+_FEWEST_LINES = 20  # of a text: fewer, with words among the numbers, are notes
 _SAMPLE = 60  # rows looked at
 _STRAY = 0.1  # of the sampled numbers: fewer with the other decimal mark are single bad cells
 _MOST_LEVELS = 4  # lines of headings
@@ -167,7 +168,7 @@ def _stated_for_all(above: Sequence[str], separator: str, width: int) -> list[st
     """Lines of a key with one number for every column, with their unit: HResolution, 5E-3, 5E-3 and HUnit, s, s."""
     keyed: dict[str, str] = {}
     for line in above:
-        key, *cells = _try_split(line, separator) if width > 2 and line.strip() else [""]
+        key, *cells = _fields(line, separator, width) if width > 2 and line.strip() else [""]
         if key and len(cells) == width - 1 and len(set(cells)) == 1 and cells[0]:
             keyed[key.strip('"')] = cells[0].strip('"')
     units = {key[:-4]: unit for key, unit in keyed.items() if key.casefold().endswith("unit") and is_unit(unit)}
@@ -337,6 +338,8 @@ def _first_row(content: Sequence[tuple[int, str]], above: int, separator: str, s
     content = content[len(before) :]
     sample = [_try_split(line, separator) for _, line in content[-_SAMPLE:]]
     rows = [cells for cells in sample if _is_row(cells)]
+    if separator == SPACES and len(content) < _FEWEST_LINES and all(map(_is_prose, rows)):
+        raise NoTableError("E_NO_DATA", "text with numbers in it, but no rows of numbers", file=source.name)
     named = any(_names_columns(line, mark) for _, line in content[-_SAMPLE:] for mark in _SEPARATORS[:-1])
     if not rows or (len(rows) == 1 and len(content) > 1 and named and not _is_row(sample[-1])):
         what = "names of columns, but no row of numbers below them" if named else "no row of numbers"
@@ -352,6 +355,11 @@ def _first_row(content: Sequence[tuple[int, str]], above: int, separator: str, s
     return first, width - trailing, trailing
 
 
+def _is_prose(cells: Sequence[str]) -> bool:
+    """Whether a line with numbers holds several words, too."""
+    return sum(_WORD.match(cell) is not None for cell in cells) >= 2
+
+
 def _first_of(content: Sequence[tuple[int, str]], width: int, separator: str) -> tuple[int, list[str]]:
     """Index and cells of the first row; a key with numbers behind it is none if lines of another kind follow."""
     worded: tuple[int, list[str]] | None = None
@@ -359,9 +367,11 @@ def _first_of(content: Sequence[tuple[int, str]], width: int, separator: str) ->
     for i, line in content:
         cells = _try_split(line, separator)
         if not _is_row(cells):
-            keyed = None
+            keyed, worded = None, worded or (i, cells)
         elif len(cells) == width and not _WORD.match(cells[0].strip('"')):
             return keyed or (i, cells)
+        elif width > 2 and len(set(filter(None, cells[1:]))) == 1:  # a key with one value for all columns
+            keyed = None
         elif len(cells) == width:
             keyed = keyed or (i, cells)
             worded = worded or keyed
@@ -477,9 +487,11 @@ def _is_times(cells: Sequence[str]) -> bool:
 
 
 def _is_keyed(cells: Sequence[str]) -> bool:
-    """Whether a line is a key followed by units, or by one number for all columns."""
+    """Whether a line is a key followed by units, by numbers, or by one text for all columns."""
     rest = cells[1:]
-    return _WORD.match(cells[0]) is not None and (_is_units(rest) or all(looks_numeric(cell) for cell in rest))
+    return _WORD.match(cells[0]) is not None and (
+        _is_units(rest) or len(set(rest)) == 1 or all(looks_numeric(cell) for cell in rest)
+    )
 
 
 def _unbracket(unit: str) -> str:

@@ -1,8 +1,9 @@
 """One cell of text: a number, a missing value, a time stamp, or none of them.
 
 Strict on purpose: what only some programs take for a number (1_000.5, 0x1F, other
-scripts' digits, thousands separators) is refused, so that no two programs read
-different values from one file.
+scripts' digits) is refused, so that no two programs read different values from one file.
+Points and commas as marks of thousands are read only in numbers that have a decimal mark, too:
+1.017,56; apostrophes and spaces always: 1'017.
 """
 
 from __future__ import annotations
@@ -17,6 +18,16 @@ NUMBER = {
     mark: re.compile(rf"[+-]?(?:[0-9]+(?:{re.escape(mark)}[0-9]*)?|{re.escape(mark)}[0-9]+)(?:[eE][+-]?[0-9]+)?")
     for mark in ".,"
 }
+_APART = "'’ \u00a0\u202f\u2009"  # marks of thousands that are no decimal mark anywhere
+_GROUPED = {
+    mark: re.compile(
+        rf"[+-]?[1-9][0-9]{{0,2}}(?:(?:{re.escape(other)}[0-9]{{3}})+{re.escape(mark)}[0-9]+"
+        rf"|([{_APART}])[0-9]{{3}}(?:\1[0-9]{{3}})*(?:{re.escape(mark)}[0-9]*)?)"
+    )
+    for mark, other in (".,", ",.")
+}
+_CELLS_APART = re.compile(r"\S\s{2,}\S|[0-9]\s[+-]")  # what another separator would split
+_SIGN_APART = re.compile(r"([+-]) +(?=[0-9.,])")  # - 0.328
 MISSING = frozenset(("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "-nan", "+nan", "nan(ind)",
                      "-nan(ind)", "#nv", "1.#qnan", "-1.#qnan", "1.#ind", "-1.#ind"))  # fmt: skip
 _INFINITE = re.compile(r"[+-]?(?:inf(?:inity)?|1\.#inf|∞)", re.IGNORECASE)
@@ -35,6 +46,9 @@ def number(token: str, mark: str) -> float | None:
 
     Infinity and numbers beyond the range of a double come back as infinity.
     """
+    token = _SIGN_APART.sub(r"\1", token, count=1) if token[1:2] == " " else token
+    if _GROUPED[mark].fullmatch(token):
+        token = "".join(c for c in token if c not in _APART and c != ("," if mark == "." else "."))
     if NUMBER[mark].fullmatch(token):
         return float(token if mark == "." else token.replace(",", "."))
     if token.lower() in MISSING:
@@ -53,7 +67,11 @@ def looks_numeric(token: str) -> bool:
         or FORTRAN.fullmatch(token)
     ):
         return True
-    if len(token) > 40 or not any(unicodedata.decimal(c, None) is not None for c in token):
+    if (
+        len(token) > 40
+        or _CELLS_APART.search(token)
+        or not any(unicodedata.decimal(c, None) is not None for c in token)
+    ):
         return False
     return all(unicodedata.decimal(c, None) is not None or c in "+-.,eE_'’ \u00a0\u202f−xX\ufffd" for c in token)
 
