@@ -21,7 +21,9 @@ from mrdamper.rig_files.rig_import import import_files, to_dataset
 
 FAST = ("mts_dat", "picoscope", "timeseries_structs", "matrix_beside_files", "merged_headings", "json_lines", "uff58",
         "controller_and_supply", "yokogawa", "graphtec", "tidy_long_table", "crank_dynamometer",
-        "comparison_of_two_force_sensors", "parquet_partitions", "npy_structured")  # fmt: skip
+        "comparison_of_two_force_sensors", "parquet_partitions", "npy_structured", "data_beside_headers_of_channels",
+        "oscilloscope_with_scales_in_labels", "pages_of_a_printer", "json_lines_below_a_header",
+        "plan_that_agrees_with_the_names", "steps_with_rests_between")  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -227,3 +229,15 @@ def test_a_sheet_with_a_heading_of_its_own_is_refused_and_leaving_it_out_takes_t
     left = import_files([tmp_path], parse_profile(f"[file]\n{remedy}"))
     assert len(left.records) == 2
     assert not left.refusals
+
+
+def test_a_plan_that_contradicts_the_names_is_refused(tests, tmp_path):
+    KINDS["plan_that_agrees_with_the_names"](tests, tmp_path)
+    plan = tmp_path / "test_matrix.csv"
+    lines = plan.read_text().splitlines()
+    shifted = [line.split(";")[1] for line in (*lines[-1:], *lines[1:-1])]
+    wrong = [";".join([line.split(";")[0], current]) for line, current in zip(lines[1:], shifted, strict=True)]
+    put(plan, ["file;current [A]", *wrong])
+    found = import_files([tmp_path])
+    assert {refusal.error.code for refusal in found.refusals} == {"E_CURRENT_CONTRADICTS"}
+    assert len(found.records) < len(tests)

@@ -907,3 +907,128 @@ def crank_dynamometer(tests, p):
         angle = (360 * q.frequency * q.t) % 360
         lines = rows(angle, 1e3 * q.x, q.f, sep=";", mark=",", fmt="%.4f")
         put(p / f"kurbel{k}.csv", [*head, "Kurbelwinkel [°];Weg [mm];Kraft [N]", *lines], "cp1252")
+
+
+@kind
+def data_beside_headers_of_channels(tests, p):
+    """Channel_1_Data beside Channel_1_Header, as measuring amplifiers export to MATLAB."""
+    import scipy.io as sio
+
+    for k, q in enumerate(tests, 1):
+        channels = (("Time  1 - default sample rate", "s", q.t), ("Weg", "mm", 1e3 * q.x), ("Kraft", "kN", q.f / 1e3),
+                    ("Strom", "mA", 1e3 * q.i))  # fmt: skip
+        says = {}
+        for j, (title, unit, values) in enumerate(channels, 1):
+            says[f"Channel_{j}_Header"] = {"SignalName": title, "Unit": unit, "NoOfSamples": str(values.size)}
+            says[f"Channel_{j}_Data"] = values[:, None]
+        sio.savemat(p / f"test{k}.mat", says)
+
+
+@kind
+def labview_with_a_clock_for_each_channel(tests, p):
+    for k, q in enumerate(tests, 1):
+        head = ["LabVIEW Measurement\t", "Separator\tTab", "Decimal_Separator\t.", "X_Columns\tMulti",
+                "***End_of_Header***\t", "Channels\t3", "Y_Unit_Label\tmm\t\tN\t\tA\t", "X_Dimension\tTime\t\tTime\t\tTime",
+                "***End_of_Header***", "X_Value\tPosition\tX_Value\tLoad\tX_Value\tCoil current\tComment"]  # fmt: skip
+        slow = list(zip(q.t[::10], q.i[::10], strict=True))
+        body = [
+            f"{t:.5f}\t{1e3 * x:.5f}\t{t:.5f}\t{f:.4f}\t"
+            + (f"{slow[j][0]:.5f}\t{slow[j][1]:.5f}\t" if j < len(slow) else "\t\t")
+            for j, (t, x, f) in enumerate(zip(q.t, q.x, q.f, strict=True))
+        ]
+        put(p / f"test_{k}.lvm", head + body, eol="\r\n")
+
+
+@kind
+def oscilloscope_with_scales_in_labels(tests, p):
+    for k, q in enumerate(tests, 1):
+        head = ["Model,MSO", "Horizontal Units,s,,", "Vertical Units,V,V,V", "Label,LVDT 5 mm/V,LOAD 400 N/V,COIL 2 A/V",
+                "TIME,CH1,CH2,CH3"]  # fmt: skip
+        body = rows(q.t - 1, 200 * q.x, q.f / 400, q.i / 2, fmt=("%.5f", "%.6f", "%.6f", "%.5f"))
+        put(p / f"tek{k:04d}.csv", head + body)
+
+
+@kind
+def counts_with_their_scale_in_the_heading(tests, p):
+    for k, q in enumerate(tests, 1):
+        head = ["# sample rate = 200 Hz", "n;pos_cnt [0.005 mm/count];load_cnt [0.25 N/count];coil_cnt [1 mA/count]"]
+        n = np.arange(q.t.size)
+        counts = (np.round(v) for v in (q.x / 5e-6, q.f / 0.25, 1e3 * q.i))
+        put(p / f"RUN{k}.TXT", head + rows(n, *counts, fmt="%d", sep=";"))
+
+
+@kind
+def pages_of_a_printer(tests, p):
+    for k, q in enumerate(tests, 1):
+        lines = []
+        for j, (t, x, f) in enumerate(zip(q.t, q.x, q.f, strict=True)):
+            if j % 50 == 0:
+                title = f"Ensayo: {k:02d}   Corriente: {q.current:.2f} A   Frecuencia: {q.frequency:.1f} Hz"
+                lines += [("\f" if j else "") + f"BANCO DE ENSAYOS     Página {j // 50 + 1}", title.replace(".", ","), "-" * 45,
+                          "      Tiempo       Desplaz.         Fuerza", "         (s)           (cm)          (daN)", "-" * 45]  # fmt: skip
+            lines.append(f"{t:12.3f}{100 * x:15.5f}{f / 10:15.3f}".replace(".", ","))
+        put(p / f"AMR-{k:02d}.LST", lines, "cp1252")
+
+
+@kind
+def table_by_run_and_a_plan(tests, p):
+    import polars as pl
+
+    parts = [pl.DataFrame({"run_id": np.full(q.t.size, 100 + k), "t_ms": 1e3 * q.t, "stroke_mm": 1e3 * q.x,
+                           "load_kN": q.f / 1e3}) for k, q in enumerate(tests)]  # fmt: skip
+    pl.concat(parts).write_parquet(p / "campaign.parquet")
+    plan = [f"{100 + k},{q.current},{q.frequency},{1e3 * q.amplitude}" for k, q in enumerate(tests)]
+    put(p / "plan.csv", ["run_id,current [A],frequency [Hz],amplitude [mm]", *plan])
+
+
+@kind
+def sheet_of_results_before_the_sheets_of_samples(tests, p):
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    book.active.append(["번호", "전류(A)", "주파수(Hz)", "변위 진폭(mm)", "최대하중(kgf)"])
+    for k, q in enumerate(tests, 1):
+        book.active.append([k, q.current, q.frequency, 1e3 * q.amplitude, float(q.f.max() / 9.80665)])
+        sheet = book.create_sheet(f"시험{k:02d}")
+        sheet.append(["시간(s)", "변위(mm)", "하중(kgf)"])
+        for row in np.column_stack([q.t, 1e3 * q.x, q.f / 9.80665]).tolist():
+            sheet.append(row)
+    book.save(p / "시험.xlsx")
+
+
+@kind
+def json_lines_below_a_header(tests, p):
+    for k, q in enumerate(tests, 1):
+        head = {"rig": "small", "run": k, "units": {"t": "s", "x": "mm", "F": "N", "drive": "%"},
+                "drive_full_scale": "100 % = 2.0 A"}  # fmt: skip
+        samples = [
+            {"t": float(t), "x": 1e3 * float(x), "F": float(f), "drive": 50 * float(i)}
+            for t, x, f, i in zip(q.t, q.x, q.f, q.i, strict=True)
+        ]
+        put(p / f"run_{k}.jsonl", [json.dumps(entry) for entry in (head, *samples)])
+
+
+@kind
+def steps_with_rests_between(tests, p):
+    """A file for each current: its motions one after the other, with the total time and that within the step."""
+    for current in sorted({q.current for q in tests}):
+        lines, start = ['"Total Time (s)","Elapsed Time (s)","Step","Position (mm)","Load (kN)"'], 0.0
+        for step, q in enumerate([q for q in tests if q.current == current]):
+            t, x, f = (v[: round(4 / (q.frequency * 0.005)) + 1] for v in (q.t - q.t[0], q.x - q.x[0], q.f))
+            lines += rows(start + t, t, np.full(t.size, 2 * step), 1e3 * x, f / 1e3)
+            rest = 0.005 * np.arange(400)
+            still = np.full(400, 1e3 * x[-1]), np.full(400, f[-1] / 1e3)
+            lines += rows(start + t[-1] + 0.005 + rest, rest, np.full(400, 2 * step + 1), *still)
+            start += t[-1] + 2.01
+        put(p / f"damper {current:.1f}A.tracking.csv", lines)
+
+
+@kind
+def plan_that_agrees_with_the_names(tests, p):
+    plan = ["file;current [A];frequency [Hz]"]
+    for q in tests:
+        file = f"damper_{q.current:.1f}A_{name(q)}.csv"
+        put(p / file, ["time [s];displacement [mm];force [N]", *rows(q.t, 1e3 * q.x, q.f, sep=";")])
+        plan.append(f"{file};{q.current:.1f};{q.frequency:g}")
+    put(p / "test_matrix.csv", plan)
+    put(p / "notes.txt", ["Runs 1 to 4: 1.5 Hz, 10 mm. Run 5: 0.5 Hz, 20 mm.", "Written by hand, not checked."])
