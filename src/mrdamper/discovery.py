@@ -175,7 +175,7 @@ class Registry(Generic[T]):
         return tuple(part for name in self.types if (part := (self._parts or {}).get(name)))
 
     def type_named(self, name: str) -> type[T]:
-        """The class of that name.
+        """Return the class of that name.
 
         Raises
         ------
@@ -280,7 +280,7 @@ def register(cls: type[T]) -> type[T]:
 
 
 def modules_with(group: str, function: str) -> tuple[tuple[Part, ModuleType], ...]:
-    """The modules of a group that define a function of that name, as commands and checks do."""
+    """List the modules of a group that define a function of that name, as commands and checks do."""
     found = []
     for point, target in provided_modules(group):
         for module in target if isinstance(target, tuple) else ():

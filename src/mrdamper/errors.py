@@ -164,7 +164,7 @@ def _fits(value: Any, kind: Any) -> bool:
 
 
 def is_series(value: object) -> bool:
-    """Whether something is a number or an array of numbers, all finite."""
+    """Tell if a value is a number or an array of numbers, all finite."""
     import numpy as np
 
     array = np.asarray(value)
@@ -380,7 +380,7 @@ _RESOURCES = {
 
 
 def resource_error(error: BaseException, where: str = "") -> ResourceError | None:
-    """What the machine has run out of, if that is what an exception says; libraries say it in several ways."""
+    """Name the resource the machine has run out of, if that is what an exception says; None otherwise."""
     number = getattr(error, "errno", None)
     if found := re.search(r"(?<=\(os error )(\d+)|(?<=Os \{ code: )(\d+)", str(error)):  # libraries in Rust
         number = int(found[0])

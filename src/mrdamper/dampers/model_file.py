@@ -176,7 +176,7 @@ def save_model(damper: Damper, path: str | Path) -> None:
 
 
 def dump_model(damper: Damper) -> str:
-    """The JSON document of a damper."""
+    """Return the JSON document of a damper."""
     require(damper, Damper, "a damper")
     document = _Document(
         format=FORMAT,
@@ -263,7 +263,7 @@ def parse_model(text: str, where: str = "model") -> Damper:
 
 
 def _outside_package(damper: Damper) -> dict[str, str]:
-    """The installed package that provides the model of a damper, where it is not mrdamper."""
+    """Name the installed package that provides the model of a damper, where it is not mrdamper."""
     name = getattr(damper.to_saved(), "model", None)
     parts = {part.name: part for part in model_parts()}
     return {_PACKAGE: parts[name].package} if name in parts and not parts[name].own else {}
@@ -289,7 +289,7 @@ def _kind(described: dict[str, Any], where: str) -> tuple[type[Damper], dict[str
 
 
 def _upgraded(raw: dict[str, Any]) -> dict[str, Any]:
-    """What older minor versions said otherwise. Before 1.2 a kernel regression was a condition-dependent damper."""
+    """Convert older minor versions. Before 1.2 a kernel regression was a condition-dependent damper."""
     described = raw.get("damper")
     if isinstance(described, dict) and described.get("kind") == "conditioned" and described.get("model") == "kernel":
         numbers, tables = described.get("coefficients"), described.get("tables")
@@ -322,7 +322,7 @@ def _describe_certainty(known: Certainty | None) -> _Covariance | None:
 
 
 def _with_certainty(damper: Damper, saved: _Covariance, where: str) -> Damper:
-    """The damper with the covariance of its file, once it fits the damper."""
+    """Return the damper with the covariance of its file, once it fits the damper."""
     size, session, model = len(saved.parameters), saved.session, saved.model_error
     square = len(saved.matrix) == size and all(len(row) == size for row in saved.matrix)
     matrix = np.array(saved.matrix, dtype=float).reshape(size, size) if square else np.zeros((0, 0))

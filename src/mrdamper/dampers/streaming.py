@@ -268,7 +268,7 @@ def steps_of(time: Floats) -> Floats:
 
 
 def stepper(damper: Damper | Model) -> Stepper:
-    """A damper or model to be asked sample by sample.
+    """Prepare a damper or model for evaluation sample by sample.
 
     Parameters
     ----------

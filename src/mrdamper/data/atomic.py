@@ -30,7 +30,7 @@ _ELSEWHERE = "choose a folder you may write to"
 
 
 def path_of(path: object) -> Path:
-    """A path, of what a user gave for one; raises `OutputError` (E_PATH) if it is none."""
+    """Return the path a user gave; raises `OutputError` (E_PATH) if it is none."""
     if isinstance(path, str | os.PathLike):
         with contextlib.suppress(UnicodeEncodeError):
             parts = os.fsencode(path).split(os.sep.encode())
@@ -145,7 +145,7 @@ def require_writable(path: str | Path | None) -> None:
 
 @contextmanager
 def _beside(final: Path) -> Iterator[Path]:
-    """A scratch folder on the same file system, so that a rename suffices."""
+    """Give a scratch folder on the same file system, so that a rename suffices."""
     parent = final.absolute().parent
     with _coded(final):
         parent.mkdir(parents=True, exist_ok=True)

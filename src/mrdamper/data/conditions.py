@@ -74,7 +74,7 @@ class Condition:
 
 
 def current_levels(currents: Sequence[float]) -> list[float]:
-    """The level of the test matrix each current belongs to [A].
+    """Assign each current to a level of the test matrix [A].
 
     Measured currents of one level differ by noise; those within 5 mA + 2 % of their neighbour are
     one level, named by its median to three digits.

@@ -97,17 +97,17 @@ class Dataset(Shown):
 
     @checked()
     def rig(self, name: str) -> Dataset:
-        """The runs of one rig."""
+        """Return the runs of one rig."""
         if name not in self.rigs:
             raise UnknownNameError.of("rig", name, self.rigs)
         return self.only([run for run in self.runs if run.rig == name], name=name or self.name)
 
     @checked()
     def split(self, split: Split) -> tuple[Run, ...]:
-        """The runs of one split."""
+        """Return the runs of one split."""
         return tuple(run for run in self.runs if run.split == split)
 
     @checked()
     def only(self, runs: Iterable[Run], name: str | None = None) -> Dataset:
-        """The same dataset with these runs only."""
+        """Return the same dataset with these runs only."""
         return Dataset(tuple(runs), name or self.name)

@@ -52,7 +52,7 @@ def markdown(text: str) -> str:
 
 
 def csv_cell(text: str) -> str:
-    """A cell a spreadsheet shows and does not compute; `csv_value` undoes it.
+    """Write a cell that a spreadsheet shows and does not compute; `csv_value` undoes it.
 
     An apostrophe goes before =, +, -, @ and tab, as spreadsheets write it themselves; numbers stay.
     """
@@ -60,7 +60,7 @@ def csv_cell(text: str) -> str:
 
 
 def csv_value(cell: str) -> str:
-    """What `csv_cell` was given."""
+    """Return the text that `csv_cell` was given."""
     return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
 
 
@@ -75,7 +75,7 @@ def csv_text(rows: Sequence[Mapping[str, object]], names: Iterable[str] | None =
 
 
 def file_names(texts: Iterable[str]) -> dict[str, str]:
-    """A part of a file name for each text: safe on every system, no two alike.
+    """Make a part of a file name for each text: safe on every system, no two alike.
 
     Letters, digits, dot, dash and underscore stay; a text that was changed otherwise than by
     replacing them, or would meet another's name, ends in a few digits of its hash.

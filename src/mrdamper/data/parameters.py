@@ -22,7 +22,7 @@ _KEY = "mrdamper.parameter"
 
 @dataclass(frozen=True, slots=True)
 class ParameterInfo:
-    """What is known of one parameter.
+    """Description of one parameter.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ def param(
 
 
 def is_number(value: object) -> bool:
-    """Whether something is a single real number, or stands for one while code is traced."""
+    """Tell if a value is a single real number, or stands for one while code is traced."""
     if isinstance(value, bool):
         return False
     return isinstance(value, numbers.Real) or hasattr(value, "tape")
@@ -131,7 +131,7 @@ _WORDS = {"yield_force": "Fz", "yield_displacement": "xz"}
 
 
 def latex_symbol(name: str) -> str:
-    r"""A name as a letter with an index: alpha, k1, kappa_x and fy0 as \alpha, k_1, \kappa_x and f_{y0}."""
+    r"""Write a name as a letter with an index: alpha, k1, kappa_x and fy0 as \alpha, k_1, \kappa_x and f_{y0}."""
     word = next((known for known in _WORDS if name.startswith(known)), "")
     head, _, tail = name.removeprefix(word).partition("_")
     if word:

@@ -19,7 +19,7 @@ def pieces(values: NDArray, overlap: int = 0) -> Iterator[tuple[int, NDArray]]:
 
 
 def taken(values: NDArray, index: NDArray) -> NDArray:
-    """The samples of an increasing index, without holding all of a memory-mapped array at once."""
+    """Return the samples of an increasing index, without holding all of a memory-mapped array at once."""
     if values.size <= PIECE:
         return values[index]
     bounds = np.searchsorted(index, np.arange(PIECE, values.size, PIECE))

@@ -181,7 +181,7 @@ class Run(Shown):
 
     @property
     def current_changes(self) -> bool:
-        """Whether the current changes within the run, by more than noise, ripple and drift."""
+        """True if the current changes within the run, by more than noise, ripple and drift."""
         return bool(_held_current(self)[1])
 
     @property
@@ -209,7 +209,7 @@ class Run(Shown):
         return inside
 
     def steady(self) -> Run:
-        """The part of the run inside its steady window."""
+        """Return the part of the run inside its steady window."""
         inside = np.flatnonzero(self.in_window)
         if inside.size < 3:
             raise RunError(
@@ -221,7 +221,7 @@ class Run(Shown):
 
     @checked()
     def part(self, start: int, stop: int) -> Run:
-        """The samples start..stop-1 as a run of their own."""
+        """Return the samples start..stop-1 as a run of their own."""
         inner = [(max(a, start) - start, min(b, stop) - start) for a, b in self.segments]
         return replace(
             self,

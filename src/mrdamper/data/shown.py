@@ -1,4 +1,4 @@
-"""What a notebook shows of data and results, and how their tables leave."""
+"""Short text, notebook table and data frame of data and results."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _ROWS_SHOWN = 30  # of a table in a notebook
 
 
 class Shown(ABC):
-    """What a notebook shows of an object: a headline, and a table that can leave as a data frame."""
+    """Object with a headline for a notebook and a table that can be exported as a data frame."""
 
     @property
     @abstractmethod
@@ -28,14 +28,14 @@ class Shown(ABC):
 
     @property
     def details(self) -> Sequence[str]:
-        """What stands under the headline where it is printed, a line each."""
+        """Lines printed under the headline."""
         return ()
 
     def __repr__(self) -> str:
         return f"<{chr(10).join((self.headline, *self.details))}>"
 
     def _repr_html_(self) -> str:
-        """The headline and the first rows, for notebooks."""
+        """Return the headline and the first rows, for notebooks."""
         head = "".join(f"<th>{escape(name)}</th>" for name in self.table)
         rows = list(zip(*self.table.values(), strict=True))
         body = "".join(
@@ -47,11 +47,11 @@ class Shown(ABC):
 
     # By name, so that the numerics depend on no library of tables: the caller asks for one.
     def to_polars(self) -> Any:
-        """The table as a `polars.DataFrame`."""
+        """Return the table as a `polars.DataFrame`."""
         return importlib.import_module("polars").DataFrame(dict(self.table))
 
     def to_pandas(self) -> Any:
-        """The table as a `pandas.DataFrame`; pandas must be installed."""
+        """Return the table as a `pandas.DataFrame`; pandas must be installed."""
         return importlib.import_module("pandas").DataFrame(dict(self.table))
 
 

@@ -45,7 +45,7 @@ def _locked(parent: Path, prefix: str, suffix: str) -> tuple[Path, int | None]:
 
 
 def _lock(folder: Path) -> int | None:
-    """An open lock on a folder; None if another process has one, or the system knows none."""
+    """Open a lock on a folder; None if another process has one, or the system provides none."""
     if os.name != "posix":
         return None
     import fcntl

@@ -25,7 +25,7 @@ def all_exporters() -> Mapping[str, type[Exporter]]:
 
 
 def exporter(name: str) -> type[Exporter]:
-    """The export format of that name; raises `UnknownNameError` with the near matches."""
+    """Return the export format of that name; raises `UnknownNameError` with the near matches."""
     return _registry.type_named(name)
 
 

@@ -1,4 +1,4 @@
-"""What an export format is: files by name, made of a damper, written whole or not at all."""
+"""Base class of export formats: files by name, written whole or not at all."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _RESERVED = re.compile(
 
 @dataclass(frozen=True)
 class Written:
-    """What an export made."""
+    """Files of an export."""
 
     files: Mapping[str, bytes]  # contents by file name
     notes: tuple[str, ...] = field(default=())  # what the user should know: limits, platforms left out
@@ -65,7 +65,7 @@ def write_export(written: Written, out: str | Path, suffix: str) -> list[Path]:
 
 
 def identifier(text: str) -> str:
-    """A name for files and symbols out of any text; raises `InputError` (E_EXPORT_NAME) if nothing usable is left."""
+    """Make a name for files and symbols of any text; raises `InputError` (E_EXPORT_NAME) if nothing is left."""
     made = re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_").lower()
     if made and made[0].isdigit():
         made = f"damper_{made}"

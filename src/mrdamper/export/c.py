@@ -87,7 +87,7 @@ def write_program(made: Program, name: str, title: str, folder: str | Path) -> l
 
 
 def self_test(made: Stream, name: str) -> str:
-    """A program that steps the model through a motion and compares with forces computed here."""
+    """Write a program that steps the model through a motion and compares with forces computed here."""
     x, current, dt = reference_motion(made)
     steps = Stepper(made)
     force = [steps.step(*sample, dt) for sample in zip(x.tolist(), current.tolist(), strict=True)]
@@ -109,7 +109,7 @@ def reference_motion(made: Stream, samples: int = _SAMPLES) -> tuple[np.ndarray,
 
 
 def c_facts(made: Stream, name: str, rig: str, language: type[CWriter] = CWriter) -> dict[str, Any]:
-    """What the templates say of a damper, in C or in a language that shares its grammar."""
+    """Collect the template values of a damper, for C or a language that shares its grammar."""
     main = language(made.step)
     drives = {quantity: language(drive, f"from_{quantity}_") for quantity, drive in made.drives.items()}
     setup, infos = main.setup(), made.model.parameters() if made.model else ()

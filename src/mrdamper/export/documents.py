@@ -49,7 +49,7 @@ class MarkdownExporter(Exporter):
 
 
 def document_facts(given: Damper | Model) -> dict[str, Any]:
-    """What a page of equations says of a damper, for any markup."""
+    """Collect the values of a page of equations, for any markup."""
     damper = damper_of(given)
     infos = damper.one_model.parameters() if damper.one_model else ()
     values = damper.one_model.values() if damper.one_model else {}

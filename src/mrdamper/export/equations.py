@@ -37,7 +37,7 @@ def equations(damper: Damper) -> list[str]:
 
 
 def function_text(function: ParameterFunction) -> str:
-    """A parameter function of I, f and A as LaTeX, its numbers in it."""
+    """Write a parameter function of I, f and A as LaTeX, its numbers in it."""
     parts = []
     for value, term in zip(function.coefficients, form_named(function.form).terms, strict=True):
         powers = {"I": term.current, "f": term.frequency, "A": term.amplitude}
@@ -53,7 +53,7 @@ def function_text(function: ParameterFunction) -> str:
 
 
 def number(value: float) -> str:
-    """A number to five digits."""
+    """Write a number to five digits."""
     text = f"{value:.5g}"
     if "e" not in text:
         return text
@@ -63,5 +63,5 @@ def number(value: float) -> str:
 
 
 def unit_text(unit: str) -> str:
-    """A unit with its powers raised."""
+    """Write a unit with its powers raised."""
     return re.sub(r"\^(-?\w+)", r"$^{\1}$", unit)

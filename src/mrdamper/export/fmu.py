@@ -69,7 +69,7 @@ class FMUExporter(Exporter):
         return self.packed(fmu_texts(damper, identifier(name), self.fmi), identifier(name))
 
     def packed(self, files: Mapping[str, bytes], name: str) -> Written:
-        """The texts of an FMU with binaries of their sources, zipped."""
+        """Zip the texts of an FMU with binaries of their sources."""
         binaries, notes = self._binaries(files, name)
         return Written({f"{name}{self.suffix}": zipped({**files, **binaries})}, tuple(notes))
 
@@ -150,7 +150,7 @@ def with_token(texts: Callable[[str], dict[str, bytes]]) -> dict[str, bytes]:
 
 
 def token_of(files: Mapping[str, bytes]) -> str:
-    """The GUID of an FMU whose texts hold none yet."""
+    """Calculate the GUID of an FMU from its texts, which hold none yet."""
     digest = hashlib.sha256()
     for path in sorted(files):
         for part in (path.encode(), files[path]):
@@ -159,7 +159,7 @@ def token_of(files: Mapping[str, bytes]) -> str:
 
 
 def zipped(files: Mapping[str, bytes]) -> bytes:
-    """A zip archive whose bytes depend on nothing but the files."""
+    """Write a zip archive whose bytes depend on nothing but the files."""
     made = io.BytesIO()
     with zipfile.ZipFile(made, "w") as archive:
         for path in sorted(files, key=lambda p: (p != "modelDescription.xml", p)):
@@ -208,7 +208,7 @@ def all_texts(
     given: Mapping[str, np.ndarray],
     found: Mapping[str, np.ndarray],
 ) -> dict[str, bytes]:
-    """The texts of an FMU by path: C sources and those of an instance, what it says of itself, its reference.
+    """Collect the texts of an FMU by path: C sources and those of an instance, its description, its reference.
 
     Parameters
     ----------

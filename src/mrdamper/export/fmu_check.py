@@ -104,7 +104,7 @@ def _binary_for_here(files: Mapping[str, bytes]) -> tuple[dict[str, bytes], list
 
 
 def _probed(files: Mapping[str, bytes], loadable: bool) -> list[Finding]:
-    """What a process that validates and simulates the unpacked FMU found, and how it ended if not well."""
+    """Validate and simulate the unpacked FMU in a process of its own; return its findings and how it ended."""
     with temporary_folder() as folder:
         unpacked, report = folder / "fmu", folder / "report"
         for name, content in files.items():

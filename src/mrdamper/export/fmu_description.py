@@ -1,4 +1,4 @@
-"""What an FMU says of itself: its variables, their units, its serialized state."""
+"""Description of an FMU: its variables, their units, its serialized state."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Variable:
 
 
 def description_facts(made: Stream, fmi: int, internal_step: float, current: float) -> dict[str, Any]:
-    """What the templates of an FMU need to know beside the C source's facts."""
+    """Collect the template values of an FMU that the C source's facts do not hold."""
     variables = _variables(made, fmi, internal_step, current)
     return {
         "variables": variables,
@@ -129,7 +129,7 @@ def variable(v: dict[str, Any], reference: int, index: int) -> Variable:
 
 
 def parameters_of_stream(made: Stream) -> list[tuple[ParameterInfo, bool]]:
-    """The model's parameters, and whether each may change: tracing may have frozen a branch on it."""
+    """List the model's parameters, and if each may change: tracing may have frozen a branch on it."""
     if made.model is None:
         return []
     return [(info, _is_free(made, info.name)) for info in made.model.parameters()]
@@ -147,7 +147,7 @@ def _is_free(made: Stream, name: str) -> bool:
 
 
 def unit_name(info: ParameterInfo, made: Stream) -> str:
-    """The unit of a parameter; an exponent that is itself a parameter is filled in where it is whole."""
+    """Write the unit of a parameter; an exponent that is itself a parameter is filled in where it is whole."""
     if info.unit == "-":
         return "1"
     if info.unit.endswith("^-n"):
@@ -184,7 +184,7 @@ def _registry() -> Any:
 
 
 def serial_fields(members: Sequence[str], parameters: Sequence[str]) -> dict[str, Any]:
-    """The serialized state: how each number is read from the state and written into it."""
+    """List the serialized state: how each number is read from the state and written into it."""
     fields: list[tuple[str, str, str]] = []  # get, set to, kept when
     inputs = [f"{group}.{name}" for group in ("set", "last") for name in ("displacement", "velocity", "current")]
     fields += [(f"s->{name}", f"s.{name} = #", "") for name in (*inputs, "time")]
@@ -214,7 +214,7 @@ def serial_fields(members: Sequence[str], parameters: Sequence[str]) -> dict[str
 
 
 def c_bounds(info: ParameterInfo) -> str:
-    """The condition a value has to meet, in C; empty without bounds."""
+    """Write the condition a value has to meet, in C; empty without bounds."""
     low, high = info.bounds
     checks = [f"value >= {float(low)!r}"] if math.isfinite(low) else []
     return " && ".join(checks + ([f"value <= {float(high)!r}"] if math.isfinite(high) else []))

@@ -61,7 +61,7 @@ def _web_sources(made: Stream, name: str) -> dict[str, bytes]:
 
 
 def _facts(damper: Damper | Model, made: Stream, name: str, library: bytes | None) -> dict[str, Any]:
-    """What the page's template says."""
+    """Collect the template values of the page."""
     rig = damper_of(damper).rig
     envelope = made.envelope
     computed = {
@@ -91,7 +91,7 @@ def _facts(damper: Damper | Model, made: Stream, name: str, library: bytes | Non
 
 
 def _vectors(made: Stream) -> dict[str, Any]:
-    """A motion and the forces of the stepper here, all digits, for the page to repeat."""
+    """Calculate a motion and the forces of the stepper here, all digits, for the page to repeat."""
     x, current, step = reference_motion(made, _VECTORS)
     stepper = Stepper(made)
     force = [stepper.step(*sample, step) for sample in zip(x.tolist(), current.tolist(), strict=True)]
@@ -103,14 +103,14 @@ def _vectors(made: Stream) -> dict[str, Any]:
 
 
 def _curve(points: np.ndarray, library: bytes | None) -> dict[str, Any]:
-    """A table's doubles, or where they stand in the WebAssembly binary."""
+    """Return a table's doubles, or their position in the WebAssembly binary."""
     packed = np.ascontiguousarray(points, "<f8").tobytes()
     at = library.find(packed) if library else -1
     return {"size": points.size, "at": at} if at >= 0 else {"data": base64.b64encode(packed).decode()}
 
 
 def _tested(envelope: Envelope) -> list[dict[str, Any]]:
-    """The tested ranges, and what to say outside them."""
+    """Describe the tested ranges, and what holds outside them."""
     named = [(field, label.lower(), unit, factor) for _, field, label, unit, factor, *_ in _KNOBS]
     named.append(("peak_velocity_m_s", "peak velocity", "mm/s", 1e3))
     return [
@@ -121,7 +121,7 @@ def _tested(envelope: Envelope) -> list[dict[str, Any]]:
 
 
 def _words(damper: Damper | Model, made: Stream) -> list[str]:
-    """Where the damper comes from and what it is good for, in sentences."""
+    """Describe the origin of the damper and its range of validity, in sentences."""
     from importlib.metadata import version
 
     said = f"{made.title[:1].upper()}{made.title[1:]}, exported by mrdamper {version('mrdamper')}"
@@ -165,7 +165,7 @@ def _knobs(envelope: Envelope | None) -> list[dict[str, Any]]:
 
 
 def _on(step: float, value: float, least: int = 0) -> float:
-    """The nearest multiple of a slider's step."""
+    """Round to the nearest multiple of a slider's step."""
     return max(round(value / step), least) * step
 
 

@@ -39,14 +39,14 @@ PLATFORMS = (
 
 
 def here() -> Platform | None:
-    """The platform this runs on, where FMUs know it."""
+    """Return the platform this runs on, where FMUs have a name for it."""
     machine = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}
     name = f"{machine.get(platform.machine().lower(), '')}-{platform.system().lower()}"
     return next((p for p in PLATFORMS if p.name == name), None)
 
 
 def compiler_for(wanted: Platform) -> tuple[str, ...]:
-    """The command that compiles for a platform; empty if there is none.
+    """Return the command that compiles for a platform; empty if there is none.
 
     The system's own compiler comes first where it fits, then zig (`pip install ziglang`), which
     compiles for all of them.

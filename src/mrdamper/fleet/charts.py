@@ -65,7 +65,7 @@ def ewma(values: Floats, target: float, deviation: float, weight: float = 0.2, w
 
 @dataclass(frozen=True)
 class Capability:
-    """How a distribution lies between its limits."""
+    """Capability of a process: how its distribution lies between the limits."""
 
     ppk: float  # NaN where the values are too few for percentiles
     low: float  # ends of its 95 % interval
@@ -76,7 +76,7 @@ class Capability:
 
 
 def is_normal(values: Floats) -> bool:
-    """Whether nothing speaks against a normal distribution (Shapiro and Wilk); of many, an even choice is tested."""
+    """Tell if Shapiro and Wilk's test accepts a normal distribution; of many values, an even choice is tested."""
     from scipy.stats import shapiro
 
     if values.size < _FEWEST_NORMALITY or np.ptp(values) == 0:
@@ -137,7 +137,7 @@ def _nearest(percentiles: Floats, lower: float | None, upper: float | None) -> F
 
 @dataclass(frozen=True)
 class Gauge:
-    """Where the variation of golden dampers comes from, as standard deviations."""
+    """Sources of the variation of master dampers, as standard deviations."""
 
     repeatability: float  # what is left when dampers and sessions are accounted for
     reproducibility: float  # from session to session

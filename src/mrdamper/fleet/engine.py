@@ -1,4 +1,4 @@
-"""Where jobs run: processes of this machine, or a Dask cluster. Both hand out futures of rows."""
+"""Execution of jobs: processes of this machine, or a Dask cluster. Both return futures of rows."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def local_engine(workers: int, limits: Limits) -> Iterator[tuple[Submit, int]]:
 
 
 def outcome(future: Future[Row]) -> Row:
-    """The row of a finished job; a job whose cluster workers died one after the other failed.
+    """Return the row of a finished job; a job whose cluster workers died one after the other failed.
 
     Raises `ClusterError` if the scheduler is lost.
     """
@@ -70,7 +70,7 @@ def outcome(future: Future[Row]) -> Row:
 
 
 def guarded(guard: Guard, job: Row) -> Row:
-    """The row of a job that is run under a guard, whatever becomes of it."""
+    """Run a job in a process with limits and return its row, also where the process fails."""
     from mrdamper.fleet.job import refused
 
     try:
@@ -127,7 +127,7 @@ _HELD = threading.local()
 
 
 def on_cluster(job: Row, limits: dict[str, Any]) -> Row:
-    """A job on a worker of the cluster; each of its threads keeps a process of its own."""
+    """Run a job on a worker of the cluster; each of its threads keeps a process of its own."""
     guard: Guard | None = getattr(_HELD, "guard", None)
     if guard is None or _HELD.limits != limits:
         if guard is not None:

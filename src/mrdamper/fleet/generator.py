@@ -73,7 +73,7 @@ class VirtualDamper:
 
 @dataclass(frozen=True)
 class Line:
-    """How a virtual line makes and tests its dampers."""
+    """Production and test plan of a synthetic population of dampers."""
 
     dampers: int = 200
     sessions: int = 10  # test days, the dampers spread over them evenly; three sessions are a batch
@@ -88,7 +88,7 @@ class Line:
     seed: int = 0
 
     def __iter__(self) -> Iterator[VirtualDamper]:
-        """The dampers in the order they are tested, golden ones first in every session."""
+        """Yield the dampers in the order they are tested, master dampers first in every session."""
         for name in self.faults:
             if name not in FAULTS:
                 raise UnknownNameError.of("fault", name, FAULTS)

@@ -34,7 +34,7 @@ class JobError(InputError):
 
 @dataclass(frozen=True)
 class Limits:
-    """What one job may take."""
+    """Limits of one job."""
 
     cpu_s: float = 120.0
     wall_s: float = 600.0
@@ -50,7 +50,7 @@ class Guard:
         self._closed = False
 
     def call(self, function: str, argument: Any) -> Any:
-        """Result of `module:function` of an argument, both as JSON.
+        """Return the result of `module:function` of an argument, both as JSON.
 
         A process that somebody killed is no fault of the job: it is done again.
 
@@ -79,7 +79,7 @@ class Guard:
         self._kill()
 
     def _ask(self, request: dict[str, Any]) -> tuple[dict[str, Any] | None, int]:
-        """The child's answer; or None, and the signal or exit status it died by."""
+        """Return the child's answer; or None, and the signal or exit status it died by."""
         if self._process is None or self._process.poll() is not None:
             self._kill()
             self._process = _start()
@@ -134,7 +134,7 @@ class Guard:
 
 
 def descendants(pid: int) -> list[int]:
-    """Processes that a process started, and those that they started; empty where the system does not tell."""
+    """List the processes that a process started, and those that they started; empty where the system has no list."""
     found = []
     with contextlib.suppress(OSError):
         for task in Path(f"/proc/{pid}/task").iterdir():

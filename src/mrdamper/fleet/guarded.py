@@ -96,7 +96,7 @@ def _written() -> int:
 
 
 def _strangers() -> list[int]:
-    """Processes a job left behind; the one that reads rig files belongs to the house."""
+    """List the processes a job left behind, without the one that reads rig files."""
     found = []
     for pid in descendants(os.getpid()):
         with contextlib.suppress(OSError):

@@ -45,7 +45,7 @@ class Item:
 
     @property
     def facts(self) -> dict[str, Any]:
-        """What the tables say of it whatever its records hold."""
+        """Columns of the tables that do not depend on the records."""
         return {name: getattr(self, name) for name in FACTS}
 
 

@@ -15,7 +15,7 @@ from mrdamper.rig_files.dataset_samples import SAMPLE_FILES
 
 
 def find_items(source: str | Path, profile: FleetProfile) -> list[Item]:
-    """The dampers of a source, sorted by serial number and session.
+    """Find the dampers of a source, sorted by serial number and session.
 
     A source is a folder of dataset folders, of folders of rig files or of rig files, a dataset folder, or
     a Parquet lake (a file, or a folder of such files) with a column for the serial number. Raises
@@ -45,7 +45,7 @@ def find_items(source: str | Path, profile: FleetProfile) -> list[Item]:
 
 
 def _holds_results(folder: Path) -> bool:
-    """Whether a folder is an earlier `--out`."""
+    """Tell if a folder is an earlier `--out`."""
     return (folder / "journal.lock").is_file()
 
 
@@ -100,7 +100,7 @@ def _named(name: str, profile: FleetProfile, kind: Kind, paths: tuple[str, ...],
 
 
 def _of_dataset(folder: Path, profile: FleetProfile) -> Iterator[Item]:
-    """The dampers of a dataset folder: one, unless columns name several serial numbers or sessions."""
+    """Find the dampers of a dataset folder: one, unless columns name several serial numbers or sessions."""
     named = _named(folder.name, profile, "dataset", (str(folder),), folder)
     try:
         table = runs_table(folder)

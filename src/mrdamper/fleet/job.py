@@ -1,4 +1,4 @@
-"""What is done for one damper: a pure function of its records, the settings and the line's plan.
+"""Job of one damper: a pure function of its records, the settings and the plan of the population.
 
 It speaks JSON on both sides, so that it runs here, in a process that can be killed, or on a cluster.
 """
@@ -45,7 +45,7 @@ _FAR = 6.0  # robust standard deviations from the line at which a damper is stud
 
 @dataclass(frozen=True)
 class Settings:
-    """What changes a result, and so belongs to the key it is kept under."""
+    """Settings that change a result, and so belong to the key it is stored under."""
 
     model: str = "play-bypass"  # identified jointly from all runs of a damper
     rig_profile: str = ""  # of rig files, as TOML text
@@ -53,7 +53,7 @@ class Settings:
 
 
 def measure(job: dict[str, Any]) -> dict[str, Any]:
-    """The row of one damper; `job` holds an item, its digest, settings and the plan, if there is one.
+    """Calculate the row of one damper; `job` holds an item, its digest, settings and the plan, if there is one.
 
     Raises `InputError` if its records cannot be used.
     """
@@ -95,14 +95,14 @@ def attempt(job: dict[str, Any]) -> dict[str, Any]:
 
 
 def refused(error: InputError) -> dict[str, Any]:
-    """The row of a damper that cannot be used, or whose job failed."""
+    """Write the row of a damper that cannot be used, or whose job failed."""
     # Neither says anything about the records that would be true the next time.
     passing = error.code.startswith("E_JOB") or error.code in _PASSING
     return {"status": "failed" if passing else "refused", "code": error.code, "reason": str(error)}
 
 
 def read(item: Item, settings: Settings) -> tuple[Dataset, tuple[str, ...]]:
-    """The records of one damper, and the codes of what was found in them.
+    """Read the records of one damper; return them and the codes of what was found in them.
 
     Raises `InputError` if they cannot be read, or come from several rigs.
     """
@@ -193,7 +193,7 @@ def _test_of(run: Run) -> Test:
 
 
 def _beside_the_line(fit: JointFit, own: list[Floats | None], plan: Plan) -> dict[str, Any]:
-    """Forces at the line's velocity ladder, and the loops of the line's tests."""
+    """Calculate forces at the population's velocities, and the loops of its tests."""
     ladder = velocity_ladder(fit.damper.model, plan.currents, plan.speeds, plan.amplitude)
     gas, friction = gas_and_friction(ladder, plan.speeds)
     return {
@@ -252,7 +252,7 @@ def _stands_for(model: Model, axis: str) -> list[str]:
 
 
 def _study(dataset: Dataset) -> dict[str, Any]:
-    """What the full study says of a damper that stands out; which candidates it has is its own affair."""
+    """Run the full study of a damper that stands out, and summarise it; the study chooses its candidates."""
     try:
         chosen = study_rig(dataset).chosen
     except InputError as error:
@@ -271,7 +271,7 @@ def _usable(dataset: Dataset) -> list[Run]:
 
 
 def _stands_out(fit: JointFit, away: float, plan: Plan) -> bool:
-    """Whether a damper lies so far from the line that it deserves a full study."""
+    """Tell if a damper lies so far from the population that it needs a full study."""
     if plan.draft:
         return False
     poor = float(np.median(fit.nrmse_pp)) > plan.error + _FAR * max(plan.error_spread, 0.1 * plan.error)
@@ -280,7 +280,7 @@ def _stands_out(fit: JointFit, away: float, plan: Plan) -> bool:
 
 
 def as_job(item: Item, digest: str, settings: Settings, plan: Plan | None) -> dict[str, Any]:
-    """The argument of `measure`."""
+    """Write the argument of `measure`."""
     return {
         "item": {k: v for k, v in vars(item).items() if k != "error"},
         "digest": digest,
@@ -291,7 +291,7 @@ def as_job(item: Item, digest: str, settings: Settings, plan: Plan | None) -> di
 
 
 def item_of(job: dict[str, Any]) -> Item:
-    """The item of a job that came as JSON."""
+    """Read the item of a job that came as JSON."""
     fields: dict[str, Any] = {**job["item"], "paths": tuple(job["item"]["paths"])}
     fields |= {name: tuple(map(tuple, fields[name])) for name in ("rows", "picks")}
     return Item(**fields)

@@ -57,12 +57,12 @@ class Journal:
             raise
 
     def result(self, key: str) -> dict[str, Any] | None:
-        """The row kept under a key."""
+        """Return the row stored under a key."""
         row = self._kept("SELECT row FROM results WHERE key = ?", key)
         return None if row is None else json.loads(row)
 
     def status(self, key: str) -> str | None:
-        """The status of that row."""
+        """Return the status of that row."""
         return self._kept("SELECT json_extract(row, '$.status') FROM results WHERE key = ?", key)
 
     def keep(self, rows: Iterable[tuple[str, dict[str, Any]]]) -> None:
@@ -70,7 +70,7 @@ class Journal:
         self._write("INSERT OR REPLACE INTO results VALUES (?, ?)", [(key, _text(row)) for key, row in rows])
 
     def plan(self, key: str) -> dict[str, Any] | None:
-        """The plan kept under a key."""
+        """Return the plan stored under a key."""
         plan = self._kept("SELECT plan FROM plans WHERE key = ?", key)
         return None if plan is None else json.loads(plan)
 

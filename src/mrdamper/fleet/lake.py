@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def is_lake(paths: Sequence[Path], profile: FleetProfile) -> bool:
-    """Whether the first readable of these files has a column for the serial number."""
+    """Tell if the first readable of these files has a column for the serial number."""
     for path in paths:
         names = _columns(path)
         if names is not None:
@@ -31,7 +31,7 @@ def is_lake(paths: Sequence[Path], profile: FleetProfile) -> bool:
 
 
 def lake_items(paths: Sequence[Path], profile: FleetProfile) -> list[Item]:
-    """The dampers of a lake, each with the rows it occupies in every file.
+    """Find the dampers of a folder of Parquet files, each with the rows it occupies in every file.
 
     A file that cannot be read, or lacks a column, becomes an item with the error; the others go on.
     """
@@ -73,7 +73,7 @@ def lake_items(paths: Sequence[Path], profile: FleetProfile) -> list[Item]:
 
 
 def lake_dataset(item: Item) -> Dataset:
-    """The records of one damper of a lake.
+    """Read the records of one damper from a folder of Parquet files.
 
     Raises `ColumnError` or `RunError` or `TimeOrderError` or `NonFiniteError` if the channels of a run do not fit
     together.

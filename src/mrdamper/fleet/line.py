@@ -31,7 +31,7 @@ _AHEAD = 2  # jobs that wait for each that runs
 
 @dataclass(frozen=True)
 class Fleet:
-    """What came of a fleet."""
+    """Summary of a population run."""
 
     table: Path  # `dampers.parquet`
     dampers: int  # in the source
@@ -243,7 +243,7 @@ class _Line:
         self._journal.keep(good)
 
     def _for(self, plan: Plan | None) -> Settings:
-        """The settings; a plan is made in the same way for fast and for cold searches."""
+        """Return the settings; a plan is made in the same way for fast and for cold searches."""
         plain = plan is None or plan.draft
         return replace(self._settings, cold=False) if plain else self._settings
 

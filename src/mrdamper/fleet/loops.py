@@ -49,7 +49,7 @@ def deviation(loop: Floats, reference: Floats) -> float:
 
 
 def shape_deviation(loop: Floats, reference: Floats) -> float:
-    """The same of what is left when the loop is scaled and shifted onto the reference: its shape alone."""
+    """Calculate the deviation of the loop scaled and shifted onto the reference: of its shape alone."""
     columns = np.column_stack([loop, np.ones(loop.size)])
     return deviation(columns @ np.linalg.lstsq(columns, reference, rcond=None)[0], reference)
 

@@ -21,7 +21,7 @@ _RIDGE = 1e-12  # keeps the curvature of what changes nothing invertible
 
 @dataclass(frozen=True)
 class Plan:
-    """What a line's reference dampers say: where to start, what to compare with.
+    """Start values and reference values from the first dampers of a population.
 
     Made once from dampers that depend on the serial numbers alone and kept in the journal, so
     that no result depends on the order in which dampers are finished.
@@ -99,7 +99,7 @@ def drafts(rows: dict[str, dict[str, Any]]) -> list[Plan]:
 
 
 def holding(plan: Plan, rows: Sequence[dict[str, Any]]) -> Plan:
-    """The draft that holds, at the line's value, what the line's tests do not determine.
+    """Fix, at the median of the population, the parameters that its tests do not determine.
 
     A few records cannot tell all parameters of a model from each other. One that could change by a
     fifth (on an axis that is no logarithm, by a twentieth of its width) while the others make up for
@@ -129,7 +129,7 @@ def holding(plan: Plan, rows: Sequence[dict[str, Any]]) -> Plan:
 
 
 def settled(plan: Plan, rows: Sequence[dict[str, Any]]) -> Plan:
-    """The plan from what the reference dampers came to under its draft."""
+    """Make the plan from the results of the reference dampers under its draft."""
     start = np.median([row["point"] for row in rows], axis=0)
     error, error_spread = _middle(np.array([row["nrmse_pp"] for row in rows]))
     away, away_spread = _middle(np.array([row["loop_deviation"] for row in rows]))
@@ -151,7 +151,7 @@ def _middle(values: Floats) -> tuple[Floats, Floats]:
 
 
 def _matrix(tests: list[Test], dampers: int) -> tuple[Test, ...]:
-    """Tests that half the dampers or more went through, each the median of its like."""
+    """List the tests of at least half the dampers, each the median of its like."""
     groups = same_condition([Condition(*test) for test in tests])
     common = [g for g in groups if 2 * len(g) >= dampers] or groups
     return tuple(sorted(_as_test(np.median([tests[i] for i in g], axis=0).tolist()) for g in common))

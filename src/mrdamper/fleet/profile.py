@@ -1,4 +1,4 @@
-"""What a fleet's folders and tables do not say: where serial numbers stand, which dampers are golden, the limits."""
+"""Profile of a population: position of serial numbers, master dampers, limits."""
 
 from __future__ import annotations
 
@@ -68,24 +68,24 @@ class FleetProfile(_Table):
         return re.compile(inner)
 
     def of_name(self, name: str) -> dict[str, str] | None:
-        """The facts a name states; None if the pattern does not fit it."""
+        """Read the facts a name states; None if the pattern does not fit it."""
         if self._expression is None:
             return {"serial": name}
         match = self._expression.fullmatch(name)
         return None if match is None else match.groupdict()
 
     def of_columns(self, row: dict[str, Any]) -> dict[str, str]:
-        """The facts a row of a table states; empty cells state nothing."""
+        """Read the facts a row of a table states; empty cells state nothing."""
         cells = {column: str(cell).strip() for column, cell in row.items() if cell is not None and str(cell).strip()}
         return {fact: cells[column] for fact in FACTS if (column := self.column_of(fact, cells))}
 
     def column_of(self, fact: str, columns: Collection[str]) -> str | None:
-        """Which of a table's columns states a fact."""
+        """Return the column of a table that states a fact."""
         wanted = (self.columns[fact],) if fact in self.columns else COLUMNS[fact]
         return next((name for name in wanted if name in columns), None)
 
     def is_golden(self, facts: dict[str, str]) -> bool:
-        """Whether a damper is one that watches the rig."""
+        """Tell if a damper is a master damper, which watches the rig."""
         return facts["serial"] in self.golden or facts.get("golden", "").lower() in _TRUE
 
 

@@ -1,4 +1,4 @@
-"""What the table of a line says: which dampers stand out and why, and what drifts, the line or the rig."""
+"""Dampers that stand out and why, and drift of the rig or of production, from the table of a population."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _CAUSES = (
 
 
 def with_features(frame: pl.DataFrame) -> pl.DataFrame:
-    """The table with half the difference of rebound and compression at the highest speed, off and its rise."""
+    """Add half the difference of rebound and compression at the highest speed, at the lowest current and its rise."""
     import polars as pl
 
     ladder = [c for c in frame.columns if c.startswith("rebound_N_")]
@@ -98,7 +98,7 @@ def _away(values: Floats, sessions: np.ndarray) -> Floats:
 
 @dataclass(frozen=True)
 class Drift:
-    """What drifts from the first session to the last."""
+    """Drift from the first session to the last."""
 
     verdict: str  # "rig", "line", "both", "none" or "cannot tell"
     rig: float  # relative change of the rig; NaN where nothing tells
@@ -168,7 +168,7 @@ def _trend(share: Floats, means: Floats) -> tuple[float, bool]:
 
 
 def clock_findings(frame: pl.DataFrame) -> list[str]:
-    """Where dates are none, or run backwards from session to session."""
+    """List dates that cannot be read, or that run backwards from session to session."""
     last, found = None, []
     for session, text in frame.select("session", "date").unique(maintain_order=True).sort("session").iter_rows():
         if not text:

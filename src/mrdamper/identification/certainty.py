@@ -1,4 +1,4 @@
-"""How sure the parameters of one identified run are, and what its motion cannot tell."""
+"""Uncertainty of the parameters of one identified run, and parameters that its motion cannot determine."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def _unseen(problem: Problem, names: Sequence[str], columns: Floats, residual: F
 def _sensitivities(
     problem: Problem, solution: Solution, motion: Excitation, state: Floats, residual: Floats
 ) -> tuple[dict[str, float], list[str], list[Floats]]:
-    """The point, its free coordinates, and derivatives of the force by them."""
+    """Calculate the point, its free coordinates, and derivatives of the force by them."""
     seen = motion.part(problem.scored)
     linear = {i.name: getattr(solution.model, i.name) for i in solution.model.parameters() if i.linear}
     searched = {name: value for name, value in solution.end.items() if name != DELAY}

@@ -1,4 +1,4 @@
-"""What test engineers read off a damper: forces at set velocities, rebound and compression apart.
+"""Forces at set velocities, rebound and compression apart, as test engineers tabulate them.
 
 Gas force is the force that does not change sign with the motion; friction is what remains at the
 lowest current as the motion becomes slow. Both are taken away or stated, never mixed into the
@@ -61,7 +61,7 @@ class Stroke:
 
 @dataclass(frozen=True)
 class Characteristics:
-    """What the runs of one damper say, without any model.
+    """Characteristic values of one damper's runs, without any model.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class Characteristics:
     passed_over: Mapping[str, str]
 
     def at(self, current: float) -> tuple[Stroke, ...]:
-        """The strokes of a level, slow to fast."""
+        """Return the strokes of a level, slow to fast."""
         return tuple(s for s in self.strokes if s.condition.current_A == current)
 
     def damping_force(self, stroke: Stroke, side: int) -> float:

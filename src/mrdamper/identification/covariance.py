@@ -1,4 +1,4 @@
-"""How certain least-squares parameters are when residuals are not independent.
+"""Covariance of least-squares parameters where residuals are not independent.
 
 Two things make a damper's residuals depend on each other. Noise remembers: its spectrum decides
 what a parameter sees of it, an offset force the noise at 0 Hz, a viscous damping that at the
@@ -112,7 +112,7 @@ def spread(jacobian: Floats, residual: Floats, time: Floats | None = None, frequ
 
 
 def alike_groups(vectors: Floats) -> list[tuple[list[int], int]]:
-    """Groups of parameters that do the same to a residual, each with the one that takes most part.
+    """Group the parameters with the same effect on a residual, each with the one that takes most part.
 
     Two pairs that are alike span a plane, and any mixture of them is an eigenvector as well: each
     group is told by the reduced form of the basis, in which it has a parameter of its own.
@@ -163,7 +163,7 @@ Part = tuple[Floats, Floats]  # Jᵀ Σ J of one cause, and the relative varianc
 def _repeated(
     jacobian: Floats, residual: Floats, time: Floats, frequency: float, inverse: Floats
 ) -> tuple[Floats, list[Part]]:
-    """What of a residual does not repeat, and the score's covariance by what does."""
+    """Separate the part of a residual that does not repeat in every cycle; return it and the score's covariance."""
     size, count = jacobian.shape
     step = float(np.median(np.diff(time)))
     most = int(min(_HARMONICS, 0.4 / (step * frequency), size // 8))
@@ -220,7 +220,7 @@ def _power_law(orders: Floats, power: Floats, expected: Floats, left: Floats) ->
 
 
 def _noise(jacobian: Floats, residual: Floats, inverse: Floats) -> tuple[Part, float]:
-    """The score's covariance by the residual's own spectrum, and its memory in samples."""
+    """Calculate the score's covariance from the residual's own spectrum, and its memory in samples."""
     size = residual.size
     model = _autoregression(residual)
     points = 1 << (2 * size - 1).bit_length()

@@ -101,7 +101,7 @@ class Elimination:
 
 @dataclass(frozen=True)
 class Kind:
-    """What a model and the choice of its free parameters make of the search.
+    """Structure of the search: the linear and the nonlinear parameters of a model.
 
     Attributes
     ----------

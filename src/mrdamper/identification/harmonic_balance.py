@@ -170,7 +170,7 @@ def damping_and_mass(
 
 
 def double_counted(shape: Shape, yield_force: float, amplitude: float, omega: float) -> tuple[float, float]:
-    """What the first harmonic of the hysteretic force adds to the closed forms of c and m.
+    """Calculate the first harmonic of the hysteretic force that the closed forms of c and m also contain.
 
     c_closed − c = f_z zc_1/(X omega),  m_closed − m = −f_z zs_1/(X omega²), with zs_1, zc_1
     the exact first harmonics of zeta. Derived for this package.
@@ -197,7 +197,7 @@ def double_counted(shape: Shape, yield_force: float, amplitude: float, omega: fl
 
 @dataclass(frozen=True)
 class StiffnessAndMass:
-    """What the in-phase force of several runs says.
+    """Stiffness and mass from the in-phase force of several runs.
 
     Attributes
     ----------

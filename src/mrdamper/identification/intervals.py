@@ -61,7 +61,7 @@ def _student(level: float, dof: float) -> float:
 
 
 def interval_about(value: float, error: float, dof: float, level: float, log: bool) -> tuple[float, float] | None:
-    """Ends of an interval; of a logarithm where `log`, then `error` is that of the logarithm.
+    """Calculate the ends of an interval; of a logarithm where `log`, then `error` is that of the logarithm.
 
     None where the parameter is not identifiable: an error that is not finite, ends a factor of more
     than a thousand apart, or a half width of more than a thousand times the estimate.
@@ -83,7 +83,7 @@ _SHOWN = {"-": (1.0, ""), "m": (1e3, "mm"), "m/s": (1e3, "mm/s")}  # how a unit 
 
 
 def written(value: float, ends: tuple[float, float] | None, unit: str = "") -> str:
-    """A number with its interval and unit, to two digits of the half width: 730 ± 110 N s/m, 0.3 (0.1 to 0.9) mm.
+    """Write a number with its interval and unit, to two digits of the half width: 730 ± 110 N s/m, 0.3 (0.1 to 0.9) mm.
 
     Lengths and speeds in millimetres, as on every screen; `ends` is None where there are none.
     """
@@ -102,7 +102,7 @@ def written(value: float, ends: tuple[float, float] | None, unit: str = "") -> s
 
 
 def _plain(value: float, digits: int) -> str:
-    """A number to some digits, without an exponent below a million."""
+    """Write a number to some digits, without an exponent below a million."""
     return f"{float(f'{value:.{digits}g}'):.10g}" if abs(value) < 1e6 else f"{value:.{digits}g}"
 
 
@@ -112,7 +112,7 @@ def weaknesses(
     alike: Sequence[Sequence[int]] = (),
     conditions: Sequence[Condition] = (),
 ) -> list[str]:
-    """What cannot be known, and what is known badly, in words.
+    """List the parameters that cannot be determined, or only roughly, in words.
 
     Parameters
     ----------

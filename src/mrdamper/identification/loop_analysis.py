@@ -1,4 +1,4 @@
-"""What a measured loop says before any model: peak force, energy, equivalent damping, dynamic range.
+"""Peak force, energy, equivalent damping and dynamic range of a measured loop, without a model.
 
 The counterpart of the test analysis in section 2 of Qian et al. 2024.
 """
@@ -89,7 +89,7 @@ def damping_share(motion: Excitation, force: Floats) -> float:
 
 
 def at_levels(loops: Sequence[LoopAnalysis]) -> tuple[LoopAnalysis, ...]:
-    """The same loops, each at the current level of the test matrix it belongs to."""
+    """Return the same loops, each at the current level of the test matrix it belongs to."""
     levels = current_levels([loop.condition.current_A for loop in loops])
     return tuple(
         replace(loop, motion=replace(loop.motion, condition=replace(loop.condition, current_A=level)))
@@ -98,7 +98,7 @@ def at_levels(loops: Sequence[LoopAnalysis]) -> tuple[LoopAnalysis, ...]:
 
 
 def whole_cycles(time: Floats, frequency: float) -> slice:
-    """Samples of the largest whole number of cycles from the start."""
+    """Return the samples of the largest whole number of cycles from the start."""
     cycles = max(1, int(np.ptp(time) * frequency + 0.02))
     return slice(0, int(np.searchsorted(time, time[0] + cycles / frequency + 1e-9, side="right")))
 

@@ -1,4 +1,4 @@
-"""What is to be identified from a run, and what came out."""
+"""Identification problem of one run, and its solution."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ class Problem:
 
 @dataclass(frozen=True)
 class Solution:
-    """What a method found.
+    """Result of an identification method.
 
     Attributes
     ----------
@@ -267,7 +267,7 @@ class Identification(Shown):
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """What the samples themselves cannot tell: parameters that do the same, a record too short."""
+        """Parameters with the same effect on the samples, and a record too short, in words."""
         return self.certainty.doubts
 
     def __getstate__(self) -> dict[str, Any]:
@@ -292,7 +292,7 @@ class Identification(Shown):
         return made
 
     def _state(self, name: str) -> str:
-        """What is known of a parameter."""
+        """Describe the state of one parameter."""
         if name not in self.free:
             return "held"
         if name not in self.standard_errors:
@@ -301,7 +301,7 @@ class Identification(Shown):
 
     @checked()
     def interval(self, name: str, level: float = 0.95) -> tuple[float, float] | None:
-        """Ends of a parameter's interval within the form of the model; None where none is known.
+        """Return the ends of a parameter's interval within the form of the model; None where there is none.
 
         Raises
         ------

@@ -27,7 +27,7 @@ def model_parts() -> tuple[Part, ...]:
 
 
 def model_type(name: str) -> type[Model]:
-    """The model of that name.
+    """Return the model of that name.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What every damper model is: frozen parameters, and the force they give for a motion.
+"""Base class of damper models: frozen parameters, and the force along a motion.
 
 A model is one file with one class. Its fields are its parameters (`param()` states unit,
 bounds and meaning); `force` is pure arithmetic on them. A model with memory also says how
@@ -58,11 +58,11 @@ class SearchAxis:
     log: bool = False
 
     def coordinate(self, value: float) -> float:
-        """Where on the axis a value lies."""
+        """Return the position of a value on the axis."""
         return math.log(value) if self.log else value
 
     def value(self, coordinate: float) -> float:
-        """The value at a place on the axis."""
+        """Return the value at a position on the axis."""
         if not self.log:
             return coordinate
         value = math.exp(coordinate)
@@ -70,7 +70,7 @@ class SearchAxis:
         return next((end for end in (self.lower, self.upper) if math.isclose(value, end, rel_tol=1e-12)), value)
 
     def below(self, limit: float) -> SearchAxis:
-        """The part of a logarithmic axis below a value."""
+        """Return the part of a logarithmic axis below a value."""
         if limit >= self.upper:
             return self
         lower = min(self.lower, 1e-3 * limit)
@@ -78,7 +78,7 @@ class SearchAxis:
         return replace(self, lower=lower, upper=limit, grid=grid)
 
     def at_bound(self, coordinate: float) -> bool:
-        """Whether a place lies within a thousandth of the axis from one of its ends."""
+        """Tell if a position lies within a thousandth of the axis from one of its ends."""
         low, high = self.coordinate(self.lower), self.coordinate(self.upper)
         return min(coordinate - low, high - coordinate) < 1e-3 * (high - low)
 
@@ -145,7 +145,7 @@ class Model(ABC):
         """Force [N] at the samples of a motion, given the internal state there."""
 
     def state(self, motion: Excitation) -> Floats:
-        """Internal state (N,) along a motion; models without memory have none."""
+        """Calculate the internal state (N,) along a motion; models without memory have none."""
         return np.zeros(len(motion))
 
     @property
@@ -164,7 +164,7 @@ class Model(ABC):
 
     @classmethod
     def parameters(cls) -> tuple[ParameterInfo, ...]:
-        """What is known of each parameter, in order."""
+        """Describe each parameter, in order."""
         return parameters_of(cls)
 
     @classmethod

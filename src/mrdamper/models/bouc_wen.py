@@ -98,7 +98,7 @@ class BoucWen(Model):
 
     @classmethod
     def within(cls, axes: tuple[SearchAxis, ...], fixed: Mapping[str, float]) -> tuple[SearchAxis, ...]:
-        """A gamma held at a value leaves room for beta >= 0 below a yield displacement of gamma^(−1/n)."""
+        """Bound the yield displacement: a fixed gamma leaves room for beta >= 0 below gamma^(−1/n)."""
         gamma = fixed.get("gamma", 0.0)
         if gamma <= 0 or "beta" in fixed:
             return axes

@@ -56,7 +56,7 @@ class Dahl(Model):
 
     @classmethod
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-        """The displacement in which the friction builds up."""
+        """Search the displacement in which the friction builds up."""
         amplitude = scale.amplitude
         ladder = tuple(amplitude * np.geomspace(1e-4, 2.0, 14))
         axis = SearchAxis("yield_displacement", amplitude * 1e-5, amplitude * 10, ladder, log=True)
@@ -64,7 +64,7 @@ class Dahl(Model):
 
     @classmethod
     def map_forms(cls) -> Mapping[str, tuple[str, ...]]:
-        """The yield force may saturate with the current, and the displacement shrink with it."""
+        """Let the yield force saturate with the current, and the displacement shrink with it."""
         return {
             "kappa_x": GENERAL_FORMS,
             "kappa_w": (*GENERAL_FORMS, "saturating-current"),

@@ -59,7 +59,7 @@ class Guo(Model):
 
     @classmethod
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-        """The curve yields somewhere between a thousandth and all of the peak velocity."""
+        """Search the yield of the curve between a thousandth and all of the peak velocity."""
         return _axes(scale.speed, scale.amplitude, free)
 
 

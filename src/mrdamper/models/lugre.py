@@ -94,7 +94,7 @@ class LuGre(Model):
 
     @classmethod
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-        """The onset force fades well below the peak velocity."""
+        """Search the velocity over which the onset force fades, well below the peak velocity."""
         return _axes(scale.amplitude, scale.speed, free)
 
 

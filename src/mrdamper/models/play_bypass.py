@@ -227,7 +227,7 @@ def _fading(current: Floats, h0: float, h1: float) -> Floats:
 
 @lately_along
 def _seated(velocity: Floats, vh: float, fading: Floats, along: Floats) -> Floats:
-    """What of the seated force builds up with velocity, h |v|/(|v| + vh) η."""
+    """Calculate the part of the series force that builds up with velocity, h |v|/(|v| + vh) η."""
     speed = _speed(velocity)
     return fading * speed / (speed + vh) * along
 

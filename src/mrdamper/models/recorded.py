@@ -51,7 +51,7 @@ def recorded(state: S) -> S:
 
 
 def channels(motion: Excitation) -> tuple[Floats, ...]:
-    """The inputs of a program that follows a motion: its channels, the time steps and the moves of its path."""
+    """Name the inputs of a program that follows a motion: its channels, the time steps and the moves of its path."""
     steps = _steps(motion.time)
     arrays = (motion.displacement, motion.velocity, motion.acceleration, motion.current)
     return (*arrays, steps, *motion.path.moves)
@@ -68,7 +68,7 @@ def _steps(time: Floats) -> Floats:
 
 
 def _traced(model: type, values: dict[str, float], state: Callable[[Any, Any], Any]) -> Any:
-    """The program of a model's state at one sample, its parameters free."""
+    """Trace the program of a model's state at one sample, its parameters free."""
     tape = Tape()
     x, v, a, current, dt, turn, back, move = (tape.input(name) for name in _CHANNELS)
     motion = TracedMotion(tape, x, v, a, current, TracedStep(tape, dt), TracedStep(tape, move, (turn, back)))

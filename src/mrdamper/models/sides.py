@@ -1,4 +1,4 @@
-"""Which side of a hysteresis loop a memoryless model is on."""
+"""Side of a hysteresis loop on which a model without memory lies."""
 
 from __future__ import annotations
 

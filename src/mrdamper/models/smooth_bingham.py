@@ -44,7 +44,7 @@ class SmoothBingham(Model):
 
     @classmethod
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-        """The yield force builds up between a thousandth and all of the peak velocity."""
+        """Search the yield velocity between a thousandth and all of the peak velocity."""
         return _axes(scale.speed, free)
 
 

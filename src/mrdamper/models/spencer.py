@@ -144,7 +144,7 @@ class Spencer(Model):
         )
 
     def to_letters(self, A: float = 1.0) -> dict[str, float]:
-        """The letters of the publication for an A [-] of choice: gamma with |v|, beta with v, SI units.
+        """Return the letters of the publication for an A [-] of choice: gamma with |v|, beta with v, SI units.
 
         x0 is 0 where there is no k1 to stand for the offset force.
         """
@@ -178,12 +178,12 @@ class Spencer(Model):
 
     @classmethod
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-        """The series damper creeps at a hundredth to all of the peak velocity."""
+        """Search the creep of the series damper between a hundredth and all of the peak velocity."""
         return _axes(scale.amplitude, scale.speed, free)
 
     @classmethod
     def map_forms(cls) -> Mapping[str, tuple[str, ...]]:
-        """The published letters are mapped: their ratios mix what depends on the current with what does not."""
+        """Map the published letters: their ratios mix what depends on the current with what does not."""
         return {
             "c1": GENERAL_FORMS,
             "c0": GENERAL_FORMS,

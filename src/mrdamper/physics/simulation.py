@@ -18,10 +18,10 @@ _MOST_CYCLES = 512
 
 @runtime_checkable
 class ForceLaw(Protocol):
-    """What a `Model` is to those that only ask for its force."""
+    """Protocol of an object with the force of a `Model`."""
 
     def parameters(self) -> tuple[ParameterInfo, ...]:
-        """What is known of each parameter."""
+        """Describe each parameter."""
         ...
 
     def values(self) -> dict[str, float]:
@@ -29,7 +29,7 @@ class ForceLaw(Protocol):
         ...
 
     def state(self, motion: Excitation) -> Floats:
-        """Internal state along a motion."""
+        """Calculate the internal state along a motion."""
         ...
 
     def force(self, motion: Excitation, state: Floats) -> Floats:

@@ -201,7 +201,7 @@ def _holds_rig_files(folder: Path) -> bool:
 
 
 def run_of(row: Mapping[str, str | None], samples: Channels, path: Path) -> Run:
-    """A run from a row of a table and its channels.
+    """Make a run from a row of a table and its channels.
 
     Raises
     ------
@@ -294,7 +294,7 @@ def _row(run: Run) -> dict[str, Any]:
 
 
 def _summarised(name: str, values: np.ndarray, run: Run) -> bool:
-    """Whether a mean of a further channel says something: of a state of the damper, not of a motion or a force."""
+    """Tell if the mean of a further channel is useful: of a state of the damper, not of a motion or a force."""
     return name.endswith(("_C", "_Pa")) and bool(np.isfinite(values[run.in_window]).any())
 
 

@@ -33,7 +33,7 @@ Channels = dict[str, Floats]
 
 
 def read_samples(folder: Path, *, trusted: bool = False) -> dict[str, Channels]:
-    """Samples of every run by its name: (N,) arrays by channel, NaN where a cell is empty.
+    """Read the samples of every run by its name: (N,) arrays by channel, NaN where a cell is empty.
 
     Raises `DatasetError` or `ColumnError` or `UnitError` if the file is missing, damaged or larger than a test can
     be, or lacks a column.
@@ -153,7 +153,7 @@ def _by_run(codes: np.ndarray, labels: tuple[str, ...], channels: Channels) -> d
 
 
 def missing_column(column: str, present: list[str], path: Path) -> ColumnError | UnitError:
-    """The refusal of a table without a column; it names the one that holds it in another unit."""
+    """Make the error for a table without a column; it names the one that holds it in another unit."""
     quantity = column.split("_")[0]
     for other in present:
         if other.lower().startswith(quantity) and _UNIT.match(other):
@@ -167,5 +167,5 @@ def missing_column(column: str, present: list[str], path: Path) -> ColumnError |
 
 
 def first_line(error: Exception) -> str:
-    """What a library says, in a line."""
+    """Return the message of a library in one line."""
     return (str(error).strip().splitlines() or [type(error).__name__])[0]

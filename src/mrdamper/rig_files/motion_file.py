@@ -50,7 +50,7 @@ def load_motion(path: str | Path, current: float | None = None) -> Run:
 
 
 def read_table(path: Path, mend: str) -> pl.DataFrame:
-    """A small table from CSV, packed or not, within the bounds of a rig's file.
+    """Read a small table from CSV, packed or not, within the bounds of a rig's file.
 
     Raises `DatasetError` if it is no such table.
     """
@@ -66,7 +66,7 @@ def read_table(path: Path, mend: str) -> pl.DataFrame:
 
 
 def _numbers(table: pl.DataFrame, name: str, path: Path) -> Floats:
-    """A column as doubles, none missing."""
+    """Return a column as doubles, none missing."""
     if name not in table.columns:
         near = [column for column in table.columns if column.lower().startswith(name.split("_")[0])]
         if near:

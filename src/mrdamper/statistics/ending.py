@@ -1,4 +1,4 @@
-"""Why a search ended."""
+"""Reasons for which a search stopped."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class Ending(StrEnum):
-    """Why a search ended, as a sentence; the member itself is what programs ask for."""
+    """Reason for which a search stopped, as a sentence; programs compare the member itself."""
 
     SOLVED = "solved: every parameter is linear"
     SETTLED = "converged: the cost changes no more"
@@ -17,5 +17,5 @@ class Ending(StrEnum):
 
     @property
     def converged(self) -> bool:
-        """Whether a minimum was reached, inside the box or at its edge."""
+        """True if a minimum was reached, inside the bounds or on them."""
         return self in (Ending.SOLVED, Ending.SETTLED, Ending.NO_STEP, Ending.AT_BOUNDS)

@@ -27,7 +27,7 @@ _WORTHLESS = 1e-3  # share of the tolerated gain below which a step is not even 
 
 @dataclass(frozen=True)
 class Minimum:
-    """Where a least-squares search ended.
+    """Minimum of a sum of squares.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ def least_squares(
 
 
 def polished(gradient: Callable[[Floats], Floats], point: Floats, lower: Floats, upper: Floats) -> Floats:
-    """The minimum next to a point where a search has ended, to the last digits.
+    """Refine the minimum next to a point where a search has stopped, to the last digits.
 
     The cost tells the place of its minimum to half of the digits only, and a search that ends by it
     ends where rounding says. The gradient tells all of them: Newton's steps on it alone, the
@@ -154,7 +154,7 @@ def polished(gradient: Callable[[Floats], Floats], point: Floats, lower: Floats,
 
 
 def _is_plain(curvature: Floats) -> bool:
-    """Whether some way costs nothing, as far as rounding lets one see, or leads down."""
+    """Tell if some direction costs nothing within rounding, or leads down."""
     values = np.linalg.eigvalsh(curvature)
     return not values[0] > _PLAIN * values[-1]
 

@@ -51,7 +51,7 @@ def solve_linear(columns: Floats, right: Floats, rank_limit: float | None = None
 
 
 def project_out_columns(columns: Floats, right: Floats, rank_limit: float = 1e-10) -> Floats:
-    """What the columns do not explain of (N,) or (N, D) right sides; arguments as `solve_linear`."""
+    """Subtract from (N,) or (N, D) right sides the part the columns explain; arguments as `solve_linear`."""
     scale = np.linalg.norm(columns, axis=0)
     basis, triangle = np.linalg.qr(columns / np.where(scale > 0, scale, 1.0))
     pivots = np.abs(np.diag(triangle))
@@ -144,7 +144,7 @@ class FixedColumns:
 
     @property
     def independent(self) -> bool:
-        """Whether no column is explained by the others."""
+        """True if no column is explained by the others."""
         pivots = np.abs(np.diag(self.triangle))
         return bool(pivots.min(initial=1.0) > _DEPENDENT * pivots.max(initial=1.0))
 

@@ -1,4 +1,4 @@
-"""How far a predicted force is from the measured one; the normaliser is in the name.
+"""Errors of a predicted force against the measured one; the normaliser is part of each name.
 
 Every score is a fraction, not per cent. Arguments are (N,) forces [N], measured first.
 """

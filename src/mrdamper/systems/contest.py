@@ -23,7 +23,7 @@ class Contest:
     runs: Mapping[str, Simulation]  # by title; no current and the highest current first, the preview last
 
     def share(self, title: str) -> float:
-        """How far a run has come from no current (0) to the preview bound (1), in mean square of the aims."""
+        """Calculate how far a run has come from no current (0) to the non-causal optimum (1), in mean square."""
         costs = {name: cost(run) for name, run in self.runs.items()}
         worst, best = next(iter(costs.values())), list(costs.values())[-1]
         return (worst - costs[title]) / (worst - best) if worst > best else 1.0

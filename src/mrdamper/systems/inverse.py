@@ -35,7 +35,7 @@ _LARGEST = 1e150  # force whose square is still a number [N]
 
 @dataclass(frozen=True)
 class Demand:
-    """What an inverse answers; expressions on a tape, or numbers."""
+    """Current, force and reachable interval of an inverse; expressions on a tape, or numbers."""
 
     current: Any  # to command [A]
     force: Any  # at the field that is there now [N]
@@ -78,7 +78,7 @@ def check_monotone(damper: Damper, highest: float | None = None) -> float:
 
 
 def _forces(damper: Damper, grid: Floats) -> Floats:
-    """(samples, currents) forces [N] along the second half of a tested sine."""
+    """Calculate (samples, currents) forces [N] along the second half of a tested sine."""
     made = stream(replace(damper, coil=None))  # type: ignore[type-var]
     prepare, step = python_functions(made.step)
     given = tuple(float(e.value) for e in made.step.tape.parameters.values())
@@ -180,7 +180,7 @@ class Inverse:
         self._memory = tuple(self.program.tape.starts.values())
 
     def step(self, displacement: float, velocity: float, acceleration: float, wanted: float, dt: float) -> Demand:
-        """Current for a wanted force at the next sample of a motion.
+        """Calculate the current for a wanted force at the next sample of a motion.
 
         Raises `ParameterError` if a value is not finite, dt is not positive, or the damper has no answer there.
         """
@@ -199,7 +199,7 @@ class Inverse:
     def along(
         self, time: Floats, displacement: Floats, velocity: Floats, acceleration: Floats, wanted: Floats
     ) -> tuple[Floats, Floats, Floats, Floats]:
-        """Current [A], force and reachable interval [N] (N,) along a motion, from the state at hand."""
+        """Calculate current [A], force and reachable interval [N] (N,) along a motion, from the present state."""
         t, *motion = series(
             time=time, displacement=displacement, velocity=velocity, acceleration=acceleration, wanted=wanted
         )
@@ -223,7 +223,7 @@ class Inverse:
 
 @checked()
 def invert(damper: Damper, highest: float | None = None) -> Inverse:
-    """The current for a wanted force.
+    """Prepare the calculation of the current for a wanted force.
 
     Parameters
     ----------

@@ -49,7 +49,7 @@ class Stage:
         return (*self.scale, *self.given)
 
     def scaled(self, gain: float, offset: float) -> Stage:
-        """The stage with its first output times a gain, plus an offset."""
+        """Return the stage with its first output times a gain, plus an offset."""
         return replace(self, scale=(gain, offset))
 
     @property
@@ -58,7 +58,7 @@ class Stage:
         return len(self.given), len(self.derived), len(self.start)
 
     def at(self, given: tuple[float, ...]) -> Stage:
-        """The stage with other parameters.
+        """Return the stage with other parameters.
 
         Raises `ParameterError` if they need another program: another branch, or other bounds.
         """
@@ -85,7 +85,7 @@ class Numbers:
 
 
 def interpreted_walk(elements: Sequence[Stage], control: Stage | None) -> Callable[..., int]:
-    """The loop for these stages in the interpreter: `walk` without its first two arguments.
+    """Return the loop for these stages in the interpreter: `walk` without its first two arguments.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def _no_command(p, d, memory, y, out):
 
 
 def _keeper(begin: int, size: int) -> Any:
-    """A function that puts a tuple into an array."""
+    """Return a function that puts a tuple into an array."""
 
     def keep(values, new):
         for i in range(size):

@@ -24,7 +24,7 @@ class Aim:
 
 
 def aims(system: System) -> tuple[Aim, ...]:
-    """What control keeps small, all in m/s².
+    """List the quantities that control keeps small, all in m/s².
 
     In a building: absolute accelerations of the floors, and storey drifts times the square of the
     lowest frequency. In a car: accelerations above the dampers, travel times half of that square,

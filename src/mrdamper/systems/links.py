@@ -16,7 +16,7 @@ from mrdamper.tracing.python import python_functions, python_source
 
 
 def stage_of(program: Program) -> Stage:
-    """A traced program as a stage; its parameters as they were traced."""
+    """Return a traced program as a stage; its parameters as they were traced."""
     prepare, step = python_functions(program)
     given = tuple(float(e.value) for e in program.tape.parameters.values())
     derived = prepare(given)[1]
@@ -28,13 +28,13 @@ def stage_of(program: Program) -> Stage:
 
 @lru_cache(maxsize=32)  # a loop is made again for every law
 def damper_stage(damper: Damper, free: bool = False) -> Stage:
-    """A damper as a stage, its own numbers free to change if asked for; raises as `stream`."""
+    """Return a damper as a stage, its own parameters free to change if asked for; raises as `stream`."""
     return stage_of(trace(damper, free))
 
 
 @lru_cache(maxsize=32)
 def contact_stage(link: Link) -> Stage:
-    """A bump stop, or the part of a tyre's force that is missing while it is in the air."""
+    """Return a bump stop, or the part of a tyre's force that is missing while the wheel is lifted off."""
     tape = Tape()
     stiffness, damping = (tape.parameter(name, getattr(link, name)) for name in ("stiffness", "damping"))
     gap = tape.parameter("gap", link.gap)
@@ -52,6 +52,6 @@ def _stop(tape: Tape, x: Any, v: Any, stiffness: Any, damping: Any, gap: Any) ->
 
 
 def _tyre(tape: Tape, x: Any, v: Any, stiffness: Any, damping: Any, gap: Any) -> tuple[Any, Any]:
-    """The structure holds the tyre as a spring that also pulls; what it would pull is given back here."""
+    """Calculate the force to give back: the structure holds the tyre as a spring that also pulls."""
     pull = stiffness * (x - gap) + damping * v
     return tape.select(pull > 0, -pull, 0.0), pull > 0

@@ -48,7 +48,7 @@ static int command(const real *p, const real *d, real *memory, const real *signa
 
 
 def compiled_walk(elements: Sequence[Stage], control: Stage | None) -> Callable[..., int] | None:
-    """The loop for these stages, compiled; None without a usable compiler. Arguments as `interpreted_walk`."""
+    """Return the loop for these stages, compiled; None without a usable compiler. Arguments as `interpreted_walk`."""
     library = _library(tuple(elements), control)
     return None if library is None else _walk_of(library)
 
@@ -104,7 +104,7 @@ def _walk_of(library: ctypes.CDLL) -> Callable[..., int]:
 def _alike(
     one: Callable[..., int], other: Callable[..., int], elements: Sequence[Stage], control: Stage | None
 ) -> bool:
-    """Whether two loops give the same motion of one mass on a spring, all elements beside it, for some steps."""
+    """Tell if two loops give the same motion of one mass on a spring, with all elements beside it, for some steps."""
     from mrdamper.systems.kernel import Numbers
 
     count, dt = len(elements), 1e-3

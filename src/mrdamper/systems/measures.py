@@ -1,4 +1,4 @@
-"""What a simulation is judged by: comfort, tyre load, travel, and ratios to the uncontrolled structure."""
+"""Criteria of a simulation: comfort, tyre load, travel, and ratios to the uncontrolled structure."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def tyre_load(done: Simulation, link: int) -> Floats:
 
 
 def benchmark_ratios(done: Simulation, uncontrolled: Simulation) -> dict[str, float]:
-    """The J ratios of the structural control benchmarks: controlled over uncontrolled, peaks and RMS.
+    """Calculate the J ratios of the structural control benchmarks: controlled over uncontrolled, peaks and RMS.
 
     J1 drift, J2 acceleration, J3 base force (M a summed), J4 to J6 their RMS; J7 damper force over
     weight, J8 damper stroke over the peak drift uncontrolled.

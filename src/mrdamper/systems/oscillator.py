@@ -219,7 +219,7 @@ class _OscillatorSearch:
         self.upper = np.array([5.0, 5.0, 3.0, 3.0, 5.0, 5.0, most_delay])
 
     def best(self) -> tuple[Floats, int]:
-        """The point of least error, and the evaluations; bounds that only limit the search are widened."""
+        """Return the point of least error, and the evaluations; bounds that only limit the search are widened."""
         starts = [np.array([1.0, 0.3, share, 1 - share, 0.3, d, 0.0]) for share in (0.5, 0.2) for d in (0.0, -0.5)]
         found = [least_squares(self.residual, start, self.lower, self.upper, 8, 1e-4) for start in starts]
         evaluations = sum(minimum.evaluations for minimum in found)
@@ -241,12 +241,12 @@ class _OscillatorSearch:
         return tuple(name for name, is_near in zip(self.NAMES, near, strict=True) if is_near)
 
     def oscillator(self, point: Floats) -> Oscillator:
-        """The oscillator of a point."""
+        """Return the oscillator of a point."""
         m, c, k, alpha, gamma, delta, _ = (point * self._scale).tolist()
         return Oscillator(m, c, k, alpha, 1.0, gamma / self._size_of_z, delta / self._size_of_z, self.n)
 
     def delay(self, point: Floats) -> float:
-        """The delay of a point [s]."""
+        """Return the delay of a point [s]."""
         return float(point[-1]) / self.sample_rate
 
     def residual(self, point: Floats) -> Floats:
@@ -285,7 +285,7 @@ def multisine(
 
 
 def _refined(force: Floats, times: int, periodic: bool) -> Floats:
-    """The force at `times` as many places, the last sample included; after it, the first one of the next period."""
+    """Interpolate the force at `times` as many places, the last sample included; then the first of the next period."""
     if periodic:
         from scipy.signal import resample
 

@@ -1,4 +1,4 @@
-"""What a system did: histories, peaks, energies, and how far a damper was taken beyond its tests."""
+"""Result of a system simulation: histories, peaks, energies, and how far a damper left its tested range."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ HALVING = 5e-3  # change of a peak when the step is halved that is still called 
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """What a system did."""
+    """Result of a system simulation."""
 
     PEAKS: ClassVar = ("displacement_m", "drift_m", "acceleration_m_s2", "force_N")
 
@@ -54,7 +54,7 @@ class Simulation:
 
     @property
     def settled(self) -> bool:
-        """Whether halving the step changed no peak by more than 0.5 %; False too where nobody asked."""
+        """True if halving the step changed no peak by more than 0.5 %; False too where this was not checked."""
         return self.halving <= HALVING
 
     @property

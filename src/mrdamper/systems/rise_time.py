@@ -1,4 +1,4 @@
-"""How fast a damper answers a step of current, as test laboratories state it."""
+"""Response time of a damper to a step of current, as test laboratories state it."""
 
 from __future__ import annotations
 

@@ -147,7 +147,7 @@ class Loop:
         return whole / math.ceil(whole / step - 1e-9)
 
     def run(self, dt: float, machine: bool | None = None, numbers: Numbers | None = None) -> Simulation:
-        """The whole input at one step.
+        """Simulate the whole input at one step.
 
         Raises `StepError` if there are too many steps, or one has no solution.
 

@@ -1,4 +1,4 @@
-"""What a damper acts in: masses, dashpots and springs as matrices, and links between points.
+"""Structures around dampers: masses, dashpots and springs as matrices, and links between points.
 
 Everything is relative to static equilibrium. The input enters through channels: the
 acceleration of the ground, or the height of the road under each wheel and its rate.
@@ -21,7 +21,7 @@ _SYMMETRY = 1e-9  # relative difference of K and K' that rounding may leave
 
 @dataclass(frozen=True)
 class Link:
-    """What lies between two points: a damper, a stop, or a tyre that may lift off."""
+    """Element between two points: a damper, a stop, or a tyre that may lift off."""
 
     name: str
     above: str  # a point
@@ -97,7 +97,7 @@ class System:
 
     @checked()
     def point(self, name: str) -> tuple[Floats, Floats]:
-        """A point as a combination of the coordinates (n,) and of the channels' heights (q,)."""
+        """Return a point as a combination of the coordinates (n,) and of the channels' heights (q,)."""
         row, road = np.zeros(len(self.coordinates)), np.zeros(len(self.channels))
         if name in self.coordinates:
             row[self.coordinates.index(name)] = 1.0
@@ -110,7 +110,7 @@ class System:
         return row, road
 
     def span(self, above: str, below: str) -> tuple[Floats, Floats]:
-        """The displacement of one point relative to another, as `point`."""
+        """Return the displacement of one point relative to another, as `point`."""
         (a, road_a), (b, road_b) = self.point(above), self.point(below)
         return a - b, road_a - road_b
 
@@ -153,7 +153,7 @@ def building(
     links: Sequence[Link] = (),
     title: str = "",
 ) -> System:
-    """A structure on ground that accelerates, by its matrices; drifts are from floor to floor."""
+    """Make a structure on ground that accelerates, by its matrices; drifts are from floor to floor."""
     below = ("ground", *floors[:-1])
     spans = dict(zip(floors, zip(floors, below, strict=True), strict=True))
     return System(
@@ -173,7 +173,7 @@ def quarter_car(
     gravity: float = 9.81,
     title: str = "",
 ) -> System:
-    """A quarter of a car: body on spring and damper, wheel on a tyre that lifts off.
+    """Make a quarter of a car: body on spring and damper, wheel on a tyre that lifts off.
 
     Parameters
     ----------

@@ -55,7 +55,7 @@ WEIGHTINGS = {
 
 
 def frequency_weighted(acceleration: Floats, step: float, weighting: str) -> Floats:
-    """An acceleration as the body feels it.
+    """Weight an acceleration by its effect on a person.
 
     The gain is applied in the spectrum, with as much silence appended as the filter remembers: no sampling rate bends
     it, as the bilinear transform would towards half the rate. Raises `UnknownNameError` if there is no such

@@ -54,15 +54,15 @@ class CWriter(Writer):
         return "".join(f"{line}\n" for line in self._lines(statements, indent))
 
     def setup(self) -> str:
-        """What is computed once, and the questions asked of parameters."""
+        """Write the statements computed once, and the conditions on parameters."""
         return self.block(self.program.setup) + self._guards(PARAMETER)
 
     def sample(self) -> str:
-        """What is computed at a sample, and the questions asked there."""
+        """Write the statements computed at a sample, and the conditions checked there."""
         return self.block(self.program.step) + self._guards(SAMPLE)
 
     def results(self) -> str:
-        """Outputs, then the new memory: all of it is computed before any of it is stored."""
+        """Write outputs, then the new memory: all of it is computed before any of it is stored."""
         tape = self.program.tape
         lines = [f"out{self.member}{name} = {self.text(value)};" for name, value in self.program.outputs.items()]
         lines += [f"{self.constant} next_{name} = {self.text(value)};" for name, value in tape.updates.items()]

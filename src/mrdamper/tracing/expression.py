@@ -122,7 +122,7 @@ class Expression(NDArrayOperatorsMixin, Traced):
 
     @property
     def logical(self) -> bool:
-        """Whether it answers yes or no."""
+        """True if its value is true or false."""
         return self.op in OPERATIONS and OPERATIONS[self.op].logical
 
     def __bool__(self) -> bool:
@@ -155,7 +155,7 @@ class Expression(NDArrayOperatorsMixin, Traced):
 
 
 def plain(value: Any) -> Any:
-    """A NumPy scalar or array of one element as what is in it."""
+    """Return the number in a NumPy scalar or in an array of one element."""
     return value.item() if isinstance(value, np.ndarray | np.generic) and np.ndim(value) == 0 else value
 
 
@@ -167,7 +167,7 @@ def choose(condition: Any, then: Callable[[], Any], otherwise: Callable[[], Any]
 
 
 def settled(value: Any) -> Any:
-    """The plain number at hand: the program that comes out holds for this value only."""
+    """Return the present number: the program that comes out holds for this value only."""
     if not isinstance(value, Expression):
         return value
     if value.value is None:

@@ -41,11 +41,11 @@ class Graft:
         self.still: dict[int, Any] = {}
 
     def answer(self, value: Any) -> dict[str, Any]:
-        """Outputs were the varying input this; nothing is remembered."""
+        """Evaluate the outputs for this varying input; nothing is remembered."""
         return self._outputs(self._copied(value))
 
     def settle(self, value: Any) -> dict[str, Any]:
-        """Outputs for the value the varying input has, remembered; questions asked at a sample are asked again."""
+        """Evaluate and remember the outputs for the present varying input; conditions of a sample are checked again."""
         known = self._copied(value)
         for name, memory in self.memory.items():
             if name in self.source.tape.updates:

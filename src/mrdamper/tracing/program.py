@@ -48,7 +48,7 @@ Statement = Let | Branch | Repeat
 
 @dataclass
 class Program:
-    """What is computed before the first sample, and at each sample."""
+    """Operations before the first sample, and at each sample."""
 
     tape: Tape
     outputs: Mapping[str, Any]
@@ -77,14 +77,14 @@ def program(tape: Tape, outputs: Mapping[str, Any]) -> Program:
 
 @dataclass(frozen=True)
 class _Use:
-    """Where a node is needed, and whether that is before the first sample."""
+    """Block in which a node is needed, and if that is before the first sample."""
 
     scope: Scope
     early: bool
 
 
 def dependencies(node: Expression | Loop) -> Iterator[tuple[Any, int | None]]:
-    """What a node is computed from; a number marks the inner block of the node it is needed in."""
+    """List the nodes a node is computed from; a number marks the inner block in which each is needed."""
     if isinstance(node, Loop):
         yield from ((value, None) for value in node.start)
         yield node.going, 0
@@ -116,7 +116,7 @@ def postorder(roots: list[Any]) -> list[Any]:
 
 
 def _scopes(roots: list[tuple[Any, bool]], order: list[Any]) -> tuple[dict[int, Scope], dict[int, list[_Use]]]:
-    """The innermost block that all users of a node share, and the uses."""
+    """Find the innermost block that all users of a node share, and the uses."""
     scopes: dict[int, Scope] = {}
     uses: dict[int, list[_Use]] = defaultdict(list)
 

@@ -48,7 +48,7 @@ class Table(Protocol):
         ...
 
     def at_float(self, x: float) -> float:
-        """The value at x; constant beyond the ends."""
+        """Evaluate the table at x; constant beyond the ends."""
         ...
 
 
@@ -63,7 +63,7 @@ class Loop:
 
 
 class Tape:
-    """What tracing writes down.
+    """Record of the operations of traced code.
 
     Attributes
     ----------
@@ -87,35 +87,35 @@ class Tape:
         self._previous: dict[int, Any] = {}
 
     def parameter(self, name: str, value: float) -> Expression:
-        """A number that is set before the first sample."""
+        """Add a number that is set before the first sample."""
         self.parameters[name] = Expression(self, "parameter", (), PARAMETER, value, name)
         return self.parameters[name]
 
     def input(self, name: str, example: float | None = None) -> Expression:
-        """A number given at every sample; an example answers questions about its range."""
+        """Add a number given at every sample; an example answers questions about its range."""
         self.inputs[name] = Expression(self, "input", (), SAMPLE, example, name)
         return self.inputs[name]
 
     def remember(self, name: str, start: float = 0.0) -> Expression:
-        """A number kept from one sample to the next."""
+        """Add a number kept from one sample to the next."""
         name = self._free(name)
         self.memory[name] = Expression(self, "memory", (), SAMPLE, None, name)
         self.starts[name] = start
         return self.memory[name]
 
     def update(self, memory: Expression, value: Any) -> None:
-        """What a memory becomes after the sample."""
+        """Set the value a memory takes after the sample."""
         self.updates[memory.name] = value
 
     @property
     def first(self) -> Expression:
-        """Whether this is the first sample."""
+        """True at the first sample."""
         if "started" not in self.memory:
             self.update(self.remember("started"), 1.0)
         return self.memory["started"] < 0.5
 
     def previous(self, value: Any, name: str) -> Any:
-        """What an expression was at the sample before; at the first sample, what it is."""
+        """Return an expression's value at the sample before; at the first sample, its value there."""
         if not isinstance(value, Expression):
             return value
         if id(value) not in self._previous:
@@ -137,7 +137,7 @@ class Tape:
         return answer
 
     def require(self, question: Any) -> None:
-        """A question that must be answered yes at every sample; the program says where it is not."""
+        """Add a condition that must hold at every sample; the program reports where it does not."""
         if isinstance(question, Expression):
             self.guards.append((question, True))
 

@@ -1,4 +1,4 @@
-"""What writing a program down has in common in every language."""
+"""Parts of writing a program that all languages share."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Writer(ABC):
 
     @abstractmethod
     def number(self, value: float) -> str:
-        """A number, all its digits."""
+        """Write a number, all its digits."""
 
     def name(self, expression: Expression) -> str:
         """Name of an expression that has one."""
@@ -44,7 +44,7 @@ class Writer(ABC):
         return f"loop{self._loops.setdefault(id(loop), len(self._loops))}_{index}"
 
     def text(self, value: Any) -> str:
-        """An expression where it is used: its name, or its formula."""
+        """Write an expression where it is used: its name, or its formula."""
         if not isinstance(value, Expression):
             return self.number(value)
         if value.op in ("carry", "result") or id(value) in self.program.names:
@@ -52,7 +52,7 @@ class Writer(ABC):
         return self.formula(value)
 
     def formula(self, expression: Expression) -> str:
-        """The operation of an expression on its arguments."""
+        """Write the operation of an expression on its arguments."""
         if expression.op == "lookup":
             return f"lookup{expression.args[0]}({self.text(expression.args[1])})"
         return self.formats[expression.op].format(*(self.text(arg) for arg in expression.args))

@@ -22,7 +22,7 @@ def all_methods() -> Mapping[str, type[Method]]:
 
 
 def method_named(name: str, settings: Mapping[str, str] | None = None) -> Method:
-    """The method of that name.
+    """Return the method of that name.
 
     Parameters
     ----------

@@ -129,7 +129,7 @@ class _Balanced:
 
 
 def steady_state(model: Model, record: SineRecord) -> Floats:
-    """Internal state on the closed loop, at the phases of a record.
+    """Calculate the internal state on the closed loop, at the phases of a record.
 
     Raises
     ------

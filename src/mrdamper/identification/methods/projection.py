@@ -170,7 +170,7 @@ def _batched_costs(elimination: Elimination, points: list[dict[str, float]]) -> 
 
 
 def _few_cycles(problem: Problem) -> tuple[Path, NDArray[np.intp]]:
-    """The last strokes of the motion, thinned, and which scored samples they hold.
+    """Return the last strokes of the motion, thinned, and which scored samples they hold.
 
     The grid only has to find the valley. The reversals stay where the whole motion has them.
     """
@@ -192,7 +192,7 @@ def _few_cycles(problem: Problem) -> tuple[Path, NDArray[np.intp]]:
 
 
 def _last_cycles(problem: Problem) -> Problem:
-    """The same problem on the thinned end of the record: following all of a long one costs a second a force."""
+    """Reduce the problem to the thinned end of the record: a long one costs a second per force."""
     run, cycle = problem.run, 1.0 / problem.analysis.condition.frequency_Hz
     last = int(np.flatnonzero(run.in_window)[-1]) + 1
     size = max(8, math.ceil(cycle * (run.time.size - 1) / float(np.ptp(run.time))))

@@ -66,7 +66,7 @@ def batch_cost(path: Path, fixed: FixedColumns, shapes: Shape) -> Floats:
 
 
 def products(path: Path, fixed: FixedColumns, shapes: Shape) -> Products:
-    """Sums of zeta times each column, the rest of the force and itself; arguments as `batch_cost`."""
+    """Calculate sums of zeta times each column, the rest of the force and itself; arguments as `batch_cost`."""
     kappa, rho = (np.array(a, dtype=float) for a in np.broadcast_arrays(shapes.kappa, shapes.rho))
     first = len(path) - fixed.rest.size
     sums = np.empty((kappa.size, fixed.basis.shape[1] + 2))

@@ -45,7 +45,7 @@ Value = Any  # float or array, as `xp` says
 
 
 def master_curve(n: float) -> MasterCurve:
-    """The curve for an exponent, made once."""
+    """Return the curve for an exponent, calculated once."""
     if n == 1:
         return _Exponential()
     if n == 2:

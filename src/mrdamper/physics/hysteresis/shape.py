@@ -98,7 +98,7 @@ class Shape:
 
     @property
     def is_many(self) -> bool:
-        """Whether this holds P shapes rather than one."""
+        """True if this holds P shapes rather than one."""
         return np.ndim(self.kappa) > 0 or np.ndim(self.rho) > 0
 
     def __iter__(self) -> Iterator[Shape]:
@@ -112,7 +112,7 @@ def z_max(beta: float | Floats, gamma: float | Floats, n: float = 2.0, A: float 
 
 
 def dissipates(beta: float | Floats, gamma: float | Floats) -> np.bool | np.ndarray:
-    """Whether no motion gets energy out of the model, for A > 0: beta >= 0 and beta + gamma > 0.
+    """Tell if every motion dissipates energy, for A > 0: beta >= 0 and beta + gamma > 0.
 
     The condition usually quoted, beta >= |gamma|, is sufficient only. Derived, with the storage
     ∫ y/(A − gamma y^n) dy. With gamma > beta the

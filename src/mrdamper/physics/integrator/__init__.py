@@ -96,7 +96,7 @@ def integrate(
 
 
 def _record(rate: Rate, states: int, given: tuple[float, ...]) -> tuple[RecordProgram, tuple[float, ...]]:
-    """The program of a rate that holds for some parameters, and what follows from them."""
+    """Return the program of a rate that holds for some parameters, and the constants that follow from them."""
     known = _programs(rate, states, len(given))
     for record in known:
         if (derived := record.prepare(given)) is not None:
@@ -115,7 +115,7 @@ def _programs(rate: Rate, states: int, given: int) -> list[RecordProgram]:
 
 
 def _traced(rate: Rate, states: int, given: tuple[float, ...]) -> Any:
-    """The program of one sample; its parameters are those of the rate, the scale and the tolerance."""
+    """Trace the program of one sample; its parameters are those of the rate, the scale and the tolerance."""
     tape = Tape()
     x, v, current, dt = (tape.input(name) for name in ("displacement", "velocity", "current", "dt"))
     numbers = [tape.parameter(f"p{i}", value) for i, value in enumerate(given)]

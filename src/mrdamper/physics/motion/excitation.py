@@ -75,13 +75,13 @@ class Excitation:
         return still
 
     def part(self, mask: ArrayLike | slice) -> Excitation:
-        """The samples selected by a mask, slice or index."""
+        """Return the samples selected by a mask, slice or index."""
         pick = {name: getattr(self, name)[mask] for name in self.__dataclass_fields__}
         return Excitation(**pick)
 
     @checked()
     def with_current(self, current: ArrayLike) -> Excitation:
-        """The same motion at another current [A], a scalar or one value per sample."""
+        """Return the same motion at another current [A], a scalar or one value per sample."""
         made = replace(self, current=np.asarray(current, dtype=float))
         if "path" in self.__dict__:
             made.__dict__["path"] = self.path  # the current does not bend it
@@ -89,12 +89,12 @@ class Excitation:
 
     @checked()
     def about(self, centre: float) -> Excitation:
-        """The same motion with displacements counted from `centre` [m]."""
+        """Return the same motion with displacements counted from `centre` [m]."""
         return replace(self, displacement=self.displacement - centre)
 
     @checked()
     def delayed(self, delay: float) -> Excitation:
-        """The motion `delay` seconds later, to first order in the delay, for small delays."""
+        """Return the motion `delay` seconds later, to first order in the delay, for small delays."""
         return replace(
             self,
             displacement=self.displacement - delay * self.velocity,

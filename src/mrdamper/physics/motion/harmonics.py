@@ -45,7 +45,7 @@ class HarmonicSeries:
     cosine: Floats
 
     def __call__(self, time: ArrayLike, derivative: int = 0) -> Floats:
-        """The series (or a derivative with respect to time) at the given times."""
+        """Evaluate the series (or a derivative with respect to time) at the given times."""
         given = np.asarray(time, dtype=float)
         if given.ndim == 1 and given.size > _BLOCK:
             return np.concatenate([self(given[part], derivative) for part in _blocks(given.size)])

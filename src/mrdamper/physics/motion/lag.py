@@ -66,12 +66,12 @@ def _weights(time: Floats, time_constant: float) -> Iterator[Floats]:
 
 @lately_along
 def _known_weights(time: Floats, time_constant: float) -> Floats:
-    """The same as rows of a table, for the next signal along these times."""
+    """Return the weights as rows of a table, for the next signal along these times."""
     return np.stack(list(_weights(time, time_constant)))
 
 
 def _spans(keep: Floats) -> Iterator[Floats]:
-    """What is kept over spans of 1, 2, 4, ... samples, until the past is forgotten."""
+    """Calculate the part of the memory kept over 1, 2, 4, ... samples, until nothing is left."""
     span = 1
     while span < keep.size and keep.max() > _FORGOTTEN:
         yield keep

@@ -95,7 +95,7 @@ def whole_clock(time: Floats) -> Floats:
 
 
 def _fits_uniform(signal: Floats, half: int) -> Floats:
-    """The same where all windows are alike (Savitzky and Golay).
+    """Fit windows that are all alike (Savitzky and Golay).
 
     Windows are taken relative to their sample and the two sides in pairs, so that a signal at rest, or
     one that turns symmetrically about a sample, has a slope of exactly zero there.

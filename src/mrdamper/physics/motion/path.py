@@ -158,7 +158,7 @@ def _checked_motion(displacement: ArrayLike, time: ArrayLike | None) -> tuple[Fl
 
 
 def _reversals(x: Floats) -> tuple[np.ndarray, np.ndarray]:
-    """Samples where the motion arrives at its turning points, and where it departs from them.
+    """Find the samples where the motion arrives at its turning points, and where it departs from them.
 
     They differ where the motion rests there.
     """
@@ -170,7 +170,7 @@ def _reversals(x: Floats) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _vertex(x: Floats, t: Floats | None, arrival: np.ndarray, departure: np.ndarray) -> tuple[Floats, np.ndarray]:
-    """How far beyond the outermost sample the motion turned (signed), and whether it did so before that sample.
+    """Calculate how far beyond the outermost sample the motion turned (signed), and if before that sample.
 
     The vertex of the parabola through the sample and its neighbours. Two equal outermost
     samples straddle the peak, and the parabola knows; three or more are a rest or the

@@ -1,4 +1,4 @@
-"""Which sine a measured motion is, or amounts to."""
+"""Equivalent sine of a measured motion."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _STILL = 1e-9  # a displacement that moves less does not move [m]
 
 @dataclass(frozen=True, eq=False)
 class MotionAnalysis:
-    """Which sine a measured motion is.
+    """Result of fitting a sine to a measured motion.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class MotionAnalysis:
 
     @property
     def is_sine(self) -> bool:
-        """Whether harmonic balance may treat the motion as a sine."""
+        """True if harmonic balance may treat the motion as a sine."""
         return self.distortion <= SINE_DISTORTION_LIMIT and self.stray < STRAY_LIMIT
 
 

@@ -1,4 +1,4 @@
-"""What an `Excitation` is for one sample, when a model runs on symbols."""
+"""Counterpart of an `Excitation` for one sample, for a model that runs on symbols."""
 
 from __future__ import annotations
 

@@ -157,7 +157,7 @@ def _replaces(longer: FunctionFit, shorter: FunctionFit, dissipating: str, condi
 
 
 def assess(function: ParameterFunction, conditions: Sequence[Condition], values: ArrayLike) -> FunctionFit:
-    """How a function found otherwise, by a joint fit, describes values identified run by run."""
+    """Calculate how well a function from a global fit describes values identified run by run."""
     target, found = np.asarray(values, dtype=float), function(*features(conditions))
     if function.log:
         target, found = np.log(target), np.log(found)

@@ -37,7 +37,7 @@ class Term:
 
     @property
     def follows_motion(self) -> bool:
-        """Whether it depends on the frequency or the amplitude."""
+        """True if it depends on the frequency or the amplitude."""
         return bool(self.frequency or self.amplitude) or self.decay_f is not None or self.power_f is not None
 
     def __call__(self, I: Floats, f: Floats, A: Floats, rates: Sequence[float]) -> Floats:
@@ -51,7 +51,7 @@ class Term:
         return value
 
     def label(self, rates: Sequence[float]) -> str:
-        """The term as text, with its rates filled in."""
+        """Write the term as text, with its rates filled in."""
         powers = {"I": self.current, "f": self.frequency, "A": self.amplitude}
         factors = [name if power == 1 else f"{name}^{power}" for name, power in powers.items() if power]
         if self.decay_I is not None:
@@ -95,7 +95,7 @@ class Form:
 
     @property
     def follows_motion(self) -> bool:
-        """Whether it depends on the frequency or the amplitude."""
+        """True if it depends on the frequency or the amplitude."""
         return any(term.follows_motion for term in self.terms)
 
     def columns(self, I: Floats, f: Floats, A: Floats, rates: Sequence[float]) -> Floats:
@@ -209,7 +209,7 @@ class ParameterFunction:
         return f"exp({text})" if self.log else text
 
     def turning_point(self, highest_current: float, frequency: float, amplitude: float) -> float | None:
-        """Current [A] within 0...1.5 × the highest at which the parameter turns over, if any."""
+        """Find the current [A] within 0...1.5 × the highest at which the parameter has an extremum, if any."""
         currents = np.linspace(0, 1.5 * highest_current, 601)
         slope = np.sign(np.diff(self(currents, frequency, amplitude)))
         turned = np.flatnonzero(slope * slope[0] < 0)
@@ -221,7 +221,7 @@ def _numbers(value: Any) -> Any:
 
 
 def form_named(name: str) -> Form:
-    """The form of that name.
+    """Return the form of that name.
 
     Raises
     ------

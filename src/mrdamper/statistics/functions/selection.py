@@ -65,7 +65,7 @@ def _variance_of_mean(values: Floats) -> float:
 
 
 def fold_groups(conditions: Sequence[Condition]) -> dict[str, list[list[int]]]:
-    """Indices of conditions that are left out together, by kind of fold: a condition, an inner current, a motion.
+    """Group the indices of conditions left out together, by kind of fold: a condition, an inner current, a motion.
 
     A form is chosen for what lies between the tested currents: a fold without the lowest or the
     highest one would ask for an extrapolation that no law over two remaining levels supports.
@@ -82,7 +82,7 @@ def fold_groups(conditions: Sequence[Condition]) -> dict[str, list[list[int]]]:
 
 
 def supported(form: Form, conditions: Sequence[Condition]) -> bool:
-    """Whether a form has few enough parameters for the current levels and the distinct motions that were tested.
+    """Tell if a form has few enough parameters for the current levels and distinct motions that were tested.
 
     Two levels carry a straight line: a law over the current has a parameter fewer than there are
     levels, but two at least where the current changes at all.
@@ -134,7 +134,7 @@ def broken_law(function: ParameterFunction, conditions: Sequence[Condition], uni
 
 
 def rises(shorter: ParameterFunction, longer: ParameterFunction, unit: str, conditions: Sequence[Condition]) -> bool:
-    """Whether a straight law replaces a constant without a test: the yield force of an MR damper rises with current."""
+    """Tell if a straight line replaces a constant without a test: the yield force rises with current."""
     if (shorter.form, longer.form, unit) != ("constant", "linear-current", "N"):
         return False
     highest = max(abs(c.current_A) for c in conditions)

@@ -19,5 +19,5 @@ def controller_types() -> Mapping[str, type[Controller]]:
 
 
 def controller_type(name: str) -> type[Controller]:
-    """The controller of that name; raises `UnknownNameError` with the near matches."""
+    """Return the controller of that name; raises `UnknownNameError` with the near matches."""
     return _registry.type_named(name)

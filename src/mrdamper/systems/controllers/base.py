@@ -1,4 +1,4 @@
-"""What a controller is: a law from what sensors see to a current, written once.
+"""Base class of controllers: a law from sensor signals to a current.
 
 The law runs on a tape, so that the loop steps it, machine code does, and C comes out of the
 same lines.
@@ -26,7 +26,7 @@ _UNITS = {
 
 @dataclass(frozen=True)
 class Sight:
-    """What the law of one damper can see and do."""
+    """Sensor signals and currents of one damper, as its control law uses them."""
 
     tape: Tape  # for memory: `remember`, `update`, `select`
     link: Link  # the damper's place
@@ -37,7 +37,7 @@ class Sight:
     shared: dict[str, Any]  # what the laws of several dampers have in common
 
     def __call__(self, point: str, quantity: str) -> Any:
-        """A signal: "position", "velocity" or "acceleration" (absolute) of a point.
+        """Return a signal: "position", "velocity" or "acceleration" (absolute) of a point.
 
         The point is a name in the system, or "above" or "below" the damper.
         """
@@ -65,11 +65,11 @@ class Sight:
         return self.signal("dt")
 
     def on_off(self, on: Any) -> Any:
-        """The highest current where a condition holds, the lowest elsewhere."""
+        """Return the highest current where a condition holds, the lowest elsewhere."""
         return self.tape.select(on, self.high, self.low)
 
     def current_for(self, force: Any) -> Any:
-        """The current for a wanted force [N], positive against extension: see `invert`."""
+        """Calculate the current for a wanted force [N], positive against extension: see `invert`."""
         rate, place = self.stroke_rate, identifier(self.link.name) + "_"
         motion = {
             "displacement": self.stroke,
@@ -82,7 +82,7 @@ class Sight:
         return invert_on(self.tape, self.damper, place, motion, force, width, self.high).current
 
     def signal(self, name: str) -> Any:
-        """A signal by its full name: POINT.position, .velocity, .acceleration; DAMPER.stroke, .stroke_rate, .force."""
+        """Return a signal by name: POINT.position, .velocity, .acceleration; DAMPER.stroke, .stroke_rate, .force."""
         known: dict[str, Any] = self.shared.setdefault("signals", {})
         if name not in known:
             known[name] = self.tape.input(identifier(name, self.tape.inputs))
@@ -90,7 +90,7 @@ class Sight:
 
 
 def identifier(name: str, taken: Container[str] = ()) -> str:
-    """A signal's or damper's name as one that every language takes."""
+    """Write a signal's or damper's name as one that every language takes."""
     word = re.sub(r"\W", "_", name, flags=re.ASCII)
     word = word if word[:1].isalpha() else f"s_{word}"
     return word if word not in taken else next(f"{word}_{i}" for i in range(2, 1000) if f"{word}_{i}" not in taken)
@@ -126,15 +126,15 @@ class Controller(ABC):
 
     @classmethod
     def parameters(cls) -> tuple[ParameterInfo, ...]:
-        """What is known of each parameter."""
+        """Describe each parameter."""
         return parameters_of(cls)
 
     @abstractmethod
     def law(self, see: Sight) -> Any:
-        """Current [A] of one damper from now on, from what can be seen now."""
+        """Calculate the current [A] of one damper from the present sensor signals."""
 
     def designed(self, system: System, links: Sequence[Link], period: float) -> Controller:
-        """The controller with what it must know of the system; it is asked every `period` [s]."""
+        """Return the controller adapted to the system; it is evaluated every `period` [s]."""
         return self
 
     def prepare(

@@ -1,4 +1,4 @@
-"""What shakes a system: ground motions and roads, one file each, found by discovery."""
+"""Inputs of a system: ground motions and roads, one file each."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ def input_types() -> Mapping[str, type[Input]]:
 
 
 def input_type(name: str) -> type[Input]:
-    """The input of that name; raises `UnknownNameError` with the near matches."""
+    """Return the input of that name; raises `UnknownNameError` with the near matches."""
     return _registry.type_named(name)
 
 
 def bundled_records() -> dict[str, Path]:
-    """Records that ship with the package, by name."""
+    """List the records that ship with the package, by name."""
     folder = Path(str(files("mrdamper.data.bundled") / "records"))
     return {path.stem: path for path in sorted(folder.glob("*.csv"))}
 
 
 def made_inputs() -> dict[str, tuple[type[Input], Mapping[str, float]]]:
-    """Inputs made from numbers, by every name they go by, with the parameters the name stands for."""
+    """List the synthetic inputs by every name they go by, with the parameters the name stands for."""
     found: dict[str, tuple[type[Input], Mapping[str, float]]] = {}
     for name, kind in input_types().items():
         if parameters_of(kind):
@@ -45,7 +45,7 @@ def made_inputs() -> dict[str, tuple[type[Input], Mapping[str, float]]]:
 
 @checked("name")
 def load_input(name: str | Path, values: Mapping[str, float] | None = None, time_scale: float = 1.0) -> Input:
-    """An input by name: a record's file or the name of one that ships with the package, or a made one.
+    """Return an input by name: a record's file, the name of a bundled record, or a synthetic input.
 
     Parameters
     ----------

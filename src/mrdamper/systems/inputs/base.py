@@ -1,4 +1,4 @@
-"""What an input is: a function of time, and its rate where it is a road."""
+"""Base class of inputs: a function of time, and its rate where it is a road."""
 
 from __future__ import annotations
 

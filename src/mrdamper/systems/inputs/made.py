@@ -70,7 +70,7 @@ class Steps(Input):
         return self.height_m * np.where(up, slope, -slope)
 
     def _at(self, time: Floats) -> tuple[Floats, Floats]:
-        """How far the step at hand is done, and whether it goes up; the first comes after half a period."""
+        """Calculate the completed part of the present step, and if it goes up; the first comes after half a period."""
         turn = (time + 0.5 * self.period_s) / self.period_s
         which = np.maximum(np.floor(turn), 0)
         since = np.where(which == 0, self.rise_s, (turn - which) * self.period_s)

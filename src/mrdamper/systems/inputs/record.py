@@ -80,7 +80,7 @@ def load_record(path: str | Path, time_scale: float = 1.0) -> Record:
 
 
 def record(time: Floats, values: Floats, quantity: str, time_scale: float = 1.0, where: str = "record") -> Record:
-    """A record from its samples; `quantity` is a column name of `load_record`, which raises the same."""
+    """Make a record from its samples; `quantity` is a column name of `load_record`, which raises the same."""
     if quantity not in _COLUMNS:
         raise UnitError(f"quantity {quantity!r}", where=where, mend=f"one of {', '.join(_COLUMNS)}")
     if time.size < 3:

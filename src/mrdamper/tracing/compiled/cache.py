@@ -37,7 +37,7 @@ class CompilerWarning(UserWarning):
 
 
 def cache_folder() -> Path:
-    """Where compiled libraries are kept."""
+    """Return the folder of compiled libraries."""
     if given := os.environ.get(FOLDER, ""):
         return Path(given)
     if sys.platform == "win32":
@@ -50,7 +50,7 @@ def cache_folder() -> Path:
 
 
 def load(source: str, holds: Callable[[ctypes.CDLL], bool]) -> ctypes.CDLL | None:
-    """The library made of a C source, compiled when it is not in the cache; None without a usable compiler.
+    """Load the library of a C source, compiled when it is not in the cache; None without a usable compiler.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def load(source: str, holds: Callable[[ctypes.CDLL], bool]) -> ctypes.CDLL | Non
 
 
 def unusable_reason() -> str:
-    """Why the compiler of this machine was given up; empty if it was not."""
+    """Return why the compiler of this machine is not used; empty if it is."""
     compiler = find_compiler()
     if compiler is None:
         return "no C compiler was found"
@@ -89,7 +89,7 @@ def clear_cache() -> int:
 
 
 def cache_size() -> tuple[int, int]:
-    """Number of compiled libraries, and their size [bytes]."""
+    """Return the number of compiled libraries, and their size [bytes]."""
     sizes = []
     for path in _libraries(cache_folder()):
         with suppress(OSError):
@@ -98,7 +98,7 @@ def cache_size() -> tuple[int, int]:
 
 
 def private(folder: Path) -> bool:
-    """Whether a folder is this user's, and nobody else can write to it."""
+    """Tell if a folder is this user's, and nobody else can write to it."""
     try:
         found = folder.lstat()
     except OSError:
@@ -119,7 +119,7 @@ def _notes(folder: Path) -> list[Path]:
 
 
 def _kept(key: str) -> ctypes.CDLL | None:
-    """The library in the cache, if its file has the hash of its name and says that it was made of this source."""
+    """Return the library in the cache, if its file has the hash of its name and was made of this source."""
     folder = cache_folder()
     if not private(folder):
         return None
@@ -182,7 +182,7 @@ def _give_up(compiler: Compiler, reason: str, note: bool = True) -> None:
 
 
 def _noted(compiler: Compiler) -> str:
-    """Why another process gave this compiler up within the last hour."""
+    """Return why another process stopped using this compiler within the last hour."""
     path = cache_folder() / f"failed-{compiler.identity}.txt"
     try:
         recent = private(path.parent) and time.time() - path.stat().st_mtime < _GIVEN_UP
@@ -192,7 +192,7 @@ def _noted(compiler: Compiler) -> str:
 
 
 def _tried(content: bytes, key: str, holds: Callable[[ctypes.CDLL], bool]) -> ctypes.CDLL | None:
-    """A library loaded from a folder of this process, if it computes what it should."""
+    """Load a library from a folder of this process, if it computes what it should."""
     with tempfile.TemporaryDirectory(prefix=SCRATCH, ignore_cleanup_errors=True) as folder:
         path = Path(folder) / f"{key}{_SUFFIX}"
         path.write_bytes(content)

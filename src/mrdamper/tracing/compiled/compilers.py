@@ -50,7 +50,7 @@ class Compiler:
 
     @property
     def is_visual(self) -> bool:
-        """Whether it takes the options of Microsoft's compiler."""
+        """True if it takes the options of Microsoft's compiler."""
         return Path(self.command[0]).stem.lower() == "cl"
 
     @property
@@ -59,7 +59,7 @@ class Compiler:
         return " ".join(self.command)
 
     def compile(self, source: str, parent: Path | None = None, patience: float = _PATIENCE) -> Built:
-        """A shared library made of one source in a folder beneath `parent`; gives up after `patience` [s]."""
+        """Make a shared library of one source in a folder beneath `parent`; stops after `patience` [s]."""
         with tempfile.TemporaryDirectory(prefix=SCRATCH, dir=parent, ignore_cleanup_errors=True) as name:
             folder = Path(name)
             (folder / "program.c").write_text(source, encoding="utf-8")
@@ -72,7 +72,7 @@ class Compiler:
 
 
 def find_compiler() -> Compiler | None:
-    """The compiler the environment variable names, the system's, or zig (`pip install ziglang`); None without one."""
+    """Find the compiler of the environment variable, the system's, or zig (`pip install ziglang`); None without one."""
     return _found(os.environ.get(VARIABLE, "").strip(), os.environ.get("PATH", ""))
 
 

@@ -54,7 +54,7 @@ class RecordProgram:
         self._walked = 0
 
     def prepare(self, given: Sequence[float]) -> tuple[float, ...] | None:
-        """What follows from parameters; None where they need another program."""
+        """Calculate the constants that follow from parameters; None where they need another program."""
         try:
             status, derived = self._prepare(tuple(given))
         except (ValueError, ArithmeticError):
@@ -85,7 +85,7 @@ class RecordProgram:
     def compiled_along(
         self, given: Sequence[float], derived: Sequence[float], memory: Sequence[float], channels: Sequence[ArrayLike]
     ) -> Along | None:
-        """The same as `along`, compiled whatever the length; None without a usable compiler."""
+        """Compute the same as `along`, compiled whatever the length; None without a usable compiler."""
         if (library := self._library) is None:
             return None
         arrays = [np.asarray(channel, dtype=float) for channel in channels]
@@ -131,7 +131,7 @@ class RecordProgram:
         return load(self._source, self._holds)
 
     def _holds(self, library: ctypes.CDLL) -> bool:
-        """Whether a library gives what the interpreter gives, on a short motion."""
+        """Tell if a library computes the same as the interpreter on a short motion."""
         turns = np.linspace(0.1, 6.0, _TRIED)
         values: Mapping[str, Floats] = {"dt": np.full(_TRIED, 1e-3), "current": 0.5 + 0.1 * turns}
         arrays = [values.get(name, (1 + k) * 1e-2 * np.sin(turns)) for k, name in enumerate(self.program.tape.inputs)]

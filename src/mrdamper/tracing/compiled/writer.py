@@ -134,7 +134,7 @@ class ArrayWriter(CWriter):
         return text
 
     def _expanded(self, value: object) -> str:
-        """An expression down to what is known before any statement."""
+        """Expand an expression down to what is available before any statement."""
         if not isinstance(value, Expression):
             return self.number(value)  # type: ignore[arg-type]
         if id(value) in self._places:
@@ -159,7 +159,7 @@ class ArrayWriter(CWriter):
         return self._places.get(id(expression)) or super(CWriter, self).name(expression)
 
     def results(self) -> str:
-        """Outputs, then the new memory: all of it is computed before any of it is stored."""
+        """Write outputs, then the new memory: all of it is computed before any of it is stored."""
         tape = self.program.tape
         places = {name: self._places[id(tape.memory[name])] for name in tape.updates}
         lines = [f"out[{i}] = {self.text(value)};" for i, value in enumerate(self.program.outputs.values())]
