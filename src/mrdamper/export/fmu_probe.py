@@ -1,4 +1,4 @@
-"""Validates, loads and walks an unpacked FMU with FMPy: a program of its own, started by its path.
+"""Check of an unpacked FMU with FMPy: a program of its own, started by its path.
 
 Writes a line a finding or stage, [code, text] as JSON, so that a crash leaves its place.
 """
@@ -13,116 +13,159 @@ import numpy as np
 
 
 def main(folder: str, report: str, tolerance: str, *binary: str) -> None:
-    """Look at the FMU unpacked in `folder`, its binary too if told so."""
-    # Here, because finding the exporters imports this module, and FMPy is an extra.
-    from fmpy import instantiate_fmu, read_model_description, simulate_fmu
-    from fmpy.fmi1 import FMICallException
-    from fmpy.validation import validate_fmu
+    """Check the FMU unpacked in `folder`, and its binary if a further argument is given."""
+    probe = _Probe(folder, Path(report))
+    with contextlib.suppress(_EndedError):
+        probe.read()
+        if binary:
+            fmu = probe.load()
+            probe.compare(float(tolerance))
+            probe.step(fmu)
+    probe.note("end")
 
-    def say(code: str, text: object = "") -> None:
-        with Path(report).open("a", encoding="utf-8") as out:
+
+class _EndedError(Exception):
+    """A finding after which nothing more can be checked."""
+
+
+class _Probe:
+    """The check of one unpacked FMU, stage by stage."""
+
+    described: Any  # its modelDescription.xml
+    motion: np.ndarray  # inputs of the reference
+    forces: np.ndarray  # outputs of the reference
+    main: str  # name of the output that is compared
+
+    def __init__(self, folder: str, report: Path):
+        self._folder, self._report = folder, report
+
+    def note(self, code: str, text: object = "") -> None:
+        """Add a line to the report."""
+        with self._report.open("a", encoding="utf-8") as out:
             out.write(json.dumps([code, " ".join(str(text).split())]) + "\n")
 
-    def failed(code: str, text: object) -> NoReturn:
-        say(code, text)
-        say("end")
-        sys.exit()
+    def fail(self, code: str, text: object) -> NoReturn:
+        """Add a finding after which nothing more can be checked."""
+        self.note(code, text)
+        raise _EndedError
 
-    for problem in validate_fmu(folder):
-        say("E_FMU_SCHEMA", problem)
-    try:
-        described: Any = read_model_description(folder, validate=False)
-        references = {v.name: v.valueReference for v in described.modelVariables}
-    except Exception as error:  # whatever FMPy's parser meets
-        failed("E_FMU_DESCRIPTION", f"modelDescription.xml: {error!r}")
-    if described.fmiVersion not in ("2.0", "3.0") or described.coSimulation is None:
-        failed("E_FMU_VERSION", f"FMI {described.fmiVersion}; co-simulation of 2.0 or 3.0 is checked")
-    try:
-        motion, known = (_table(Path(folder, f"resources/reference_{way}.csv")) for way in ("in", "out"))
-        if motion.size != known.size or motion.size < 3:
-            raise ValueError("the tables do not fit together")
-        names, main = [*(motion.dtype.names or ())][1:], [*(known.dtype.names or ())][1]
-        dt, rows = float(motion["time"][1]), [[float(row[name]) for name in names] for row in motion]
-        forces = known[main]
-    except (OSError, ValueError, IndexError) as error:
-        failed("E_FMU_REFERENCE", f"the reference cannot be read: {error}")
-    try:
-        force, inputs = references[main], [references[name] for name in names]
-    except KeyError as error:
-        failed("E_FMU_DESCRIPTION", f"modelDescription.xml: no variable {error}")
-    if not binary:
-        return say("end")
+    def read(self) -> None:
+        """Validate the XML; read the description and the reference."""
+        # Here, because finding the exporters imports this module, and FMPy is an extra.
+        from fmpy import read_model_description
+        from fmpy.validation import validate_fmu
 
-    say("stage", "token")
-    right, described.guid = described.guid, "{00000000-0000-4000-8000-000000000000}"
-    try:
-        instantiate_fmu(folder, described)
-        say("E_FMU_TOKEN", "the binary takes any token")
-    except AttributeError as error:  # ctypes, of a symbol
-        failed("E_FMU_SYMBOL", f"the binary lacks {str(error).split()[-1]}")
-    except Exception as error:  # FMPy's own are bare
-        if "instantiate" not in str(error):
-            failed("E_FMU_BINARY", f"the binary cannot be loaded: {error}")
-    described.guid = right
-    try:
-        fmu: Any = instantiate_fmu(folder, described)
-    except Exception:  # FMPy's own are bare
-        failed("E_FMU_TOKEN", "the binary refuses the token of modelDescription.xml")
+        for problem in validate_fmu(self._folder):
+            self.note("E_FMU_SCHEMA", problem)
+        try:
+            self.described = read_model_description(self._folder, validate=False)
+            references = {v.name: v.valueReference for v in self.described.modelVariables}
+        except Exception as error:  # whatever FMPy's parser meets
+            self.fail("E_FMU_DESCRIPTION", f"modelDescription.xml: {error!r}")
+        if self.described.fmiVersion not in ("2.0", "3.0") or self.described.coSimulation is None:
+            self.fail("E_FMU_VERSION", f"FMI {self.described.fmiVersion}; co-simulation of 2.0 or 3.0 is checked")
+        try:
+            self.motion, outputs = (
+                _table(Path(self._folder, f"resources/reference_{way}.csv")) for way in ("in", "out")
+            )
+            if self.motion.size != outputs.size or self.motion.size < 3:
+                raise ValueError("the tables do not fit together")
+            names = [*(self.motion.dtype.names or ())][1:]
+            self.main = [*(outputs.dtype.names or ())][1]
+            self.dt = float(self.motion["time"][1])
+            self.rows = [[float(row[name]) for name in names] for row in self.motion]
+            self.forces = outputs[self.main]
+        except (OSError, ValueError, IndexError) as error:
+            self.fail("E_FMU_REFERENCE", f"the reference cannot be read: {error}")
+        try:
+            self.force, self.inputs = references[self.main], [references[name] for name in names]
+        except KeyError as error:
+            self.fail("E_FMU_DESCRIPTION", f"modelDescription.xml: no variable {error}")
 
-    say("stage", "reference")
-    end = dict(stop_time=motion["time"][-1], output_interval=dt)
-    try:
-        answer: Any = simulate_fmu(folder, input=motion, output=[main], validate=False, **end)[main]
-    except FMICallException as error:
-        failed("E_FMU_REFERENCE", f"the reference is not answered: {error}")
-    worst = np.abs(answer - forces).max() if answer.shape == forces.shape else np.nan
-    if not worst <= float(tolerance) * np.abs(forces).max():
-        say("E_FMU_REFERENCE", f"{main} differs from the reference by {worst:.3g}")
+    def load(self) -> Any:
+        """Load the binary: a wrong token must be refused, the right one accepted."""
+        from fmpy import instantiate_fmu
 
-    if described.fmiVersion == "2.0":
-        fmu.setupExperiment()
-    put, get = (getattr(fmu, w + ("Real" if described.fmiVersion == "2.0" else "Float64")) for w in ("set", "get"))
+        self.note("stage", "token")
+        right, self.described.guid = self.described.guid, "{00000000-0000-4000-8000-000000000000}"
+        try:
+            instantiate_fmu(self._folder, self.described)
+            self.note("E_FMU_TOKEN", "the binary takes any token")
+        except AttributeError as error:  # ctypes, of a symbol
+            self.fail("E_FMU_SYMBOL", f"the binary lacks {str(error).split()[-1]}")
+        except Exception as error:  # FMPy's own are bare
+            if "instantiate" not in str(error):
+                self.fail("E_FMU_BINARY", f"the binary cannot be loaded: {error}")
+        self.described.guid = right
+        try:
+            return instantiate_fmu(self._folder, self.described)
+        except Exception:  # FMPy's own are bare
+            self.fail("E_FMU_TOKEN", "the binary refuses the token of modelDescription.xml")
 
-    def step(values: list[float], dt: float) -> float:
-        put(inputs, values)
-        fmu.doStep(0.0, dt)
-        return get([force])[0]
+    def compare(self, tolerance: float) -> None:
+        """Simulate the reference motion and compare the force."""
+        from fmpy import simulate_fmu
+        from fmpy.fmi1 import FMICallException
 
-    say("stage", "refusals")
-    fmu.enterInitializationMode()
-    put(inputs, rows[0])
-    fmu.exitInitializationMode()
-    tries = {"input nan": lambda: put(inputs, [np.nan, *rows[0][1:]])}
-    tries |= {f"step {bad}": lambda bad=bad: fmu.doStep(0.0, bad) for bad in (0.0, -dt, np.nan, np.inf)}
-    for name, attempt in tries.items():
-        with contextlib.suppress(FMICallException):
-            attempt()
-            say("E_FMU_REFUSAL", f"the binary lets pass: {name}")
+        self.note("stage", "reference")
+        end = dict(stop_time=self.motion["time"][-1], output_interval=self.dt)
+        try:
+            answer: Any = simulate_fmu(self._folder, input=self.motion, output=[self.main], validate=False, **end)
+        except FMICallException as error:
+            self.fail("E_FMU_REFERENCE", f"the reference is not answered: {error}")
+        force = answer[self.main]
+        worst = np.abs(force - self.forces).max() if force.shape == self.forces.shape else np.nan
+        if not worst <= tolerance * np.abs(self.forces).max():
+            self.note("E_FMU_REFERENCE", f"{self.main} differs from the reference by {worst:.3g}")
 
-    say("stage", "state")
-    try:
-        for row in rows[:-20]:
-            step(row, dt)
-        saved = fmu.getFMUState()
-        ways = [saved, fmu.deserializeFMUState(fmu.serializeFMUState(saved))]
-        straight = [step(row, 2 * dt) for row in rows[-20:]]
-        for word, state in zip(("saved", "carried"), ways, strict=True):
-            fmu.setFMUState(state)
-            if [step(row, 2 * dt) for row in rows[-20:]] != straight:
-                say("E_FMU_STATE", f"a {word} state does not lead to the same forces again")
-            fmu.freeFMUState(state)
-    except FMICallException as error:
-        say("E_FMU_STATE", f"a state cannot be carried: {error}")
-    fmu.terminate()
-    fmu.freeInstance()
-    say("end")
+    def step(self, fmu: Any) -> None:
+        """Step the binary: bad inputs must be refused, a stored state must lead to the same forces again."""
+        from fmpy.fmi1 import FMICallException
+
+        old, dt, rows = self.described.fmiVersion == "2.0", self.dt, self.rows
+        if old:
+            fmu.setupExperiment()
+        put, get = (getattr(fmu, way + ("Real" if old else "Float64")) for way in ("set", "get"))
+
+        def force_after(values: list[float], dt: float) -> float:
+            put(self.inputs, values)
+            fmu.doStep(0.0, dt)
+            return get([self.force])[0]
+
+        self.note("stage", "refusals")
+        fmu.enterInitializationMode()
+        put(self.inputs, rows[0])
+        fmu.exitInitializationMode()
+        tries = {"input nan": lambda: put(self.inputs, [np.nan, *rows[0][1:]])}
+        tries |= {f"step {bad}": lambda bad=bad: fmu.doStep(0.0, bad) for bad in (0.0, -dt, np.nan, np.inf)}
+        for name, attempt in tries.items():
+            with contextlib.suppress(FMICallException):
+                attempt()
+                self.note("E_FMU_REFUSAL", f"the binary lets pass: {name}")
+
+        self.note("stage", "state")
+        try:
+            for row in rows[:-20]:
+                force_after(row, dt)
+            saved = fmu.getFMUState()
+            ways = [saved, fmu.deserializeFMUState(fmu.serializeFMUState(saved))]
+            straight = [force_after(row, 2 * dt) for row in rows[-20:]]
+            for word, state in zip(("saved", "carried"), ways, strict=True):
+                fmu.setFMUState(state)
+                if [force_after(row, 2 * dt) for row in rows[-20:]] != straight:
+                    self.note("E_FMU_STATE", f"a {word} state does not lead to the same forces again")
+                fmu.freeFMUState(state)
+        except FMICallException as error:
+            self.note("E_FMU_STATE", f"a state cannot be carried: {error}")
+        fmu.terminate()
+        fmu.freeInstance()
 
 
 def _table(path: Path) -> np.ndarray:
-    found = np.genfromtxt(path, delimiter=",", names=True)
-    if not all(np.isfinite(found[name]).all() for name in found.dtype.names or ()):
+    table = np.genfromtxt(path, delimiter=",", names=True)
+    if not all(np.isfinite(table[name]).all() for name in table.dtype.names or ()):
         raise ValueError(f"{path.name} holds what is no number")
-    return found
+    return table
 
 
 if __name__ == "__main__":

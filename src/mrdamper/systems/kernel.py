@@ -220,15 +220,11 @@ def walk(
     slope, scale = np.zeros(count), np.full(count, 1e-6)
     mean, free = np.zeros(n), np.zeros(count)
     signals, held = np.zeros(H.shape[0] + 1), currents[0].copy()
-    state = np.zeros(2 * n + count)
     for i in range(1, samples):
         if H.shape[0] > 0 and (i - 1) % every == 0:
-            state[:n], state[n : 2 * n], state[2 * n :] = x[i - 1], v[i - 1], f[i - 1]
+            state = (*x[i - 1], *v[i - 1], *f[i - 1])
             for s in range(H.shape[0]):
-                total = seen[i - 1, s]
-                for k in range(state.size):
-                    total += H[s, k] * state[k]
-                signals[s] = total
+                signals[s] = _plus_product(seen[i - 1, s], H[s], state)
             signals[H.shape[0]] = every * dt
             if command(cp, cd, cm, signals, held) != 0:
                 return i
@@ -237,44 +233,45 @@ def walk(
             total = loads[i, r]
             for k in range(n):
                 total += P[r, k] * v[i - 1, k] + Q[r, k] * x[i - 1, k]
-            for k in range(count):
-                total -= 0.5 * R[r, k] * f[i - 1, k]
-            mean[r] = total
+            mean[r] = _plus_product(total, -0.5 * R[r], f[i - 1])
         for j in range(count):
-            total = road_rate[i, j]
-            for k in range(n):
-                total += B[j, k] * (2.0 * mean[k] - v[i - 1, k])
-            free[j] = total
-            f[i, j] = f[i - 1, j]
-        for _sweep in range(_MOST_SWEEPS):
+            free[j] = _plus_product(road_rate[i, j], B[j], 2.0 * mean - v[i - 1])
+        f[i] = f[i - 1]
+        for _ in range(_MOST_SWEEPS):
             moved = 0.0
             for j in range(count):
-                x0, u0 = road[i - 1, j], road_rate[i - 1, j]
-                for k in range(n):
-                    x0 += B[j, k] * x[i - 1, k]
-                    u0 += B[j, k] * v[i - 1, k]
-                drift = road[i, j] - road[i - 1, j] - 0.5 * dt * (road_rate[i, j] + road_rate[i - 1, j])
-                line = free[j]
-                for k in range(count):
-                    if k != j:
-                        line -= G[j, k] * f[i, k]
-                began = (x0, u0, f[i - 1, j], drift)
-                status, _, force, flag, slope[j] = search(
+                began = _start_of(j, i, dt, B, road, road_rate, x, v, f)
+                others = np.arange(count) != j
+                line = _plus_product(free[j], -G[j][others], f[i][others])
+                status, _u, force, flag, slope[j] = search(
                     evaluate, j, p, d, memory, later, began, line, G[j, j], currents[i, j], dt, slope[j], scale[j]
                 )
                 if status != 0:
                     return i
                 scale[j] = max(scale[j], abs(force))
-                if j > 0:  # those before it counted on the force that it had
+                if j > 0:  # the elements before it were solved with its former force
                     moved = max(moved, abs(force - f[i, j]) / scale[j])
                 f[i, j], flags[i, j] = force, flag
             if moved <= 10 * _TOLERANCE:
                 break
         memory[:] = later
         for r in range(n):
-            total = mean[r]
-            for k in range(count):
-                total -= 0.5 * R[r, k] * f[i, k]
+            total = _plus_product(mean[r], -0.5 * R[r], f[i])
             v[i, r] = 2.0 * total - v[i - 1, r]
             x[i, r] = x[i - 1, r] + dt * total
     return -1
+
+
+def _plus_product(start, row, values):
+    """Return start + row · values, summed from left to right as the compiled loop does."""
+    for a, b in zip(row, values, strict=True):
+        start += a * b
+    return start
+
+
+def _start_of(j, i, dt, B, road, road_rate, x, v, f):
+    """Return stroke, its rate and the force of element j where step i begins, and the road's part of its movement."""
+    x0 = _plus_product(road[i - 1, j], B[j], x[i - 1])
+    u0 = _plus_product(road_rate[i - 1, j], B[j], v[i - 1])
+    drift = road[i, j] - road[i - 1, j] - 0.5 * dt * (road_rate[i, j] + road_rate[i - 1, j])
+    return x0, u0, f[i - 1, j], drift
