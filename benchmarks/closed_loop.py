@@ -21,7 +21,7 @@ from mrdamper.systems.controllers import controller_type
 from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.inputs import load_input
 from mrdamper.systems.monte_carlo import draw, monte_carlo
-from mrdamper.systems.simulate import Loop
+from mrdamper.systems.simulate import SystemLoop
 from mrdamper.systems.system_file import load_system
 
 C = 2000.0  # N s/m
@@ -99,7 +99,7 @@ def main() -> None:
     rows = []
 
     def ours(title, system, source, dampers, law, dt):
-        loop = Loop(system, source, dampers, law)
+        loop = SystemLoop(system, source, dampers, law)
         seconds = best(lambda: loop.run(dt, machine=True))
         rows.append((title, seconds, loop.run(dt, machine=True).peaks["drift_m"][0]))
 
@@ -114,7 +114,7 @@ def main() -> None:
     ours("quarter car, skyhook, 60 s of road at 1 ms", car, road, {"damper": real}, controller_type("skyhook")(), 1e-3)
     for title, seconds, peak in rows:
         print(f"{title:45} {1e3 * seconds:9.1f} ms   peak drift {1e3 * peak:8.4f} mm")
-    loop = Loop(file.system, spread, {"mr": real}, Passive(0.5), free=True)
+    loop = SystemLoop(file.system, spread, {"mr": real}, Passive(0.5), free=True)
     draws = draw({"mr": certain(real, load_dataset().rig("labcontrol").split("train"))}, 1000)
     begin = time.perf_counter()
     monte_carlo(loop, draws, loop.run(5e-4))

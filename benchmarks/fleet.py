@@ -30,7 +30,7 @@ import numpy as np
 import polars as pl
 
 from mrdamper.fleet import engine
-from mrdamper.fleet.generator import FAULTS, Line, write_fleet
+from mrdamper.fleet.generator import FAULTS, Population, write_fleet
 from mrdamper.fleet.guard import descendants
 from mrdamper.fleet.item import digest_of
 from mrdamper.fleet.items import find_items
@@ -87,7 +87,7 @@ def records(folder: Path, dampers: int) -> Path:
     if not source.exists():
         making = source.with_suffix(".part")
         shutil.rmtree(making, ignore_errors=True)
-        write_fleet(Line(dampers=dampers, sessions=4, golden=0), making)
+        write_fleet(Population(dampers=dampers, sessions=4, golden=0), making)
         making.rename(source)
     return source
 
@@ -234,7 +234,7 @@ def truth(folder: Path, dampers: int, seeds: Sequence[int]) -> None:
     for name, base in (("usual", VirtualRig()), ("four times as strong", STRONG)):
         found = planted = alarms = sound = named = 0
         for seed in seeds:
-            line = Line(dampers=dampers, sessions=5, golden=1, base=base, seed=seed,
+            line = Population(dampers=dampers, sessions=5, golden=1, base=base, seed=seed,
                         faults=dict.fromkeys(FAULTS, 3))  # fmt: skip
             table = _identified(folder / f"truth-{name[:2]}-{seed}", line)
             told = {s.serial: s.cause for s in suspects(with_features(table).filter(~pl.col("golden")))}
@@ -252,7 +252,7 @@ def drifts(folder: Path, dampers: int, seeds: Sequence[int]) -> None:
     for planted, change in (("rig", {"rig_drift": 0.03}), ("line", {"line_drift": 0.03}), ("none", {})):
         told, blind = [], []
         for seed in seeds:
-            line = replace(Line(dampers=dampers, sessions=8, golden=2, seed=seed), **change)
+            line = replace(Population(dampers=dampers, sessions=8, golden=2, seed=seed), **change)
             table = with_features(_identified(folder / f"drift-{planted}-{seed}", line)).sort("session", "serial")
             told.append(_told(table))
             blind.append(_told(table.filter(~pl.col("golden"))))
@@ -264,7 +264,7 @@ def _told(table: pl.DataFrame) -> str:
     return drift(np.array(table["force_rise_N"].to_list()), *columns).verdict
 
 
-def _identified(folder: Path, line: Line) -> pl.DataFrame:
+def _identified(folder: Path, line: Population) -> pl.DataFrame:
     if not (folder / "out" / "dampers.parquet").exists():
         shutil.rmtree(folder, ignore_errors=True)
         write_fleet(line, folder / "records")

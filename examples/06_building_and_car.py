@@ -9,7 +9,7 @@ import math
 from mrdamper import invert, load_input, load_system
 from mrdamper.systems.controllers import controller_type
 from mrdamper.systems.controllers.passive import Passive
-from mrdamper.systems.simulate import Loop
+from mrdamper.systems.simulate import SystemLoop
 
 file = load_system("dyke1996")
 quake = load_input("elcentro", time_scale=5)
@@ -20,7 +20,7 @@ for title, dampers, law in (
     ("2.25 V", file.dampers, Passive(0.75)),
     ("clipped-optimal", file.dampers, controller_type("clipped-optimal")()),
 ):
-    done = Loop(file.system, quake, dampers, law).run(STEP)
+    done = SystemLoop(file.system, quake, dampers, law).run(STEP)
     drift, acceleration = done.peaks["drift_m"].max(), done.peaks["acceleration_m_s2"].max()
     print(f"{title:16} drift {1e3 * drift:5.2f} mm   acceleration {acceleration:5.2f} m/s²")
 

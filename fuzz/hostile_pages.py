@@ -66,11 +66,11 @@ def attack_exports(share: float) -> list[Count]:
 def attack_pages(share: float) -> list[Count]:
     """Every command that writes pages and figures, its rig, runs, remarks, folders and dampers by hostile names."""
     from mrdamper.errors import InputError
-    from mrdamper.fleet.generator import Line
+    from mrdamper.fleet.generator import Population
     from mrdamper.rig_files.dataset_folder import save_dataset
 
     count, ran = Count("whole result of named runs"), Count("command on named runs")
-    dataset, rng = next(iter(Line(dampers=1, sessions=1, golden=0))).dataset(), random.Random(8)
+    dataset, rng = next(iter(Population(dampers=1, sessions=1, golden=0))).dataset(), random.Random(8)
 
     def allowed(name: str) -> bool:
         try:

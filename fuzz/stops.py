@@ -237,10 +237,10 @@ def _prepare(root: Path) -> None:
     from dataclasses import replace
 
     from mrdamper.dampers.model_file import save_model
-    from mrdamper.fleet.generator import Line
+    from mrdamper.fleet.generator import Population
     from mrdamper.rig_files.dataset_folder import save_dataset
 
-    for n, made in enumerate(Line(dampers=2, sessions=1, golden=0), start=1):
+    for n, made in enumerate(Population(dampers=2, sessions=1, golden=0), start=1):
         save_dataset(made.dataset(), root / f"data{n}")
         (root / f"files{n}").mkdir()
         for run in made.dataset():

@@ -56,11 +56,11 @@ def test_the_structure_keeps_its_limits():
     assert len(structure.top_level_names()) <= 18
     assert len(structure.layers()) <= 13
     assert structure.isinstance_over_dampers() == []
-    assert len(structure.circles()) <= CIRCLES
-    assert len(structure.longest_chain()) <= CHAIN
-    assert len(structure.long_functions()) <= LONG
+    assert len(structure.circles()) <= 2
+    assert len(structure.longest_chain()) <= 31
+    assert len(structure.long_functions()) <= 20
     assert _of_rewritten(structure.long_functions()) == []
-    assert len(structure.repeated_class_names()) <= REPEATED
+    assert len(structure.repeated_class_names()) <= 15
 
 
 def test_docstrings_of_rewritten_packages_open_with_a_definition_or_an_imperative():

@@ -44,7 +44,7 @@ class PluginWarning(UserWarning):
 
 
 @dataclass(frozen=True)
-class Part:
+class ExtensionPart:
     """Something an installed package provides.
 
     Attributes
@@ -98,7 +98,7 @@ def provided_modules(group: str) -> tuple[tuple[EntryPoint, tuple[ModuleType, ..
         except Exception as error:  # whatever a package raises when it is imported
             if _is_own(point):
                 raise
-            skip(Part(group, point.name, package_of(point.dist), point.value), error)
+            skip(ExtensionPart(group, point.name, package_of(point.dist), point.value), error)
     return tuple(loaded)
 
 
@@ -129,10 +129,10 @@ def _load(point: EntryPoint) -> tuple[ModuleType, ...] | type:
     return (target, *(importlib.import_module(f"{target.__name__}.{name}") for name in sorted(names)))
 
 
-_skipped: list[Part] = []
+_skipped: list[ExtensionPart] = []
 
 
-def skip(part: Part, problem: Exception | str) -> None:
+def skip(part: ExtensionPart, problem: Exception | str) -> None:
     """Note that a part of an outside package is not used, and warn once."""
     if isinstance(problem, Exception):
         problem = f"{type(problem).__name__}: {problem}"
@@ -155,7 +155,7 @@ class Registry(Generic[T]):
 
     def __init__(self, group: str, base: type[T], kind: str):
         self.group, self.base, self.kind = group, base, kind
-        self._parts: dict[str, Part] | None = None
+        self._parts: dict[str, ExtensionPart] | None = None
         self._types: dict[str, type[T]] = {}
         _registries[group] = self
 
@@ -170,7 +170,7 @@ class Registry(Generic[T]):
         return MappingProxyType(dict(sorted(self._types.items())))
 
     @property
-    def parts(self) -> tuple[Part, ...]:
+    def parts(self) -> tuple[ExtensionPart, ...]:
         """Every class of the group and the package it comes from, sorted by name."""
         return tuple(part for name in self.types if (part := (self._parts or {}).get(name)))
 
@@ -214,7 +214,7 @@ class Registry(Generic[T]):
             problem = f"{target} is not a complete subclass of {self.base.__module__}.{self.base.__qualname__}"
         elif name in self._types:
             problem = f"the {self.kind} {name!r} exists already in {parts[name].package}"
-        part = Part(self.group, str(name), package, target, own=is_own)
+        part = ExtensionPart(self.group, str(name), package, target, own=is_own)
         if not problem:
             self._types[name], parts[name] = cls, part
         elif is_own:
@@ -279,19 +279,19 @@ def register(cls: type[T]) -> type[T]:
     return cls
 
 
-def modules_with(group: str, function: str) -> tuple[tuple[Part, ModuleType], ...]:
+def modules_with(group: str, function: str) -> tuple[tuple[ExtensionPart, ModuleType], ...]:
     """List the modules of a group that define a function of that name, as commands and checks do."""
     found = []
     for point, target in provided_modules(group):
         for module in target if isinstance(target, tuple) else ():
             if callable(getattr(module, function, None)):
                 name = module.__name__.rpartition(".")[2]
-                part = Part(group, name, package_of(point.dist), module.__name__, own=_is_own(point))
+                part = ExtensionPart(group, name, package_of(point.dist), module.__name__, own=_is_own(point))
                 found.append((part, module))
     return tuple(found)
 
 
-def all_parts() -> tuple[Part, ...]:
+def all_parts() -> tuple[ExtensionPart, ...]:
     """Everything that installed packages provide, used and skipped, by group and name."""
     for group in GROUPS:  # importing the module that holds a group's registry creates it
         provided_modules(group)

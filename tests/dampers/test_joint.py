@@ -24,7 +24,7 @@ from mrdamper.models.play_bypass import PlayBypass, play_position
 from mrdamper.physics.motion import random_motion, sine, sweep
 from mrdamper.physics.motion.lag import first_order_lag
 from mrdamper.physics.simulation import simulate, steady_loop
-from mrdamper.statistics.ending import Ending
+from mrdamper.statistics.ending import StopReason
 from mrdamper.statistics.levenberg_marquardt import Minimum
 from mrdamper.study.validation import validate
 
@@ -122,7 +122,7 @@ def test_of_each_length_the_best_start_and_the_first_length_first_unless_another
     for costs, order in (([1.0, 0.86, 0.9, 9.0], [0, 1, 2]), ([1.0, 0.9, 0.84, 9.0], [2, 0, 1])):
         other, left = JointProblem(problem.runs, "play-bypass", parts=problem.parts), iter(costs)
         monkeypatch.setattr(
-            JointProblem, "_downhill", lambda self, u, left=left: Minimum(u, u, next(left), 1, Ending.SETTLED)
+            JointProblem, "_downhill", lambda self, u, left=left: Minimum(u, u, next(left), 1, StopReason.SETTLED)
         )
         assert [u[at] for u in other._promising[:3]] == [lengths[k] for k in order]
         assert np.array_equal(other.start, other._promising[0])
@@ -133,7 +133,7 @@ def test_of_each_length_the_best_start_and_the_first_length_first_unless_another
 
 def ended(error, knee):
     damper = replace(joint_damper(), model=replace(joint_damper().model, d=knee / 2))
-    return JointFit(damper, np.array([error / 2, 3 * error / 2]), (), np.zeros(2), Ending.SETTLED, 9, 0.1)
+    return JointFit(damper, np.array([error / 2, 3 * error / 2]), (), np.zeros(2), StopReason.SETTLED, 9, 0.1)
 
 
 @pytest.mark.parametrize(

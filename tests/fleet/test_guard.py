@@ -7,15 +7,15 @@ from dataclasses import replace
 import pytest
 
 from mrdamper.errors import InputError
-from mrdamper.fleet.guard import Guard, JobError, Limits, descendants
+from mrdamper.fleet.guard import JobError, JobLimits, KillableWorker, descendants
 
 HERE = "support.bad_jobs"
-SMALL = Limits(cpu_s=1.0, wall_s=60.0, memory_bytes=700 * 2**20)
+SMALL = JobLimits(cpu_s=1.0, wall_s=60.0, memory_bytes=700 * 2**20)
 
 
 @pytest.fixture
 def guard():
-    held = Guard(SMALL)
+    held = KillableWorker(SMALL)
     yield held
     held.close()
 
@@ -34,7 +34,7 @@ def guard():
 )
 def test_it_fails_alone_and_is_named(guard, job, argument, code, found):
     if job == "hang":
-        guard = Guard(replace(SMALL, wall_s=2.0))
+        guard = KillableWorker(replace(SMALL, wall_s=2.0))
     with pytest.raises(JobError) as failed:
         guard.call(f"{HERE}:{job}", argument)
     assert failed.value.code == code

@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 from mrdamper.cli import application
 from mrdamper.data import Dataset
 from mrdamper.errors import InputError
-from mrdamper.fleet.generator import Line
+from mrdamper.fleet.generator import Population
 from mrdamper.fleet.item import digest_of
 from mrdamper.fleet.items import find_items
 from mrdamper.fleet.job import Settings, as_job, attempt, read
@@ -101,7 +101,7 @@ def _copied(out):
 
 
 def test_a_damper_that_cannot_be_used_is_named_and_the_others_go_on(identified, tmp_path):
-    dampers = list(Line(dampers=6, sessions=1, golden=0))
+    dampers = list(Population(dampers=6, sessions=1, golden=0))
     source = tmp_path / "records"
     for damper in dampers:
         save_dataset(damper.dataset(), source / damper.serial)
@@ -174,7 +174,7 @@ def test_a_source_without_a_damper_is_refused(tmp_path):
 
 
 def test_rig_files_of_a_folder_are_one_damper(identified, tmp_path):
-    for damper in Line(dampers=2, sessions=1, golden=0):
+    for damper in Population(dampers=2, sessions=1, golden=0):
         folder = tmp_path / "records" / damper.serial
         folder.mkdir(parents=True)
         for run in damper.dataset():

@@ -7,10 +7,10 @@ from typer.testing import CliRunner
 
 from mrdamper.cli import application
 from mrdamper.errors import ColumnError
-from mrdamper.fleet.generator import FAULTS, Line, write_fleet
+from mrdamper.fleet.generator import FAULTS, Population, write_fleet
 from mrdamper.fleet.line import run_fleet
 from mrdamper.fleet.page import write_page
-from mrdamper.fleet.profile import FleetProfile, Limit, LimitsError, load_limits
+from mrdamper.fleet.profile import ColumnLimits, FleetProfile, LimitsError, load_limits
 from mrdamper.fleet.verdicts import clock_findings, drift, suspects, with_features
 
 
@@ -66,7 +66,7 @@ def test_false_alarms_are_rare():
 
 @pytest.mark.slow
 def test_planted_faults_are_found_and_named(tmp_path):
-    line = Line(dampers=80, sessions=4, golden=1, faults=dict.fromkeys(FAULTS, 3), seed=11)
+    line = Population(dampers=80, sessions=4, golden=1, faults=dict.fromkeys(FAULTS, 3), seed=11)
     write_fleet(line, tmp_path / "records")
     found = run_fleet(tmp_path / "records", tmp_path / "out", workers=2)
     table = with_features(pl.read_parquet(found.table)).filter(~pl.col("golden"))
@@ -80,7 +80,9 @@ def test_planted_faults_are_found_and_named(tmp_path):
 
 
 def test_the_page_traces_everything_by_serial_number(identified, tmp_path):
-    said = write_page(identified.table, identified.plan, {"gas_force_N": Limit(lower=119.5)}, tmp_path / "fleet.html")
+    said = write_page(
+        identified.table, identified.plan, {"gas_force_N": ColumnLimits(lower=119.5)}, tmp_path / "fleet.html"
+    )
     text = (tmp_path / "fleet.html").read_text(encoding="utf-8")
     table = pl.read_parquet(identified.table)
     below = table.filter(~pl.col("golden") & (pl.col("gas_force_N") < 119.5))["serial"].to_list()
@@ -100,7 +102,7 @@ def test_a_long_line_is_charted_by_medians(identified, tmp_path):
 
 def test_a_limit_for_no_column_is_refused(identified, tmp_path):
     with pytest.raises(ColumnError, match="gas_force_N"):
-        write_page(identified.table, identified.plan, {"gas": Limit(lower=1)}, tmp_path / "fleet.html")
+        write_page(identified.table, identified.plan, {"gas": ColumnLimits(lower=1)}, tmp_path / "fleet.html")
     assert not (tmp_path / "fleet.html").exists()
 
 

@@ -7,7 +7,7 @@ from support.synthetic import synthetic_run
 from mrdamper.data import Condition
 from mrdamper.identification import Problem
 from mrdamper.identification.columns import linear_table
-from mrdamper.identification.elimination import Elimination, kind_of
+from mrdamper.identification.elimination import Elimination, linear_structure
 from mrdamper.identification.methods.projection import Projection, search_axes
 from mrdamper.models import Scale, all_models
 from mrdamper.models.bouc_wen import BoucWen
@@ -16,7 +16,7 @@ from mrdamper.models.spencer import Spencer
 from mrdamper.physics.hysteresis import Shape, follow
 from mrdamper.physics.hysteresis.batch import batch_cost, follow_alike, follow_quickly, follow_with_slope
 from mrdamper.physics.motion import Path, sine
-from mrdamper.statistics.ending import Ending
+from mrdamper.statistics.ending import StopReason
 from mrdamper.statistics.levenberg_marquardt import least_squares
 from mrdamper.statistics.linear import FixedColumns
 from mrdamper.statistics.one_number import least_squares_in_one
@@ -124,19 +124,19 @@ def test_a_bound_sends_the_search_the_general_way():
 
 
 def test_kinds_follow_from_what_models_declare():
-    bent = kind_of(BoucWen, ("c", "alpha", "beta", "f0", "k1"), (("gamma", -1.0), ("n", 2.0)))
+    bent = linear_structure(BoucWen, ("c", "alpha", "beta", "f0", "k1"), (("gamma", -1.0), ("n", 2.0)))
     assert bent.state.name == "alpha"
     assert not bent.has_shape  # a gamma that is held bends the asymmetry with the length
     assert (
-        kind_of(BoucWen, ("c", "alpha", "beta"), (("gamma", 2e5),)) is None
+        linear_structure(BoucWen, ("c", "alpha", "beta"), (("gamma", 2e5),)) is None
     )  # the longest lengths allow no such gamma
-    free = kind_of(BoucWen, ("c", "alpha", "beta", "f0"), (("k1", 0.0), ("n", 2.0)))
+    free = linear_structure(BoucWen, ("c", "alpha", "beta", "f0"), (("k1", 0.0), ("n", 2.0)))
     assert free.has_shape
     assert free.shape({"yield_displacement": 1e-3}) == (1e3, 0.0, 2.0)
-    kwok = kind_of(Kwok, ("c", "k", "alpha", "beta", "delta", "f0"), (("xs", 0.0),))
+    kwok = linear_structure(Kwok, ("c", "k", "alpha", "beta", "delta", "f0"), (("xs", 0.0),))
     assert kwok.state.name == "alpha"
     assert not kwok.has_shape
-    assert kind_of(Spencer, ("c1", "creep"), ()) is None
+    assert linear_structure(Spencer, ("c1", "creep"), ()) is None
 
 
 @pytest.mark.parametrize("name", [name for name, model in all_models().items() if model.state_column])
@@ -180,7 +180,7 @@ def test_one_number_search_matches_levenberg_marquardt_and_keeps_its_bounds():
     assert quick.point[0] == pytest.approx(slow.point[0], rel=1e-4)
     bounded = least_squares_in_one(evaluate, 0.3, 0.0, 1.0)
     assert bounded.point[0] == 1.0
-    assert bounded.ending is Ending.AT_BOUNDS
+    assert bounded.ending is StopReason.AT_BOUNDS
     assert least_squares_in_one(lambda u: None, 0.3, 0.0, 1.0) is None
 
 

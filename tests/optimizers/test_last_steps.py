@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from mrdamper.statistics.levenberg_marquardt import polished
+from mrdamper.statistics.levenberg_marquardt import newton_refine
 
 NEAR = np.array([1.01, 0.7])
 
 
 def ended(gradient):
-    return polished(gradient, NEAR, np.zeros(2), np.full(2, 2.0))
+    return newton_refine(gradient, NEAR, np.zeros(2), np.full(2, 2.0))
 
 
 def test_the_last_steps_find_the_minimum():

@@ -19,7 +19,7 @@ from mrdamper.physics.gas_spring import GasSpring
 from mrdamper.physics.hysteresis import steady_loop
 from mrdamper.physics.motion import sine
 from mrdamper.statistics import levenberg_marquardt
-from mrdamper.statistics.ending import Ending
+from mrdamper.statistics.ending import StopReason
 
 GAS = GasSpring(1.5e6, 1.5e-4, np.pi * 1e-4)
 READINGS = ("first-harmonic", "half-peak-to-peak")
@@ -143,7 +143,7 @@ def test_a_gamma_that_is_held_ends_where_it_leaves_nothing_for_beta():
     [(10.0005, 5e6, ("alpha",)), (10.00101, 5e6, ()), (1009.9995, 1e7 - 1, ("alpha", "beta")), (500.0, 3.0, ("beta",))],
 )
 def test_a_search_ended_at_its_box_within_a_millionth_of_it(monkeypatch, alpha, beta, ended):
-    minimum = GeneticMinimum(np.array([alpha, beta]), 0.0, 1, np.array([]), (), Ending.SETTLED)
+    minimum = GeneticMinimum(np.array([alpha, beta]), 0.0, 1, np.array([]), (), StopReason.SETTLED)
     monkeypatch.setattr(paper, "_optimum", lambda *_: minimum)
     run = steady_run(Condition(1.0, 1.0, 0.05), samples=200)
     method = Paper(search="optimum", bounds=((10.0, 1010.0), (0.0, 1e7)), explain=False)

@@ -8,7 +8,7 @@ from support.dampers import joint_damper
 
 from mrdamper.dampers.joint import JointFit, Valley
 from mrdamper.report.limitations import RANGE, by_group, limitations
-from mrdamper.statistics.ending import Ending
+from mrdamper.statistics.ending import StopReason
 from mrdamper.study.recipe import Scored, play_and_bypass
 from mrdamper.study.validation import Validation
 
@@ -26,10 +26,10 @@ def scored(fit):
 @pytest.mark.parametrize(
     ("why", "said"),
     [
-        (Ending.SETTLED, None),
-        (Ending.AT_BOUNDS, None),  # parameters at bounds have a sentence of their own
+        (StopReason.SETTLED, None),
+        (StopReason.AT_BOUNDS, None),  # parameters at bounds have a sentence of their own
         (
-            Ending.STEPS_SPENT,
+            StopReason.STEPS_SPENT,
             "The global fit did not converge: the search stopped at the limit of steps, the cost still falling.",
         ),
     ],
@@ -43,7 +43,7 @@ def test_a_search_that_did_not_converge_is_said_so_in_a_sentence(why, said):
 
 
 def test_a_second_end_of_the_search_is_told_with_its_error():
-    fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), Ending.SETTLED, 9, 0.1)
+    fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), StopReason.SETTLED, 9, 0.1)
     worse, better = (Valley(1.4e-3, e, 4e-4, 0.0266) for e in (0.0273, 0.026))
     start = "Second local minimum of the fit: yield displacement 1.40 mm instead of 0.40 mm, mean error"
     assert f"{start} 2.73 % instead of 2.66 %." in texts(replace(fit, second=worse))
@@ -53,7 +53,7 @@ def test_a_second_end_of_the_search_is_told_with_its_error():
 
 
 def test_a_run_described_far_worse_than_the_others_is_named_by_its_factor():
-    fit = JointFit(joint_damper(), np.array([0.02, 0.02, 0.09]), ("d",), np.zeros(2), Ending.SETTLED, 9, 0.1)
+    fit = JointFit(joint_damper(), np.array([0.02, 0.02, 0.09]), ("d",), np.zeros(2), StopReason.SETTLED, 9, 0.1)
     sentences = texts(fit)
     assert any("4.5 times the median" in s for s in sentences)
     assert any("(interval one-sided): d (" in s for s in sentences)
@@ -62,7 +62,7 @@ def test_a_run_described_far_worse_than_the_others_is_named_by_its_factor():
 
 
 def test_limitations_are_grouped_and_the_tested_range_stands_last():
-    fit = JointFit(joint_damper(), np.array([0.02, 0.02, 0.09]), (), np.zeros(2), Ending.SETTLED, 9, 0.1)
+    fit = JointFit(joint_damper(), np.array([0.02, 0.02, 0.09]), (), np.zeros(2), StopReason.SETTLED, 9, 0.1)
     found = limitations(scored(fit), ())
     groups = by_group(found)
     assert list(groups)[-1] == RANGE

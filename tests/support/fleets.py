@@ -5,10 +5,10 @@ import sqlite3
 
 import polars as pl
 
-from mrdamper.fleet.generator import Line
+from mrdamper.fleet.generator import Population
 from mrdamper.fleet.table import TIMES
 
-LINE = Line(dampers=4, sessions=2, golden=1, faults={"wrong coil": 1}, seed=3)
+LINE = Population(dampers=4, sessions=2, golden=1, faults={"wrong coil": 1}, seed=3)
 ROWS = 6  # four dampers, and the golden one in two sessions
 
 

@@ -14,11 +14,11 @@ from mrdamper.statistics.functions.forms import ParameterFunction
 from mrdamper.systems.controllers import controller_type, controller_types
 from mrdamper.systems.controllers.base import Controller
 from mrdamper.systems.controllers.passive import Passive
-from mrdamper.systems.controllers.preview import Preview
+from mrdamper.systems.controllers.preview import NonCausalOptimum
 from mrdamper.systems.inputs import load_input
 from mrdamper.systems.inverse import invert
 from mrdamper.systems.measures import cost
-from mrdamper.systems.simulate import Loop
+from mrdamper.systems.simulate import SystemLoop
 from mrdamper.systems.structure import quarter_car
 from mrdamper.systems.system_file import load_system
 
@@ -29,12 +29,12 @@ LAWS = [name for name in controller_types() if name != "preview"]
 
 @pytest.fixture(scope="module")
 def preview():
-    return Loop(CAR, ROAD, {"damper": joint_damper()}, Preview()).run(1e-3)
+    return SystemLoop(CAR, ROAD, {"damper": joint_damper()}, NonCausalOptimum()).run(1e-3)
 
 
 @pytest.mark.parametrize("name", LAWS)
 def test_nothing_beats_the_preview(name, preview):
-    done = Loop(CAR, ROAD, {"damper": joint_damper()}, controller_type(name)()).run(1e-3, machine=False)
+    done = SystemLoop(CAR, ROAD, {"damper": joint_damper()}, controller_type(name)()).run(1e-3, machine=False)
     assert cost(preview) < cost(done)
     assert done.energy_gap < 1e-6
     assert done.current.min() >= 0
@@ -45,18 +45,18 @@ def test_nothing_beats_the_preview(name, preview):
 
 
 def test_the_preview_is_where_its_cost_is_flat(preview):
-    loop = Loop(CAR, ROAD, {"damper": joint_damper()}, Preview())
+    loop = SystemLoop(CAR, ROAD, {"damper": joint_damper()}, NonCausalOptimum())
     rng = np.random.default_rng(1)
     for _ in range(5):
         way = np.cumsum(rng.standard_normal((preview.time.size, 1)), axis=0)
         way[0] = 0
 
         @dataclass(frozen=True)
-        class Nudged(Preview):
+        class Nudged(NonCausalOptimum):
             share: float = 0.0
 
             def forces(self, *given):
-                return Preview.forces(self, *given) + self.share * way  # noqa: B023
+                return NonCausalOptimum.forces(self, *given) + self.share * way  # noqa: B023
 
         loop.controller = Nudged(share=1.0)
         more = cost(loop.run(1e-3))
@@ -76,7 +76,7 @@ def test_a_skyhook_with_its_sign_exchanged_lets_energy_into_the_body():
             return see.on_off(see("above", "velocity") * see.stroke_rate < 0)
 
     right, wrong = (
-        Loop(CAR, ROAD, {"damper": joint_damper()}, law()).run(1e-3, machine=False)
+        SystemLoop(CAR, ROAD, {"damper": joint_damper()}, law()).run(1e-3, machine=False)
         for law in (controller_type("skyhook"), Wrong)
     )
     assert right.timing["damper"] > 0.2
@@ -154,5 +154,5 @@ def test_every_law_says_where_it_comes_from():
 
 def test_a_demand_that_is_never_in_reach_is_counted():
     kind = controller_type("skyhook-continuous")
-    done = Loop(CAR, ROAD, {"damper": joint_damper()}, kind(c_sky=1e9)).run(1e-3, machine=False)
+    done = SystemLoop(CAR, ROAD, {"damper": joint_damper()}, kind(c_sky=1e9)).run(1e-3, machine=False)
     assert done.unreachable["damper"] > 0.9

@@ -23,7 +23,7 @@ from mrdamper.export.toolchain import here
 from mrdamper.systems.controllers import controller_type
 from mrdamper.systems.inputs import load_input
 from mrdamper.systems.inverse import invert
-from mrdamper.systems.simulate import Loop
+from mrdamper.systems.simulate import SystemLoop
 from mrdamper.systems.structure import quarter_car
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
@@ -71,7 +71,7 @@ LAWS = ["sh-add", "skyhook-continuous", "clipped-optimal"]
 
 def loop_of(law):
     car = quarter_car("car", 300, 40, 20e3, 200e3)
-    return Loop(car, load_input("bump", {"length_s": 0.5}), {"damper": joint_damper()}, controller_type(law)())
+    return SystemLoop(car, load_input("bump", {"length_s": 0.5}), {"damper": joint_damper()}, controller_type(law)())
 
 
 def closed_with(law, answer):

@@ -10,7 +10,7 @@ from mrdamper.models import model_type
 from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.inputs import load_input
 from mrdamper.systems.inputs.record import record
-from mrdamper.systems.simulate import Loop, simulate_system
+from mrdamper.systems.simulate import SystemLoop, simulate_system
 from mrdamper.systems.structure import Link, building, half_car, quarter_car, shear_building
 
 ENVELOPE = Envelope((0.0, 1.0), (0.5, 4.0), (0.004, 0.02), (0.02, 0.3))
@@ -30,7 +30,7 @@ def test_a_quarter_car_passes_on_what_its_transfer_function_says(frequency):
     car = quarter_car("car", 300, 40, 20e3, 200e3)
     dt, c = 1e-3, 1500.0
     road = load_input("sweep", {"amplitude_m": 1e-3, "lowest_Hz": frequency, "highest_Hz": frequency, "length_s": 12})
-    done = Loop(car, road, {"damper": dashpot(c)}, Passive()).run(dt, machine=False)
+    done = SystemLoop(car, road, {"damper": dashpot(c)}, Passive()).run(dt, machine=False)
     last = done.time > 12 - 3 / frequency
     columns = np.column_stack([np.exp(2j * np.pi * frequency * done.time), np.exp(-2j * np.pi * frequency * done.time)])
     body = np.linalg.lstsq(columns[last], done.x[last].astype(complex), rcond=None)[0][0] / (1e-3 / 2j)
@@ -42,7 +42,7 @@ def test_a_quarter_car_passes_on_what_its_transfer_function_says(frequency):
 
 def test_energy_balances_and_steps_converge_with_order_two():
     frame = shear_building("frame", [100.0, 80.0], [4e5, 3e5], [50.0, 40.0], [Link("d", "floor1", "ground")])
-    loop = Loop(frame, pulse(), {"d": dashpot(8e4)}, Passive())  # damping a thousand times critical
+    loop = SystemLoop(frame, pulse(), {"d": dashpot(8e4)}, Passive())  # damping a thousand times critical
     runs = [loop.run(dt, machine=False) for dt in (2e-3, 1e-3, 5e-4)]
     assert max(run.energy_gap for run in runs) < 1e-9
     fine = runs[2].x
@@ -53,9 +53,9 @@ def test_energy_balances_and_steps_converge_with_order_two():
 
 def test_a_jump_of_the_force_holds_the_structure_still():
     frame = shear_building("frame", [100.0], [4e5], [0.0], [Link("d", "floor1", "ground")])
-    stuck = Loop(frame, pulse(1.0), {"d": dashpot(0.0, fy=500.0)}, Passive()).run(1e-3, machine=False)
+    stuck = SystemLoop(frame, pulse(1.0), {"d": dashpot(0.0, fy=500.0)}, Passive()).run(1e-3, machine=False)
     assert np.abs(stuck.x).max() < 1e-9  # 100 N of inertia against 500 N of friction
-    slips = Loop(frame, pulse(20.0), {"d": dashpot(0.0, fy=500.0)}, Passive()).run(1e-3, machine=False)
+    slips = SystemLoop(frame, pulse(20.0), {"d": dashpot(0.0, fy=500.0)}, Passive()).run(1e-3, machine=False)
     assert np.abs(slips.x).max() > 1e-3
     assert np.abs(slips.force).max() == pytest.approx(500.0, rel=1e-6)
     assert slips.energy_gap < 1e-9
@@ -65,8 +65,10 @@ def test_dampers_side_by_side_share_the_force_of_one():
     def frame(*links):
         return shear_building("frame", [100.0, 80.0], [4e5, 3e5], [50.0, 40.0], links)
 
-    one = Loop(frame(Link("a", "floor1", "ground")), pulse(), {"a": dashpot(4e3)}, Passive()).run(1e-3, machine=False)
-    two = Loop(
+    one = SystemLoop(frame(Link("a", "floor1", "ground")), pulse(), {"a": dashpot(4e3)}, Passive()).run(
+        1e-3, machine=False
+    )
+    two = SystemLoop(
         frame(Link("a", "floor1", "ground"), Link("b", "floor1", "ground")),
         pulse(), {"a": dashpot(1e3), "b": dashpot(3e3)}, Passive(),
     ).run(1e-3, machine=False)  # fmt: skip
@@ -77,7 +79,7 @@ def test_dampers_side_by_side_share_the_force_of_one():
 def test_tyres_lift_off_and_stops_are_touched_and_energy_still_balances():
     car = quarter_car("car", 300, 40, 20e3, 200e3, stop=(0.03, 2e5))
     bump = load_input("bump", {"height_m": 0.12, "bump_m": 1.0, "speed_m_s": 8.0, "length_s": 2.0})
-    done = Loop(car, bump, {"damper": dashpot()}, Passive()).run(5e-4, machine=False)
+    done = SystemLoop(car, bump, {"damper": dashpot()}, Passive()).run(5e-4, machine=False)
     tyre = [link.name for link in done.links].index("tyre")
     assert set(done.outside) >= {"stop", "tyre"}
     in_air = done.flags[:, tyre] == 1
@@ -89,12 +91,12 @@ def test_tyres_lift_off_and_stops_are_touched_and_energy_still_balances():
 def test_the_rear_axle_follows_the_front():
     car = half_car("car", 690, 1222, 1.3, 1.5, (40, 45), (18e3, 22e3), (192e3, 192e3))
     bump = load_input("bump", {"height_m": 0.02, "speed_m_s": 7.0, "length_s": 1.5})
-    done = Loop(car, bump, {name: dashpot() for name in ("damper_front", "damper_rear")}, Passive()).run(
+    done = SystemLoop(car, bump, {name: dashpot() for name in ("damper_front", "damper_rear")}, Passive()).run(
         1e-3, machine=False
     )
     assert done.road[600, 1] == pytest.approx(done.road[200, 0], abs=1e-9)  # 2.8 m at 7 m/s
     mirrored = half_car("car", 690, 1222, 1.4, 1.4, (40, 40), (18e3, 18e3), (192e3, 192e3))
-    heave = Loop(
+    heave = SystemLoop(
         mirrored, load_input("bump", {"speed_m_s": 150.0, "bump_m": 100.0, "height_m": 0.02, "length_s": 1.5}), {},
         Passive(),
     ).run(1e-3, machine=False)  # fmt: skip
@@ -103,7 +105,7 @@ def test_the_rear_axle_follows_the_front():
 
 def test_compiled_code_and_interpreter_agree():
     frame = building("frame", ["a"], np.eye(1) * 100, np.eye(1) * 10, np.eye(1) * 1e5, [Link("d", "a", "ground")])
-    loop = Loop(frame, pulse(end=0.3), {"d": dashpot(2e3, fy=50.0)}, Passive())
+    loop = SystemLoop(frame, pulse(end=0.3), {"d": dashpot(2e3, fy=50.0)}, Passive())
     slow, fast = loop.run(1e-3, machine=False), loop.run(1e-3, machine=True)
     assert fast.x == pytest.approx(slow.x, rel=1e-12, abs=1e-15)
 

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from mrdamper.cli import application
 from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.inputs import load_input
-from mrdamper.systems.simulate import Loop, simulate_system
+from mrdamper.systems.simulate import SystemLoop, simulate_system
 from mrdamper.systems.system_file import load_system
 
 # displacement [cm], drift [cm], acceleration [cm/s²], force [N]
@@ -25,7 +25,7 @@ def test_the_printed_table(volts):
     file = load_system("dyke1996")
     dampers = {} if volts == "uncontrolled" else file.dampers
     current = 0.0 if volts == "uncontrolled" else volts / 3
-    loop = Loop(file.system, load_input("elcentro", time_scale=5), dampers, Passive(current))
+    loop = SystemLoop(file.system, load_input("elcentro", time_scale=5), dampers, Passive(current))
     found = loop.run(1e-3, machine=False)
     x, drift, a, force = PRINTED[volts]
     assert 100 * found.peaks["displacement_m"] == pytest.approx(x, rel=0.04)

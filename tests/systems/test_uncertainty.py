@@ -22,7 +22,7 @@ from mrdamper.systems.inputs import load_input
 from mrdamper.systems.inputs.record import record
 from mrdamper.systems.monte_carlo import Draw, draw, monte_carlo
 from mrdamper.systems.rise_time import rise_times
-from mrdamper.systems.simulate import Loop
+from mrdamper.systems.simulate import SystemLoop
 from mrdamper.systems.structure import Link, quarter_car, shear_building
 
 CAR = quarter_car("car", 300, 40, 20e3, 200e3)
@@ -42,12 +42,12 @@ DAMPERS = {"joint": (joint_damper(), ("c0", "c1")), "modified": (modified_damper
 def test_other_numbers_in_one_loop_are_other_dampers(kind):
     damper, names = DAMPERS[kind]
     damper = certain(damper, names, [0.05, 0.05] if damper.fitted_parameters[names[0]].log else [60.0, 40.0])
-    loop = Loop(CAR, ROAD, {"damper": damper}, Passive(0.5), free=True)
+    loop = SystemLoop(CAR, ROAD, {"damper": damper}, Passive(0.5), free=True)
     draws = draw({"damper": damper}, 3, seed=4)
     bands = monte_carlo(loop, draws, loop.run(1e-3, machine=False))
     for row, one in zip(bands.peaks["acceleration_m_s2"], draws, strict=True):
         other = damper.with_parameters(one["damper"].numbers)
-        alone = Loop(CAR, ROAD, {"damper": other}, Passive(0.5)).run(bands.step, machine=False)
+        alone = SystemLoop(CAR, ROAD, {"damper": other}, Passive(0.5)).run(bands.step, machine=False)
         assert row == pytest.approx(alone.peaks["acceleration_m_s2"], rel=1e-9)
     low, middle, high = bands.quantiles()["force_N"]
     assert low < middle < high
@@ -58,7 +58,7 @@ def test_a_session_brings_a_gain_and_an_offset():
     frame = shear_building("still", [1e9], [1e12], [0.0], [Link("d", "floor1", "ground")])  # moves as it would alone
     damper = joint_damper()
     quake = record(np.arange(0, 0.5, 0.01), np.sin(20 * np.arange(0, 0.5, 0.01)), "acceleration_m_s2")
-    loop = Loop(frame, quake, {"d": damper}, Passive(0.5))
+    loop = SystemLoop(frame, quake, {"d": damper}, Passive(0.5))
     bands = monte_carlo(loop, [{"d": Draw()}, {"d": Draw(gain=0.1)}, {"d": Draw(offset=50.0)}], loop.run(1e-3))
     plain, more, pushed = bands.peaks["force_N"][:, 0]
     assert more == pytest.approx(1.1 * plain, rel=1e-6)

@@ -18,7 +18,7 @@ import numpy as np
 from mrdamper.dampers.causal import SLACK, causal_force
 from mrdamper.dampers.certainty import Certainty, FittedParameter, table
 from mrdamper.dampers.coil import Coil
-from mrdamper.data import Condition, Floats, Run, Shown, same_condition
+from mrdamper.data import Condition, Displayable, Floats, Run, same_condition
 from mrdamper.errors import InputError, checked
 from mrdamper.models import Model
 from mrdamper.physics.motion import Excitation, equivalent_sine, measured_motion
@@ -149,7 +149,7 @@ def samples_in_knee(motion: Excitation, knee: float) -> float:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Prediction(Shown):
+class Prediction(Displayable):
     """A predicted force.
 
     Attributes
@@ -228,7 +228,7 @@ class Saved:
     __pydantic_config__: ClassVar = {"extra": "forbid", "allow_inf_nan": False}
 
 
-class Damper(Shown):
+class Damper(Displayable):
     """An identified damper. Subclasses are frozen dataclasses, found by their file.
 
     Attributes

@@ -26,7 +26,7 @@ from mrdamper.physics.hysteresis.batch import follow_alike
 from mrdamper.statistics.functions.fitting import fit_function, require_determined
 from mrdamper.statistics.functions.forms import FORMS, Form, ParameterFunction, features
 from mrdamper.statistics.functions.selection import broken_law, fold_groups, rises, smaller_wins, supported
-from mrdamper.statistics.levenberg_marquardt import least_squares, polished
+from mrdamper.statistics.levenberg_marquardt import least_squares, newton_refine
 from mrdamper.statistics.linear import on_one_blas_thread, project_out_columns, robust_weights, solve_linear
 
 _RUNG = 1500 ** (1 / 40)  # from one yield displacement to the next; between them Gram matrices are interpolated
@@ -303,7 +303,7 @@ def fit_jointly(
         if settled:
             break
     if polish:
-        centre = polished(last.gradient, centre, *box)
+        centre = newton_refine(last.gradient, centre, *box)
     solution = last.solution(centre)
     function = ParameterFunction(start.form, tuple((centre / search.scale).tolist()), start.rates, log=True)
     made = _finish(design, solution, {data.shape: function})

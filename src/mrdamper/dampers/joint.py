@@ -25,8 +25,8 @@ from mrdamper.dampers.strung import Linearised, Part, Table
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, ParameterError, require
 from mrdamper.models import Model, Scale, SearchAxis, model_type
-from mrdamper.statistics.ending import Ending
-from mrdamper.statistics.levenberg_marquardt import Minimum, least_squares, polished
+from mrdamper.statistics.ending import StopReason
+from mrdamper.statistics.levenberg_marquardt import Minimum, least_squares, newton_refine
 from mrdamper.statistics.linear import on_one_blas_thread
 
 RISE, FALL = "coil.rise_s", "coil.fall_s"  # names of the coil's lags on the search axes
@@ -158,7 +158,7 @@ class JointFit:
     at_bounds : tuple of str
     point : (D,) array
         Where the search ended, on its axes.
-    ending : Ending
+    ending : StopReason
     evaluations : int
     seconds : float
     searched : tuple of str
@@ -170,7 +170,7 @@ class JointFit:
     nrmse_pp: Floats
     at_bounds: tuple[str, ...]
     point: Floats
-    ending: Ending
+    ending: StopReason
     evaluations: int
     seconds: float
     searched: tuple[str, ...] = ()
@@ -378,7 +378,7 @@ class JointProblem:
         to_the_last_digit: bool = False,
     ) -> JointFit:
         """Search in rounds, with weights by the errors the last one left."""
-        evaluations, ending, curved = 0, Ending.SOLVED, settled < _SETTLED
+        evaluations, ending, curved = 0, StopReason.SOLVED, settled < _SETTLED
         for left in reversed(range(rounds)):
             if self.axes:
                 found = least_squares(
@@ -387,7 +387,7 @@ class JointProblem:
                 point, ending = found.point, found.ending
                 evaluations += found.evaluations
                 if to_the_last_digit and not left:
-                    point = polished(table.gradient, point, *self.box())
+                    point = newton_refine(table.gradient, point, *self.box())
             table.weigh(table.solve(point).nrmse_pp)
         solved = table.solve(point)
         return JointFit(

@@ -44,7 +44,7 @@ UNITS = {
 }
 
 
-class _Strict(BaseModel):
+class _SavedPart(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
@@ -64,7 +64,7 @@ Signed = Annotated[tuple[float, float], AfterValidator(_ascending)]
 Range = Annotated[Signed, AfterValidator(_not_negative)]
 
 
-class _Envelope(_Strict):
+class _Envelope(_SavedPart):
     current_A: Signed
     frequency_Hz: Range
     amplitude_m: Range
@@ -73,14 +73,14 @@ class _Envelope(_Strict):
     conditions: tuple[tuple[float, float, float], ...] | None = None  # tested: [A], [Hz], [m]
 
 
-class _Driver(_Strict):
+class _Driver(_SavedPart):
     amperes_per_volt: float
     resistance_ohm: float = 0.0
     inductance_H: float = 0.0
     limit_A: float | None = None
 
 
-class _Coil(_Strict):
+class _Coil(_SavedPart):
     rise_s: float
     fall_s: float
     driver: _Driver | None = None
@@ -90,20 +90,20 @@ class _Coil(_Strict):
 Deviation = Annotated[float, Field(ge=0, le=1e12)]
 
 
-class _Session(_Strict):
+class _Session(_SavedPart):
     gain: Deviation
     offset_N: Deviation
     degrees_of_freedom: Deviation
 
 
-class _ModelError(_Strict):
+class _ModelError(_SavedPart):
     force: Deviation
     peak: Deviation
     energy: Deviation
     left_out: int
 
 
-class _Covariance(_Strict):
+class _Covariance(_SavedPart):
     parameters: tuple[str, ...]
     logarithmic: tuple[bool, ...]
     matrix: tuple[tuple[float, ...], ...]
@@ -120,7 +120,7 @@ class _Covariance(_Strict):
     calibration: Calibration | None = None  # since 1.5
 
 
-class _Document(_Strict):
+class _Document(_SavedPart):
     format: Literal["mrdamper-model"]
     version: str
     rig: str

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from mrdamper.data.runs import Run, Split
-from mrdamper.data.shown import Shown
+from mrdamper.data.shown import Displayable
 from mrdamper.errors import RunError, UnknownNameError, check_fields, checked
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Dataset(Shown):
+class Dataset(Displayable):
     """Runs that belong together.
 
     Attributes

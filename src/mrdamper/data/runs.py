@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mrdamper.data.conditions import Condition
 from mrdamper.data.pieces import pieces, taken
-from mrdamper.data.shown import Shown
+from mrdamper.data.shown import Displayable
 from mrdamper.errors import (
     NonFiniteError,
     RunError,
@@ -39,7 +39,7 @@ _LONGEST_NAME = 255
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Run(Shown):
+class Run(Displayable):
     """One recorded test.
 
     Attributes

@@ -13,7 +13,7 @@ import numpy as np
 _ROWS_SHOWN = 30  # of a table in a notebook
 
 
-class Shown(ABC):
+class Displayable(ABC):
     """Object with a headline for a notebook and a table that can be exported as a data frame."""
 
     @property

@@ -20,7 +20,7 @@ from mrdamper.export.templates import render
 from mrdamper.models import Model
 from mrdamper.tracing import Program
 from mrdamper.tracing.c_writer import CWriter
-from mrdamper.tracing.tape import Table
+from mrdamper.tracing.tape import LookupTable
 
 TOLERANCE = 1e-9  # of the largest force: the self-test forgives other compilers and libraries this much
 _SAMPLES = 400
@@ -159,12 +159,12 @@ def c_facts(made: Stream, name: str, rig: str, language: type[CWriter] = CWriter
     }
 
 
-def shared_points(tables: Sequence[Table]) -> list[Floats]:
+def shared_points(tables: Sequence[LookupTable]) -> list[Floats]:
     """Points at the nodes (K, 4), once for the tables that read them forwards and backwards."""
     return list({id(table.points): table.points for table in tables}.values())
 
 
-def _tables(tables: Sequence[Table], number: Callable[[float], str]) -> dict[str, Any]:
+def _tables(tables: Sequence[LookupTable], number: Callable[[float], str]) -> dict[str, Any]:
     shared = shared_points(tables)
     return {
         "curves": [

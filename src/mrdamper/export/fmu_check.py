@@ -33,7 +33,7 @@ _TOKEN = re.compile(rb'(?:guid|instantiationToken)="([^"]*)"')
 
 
 @dataclass(frozen=True)
-class Finding:
+class FmuFinding:
     """Something about an FMU its user should know; a note says what could not be looked at."""
 
     code: str
@@ -44,7 +44,7 @@ class Finding:
         return f"{self.text} [{self.code}]"
 
 
-def check_fmu(path: str | Path) -> list[Finding]:
+def check_fmu(path: str | Path) -> list[FmuFinding]:
     """Look at everything an FMU made by `FMUExporter` promises; no findings if all is well.
 
     The binary runs on this machine with this user's rights: check only FMUs you would run. Raises `MissingExtraError`
@@ -55,9 +55,9 @@ def check_fmu(path: str | Path) -> list[Finding]:
     try:
         files = _unpacked(Path(path))
     except _UNREADABLE as error:
-        return [Finding("E_FMU_ARCHIVE", f"{Path(path).name} cannot be unpacked: {error}")]
+        return [FmuFinding("E_FMU_ARCHIVE", f"{Path(path).name} cannot be unpacked: {error}")]
     if "modelDescription.xml" not in files:
-        return [Finding("E_FMU_DESCRIPTION", "there is no modelDescription.xml")]
+        return [FmuFinding("E_FMU_DESCRIPTION", "there is no modelDescription.xml")]
     binaries, notes = _binary_for_here(files)
     loadable = bool(binaries) or not notes
     return [*_token(files), *notes, *_probed({**files, **binaries}, loadable)]
@@ -74,21 +74,21 @@ def _unpacked(path: Path) -> dict[str, bytes]:
         return {entry.filename: archive.read(entry) for entry in entries}
 
 
-def _token(files: Mapping[str, bytes]) -> list[Finding]:
+def _token(files: Mapping[str, bytes]) -> list[FmuFinding]:
     found = _TOKEN.search(files["modelDescription.xml"])
     token = found[1] if found else b""
     texts = {path: text.replace(token, b"") for path, text in files.items() if not path.startswith("binaries/")}
     if token and token_of(texts).encode() == token:
         return []
     text = f"the token {token.decode(errors='replace')} was not made from these texts: something was changed afterwards"
-    return [Finding("E_FMU_TOKEN", text)]
+    return [FmuFinding("E_FMU_TOKEN", text)]
 
 
-def _binary_for_here(files: Mapping[str, bytes]) -> tuple[dict[str, bytes], list[Finding]]:
+def _binary_for_here(files: Mapping[str, bytes]) -> tuple[dict[str, bytes], list[FmuFinding]]:
     """Nothing where the binary for this machine is there; one made of the sources where it is not."""
     platform, described = here(), files["modelDescription.xml"]
     if platform is None:
-        return {}, [Finding("N_FMU_PLATFORM", "binaries cannot be run on this machine", "note")]
+        return {}, [FmuFinding("N_FMU_PLATFORM", "binaries cannot be run on this machine", "note")]
     folder = platform.fmi2 if b'fmiVersion="2' in described else platform.name
     name = re.search(rb'modelIdentifier="(\w+)"', described)
     path = f"binaries/{folder}/{name[1].decode() if name else ''}{platform.suffix}"
@@ -98,12 +98,12 @@ def _binary_for_here(files: Mapping[str, bytes]) -> tuple[dict[str, bytes], list
     built = build_library(sources, platform)
     if built.library is None:
         text = f"there is no {path}, and its sources were not compiled: {built.reason}"
-        return {}, [Finding("N_FMU_PLATFORM", text, "note")]
+        return {}, [FmuFinding("N_FMU_PLATFORM", text, "note")]
     text = f"there is no {path}; its sources were compiled instead"
-    return {path: built.library}, [Finding("N_FMU_PLATFORM", text, "note")]
+    return {path: built.library}, [FmuFinding("N_FMU_PLATFORM", text, "note")]
 
 
-def _probed(files: Mapping[str, bytes], loadable: bool) -> list[Finding]:
+def _probed(files: Mapping[str, bytes], loadable: bool) -> list[FmuFinding]:
     """Validate and simulate the unpacked FMU in a process of its own; return its findings and how it ended."""
     with temporary_folder() as folder:
         unpacked, report = folder / "fmu", folder / "report"
@@ -118,7 +118,7 @@ def _probed(files: Mapping[str, bytes], loadable: bool) -> list[Finding]:
         except subprocess.TimeoutExpired:
             died = f"did not answer within {_PATIENCE} s"
         lines = [json.loads(line) for line in report.read_text().splitlines()] if report.exists() else []
-    findings = [Finding(code, text) for code, text in lines if code.startswith("E_")]
+    findings = [FmuFinding(code, text) for code, text in lines if code.startswith("E_")]
     if lines and lines[-1][0] == "end":
         return findings
-    return [*findings, Finding("E_FMU_BINARY", f"the binary {died} at the {lines[-1][1] if lines else 'start'}")]
+    return [*findings, FmuFinding("E_FMU_BINARY", f"the binary {died} at the {lines[-1][1] if lines else 'start'}")]

@@ -15,7 +15,7 @@ import numpy as np
 def main(folder: str, report: str, tolerance: str, *binary: str) -> None:
     """Check the FMU unpacked in `folder`, and its binary if a further argument is given."""
     probe = _Probe(folder, Path(report))
-    with contextlib.suppress(_EndedError):
+    with contextlib.suppress(_ProbeEndedError):
         probe.read()
         if binary:
             fmu = probe.load()
@@ -24,7 +24,7 @@ def main(folder: str, report: str, tolerance: str, *binary: str) -> None:
     probe.note("end")
 
 
-class _EndedError(Exception):
+class _ProbeEndedError(Exception):
     """A finding after which nothing more can be checked."""
 
 
@@ -47,7 +47,7 @@ class _Probe:
     def fail(self, code: str, text: object) -> NoReturn:
         """Add a finding after which nothing more can be checked."""
         self.note(code, text)
-        raise _EndedError
+        raise _ProbeEndedError
 
     def read(self) -> None:
         """Validate the XML; read the description and the reference."""

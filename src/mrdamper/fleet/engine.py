@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from mrdamper.errors import InputError, MissingExtraError
-from mrdamper.fleet.guard import Guard, JobError, Limits
+from mrdamper.fleet.guard import JobError, JobLimits, KillableWorker
 
 Row = dict[str, Any]
 Submit = Callable[[Row], "Future[Row]"]
@@ -28,16 +28,16 @@ class ClusterError(InputError):
 
 
 @contextmanager
-def local_engine(workers: int, limits: Limits) -> Iterator[tuple[Submit, int]]:
+def local_engine(workers: int, limits: JobLimits) -> Iterator[tuple[Submit, int]]:
     """Jobs on this machine, each worker a process that can be killed; no socket listens.
 
     Yields a function from the argument of a job to the future of its row, and how many run at once.
     """
     held = threading.local()
-    guards: list[Guard] = []
+    guards: list[KillableWorker] = []
 
     def begin() -> None:
-        held.guard = Guard(limits)
+        held.guard = KillableWorker(limits)
         guards.append(held.guard)
 
     pool = ThreadPoolExecutor(workers, thread_name_prefix="fleet", initializer=begin)
@@ -69,7 +69,7 @@ def outcome(future: Future[Row]) -> Row:
         return refused(JobError(_first_line(error), mend="run the same command again"))
 
 
-def guarded(guard: Guard, job: Row) -> Row:
+def guarded(guard: KillableWorker, job: Row) -> Row:
     """Run a job in a process with limits and return its row, also where the process fails."""
     from mrdamper.fleet.job import refused
 
@@ -81,7 +81,7 @@ def guarded(guard: Guard, job: Row) -> Row:
 
 @contextmanager
 def cluster_engine(
-    address: str, limits: Limits, tls: str | Path | None = None, patience: float = 10.0
+    address: str, limits: JobLimits, tls: str | Path | None = None, patience: float = 10.0
 ) -> Iterator[tuple[Submit, int]]:
     """Jobs on a Dask cluster, each in a process that can be killed beside its worker; yields as `local_engine`.
 
@@ -128,11 +128,11 @@ _HELD = threading.local()
 
 def on_cluster(job: Row, limits: dict[str, Any]) -> Row:
     """Run a job on a worker of the cluster; each of its threads keeps a process of its own."""
-    guard: Guard | None = getattr(_HELD, "guard", None)
+    guard: KillableWorker | None = getattr(_HELD, "guard", None)
     if guard is None or _HELD.limits != limits:
         if guard is not None:
             guard.close()
-        _HELD.limits, _HELD.guard = limits, Guard(Limits(**limits))
+        _HELD.limits, _HELD.guard = limits, KillableWorker(JobLimits(**limits))
         atexit.register(_HELD.guard.close)
         guard = _HELD.guard
     return guarded(guard, job)

@@ -72,7 +72,7 @@ class VirtualDamper:
 
 
 @dataclass(frozen=True)
-class Line:
+class Population:
     """Production and test plan of a synthetic population of dampers."""
 
     dampers: int = 200
@@ -131,7 +131,7 @@ def _scaled(rig: VirtualRig, factors: Mapping[str, float]) -> VirtualRig:
     return replace(rig, **{name: getattr(rig, name) * float(factor) for name, factor in factors.items()})
 
 
-def write_fleet(dampers: Iterator[VirtualDamper] | Line, folder: str | Path) -> None:
+def write_fleet(dampers: Iterator[VirtualDamper] | Population, folder: str | Path) -> None:
     """Write a dataset folder a damper and session: SERIAL, or SERIAL-SESSION for golden dampers.
 
     Raises `OutputError` if a folder exists already or cannot be written.

@@ -33,7 +33,7 @@ class JobError(InputError):
 
 
 @dataclass(frozen=True)
-class Limits:
+class JobLimits:
     """Limits of one job."""
 
     cpu_s: float = 120.0
@@ -41,11 +41,11 @@ class Limits:
     memory_bytes: int = 2 * 2**30  # of its process and everything that process starts
 
 
-class Guard:
+class KillableWorker:
     """Runs jobs one after the other in a process of its own."""
 
-    def __init__(self, limits: Limits | None = None):
-        self._limits = limits or Limits()
+    def __init__(self, limits: JobLimits | None = None):
+        self._limits = limits or JobLimits()
         self._process: subprocess.Popen[bytes] | None = None
         self._closed = False
 

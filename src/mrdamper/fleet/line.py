@@ -13,7 +13,7 @@ from typing import Any
 from mrdamper.data.atomic import require_writable
 from mrdamper.errors import InputError
 from mrdamper.fleet.engine import Submit, cluster_engine, local_engine, outcome
-from mrdamper.fleet.guard import Limits
+from mrdamper.fleet.guard import JobLimits
 from mrdamper.fleet.item import Item, digest_of, hash_of
 from mrdamper.fleet.items import find_items
 from mrdamper.fleet.job import VERSION, Settings, as_job, refused
@@ -52,7 +52,7 @@ def run_fleet(
     scheduler: str | None = None,
     tls: str | Path | None = None,
     patience: float = 10.0,
-    limits: Limits | None = None,
+    limits: JobLimits | None = None,
     progress: Progress = lambda what, share: None,
 ) -> Fleet:
     """Identify every damper of a source that is not yet in the journal of `out`, and write the table.
@@ -79,7 +79,7 @@ def run_fleet(
         Folder with ca.pem, cert.pem and key.pem, for a tls:// scheduler.
     patience : float
         Time in which a scheduler has to answer [s].
-    limits : Limits, optional
+    limits : JobLimits, optional
         Of one damper's job.
     progress : callable
 
@@ -111,8 +111,8 @@ def run_fleet(
     journal = Journal(out)
     try:
         line = _Line(items, settings, journal, progress)
-        engine = cluster_engine(scheduler, limits or Limits(), tls, patience) if scheduler else local_engine(
-            workers, limits or Limits()
+        engine = cluster_engine(scheduler, limits or JobLimits(), tls, patience) if scheduler else local_engine(
+            workers, limits or JobLimits()
         )  # fmt: skip
         with engine as (submit, slots):
             line.run(submit, slots)

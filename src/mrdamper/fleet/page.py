@@ -16,7 +16,7 @@ from mrdamper.errors import ColumnError
 from mrdamper.fleet.charts import Gauge, capability, ewma, gauge_study, individuals
 from mrdamper.fleet.job import OTHER_RIG
 from mrdamper.fleet.plan import Plan
-from mrdamper.fleet.profile import Limit
+from mrdamper.fleet.profile import ColumnLimits
 from mrdamper.fleet.verdicts import FEATURES, clock_findings, drift, suspects, with_features
 from mrdamper.report.page import render_page
 from mrdamper.report.plots.style import PALETTE, Picture, label, new_figure
@@ -29,7 +29,7 @@ _WORST = 10
 _MOST_NAMED = 50  # refused or failed dampers, and suspects, that the page lists
 
 
-def write_page(table: Path, plan: Plan | None, limits: Mapping[str, Limit], path: Path) -> list[str]:
+def write_page(table: Path, plan: Plan | None, limits: Mapping[str, ColumnLimits], path: Path) -> list[str]:
     """Write the page of a line; gives what a terminal should say: suspects, drift, limits.
 
     Without limits (by column of the table) nothing passes or fails. Raises `ColumnError` if a limit is for no column of
@@ -102,7 +102,7 @@ def _gauge(golden: pl.DataFrame, line: pl.DataFrame, name: str) -> Gauge | None:
     return gauge_study(wide.drop_nulls().to_numpy().astype(float), _values(line, name)) if wide.height else None
 
 
-def _judged(line: pl.DataFrame, name: str, limit: Limit) -> dict[str, Any]:
+def _judged(line: pl.DataFrame, name: str, limit: ColumnLimits) -> dict[str, Any]:
     values = _values(line, name)
     outside = (values < (-np.inf if limit.lower is None else limit.lower)) | (
         values > (np.inf if limit.upper is None else limit.upper)

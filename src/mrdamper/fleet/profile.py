@@ -26,11 +26,11 @@ _TRUE = ("true", "yes", "1")
 _HELP = "correct it; docs/how-to/fleet.md shows every key"
 
 
-class _Table(BaseModel):
+class _ProfileTable(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class FleetProfile(_Table):
+class FleetProfile(_ProfileTable):
     """The fleet profile, a TOML file; every key may be left out."""
 
     # pattern of the names of folders or files: {serial}, {session}, {batch}, {date}, and * for anything:
@@ -89,14 +89,14 @@ class FleetProfile(_Table):
         return facts["serial"] in self.golden or facts.get("golden", "").lower() in _TRUE
 
 
-class Limit(_Table):
+class ColumnLimits(_ProfileTable):
     """Lowest and highest allowed value of a column; one of them may be left out."""
 
     lower: float | None = Field(default=None, allow_inf_nan=False)
     upper: float | None = Field(default=None, allow_inf_nan=False)
 
     @model_validator(mode="after")
-    def _lower_lies_below(self) -> Limit:
+    def _lower_lies_below(self) -> ColumnLimits:
         if self.lower is None and self.upper is None:
             raise ValueError("give lower, upper or both")
         if self.lower is not None and self.upper is not None and self.lower >= self.upper:
@@ -105,7 +105,7 @@ class Limit(_Table):
 
 
 _OTHER_PARTS: dict[str, Any] = {name: (Any, None) for name in (FORCE_LIMITS, *RIG_LIMITS)}  # of other commands
-_Limits = create_model("_Limits", __base__=_Table, limits=(dict[str, Limit], ...), **_OTHER_PARTS)
+_Limits = create_model("_Limits", __base__=_ProfileTable, limits=(dict[str, ColumnLimits], ...), **_OTHER_PARTS)
 
 
 def load_fleet_profile(path: str | Path | None) -> FleetProfile:
@@ -121,7 +121,7 @@ def load_fleet_profile(path: str | Path | None) -> FleetProfile:
     return profile.model_copy(update={"rig": str(Path(path).absolute().parent / profile.rig)})
 
 
-def load_limits(path: str | Path) -> dict[str, Limit]:
+def load_limits(path: str | Path) -> dict[str, ColumnLimits]:
     """Read the column limits of a limits file: tables [limits.COLUMN] with lower, upper or both.
 
     Raises `LimitsError` if it is no TOML, a key is not known, or a lower limit is not below the upper.

@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.identification.columns import linear_table
-from mrdamper.identification.covariance import Spread, spread
+from mrdamper.identification.covariance import ParameterCovariance, spread
 from mrdamper.identification.intervals import weaknesses
 from mrdamper.identification.problem import DELAY, Problem, RunCertainty, Solution
 from mrdamper.physics.motion import Excitation
@@ -61,7 +61,9 @@ def certainty_of_run(
     return RunCertainty(shown, dof, {name: effective[name] for name in shown}, tuple(doubts))
 
 
-def _unseen(problem: Problem, names: Sequence[str], columns: Floats, residual: Floats, found: Spread) -> list[str]:
+def _unseen(
+    problem: Problem, names: Sequence[str], columns: Floats, residual: Floats, found: ParameterCovariance
+) -> list[str]:
     """Parameters of the hysteresis where the other columns alone explain the force as well [Davies 1987].
 
     Both fits determine every linear parameter anew: a method that computes some of them in closed form has a

@@ -27,7 +27,7 @@ _NO_MORE = 1e-12  # of the largest: eigenvalue of the scaled normal matrix below
 
 
 @dataclass(frozen=True, eq=False)
-class Spread:
+class ParameterCovariance:
     """Covariance of parameters.
 
     Attributes
@@ -59,7 +59,9 @@ class Spread:
         return np.sqrt(np.diag(self.covariance))
 
 
-def spread(jacobian: Floats, residual: Floats, time: Floats | None = None, frequency: float | None = None) -> Spread:
+def spread(
+    jacobian: Floats, residual: Floats, time: Floats | None = None, frequency: float | None = None
+) -> ParameterCovariance:
     """Covariance of the parameters of a least-squares fit to one record.
 
     (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹ with Σ from the residual: an autoregression whose order an
@@ -86,7 +88,7 @@ def spread(jacobian: Floats, residual: Floats, time: Floats | None = None, frequ
     size, count = residual.size, scale.size
     covariance = np.diag(np.full(count, np.inf))
     if not known.any():
-        return Spread(covariance, np.ones(count), np.zeros(count), np.full(count, np.inf), np.inf)
+        return ParameterCovariance(covariance, np.ones(count), np.zeros(count), np.full(count, np.inf), np.inf)
     unit = jacobian[:, known] / scale[known]
     values, vectors = np.linalg.eigh(unit.T @ unit)
     safe = np.maximum(values, np.finfo(float).eps * values[-1] * known.sum())
@@ -108,7 +110,7 @@ def spread(jacobian: Floats, residual: Floats, time: Floats | None = None, frequ
         effective = np.nan_to_num(whole * textbook / np.diag(covariance), nan=0.0, posinf=float(whole))
     free = np.ones(count)
     free[rows] = np.clip(dof, 1.0, max(size - known.sum(), 1))
-    return Spread(covariance, free, np.minimum(effective, whole), np.sqrt(textbook), memory, alike)
+    return ParameterCovariance(covariance, free, np.minimum(effective, whole), np.sqrt(textbook), memory, alike)
 
 
 def alike_groups(vectors: Floats) -> list[tuple[list[int], int]]:

@@ -38,20 +38,20 @@ class Elimination:
         Columns that stay, at the scored samples.
     right : (N,) array
         Measured force less the force without linear parameters [N].
-    kind : Kind
+    kind : LinearStructure
     """
 
     problem: Problem
     columns: Floats
     right: Floats
-    kind: Kind
+    kind: LinearStructure
 
     @classmethod
     def of(cls, problem: Problem, axes: Sequence[SearchAxis]) -> Self | None:
         """Evaluate the columns that stay; None where the model or the search is of another kind."""
         if any(axis.name == DELAY for axis in axes):
             return None
-        kind = kind_of(problem.model_type, problem.free, tuple(sorted(problem.fixed.items())))
+        kind = linear_structure(problem.model_type, problem.free, tuple(sorted(problem.fixed.items())))
         if kind is None or kind.coordinates != tuple(axis.name for axis in axes):
             return None
         base, columns = linear_table(kind.bare, kind.others, problem.seen, np.zeros(len(problem.seen)))
@@ -100,7 +100,7 @@ class Elimination:
 
 
 @dataclass(frozen=True)
-class Kind:
+class LinearStructure:
     """Structure of the search: the linear and the nonlinear parameters of a model.
 
     Attributes
@@ -135,7 +135,9 @@ class Kind:
 
 
 @lru_cache
-def kind_of(model_type: type[Model], free: tuple[str, ...], fixed: tuple[tuple[str, float], ...]) -> Kind | None:
+def linear_structure(
+    model_type: type[Model], free: tuple[str, ...], fixed: tuple[tuple[str, float], ...]
+) -> LinearStructure | None:
     """Ask a model what its state is, at two places of the search.
 
     Parameters
@@ -148,7 +150,7 @@ def kind_of(model_type: type[Model], free: tuple[str, ...], fixed: tuple[tuple[s
 
     Returns
     -------
-    Kind or None
+    LinearStructure or None
         None where the state fills no column of its own, or that column's parameter is held.
     """
     linear = tuple(i for i in model_type.parameters() if i.linear and i.name in free)
@@ -161,7 +163,9 @@ def kind_of(model_type: type[Model], free: tuple[str, ...], fixed: tuple[tuple[s
         bare = [model_type.build({**point, **{i.name: 0.0 for i in linear}}) for point in points]
     except ParameterError:  # what is held leaves no room at one of the places
         return None
-    found = Kind(tuple(axis.name for axis in axes), state, tuple(i for i in linear if i is not state), bare[0])
+    found = LinearStructure(
+        tuple(axis.name for axis in axes), state, tuple(i for i in linear if i is not state), bare[0]
+    )
     shape = bare[0].shape
     if shape is None or not {_LENGTH} <= set(found.coordinates) <= {_LENGTH, _ASYMMETRY, _SHARPNESS}:
         return found
@@ -170,7 +174,7 @@ def kind_of(model_type: type[Model], free: tuple[str, ...], fixed: tuple[tuple[s
     return shaped if all(_has_shape(shaped, *pair) for pair in zip(bare, points, strict=True)) else found
 
 
-def _has_shape(kind: Kind, model: Model, point: Mapping[str, float]) -> bool:
+def _has_shape(kind: LinearStructure, model: Model, point: Mapping[str, float]) -> bool:
     shape, expected = model.shape, kind.shape(point)
     if shape is None or expected is None:
         return False

@@ -11,13 +11,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mrdamper.data import Condition, Floats, Run, Shown
+from mrdamper.data import Condition, Displayable, Floats, Run
 from mrdamper.errors import IdentificationError, UnknownNameError, checked
 from mrdamper.identification.intervals import NOT_IDENTIFIABLE, interval_about, written
 from mrdamper.models import Model
 from mrdamper.physics.gas_spring import GasSpring
 from mrdamper.physics.motion import Excitation, MotionAnalysis, analyse_motion, measured_motion
-from mrdamper.statistics.ending import Ending
+from mrdamper.statistics.ending import StopReason
 from mrdamper.statistics.metrics import Scores
 
 DELAY = "delay"  # name of the search coordinate
@@ -143,7 +143,7 @@ class Solution:
     start, end : mapping
         Search coordinates.
     evaluations : int
-    ending : Ending
+    ending : StopReason
     seed : int or None
     notes : tuple of str
     """
@@ -154,7 +154,7 @@ class Solution:
     start: Mapping[str, float]
     end: Mapping[str, float]
     evaluations: int
-    ending: Ending
+    ending: StopReason
     seed: int | None = None
     notes: tuple[str, ...] = ()
 
@@ -195,7 +195,7 @@ class RunCertainty:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Identification(Shown):
+class Identification(Displayable):
     """A model identified from one run.
 
     Attributes
@@ -220,7 +220,7 @@ class Identification(Shown):
         Search coordinates the refinement began and ended at.
     evaluations : int
         Forces computed.
-    ending : Ending
+    ending : StopReason
         Why the search ended.
     seed : int or None
         Of the random search, where one was used.
@@ -245,7 +245,7 @@ class Identification(Shown):
     start: Mapping[str, float]
     end: Mapping[str, float]
     evaluations: int
-    ending: Ending
+    ending: StopReason
     seed: int | None
     notes: tuple[str, ...]
     residual: Floats

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from mrdamper.discovery import Part, Registry
+from mrdamper.discovery import ExtensionPart, Registry
 from mrdamper.models.base import Model, Scale, SearchAxis
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ def all_models() -> Mapping[str, type[Model]]:
     return _registry.types
 
 
-def model_parts() -> tuple[Part, ...]:
+def model_parts() -> tuple[ExtensionPart, ...]:
     """Every model with the package that provides it."""
     return _registry.parts
 

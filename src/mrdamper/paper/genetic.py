@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mrdamper.errors import ParameterError
-from mrdamper.statistics.ending import Ending
+from mrdamper.statistics.ending import StopReason
 from mrdamper.statistics.linear import Floats
 
 GENERATIONS_OF_MANY = 60  # generations of a search that is one of dozens
@@ -93,7 +93,7 @@ class GeneticMinimum:
     evaluations: int
     history: Floats
     boxes: tuple[tuple[Floats, Floats], ...]
-    ending: Ending = Ending.GENERATIONS_SPENT
+    ending: StopReason = StopReason.GENERATIONS_SPENT
 
     @property
     def to_settle(self) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import StrEnum
 
 
-class Ending(StrEnum):
+class StopReason(StrEnum):
     """Reason for which a search stopped, as a sentence; programs compare the member itself."""
 
     SOLVED = "solved: every parameter is linear"
@@ -18,4 +18,4 @@ class Ending(StrEnum):
     @property
     def converged(self) -> bool:
         """True if a minimum was reached, inside the bounds or on them."""
-        return self in (Ending.SOLVED, Ending.SETTLED, Ending.NO_STEP, Ending.AT_BOUNDS)
+        return self in (StopReason.SOLVED, StopReason.SETTLED, StopReason.NO_STEP, StopReason.AT_BOUNDS)

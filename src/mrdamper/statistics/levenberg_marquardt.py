@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mrdamper.statistics.ending import Ending
+from mrdamper.statistics.ending import StopReason
 from mrdamper.statistics.linear import Floats
 
 _STEP = 1e-6  # forward difference, relative to the width of the box
@@ -36,14 +36,14 @@ class Minimum:
     cost : float
         Sum of squared residuals.
     evaluations : int
-    ending : Ending
+    ending : StopReason
     """
 
     point: Floats
     residual: Floats
     cost: float
     evaluations: int
-    ending: Ending
+    ending: StopReason
 
 
 def least_squares(
@@ -80,7 +80,7 @@ def least_squares(
     r = residual(point)
     cost, evaluations, damping = float(r @ r), 1, 1e-3
     extra = before = None
-    ending = Ending.STEPS_SPENT
+    ending = StopReason.STEPS_SPENT
     for _ in range(most_steps):
         jacobian = slopes(point) if slopes else forward_differences(residual, point, r, lower, upper)
         evaluations += point.size
@@ -90,7 +90,7 @@ def least_squares(
         held = ((point <= lower) & (gradient > 0)) | ((point >= upper) & (gradient < 0))
         free = ~held & jacobian.any(axis=0)  # a coordinate that changes nothing has no step
         if not free.any():
-            ending = Ending.AT_BOUNDS
+            ending = StopReason.AT_BOUNDS
             break
         better = None
         while better is None and damping < _STIFFEST:
@@ -105,19 +105,19 @@ def least_squares(
             else:
                 damping *= 10
         if better is None:
-            ending = Ending.NO_STEP
+            ending = StopReason.NO_STEP
             break
         moved = float(np.max(np.abs(better[0] - point) / width))
         before, costlier = (point, gradient), cost
         point, r = better
         cost = float(r @ r)
         if costlier - cost <= tolerance * cost or moved < tolerance:
-            ending = Ending.SETTLED
+            ending = StopReason.SETTLED
             break
     return Minimum(point, r, cost, evaluations, ending)
 
 
-def polished(gradient: Callable[[Floats], Floats], point: Floats, lower: Floats, upper: Floats) -> Floats:
+def newton_refine(gradient: Callable[[Floats], Floats], point: Floats, lower: Floats, upper: Floats) -> Floats:
     """Refine the minimum next to a point where a search has stopped, to the last digits.
 
     The cost tells the place of its minimum to half of the digits only, and a search that ends by it

@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mrdamper.statistics.ending import Ending
+from mrdamper.statistics.ending import StopReason
 from mrdamper.statistics.levenberg_marquardt import Minimum
 from mrdamper.statistics.linear import Floats
 
@@ -44,7 +44,7 @@ def least_squares_in_one(
     """
     low, high = -math.inf, math.inf  # places whose gradient points up to, and back to, the minimum
     u, before, best, evaluations = start, None, None, 0
-    ending = Ending.STEPS_SPENT
+    ending = StopReason.STEPS_SPENT
     for _ in range(most_steps):
         found = evaluate(u)
         evaluations += 1
@@ -58,10 +58,10 @@ def least_squares_in_one(
         if before is not None and (gradient - before[1]) * (u - before[0]) > 0:
             curvature = (gradient - before[1]) / (u - before[0])
         if (u <= lower and gradient > 0) or (u >= upper and gradient < 0):
-            ending = Ending.AT_BOUNDS
+            ending = StopReason.AT_BOUNDS
             break
         if gradient**2 <= tolerance * cost * curvature:
-            ending = Ending.SETTLED
+            ending = StopReason.SETTLED
             break
         target = min(max(u - gradient / curvature, lower), upper)
         if not low < target < high:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from mrdamper.data import Dataset, Run, Shown
+from mrdamper.data import Dataset, Displayable, Run
 from mrdamper.errors import InputError, checked
 from mrdamper.rig_files.quality.table import judged
 from mrdamper.study.contradictions import ContradictionError, find_contradictions
@@ -43,7 +43,7 @@ class DatasetFinding:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DatasetCheck(Shown):
+class DatasetCheck(Displayable):
     """The findings on a dataset.
 
     Attributes

@@ -12,7 +12,7 @@ from mrdamper.dampers.bands import band
 from mrdamper.dampers.base import Damper, Prediction
 from mrdamper.dampers.calibration import PredictedRun
 from mrdamper.dampers.sessions import KNOWN, UNKNOWN, Expected, Reading, Sessions, When
-from mrdamper.data import Condition, Run, Shown, same_condition
+from mrdamper.data import Condition, Displayable, Run, same_condition
 from mrdamper.errors import InputError, RunError, UnknownNameError, checked, require
 from mrdamper.statistics.metrics import Scores, dissipated_power, peak_force, score
 
@@ -58,7 +58,7 @@ class RunScore:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Validation(Shown):
+class Validation(Displayable):
     """Scores of several runs.
 
     Attributes

@@ -20,7 +20,7 @@ from mrdamper.dampers.covariance import certain
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.dampers.sessions import Sessions, known_errors
-from mrdamper.data import Dataset, Floats, Run, Shown
+from mrdamper.data import Dataset, Displayable, Floats, Run
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError, checked
 from mrdamper.identification import refuse_clipped
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, at_levels, dynamic_ranges
@@ -58,7 +58,7 @@ STUDIED = ("bouc-wen", "bingham")  # the model of the method, and the one everyb
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RigStudy(Shown):
+class RigStudy(Displayable):
     """The study of one rig.
 
     Attributes
@@ -137,7 +137,7 @@ class RigStudy(Shown):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Study(Shown):
+class Study(Displayable):
     """A study of a dataset, rig by rig.
 
     Attributes

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from mrdamper.dampers.base import Damper
 from mrdamper.systems.controllers import Controller
 from mrdamper.systems.controllers.passive import Passive
-from mrdamper.systems.controllers.preview import Preview
+from mrdamper.systems.controllers.preview import NonCausalOptimum
 from mrdamper.systems.inputs import Input
 from mrdamper.systems.measures import cost
 from mrdamper.systems.result import Simulation
-from mrdamper.systems.simulate import Loop, simulate_system
+from mrdamper.systems.simulate import SystemLoop, simulate_system
 from mrdamper.systems.structure import System
 
 
@@ -54,10 +54,10 @@ def contest(
     first = simulate_system(system, source, dampers, Passive(), step, highest)
     runs = {"no current": first}
     between = {f"{highest:.3g} A": Passive(highest), **{_title(c): c for c in controllers}}
-    several = {**between, Preview.title: Preview()}
+    several = {**between, NonCausalOptimum.title: NonCausalOptimum()}
     for number, (title, controller) in enumerate(several.items()):
         progress(title, number / len(several))
-        runs[title] = Loop(system, source, dampers, controller, highest).run(first.step)
+        runs[title] = SystemLoop(system, source, dampers, controller, highest).run(first.step)
     return Contest(runs)
 
 

@@ -22,7 +22,7 @@ from mrdamper.dampers.streaming import steps_of, stream
 from mrdamper.data import Floats
 from mrdamper.errors import ParameterError, checked, numbers, series
 from mrdamper.tracing import Program, Tape, program
-from mrdamper.tracing.graft import Graft
+from mrdamper.tracing.graft import ProgramCopy
 from mrdamper.tracing.python import python_functions
 
 _ROUNDS = 2  # of the search after the two ends
@@ -115,7 +115,7 @@ def invert_on(
         Largest current [A].
     """
     bare = stream(replace(damper, coil=None)).step  # type: ignore[type-var]
-    copy = Graft(bare, tape, prefix, "current", **motion)
+    copy = ProgramCopy(bare, tape, prefix, "current", **motion)
     last = tape.remember(f"{prefix}wanted_current")
     coil = damper.coil or Coil(0.0, 0.0)
     ends = [(0.0, copy.answer(0.0)["force"]), (highest, copy.answer(highest)["force"])]
@@ -137,7 +137,7 @@ def invert_on(
     return Demand(command, copy.settle(felt)["force"], lowest, most)
 
 
-def _searched(tape: Tape, copy: Graft, ends: list[tuple[Any, Any]], target: Any) -> Any:
+def _searched(tape: Tape, copy: ProgramCopy, ends: list[tuple[Any, Any]], target: Any) -> Any:
     """Regula falsi between the ends; one end's weight halved when it stays (Illinois)."""
     (i0, f0), (i1, f1) = ends
     g0, g1 = f0 - target, f1 - target

@@ -30,7 +30,7 @@ Step = Callable[..., Any]
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
+class LoopElement:
     """A function for one sample, with its numbers: (p, derived, memory, inputs) → (status, outputs, memory)."""
 
     step: Step
@@ -48,7 +48,7 @@ class Stage:
         """Gain, offset, parameters: as they are strung together."""
         return (*self.scale, *self.given)
 
-    def scaled(self, gain: float, offset: float) -> Stage:
+    def scaled(self, gain: float, offset: float) -> LoopElement:
         """Return the stage with its first output times a gain, plus an offset."""
         return replace(self, scale=(gain, offset))
 
@@ -57,7 +57,7 @@ class Stage:
         """Numbers of parameters, of what follows from them, and of what is remembered."""
         return len(self.given), len(self.derived), len(self.start)
 
-    def at(self, given: tuple[float, ...]) -> Stage:
+    def at(self, given: tuple[float, ...]) -> LoopElement:
         """Return the stage with other parameters.
 
         Raises `ParameterError` if they need another program: another branch, or other bounds.
@@ -69,7 +69,7 @@ class Stage:
 
 
 @dataclass(frozen=True, eq=False)
-class Numbers:
+class ElementParameters:
     """All numbers of stages, end to end, and where each one's begin."""
 
     given: Floats
@@ -77,22 +77,22 @@ class Numbers:
     start: Floats
 
     @classmethod
-    def of(cls, stages: Sequence[Stage]) -> Numbers:
+    def of(cls, stages: Sequence[LoopElement]) -> ElementParameters:
         def strung(name: str) -> Floats:
             return np.array([value for stage in stages for value in getattr(stage, name)], dtype=float)
 
         return cls(strung("scaled_given"), strung("derived"), strung("start"))
 
 
-def interpreted_walk(elements: Sequence[Stage], control: Stage | None) -> Callable[..., int]:
+def interpreted_loop(elements: Sequence[LoopElement], control: LoopElement | None) -> Callable[..., int]:
     """Return the loop for these stages in the interpreter: `walk` without its first two arguments.
 
     Parameters
     ----------
-    elements : sequence of Stage
+    elements : sequence of LoopElement
         Inputs displacement [m], velocity [m/s], acceleration [m/s²], command [A], dt [s];
         outputs force [N] and flags.
-    control : Stage, optional
+    control : LoopElement, optional
         From signals and dt to one command [A] an element.
     """
     command: Any = _no_command

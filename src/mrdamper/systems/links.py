@@ -9,31 +9,31 @@ import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.causal import trace
-from mrdamper.systems.kernel import Stage
+from mrdamper.systems.kernel import LoopElement
 from mrdamper.systems.structure import Link
 from mrdamper.tracing import Program, Tape, program
 from mrdamper.tracing.python import python_functions, python_source
 
 
-def stage_of(program: Program) -> Stage:
+def stage_of(program: Program) -> LoopElement:
     """Return a traced program as a stage; its parameters as they were traced."""
     prepare, step = python_functions(program)
     given = tuple(float(e.value) for e in program.tape.parameters.values())
     derived = prepare(given)[1]
     lines, tape = python_source(program).count("\n"), program.tape
-    return Stage(
+    return LoopElement(
         step, given, tuple(derived), tuple(tape.starts.values()), program, lines, prepare, tuple(tape.parameters)
     )
 
 
 @lru_cache(maxsize=32)  # a loop is made again for every law
-def damper_stage(damper: Damper, free: bool = False) -> Stage:
+def damper_stage(damper: Damper, free: bool = False) -> LoopElement:
     """Return a damper as a stage, its own parameters free to change if asked for; raises as `stream`."""
     return stage_of(trace(damper, free))
 
 
 @lru_cache(maxsize=32)
-def contact_stage(link: Link) -> Stage:
+def contact_stage(link: Link) -> LoopElement:
     """Return a bump stop, or the part of a tyre's force that is missing while the wheel is lifted off."""
     tape = Tape()
     stiffness, damping = (tape.parameter(name, getattr(link, name)) for name in ("stiffness", "damping"))

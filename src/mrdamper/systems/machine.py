@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mrdamper.systems.kernel import Stage, interpreted_walk
+from mrdamper.systems.kernel import LoopElement, interpreted_loop
 from mrdamper.tracing.compiled.cache import load
 from mrdamper.tracing.compiled.record import address
 from mrdamper.tracing.compiled.writer import PREAMBLE, functions
@@ -47,21 +47,21 @@ static int command(const real *p, const real *d, real *memory, const real *signa
 """
 
 
-def compiled_walk(elements: Sequence[Stage], control: Stage | None) -> Callable[..., int] | None:
-    """Return the loop for these stages, compiled; None without a usable compiler. Arguments as `interpreted_walk`."""
+def compiled_loop(elements: Sequence[LoopElement], control: LoopElement | None) -> Callable[..., int] | None:
+    """Return the loop for these stages, compiled; None without a usable compiler. Arguments as `interpreted_loop`."""
     library = _library(tuple(elements), control)
     return None if library is None else _walk_of(library)
 
 
 @lru_cache(maxsize=16)
-def _library(elements: tuple[Stage, ...], control: Stage | None) -> ctypes.CDLL | None:
+def _library(elements: tuple[LoopElement, ...], control: LoopElement | None) -> ctypes.CDLL | None:
     def holds(library: ctypes.CDLL) -> bool:
-        return _alike(_walk_of(library), interpreted_walk(elements, control), elements, control)
+        return _alike(_walk_of(library), interpreted_loop(elements, control), elements, control)
 
     return load(_source(elements, control), holds)
 
 
-def _source(elements: Sequence[Stage], control: Stage | None) -> str:
+def _source(elements: Sequence[LoopElement], control: LoopElement | None) -> str:
     programs = list({id(stage.program): stage.program for stage in elements}.values())
     places = {id(program): index for index, program in enumerate(programs)}
     begins = np.cumsum([[0, 0, 0], *([2 + p, d, m] for p, d, m in (e.sizes for e in elements))], axis=0).tolist()
@@ -102,13 +102,13 @@ def _walk_of(library: ctypes.CDLL) -> Callable[..., int]:
 
 
 def _alike(
-    one: Callable[..., int], other: Callable[..., int], elements: Sequence[Stage], control: Stage | None
+    one: Callable[..., int], other: Callable[..., int], elements: Sequence[LoopElement], control: LoopElement | None
 ) -> bool:
     """Tell if two loops give the same motion of one mass on a spring, with all elements beside it, for some steps."""
-    from mrdamper.systems.kernel import Numbers
+    from mrdamper.systems.kernel import ElementParameters
 
     count, dt = len(elements), 1e-3
-    numbers, law = Numbers.of(elements), Numbers.of([] if control is None else [control])
+    numbers, law = ElementParameters.of(elements), ElementParameters.of([] if control is None else [control])
     mass, stiffness = 300.0, 2e4
     S = np.array([[1 / (2 / dt * mass + dt / 2 * stiffness)]])
     B, H = np.ones((count, 1)), np.zeros((0 if control is None else len(control.program.tape.inputs) - 1, 2 + count))

@@ -11,10 +11,10 @@ from mrdamper.dampers.base import Damper
 from mrdamper.dampers.causal import free_name
 from mrdamper.data import Floats
 from mrdamper.errors import InputError, StepError
-from mrdamper.systems.kernel import Numbers
+from mrdamper.systems.kernel import ElementParameters
 from mrdamper.systems.measures import measures
 from mrdamper.systems.result import Simulation
-from mrdamper.systems.simulate import Loop, changed
+from mrdamper.systems.simulate import SystemLoop, changed
 
 LEVELS = (0.05, 0.5, 0.95)
 _MOST = 100_000
@@ -109,7 +109,7 @@ def _student(rng: np.random.Generator, dof: float, count: int) -> Floats:
 
 
 def monte_carlo(
-    loop: Loop,
+    loop: SystemLoop,
     draws: Sequence[Mapping[str, Draw]],
     mean: Simulation,
     progress: Callable[[str, float], None] = lambda what, share: None,
@@ -120,7 +120,7 @@ def monte_carlo(
 
     Parameters
     ----------
-    loop : Loop
+    loop : SystemLoop
         Made with `free`.
     draws : sequence of mapping of str to Draw
         By link, as `draw` gives them.
@@ -159,7 +159,7 @@ def monte_carlo(
     )
 
 
-def _numbers(loop: Loop, one: Mapping[str, Draw]) -> Numbers:
+def _numbers(loop: SystemLoop, one: Mapping[str, Draw]) -> ElementParameters:
     stages = []
     for link, stage in zip(loop.links, loop.stages, strict=True):
         if link.name in one:
@@ -168,4 +168,4 @@ def _numbers(loop: Loop, one: Mapping[str, Draw]) -> Numbers:
             given = tuple(moved.get(name, value) for name, value in zip(stage.names, stage.given, strict=True))
             stage = stage.at(given).scaled(1.0 + drawn.gain, drawn.offset)
         stages.append(stage)
-    return Numbers.of(stages)
+    return ElementParameters.of(stages)

@@ -15,12 +15,12 @@ from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, StepError, StructureError, checked, numbers
 from mrdamper.systems.controllers import Controller
 from mrdamper.systems.controllers.passive import Passive
-from mrdamper.systems.controllers.preview import Preview
+from mrdamper.systems.controllers.preview import NonCausalOptimum
 from mrdamper.systems.inputs import Input
-from mrdamper.systems.kernel import Numbers, Stage, interpreted_walk
+from mrdamper.systems.kernel import ElementParameters, LoopElement, interpreted_loop
 from mrdamper.systems.linear import aims, linear_system
 from mrdamper.systems.links import contact_stage, damper_stage, stage_of
-from mrdamper.systems.machine import compiled_walk
+from mrdamper.systems.machine import compiled_loop
 from mrdamper.systems.result import HALVING, Simulation
 from mrdamper.systems.structure import System
 
@@ -79,7 +79,7 @@ def simulate_system(
     >>> bool(abs(damped.x[:, 2]).max() < 0.5 * abs(bare.x[:, 2]).max())  # [m], the top floor
     True
     """
-    loop = Loop(system, source, dampers, controller or Passive(), highest)
+    loop = SystemLoop(system, source, dampers, controller or Passive(), highest)
     dt = loop.first_step if step is None else numbers(step)[0]
     coarse, first, first_step, last = loop.run(dt), None, dt, math.inf
     while True:
@@ -100,7 +100,7 @@ def simulate_system(
     return replace(fine, halving=change)
 
 
-class Loop:
+class SystemLoop:
     """A system with its links and controller made ready; `run` may be called again and again.
 
     Parameters
@@ -130,7 +130,7 @@ class Loop:
             damper_stage(dampers[link.name], free) if link.role == "damper" else contact_stage(link)
             for link in self.links
         ]
-        self.numbers = Numbers.of(self.stages)
+        self.numbers = ElementParameters.of(self.stages)
         rows = [system.span(link.above, link.below) for link in self.links]
         self.dampers = dict(dampers)
         self.B = np.array([row for row, _ in rows]).reshape(len(rows), len(system.coordinates))
@@ -146,7 +146,7 @@ class Loop:
         whole = self.period if self.control.program else self.source.step
         return whole / math.ceil(whole / step - 1e-9)
 
-    def run(self, dt: float, machine: bool | None = None, numbers: Numbers | None = None) -> Simulation:
+    def run(self, dt: float, machine: bool | None = None, numbers: ElementParameters | None = None) -> Simulation:
         """Simulate the whole input at one step.
 
         Raises `StepError` if there are too many steps, or one has no solution.
@@ -182,12 +182,12 @@ class Loop:
         x, v = np.zeros((samples, n)), np.zeros((samples, n))
         force, current, flags = (np.zeros((samples, len(self.links))) for _ in range(3))
         current[:] = self.control.start
-        if isinstance(self.controller, Preview):
+        if isinstance(self.controller, NonCausalOptimum):
             self._previewed(dt, S, mean_load, load, road, x, v, force)
             failed = -1
         else:
             numbers = numbers or self.numbers
-            control = Numbers.of(self._controllers)
+            control = ElementParameters.of(self._controllers)
             every = max(1, round(self.period / dt))
             rows = (S @ (2 / dt * system.M), -S @ system.K, R, self.B @ R, self.B, mean_load)
             rows = (*rows, road @ self.D.T, road_rate @ self.D.T, H, seen)
@@ -222,7 +222,7 @@ class Loop:
         m = np.hstack([-S @ system.K, S @ (2 / dt * system.M)])
         A = np.vstack([dt * m, 2 * m]) + np.kron(np.diag([1, -1]), np.eye(n))
         push = -S @ self.B[at].T
-        assert isinstance(self.controller, Preview)
+        assert isinstance(self.controller, NonCausalOptimum)
         linear = linear_system(system, [self.links[i] for i in at])
         aimed = np.zeros((load.shape[0], linear.aim[0].shape[0]))
         pushed = load @ np.linalg.inv(system.M)
@@ -283,15 +283,15 @@ class Loop:
         return H, seen
 
     @cached_property
-    def _controllers(self) -> list[Stage]:
+    def _controllers(self) -> list[LoopElement]:
         """None or one."""
         return [stage_of(self.control.program)] if self.control.program else []
 
     def _walk(self, machine: bool) -> Any:
         if machine not in self._walks:
             law = next(iter(self._controllers), None)
-            compiled = compiled_walk(self.stages, law) if machine else None
-            self._walks[machine] = compiled or interpreted_walk(self.stages, law)
+            compiled = compiled_loop(self.stages, law) if machine else None
+            self._walks[machine] = compiled or interpreted_loop(self.stages, law)
         return self._walks[machine]
 
     def _energy(self, dt: float, x: Floats, v: Floats, force: Floats, load: Floats, road: Floats) -> dict[str, Floats]:

@@ -24,11 +24,11 @@ NotNegative = Annotated[float, Field(ge=0)]
 Pair = tuple[Positive, Positive]
 
 
-class _Strict(BaseModel):
+class _SystemPart(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-class _Building(_Strict):
+class _Building(_SystemPart):
     mass_kg: list[float] | list[list[float]]
     damping_N_s_m: list[list[float]]
     stiffness_N_m: list[list[float]]
@@ -41,13 +41,13 @@ class _Building(_Strict):
         return building(name, floors, *matrices, links, title)
 
 
-class _Storey(_Strict):
+class _Storey(_SystemPart):
     mass_kg: float
     stiffness_N_m: Positive
     damping_N_s_m: NotNegative = 0.0
 
 
-class _Car(_Strict):
+class _Car(_SystemPart):
     body_kg: Positive
     tyre_damping_N_s_m: NotNegative = 0.0
     stop_gap_m: Positive | None = None
@@ -84,14 +84,14 @@ class _HalfCar(_Car):
         return half_car(name, *body, *axles, self.tyre_damping_N_s_m, self.stop, title=title)
 
 
-class _Damper(_Strict):
+class _DamperEntry(_SystemPart):
     name: str
     above: str | None = None
     below: str = "ground"
     model: str | None = None
 
 
-class SystemDocument(_Strict):
+class SystemDocument(_SystemPart):
     """A vehicle or building as a file states it."""
 
     title: str = ""
@@ -100,7 +100,7 @@ class SystemDocument(_Strict):
     storey: list[_Storey] | None = None
     quarter_car: _QuarterCar | None = None
     half_car: _HalfCar | None = None
-    damper: list[_Damper] = []
+    damper: list[_DamperEntry] = []
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,10 +10,10 @@ from typing import Any
 
 from mrdamper.tracing.expression import SAMPLE, Expression
 from mrdamper.tracing.program import Program, dependencies, postorder
-from mrdamper.tracing.tape import Loop, Tape
+from mrdamper.tracing.tape import Tape, TracedLoop
 
 
-class Graft:
+class ProgramCopy:
     """A program on another tape.
 
     Parameters
@@ -78,7 +78,7 @@ class Graft:
                 return moving
 
     def _copied(self, value: Any) -> dict[int, Any]:
-        known, loops = dict(self.still), dict[int, Loop]()
+        known, loops = dict(self.still), dict[int, TracedLoop]()
         for node in self.order:
             if id(node) not in known:
                 known[id(node)] = self._copy(node, known, loops, value)
@@ -86,18 +86,18 @@ class Graft:
                     self.still[id(node)] = known[id(node)]
         return known
 
-    def _copy(self, node: Any, known: dict[int, Any], loops: dict[int, Loop], value: Any) -> Any:
+    def _copy(self, node: Any, known: dict[int, Any], loops: dict[int, TracedLoop], value: Any) -> Any:
         def of(part: Any) -> Any:
             return known[id(part)] if isinstance(part, Expression) else part
 
-        if isinstance(node, Loop):
-            loop = loops.setdefault(id(node), Loop((), node.most))
+        if isinstance(node, TracedLoop):
+            loop = loops.setdefault(id(node), TracedLoop((), node.most))
             loop.start, loop.updates = tuple(map(of, node.start)), tuple(map(of, node.updates))
             loop.going = of(node.going)
             loop.carries = tuple(Expression(self.tape, "carry", (loop, i), SAMPLE) for i in range(len(node.start)))
             return loop
         if node.op == "carry":
-            loop = loops.setdefault(id(node.args[0]), Loop((), node.args[0].most))
+            loop = loops.setdefault(id(node.args[0]), TracedLoop((), node.args[0].most))
             return Expression(self.tape, "carry", (loop, node.args[1]), SAMPLE)
         if node.op == "result":
             return Expression(self.tape, "result", (known[id(node.args[0])], node.args[1]), SAMPLE)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from mrdamper.tracing.expression import PARAMETER, Expression
-from mrdamper.tracing.tape import Loop, Tape
+from mrdamper.tracing.tape import Tape, TracedLoop
 
 _LEAVES = ("parameter", "input", "memory", "carry")
 Scope = tuple[tuple[int, int], ...]
@@ -39,7 +39,7 @@ class Branch:
 class Repeat:
     """Do a block until it says that it is enough."""
 
-    loop: Loop
+    loop: TracedLoop
     body: list[Statement]
 
 
@@ -83,9 +83,9 @@ class _Use:
     early: bool
 
 
-def dependencies(node: Expression | Loop) -> Iterator[tuple[Any, int | None]]:
+def dependencies(node: Expression | TracedLoop) -> Iterator[tuple[Any, int | None]]:
     """List the nodes a node is computed from; a number marks the inner block in which each is needed."""
-    if isinstance(node, Loop):
+    if isinstance(node, TracedLoop):
         yield from ((value, None) for value in node.start)
         yield node.going, 0
         yield from ((value, 0) for value in node.updates)
@@ -104,7 +104,7 @@ def postorder(roots: list[Any]) -> list[Any]:
     stack: list[tuple[Any, bool]] = [(root, False) for root in reversed(roots)]
     while stack:
         node, done = stack.pop()
-        if not isinstance(node, Expression | Loop):
+        if not isinstance(node, Expression | TracedLoop):
             continue
         if done:
             order.append(node)
@@ -121,7 +121,7 @@ def _scopes(roots: list[tuple[Any, bool]], order: list[Any]) -> tuple[dict[int, 
     uses: dict[int, list[_Use]] = defaultdict(list)
 
     def used(part: Any, use: _Use) -> None:
-        if isinstance(part, Expression | Loop):
+        if isinstance(part, Expression | TracedLoop):
             uses[id(part)].append(use)
             scopes[id(part)] = _common(scopes.get(id(part), use.scope), use.scope)
 
@@ -154,7 +154,7 @@ def _name(made: Program, order: list[Any], scopes: dict[int, Scope], uses: dict[
     """
     stored = {id(value) for value in made.tape.updates.values()}
     for node in order:
-        if isinstance(node, Loop):
+        if isinstance(node, TracedLoop):
             continue
         if node.op in ("parameter", "input", "memory"):
             made.names[id(node)] = node.name
@@ -179,7 +179,7 @@ def _fill(made: Program, order: list[Any], scopes: dict[int, Scope]) -> None:
     for node in order:
         scope, early = scopes[id(node)], id(node) in early_blocks
         home = blocks[scope, early]
-        if isinstance(node, Loop):
+        if isinstance(node, TracedLoop):
             home.append(Repeat(node, blocks[(*scope, (id(node), 0)), early]))
         elif node.op == "select":
             home.append(Branch(node, *(blocks[(*scope, (id(node), side)), early] for side in (0, 1))))

@@ -24,7 +24,7 @@ _WITH_INFINITY = {op: OPERATIONS[op].value for op in ("less", "less_equal", "gre
 _UNROLLED = 6  # highest integer power written as products
 
 
-class Table(Protocol):
+class LookupTable(Protocol):
     """Piecewise polynomials: what a traced lookup needs of them."""
 
     @property
@@ -52,7 +52,7 @@ class Table(Protocol):
         ...
 
 
-class Loop:
+class TracedLoop:
     """A bounded repetition: carried values change until the condition fails."""
 
     def __init__(self, start: Sequence[Any], most: int):
@@ -82,7 +82,7 @@ class Tape:
         self.starts: dict[str, float] = {}
         self.updates: dict[str, Any] = {}
         self.guards: list[tuple[Expression, bool]] = []
-        self.tables: list[Table] = []
+        self.tables: list[LookupTable] = []
         self._known: dict[tuple[Any, ...], Expression] = {}
         self._previous: dict[int, Any] = {}
 
@@ -157,7 +157,7 @@ class Tape:
             return then if condition else otherwise
         return self._note("select", (condition, then, otherwise))
 
-    def lookup(self, table: Table, x: Any) -> Expression:
+    def lookup(self, table: LookupTable, x: Any) -> Expression:
         """Value of a table at an expression."""
         found = [i for i, known in enumerate(self.tables) if known is table]
         if not found:
@@ -171,7 +171,7 @@ class Tape:
         most: int,
     ) -> tuple[Expression, ...]:
         """Do `body(*carried) -> (whether to go on, new values)`, and again, at most so often."""
-        loop = Loop([plain(value) for value in start], most)
+        loop = TracedLoop([plain(value) for value in start], most)
         loop.carries = tuple(Expression(self, "carry", (loop, i), SAMPLE) for i in range(len(loop.start)))
         loop.going, updates = body(*loop.carries)
         loop.updates = tuple(plain(value) for value in updates)

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from mrdamper.tracing.expression import Expression
 from mrdamper.tracing.program import Program
-from mrdamper.tracing.tape import Loop
+from mrdamper.tracing.tape import TracedLoop
 
 FUNCTIONS = {name: name for name in ("sqrt", "exp", "expm1", "log", "log1p", "tan", "tanh")}
 FUNCTIONS |= {"arctan": "atan", "arctanh": "atanh"}  # as C, JavaScript and Python call them
@@ -39,7 +39,7 @@ class Writer(ABC):
             return self.carry(loop, index)
         return self.program.names[id(expression)]
 
-    def carry(self, loop: Loop, index: int) -> str:
+    def carry(self, loop: TracedLoop, index: int) -> str:
         """Name of a value that a loop carries."""
         return f"loop{self._loops.setdefault(id(loop), len(self._loops))}_{index}"
 

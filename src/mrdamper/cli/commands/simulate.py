@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from mrdamper.systems.controllers import Controller
     from mrdamper.systems.monte_carlo import Bands
     from mrdamper.systems.result import Simulation
-    from mrdamper.systems.simulate import Loop
+    from mrdamper.systems.simulate import SystemLoop
 
 
 def register(app: typer.Typer) -> None:
@@ -67,7 +67,7 @@ def register(app: typer.Typer) -> None:
         from mrdamper.systems.controllers import controller_type
         from mrdamper.systems.inputs import load_input
         from mrdamper.systems.monte_carlo import draw, monte_carlo
-        from mrdamper.systems.simulate import Loop, simulate_system
+        from mrdamper.systems.simulate import SystemLoop, simulate_system
         from mrdamper.systems.system_file import load_system
 
         if out is not None:
@@ -95,7 +95,7 @@ def register(app: typer.Typer) -> None:
         if others and not dampers:
             raise InputError("controllers without a damper", mend="omit --without-damper or --compare")
         if law_out is not None or law_fmu is not None:
-            _export_law(Loop(found.system, shaken_by, dampers, controller, highest), law_out, law_fmu)
+            _export_law(SystemLoop(found.system, shaken_by, dampers, controller, highest), law_out, law_fmu)
         drawn = None
         if draws is not None:
             if not dampers:
@@ -105,7 +105,7 @@ def register(app: typer.Typer) -> None:
         with progress_soon(f"{found.system.title}, time step halved until peaks converge") as tell:
             done = simulate_system(found.system, shaken_by, dampers, controller, step, highest)
             if drawn is not None:
-                loop = Loop(found.system, shaken_by, dampers, controller, highest, free=True)
+                loop = SystemLoop(found.system, shaken_by, dampers, controller, highest, free=True)
                 bands = monte_carlo(loop, drawn, done, tell)
             if out is not None:
                 from mrdamper.report.simulation import write_simulation
@@ -123,7 +123,7 @@ def register(app: typer.Typer) -> None:
             _print_bands(done, bands, dampers)
 
 
-def _export_law(loop: Loop, folder: Path | None, fmu: Path | None) -> None:
+def _export_law(loop: SystemLoop, folder: Path | None, fmu: Path | None) -> None:
     """The law of a loop as C99 in a folder, and as an FMU."""
     from mrdamper.errors import InputError
     from mrdamper.export.c import write_program

@@ -21,7 +21,7 @@ from mrdamper.identification.harmonic_balance import HarmonicProjection, SineRec
 from mrdamper.identification.problem import Method, Problem, Solution
 from mrdamper.models import Model, Scale
 from mrdamper.physics.hysteresis import steady_loop
-from mrdamper.statistics.ending import Ending
+from mrdamper.statistics.ending import StopReason
 from mrdamper.statistics.levenberg_marquardt import least_squares
 from mrdamper.statistics.linear import solve_bounded
 
@@ -68,7 +68,7 @@ class Balance(Method):
         axes = kind.within(kind.search_axes(Scale.of(record.motion, record.force, X), problem.free), problem.fixed)
         if not axes:
             model, _, held = balanced.at({})
-            return Solution(model, 0.0, held, {}, {}, 1, Ending.SOLVED)
+            return Solution(model, 0.0, held, {}, {}, 1, StopReason.SOLVED)
 
         def point(u: Floats) -> dict[str, float]:
             return {axis.name: axis.value(float(c)) for axis, c in zip(axes, u, strict=True)}

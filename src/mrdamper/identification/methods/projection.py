@@ -25,7 +25,7 @@ from mrdamper.models import Model, Scale, SearchAxis
 from mrdamper.physics.hysteresis import Shape
 from mrdamper.physics.hysteresis.batch import batch_cost
 from mrdamper.physics.motion import Path
-from mrdamper.statistics.ending import Ending
+from mrdamper.statistics.ending import StopReason
 from mrdamper.statistics.levenberg_marquardt import Minimum, least_squares
 from mrdamper.statistics.linear import FixedColumns, on_one_blas_thread, solve_bounded
 from mrdamper.statistics.one_number import least_squares_in_one
@@ -57,7 +57,7 @@ class Projection(Method):
         axes = search_axes(problem)
         if not axes:
             projected = _project(problem, {})
-            return Solution(projected.model, 0.0, projected.at_bounds, {}, {}, 1, Ending.SOLVED)
+            return Solution(projected.model, 0.0, projected.at_bounds, {}, {}, 1, StopReason.SOLVED)
         elimination = Elimination.of(problem, axes)
         if problem.model_type.integrated and problem.force.size > _LONG:
             piece = self.solve(_last_cycles(problem))

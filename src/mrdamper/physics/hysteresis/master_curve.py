@@ -210,7 +210,7 @@ class _Tabulated(MasterCurve):
         return 1.0 + xp.exp(-self._falling.coordinate(start + phi, xp))
 
     @cached_property
-    def _rising(self) -> _Table:
+    def _rising(self) -> _CurveTable:
         """dy/dphi = 1 − y^n from 0 to 1; y = 1 − e^−r."""
 
         def rate(r: Floats) -> tuple[Floats, Floats]:
@@ -218,10 +218,10 @@ class _Tabulated(MasterCurve):
                 speed = approach_rate(r, self.n)
             return speed, speed - self.n * (-np.expm1(-r)) ** (self.n - 1)
 
-        return _Table(crowded_nodes(SATURATED), rate)
+        return _CurveTable(crowded_nodes(SATURATED), rate)
 
     @cached_property
-    def _growing(self) -> _Table:
+    def _growing(self) -> _CurveTable:
         """dy/dphi = 1 + y^n from 0 on; y = e^r − 1."""
 
         def rate(r: Floats) -> tuple[Floats, Floats]:
@@ -229,10 +229,10 @@ class _Tabulated(MasterCurve):
             speed = (1 + y**self.n) / (1 + y)
             return speed, self.n * y ** (self.n - 1) - speed
 
-        return _Table(crowded_nodes(math.log1p(STEEPEST ** (1 / self.n))), rate)
+        return _CurveTable(crowded_nodes(math.log1p(STEEPEST ** (1 / self.n))), rate)
 
     @cached_property
-    def _falling(self) -> _Table:
+    def _falling(self) -> _CurveTable:
         """dy/dphi = 1 − y^n from the ceiling down to 1; y = 1 + e^−r."""
 
         def rate(r: Floats) -> tuple[Floats, Floats]:
@@ -240,7 +240,7 @@ class _Tabulated(MasterCurve):
             speed = np.expm1(self.n * np.log1p(gap)) / gap
             return speed, speed - self.n * (1 + gap) ** (self.n - 1)
 
-        return _Table(np.linspace(-math.log(CEILING - 1), SATURATED, 4097), rate)
+        return _CurveTable(np.linspace(-math.log(CEILING - 1), SATURATED, 4097), rate)
 
 
 def crowded_nodes(end: float) -> Floats:
@@ -248,7 +248,7 @@ def crowded_nodes(end: float) -> Floats:
     return end * np.linspace(0, 1, 769) ** 4
 
 
-class _Table:
+class _CurveTable:
     """r over distance and distance over r, for dr/dphi = rate(r).
 
     Parameters

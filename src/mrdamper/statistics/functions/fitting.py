@@ -14,7 +14,7 @@ from mrdamper.data import Condition, Floats
 from mrdamper.errors import IdentificationError
 from mrdamper.statistics.functions.forms import Form, ParameterFunction, features, form_named
 from mrdamper.statistics.functions.selection import broken_law, fold_groups, rises, smaller_wins, supported
-from mrdamper.statistics.levenberg_marquardt import least_squares, polished
+from mrdamper.statistics.levenberg_marquardt import least_squares, newton_refine
 from mrdamper.statistics.linear import project_out_columns, solve_linear
 
 # Below this share of the largest singular value the tests cannot tell the terms apart: a rig repeats a motion to 1e-6.
@@ -215,7 +215,7 @@ def _best_rates(
     starts = grid[np.argsort(-explained, kind="stable")[:3]]
     found = [least_squares(residual, u, lower, upper, most_steps=15, slopes=slopes) for u in starts]
     best = min(found, key=lambda minimum: minimum.cost)
-    settled = polished(lambda u: residual(u) @ slopes(u), best.point, lower, upper)
+    settled = newton_refine(lambda u: residual(u) @ slopes(u), best.point, lower, upper)
     return tuple(np.exp(settled).tolist())
 
 

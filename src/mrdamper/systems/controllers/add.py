@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from mrdamper.data.parameters import param
-from mrdamper.systems.controllers.base import Controller, Sight
+from mrdamper.systems.controllers.base import Controller, Sensors
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class AccelerationDriven(Controller):
     title: ClassVar[str] = "acceleration-driven damper (ADD)"
     source: ClassVar[str] = "Savaresi, Silani and Bittanti 2005"
 
-    def law(self, see: Sight) -> Any:
+    def law(self, see: Sensors) -> Any:
         return see.on_off(see("above", "acceleration") * see.stroke_rate > 0)
 
 
@@ -45,7 +45,7 @@ class MixedSkyhookADD(Controller):
 
     crossover_Hz: float = param("Hz", "frequency at which the two rules change over", bounds=(0, math.inf), default=1.8)
 
-    def law(self, see: Sight) -> Any:
+    def law(self, see: Sensors) -> Any:
         v, a = see("above", "velocity"), see("above", "acceleration")
         slow = a * a <= (2 * math.pi * self.crossover_Hz) ** 2 * v * v
         return see.on_off(see.tape.select(slow, v, a) * see.stroke_rate > 0)

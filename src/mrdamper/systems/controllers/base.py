@@ -25,7 +25,7 @@ _UNITS = {
 
 
 @dataclass(frozen=True)
-class Sight:
+class Sensors:
     """Sensor signals and currents of one damper, as its control law uses them."""
 
     tape: Tape  # for memory: `remember`, `update`, `select`
@@ -130,7 +130,7 @@ class Controller(ABC):
         return parameters_of(cls)
 
     @abstractmethod
-    def law(self, see: Sight) -> Any:
+    def law(self, see: Sensors) -> Any:
         """Calculate the current [A] of one damper from the present sensor signals."""
 
     def designed(self, system: System, links: Sequence[Link], period: float) -> Controller:
@@ -152,7 +152,7 @@ class Controller(ABC):
             command: Any = 0.0
             if link.role == "damper":
                 damper = dampers[link.name]
-                see = Sight(tape, link, damper, *current_range(damper, highest), period, shared)
+                see = Sensors(tape, link, damper, *current_range(damper, highest), period, shared)
                 command = ready.law(see)
                 start.append(see.low)
             else:

@@ -15,7 +15,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.parameters import param
-from mrdamper.systems.controllers.base import Controller, Sight
+from mrdamper.systems.controllers.base import Controller, Sensors
 from mrdamper.systems.linear import aims, linear_system
 from mrdamper.systems.structure import Link, System
 
@@ -82,12 +82,12 @@ class ClippedOptimal(Controller):
         names = tuple(link.name for link in links if link.role == "damper")
         return replace(self, design=Design(A, B, C, D, L, G, size, system.coordinates, names))
 
-    def law(self, see: Sight) -> Any:
+    def law(self, see: Sensors) -> Any:
         if "wanted" not in see.shared:
             see.shared["wanted"] = self._optimal(see)
         return see.on_off((see.shared["wanted"][see.link.name] - see.force) * see.force > 0)
 
-    def _optimal(self, see: Sight) -> dict[str, Any]:
+    def _optimal(self, see: Sensors) -> dict[str, Any]:
         """f* of every damper, from an observer of the structure."""
         design, tape = self.design, see.tape
         assert design is not None

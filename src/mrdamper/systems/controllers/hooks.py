@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from mrdamper.data.parameters import param
-from mrdamper.systems.controllers.base import Controller, Sight
+from mrdamper.systems.controllers.base import Controller, Sensors
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Skyhook(Controller):
     source: ClassVar[str] = "Karnopp, Crosby and Harwood 1974"
     calms: ClassVar[str] = "above"
 
-    def law(self, see: Sight) -> Any:
+    def law(self, see: Sensors) -> Any:
         return see.on_off(see("above", "velocity") * see.stroke_rate > 0)
 
 
@@ -46,7 +46,7 @@ class SkyhookContinuous(Controller):
 
     c_sky: float = param("N s/m", "damping to the sky", bounds=(0, math.inf), default=2000.0)
 
-    def law(self, see: Sight) -> Any:
+    def law(self, see: Sensors) -> Any:
         return see.current_for(self.c_sky * see("above", "velocity"))
 
 
@@ -65,7 +65,7 @@ class Groundhook(Controller):
     source: ClassVar[str] = "Valášek, Novák, Šika and Vaculín 1997"
     calms: ClassVar[str] = "below"
 
-    def law(self, see: Sight) -> Any:
+    def law(self, see: Sensors) -> Any:
         return see.on_off(see("below", "velocity") * see.stroke_rate < 0)
 
 
@@ -86,6 +86,6 @@ class Hybrid(Controller):
     c_hook: float = param("N s/m", "damping to the sky and to the road", bounds=(0, math.inf), default=2000.0)
     share: float = param("-", "of the skyhook; the rest is groundhook", bounds=(0, 1), default=0.5)
 
-    def law(self, see: Sight) -> Any:
+    def law(self, see: Sensors) -> Any:
         above, below = see("above", "velocity"), see("below", "velocity")
         return see.current_for(self.c_hook * (self.share * above - (1 - self.share) * below))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from mrdamper.data.parameters import param
-from mrdamper.systems.controllers.base import Controller, Sight
+from mrdamper.systems.controllers.base import Controller, Sensors
 
 
 @dataclass(frozen=True)
@@ -20,5 +20,5 @@ class Passive(Controller):
 
     current_A: float = param("A", "coil current", bounds=(0, math.inf), default=0.0)
 
-    def law(self, see: Sight) -> Any:
+    def law(self, see: Sensors) -> Any:
         return self.current_A

@@ -12,13 +12,13 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.systems.controllers.base import Controller, Sight
+from mrdamper.systems.controllers.base import Controller, Sensors
 
 _SETTLED = 1e-13  # relative change at which the Riccati recursion has ended
 
 
 @dataclass(frozen=True)
-class Preview(Controller):
+class NonCausalOptimum(Controller):
     """Minimises the mean square of the aims (`linear.aims`) over all force histories.
 
     A linear-quadratic problem with a known disturbance, solved backwards in the very steps that
@@ -34,7 +34,7 @@ class Preview(Controller):
     title: ClassVar[str] = "optimum with the whole record known"
     source: ClassVar[str] = "Bryson and Ho 1975; Hrovat 1997"
 
-    def law(self, see: Sight) -> Any:
+    def law(self, see: Sensors) -> Any:
         return see.low
 
     def forces(self, A: Floats, B: Floats, driven: Floats, C: Floats, D: Floats, aimed: Floats) -> Floats:

@@ -20,7 +20,7 @@ _STRONGEST = 50.0  # m/s²: five times the strongest ground motion ever recorded
 
 
 @dataclass(frozen=True, eq=False)
-class Record(Input):
+class RecordedInput(Input):
     """Samples at equal steps, straight lines between them."""
 
     name: ClassVar[str] = "record"
@@ -47,7 +47,7 @@ class Record(Input):
         return slope[at]
 
 
-def load_record(path: str | Path, time_scale: float = 1.0) -> Record:
+def load_record(path: str | Path, time_scale: float = 1.0) -> RecordedInput:
     """Read a record.
 
     Raises `DatasetError` or `ColumnError` or `UnitError` or `RecordError` if the file cannot be read, says no unit,
@@ -79,7 +79,9 @@ def load_record(path: str | Path, time_scale: float = 1.0) -> Record:
     return record(columns["time_s"], columns[found[0]], found[0], time_scale, where=str(path))
 
 
-def record(time: Floats, values: Floats, quantity: str, time_scale: float = 1.0, where: str = "record") -> Record:
+def record(
+    time: Floats, values: Floats, quantity: str, time_scale: float = 1.0, where: str = "record"
+) -> RecordedInput:
     """Make a record from its samples; `quantity` is a column name of `load_record`, which raises the same."""
     if quantity not in _COLUMNS:
         raise UnitError(f"quantity {quantity!r}", where=where, mend=f"one of {', '.join(_COLUMNS)}")
@@ -107,4 +109,4 @@ def record(time: Floats, values: Floats, quantity: str, time_scale: float = 1.0,
             mend="no ground moves like that: is it in cm/s² (gal), or m/s² under the name of g?",
         )
     clock = np.arange(time.size) * ((time[-1] - time[0]) / (time.size - 1) / time_scale)
-    return Record(clock, scaled, "road" if quantity == "height_m" else "ground")
+    return RecordedInput(clock, scaled, "road" if quantity == "height_m" else "ground")

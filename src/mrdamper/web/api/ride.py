@@ -21,7 +21,7 @@ from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.inputs import Input, bundled_records, load_input, made_inputs
 from mrdamper.systems.measures import cost
 from mrdamper.systems.result import Simulation
-from mrdamper.systems.simulate import Loop, simulate_system
+from mrdamper.systems.simulate import SystemLoop, simulate_system
 from mrdamper.systems.structure import System
 from mrdamper.systems.system_file import bundled_systems, load_system
 from mrdamper.web.answers import frame, number
@@ -78,7 +78,7 @@ def ride(ask: Ask, session: Current) -> Response:
     law = with_values(kind, {"current_A": ask.current_A}) if kind is Passive else kind()
     with _TURN:
         done = simulate_system(system, source, dampers, law, highest=None if kind is Passive else ask.current_A)
-        idle = Loop(system, source, dampers, Passive()).run(done.step)
+        idle = SystemLoop(system, source, dampers, Passive()).run(done.step)
     every = slice(None, None, -(-done.time.size // _SAMPLES))
     unmoved = {f"idle.{name}": idle.a[:, i] for i, name in enumerate(system.coordinates)}
     arrays = {name: values[every] for name, values in (_histories(done, source) | unmoved).items()}

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mrdamper.systems.controllers.base import Controller, Sight
+from mrdamper.systems.controllers.base import Controller, Sensors
 
 
 @dataclass(frozen=True)
@@ -18,5 +18,5 @@ class FirmInwards(Controller):
     title: ClassVar[str] = "firm in compression"
     source: ClassVar[str] = "tests"
 
-    def law(self, see: Sight) -> Any:
+    def law(self, see: Sensors) -> Any:
         return 2.0 * abs(np.minimum(see.stroke_rate, 0.0))
