@@ -85,7 +85,7 @@ class GeneticMinimum:
         Lowest cost after every generation, over all boxes.
     boxes : tuple of (lower, upper)
         Searched one after the other, (D,) arrays.
-    ending : Ending
+    ending : StopReason
     """
 
     point: Floats
