@@ -40,7 +40,6 @@ EXPLAINED = (
     Explained("paper.", "np.mean(steady.force)", "mean → median", "a loop's force has its mean in its middle"),
     Explained("paper.", "np.mean(record.force", "mean → median", "samples within five degrees have one force"),
     Explained("paper.", "< 1e-3", "0.001 → 0.01", "levels lie further apart"),
-    Explained("paper.seeds", "found[0]", "0 → 1", "every seed has the same keys"),
     Explained("paper.virtual_rig", "default_rng((seed,", "", "another draw of the same noise"),
     Explained("paper.virtual_rig", "path.direction * np.where", "Mult → Div", _SIGN),
     Explained("paper.sensitivity", "_SAMPLES", "", "a whole cycle more, or another of the same samples"),

@@ -30,16 +30,16 @@ def _room(modules: str, tests: str, without: str = "") -> Room:
 
 
 ROOMS = (
-    _room("validation metrics", "test_validation.py test_metrics.py"),
+    _room("study.validation statistics.metrics", "test_validation.py test_metrics.py"),
     _room("identification.loop_analysis", "identification/test_loop_analysis.py"),
     _room(
         "identification.covariance",
         "identification/test_covariance.py identification/test_covariance_by_hand.py",
         "cover_what_they_say scatter_of_repeated",
     ),
-    _room("functions.forms functions.fitting", "functions"),
+    _room("statistics.functions.forms statistics.functions.fitting", "functions"),
     _room(
-        "paper.verdicts paper.claims paper.claims_on_tests paper.claims_on_fits paper.seeds",
+        "paper.claims paper.claims_on_tests paper.claims_on_fits",
         "paper/test_verdicts.py paper/test_claims.py paper/test_measured.py paper/test_seeds.py",
     ),
     _room("paper.output", "paper/test_output.py"),
@@ -85,5 +85,5 @@ ROOMS = (
 )
 
 # A fault that no working trial lets live: the sign in the root mean square error.
-CERTAIN = _room("metrics", "test_metrics.py")
+CERTAIN = _room("statistics.metrics", "test_metrics.py")
 CERTAIN_FAULT = ("return float(np.sqrt(np.mean((predicted - measured) ** 2)))", "Sub → Add")

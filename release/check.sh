@@ -14,8 +14,9 @@ row() {  # CHECK RESULT: one line of the table, with the seconds since the last 
 }
 
 [ -x $bin/python ] || python3 -m venv .venv-release
-$bin/python -m pip install --quiet 'pip>=25.1'
-$bin/python -m pip install --quiet --group release
+$bin/python -m pip install --quiet uv
+uv=$PWD/$bin/uv
+$uv pip install --quiet --python .venv-release -c constraints.txt --group release
 row "tools" "installed"
 
 $bin/repo-review --format json . >"$table.review" || true
@@ -40,10 +41,10 @@ bash release/bare.sh dist/*.whl
 row "bare wheel" "installs, imports, studies, predicts, exports"
 
 # The lock: installs by hash, and holds what pyproject.toml asks for.
-rm -rf .venv-locked && python3 -m venv .venv-locked
-.venv-locked/bin/python -m pip install --quiet --require-hashes --only-binary :all: -r release/lock.txt
-.venv-locked/bin/python -m pip install --quiet --no-deps dist/*.whl
-.venv-locked/bin/python -m pip check >/dev/null
+rm -rf .venv-locked && $uv venv --quiet --python python3 .venv-locked
+$uv pip install --quiet --python .venv-locked --require-hashes --only-binary :all: -r release/lock.txt
+$uv pip install --quiet --python .venv-locked --no-deps dist/*.whl
+$uv pip check --quiet --python .venv-locked
 ! grep -nE 'https?:|--index|--find-links' release/lock.txt constraints.txt || { echo "a lock names a host" >&2; exit 1; }
 row "lock" "installs, hash by hash"
 
@@ -52,7 +53,7 @@ $bin/cyclonedx-py environment .venv-locked --output-reproducible --pyproject pyp
   --mc-type library --output-format JSON --output-file dist/mrdamper.cdx.json
 row "SBOM" "$($bin/python -c 'import json; print(len(json.load(open("dist/mrdamper.cdx.json"))["components"]))') components"
 
-bash release/lowest.sh dist/*.whl
+bash release/lowest.sh $uv dist/*.whl
 row "lowest versions" "tests pass"
 
 (cd dist && sha256sum ./*.whl ./*.tar.gz ./*.json > SHA256SUMS)
