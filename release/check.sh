@@ -27,7 +27,7 @@ row "workflows (zizmor)" "no finding"
 
 rm -rf dist build
 for turn in first second; do
-  $bin/python -m build --quiet --outdir "dist/$turn" .
+  $bin/python -m build --quiet --installer uv --outdir "dist/$turn" .
 done
 diff <(cd dist/first && sha256sum ./*) <(cd dist/second && sha256sum ./*) || { echo "two builds differ" >&2; exit 1; }
 mv dist/first/* dist/ && rm -r dist/first dist/second
