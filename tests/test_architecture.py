@@ -81,3 +81,13 @@ def test_the_page_on_the_architecture_lists_every_package_in_its_layer():
     layer = {name.strip(): i for i, line in enumerate(structure.layers()) for name in line.split("|")}
     order = [layer[name] for row in named for name in row]
     assert order == sorted(order)
+
+
+def test_every_decision_is_in_the_index_with_context_decision_and_consequences():
+    folder = ROOT / "docs" / "decisions"
+    records = sorted(path for path in folder.glob("*.md") if path.name != "index.md")
+    listed = re.findall(r"^(\d{4}-[\w-]+)$", (folder / "index.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert sorted(listed) == [path.stem for path in records]
+    for path in records:
+        headings = re.findall(r"^## (.+)$", path.read_text(encoding="utf-8"), re.MULTILINE)
+        assert headings[:3] == ["Context", "Decision", "Consequences"], path.name

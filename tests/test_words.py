@@ -44,10 +44,11 @@ REWRITTEN = (
     "src/mrdamper/web/static/js/views/ride.js",
     "src/mrdamper/web/static/js/views/takeaway.js",
 )
+DECISIONS = tuple(str(path.relative_to(ROOT)) for path in sorted((ROOT / "docs" / "decisions").glob("*.md")))
 READERS = {str(path.relative_to(ROOT)): (path, reader) for path, reader in all_texts()}
 
 
-@pytest.mark.parametrize("name", REWRITTEN)
+@pytest.mark.parametrize("name", REWRITTEN + DECISIONS)
 def test_a_rewritten_file_uses_the_terms_of_the_field(name):
     path, reader = READERS[name]
     hits = [
