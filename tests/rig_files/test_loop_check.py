@@ -1,5 +1,6 @@
 """The check of the loop on made forces whose share, sign and scatter are worked out by hand."""
 
+from copy import copy
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -46,8 +47,9 @@ def test_of_segments_that_hold_a_cycle_the_least_share_counts():
     made = view(lambda p, n, t: np.where(n < 2, 1.0, -0.5) * np.cos(p))
 
     def share(*segments):
-        made.run = SimpleNamespace(**{name: getattr(whole, name) for name in ("time", "force")}, segments=segments)
-        return damping_share(made)
+        cut = copy(made)
+        cut.run = SimpleNamespace(**{name: getattr(whole, name) for name in ("time", "force")}, segments=segments)
+        return damping_share(cut)
 
     whole = made.run
     made.moving  # noqa: B018  the motion of all

@@ -16,7 +16,7 @@ from mrdamper.data import Floats
 from mrdamper.physics.motion import SINE_DISTORTION_LIMIT
 from mrdamper.rig_files.quality.cycles import POINTS, steady_cycles
 from mrdamper.rig_files.quality.effects import REFUSED, percent
-from mrdamper.rig_files.quality.view import View, sample_noise
+from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding
 
 _VELOCITY = 0.008  # power of the velocity that is no part of the motion, of all: bundled rigs reach 0.004
@@ -51,7 +51,9 @@ def motion_is_one(view: View) -> Iterator[Finding]:
     inside = slice(velocity.size // 40, -(velocity.size // 40) or None)  # fits at the ends are wider of the mark
     size = float(np.var(velocity[inside]))
     share = float(np.var(rest[inside])) / size
-    parts = np.array([np.mean(part**2) for part in np.array_split(rest[inside], _PARTS)]) / size
+    power = rest[inside] ** 2
+    starts = np.linspace(0, power.size, _PARTS, endpoint=False).astype(int)
+    parts = np.add.reduceat(power, starts) / np.diff(starts, append=power.size) / size
     burst = float(np.max(parts)) > max(_BURST, _BURST_STANDS_OUT * float(np.median(parts)))
     if share < _LINE_POWER and not burst:
         return
@@ -142,7 +144,7 @@ def force_is_fine(view: View) -> Iterator[Finding]:
     cycles = steady_cycles(view)
     if cycles is None or cycles.force.span == 0.0:
         return
-    noise = sample_noise(view.steady.force) / cycles.force.span
+    noise = view.force_noise / cycles.force.span
     if noise > _NOISE:
         yield Finding(
             "W_NOISE",
@@ -158,13 +160,15 @@ def changes_at_every_sample(view: View) -> Iterator[Finding]:
         return
     for name in ("displacement", "force"):
         moved = np.flatnonzero(np.diff(getattr(view.steady, name))) + 1
-        if moved.size < 20:
+        if not 20 <= moved.size <= view.steady.time.size / 2:
             continue
         apart = np.diff(moved)
         usual = int(np.median(apart))
+        if usual < _HELD:
+            continue
         even = float(np.mean(apart % usual == 0))
         late = 0.5 * (usual - 1) * view.step * motion.condition.frequency_Hz
-        if usual >= _HELD and even > 0.9 and float(np.mean(apart == usual)) > 0.6 and late > _HELD_LATE:
+        if even > 0.9 and float(np.mean(apart == usual)) > 0.6 and late > _HELD_LATE:
             yield Finding(
                 "W_HELD",
                 f"the {name} changes at every {usual}th sample only: it was recorded at a slower rate and is late by "

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -106,7 +107,7 @@ def _channels(view: View) -> dict[str, _Channel]:
     for name in _OTHER:
         values = view.channels[name]
         low, high = float(np.nanmin(values)), float(np.nanmax(values))
-        found[name] = _Channel(values, _equal_stretches(values), low, high, _resolution(values), name == "displacement")
+        found[name] = _Channel(values, _equal_stretches(values), low, high, name == "displacement")
     return found
 
 
@@ -118,8 +119,12 @@ class _Channel:
     equal: np.ndarray
     low: float
     high: float
-    level: float  # resolution step; zero where there is none
     smooth: bool  # a position: a kink in it is evidence even at coarse resolution
+
+    @cached_property
+    def level(self) -> float:
+        """Resolution step; zero where there is none."""
+        return _resolution(self.values)
 
     @property
     def span(self) -> float:

@@ -24,7 +24,7 @@ from mrdamper.data import Floats
 from mrdamper.rig_files.quality.cycles import POINTS, Cycles, steady_cycles
 from mrdamper.rig_files.quality.effects import change, damping, elastic_plastic, percent
 from mrdamper.rig_files.quality.flat import flagged_samples
-from mrdamper.rig_files.quality.view import View, sample_noise
+from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding
 from mrdamper.statistics.linear import on_one_blas_thread
 
@@ -133,7 +133,7 @@ def force_lag(view: View) -> ForceLag | None:
     best = min(tried, key=tried.__getitem__)
     enough = max(_AS_GOOD * tried[best], _MODEL * without)
     alike = [delay for delay, left in tried.items() if left <= enough]
-    noise = sample_noise(view.steady.force) * np.sqrt(POINTS / len(cycles.starts)) / size
+    noise = view.force_noise * np.sqrt(POINTS / len(cycles.starts)) / size
     left, unmoved = (float(np.sqrt(max(m**2 - noise**2, (0.3 * noise) ** 2))) for m in (tried[best], without))
     return ForceLag(best, left, unmoved, min(alike), max(alike))
 

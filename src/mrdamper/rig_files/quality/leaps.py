@@ -35,11 +35,14 @@ def spikes_in(values: Floats, off_by: float) -> np.ndarray:
     if values.size < 20:
         return np.empty(0, dtype=int)
     some = values[:: max(1, values.size // _SAMPLE)]
-    low, high = np.nanquantile(some, [0.01, 0.99])
-    at = np.arange(1, values.size - 1)[:: max(1, values.size // _SAMPLE)]
-    usual = float(np.nanquantile(np.abs(values[at] - 0.5 * (values[at - 1] + values[at + 1])), 0.95))
-    far = max(off_by * float(high - low), _FAR * usual)
+    low, high = np.quantile(some[np.isfinite(some)], [0.01, 0.99])
     steps = np.diff(values)
+    if not np.nanmax(np.abs(steps)) > 0.5 * off_by * float(high - low):
+        return np.empty(0, dtype=int)
+    at = np.arange(1, values.size - 1)[:: max(1, values.size // _SAMPLE)]
+    bends = np.abs(values[at] - 0.5 * (values[at - 1] + values[at + 1]))
+    usual = float(np.quantile(bends[np.isfinite(bends)], 0.95))
+    far = max(off_by * float(high - low), _FAR * usual)
     enters = np.flatnonzero(np.abs(steps[:-1]) > 0.5 * far) + 1
     # Only where the channel comes back within so many samples: a steep flank does not.
     after = np.minimum(enters[:, None] + np.arange(1, _WIDEST + 1), values.size - 1)

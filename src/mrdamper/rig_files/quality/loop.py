@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mrdamper.data import Floats
+from mrdamper.data import Floats, once_per_run
 from mrdamper.errors import QualityError
 from mrdamper.identification.loop_analysis import damping_share as share_of_damping
 from mrdamper.physics.motion.harmonics import fit_harmonics
@@ -64,11 +64,14 @@ def _is_rectified(view: View) -> bool:
     """
     force, velocity = view.run.force, view.moving.velocity
     span = float(np.ptp(force))
-    force = -force if np.median(force) < 0 else force
+    force = -force if 2 * np.count_nonzero(force < 0) > force.size else force
+    negative = np.count_nonzero(force < -3 * sample_noise(force) - 0.02 * span)
+    if negative > 0.01 * (force.size - 1):
+        return False
     fastest = float(np.max(np.abs(velocity)))
     parts = [force[np.abs(velocity) < _SLOW * fastest], force[velocity > _FAST * fastest]]
     parts += [force[velocity < -_FAST * fastest]]
-    if np.quantile(force, 0.01) < -3 * sample_noise(force) - 0.02 * span or min(map(len, parts)) < _FEWEST:
+    if min(map(len, parts)) < _FEWEST:
         return False
     turning, *strokes = (float(np.median(part)) for part in parts)
     return turning < min(strokes) - _BELOW * span or _is_folded(view, force, *strokes)
@@ -97,14 +100,16 @@ def keeps_its_sign(view: View) -> None:
     cycles = [tuple(map(int, np.searchsorted(time, (start, start + period)))) for start in starts]
     if len(cycles) < 2 or min(b - a for a, b in cycles) < _FEWEST:
         return
-    shares = [_damping_share(view, a, b) for a, b in cycles]
-    flipped = [cycle for cycle, share in zip(cycles, shares, strict=True) if share < -_CLEARLY]
-    if flipped and max(shares) > _CLEARLY:
-        raise _flip(view, time[flipped[0][0]], len(flipped), len(cycles))
+    phase = np.linspace(0.0, period, POINTS, endpoint=False)
+    grid = (starts[:, None] + phase).reshape(-1)
+    folded = np.interp(grid, time, view.run.force).reshape(-1, POINTS)
+    motions = (np.interp(grid, time, values) for values in (view.moving.velocity, view.moving.displacement))
+    shares = _shares(*(values.reshape(-1, POINTS) for values in motions), folded)
+    flipped = np.flatnonzero(shares < -_CLEARLY)
+    if flipped.size and float(np.max(shares)) > _CLEARLY:
+        raise _flip(view, float(starts[flipped[0]]), flipped.size, len(cycles))
     if len(cycles) < 3:
         return
-    phase = np.linspace(0.0, period, POINTS, endpoint=False)
-    folded = np.array([np.interp(start + phase, time, view.run.force) for start in starts])
     _keeps_its_scale(view, starts, folded)
     usual = np.median(folded, axis=0)
     counts = np.abs(usual) > 0.3 * np.max(np.abs(usual))
@@ -115,11 +120,27 @@ def keeps_its_sign(view: View) -> None:
             raise _flip(view, start + phase[begins[np.argmax(ends - begins)]], 1, len(cycles))
 
 
+def _shares(velocity: Floats, displacement: Floats, force: Floats) -> Floats:
+    """(K,) parts of the force's standard deviation that oppose the velocity, of K cycles of (K, P) samples each.
+
+    Those of c in F = f0 + r t + k x + c v by least squares.
+    """
+    ramp = np.broadcast_to(np.linspace(-0.5, 0.5, force.shape[1]), force.shape)
+    columns = np.stack([velocity, displacement, ramp, force])
+    columns = columns - columns.mean(axis=2, keepdims=True)
+    columns = columns / np.maximum(columns.std(axis=2, keepdims=True), np.finfo(float).tiny)
+    normal = np.einsum("ikp,jkp->kij", columns, columns) / force.shape[1]
+    table = normal[:, :3, :3] + 1e-9 * np.eye(3)
+    return np.asarray(np.linalg.solve(table, normal[:, :3, 3:])[:, 0, 0])
+
+
 def _keeps_its_scale(view: View, starts: Floats, folded: Floats) -> None:
     """Refuse a force that from some cycle on is the same times another number."""
     if view.record.current is not None and np.ptp(view.run.current) > _SAME_CURRENT:
         return
     sizes = np.log(np.mean(np.abs(folded - np.mean(folded, axis=1, keepdims=True)), axis=1))
+    if np.ptp(sizes) <= _GAIN:
+        return
     for within in (0, 1):  # between two cycles, or within one
         for at in range(2, len(starts) - within):
             old, new = sizes[:at], sizes[at + within :]
@@ -142,6 +163,7 @@ def _flip(view: View, time: float, count: int, cycles: int) -> QualityError:
     )
 
 
+@once_per_run
 def damping_share(view: View) -> float:
     """Part of the force's standard deviation that opposes the velocity; negative where the loop gives energy.
 
@@ -202,4 +224,4 @@ def repeatability(view: View) -> tuple[float, float] | None:
     if cycles is None or len(cycles.starts) < 2 or cycles.force.span == 0.0:
         return None
     scatter = np.sqrt(np.mean(np.var(cycles.force.values, axis=0, ddof=1)))
-    return float(scatter) / cycles.force.span, sample_noise(view.steady.force) / cycles.force.span
+    return float(scatter) / cycles.force.span, view.force_noise / cycles.force.span

@@ -62,7 +62,9 @@ def unusual(view: View) -> Iterator[Finding]:
         if odd:
             yield Finding("W_RANGE", f"{text}: is its unit right?")
     for name in ("displacement", "force"):
-        levels = np.unique(getattr(view.run, name)).size
+        values = getattr(view.run, name)
+        levels = np.unique(values[: _MANY * FEWEST_LEVELS]).size
+        levels = levels if levels >= FEWEST_LEVELS else np.unique(values).size
         if levels < FEWEST_LEVELS and view.run.time.size > _MANY * levels:
             yield Finding(
                 "W_COARSE", f"{name} has {levels} different values only: a sensor of so few steps hides the loop"

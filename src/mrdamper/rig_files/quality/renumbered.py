@@ -54,22 +54,25 @@ def copied(view: View) -> Iterator[Finding]:
     if motion is None:
         return
     run = view.steady
-    channels = (run.displacement, run.force)
-    if sample_noise(run.force) < _NOISY * float(np.ptp(run.force)):
+    if view.force_noise < _NOISY * float(np.ptp(run.force)):
         return
     period = 1 / motion.condition.frequency_Hz / view.step
+    alike: dict[int, np.ndarray] = {}
+    for cycles in range(1, int(motion.cycles) + 1):
+        for lag in range(int(cycles * period) - 2, int(cycles * period) + 4):
+            if not 2 < lag < run.time.size - _COPY:
+                continue
+            equal = run.force[lag:] == run.force[:-lag]
+            if np.count_nonzero(equal) >= _COPY:
+                equal &= run.displacement[lag:] == run.displacement[:-lag]
+                alike |= {lag: equal} if np.count_nonzero(equal) >= _COPY else {}
+    if not alike:
+        return
     chance = max(float(np.mean(np.diff(run.force) == 0)), 0.5 * _level_share(run.force))
     least = _COPY if chance < 0.3 else int(np.ceil(-16 / np.log(min(chance, 0.97))))
     copies = np.zeros(run.time.size, dtype=bool)
-    for cycles in range(1, int(motion.cycles) + 1):
-        for lag in range(int(cycles * period) - 1, int(cycles * period) + 3):
-            if not 2 < lag < run.time.size - least:
-                continue
-            equal = np.ones(run.time.size - lag, dtype=bool)
-            for values in channels:
-                equal &= values[lag:] == values[:-lag]
-            if np.count_nonzero(equal) >= least:
-                copies[lag:] |= _long_runs(equal, least)
+    for lag, equal in alike.items():
+        copies[lag:] |= _long_runs(equal, least)
     share = float(np.mean(copies))
     if not share:
         return

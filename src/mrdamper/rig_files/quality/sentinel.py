@@ -21,6 +21,7 @@ _LEAP = 0.25  # of the channel's range: a code stands that far from the samples 
 _FAR = 2.0  # times as far as all but a hundredth of the channel's own leaps
 _PULSES = 9  # times as far, a value that no logger writes for missing ones is no pulse of a supply
 COARSEST = {"current": 0.1, "voltage": 1.0}  # leaps below are a supply's own [A, V]: ripple and a chopper's pulses
+_CLOCK = 3.0  # times the mean step: larger ones are none of an even clock
 _RARE = 0.1  # of the samples: a value held more often is the channel's own
 _FEW = 50  # distinct values of a channel that does not vary
 _CHUNK = 1_000_000  # samples looked at together
@@ -52,7 +53,7 @@ def code_in(values: Floats, coarsest: float) -> float | None:
     Leaps below `coarsest` are the channel's own, in its unit.
     """
     present = np.isfinite(values)
-    if not present.any():
+    if not present.any() or _runs_evenly(values):
         return None
     extremes = {float(np.nanmin(values)), float(np.nanmax(values)), 0.0}
     counts = {value: int(np.count_nonzero(values == value)) for value in extremes}
@@ -84,6 +85,14 @@ def code_in(values: Floats, coarsest: float) -> float | None:
         if scattered and _stands_out(values, value, leap):
             return value
     return next((code for code in codes - extremes | codes & {0.0} if _too_often(values[:_CHUNK], code)), None)
+
+
+def _runs_evenly(values: Floats) -> bool:
+    """Tell a clock, whose steps are alike and forwards."""
+    if values.size < 3 or not values[-1] > values[0]:
+        return False
+    steps = np.diff(values[:_CHUNK])
+    return bool(np.min(steps) > 0 and np.max(steps) < _CLOCK * np.mean(steps)) and values.size <= _CHUNK
 
 
 def _drops_to(values: Floats, value: float, step: float) -> bool:

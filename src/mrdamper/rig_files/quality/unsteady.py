@@ -56,6 +56,8 @@ def stroke_steps(view: View) -> Iterator[Finding]:
     strokes, force = view.strokes, view.run.force
     if strokes.lengths.size < 5 or view.noticed("W_FROZEN", "W_CLIPPED"):
         return
+    if np.ptp(strokes.lengths) < STROKE * float(np.min(strokes.lengths)):
+        return
     forces = np.maximum.reduceat(force, strokes.reversals)[:-1] - np.minimum.reduceat(force, strokes.reversals)[:-1]
     for at in range(2, strokes.lengths.size - 2):
         before, after = strokes.lengths[:at], strokes.lengths[at + 1 :]

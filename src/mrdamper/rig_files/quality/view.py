@@ -23,6 +23,7 @@ MOST_SAMPLES = 40_000
 SHORTEST = 5  # samples of a segment; a slope needs as many
 _UNEXPLAINED = 0.3  # of the motion's standard deviation: more is no periodic motion
 _HOLE = 0.03  # of a period without samples: more of a loop may be missing than a line can bridge
+_FITTED, _FITTED_A_PERIOD = 600, 40  # samples, and per period, that determine the sine of the motion
 _FINE = 200  # samples per period that are enough for every figure here
 
 
@@ -107,10 +108,26 @@ class View:
     def motion(self) -> MotionAnalysis | None:
         """Which sine the steady part is; None under a cycle, or where no sine with harmonics and drift explains it."""
         try:
-            found = analyse_motion(self.steady)
+            found = analyse_motion(self._thinned(self.steady))
         except ExcitationError:
             return None
         return found if found.residual < _UNEXPLAINED * float(np.std(self.steady.displacement)) else None
+
+    def _thinned(self, run: Run) -> Run:
+        """Leave out samples that a sine of this period does not need, but not the last."""
+        if len(run.segments) > 1 or self.strokes.period is None:
+            return run
+        periods = float(run.time[-1] - run.time[0]) / self.strokes.period
+        size = max(_FITTED, int(_FITTED_A_PERIOD * periods))
+        if run.time.size < 2 * size:
+            return run
+        kept = np.linspace(0, run.time.size - 1, size).astype(int)
+        return Run(run.id, run.time[kept], run.displacement[kept], run.force[kept], np.zeros(size))
+
+    @cached_property
+    def force_noise(self) -> float:
+        """Standard deviation of the white noise on the force of the steady part [N]."""
+        return sample_noise(self.steady.force)
 
     @cached_property
     def moving(self) -> Excitation:
@@ -159,9 +176,12 @@ def sample_noise(signal: Floats) -> float:
     The median keeps corners of the signal out; 20 is the sum of the squared coefficients
     1, 3, 3, 1, and 0.6745 the median of a standard normal's size.
     """
-    third = np.abs(np.diff(signal, 3))
+    third = np.abs(signal[3:] - signal[:-3] - 3 * (signal[2:-1] - signal[1:-2]))
     third = third[np.isfinite(third)]
-    return float(np.median(third)) / 0.6745 / float(np.sqrt(20)) if third.size else 0.0
+    if not third.size:
+        return 0.0
+    middle = third.size // 2  # of an even number, the upper of the two
+    return float(np.partition(third, middle)[middle]) / 0.6745 / float(np.sqrt(20))
 
 
 def runs_of(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
