@@ -80,7 +80,8 @@ def violations(site: Path, pages: Sequence[Path], searches: Sequence[str] = ()) 
             tab.wait_for_timeout(1000)  # results appear one after another
             links = tab.eval_on_selector_all("#search-results li a", "all => all.map(a => a.getAttribute('href'))")
             first = [link.partition(".html")[0] for link in links][:_SHOWN]
-            if SEARCHES[words] not in first or any(name.startswith(("decisions/", "changes")) for name in first):
+            ordered = sorted(first, key=lambda name: name.startswith(("decisions/", "changes")))
+            if SEARCHES[words] not in first or first != ordered:
                 found.append(f"search {words!r}: finds {', '.join(first) or 'nothing'}; expected {SEARCHES[words]}")
         tab.on("pageerror", lambda error: found.append(f"{tab.url}: {error}"))
         tab.on("requestfailed", lambda request: found.append(f"{tab.url}: cannot load {request.url}"))

@@ -9,7 +9,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from benchmarks import accuracy, commands, conditions, goals, page, streams, study
+from benchmarks import accuracy, commands, conditions, goals, page, streams, study, testing
 from benchmarks.batches import prepared
 from benchmarks.genetic import plain_genetic
 from benchmarks.identification import Task
@@ -18,6 +18,7 @@ from benchmarks.timing import growth, race
 from mrdamper.identification.methods.projection import Projection
 from mrdamper.physics.hysteresis import Shape, follow
 from mrdamper.physics.motion import Path as Strokes
+from mutants.rooms import ROOMS
 
 
 def test_growth_is_the_exponent():
@@ -113,3 +114,27 @@ def test_an_empty_page_says_what_was_not_measured():
     assert "202" not in page.machine().split("Python")[0]  # no date
     assert goals.Goal("x", 1.0, 2.0, "").verdict == "missed"
     assert goals.Goal("x", 1.0, 2.0, "", at_least=True).verdict == "met"
+
+
+def test_the_page_of_tests_takes_the_last_lines_of_a_command():
+    page = testing.PAGE.read_text(encoding="utf-8")
+    commands = testing.commands_of(page)
+    assert {command.split()[2] for command in commands.values()} == {
+        "mutants",
+        "fuzz.fuzz_import",
+        "fuzz.attack",
+        "benchmarks.coverage",
+    }
+    first, *others = commands.values()
+    changed = testing.with_output(page, first, "\n".join(f"line {i}" for i in range(20)))
+    assert f"$ {first}\nline 8\n" in changed
+    assert "line 19\n```" in changed
+    assert all(f"$ {other}\n" in changed for other in others)
+    assert testing.with_output(changed, first, "done") == testing.with_output(page, first, "done")
+
+
+@pytest.mark.parametrize("room", ROOMS, ids=lambda room: room.modules[0])
+def test_faults_are_planted_in_modules_that_exist(room):
+    root = Path(__file__).parent.parent
+    assert all((root / test).exists() for test in room.tests)
+    assert all((root / "src" / f"{module.replace('.', '/')}.py").is_file() for module in room.modules)
