@@ -1,6 +1,8 @@
 """The published JSON Schemas accept what is written and refuse what is not of the format."""
 
 import json
+import re
+import tomllib
 
 import jsonschema
 import pytest
@@ -17,7 +19,7 @@ def schema(name):
     return json.loads(done.stdout)
 
 
-@pytest.mark.parametrize("name", ["model", "profile", "fleet", "system"])
+@pytest.mark.parametrize("name", ["model", "profile", "limits", "about", "fleet", "system"])
 def test_a_schema_is_valid(name):
     jsonschema.Draft202012Validator.check_schema(schema(name))
 
@@ -29,3 +31,23 @@ def test_a_saved_model_follows_the_schema(make):
     for change in ({"units": {}, "extra": 1}, {"envelope": {}}, {"damper": {"kind": "none"}}):
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate({**document, **change}, schema("model"))
+
+
+@pytest.mark.parametrize("name", ["about", "limits"])
+def test_a_template_follows_the_schema_and_a_misspelt_key_does_not(name):
+    template = CliRunner().invoke(application(), ["init", name]).stdout
+    document = tomllib.loads(re.sub(r"^#(?=[\w\[])", "", template, flags=re.MULTILINE))
+    assert document
+    jsonschema.validate(document, schema(name))
+    for key in document:
+        misspelt = {(f"{k}x" if k == key else k): value for k, value in document.items()}
+        with pytest.raises(jsonschema.ValidationError, match=f"{key}x"):
+            jsonschema.validate(misspelt, schema(name))
+
+
+def test_a_limit_of_another_side_violates_the_schema():
+    limit = {"current_A": 0.5, "velocity_m_s": 0.1, "side": "rebound", "lower_N": 300.0, "upper_N": 420.0}
+    jsonschema.validate({"limit": [limit]}, schema("limits"))
+    for change in ({"side": "extension"}, {"lower": 1.0}, {"upper_N": "high"}):
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate({"limit": [{**limit, **change}]}, schema("limits"))

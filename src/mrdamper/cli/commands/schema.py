@@ -6,7 +6,7 @@ import json
 
 import typer
 
-_FORMATS = ("model", "profile", "fleet", "system")
+_FORMATS = ("model", "profile", "limits", "about", "fleet", "system")
 
 
 def register(app: typer.Typer) -> None:
@@ -16,7 +16,7 @@ def register(app: typer.Typer) -> None:
     def schema(
         name: str = typer.Argument(..., help=f"File format: {', '.join(_FORMATS)}."),
     ) -> None:
-        """Print the JSON Schema of a saved model, profile or system."""
+        """Print the JSON Schema of a saved model, or of a file that is written by hand."""
         from mrdamper.errors import UnknownNameError
 
         if name not in _FORMATS:
@@ -33,6 +33,10 @@ def _schema(name: str) -> dict:
         from mrdamper.rig_files.profile import Profile
 
         document = Profile.model_json_schema()
+    elif name == "limits":
+        document = _limits()
+    elif name == "about":
+        document = _about()
     elif name == "fleet":
         from mrdamper.fleet.profile import FleetProfile
 
@@ -42,3 +46,32 @@ def _schema(name: str) -> dict:
 
         document = SystemDocument.model_json_schema()
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **document}
+
+
+def _limits() -> dict:
+    """Limits of the test rig, of the force and of the columns of a fleet, as one file holds them."""
+    from pydantic import TypeAdapter
+
+    from mrdamper.fleet.profile import ColumnLimits
+    from mrdamper.report.about import Limit
+    from mrdamper.rig_files.limits_file import COLUMN_LIMITS, FORCE_LIMITS
+    from mrdamper.study.limits import Limits
+
+    force = {**TypeAdapter(Limit).json_schema(), "additionalProperties": False}
+    force["properties"]["side"]["enum"] = ["rebound", "compression"]
+    parts = {
+        FORCE_LIMITS: {"type": "array", "items": force},
+        COLUMN_LIMITS: {"type": "object", "additionalProperties": ColumnLimits.model_json_schema()},
+    }
+    rig = TypeAdapter(Limits).json_schema()["properties"]
+    return {"title": "Limits", "type": "object", "properties": {**rig, **parts}, "additionalProperties": False}
+
+
+def _about() -> dict:
+    """Fields of the head of a report: text or numbers."""
+    from dataclasses import fields
+
+    from mrdamper.report.about import About
+
+    properties = {field.name: {"type": ["string", "number"]} for field in fields(About)}
+    return {"title": "About", "type": "object", "properties": properties, "additionalProperties": False}
