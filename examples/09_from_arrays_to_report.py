@@ -42,5 +42,5 @@ print(prediction.to_polars().head(3))  # or to_pandas()
 # %%
 # The report with its head, the model file, the tables and the figures.
 folder = Path(tempfile.mkdtemp())
-written = study.write_report(folder, about={"customer": "Example Ltd", "specimen": "damper 7"})
+written = study.write_report(folder, about={"customer": "Example Ltd", "type": "damper 7"})
 print(f"{len(written)} files, the first of them {written[0].name}")
