@@ -21,8 +21,9 @@ _AGREE_A, _AGREE = 0.05, 0.15  # a nominal and a measured current may differ by 
 _IN_NAME = re.compile(
     r"(?<![0-9A-Za-z.,])(?:[iI](?:_?(?:[cC]oil|[sS]pule))?|(?:[sS]pulen|[cC]oil)?(?:[sS]trom|[cC]urr(?:ent)?|[cC]ur))?"
     r"([0-9]{1,4}(?:[.,xp][0-9]{1,4})?)[ _]?(m?)(?:A(?:mp(?:ere)?s?)?|amp(?:ere)?s?|(?<=m)a)"
-    r"(?![A-Za-z0-9]|\s?/\s?[A-Za-z]|_[0-9.]+(?:_|\.?$|\.[a-z]{2,4}$))"  # 2_A_20: the name of the next number
+    r"(?![A-Za-z0-9]|\s?/\s?[A-Za-z])"
 )
+_NEXT_NUMBER = re.compile(r"_A_[0-9.]+(?:_|\.[a-z]{2,4}$|$)")  # 2_A_20: the name of the next number
 _NEGATIVE = re.compile(r"[=:]\s*[-−]$")  # a dash elsewhere may stand between two parts of a name
 _NUMERIC_CELL = re.compile(r"[,;]\s*\"?[+-]?[0-9.]+\"?\s*$")
 _LINE = re.compile(
@@ -80,6 +81,7 @@ def currents_in(text: str) -> tuple[float, ...]:
         return ()
     # 04A may be four or 0.4 amperes; 0400mA is padded.
     stated = [match for match in _IN_NAME.finditer(text) if match[2] or not re.fullmatch("0[1-9]+", match[1])]
+    stated = [match for match in stated if not _NEXT_NUMBER.match(text, match.end(1))]
     signs = [-1.0 if _NEGATIVE.search(text[: match.start()]) else 1.0 for match in stated]
     found = [sign * amperes(match[1], f"{match[2]}A") + 0.0 for sign, match in zip(signs, stated, strict=True)]
     return tuple(dict.fromkeys(found))
