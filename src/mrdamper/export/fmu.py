@@ -187,7 +187,7 @@ def _facts(made: Stream, name: str, rig: str, fmi: int, known: Reference) -> dic
         "fmi": fmi,
         "most_steps": MOST_STEPS,
         "stop_time": repr(known.step * (known.force.size - 1)),
-        "about": f"{made.title}{f' of rig {rig}' if rig else ''}, made by mrdamper.",
+        "about": f"{made.title}{f' of rig {rig}' if rig else ''}, written by mrdamper.",
     }
 
 

@@ -99,7 +99,7 @@ def _facts(
         "name": word,
         "upper": word.upper(),
         "title": c_comment(title),
-        "about": f"{title}, made by mrdamper.",
+        "about": f"{title}, written by mrdamper.",
         "version": package_version(),
         "fmi": fmi,
         "variables": variables,

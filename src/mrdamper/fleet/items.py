@@ -39,7 +39,7 @@ def find_items(source: str | Path, profile: FleetProfile) -> list[Item]:
     if not found:
         raise FleetError(
             "no damper in this folder", where=str(source), code="E_FLEET_EMPTY",
-            mend="a fleet is a folder of dataset folders, of rig files, or a Parquet lake",
+            mend="give a folder of dataset folders, of rig files, or of Parquet files",
         )  # fmt: skip
     return _without_twins(sorted(found, key=lambda item: (item.serial, item.session, item.paths)))
 

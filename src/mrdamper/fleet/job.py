@@ -261,12 +261,12 @@ def _study(dataset: Dataset) -> dict[str, Any]:
 
 
 def _usable(dataset: Dataset) -> list[Run]:
-    """Train runs that can be believed and move; a damper with none raises what was wrong with the first."""
+    """Return the accepted identification runs with a motion; a damper without one raises the first one's error."""
     kept, refused = believed(dataset.split("train"))
     runs, unusable = usable(kept)
     if runs:
         return runs
-    why = next(iter({**refused, **unusable}.values()), "no train run; check the column split")
+    why = next(iter({**refused, **unusable}.values()), "no identification run; check the column split")
     raise FleetError(why, where=dataset.name, code="E_FLEET_EMPTY")
 
 

@@ -137,7 +137,7 @@ class _Line:
                 try:
                     self._digests[number] = digest_of(item)
                 except OSError as error:
-                    found, mend = error.strerror or str(error), "mend the file or its rights"
+                    found, mend = error.strerror or str(error), "correct the file or its permissions"
                     self._failed[number] = refused(InputError(found, where=item.paths[0], mend=mend))
             if number % 100 == 0:
                 self._progress(f"reading {len(self._items)} dampers", 0.0)

@@ -104,7 +104,7 @@ def identify(
         raise IdentificationError(
             f"the samples do not determine the parameters ({error})",
             where=where,
-            mend="record more cycles, or more samples a cycle, and check the units",
+            mend="record more cycles, or more samples per cycle, and check the units",
         ) from error
     if not np.isfinite(found.scores.nrmse_pp):
         raise IdentificationError("the error of the fit is no number", where=where, mend="check the units of the force")

@@ -258,7 +258,9 @@ class Identification(Displayable):
             return self.ask()
         except (np.linalg.LinAlgError, ArithmeticError) as error:
             unknown = dict.fromkeys(self.free, np.inf)
-            return RunCertainty(unknown, unknown, doubts=(f"how sure the parameters are {NOT_IDENTIFIABLE}: {error}",))
+            return RunCertainty(
+                unknown, unknown, doubts=(f"the uncertainty of the parameters is {NOT_IDENTIFIABLE}: {error}",)
+            )
 
     @property
     def standard_errors(self) -> Mapping[str, float]:

@@ -92,6 +92,6 @@ def _refuse_gap(time: Floats, path: Path) -> None:
         raise RunError(
             f"a gap of {steps[at]:.4g} s after {time[at]:.6g} s",
             where=str(path),
-            mend="predict the parts one by one: the damper's state is unknown after a gap",
+            mend="predict each part separately: the damper's state is unknown after a gap",
             code="E_TIME_GAP",
         )

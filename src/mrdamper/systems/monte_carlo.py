@@ -73,7 +73,7 @@ def draw(dampers: Mapping[str, Damper], count: int, seed: int = 1) -> list[dict[
         known = damper.certainty
         if known is None:
             raise InputError(
-                f"how sure {damper.title} is was not saved with it",
+                f"{damper.title} was saved without its uncertainty",
                 where=link,
                 mend="give a model that study wrote from tests, or leave out --draws",
                 code="E_CERTAINTY",

@@ -36,7 +36,7 @@ class Simulation:
     stroke: Floats  # (N, E) [m]
     stroke_rate: Floats  # (N, E) [m/s]
     current: Floats  # (N, E) commanded to each link [A]; zero for stops and tyres
-    # (N, E) of dampers: bits of `streaming.FLAGS`; of stops and tyres: touching; in the air
+    # (N, E) of dampers: bits of `streaming.FLAGS`; of stops: contact; of tyres: lift-off
     flags: NDArray[np.int64]
     road: Floats  # (N, q) height of the road by channel [m]; zero on the ground
     road_rate: Floats  # (N, q) [m/s]
@@ -64,10 +64,14 @@ class Simulation:
 
     @property
     def outside(self) -> dict[str, dict[str, float]]:
-        """Share of the time each damper spent outside its tests, by quantity; stops and tyres: in touch, in the air."""
+        """Share of the time each damper spent outside its tests, by quantity; contact of stops, lift-off of wheels."""
         found: dict[str, dict[str, float]] = {}
         for i, link in enumerate(self.links):
-            words = FLAGS if link.role == "damper" else ({"stop": "touching", "tyre": "in the air"}[link.role],)
+            words = (
+                FLAGS
+                if link.role == "damper"
+                else ({"stop": "bump-stop contact", "tyre": "wheel lift-off"}[link.role],)
+            )
             shares = {word: float(np.mean(self.flags[:, i] >> bit & 1)) for bit, word in enumerate(words)}
             if kept := {word: share for word, share in shares.items() if share > 0}:
                 found[link.name] = kept
