@@ -97,12 +97,12 @@ def _written() -> int:
 
 def _strangers() -> list[int]:
     """List the processes a job left behind, without the one that reads rig files."""
-    found = []
+    processes = []
     for pid in descendants(os.getpid()):
         with contextlib.suppress(OSError):
             if b"sandbox_worker" not in Path(f"/proc/{pid}/cmdline").read_bytes():
-                found.append(pid)
-    return found
+                processes.append(pid)
+    return processes
 
 
 def _adopt_orphans() -> None:

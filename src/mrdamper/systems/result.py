@@ -65,7 +65,7 @@ class Simulation:
     @property
     def outside(self) -> dict[str, dict[str, float]]:
         """Share of the time each damper spent outside its tests, by quantity; contact of stops, lift-off of wheels."""
-        found: dict[str, dict[str, float]] = {}
+        shares_by_link: dict[str, dict[str, float]] = {}
         for i, link in enumerate(self.links):
             words = (
                 FLAGS
@@ -74,20 +74,20 @@ class Simulation:
             )
             shares = {word: float(np.mean(self.flags[:, i] >> bit & 1)) for bit, word in enumerate(words)}
             if kept := {word: share for word, share in shares.items() if share > 0}:
-                found[link.name] = kept
-        return found
+                shares_by_link[link.name] = kept
+        return shares_by_link
 
     @cached_property
     def peaks(self) -> dict[str, Floats]:
         """Largest magnitudes: displacement, drift, acceleration, force, by coordinate, span, damper."""
         dampers = [i for i, link in enumerate(self.links) if link.role == "damper"]
-        found = (
+        series = (
             np.abs(self.x).max(axis=0),
             np.array([np.abs(self.span(name)).max() for name in self.system.spans]),
             np.abs(self.a).max(axis=0),
             np.abs(self.force[:, dampers]).max(axis=0),
         )
-        return dict(zip(self.PEAKS, found, strict=True))
+        return dict(zip(self.PEAKS, series, strict=True))
 
     @checked()
     def span(self, name: str) -> Floats:
@@ -105,12 +105,12 @@ class Simulation:
     @property
     def unreachable(self) -> dict[str, float]:
         """Share of the time the force asked of a damper was out of its reach: its current at an end."""
-        found = {}
+        shares = {}
         for i, link in enumerate(self.links):
             if link.name in self.limits:
                 most, current = self.limits[link.name], self.current[1:, i]
-                found[link.name] = float(np.mean((current <= 0.01 * most) | (current >= 0.99 * most)))
-        return found
+                shares[link.name] = float(np.mean((current <= 0.01 * most) | (current >= 0.99 * most)))
+        return shares
 
     @property
     def timing(self) -> dict[str, float]:
@@ -119,7 +119,7 @@ class Simulation:
         Negative: firm just when it shakes that mass, as with a sign exchanged. Left out where the
         current does not change.
         """
-        found = {}
+        times = {}
         for i, link in enumerate(self.links):
             current = self.current[:, i]
             if link.role == "damper" and np.ptp(current) > 0:
@@ -127,8 +127,8 @@ class Simulation:
                 row, road = self.system.point(end)
                 power = sign * self.force[:, i] * (self.v @ row + self.road_rate @ road)
                 if np.ptp(power) > 0:
-                    found[link.name] = float(np.corrcoef(current, power)[0, 1])
-        return found
+                    times[link.name] = float(np.corrcoef(current, power)[0, 1])
+        return times
 
     @property
     def energy_gap(self) -> float:
