@@ -19,7 +19,7 @@ from mrdamper.tracing import Program, Tape, program
 from mrdamper.tracing.compiled import RecordProgram
 
 if TYPE_CHECKING:
-    from mrdamper.dampers.base import Damper
+    from mrdamper.dampers.protocols import DamperLike as Damper
     from mrdamper.physics.motion import Excitation
 
 SLACK = 0.02  # a test bench repeats a condition to a few per cent; within that nothing is extrapolated

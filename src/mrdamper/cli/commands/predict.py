@@ -92,6 +92,7 @@ def register(app: typer.Typer) -> None:
             )
         known = band(damper, prediction, level)
         if check_run:
+            from mrdamper.dampers.bands import session_band
             from mrdamper.dampers.sessions import When, sessions_known
             from mrdamper.rig_files.dataset_folder import load_dataset
 
@@ -99,7 +100,8 @@ def register(app: typer.Typer) -> None:
             runs = [dataset[name] for name in check_run]
             expected = sessions_known(damper, runs).expected(When.of(runs[-1]))
             assert expected is not None  # the last check run's own session
-            known, prediction = expected.band(damper, prediction, level), expected.corrected(prediction)
+            known = session_band(expected, damper, prediction, level)
+            prediction = expected.corrected(prediction)
             typer.echo(
                 f"session known by {', '.join(check_run)}: gain {expected.gain:.3f} ± {expected.gain_spread:.3f}, "
                 f"offset {expected.offset:.3g} ± {expected.offset_spread:.2g} N",
