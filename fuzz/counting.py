@@ -1,4 +1,4 @@
-"""What all attacks share: hostile texts and values, and the count of what was tried and held."""
+"""Common parts of all attacks: hostile texts and values, and the count of what was tried and held."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _TOLD = 5  # of a kind, as they happen
 
 @dataclass
 class Count:
-    """How many of a kind were tried, and what did not hold."""
+    """Number of trials of a kind, and those that did not hold."""
 
     kind: str
     tried: int = 0

@@ -49,7 +49,7 @@ def attack_extremes(share: float, only: Sequence[str] = ()) -> list[Count]:
 
 
 def _finite_scores(path: Path) -> bool:
-    """Whether every score in a table is a number; what cannot be known of a parameter is infinite by right."""
+    """Check that every score in a table is a number; an interval of a parameter may be infinite."""
     with path.open(newline="", encoding="utf-8", errors="replace") as file:
         rows = list(csv.DictReader(file))
     scores = [row[name] for row in rows for name in row if name and name.startswith(("nrmse", "wape"))]

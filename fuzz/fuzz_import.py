@@ -104,7 +104,7 @@ def mutate(content: bytes, rng: random.Random) -> bytes:
 
 
 def attempt(path: Path) -> tuple[str, float, str]:
-    """What came of one file: a code or "read"; the seconds it took; and a fault, if it is one."""
+    """Result of one file: a code or "read"; the seconds it took; and a fault, if it is one."""
     begin = time.perf_counter()
     try:
         read_runs(path)

@@ -113,7 +113,7 @@ def attack_pages(share: float) -> list[Count]:
 
 
 def unsound(name: str, content: bytes) -> str:
-    """What is wrong with a file somebody will open; nothing where a name stayed a name."""
+    """Fault of a file that somebody will open; empty where a name stayed a name."""
     kind = name.rsplit(".", 1)[-1]
     try:
         if kind == "html":

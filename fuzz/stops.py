@@ -119,7 +119,7 @@ def _chosen(only: Sequence[str]) -> list[tuple[str, tuple[str, str]]]:
 
 
 def _begin_anew(folder: Path, n: int, empty: bool = False) -> None:
-    """What a command must find: the dataset it changes, no dataset where it makes one, the other result or nothing."""
+    """Files a command needs: the dataset it changes, no dataset where it makes one, the other result or nothing."""
     out = folder / COMMANDS[folder.name][0].format(n=n)
     if folder.name in _CHANGE or empty or "{n}" in COMMANDS[folder.name][0]:
         shutil.rmtree(out) if out.is_dir() else out.unlink(missing_ok=True)
@@ -128,7 +128,7 @@ def _begin_anew(folder: Path, n: int, empty: bool = False) -> None:
 
 
 def _adopt_orphans() -> None:
-    """What a killed command leaves running becomes a child of this process, which is how it is seen."""
+    """Make this process the parent of processes that a killed command leaves running."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(36, 1, 0, 0, 0)  # PR_SET_CHILD_SUBREAPER
 
@@ -147,7 +147,7 @@ def _orphans() -> list[str]:
 
 
 def _steps(folder: Path, line: str) -> int:
-    """How many steps of publishing a run takes."""
+    """Count the steps of publishing that a run takes."""
     _begin_anew(folder, 1)
     seen = folder.parent / "steps"
     seen.write_bytes(b"")
@@ -210,7 +210,7 @@ def attack_limits(share: float, only: Sequence[str] = ()) -> list[Count]:
 
 
 def _amounts(folder: Path, share: float) -> Iterator[tuple[str, float]]:
-    """What a command is left with: most points where there is little."""
+    """Resources left to a command: most points where there is little."""
     size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
     most = {"disk": 1.2 * size, "memory": 4 * 2**30, "file size": 1.1 * size, "files": 16, "temporary folder": 0}
     for kind, points in _POINTS.items():
@@ -289,7 +289,7 @@ def _wait(pid: int) -> int:
 
 
 def run_command(folder: Path, line: str, limit: Callable[[], None] | None = None) -> str | None:
-    """What a command said that did not end well; None if it did."""
+    """Output of a command that failed; None if it did not."""
     reading, writing = os.pipe()  # no file: a limit of the size of files would hold for it too
     status = _wait(_begin(folder, line, limit, writing))
     os.set_blocking(reading, False)

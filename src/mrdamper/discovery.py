@@ -10,6 +10,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import pkgutil
+import threading
 import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -156,17 +157,19 @@ class Registry(Generic[T]):
     def __init__(self, group: str, base: type[T], kind: str):
         self.group, self.base, self.kind = group, base, kind
         self._parts: dict[str, ExtensionPart] | None = None
+        self._lock = threading.RLock()
         self._types: dict[str, type[T]] = {}
         _registries[group] = self
 
     @property
     def types(self) -> Mapping[str, type[T]]:
         """Every class by its name, sorted."""
-        if self._parts is None:
-            self._parts = {}
-            for point, target in provided_modules(self.group):
-                for cls in self._classes(target):
-                    self._add(cls, package_of(point.dist), is_own=_is_own(point))
+        with self._lock:  # another thread waits until all classes are there
+            if self._parts is None:
+                self._parts = {}
+                for point, target in provided_modules(self.group):
+                    for cls in self._classes(target):
+                        self._add(cls, package_of(point.dist), is_own=_is_own(point))
         return MappingProxyType(dict(sorted(self._types.items())))
 
     @property

@@ -10,12 +10,14 @@ import pytest
 from mrdamper.data import Run
 from mrdamper.rig_files.quality.cycles import POINTS, steady_cycles
 from mrdamper.rig_files.quality.effects import damping, elastic_plastic
+from mrdamper.rig_files.quality.filtered import noise_by_octave
 from mrdamper.rig_files.quality.force_lag import force_lag
 from mrdamper.rig_files.quality.names import agrees_with_its_name
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Record
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
+from fuzz import operator_faults
 from fuzz.fuzz_records import codes_of, table, trials
 from fuzz.record_faults import KINDS, UNOBSERVABLE
 from fuzz.synthetic_records import FAMILIES, clean_record
@@ -94,7 +96,18 @@ SEVERE = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind.name in SEVERE], ids=lambda kind: kind.name)
+SEVERE |= {
+    "displacement behind a first-order low-pass": 0.04, "force smoothed without phase": 0.02,
+    "force clipped at one end before noise": 0.5, "gain of the displacement steps": 0.2,
+    "hum for a quarter of the record, displacement": 0.03, "displacement stored on change only": 0.05,
+    "force stored on change only": 0.1, "bit of the force stuck": 0.15, "telemetry packets lost, last sample held": 0.2,
+    "displacement averaged over a moving window": 0.1, "carrier aliased into the displacement": 0.05,
+    "buffers of the logger exchanged": 0.1, "polarity of the force reversed late": 0.3,
+}  # fmt: skip
+ALL_KINDS = (*KINDS, *operator_faults.KINDS)
+
+
+@pytest.mark.parametrize("kind", [kind for kind in ALL_KINDS if kind.name in SEVERE], ids=lambda kind: kind.name)
 def test_a_fault_of_a_size_that_matters_is_found(kind):
     faulty = kind.change(sine_record(), SEVERE[kind.name], np.random.default_rng(3))
     assert codes_of(faulty) - codes_of(sine_record())
@@ -124,8 +137,9 @@ def test_what_a_name_states_is_compared_with_the_motion(name, said):
 
 def test_there_are_forty_kinds_and_each_changes_a_record():
     assert len(KINDS) >= 40
+    assert len(operator_faults.KINDS) >= 25
     record = clean_record(1, np.random.default_rng(0), least_cycles=4.0)
-    for kind in (*KINDS, *UNOBSERVABLE):
+    for kind in (*KINDS, *UNOBSERVABLE, *operator_faults.KINDS, *operator_faults.UNOBSERVABLE):
         faulty = kind.change(record, float(np.sqrt(kind.low * kind.high)), np.random.default_rng(1))
         Run("r", faulty.time, faulty.displacement, faulty.force, faulty.current)  # a record as any
         same = faulty.time.size == record.time.size and all(
@@ -151,10 +165,28 @@ def printed_table():
 
 
 def test_the_table_of_the_rig_procedure_has_every_kind():
-    rows = printed_table().splitlines()[2:]
-    assert [row.split(" | ")[0].removeprefix("| ") for row in rows] == [kind.name for kind in KINDS]
+    rows = [row for row in printed_table().splitlines() if row and not row.startswith(("| Fault", "|---"))]
+    names = [kind.name for kind in (*KINDS, *operator_faults.KINDS)]
+    assert [row.split(" | ")[0].removeprefix("| ") for row in rows] == names
 
 
 @pytest.mark.slow
 def test_the_table_of_the_rig_procedure_is_what_the_command_prints():
-    assert printed_table() == table(list(trials(KINDS, 12, 1)))
+    tables = (table(list(trials(kinds, 12, 1))) for kinds in (KINDS, operator_faults.KINDS))
+    assert printed_table() == "\n\n".join(tables)
+
+
+def test_noise_is_white_by_octave_until_a_filter_colours_it():
+    """A first-order filter takes 6 dB an octave; without noise there is nothing to tell."""
+    record = sine_record(cycles=16, points=400)
+    levels, highest = noise_by_octave(View(record), "force")
+    assert highest == pytest.approx(200)
+    assert np.ptp(levels) < 4
+    kept = np.exp(-0.0025 / 0.05)
+    filtered = [record.force[0]]
+    for value in record.force[1:]:
+        filtered.append(kept * filtered[-1] + (1 - kept) * value)
+    falls = np.diff(noise_by_octave(View(replace(record, force=np.array(filtered))), "force")[0])[1:4]
+    assert np.all((falls > 4) & (falls < 9)), falls
+    clean = replace(record, force=1500 * 0.04 * np.pi * np.cos(2 * np.pi * record.time))
+    assert noise_by_octave(View(clean), "force")[0].size == 0

@@ -1,4 +1,4 @@
-"""Whether a record can be believed: every check in order, findings added or the record refused.
+"""Quality checks of a record in their order: findings are added, or the record is refused.
 
 A check is a function of a `View` that yields findings, or only raises `QualityError`. The
 order matters: a check may trust what the ones before it made sure of. A module dropped in here
@@ -15,6 +15,7 @@ from mrdamper.discovery import modules_with
 from mrdamper.errors import QualityError
 from mrdamper.rig_files.quality import (
     clock,
+    converter,
     current,
     disturbance,
     filtered,
@@ -63,10 +64,12 @@ CHECKS: tuple[Check, ...] = (
     motion.is_a_sine,
     motion.drifts,
     names.agrees_with_its_name,
-    disturbance.changes_at_every_sample,
+    converter.changes_at_every_sample,
+    converter.is_not_stored_on_change,
     disturbance.motion_is_one,
     disturbance.force_lines,
     disturbance.force_is_fine,
+    converter.no_bit_is_stuck,
     flattened.cut_off_before_noise,
     flattened.rests_at_its_ends,
     renumbered.lost_or_doubled,

@@ -38,7 +38,7 @@ def order_of_time(view: View) -> None:
 
 
 def _turning_back(seconds: float) -> str:
-    """What to do about a clock that goes back so far."""
+    """Remedy for a clock that goes back by a time."""
     if abs(seconds - _DAY) < _NEAR:
         return "export the time of day with its date: the test went on past midnight"
     if abs(seconds - _HOUR) < _NEAR:

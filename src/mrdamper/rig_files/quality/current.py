@@ -16,7 +16,7 @@ _MOST = 1_000_000  # samples looked at
 
 
 def changes(view: View) -> Iterator[Finding]:
-    """Say that the current changes within the steady motion."""
+    """Report a current that changes within the steady motion."""
     yield from change_of(view.record, steady_window(view))
 
 

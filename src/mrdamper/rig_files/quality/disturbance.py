@@ -28,8 +28,6 @@ _ABOVE = 12.0  # times the median line around it; noise reaches 8
 _AROUND = 60  # lines on either side
 _NOISE = 0.026  # RMS noise of the force, of its peak-to-peak value: bundled rigs have up to 0.011
 _EXTREME = 4.0  # RMS noise by which the extremes of a cycle's samples widen its peak-to-peak value
-_HELD = 3  # samples; held for as long all the time, a channel was recorded at a slower rate
-_HELD_LATE = 0.005  # of the period
 
 
 class Line(NamedTuple):
@@ -151,26 +149,3 @@ def force_is_fine(view: View) -> Iterator[Finding]:
             f"noise of the force {100 * noise:.2g} % of its peak-to-peak value: single samples exceed the peak force "
             f"by {percent(_EXTREME * noise)}; filter before sampling, or use a finer range",
         )
-
-
-def changes_at_every_sample(view: View) -> Iterator[Finding]:
-    """Report a channel whose values are held for several samples all the time: it lags by half of that."""
-    motion = view.motion
-    if motion is None or view.noticed("W_FROZEN"):
-        return
-    for name in ("displacement", "force"):
-        moved = np.flatnonzero(np.diff(getattr(view.steady, name))) + 1
-        if not 20 <= moved.size <= view.steady.time.size / 2:
-            continue
-        apart = np.diff(moved)
-        usual = int(np.median(apart))
-        if usual < _HELD:
-            continue
-        even = float(np.mean(apart % usual == 0))
-        late = 0.5 * (usual - 1) * view.step * motion.condition.frequency_Hz
-        if even > 0.9 and float(np.mean(apart == usual)) > 0.6 and late > _HELD_LATE:
-            yield Finding(
-                "W_HELD",
-                f"the {name} changes at every {usual}th sample only: it was recorded at a slower rate and is late by "
-                f"{1e3 * late / motion.condition.frequency_Hz:.3g} ms, {100 * late:.2g} % of the period",
-            )

@@ -32,7 +32,7 @@ _OTHER = {"displacement": "force", "force": "displacement"}
 
 
 def clipped(view: View) -> Iterator[Finding]:
-    """Say where displacement or force hit the end of their range."""
+    """Report displacement or force that reach the end of their range."""
     for name, unit, scale in (("displacement", "mm", 1e3), ("force", "N", 1.0)):
         tops = flat_tops(view, name)
         if tops:
@@ -46,7 +46,7 @@ def clipped(view: View) -> Iterator[Finding]:
 
 
 def frozen(view: View) -> Iterator[Finding]:
-    """Say where a channel stands still while the other goes on."""
+    """Report a channel that stands still while the other goes on."""
     for name, other in _OTHER.items():
         found = frozen_stretches(view, name)
         if len(found):
@@ -77,7 +77,7 @@ def flat_tops(view: View, name: str) -> dict[float, np.ndarray]:
 
 
 def frozen_stretches(view: View, name: str) -> np.ndarray:
-    """Where a channel repeats one sample, not at the end of its range, while the other channel moves."""
+    """Find stretches in which a channel repeats one sample inside its range while the other channel moves."""
     channel, other, time = _channels(view)[name], view.channels[_OTHER[name]], view.record.time
     at_end = np.isin(channel.values[channel.equal[:, 0]], (channel.low, channel.high))
     found = channel.equal[~at_end | channel.leaps(channel.equal)]
@@ -150,7 +150,7 @@ class _Channel:
         return inside & (step > _LEAP * self.span) & (step > 3 * next_step)
 
     def piled_up(self, level: float) -> bool:
-        """Whether the end of the range holds far more samples than the levels next to it, despite noise."""
+        """Check that the end of the range holds far more samples than the levels next to it, despite noise."""
         if self.level == 0 or not sample_noise(self.values[:100_000]) > self.level / 2:
             return False  # friction without noise holds a level too
         near = self.values[np.abs(self.values - level) < 20 * self.level]
@@ -160,7 +160,7 @@ class _Channel:
         return bool(counts[at] > 4 * np.max(beside, initial=1) + 4)
 
     def _kink(self, stretches: np.ndarray) -> np.ndarray:
-        """Whether a curve through the samples before and after would have left the level by far.
+        """Find the stretches whose curve through the samples before and after would have left the level by far.
 
         The curve is the cubic with the value and the slope at either side; slopes are those of
         parabolas through three samples, so that a motion which comes to rest smoothly has none.
@@ -181,7 +181,7 @@ class _Channel:
         return inside
 
     def _too_quiet(self, start: int, stop: int) -> bool:
-        """Whether the noise around would have shown in the stretch."""
+        """Check that the noise around would have shown in the stretch."""
         sides = [self.values[max(0, start - _NEAR) : start], self.values[stop : stop + _NEAR]]
         sides = [here for side in sides if (here := side[np.isfinite(side)]).size >= _NEAR // 4]
         steps = [np.diff(side) for side in sides]

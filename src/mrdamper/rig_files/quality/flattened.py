@@ -124,7 +124,7 @@ def _top(loop: Floats, depth: float) -> Top:
 
 
 def _reach(values: Floats, level: float) -> float:
-    """How far a curve stays above a level, in phases, between two by interpolation."""
+    """Measure the width over which a curve stays above a level, in phases, between two by interpolation."""
     below = np.flatnonzero(values <= level)
     if not below.size:
         return float(values.size)

@@ -1,4 +1,4 @@
-"""Whether samples can tell the motion, and whether the force follows it: without either nothing can be identified."""
+"""Checks that the samples determine the motion and that the force follows it; without either nothing is identified."""
 
 from __future__ import annotations
 

@@ -80,7 +80,7 @@ def force_channel(view: View) -> Iterator[Finding]:
 
 
 def _stands_still(view: View, cycles: Cycles) -> bool:
-    """Whether a channel is frozen within the cycles: flat stretches look late."""
+    """Check for a channel that is frozen within the cycles: flat stretches look late."""
     if not view.noticed("W_FROZEN"):
         return False
     flagged = view.record.time[flagged_samples(view)]

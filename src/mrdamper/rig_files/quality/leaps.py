@@ -53,7 +53,7 @@ def spikes_in(values: Floats, off_by: float) -> np.ndarray:
 
 
 def _stands_alone(values: Floats, at: int, far: float) -> bool:
-    """Whether up to three samples from here on lie far off, on one side, from neighbours that agree."""
+    """Check for up to three samples from here on that lie far off, on one side, from neighbours that agree."""
     for width in range(1, _WIDEST + 1):
         if at + width >= values.size:
             return False

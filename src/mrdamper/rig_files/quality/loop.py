@@ -58,7 +58,7 @@ def dissipates(view: View) -> None:
 
 
 def _is_rectified(view: View) -> bool:
-    """Whether the force has one sign and is nearer to zero at the reversals than in either stroke.
+    """Check for a force that has one sign and is nearer to zero at the reversals than in either stroke.
 
     A damper's force at a reversal lies between those of the strokes.
     """
@@ -78,7 +78,7 @@ def _is_rectified(view: View) -> bool:
 
 
 def _is_folded(view: View, force: Floats, out: float, back: float) -> bool:
-    """Whether a force is as large in one direction as in the other and goes down to zero on either side of the middle.
+    """Check for a force as large in one direction as in the other that goes down to zero on either side of the middle.
 
     A damper's strokes differ by most of its range, whatever gas or a spring adds.
     """
@@ -103,8 +103,10 @@ def keeps_its_sign(view: View) -> None:
     phase = np.linspace(0.0, period, POINTS, endpoint=False)
     grid = (starts[:, None] + phase).reshape(-1)
     folded = np.interp(grid, time, view.run.force).reshape(-1, POINTS)
-    motions = (np.interp(grid, time, values) for values in (view.moving.velocity, view.moving.displacement))
-    shares = _shares(*(values.reshape(-1, POINTS) for values in motions), folded)
+    velocity, x = (
+        np.interp(grid, time, v).reshape(-1, POINTS) for v in (view.moving.velocity, view.moving.displacement)
+    )
+    shares = _shares(velocity, x, folded)
     flipped = np.flatnonzero(shares < -_CLEARLY)
     if flipped.size and float(np.max(shares)) > _CLEARLY:
         raise _flip(view, float(starts[flipped[0]]), flipped.size, len(cycles))
@@ -183,7 +185,7 @@ def _damping_share(view: View, start: int, stop: int) -> float:
 
 
 def _exchanged(view: View) -> bool:
-    """Whether the channel called force moves like a sine and the one called displacement does not."""
+    """Check for a channel called force that moves like a sine while the one called displacement does not."""
     motion = view.motion
     if motion is None or (not view.strokes.steady and cycles_of(view) < LEAST_CYCLES):
         return float(np.ptp(view.run.displacement)) > float(np.ptp(view.run.force))
@@ -197,7 +199,7 @@ def _exchanged(view: View) -> bool:
 
 
 def repeats(view: View) -> Iterator[Finding]:
-    """Say that the cycles of a record differ from each other by more than noise."""
+    """Report cycles of a record that differ from each other by more than noise."""
     found = repeatability(view)
     if found is None:
         return

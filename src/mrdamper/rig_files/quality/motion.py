@@ -55,7 +55,7 @@ def steady_window(view: View) -> tuple[float, float] | None:
 
 
 def enough_cycles(view: View) -> Iterator[Finding]:
-    """Say that a record is shorter than a cycle: it has no frequency and no amplitude."""
+    """Report a record shorter than a cycle: it has no frequency and no amplitude."""
     cycles = cycles_of(view)
     if cycles < LEAST_CYCLES:
         yield Finding(
@@ -65,7 +65,7 @@ def enough_cycles(view: View) -> Iterator[Finding]:
 
 
 def is_a_sine(view: View) -> Iterator[Finding]:
-    """Say that a motion is no sine: the harmonic balance needs one."""
+    """Report a motion that is no sine: the harmonic balance needs one."""
     if cycles_of(view) < LEAST_CYCLES:
         return
     motion = view.motion
@@ -80,7 +80,7 @@ def is_a_sine(view: View) -> Iterator[Finding]:
 
 
 def drifts(view: View) -> Iterator[Finding]:
-    """Say that amplitude or mean of a periodic motion wander over the record."""
+    """Report a periodic motion whose amplitude or mean drift over the record."""
     if view.motion is None:
         return
     amplitude = view.motion.condition.amplitude_m

@@ -1,4 +1,4 @@
-"""What is missing from a record: infinite values refused, missing ones counted."""
+"""Missing samples of a record: infinite values refused, missing ones counted."""
 
 from __future__ import annotations
 

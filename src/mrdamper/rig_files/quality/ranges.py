@@ -50,7 +50,7 @@ def exchanged_or_out_of_range(view: View) -> None:
 
 
 def unusual(view: View) -> Iterator[Finding]:
-    """Say what a damper test hardly ever has: sizes of a slipped unit, and channels of a few levels."""
+    """Report values that hardly occur in a damper test: sizes of a slipped unit, and channels of a few levels."""
     record, period = view.record, view.strokes.period
     stroke, force = _peak_to_peak(record.displacement), _peak_to_peak(record.force)
     sizes = (

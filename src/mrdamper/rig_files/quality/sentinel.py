@@ -96,7 +96,7 @@ def _runs_evenly(values: Floats) -> bool:
 
 
 def _drops_to(values: Floats, value: float, step: float) -> bool:
-    """Whether a channel leaps to a value and back, much further than it turns back anywhere else.
+    """Check for leaps of a channel to a value and back, much further than it turns back anywhere else.
 
     A force that changes its sign leaps past zero, and a V turns at its tip: neither counts.
     """
@@ -116,7 +116,7 @@ def _drops_to(values: Floats, value: float, step: float) -> bool:
 
 
 def _too_often(values: Floats, value: float) -> bool:
-    """Whether a fine channel holds a value far more often than the levels around it, and stands off there.
+    """Check for a value that a fine channel holds far more often than the levels around it, standing off there.
 
     Among samples of its own size a code does not stand off; but a channel passes each of its
     levels about as often, and its samples are smooth.
@@ -146,7 +146,7 @@ def _codes_among(values: Floats) -> set[float]:
 
 
 def _levels_around(values: Floats, value: float) -> tuple[int, np.ndarray]:
-    """How often a channel holds a value, and each of the levels next to it on either side."""
+    """Count the samples at a value of a channel, and at each of the levels next to it on either side."""
     width, span = 1e-4, float(np.ptp(values))
     while True:
         levels, counts = np.unique(values[np.abs(values - value) <= width * span], return_counts=True)
@@ -195,7 +195,7 @@ def _scattered(values: Floats, value: float, leap: float) -> tuple[int, float]:
 
 
 def _stands_out(values: Floats, value: float, leap: float) -> bool:
-    """Whether a channel leaps to a value from much further than it leaps by itself.
+    """Check for leaps of a channel to a value from much further than it leaps by itself.
 
     A leap is how far a sample lies from the middle of its neighbours.
     """

@@ -40,7 +40,7 @@ class Quality:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What was noticed, without what refused the record."""
+        """Findings without the one that refused the record."""
         return self.record.findings
 
     @property

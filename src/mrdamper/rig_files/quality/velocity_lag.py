@@ -61,7 +61,7 @@ def velocity_channel(view: View) -> None:
 
 
 def delay_between(time: Floats, reference: Floats, signal: Floats, period: float) -> Delay:
-    """How late a signal is against a reference, within half a period [s] either way.
+    """Find the delay of a signal against a reference, within half a period [s] either way.
 
     A signal that is the reference's negative, to a twentieth of its variance, is called that
     rather than half a period late. Otherwise the best of a grid of delays is refined by

@@ -1,4 +1,4 @@
-"""What the checks look at: a record's channels without holes, and the motion in them.
+"""The view of a record that the checks use: its channels without holes, and the motion in them.
 
 Physics is judged on at most `MOST_SAMPLES` samples of a record, so that a long record takes
 no longer than a short one; counts (missing, repeated, frozen) are of all samples.
@@ -40,7 +40,7 @@ class View:
 
     @property
     def where(self) -> str:
-        """How messages name the record."""
+        """Name of the record in messages."""
         return self.record.provenance.get("file", "") or f"run {self.record.id}"
 
     def refused(self, code: str, found: str, mend: str) -> QualityError:
@@ -48,7 +48,7 @@ class View:
         return QualityError(found, where=self.where, mend=mend, code=code)
 
     def place(self, sample: int) -> str:
-        """Where a sample stands in its file: its line, or its number."""
+        """Place of a sample in its file: its line, or its number."""
         lines = self.record.lines
         return f"at sample {sample}" if lines is None else f"in line {int(lines[sample])}"
 
@@ -58,7 +58,7 @@ class View:
         return self.record.channels
 
     def noticed(self, *codes: str) -> bool:
-        """Whether one of these findings was made."""
+        """Check that one of these findings was made."""
         return any(finding.code in codes for finding in self.found)
 
     @cached_property
@@ -106,7 +106,7 @@ class View:
 
     @cached_property
     def motion(self) -> MotionAnalysis | None:
-        """Which sine the steady part is; None under a cycle, or where no sine with harmonics and drift explains it."""
+        """The sine of the steady part; None under a cycle, or where no sine with harmonics and drift explains it."""
         try:
             found = analyse_motion(self._thinned(self.steady))
         except ExcitationError:
