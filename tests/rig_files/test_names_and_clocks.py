@@ -1,0 +1,52 @@
+"""Names, signs and clocks of the channels: what contradicts is refused, a current counts by its magnitude."""
+
+import numpy as np
+import pytest
+
+from mrdamper.rig_files.rig_import import import_files
+
+TIME = np.arange(2001) / 200
+PHASE = 2 * np.pi * TIME
+
+
+def imported(folder, name, heads, columns):
+    rows = "\n".join(",".join(f"{value:.7g}" for value in row) for row in zip(*columns, strict=True))
+    path = folder / name
+    path.write_text(f"{','.join(heads)}\n{rows}\n")
+    return import_files([path])
+
+
+def force(phase):
+    noise = 2 * np.random.default_rng(1).standard_normal(TIME.size)
+    return 800 * np.cos(phase) + 300 * np.tanh(np.cos(phase) / 0.02) + noise
+
+
+@pytest.mark.parametrize(
+    ("name", "current", "accepted"),
+    [("t_0.5A", -0.5, True), ("t_-0.5A", 0.5, True), ("t_-0.5A", -0.5, True), ("t_0.5A", 0.9, False)],
+)
+def test_a_current_in_a_name_is_compared_by_magnitude(tmp_path, name, current, accepted):
+    heads = ("time [s]", "displacement [mm]", "force [N]", "current [A]")
+    columns = (TIME, 20 * np.sin(PHASE), force(PHASE), np.full(TIME.size, current))
+    assert bool(imported(tmp_path, f"{name}.csv", heads, columns).records) is accepted
+
+
+@pytest.mark.parametrize(("heading", "value"), [("CURRENT [MA]", 500.0), ("CURRENT [A]", 0.5), ("CURRENT [mA]", 500.0)])
+def test_units_in_capitals_are_read(tmp_path, heading, value):
+    heads = ("TIME [S]", "DISPLACEMENT [MM]", "FORCE [N]", heading)
+    columns = (TIME, 20 * np.sin(PHASE), force(PHASE), np.full(TIME.size, value))
+    (record,) = imported(tmp_path, "test.csv", heads, columns).records
+    assert np.mean(record.current) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("late", [0.02, -0.02])
+def test_two_clocks_are_never_paired_by_row(tmp_path, late):
+    """The force's own stamps are 20 ms off: its samples are taken at the times of the displacement, or refused."""
+    heads = ("time [s]", "displacement [mm]", "time 2 [s]", "force [N]", "current [A]")
+    columns = (TIME, 20 * np.sin(PHASE), TIME + late, force(PHASE + 2 * np.pi * late), np.full(TIME.size, 0.5))
+    result = imported(tmp_path, "test.csv", heads, columns)
+    assert result.records or result.refusals
+    for record in result.records:
+        true = np.cos(2 * np.pi * record.time)
+        assert np.corrcoef(record.force, true)[0, 1] > 0.97
+        assert abs(np.corrcoef(record.force, np.sin(2 * np.pi * record.time))[0, 1]) < 0.02
