@@ -118,14 +118,18 @@ def make_run(
     return Run(name, time, x, force, channel, rig="bench", window=(float(time[0] + 1.3 / frequency), float(time[-1])))
 
 
-def make_random(damper: SyntheticDamper, name: str, rng: np.random.Generator, gain: float = 1.0) -> Run:
-    """A random motion under a switched current."""
+def make_random(
+    damper: SyntheticDamper, name: str, rng: np.random.Generator, gain: float = 1.0, constant: float | None = None
+) -> Run:
+    """A random motion under a switched or a constant current [A]."""
     time = np.arange(0, 20, 1 / RATE)
     frequencies = np.linspace(0.2, 3, 25)
     waves = np.sin(2 * np.pi * frequencies * time[:, None] + rng.uniform(0, 6.3, 25)) / (1 + frequencies)
     x = waves.sum(axis=1)
     x *= damper.amplitude / np.max(np.abs(x))
     current = np.repeat(rng.choice(damper.currents, size=20), int(RATE))[: time.size]
+    if constant is not None:
+        current = np.full(time.size, constant)
     force = gain * damper.force(time, x, current)
     force += 0.004 * np.ptp(force) * rng.normal(size=time.size)
     return Run(name, time, x, force, current, rig="bench", excitation="random")
@@ -210,25 +214,25 @@ class Folder:
 Change = Callable[[Run], Run]
 
 
-def _force(gain: float, offset: float = 0.0) -> Change:
+def change_force(gain: float, offset: float = 0.0) -> Change:
     return lambda run: replace(run, force=gain * run.force + offset)
 
 
-def _motion(gain: float) -> Change:
+def change_motion(gain: float) -> Change:
     return lambda run: replace(run, displacement=gain * run.displacement)
 
 
-def _clock(factor: float) -> Change:
+def change_time(factor: float) -> Change:
     return lambda run: replace(
         run, time=factor * run.time, window=(factor * run.window[0], factor * run.window[1]) if run.window else None
     )
 
 
-def _labelled(current: float) -> Change:
+def with_current(current: float) -> Change:
     return lambda run: replace(run, current=run.current - np.mean(run.current) + current)
 
 
-def _copy(run: Run, name: str, start: int = 0, every: int = 1, noise: float = 0.0, seed: int = 5) -> Run:
+def copy_of(run: Run, name: str, start: int = 0, every: int = 1, noise: float = 0.0, seed: int = 5) -> Run:
     rng = np.random.default_rng(seed)
     part = slice(start, None, every)
     time = run.time[part]
@@ -255,35 +259,35 @@ def folders(damper: SyntheticDamper, seed: int = 3) -> list[Folder]:
         f, a = motions(damper)[k % 3]
         return make_run(damper, f"t{k:02d}", levels[k // 3], f, a, rng, coil=coil)
 
-    add("one run in lbf", {4: _force(1 / LBF)}, "force")
-    add("one run in kgf", {8: _force(1 / KGF)}, "force")
-    add("one run in kN", {5: _force(1e-3)}, "force", "size")
-    add("N under lbf", {7: _force(LBF)}, "force")
-    add("three runs in lbf", {1: _force(1 / LBF), 5: _force(1 / LBF), 9: _force(1 / LBF)}, "force")
-    add("range of the load cell doubled", {6: _force(2.0)}, "force")
-    add("half the force", {10: _force(0.5)}, "force", "current")
-    add("zero of the load cell", {3: _force(1.0, 0.8 * size)}, "offset")
-    add("one run in inches", {4: _motion(1 / INCH)}, "displacement")
-    add("one run in cm", {7: _motion(0.1)}, "displacement")
-    add("one run in metres", {7: _motion(1e-3)}, "displacement", "size")
-    add("mm under inches", {1: _motion(INCH)}, "displacement")
-    add("stroke for amplitude", {6: _motion(2.0)}, "displacement", "time")
-    add("current in mA", {8: _labelled(1e3 * levels[2])}, "current", "size")
+    add("one run in lbf", {4: change_force(1 / LBF)}, "force")
+    add("one run in kgf", {8: change_force(1 / KGF)}, "force")
+    add("one run in kN", {5: change_force(1e-3)}, "force", "size")
+    add("N under lbf", {7: change_force(LBF)}, "force")
+    add("three runs in lbf", {1: change_force(1 / LBF), 5: change_force(1 / LBF), 9: change_force(1 / LBF)}, "force")
+    add("range of the load cell doubled", {6: change_force(2.0)}, "force")
+    add("half the force", {10: change_force(0.5)}, "force", "current")
+    add("zero of the load cell", {3: change_force(1.0, 0.8 * size)}, "offset")
+    add("one run in inches", {4: change_motion(1 / INCH)}, "displacement")
+    add("one run in cm", {7: change_motion(0.1)}, "displacement")
+    add("one run in metres", {7: change_motion(1e-3)}, "displacement", "size")
+    add("mm under inches", {1: change_motion(INCH)}, "displacement")
+    add("stroke for amplitude", {6: change_motion(2.0)}, "displacement", "time")
+    add("current in mA", {8: with_current(1e3 * levels[2])}, "current", "size")
     add("open coil", {7: tested(7, 0.0)}, "current")
     add("open coil at the highest current", {10: tested(10, 0.0)}, "current")
     add("half-open coil", {7: tested(7, levels[2] / 2)}, "current", "force")
     add("two half-open coils", {9: tested(9, levels[3] / 2), 11: tested(11, levels[3] / 2)}, "current", "force")
     add("another current than written", {4: tested(4, levels[3])}, "current", "force")
-    add("two rows exchanged", {1: _labelled(levels[3]), 10: _labelled(levels[0])}, "current", "shifted")
-    shifted = {k: _labelled(float(np.mean(sound[k - 1].current))) for k in range(6, 12)}
+    add("two rows exchanged", {1: with_current(levels[3]), 10: with_current(levels[0])}, "current", "shifted")
+    shifted = {k: with_current(float(np.mean(sound[k - 1].current))) for k in range(6, 12)}
     add("rows shifted from the seventh on", {k: shifted[k] for k in shifted if k % 3 == 0}, "shifted", "current")
     add(
         "both channels inverted",
         {5: lambda run: replace(run, force=-run.force, displacement=-run.displacement)},
         "sign",
     )
-    add("time in half seconds", {2: _clock(2.0)}, "time", "displacement")
-    add("time too short", {7: _clock(0.2)}, "time", "displacement")
+    add("time in half seconds", {2: change_time(2.0)}, "time", "displacement")
+    add("time too short", {7: change_time(0.2)}, "time", "displacement")
     weak = replace(
         damper, per_ampere=0.45 * damper.per_ampere, viscous=0.4 * damper.viscous, friction=2.5 * damper.friction
     )
@@ -292,23 +296,23 @@ def folders(damper: SyntheticDamper, seed: int = 3) -> list[Folder]:
     add("another damper in one run", {7: another}, "damper", "force", "current")
     many = {k: make_run(weak, f"t{k:02d}", levels[k // 3], *motions(damper)[k % 3], rng) for k in (1, 4, 7, 10)}
     add("another damper in four runs", {**many}, "damper", "force", "current")
-    add("a copy with noise", {}, "copy", extra=(_copy(sound[5], "t12", noise=0.0005 * size),))
-    add("a copy cropped", {}, "copy", extra=(_copy(sound[8], "t12", start=137),))
-    add("a copy decimated", {}, "copy", extra=(_copy(sound[3], "t12", every=2),))
-    add("a copy cropped, decimated, with noise", {}, "copy", extra=(_copy(sound[10], "t12", 51, 2, 0.001 * size),))
+    add("a copy with noise", {}, "copy", extra=(copy_of(sound[5], "t12", noise=0.0005 * size),))
+    add("a copy cropped", {}, "copy", extra=(copy_of(sound[8], "t12", start=137),))
+    add("a copy decimated", {}, "copy", extra=(copy_of(sound[3], "t12", every=2),))
+    add("a copy cropped, decimated, with noise", {}, "copy", extra=(copy_of(sound[10], "t12", 51, 2, 0.001 * size),))
     add(
         "a validation run that is a copy",
         {},
         "copy",
-        extra=(replace(_copy(sound[4], "t12", noise=0.001 * size), split="validate"),),
+        extra=(replace(copy_of(sound[4], "t12", noise=0.001 * size), split="validate"),),
     )
     add(
         "a copy under another current",
         {},
         "copy",
-        extra=(_labelled(levels[1])(_copy(sound[9], "t12", noise=0.0005 * size)),),
+        extra=(with_current(levels[1])(copy_of(sound[9], "t12", noise=0.0005 * size)),),
     )
-    add("a random record in lbf", {}, "force", extra=(_force(1 / LBF)(make_random(damper, "r0", rng)),))
+    add("a random record in lbf", {}, "force", extra=(change_force(1 / LBF)(make_random(damper, "r0", rng)),))
     half = {k: make_run(weak, f"t{k:02d}", levels[k // 3], *motions(damper)[k % 3], rng) for k in range(0, 12, 2)}
     found.append(
         Folder(

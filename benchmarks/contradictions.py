@@ -9,6 +9,8 @@ import argparse
 import time
 
 from benchmarks.contradicting_folders import DAMPERS, Folder, folders, sound_folder
+from benchmarks.contradicting_folders_two import DAMPERS as SECOND
+from benchmarks.contradicting_folders_two import second_folders
 from mrdamper.study.contradictions import ContradictionError, find_contradictions
 
 
@@ -29,8 +31,8 @@ def main() -> None:
     given = arguments.parse_args()
     right = tried = 0
     begin = time.process_time()
-    for damper in DAMPERS:
-        for folder in folders(damper):
+    for damper, make in [*((d, folders) for d in DAMPERS), *((d, second_folders) for d in SECOND)]:
+        for folder in make(damper):
             if given.only in folder.name:
                 good, found = verdict(folder)
                 tried, right = tried + 1, right + good

@@ -49,11 +49,11 @@ class Dataset(Displayable):
         check_fields(self, "runs", "name")
         if not self.runs:
             raise RunError("no runs", where=f"dataset {self.name}", mend="give at least one")
-        ids: set[str] = set()
+        seen: set[str] = set()
         for run in self.runs:
-            if run.id in ids:
+            if run.id in seen:
                 raise RunError(f"two runs are called {run.id}", where=f"dataset {self.name}", mend="rename one")
-            ids.add(run.id)
+            seen.add(run.id)
 
     @property
     def headline(self) -> str:

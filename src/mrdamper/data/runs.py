@@ -287,13 +287,13 @@ def once_per_run(function: Callable[[K], T]) -> Callable[[K], T]:
     A study asks for the same run's motion dozens of times; runs are frozen, so the answer
     cannot change.
     """
-    results: WeakKeyDictionary[K, T] = WeakKeyDictionary()
+    known: WeakKeyDictionary[K, T] = WeakKeyDictionary()
 
     @wraps(function)
     def remembered(run: K) -> T:
-        if run not in results:
-            results[run] = function(run)
-        return results[run]
+        if run not in known:
+            known[run] = function(run)
+        return known[run]
 
     return remembered
 
@@ -342,7 +342,7 @@ def held_current(current: Floats) -> tuple[float, str]:
     """
     low, high = float(current.min()), float(current.max())
     if low == high:
-        return round(low, 9) + 0.0, ""
+        return (0.0 if abs(low) <= _LEVEL_A else round(low, 9)), ""
     mean, size = float(np.mean(current)), current.size
     count = min(_BLOCKS, max(3, size // 8))
     bounds = np.linspace(0, size, count, endpoint=False).astype(int)

@@ -46,11 +46,11 @@ def least_squares_in_one(
     u, before, best, evaluations = start, None, None, 0
     ending = StopReason.STEPS_SPENT
     for _ in range(most_steps):
-        value = evaluate(u)
+        found = evaluate(u)
         evaluations += 1
-        if value is None:
+        if found is None:
             return None
-        residual, slope = value
+        residual, slope = found
         cost, gradient, curvature = (float(a @ b) for a, b in ((residual, residual), (slope, residual), (slope, slope)))
         if best is None or cost <= best[0]:
             best = cost, u, residual

@@ -6,12 +6,10 @@ object that plots, reports and files take from there.
 
 from __future__ import annotations
 
-import importlib
 import time
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -178,32 +176,6 @@ class Study(Displayable):
             raise IdentificationError(f"the dataset holds {len(self.rigs)} rigs", mend=f"use study.rig(name): {names}")
         return next(iter(self.rigs)).damper
 
-    def write_report(self, folder: str | Path, **options: Any) -> list[Path]:
-        """Write report.html, models, tables and figures.
-
-        Parameters
-        ----------
-        folder : path
-            Made if missing.
-        **options
-            Keywords of `mrdamper.report.study.write_study`: about, limits, also, paper. `about` is an `About`, a
-            mapping of its names to texts, or the path of a TOML file (`mrdamper init about`).
-
-        Returns
-        -------
-        list of Path
-            Written files, the report first.
-
-        Raises
-        ------
-        AboutError
-            If `about` has an unknown name.
-        OutputError
-            If the folder cannot be written to.
-        """
-        write = importlib.import_module("mrdamper.report.study").write_study  # draws: needed here only
-        return write(self, folder, **options)
-
     def rig(self, name: str) -> RigStudy:
         """The study of one rig."""
         self.dataset.rig(name)
@@ -289,9 +261,8 @@ def study_rig(
     method, model = (model, model.name) if isinstance(model, StudyMethod) else (None, model)
     rig = dataset.rigs[0]
     progress(f"{rig or 'rig'}: loops", 0.0)
-    contradictions = tuple(find_contradictions(believed(dataset)[0], keep))
+    dataset, contradictions = agreeing(dataset, keep)
     aside = {one.run_id: str(one) for one in contradictions}
-    dataset = dataset.only([run for run in dataset if run.id not in aside])
     sines, refused = usable_sines(dataset)
     loops = at_levels([analyse_loop(run) for run in sines])
     train = [run for run in sines if run.split == "train"]
@@ -399,6 +370,19 @@ def _refuse_clipped(run: Run, clipped: bool) -> None:
     """As the identification, but seen today: a dataset written elsewhere says nothing."""
     seen = " ".join(finding.code for finding in judged(run)[1])
     refuse_clipped(replace(run, notes={**run.notes, "findings": f"{run.notes.get('findings', '')} {seen}"}), clipped)
+
+
+def agreeing(dataset: Dataset, keep: Collection[str] = ()) -> tuple[Dataset, tuple[Contradiction, ...]]:
+    """Set aside the runs of a rig that contradict the others.
+
+    Raises
+    ------
+    ContradictionError
+        If more than a third of the identification runs contradict the others.
+    """
+    contradictions = tuple(find_contradictions(believed(dataset)[0], keep))
+    aside = {one.run_id for one in contradictions}
+    return dataset.only([run for run in dataset if run.id not in aside]), contradictions
 
 
 def believed(dataset: Iterable[Run]) -> tuple[list[Run], dict[str, str]]:

@@ -82,10 +82,10 @@ class Excitation:
     @checked()
     def with_current(self, current: ArrayLike) -> Excitation:
         """Return the same motion at another current [A], a scalar or one value per sample."""
-        motion = replace(self, current=np.asarray(current, dtype=float))
+        made = replace(self, current=np.asarray(current, dtype=float))
         if "path" in self.__dict__:
-            motion.__dict__["path"] = self.path  # the current does not bend it
-        return motion
+            made.__dict__["path"] = self.path  # the current does not bend it
+        return made
 
     @checked()
     def about(self, centre: float) -> Excitation:

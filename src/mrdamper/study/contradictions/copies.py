@@ -23,6 +23,7 @@ _LEAST_CORRELATION = 0.35  # of the noise of two copies
 _ABOVE_OWN = 0.25  # by which it exceeds the largest correlation of a run's noise with itself at another time
 _SIGNIFICANCE = 9.0  # standard deviations of a correlation by chance
 _MOST_RATIO = 10  # ratio of two sample rates
+_PHASES = 8  # parts of a sample by which a run is moved before it is compared at another sample rate
 _EVEN = 0.01  # relative deviation of that ratio from a whole number
 
 
@@ -74,12 +75,18 @@ def _shared_noise(first: Run, second: Run) -> float | None:
     fine, coarse = (first, second) if steps[0] <= steps[1] else (second, first)
     ratio = max(steps) / min(steps)
     every = round(ratio)
-    if every > _MOST_RATIO or abs(ratio / every - 1) > _EVEN:
+    if every > _MOST_RATIO:
         return None
     other = _noise(coarse.force)
     best: float | None = None
-    for phase in range(every):
-        correlation = _correlation(_noise(fine.force[phase::every]), other)
+    is_even = abs(ratio / every - 1) <= _EVEN
+    for phase in range(every if is_even else _PHASES):
+        if is_even:
+            force = fine.force[phase::every]
+        else:
+            places = np.arange(phase / _PHASES, fine.force.size / ratio - 1) * ratio
+            force = np.interp(places, np.arange(fine.force.size), fine.force)
+        correlation = _correlation(_noise(force), other)
         if correlation is not None and (best is None or correlation > best):
             best = correlation
     return best

@@ -1,17 +1,17 @@
 """Evidence of one linear model for a set of runs, to compare explanations of runs that disagree.
 
 The force of a run is linear in elements of a damper: offset, spring, mass, viscous damping, friction
-over velocity, and stop operators, which are elastic-plastic elements [Prandtl and Ishlinskii]; every
-coefficient is a smooth function of the current, a Gaussian process. Gain and offset of a run vary as
-they do between sessions. The logarithm of the evidence (marginal likelihood) of a set of runs follows
-from sums over its runs, so that leaving out a run or changing it costs one factorisation.
+over velocity, friction whose sign depends on the displacement, too, and stop operators, which are
+elastic-plastic elements [Prandtl and Ishlinskii]; every coefficient is a smooth function of the
+current, a Gaussian process. Gain and offset of a run vary as they do between sessions. The logarithm
+of the evidence (marginal likelihood) of a set of runs follows from sums over its runs, so that
+leaving out a run or changing it costs one factorisation.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,16 +21,71 @@ from mrdamper.data import Floats, current_levels
 from mrdamper.study.contradictions.tracks import Track
 
 _YIELDS = (0.015, 0.06, 0.2, 0.6)  # yield displacements of the stop operators, relative to the median amplitude
-_VELOCITIES = (0.03, 0.25)  # velocities at which friction saturates, relative to the median peak velocity
-_ELEMENTS = 5 + len(_VELOCITIES) + len(_YIELDS)
+_VELOCITIES = (0.03, 0.1, 0.3)  # velocities at which friction saturates, relative to the median peak velocity
+_LEADS = (0.1, 0.4)  # displacements that count as velocity in friction, relative to the median amplitude
+_ELEMENTS = 7 + len(_VELOCITIES) + len(_LEADS) + len(_YIELDS)
+_MOST_ELEMENT = 20.0  # size of an element relative to its usual one
 _MOST_NODES = 7  # currents at which coefficients are estimated
-_COMMON, _SLOPE, _BEND = 1.5, 1.5, 0.5  # standard deviations of a coefficient, relative to the median force
+_COMMON, _SLOPE, _BEND = 1.5, 1.5, 0.8  # standard deviations of a coefficient, relative to the median force
 _LENGTH = 0.5  # correlation length of a coefficient over the current, relative to the highest current
 _MISFIT = 0.05  # standard deviation of the model error, relative to the run's force
 _FLOOR = 0.03  # the same, relative to the median force
 _SAMPLES = 12.0  # independent samples of a run's model error
-_GAIN = 0.06  # standard deviation of a run's gain
-_OFFSET = 0.04  # standard deviation of a run's offset, relative to the median force
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Assumed differences between a run and the model of all runs.
+
+    Attributes
+    ----------
+    misfit : float
+        Factor of the model error that is usual.
+    gain : float
+        Standard deviation of a run's gain.
+    offset : float
+        Standard deviation of a run's offset, relative to the median force.
+    """
+
+    misfit: float = 1.0
+    gain: float = 0.06
+    offset: float = 0.04
+
+
+@dataclass(frozen=True, eq=False)
+class Products:
+    """Products of the rows of a run, in units of the median force.
+
+    Attributes
+    ----------
+    gram : (E, E) array, or (P, P) where the current changes
+    moment : (E,) or (P,) array
+    power : float
+    rows : int
+    size : float
+        Half the peak-to-peak force.
+    over : (K,) array or None
+        Shares of the nodes at the run's constant current.
+    """
+
+    gram: Floats
+    moment: Floats
+    power: float
+    rows: int
+    size: float
+    over: Floats | None
+
+    @property
+    def constant(self) -> Floats:
+        """(E,) or (P,) coefficients of a force of one."""
+        return np.tile(np.eye(_ELEMENTS)[0], len(self.gram) // _ELEMENTS)
+
+    def with_force(self, gain: float, offset: float) -> Products:
+        """The same with another gain and offset of the force."""
+        one = self.constant
+        power = gain**2 * self.power + 2 * gain * offset * float(one @ self.moment) + self.rows * offset**2
+        moment = gain * self.moment + offset * self.gram @ one
+        return replace(self, moment=moment, power=power, size=abs(gain) * self.size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +109,7 @@ class Moments:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """What a set of runs determines: mean and covariance of the coefficients.
+    """Coefficients determined by a set of runs: mean and covariance.
 
     Attributes
     ----------
@@ -62,29 +117,56 @@ class Posterior:
     root : (P, P) array
         The covariance is root root'.
     evidence : Evidence
+    known : dict
+        Mean and covariance at the currents that were asked for.
     """
 
     mean: Floats
     root: Floats
     evidence: Evidence
+    known: dict[bytes, tuple[Floats, Floats]] = field(default_factory=dict)
+
+    def at(self, over: Floats | None) -> tuple[Floats, Floats]:
+        """Mean and covariance of the coefficients at a constant current, or of all of them."""
+        key = b"" if over is None else over.tobytes()
+        if key not in self.known:
+            mean, root = self.mean, self.root
+            if over is not None:
+                size = mean.size // over.size
+                mean = over @ mean.reshape(over.size, size)
+                root = np.tensordot(over, root.reshape(over.size, size, -1), 1)
+            self.known[key] = mean, root @ root.T
+        return self.known[key]
+
+    def weigh(self, run: Products) -> Moments:
+        """Weighted products of a run that is compared with these coefficients."""
+        return self.evidence.weigh(run, self.at(run.over)[0])
 
     def log_probability(self, run: Moments) -> float:
         """Logarithm of the probability density of a run's force."""
-        mean, root = self.mean, self.root
-        if run.over is not None:
-            mean = run.over @ mean.reshape(run.over.size, -1)
-            root = np.tensordot(run.over, root.reshape(run.over.size, mean.size, -1), axes=1)
-        left = run.gram @ mean
-        power = run.power + float(mean @ left) - 2 * float(mean @ run.moment)
-        covariance = root @ root.T
-        system = np.eye(mean.size) + run.gram @ covariance
-        rest = run.moment - left
-        gained = float(rest @ covariance @ np.linalg.solve(system, rest))
-        return 0.5 * (gained - power - float(np.linalg.slogdet(system)[1]))
+        return _log_probability(run, *self.at(run.over))
 
-    def force(self, track: Track, columns: Floats) -> Floats:
-        """(R,) expected force [N] at the rows of a run, from the elements there."""
-        return self.evidence.force * (_full(columns, self.evidence.over_current(track)) @ self.mean)
+    def without(self, run: Moments) -> tuple[Floats, Floats]:
+        """Mean and covariance of the coefficients at a run's current, without that run."""
+        mean, covariance = self.at(run.over)
+        left = np.eye(mean.size) - covariance @ run.gram
+        found: Floats = np.asarray(
+            np.linalg.solve(left, np.column_stack([mean - covariance @ run.moment, covariance])), dtype=float
+        )
+        return found[:, 0], found[:, 1:]
+
+    def log_probability_by_others(self, run: Moments) -> float:
+        """Logarithm of the probability density of a run's force, by the other runs alone."""
+        return _log_probability(run, *self.without(run))
+
+
+def _log_probability(run: Moments, mean: Floats, covariance: Floats) -> float:
+    left = run.gram @ mean
+    power = run.power + float(mean @ left) - 2 * float(mean @ run.moment)
+    system = np.eye(mean.size) + run.gram @ covariance
+    rest = run.moment - left
+    gained = float(rest @ covariance @ np.linalg.solve(system, rest))
+    return 0.5 * (gained - power - float(np.linalg.slogdet(system)[1]))
 
 
 class Evidence:
@@ -93,12 +175,10 @@ class Evidence:
     Parameters
     ----------
     tracks : sequence of Track
-    misfit : float
-        Factor of the model error that is usual.
     """
 
-    def __init__(self, tracks: Sequence[Track], misfit: float = 1.0) -> None:
-        self.misfit = misfit
+    def __init__(self, tracks: Sequence[Track]) -> None:
+        self.spread = Spread()
         self.force = float(np.median([track.half_range for track in tracks])) or 1.0
         self.amplitude = float(np.median([np.ptp(t.displacement) / 2 for t in tracks])) or 1.0
         self._velocity = float(np.median([np.max(np.abs(t.velocity)) for t in tracks])) or 1.0
@@ -106,28 +186,14 @@ class Evidence:
         self.nodes = _nodes(tracks)
         self._root = _outer(_root_covariance(self.nodes), np.eye(_ELEMENTS))
 
-    def with_misfit(self, misfit: float) -> Evidence:
-        """The same scales with another model error."""
-        other = copy(self)
-        other.misfit = misfit
-        other.__dict__.pop("prior", None)
-        return other
+    @cached_property
+    def prior(self) -> Posterior:
+        """Coefficients before any run."""
+        return Posterior(np.zeros(len(self._root)), self._root, self)
 
-    def moments(self, tracks: Sequence[Track], elements: Sequence[Floats] | None = None) -> list[Moments]:
-        """Weighted products of the rows of runs, from the elements there."""
-        tables = self.elements(tracks) if elements is None else elements
-        return [self.moments_of(t, columns) for t, columns in zip(tracks, tables, strict=True)]
-
-    def posterior(self, members: Iterable[Moments], but: Moments | None = None) -> Posterior:
-        """Coefficients determined by runs, or by all of them but one."""
+    def posterior(self, members: Iterable[Moments]) -> Posterior:
+        """Coefficients determined by runs."""
         gram, moment = self.total(members)
-        return self.posterior_of(gram, moment, but)
-
-    def posterior_of(self, gram: Floats, moment: Floats, but: Moments | None = None) -> Posterior:
-        """Coefficients determined by the total of runs, less one of them."""
-        if but is not None:
-            gram, moment = gram.copy(), moment.copy()
-            self._add(gram, moment, but, -1.0)
         factor = np.linalg.cholesky(self._root.T @ gram @ self._root + np.eye(len(moment)))
         root = solve_triangular(factor, self._root.T, lower=True).T
         return Posterior(root @ (root.T @ moment), root, self)
@@ -140,74 +206,67 @@ class Evidence:
         power = sum(member.power for member in members)
         return float(0.5 * (half @ half) - np.sum(np.log(np.diag(factor))) - 0.5 * power)
 
-    @cached_property
-    def prior(self) -> Posterior:
-        """Coefficients before any run."""
-        return Posterior(np.zeros(len(self._root)), self._root, self)
+    def weigh(self, run: Products, expected: Floats) -> Moments:
+        """Weighted products of a run; its gain multiplies the force of the coefficients expected of it."""
+        spread, size = self.spread, run.size
+        level = (_MISFIT * size) ** 2 + _FLOOR**2 * min(1.0, size)
+        weight = _SAMPLES / (run.rows * spread.misfit**2 * level)
+        one = run.constant
+        mean = float(one @ run.gram @ expected) / run.rows
+        shared = np.column_stack([spread.gain * (expected - mean * one), spread.offset * np.sqrt(max(size, 0.1)) * one])
+        along = weight * run.gram @ shared
+        inner = np.linalg.inv(np.eye(2) + shared.T @ along)
+        with_force = weight * shared.T @ run.moment
+        normalisation = _SAMPLES * np.log(spread.misfit**2 * level / size**2) - float(np.linalg.slogdet(inner)[1])
+        return Moments(
+            weight * run.gram - along @ inner @ along.T,
+            weight * run.moment - along @ inner @ with_force,
+            weight * run.power - float(with_force @ inner @ with_force) + normalisation,
+            run.over,
+        )
 
-    def elements(self, tracks: Sequence[Track]) -> list[Floats]:
-        """(R, E) elements of the damper at the rows of each run, before their dependence on the current."""
+    def products(self, tracks: Sequence[Track]) -> list[Products]:
+        """Products of the rows of runs."""
         yields = np.array(_YIELDS) * self.amplitude
         stops = stop_operators([t.displacement for t in tracks], yields)
-        found = []
-        for track, stop in zip(tracks, stops, strict=True):
-            rows = track.rows
-            x, v = track.displacement[rows] / self.amplitude, track.velocity[rows] / self._velocity
-            friction = [np.tanh(v / scale) for scale in _VELOCITIES]
-            linear = [np.ones(rows.size), x, x * x, v, track.acceleration[rows] / self._acceleration]
-            found.append(np.column_stack([*linear, *friction, stop[rows] / yields]))
-        return found
+        return [self._of_rows(track, stop[track.rows] / yields) for track, stop in zip(tracks, stops, strict=True)]
 
-    def over_current(self, track: Track) -> Floats:
-        """(R, K) shares of the nodes at the currents of the rows; (1, K) of a constant current."""
-        return self.shares(track.current[track.rows] if track.current_changes else track.current[:1])
+    def _of_rows(self, track: Track, stops: Floats) -> Products:
+        rows = track.rows
+        x, v = track.displacement[rows] / self.amplitude, track.velocity[rows] / self._velocity
+        friction = [np.tanh(v / scale) for scale in _VELOCITIES]
+        led = [np.tanh((v + lead * x) / _VELOCITIES[1]) for lead in _LEADS]
+        linear = [np.ones(rows.size), x, x * x, v, track.acceleration[rows] / self._acceleration]
+        uneven = [np.abs(v), np.abs(friction[1])]
+        table = np.clip(np.column_stack([*linear, *friction, *led, *uneven, stops]), -_MOST_ELEMENT, _MOST_ELEMENT)
+        over = self.shares(track.current[rows] if track.current_changes else track.current[:1])
+        if track.current_changes:
+            table = (over[:, :, None] * table[:, None, :]).reshape(rows.size, -1)
+        y = track.force[rows] / self.force
+        return Products(
+            table.T @ table, table.T @ y, float(y @ y), rows.size, track.half_range / self.force,
+            None if track.current_changes else over[0],
+        )  # fmt: skip
 
     def shares(self, current: Floats) -> Floats:
         """(N, K) shares of the nodes at currents [A]."""
         return np.column_stack([np.interp(current, self.nodes, hat) for hat in np.eye(self.nodes.size)])
 
-    def moments_of(self, track: Track, columns: Floats) -> Moments:
-        """Weighted products of the rows of a run, from the elements there."""
-        force = track.force[track.rows] / self.force
-        size = track.half_range / self.force
-        noise = (
-            self.misfit * np.sqrt((_MISFIT * size) ** 2 + _FLOOR**2 * min(1.0, size)) * np.sqrt(force.size / _SAMPLES)
-        )
-        swing = (force - np.mean(force)) * (_GAIN / noise)
-        shared = np.column_stack([swing, np.full(force.size, _OFFSET * np.sqrt(max(size, 0.1)) / noise)])
-        over = self.over_current(track)
-        inner = np.linalg.inv(np.eye(2) + shared.T @ shared)
-        y = force / noise
-        constant = len(over) == 1
-        table = (columns if constant else _full(columns, over)) / noise
-        along = shared.T @ table
-        gram = table.T @ table - along.T @ inner @ along
-        moment = table.T @ y - along.T @ inner @ (shared.T @ y)
-        power = float(y @ y - (shared.T @ y) @ inner @ (shared.T @ y)) - float(np.linalg.slogdet(inner)[1])
-        power += 2 * _SAMPLES * float(np.log(noise / size))
-        return Moments(gram, moment, power, over[0] if constant else None)
-
     def total(self, members: Iterable[Moments]) -> tuple[Floats, Floats]:
-        """(P, P) and (P,) sums over runs."""
-        size = len(self._root)
-        gram, moment = np.zeros((size, size)), np.zeros(size)
+        """Sums of the moments of runs over all nodes."""
+        gram, moment = np.zeros(self._root.shape), np.zeros(len(self._root))
+        blocks = gram.reshape(self.nodes.size, _ELEMENTS, self.nodes.size, _ELEMENTS)
         for member in members:
-            self._add(gram, moment, member, 1.0)
+            if member.over is None:
+                gram += member.gram
+                moment += member.moment
+                continue
+            at = np.flatnonzero(member.over)
+            for i in at:
+                moment[i * _ELEMENTS : (i + 1) * _ELEMENTS] += member.over[i] * member.moment
+                for j in at:
+                    blocks[i, :, j, :] += member.over[i] * member.over[j] * member.gram
         return gram, moment
-
-    @staticmethod
-    def _add(gram: Floats, moment: Floats, member: Moments, sign: float) -> None:
-        if member.over is None:
-            gram += sign * member.gram
-            moment += sign * member.moment
-            return
-        size = member.moment.size
-        at = np.flatnonzero(member.over)
-        for i in at:
-            moment[i * size : (i + 1) * size] += sign * member.over[i] * member.moment
-            for j in at:
-                share = sign * member.over[i] * member.over[j]
-                gram[i * size : (i + 1) * size, j * size : (j + 1) * size] += share * member.gram
 
 
 def _outer(a: Floats, b: Floats) -> Floats:
@@ -229,10 +288,6 @@ def stop_operators(displacements: Sequence[Floats], yields: Floats) -> list[Floa
         np.maximum(state, -yields, out=row)
         state[:] = row
     return [found[: x.size, i] for i, x in enumerate(displacements)]
-
-
-def _full(columns: Floats, over: Floats) -> Floats:
-    return (over[:, :, None] * columns[:, None, :]).reshape(len(columns), -1)
 
 
 def _nodes(tracks: Sequence[Track]) -> Floats:

@@ -2,36 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
-from mrdamper.study.contradictions.evidence import Moments, Posterior
+from mrdamper.data import Floats
+from mrdamper.study.contradictions.evidence import Evidence, Posterior, Products
 from mrdamper.study.contradictions.tracks import Track
 
-Cause = Literal["force", "offset", "current", "displacement", "time", "sign", "damper"]
+Cause = Literal["force", "offset", "current", "displacement", "time", "sign", "damper", "shifted"]
 
 FORCE_UNITS = {"lbf": 4.4482216, "kgf": 9.80665, "kN": 1e3, "daN": 10.0, "kip": 4448.2216}  # in newtons
 LENGTH_UNITS = {"inch": 25.4, "cm": 10.0, "m": 1e3, "µm": 1e-3}  # in millimetres
+TIME_UNITS = {"ms": 1e-3, "min": 60.0}  # in seconds
 _NAMED = 0.08  # difference of the logarithms up to which a factor is that of a unit
 _FACTORS = (0.2, 0.25, 0.35, 0.5, 0.7, 1.4, 2.0, 2.8, 4.0, 5.0)  # of displacement or time, beside units
-_TIMES = (0.02, 0.05, 0.1, 60 / 1000, 10.0, 20.0, 60.0)  # factors of time, beside these
+_MOST_FACTOR = 2e3  # factor of displacement or time between two tested motions
+_SAME_FACTOR = 0.03  # difference of the logarithms of factors that are one
 _CURRENTS = 31  # currents that are tried
 
-# Logarithms of prior odds against an explanation: one that names a unit or a tested level is simpler.
+# Logarithms of prior odds against an explanation: one that names a unit, a tested level or a tested motion is simpler.
 _UNIT, _LEVEL, _FREE, _SIGN, _ODD, _ALONE = 4.0, 4.0, 7.0, 4.0, 12.0, 10.0
+_TESTED_MOTION = 5.0  # what a motion of other runs lowers them by, and losing such a motion raises them by
+_EDGE = 8.0  # what the only run at the lowest or highest current raises those of a factor or another current by
+_USUAL_STEP = 3.0  # the same of the time between two samples
+_SAME_STEP = 0.01  # relative difference of times between samples that are one
 
 # Sizes below which an explanation is no contradiction but what sessions and tests differ by.
 LEAST_FACTOR = 1.25  # of a force or a displacement
 LEAST_OFFSET = 0.2  # of the median half range of the force
-LEAST_CURRENT_EFFECT = 0.15  # change of the force over the run's half range
+LEAST_CURRENT_EFFECT = 0.12  # RMS change of the force over the run's half range
+LEAST_UNEXPLAINED = 0.1  # RMS error of the force over the run's half range, at the best gain of a session
+_MOST_SESSION = 1.12  # gain of a session against the others
 
 
-@dataclass(frozen=True, eq=False)
-class Explanation:
-    """What would make a run agree with the others.
+@dataclass(frozen=True)
+class Trial:
+    """A change of a run that may explain it.
 
     Attributes
     ----------
@@ -41,116 +51,200 @@ class Explanation:
         Factor that corrects the force, the displacement or the time; force to add [N]; current [A].
     unit : str
         Unit the channel is in, where the factor is that of a unit.
-    gain : float
-        Logarithm of the odds of the explanation against no explanation.
-    moments : Moments
-        Of the run as corrected.
-    track : Track
-        The run as corrected.
+    odds : float
+        Logarithm of the prior odds against it.
     """
 
     cause: Cause
     value: float
     unit: str
+    odds: float
+
+    def is_like(self, other: Trial) -> bool:
+        """Tell whether two runs have the same cause with the same value."""
+        if self.cause != other.cause:
+            return False
+        if self.cause in ("force", "displacement", "time"):
+            return abs(np.log(self.value / other.value)) < _NAMED
+        return abs(self.value - other.value) <= 0.1 * max(abs(self.value), abs(other.value))
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """What would make a run agree with the others.
+
+    Attributes
+    ----------
+    trial : Trial
+    gain : float
+        Logarithm of the odds of the explanation against no explanation.
+    products : Products
+        Of the run as corrected.
+    """
+
+    trial: Trial
     gain: float
-    moments: Moments
-    track: Track
+    products: Products
 
-
-class _Trial(NamedTuple):
-    cause: Cause
-    value: float
-    unit: str
-    odds: float  # logarithm of the prior odds against it
+    @property
+    def cause(self) -> Cause:
+        """The cause of the trial."""
+        return self.trial.cause
 
 
 class Candidate:
-    """A run beside what the other runs determine.
+    """A run and its changed versions, whose products are computed once.
 
     Parameters
     ----------
-    track : Track
-    others : Posterior
+    index : int
+        Position of the run.
+    tracks : sequence of Track
+        All runs.
+    evidence : Evidence
+    products : Products
+        Of the run as it is.
     """
 
-    def __init__(self, track: Track, others: Posterior) -> None:
-        self.track, self.others, self.evidence = track, others, others.evidence
-        self._columns = self.evidence.elements([track])[0]
-        self.own = self.evidence.moments_of(track, self._columns)
-        self.least = others.log_probability(self.own)
-        self.expected = others.force(track, self._columns)
+    def __init__(self, index: int, tracks: Sequence[Track], evidence: Evidence, products: Products) -> None:
+        self.track, self.evidence, self.own = tracks[index], evidence, products
+        self._others = [t for k, t in enumerate(tracks) if k != index]
+        self._moved: list[tuple[Trial, Products]] = []
 
-    @property
-    def alone(self) -> Explanation:
+    def explanations(self, others: Posterior) -> list[Explanation]:
+        """Explanations that are more than differences between sessions, the most probable first.
+
+        Parameters
+        ----------
+        others : Posterior
+            What the other runs determine.
+        """
+        least = others.log_probability(others.weigh(self.own))
+        found = []
+        for trial, products in self._trials(others):
+            if self._is_large(trial, products, others):
+                odds = trial.odds + (_EDGE if trial.cause in ("force", "current") and self._is_edge else 0.0)
+                gain = others.log_probability(others.weigh(products)) - odds - least
+                found.append(Explanation(replace(trial, odds=odds), gain, products))
+        return sorted(found, key=lambda e: -e.gain)
+
+    def alone(self, others: Posterior) -> Explanation:
         """The last resort: the run is of another damper."""
-        gain = self.evidence.prior.log_probability(self.own) - _ALONE - self.least
-        return Explanation("damper", 1.0, "", gain, self.own, self.track)
+        prior = self.evidence.prior
+        own = others.weigh(self.own)
+        gain = prior.log_probability(own) - _ALONE - others.log_probability(own)
+        if self._unexplained(self.own, others) < LEAST_UNEXPLAINED:
+            gain = -np.inf
+        return Explanation(Trial("damper", 1.0, "", _ALONE), gain, self.own)
 
-    def explanations(self) -> list[Explanation]:
-        """Explanations that are more than differences between sessions, the most probable first."""
-        found = [*self._of_the_force(), *self._of_the_current(), *self._of_the_motion()]
-        return [self.alone, *(e for e in sorted(found, key=lambda e: -e.gain) if self._is_large(e))]
+    def changed(self, trial: Trial) -> Products:
+        """Products of the run as corrected by a trial of force, offset or current."""
+        if trial.cause == "current":
+            return replace(self.own, over=self.evidence.shares(np.array([trial.value]))[0])
+        if trial.cause == "offset":
+            return self.own.with_force(1.0, trial.value / self.evidence.force)
+        return self.own.with_force(trial.value, 0.0)
 
-    def _explanation(self, trial: _Trial, moments: Moments, track: Track) -> Explanation:
-        cause, value, unit, odds = trial
-        gain = self.others.log_probability(moments) - odds - self.least
-        return Explanation(cause, value, unit, gain, moments, track)
+    @cached_property
+    def _is_edge(self) -> bool:
+        """Whether the run is the only one at the lowest or highest current: the others are extrapolated to it."""
+        currents = np.concatenate([track.current[[0, -1]] for track in self._others])
+        return bool(
+            np.all(self.track.current > currents.max() * 1.05) or np.all(self.track.current < currents.min() * 0.95)
+        )
 
-    def _of_the_force(self) -> Iterator[Explanation]:
+    def _trials(self, others: Posterior) -> Iterator[tuple[Trial, Products]]:
+        for trial in (*self._of_the_force(others), *self._of_the_current()):
+            yield trial, self.changed(trial)
+        if not self._moved:
+            trials = list(self._of_the_motion())
+            self._moved = list(zip(trials, self.evidence.products([self._move(t) for t in trials]), strict=True))
+        yield from self._moved
+
+    def _of_the_force(self, others: Posterior) -> Iterator[Trial]:
         """A factor or an offset of the force."""
-        expected, measured = self.expected, self.track.force[self.track.rows]
-        offset = float(np.mean(expected) - np.mean(measured))
-        trials: list[_Trial] = [_Trial("offset", offset, "", _FREE)]
-        swing = expected - np.mean(expected)
-        along = float(swing @ (measured - np.mean(measured)))
+        expected, one = others.at(self.own.over)[0], self.own.constant
+        mean = float(one @ self.own.gram @ expected) / self.own.rows
+        measured = float(one @ self.own.moment) / self.own.rows
+        yield Trial("offset", self.evidence.force * (mean - measured), "", _FREE)
+        swing = expected - mean * one
+        along = float(swing @ self.own.moment) - measured * float(swing @ self.own.gram @ one)
         if along > 0:
-            best = float(swing @ swing) / along
-            trials.append(_Trial("force", best, "", _FREE))
-            units = [(u, f) for u, f in _both_ways(FORCE_UNITS) if abs(np.log(best / f)) < 3 * _NAMED]
-            trials += [_Trial("force", factor, unit, _UNIT) for unit, factor in units]
-        for trial in trials:
-            cause, value = trial.cause, trial.value
-            track = self.track.with_force(value) if cause == "force" else self.track.with_force(1.0, value)
-            yield self._explanation(trial, self.evidence.moments_of(track, self._columns), track)
+            best = float(swing @ self.own.gram @ swing) / along
+            yield Trial("force", best, "", _FREE)
+            for unit, factor in _both_ways(FORCE_UNITS):
+                if abs(np.log(best / factor)) < 3 * _NAMED:
+                    yield Trial("force", factor, unit, _UNIT)
 
-    def _of_the_current(self) -> Iterator[Explanation]:
+    def _of_the_current(self) -> Iterator[Trial]:
         """Another constant current."""
         if self.track.current_changes:
             return
         levels = self.evidence.nodes.tolist()
-        free = np.linspace(0, levels[-1], _CURRENTS)[1:-1].tolist()
-        trials: list[_Trial] = [_Trial("current", level, "", _LEVEL) for level in levels]
-        trials += [_Trial("current", current, "", _FREE) for current in free]
-        for trial, over in zip(trials, self.evidence.shares(np.array([*levels, *free])), strict=True):
-            yield self._explanation(trial, replace(self.own, over=over), self.track.with_current(trial.value))
+        yield from (Trial("current", level, "", _LEVEL) for level in levels)
+        yield from (Trial("current", i, "", _FREE) for i in np.linspace(0, levels[-1], _CURRENTS)[1:-1].tolist())
 
-    def _of_the_motion(self) -> Iterator[Explanation]:
+    def _of_the_motion(self) -> Iterator[Trial]:
         """A factor of displacement or time; both channels inverted."""
-        trials: list[_Trial] = [_Trial("sign", -1.0, "", _SIGN)]
-        trials += [_Trial("displacement", factor, unit, _UNIT) for unit, factor in _both_ways(LENGTH_UNITS)]
-        trials += [_Trial("displacement", factor, "", _ODD) for factor in _FACTORS]
-        trials += [_Trial("time", factor, "", _ODD) for factor in (*_FACTORS, *_TIMES)]
-        tracks = [self._moved(cause, value) for cause, value, *_ in trials]
-        for trial, track, moments in zip(trials, tracks, self.evidence.moments(tracks), strict=True):
-            yield self._explanation(trial, moments, track)
+        yield Trial("sign", -1.0, "", _SIGN)
+        kinds: tuple[tuple[Cause, dict[str, float]], ...] = (("displacement", LENGTH_UNITS), ("time", TIME_UNITS))
+        for cause, units in kinds:
+            named = [(unit, factor) for unit, factor in _both_ways(units) if cause == "time" or self._is_nearer(factor)]
+            factors = [*((f, u, _UNIT) for u, f in named), *((f, "", _ODD) for f in (*_FACTORS, *self._ratios(cause)))]
+            for k, (factor, unit, odds) in enumerate(factors):
+                if any(abs(np.log(factor / f)) < _SAME_FACTOR for f, *_ in factors[:k]):
+                    continue
+                trial = Trial(cause, factor, unit, odds)
+                odds -= _TESTED_MOTION * self._tested(trial)
+                yield replace(trial, odds=odds - _USUAL_STEP * (cause == "time") * self._is_usual(factor))
 
-    def _moved(self, cause: Cause, value: float) -> Track:
-        if cause == "sign":
-            return self.track.scaled(-1.0).with_force(-1.0)
-        return self.track.scaled(time=value) if cause == "time" else self.track.scaled(value)
+    def _ratios(self, cause: Cause) -> list[float]:
+        """Factors that bring the motion to one that other runs have."""
+        own, name = self.track, {"time": "frequency"}.get(cause, "amplitude")
+        if not own.frequency:
+            return []
+        ratios = [getattr(t, name) / getattr(own, name) for t in self._others if t.frequency]
+        ratios = [1 / r if cause == "time" else r for r in ratios]
+        return [r for r in ratios if LEAST_FACTOR < max(r, 1 / r) < _MOST_FACTOR]
 
-    def _is_large(self, explanation: Explanation) -> bool:
-        value, size = explanation.value, self.track.half_range
-        if explanation.unit and explanation.cause == "displacement" and not self._is_nearer(value):
-            return False
-        if explanation.cause in ("force", "displacement"):
+    def _tested(self, trial: Trial) -> int:
+        """1 if the change brings the motion to one that more of the other runs have, −1 if to one that fewer have."""
+        if not self.track.frequency:
+            return 0
+        moved = self._move(trial)
+        return int(np.sign(sum(moved.is_at_motion(t) - self.track.is_at_motion(t) for t in self._others)))
+
+    def _is_usual(self, factor: float) -> int:
+        """1 if a factor of time makes the time between two samples that of most other runs, −1 if it was that."""
+        usual = float(np.median([track.step for track in self._others]))
+        after, before = (abs(self.track.step * f / usual - 1) < _SAME_STEP for f in (factor, 1.0))
+        return int(after) - int(before)
+
+    def _move(self, trial: Trial) -> Track:
+        if trial.cause == "sign":
+            moved = self.track.scaled(-1.0)
+            return replace(moved, force=-self.track.force)
+        return self.track.scaled(time=trial.value) if trial.cause == "time" else self.track.scaled(trial.value)
+
+    def _is_large(self, trial: Trial, products: Products, others: Posterior) -> bool:
+        value, size = trial.value, self.own.size
+        if trial.cause in ("force", "displacement", "time"):
             return abs(np.log(value)) > np.log(LEAST_FACTOR)
-        if explanation.cause == "offset":
-            return abs(value) > LEAST_OFFSET * max(size, 0.3 * self.evidence.force)
-        if explanation.cause == "current":
-            change = self.others.force(self.track.with_current(value), self._columns) - self.expected
-            return float(np.max(np.abs(change))) > LEAST_CURRENT_EFFECT * size
+        if trial.cause == "offset":
+            return abs(value) > LEAST_OFFSET * self.evidence.force * max(size, 0.3)
+        if trial.cause == "current":
+            change = others.at(products.over)[0] - others.at(self.own.over)[0]
+            return _rms(products, change) > LEAST_CURRENT_EFFECT * size
         return True
+
+    def _unexplained(self, products: Products, others: Posterior) -> float:
+        """RMS error of the force expected by other runs, at the best gain and offset, over the half range."""
+        expected, one = others.at(products.over)[0], products.constant
+        table = np.column_stack([expected, one])
+        best = np.linalg.lstsq(table.T @ products.gram @ table, table.T @ products.moment, rcond=1e-10)[0]
+        found = table @ np.clip(best, [1 / _MOST_SESSION, -np.inf], [_MOST_SESSION, np.inf])
+        power = products.power - 2 * float(found @ products.moment) + float(found @ products.gram @ found)
+        return float(np.sqrt(max(power, 0.0) / products.rows)) / products.size
 
     def _is_nearer(self, factor: float) -> bool:
         """Tell whether a factor brings the stroke nearer to the usual one, as the right unit does."""
@@ -158,6 +252,10 @@ class Candidate:
         return abs(np.log(stroke * factor)) < abs(np.log(stroke))
 
 
+def _rms(products: Products, coefficients: Floats) -> float:
+    return float(np.sqrt(max(float(coefficients @ products.gram @ coefficients), 0.0) / products.rows))
+
+
 def _both_ways(units: dict[str, float]) -> list[tuple[str, float]]:
-    """Units of a channel that was read as N or mm, and of one that was read as this unit and is in N or mm."""
+    """Units of a channel that was read as N, mm or s, and of one that was read as this unit and is in N, mm or s."""
     return [*units.items(), *((f"not {name}", 1 / factor) for name, factor in units.items())]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from mrdamper.data import Run
 from mrdamper.study.contradictions.copies import Copy
-from mrdamper.study.contradictions.explanations import Explanation
+from mrdamper.study.contradictions.explanations import Explanation, Trial
 
 CODES = {
     "force": "E_FORCE_SCALE",
@@ -67,11 +67,11 @@ def describe(run: Run, explanation: Explanation, others: int) -> Contradiction:
     """
     text = {
         "force": _force, "offset": _offset, "current": _current, "displacement": _displacement, "time": _time,
-        "sign": _sign, "damper": _damper,
+        "sign": _sign, "damper": _damper, "shifted": _shifted,
     }[explanation.cause]  # fmt: skip
-    found, remedy = text(run, explanation)
+    found, remedy = text(run, explanation.trial)
     against = f"contradicts the other {others} runs: {found} (log odds {explanation.gain:.0f})"
-    return Contradiction(run.id, explanation.cause, explanation.value, explanation.gain, against, remedy)
+    return Contradiction(run.id, explanation.cause, explanation.trial.value, explanation.gain, against, remedy)
 
 
 def describe_copy(copy: Copy, validation: bool) -> Contradiction:
@@ -81,17 +81,7 @@ def describe_copy(copy: Copy, validation: bool) -> Contradiction:
     return Contradiction(copy.run_id, "copy", copy.correlation, float("inf"), found, f"{remedy}: delete the file")
 
 
-def describe_shift(run: Run, current: float, tested: float, evidence: float, first: str, down: bool) -> Contradiction:
-    """Say in words that rows of the table of tests are shifted."""
-    found = (
-        f"contradicts the others: from run {first} on, the currents are those of the rows "
-        f"{'above' if down else 'below'} (log odds {evidence:.0f}); this run looks like {_amperes(current)}, "
-        f"written down is {_amperes(tested)}"
-    )
-    return Contradiction(run.id, "shifted", current, evidence, found, f"in tests.csv, {_row(run, current)}")
-
-
-def _force(run: Run, e: Explanation) -> tuple[str, str]:
+def _force(run: Run, e: Trial) -> tuple[str, str]:
     if e.unit.startswith("not "):
         return (
             f"its force is {1 / e.value:.3g} times as large, as if newtons had been read as {e.unit[4:]}",
@@ -108,14 +98,14 @@ def _force(run: Run, e: Explanation) -> tuple[str, str]:
     )
 
 
-def _offset(run: Run, e: Explanation) -> tuple[str, str]:
+def _offset(run: Run, e: Trial) -> tuple[str, str]:
     return (
         f"the zero of its force is off by {-e.value:.3g} N",
         _own_profile(run, f"[channels.force] offset = {e.value:.3g}"),
     )
 
 
-def _current(run: Run, e: Explanation) -> tuple[str, str]:
+def _current(run: Run, e: Trial) -> tuple[str, str]:
     tested = abs(run.mean_current)
     if e.unit == "mA":
         return (
@@ -131,7 +121,7 @@ def _current(run: Run, e: Explanation) -> tuple[str, str]:
     )
 
 
-def _displacement(run: Run, e: Explanation) -> tuple[str, str]:
+def _displacement(run: Run, e: Trial) -> tuple[str, str]:
     if e.unit.startswith("not "):
         return (
             f"its displacement is {1 / e.value:.3g} times too large, as if millimetres had been read as {e.unit[4:]}",
@@ -149,22 +139,30 @@ def _displacement(run: Run, e: Explanation) -> tuple[str, str]:
     )
 
 
-def _time(run: Run, e: Explanation) -> tuple[str, str]:
+def _time(run: Run, e: Trial) -> tuple[str, str]:
     return (
         f"its time runs {1 / e.value:.2g} times as long as its force shows: another sample rate",
         _own_profile(run, f"[channels.time] scale = {e.value:.2g}"),
     )
 
 
-def _sign(run: Run, e: Explanation) -> tuple[str, str]:
+def _sign(run: Run, e: Trial) -> tuple[str, str]:
     return (
         "its force and displacement both count in the other direction",
         _own_profile(run, "[channels.force] sign = -1 and [channels.displacement] sign = -1"),
     )
 
 
-def _damper(run: Run, e: Explanation) -> tuple[str, str]:
+def _damper(run: Run, e: Trial) -> tuple[str, str]:
     return "no factor, offset or current explains its force: another damper, or another state of it", _specimen(run)
+
+
+def _shifted(run: Run, e: Trial) -> tuple[str, str]:
+    return (
+        f"its current is that of another row of tests.csv, as those of other runs are: its force is that of "
+        f"{_amperes(e.value)}, not of {_amperes(abs(run.mean_current))}",
+        f"in tests.csv, {_row(run, e.value)}",
+    )
 
 
 def _own_profile(run: Run, line: str) -> str:

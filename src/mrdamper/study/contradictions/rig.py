@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -11,8 +12,8 @@ from mrdamper.data import Run
 from mrdamper.errors import InputError
 from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.study.contradictions.copies import find_copies
-from mrdamper.study.contradictions.findings import Contradiction, describe, describe_copy, describe_shift
-from mrdamper.study.contradictions.search import Search, best_explanation, find_shift, is_far_better, search
+from mrdamper.study.contradictions.findings import Contradiction, describe, describe_copy
+from mrdamper.study.contradictions.search import Search
 from mrdamper.study.contradictions.tracks import Track, tracks_of
 
 FEWEST_RUNS = 4  # identification runs from which one can contradict the others
@@ -61,18 +62,9 @@ def find_contradictions(runs: Sequence[Run], keep: Collection[str] = ()) -> list
 
 
 def _among(train: Sequence[Track], keep: Collection[str]) -> dict[str, Contradiction]:
-    shift = find_shift(train)
-    if shift is not None:
-        shifted = [train[i] for i in shift.currents]
-        found = {
-            t.run.id: describe_shift(
-                t.run, current, abs(t.run.mean_current), shift.gain, train[shift.first].run.id, shift.down
-            )
-            for t, current in zip(shifted, shift.currents.values(), strict=True)
-        }
-    else:
-        result = search(train, int(_MOST_SHARE * len(train)))
-        found = {train[i].run.id: describe(train[i].run, e, len(train) - 1) for i, e in result.explanations.items()}
+    search = Search(train)
+    search.run(int(_MOST_SHARE * len(train)))
+    found = {train[i].run.id: describe(train[i].run, e, len(train) - 1) for i, e in sorted(search.found.items())}
     found = {name: one for name, one in found.items() if name not in keep}
     if len(found) > _MOST_SHARE * len(train) or _opposed(list(found.values())):
         raise _disagreement(train, found)
@@ -88,14 +80,13 @@ def _opposed(found: Sequence[Contradiction]) -> bool:
 def _of_validation(validation: Sequence[Track], trusted: Sequence[Track]) -> dict[str, Contradiction]:
     if not validation or len(trusted) < FEWEST_RUNS:
         return {}
-    known = Search.of(trusted)
-    others = known.evidence.posterior(known.members)
-    explained = [(track.run, best_explanation(track, others)) for track in validation]
-    return {run.id: describe(run, e, len(trusted)) for run, e in explained if e.cause != "damper" and is_far_better(e)}
+    search = Search(trusted)
+    explained = [(track.run, search.explain(track)) for track in validation]
+    return {run.id: describe(run, e, len(trusted)) for run, e in explained if e is not None}
 
 
 def _in_amperes(tracks: Sequence[Track], keep: Collection[str]) -> tuple[list[Track], dict[str, Contradiction]]:
-    """The runs without those whose current is a thousand times the others', which are in milliamperes."""
+    """The runs, those in amperes whose current is a thousand times the others', which are in milliamperes."""
     sizes = [float(np.median(track.current)) for track in tracks]
     usual = float(np.median([size for size in sizes if size > 0] or [0.0]))
     kept, found = [], {}
@@ -106,6 +97,7 @@ def _in_amperes(tracks: Sequence[Track], keep: Collection[str]) -> tuple[list[Tr
             continue
         text = f"its current of {size:.4g} A is {size / usual:.3g} times that of the others: it looks like milliamperes"
         remedy = f"in tests.csv, set current_A of {run.notes.get('file', '') or run.id} to {size / 1e3:.3g}"
+        kept.append(replace(track, current=track.current / 1e3))
         found[run.id] = Contradiction(run.id, "current", size / 1e3, float("inf"), text, remedy)
     return kept, found
 

@@ -2,173 +2,378 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 
-from mrdamper.study.contradictions.evidence import Evidence, Moments, Posterior
-from mrdamper.study.contradictions.explanations import Candidate, Explanation
+from mrdamper.data import Floats, current_levels
+from mrdamper.study.contradictions.evidence import Evidence, Moments, Posterior, Products, Spread
+from mrdamper.study.contradictions.explanations import Candidate, Cause, Explanation, Trial
 from mrdamper.study.contradictions.tracks import Track
 
-_ODDS = 8.0  # logarithm of the odds from which an explanation is far better than none
-_ALONE_ODDS = 20.0  # the same of a run that nothing explains
-_MISFITS = (4.0, 2.0, 1.0, 0.6, 0.4)  # factors of the usual model error that are tried
-_LOOKED_AT = 8  # runs whose explanations are tried in a round, at least
+_ODDS, _FEW_ODDS = 12.0, 36.0  # logarithm of the odds from which an explanation is far better: always, over the runs
+_ALONE_ODDS = 10.0  # more of them for a run that nothing explains
+_MISFITS = (4.0, 2.0, 1.4, 1.0, 0.7, 0.5, 0.35)  # factors of the usual model error that are tried
+_DRIFTS = ((0.06, 0.04), (0.04, 0.04), (0.06, 0.01), (0.04, 0.01))  # gains and offsets that are tried
+_ALIKE = 3  # explanations of a run that others may have in common with it
+_LOOKED_AT = 12  # runs whose explanations are tried in a round, at least
+_STAYS = 3.0  # logarithm of the odds from which an accepted explanation stays
 _SHIFT_ODDS = 12.0  # logarithm of the prior odds against shifted rows
+_EXCHANGE_ODDS = 6.0  # the same against two exchanged rows
+_REGULAR = 6.0  # what an empty cell of the matrix of tests that is filled lowers them by
+_NEARLY = 0.5  # repeated and missing tests of a matrix that is nearly complete, over its tests
+_LEAST_SHIFT_ODDS = 0.0  # prior odds of shifted rows at least
+_MEMBER_ODDS = 4.0  # the same against a further run with the same cause
 _FEWEST_SHIFTED = 2  # runs whose current a shift has to change
 _SAME_CURRENT = 0.01  # difference of two currents that are one [A]
 _EQUAL = 6.0  # odds up to which a run nothing explains better takes the best explanation
+_BEST = 6  # explanations of a run that are compared with those of other runs
+_SEEDS = 5  # runs from which a second group of runs is grown
+_SHARPER = 2.5  # factor by which the model error of a group of its own is smaller than that of all runs
+_LEAST_MISFIT = 0.5  # factor of the usual model error for groups at least
+_SMALLER = (1.0, 0.7, 0.45, 0.3)  # factors of the model error that explained runs leave
+_REFINED = 4  # single explanations whose model error is adapted
+_JUMP = 0.3  # difference of the logarithms of the gains of two groups of runs at one current
+_ROUNDS = 4  # assignments of runs to two groups
 
 
 @dataclass(frozen=True, eq=False)
-class Search:
-    """Runs as explained.
+class Proposal:
+    """Explanations of some runs together, and the logarithm of their odds against none."""
 
-    Attributes
-    ----------
-    evidence : Evidence
-    explanations : mapping of int to Explanation
-        By the run's position.
-    members : list of Moments
-        Of every run as corrected.
-    """
-
-    evidence: Evidence
     explanations: dict[int, Explanation]
-    members: list[Moments]
-
-    @classmethod
-    def of(cls, tracks: Sequence[Track]) -> Search:
-        """Runs that agree."""
-        evidence, _ = _suitable(tracks, range(len(tracks)))
-        return cls(evidence, {}, evidence.moments(tracks))
-
-
-@dataclass(frozen=True)
-class Shift:
-    """Rows of a table of tests that are shifted by one.
-
-    Attributes
-    ----------
-    first : int
-        Position of the first run with the current of another row.
-    down : bool
-        The rows hold the currents of the rows above.
-    currents : mapping of int to float
-        Apparent current of every run whose current is wrong [A].
-    gain : float
-        Logarithm of the odds against no shift.
-    """
-
-    first: int
-    down: bool
-    currents: dict[int, float]
     gain: float
 
 
-def search(tracks: Sequence[Track], most: int) -> Search:
-    """Explain runs, the least probable one first, until the others agree.
+_FALLING, _LEAST_FALL, _MOST_FALLING = 60.0, 0.05, 8.0  # odds against a falling force: per share, from, at most
+_AT_NODE = 0.9  # share of a node from which a run is at its current
+_NOTHING = Proposal({}, -np.inf)
+
+
+class Search:
+    """Runs of a rig, compared with each other.
 
     Parameters
     ----------
     tracks : sequence of Track
-    most : int
-        Explanations at which the search ends: the runs disagree.
     """
-    corrected = list(tracks)
-    found: dict[int, Explanation] = {}
-    evidence, odds = _suitable(tracks, range(len(tracks)))
-    while len(found) <= most:
-        members = evidence.moments(corrected)
-        order = sorted(odds, key=lambda i: -odds[i])
-        suspects = [i for k, i in enumerate(order) if k < max(_LOOKED_AT, len(order) // 4)]
-        best = {i: best_explanation(tracks[i], _posterior(evidence, members, found, i)) for i in suspects}
-        i, explanation = max(best.items(), key=lambda pair: pair[1].gain)
-        if not is_far_better(explanation):
-            break
-        found[i], corrected[i] = explanation, explanation.track
-        evidence, odds = _suitable(corrected, [k for k in range(len(tracks)) if not _is_alone(found, k)])
-        odds = {k: v for k, v in odds.items() if k not in found}
-    return _reviewed(found, tracks, corrected)
 
+    def __init__(self, tracks: Sequence[Track]) -> None:
+        self.tracks = tracks
+        self.found: dict[int, Explanation] = {}
+        self.evidence = Evidence(tracks)
+        self._products = self.evidence.products(tracks)
+        self._candidates = [Candidate(i, tracks, self.evidence, p) for i, p in enumerate(self._products)]
+        self._members: list[Moments] = []
+        self._adapt()
 
-def find_shift(tracks: Sequence[Track]) -> Shift | None:
-    """Find currents that are those of the rows above or below in the table of tests, from some row on.
+    def run(self, most: int) -> None:
+        """Explain runs until the others agree, or more than `most` are explained."""
+        while len(self.found) <= most:
+            best = max(self._proposals(), key=lambda proposal: proposal.gain, default=_NOTHING)
+            if not best.explanations or best.gain < self._threshold(best.explanations.values()):
+                break
+            self._accept(best.explanations)
+        self._review()
 
-    None where a single run explains as much.
-    """
-    if any(track.current_changes for track in tracks):
-        return None
-    evidence, odds = _suitable(tracks, range(len(tracks)))
-    own = evidence.moments(tracks)
-    written = [float(track.current[0]) for track in tracks]
-    shares = evidence.shares(np.array(written))
-    base, best = evidence.log_evidence(own), None
-    for down in (False, True):
-        for first in range(len(tracks) - 1):
-            source = [
-                k if k < first else min(k + 1, len(own) - 1) if down else max(k - 1, first) for k in range(len(own))
-            ]
-            changed = {k: written[j] for k, j in enumerate(source) if abs(written[j] - written[k]) > _SAME_CURRENT}
-            if len(changed) < _FEWEST_SHIFTED:
-                continue
-            moved = [replace(own[k], over=shares[j]) for k, j in enumerate(source)]
-            gain = evidence.log_evidence(moved) - base - _SHIFT_ODDS
-            if best is None or gain > best.gain:
-                best = Shift(min(changed), not down, changed, gain)
-    if best is None or best.gain < _ODDS:
-        return None
-    suspects = sorted(odds, key=lambda i: -odds[i])[:_LOOKED_AT]
-    single = max(best_explanation(tracks[i], _posterior(evidence, own, {}, i)).gain for i in suspects)
-    return best if best.gain > single else None
+    def posterior(self, but: Iterable[int] = ()) -> Posterior:
+        """Coefficients determined by the runs as corrected, without some of them."""
+        return self.evidence.posterior([self._members[k] for k in self._agreeing(but)])
 
+    def explain(self, track: Track) -> Explanation | None:
+        """The named explanation of a further run that is far better than none."""
+        candidate = Candidate(len(self.tracks), [*self.tracks, track], self.evidence, *self.evidence.products([track]))
+        best = next(iter(candidate.explanations(self.posterior())), None)
+        return best if best is not None and best.gain >= self._threshold([best]) else None
 
-def is_far_better(explanation: Explanation) -> bool:
-    """Tell whether an explanation is far better than none."""
-    return explanation.gain >= (_ALONE_ODDS if explanation.cause == "damper" else _ODDS)
+    def _threshold(self, explanations: Iterable[Explanation]) -> float:
+        """Logarithm of the odds from which explanations are far better than none."""
+        alone = any(e.cause == "damper" for e in explanations)
+        return _ODDS + _FEW_ODDS / len(self.tracks) + (_ALONE_ODDS if alone else 0.0)
 
+    def _agreeing(self, but: Iterable[int] = ()) -> list[int]:
+        aside = {k for k, explanation in self.found.items() if explanation.cause == "damper"} | set(but)
+        return [k for k in range(len(self.tracks)) if k not in aside]
 
-def best_explanation(track: Track, others: Posterior) -> Explanation:
-    """The most probable explanation of a run that is more than what sessions differ by."""
-    alone, *named = Candidate(track, others).explanations()
-    return named[0] if named and alone.gain - named[0].gain < _EQUAL else alone
+    def _accept(self, explanations: dict[int, Explanation]) -> None:
+        self.found |= explanations
+        for i, explanation in explanations.items():
+            self._products[i] = explanation.products
+        self._adapt()
 
+    def _adapt(self) -> None:
+        """Choose the spread that suits the runs, whatever a minority of them does; weigh the runs with it."""
+        agreeing = self._agreeing()
+        expected = self.evidence.prior
+        self.evidence.spread = Spread(2.0)
+        for _ in range(2):
+            expected = self.evidence.posterior([expected.weigh(self._products[k]) for k in agreeing])
+        scores: dict[Spread, float] = {}
 
-def _posterior(evidence: Evidence, members: Sequence[Moments], found: dict[int, Explanation], but: int) -> Posterior:
-    return evidence.posterior([m for k, m in enumerate(members) if k != but and not _is_alone(found, k)])
+        def score(spread: Spread) -> float:
+            self.evidence.spread = spread
+            members = [expected.weigh(self._products[k]) for k in agreeing]
+            posterior = self.evidence.posterior(members)
+            return float(np.median([posterior.log_probability_by_others(member) for member in members]))
 
+        for misfit in _MISFITS:
+            scores[Spread(misfit)] = score(Spread(misfit))
+        best = max(scores, key=scores.__getitem__)
+        for gain, offset in _DRIFTS[1:]:
+            scores[Spread(best.misfit, gain, offset)] = score(Spread(best.misfit, gain, offset))
+        self.evidence.spread = max(scores, key=scores.__getitem__)
+        expected = self.evidence.posterior([expected.weigh(self._products[k]) for k in agreeing])
+        self._members = [expected.weigh(products) for products in self._products]
 
-def _is_alone(found: dict[int, Explanation], k: int) -> bool:
-    return k in found and found[k].cause == "damper"
+    def _proposals(self) -> Iterator[Proposal]:
+        posterior, prior = self.posterior(), self.evidence.prior
+        self._base = self._adapted([self._products[k] for k in self._agreeing()], posterior)
+        left = [k for k in range(len(self.tracks)) if k not in self.found]
+        odds = {
+            k: prior.log_probability(self._members[k]) - posterior.log_probability_by_others(self._members[k])
+            for k in left
+        }
+        order = sorted(left, key=lambda k: -odds[k])
+        self._own = self.evidence.log_evidence([self._members[k] for k in self._agreeing()])
+        self._options: dict[int, list[Explanation]] = {}
+        singles = [self._of_one(i) for i in order[: max(_LOOKED_AT, len(order) // 4)]]
+        yield from map(self._refined, sorted(singles, key=lambda proposal: -proposal.gain)[:_REFINED])
+        groups = dict.fromkeys([*self._groups(order, posterior), *self._alike(order)])
+        ranked = sorted(map(self._of_group, groups), key=lambda proposal: -proposal.gain)
+        yield from (self._smaller(proposal) for proposal in ranked[:_REFINED])
+        if not self.found:
+            best = max(self._of_rows(order[:_LOOKED_AT]), key=lambda proposal: proposal.gain, default=_NOTHING)
+            if best.explanations:
+                yield self._refined_rows(best, posterior)
 
+    def _of_one(self, i: int) -> Proposal:
+        """The best explanation of a run."""
+        others = self.posterior([i])
+        alone = self._candidates[i].alone(others)
+        self._options[i] = self._candidates[i].explanations(others)
+        named = next(iter(self._options[i]), None)
+        best = named if named is not None and alone.gain - named.gain < _EQUAL else alone
+        return Proposal({i: best}, best.gain)
 
-def _reviewed(found: dict[int, Explanation], tracks: Sequence[Track], corrected: list[Track]) -> Search:
-    """The explanations against all the other runs as they ended; those no longer needed are dropped."""
-    evidence, _ = _suitable(corrected, [k for k in range(len(tracks)) if not _is_alone(found, k)])
-    members = evidence.moments(corrected)
-    for i in list(found):
-        explanation = best_explanation(tracks[i], _posterior(evidence, members, found, i))
-        if is_far_better(explanation):
-            found[i], members[i] = explanation, explanation.moments
+    def _refined(self, proposal: Proposal) -> Proposal:
+        """A proposal for one run whose gain counts that all runs agree better afterwards."""
+        ((i, explanation),) = proposal.explanations.items()
+        rest = self._agreeing([i])
+        others = self.evidence.posterior([self._members[k] for k in rest])
+        kept = [self._products[k] for k in rest]
+        if explanation.cause == "damper":
+            gain = self._adapted(kept, others, [[explanation.products]])
         else:
-            del found[i]
-            members[i] = evidence.moments([tracks[i]])[0]
-    return Search(evidence, found, members)
+            gain = self._adapted([*kept, explanation.products], others)
+        gain -= self._base + explanation.trial.odds
+        return Proposal({i: replace(explanation, gain=gain)}, gain)
 
+    def _adapted(
+        self, products: Sequence[Products], expected: Posterior, apart: Sequence[Sequence[Products]] = ()
+    ) -> float:
+        """Logarithm of the evidence of runs, and of others apart, at the model error most probable for them."""
+        spread, best = self.evidence.spread, -np.inf
+        for factor in _SMALLER:
+            self.evidence.spread = replace(spread, misfit=max(factor * spread.misfit, _MISFITS[-1]))
+            members = [expected.weigh(p) for p in products]
+            total = self.evidence.log_evidence(members) - self._falling(members)
+            for group in apart:
+                own = self.evidence.posterior([expected.weigh(p) for p in group])
+                total += self.evidence.log_evidence([own.weigh(p) for p in group])
+            best = max(best, total)
+        self.evidence.spread = spread
+        return best
 
-def _suitable(tracks: Sequence[Track], members: Sequence[int]) -> tuple[Evidence, dict[int, float]]:
-    """The evidence whose model error suits the runs, whatever a minority of them does; odds of a model of their own."""
-    chosen = [tracks[i] for i in members]
-    usual = Evidence(chosen)
-    elements = usual.elements(chosen)
-    found = []
-    for misfit in _MISFITS:
-        evidence = usual.with_misfit(misfit)
-        own = evidence.moments(chosen, elements)
-        total = evidence.total(own)
-        others = np.array([evidence.posterior_of(*total, but=one).log_probability(one) for one in own])
-        found.append((evidence, own, others))
-    scores = [float(np.median(others - found[0][2])) for _, _, others in found]
-    evidence, own, others = found[int(np.argmax(scores))]
-    return evidence, {i: evidence.prior.log_probability(o) - p for i, o, p in zip(members, own, others, strict=True)}
+    def _falling(self, members: Sequence[Moments]) -> float:
+        """Logarithm of the prior odds against a force that falls with the current, by the share it falls by."""
+        occupied = np.sum([m.over for m in members if m.over is not None and m.over.max() > _AT_NODE], axis=0)
+        nodes = np.eye(self.evidence.nodes.size)[np.asarray(occupied) > 0] if np.ndim(occupied) else []
+        if len(nodes) < 2:
+            return 0.0
+        posterior = self.evidence.posterior(members)
+        sizes = np.array(
+            [np.sqrt(mean @ self._usual_gram @ mean) for mean in (posterior.at(node)[0] for node in nodes)]
+        )
+        fall = float(np.max(1 - sizes / np.maximum.accumulate(sizes)))
+        return min(_FALLING * max(fall - _LEAST_FALL, 0.0), _MOST_FALLING)
+
+    @cached_property
+    def _usual_gram(self) -> Floats:
+        """Mean products of the elements over the runs at constant currents."""
+        return np.mean([p.gram / p.rows for p in self._products if p.over is not None], axis=0)
+
+    def _groups(self, order: Sequence[int], posterior: Posterior) -> list[tuple[int, ...]]:
+        """Sets of runs that may be wrong in the same way: the high or low runs of a current; a second group."""
+        gains = {k: self._gain(k, posterior) for k in order}
+        sets: list[list[int]] = []
+        low: list[int] = []
+        high: list[int] = []
+        constant = [k for k in order if not self.tracks[k].current_changes]
+        levels = dict(zip(constant, current_levels([float(self.tracks[k].current[0]) for k in constant]), strict=True))
+        for level in sorted(set(levels.values())):
+            at = sorted((k for k in constant if levels[k] == level), key=gains.__getitem__)
+            for size in range(2, len(at)):
+                sets += [at[:size], at[-size:]]
+            jumps = np.diff([np.log(max(gains[k], 1e-3)) for k in at])
+            if jumps.size and jumps.max() > _JUMP:
+                low += at[: int(np.argmax(jumps)) + 1]
+                high += at[int(np.argmax(jumps)) + 1 :]
+        sets += [low, high]
+        ranked = sorted(order, key=gains.__getitem__)
+        for seeds in (*([k] for k in order[:_SEEDS]), ranked[: len(ranked) // 3], ranked[-(len(ranked) // 3) :]):
+            sets.append(self._grown(seeds, posterior))
+        return list(dict.fromkeys(tuple(sorted(s)) for s in sets if 2 <= len(s) <= len(self.tracks) // 2))
+
+    def _alike(self, order: Sequence[int]) -> list[tuple[int, ...]]:
+        """Sets of runs that one explanation makes more probable each."""
+        sets = []
+        for i in order[:_SEEDS]:
+            for explanation in self._options.get(i, [])[:_ALIKE]:
+                trial = explanation.trial
+                sets.append(
+                    [k for k, of in self._options.items() if any(e.gain > 0 and e.trial.is_like(trial) for e in of)]
+                )
+        return [tuple(sorted(s)) for s in sets if 2 <= len(s) <= len(self.tracks) // 2]
+
+    def _gain(self, k: int, posterior: Posterior) -> float:
+        """Force of a run over that expected by the others."""
+        products = self._products[k]
+        expected = posterior.without(self._members[k])[0]
+        swing = expected - products.constant * float(products.constant @ products.gram @ expected) / products.rows
+        return float(swing @ products.moment) / max(float(swing @ products.gram @ swing), 1e-12)
+
+    def _grown(self, seeds: Sequence[int], posterior: Posterior) -> list[int]:
+        """The group of runs about some that follow a damper of their own rather than that of the others."""
+        every = [k for k in self._agreeing() if k not in self.found]
+        spread = self.evidence.spread
+        self.evidence.spread = replace(spread, misfit=max(spread.misfit / _SHARPER, _LEAST_MISFIT))
+        members = {k: posterior.weigh(self._products[k]) for k in self._agreeing()}
+        group = set(seeds)
+        for _ in range(_ROUNDS):
+            if not 0 < len(group) < len(members):
+                break
+            own = self.evidence.posterior([members[k] for k in group])
+            rest = self.evidence.posterior([members[k] for k in members if k not in group])
+            moved = set()
+            for k in every:
+                run, inside = members[k], k in group
+                by_own = own.log_probability_by_others(run) if inside else own.log_probability(run)
+                by_rest = rest.log_probability(run) if inside else rest.log_probability_by_others(run)
+                if by_own > by_rest:
+                    moved.add(k)
+            if moved == group:
+                break
+            group = moved
+        self.evidence.spread = spread
+        return sorted(group)
+
+    def _of_group(self, group: tuple[int, ...]) -> Proposal:
+        """The best explanation that several runs have in common: one cause with one value, or another damper."""
+        rest = self._agreeing(group)
+        others = self.evidence.posterior([self._members[k] for k in rest])
+        kept, own = [self._products[k] for k in rest], [self._products[k] for k in group]
+        base = self._base + _MEMBER_ODDS * (len(group) - 1)
+        options = [self._candidates[k].explanations(others) for k in group]
+        best, joint = _NOTHING, -np.inf
+        for explanation in options[0][:_BEST]:
+            if explanation.cause == "current" and not self._may_share(group, explanation.trial.value):
+                continue
+            alike = [next((e for e in of if e.trial.is_like(explanation.trial)), None) for of in options]
+            members = {k: e for k, e in zip(group, alike, strict=True) if e is not None}
+            if len(members) == len(group):
+                odds = max(e.trial.odds for e in members.values())
+                moments = [others.weigh(e.products) for e in members.values()]
+                score = self.evidence.log_evidence([*(self._members[k] for k in rest), *moments]) - odds
+                if score > joint:
+                    joint, best = score, Proposal(members, odds)
+        if best.explanations:
+            corrected = [e.products for e in best.explanations.values()]
+            gain = self._adapted([*kept, *corrected], others) - base - best.gain
+            best = Proposal({k: replace(e, gain=gain) for k, e in best.explanations.items()}, gain)
+        alone = [self._candidates[k].alone(others) for k in group]
+        if sum(np.isfinite(e.gain) for e in alone) > len(group) / 2:
+            gain = self._adapted(kept, others, [own]) - base - alone[0].trial.odds
+            if gain > best.gain + _EQUAL:
+                best = Proposal({k: replace(e, gain=gain) for k, e in zip(group, alone, strict=True)}, gain)
+        return best
+
+    def _may_share(self, group: tuple[int, ...], current: float) -> bool:
+        """Tell whether runs may have one current: those of a level, but not all of them, or of open coils."""
+        constant = [k for k, track in enumerate(self.tracks) if not track.current_changes]
+        levels = current_levels([float(self.tracks[k].current[0]) for k in constant])
+        inside = {level for k, level in zip(constant, levels, strict=True) if k in group}
+        outside = {level for k, level in zip(constant, levels, strict=True) if k not in group}
+        return inside <= outside and (len(inside) == 1 or current <= _SAME_CURRENT)
+
+    def _smaller(self, proposal: Proposal) -> Proposal:
+        """A proposal for a group without the runs that need no explanation once the others are explained."""
+        while len(proposal.explanations) > 2 and proposal.gain >= self._threshold(proposal.explanations.values()):
+            members = tuple(proposal.explanations)
+            subsets = [tuple(k for k in members if k != left) for left in members]
+            best = max(map(self._of_group, subsets), key=lambda subset: subset.gain)
+            if best.gain <= proposal.gain:
+                break
+            proposal = best
+        return proposal
+
+    def _of_rows(self, suspects: Sequence[int]) -> Iterator[Proposal]:
+        """Currents of other rows of the table of tests: two rows exchanged, or all shifted by one from some row on."""
+        order = [k for k, track in enumerate(self.tracks) if not track.current_changes]
+        written = [float(self.tracks[k].current[0]) for k in order]
+        rows, last = list(range(len(order))), len(order) - 1
+        empty = self._irregular(written)
+        for i, j in combinations(rows, 2):
+            if (order[i] in suspects or order[j] in suspects) and abs(written[i] - written[j]) > _SAME_CURRENT:
+                yield self._of_currents({order[i]: written[j], order[j]: written[i]}, "current", _EXCHANGE_ODDS)
+        for step in (-1, 1):
+            for first in range(last):
+                moved = [written[k if k < first else min(max(k + step, first), last)] for k in rows]
+                changed = {order[k]: moved[k] for k in rows if abs(moved[k] - written[k]) > _SAME_CURRENT}
+                if len(changed) >= _FEWEST_SHIFTED:
+                    filled = empty - self._irregular(moved) if set(moved) == set(written) else 0
+                    odds = _SHIFT_ODDS - _REGULAR * filled * (empty <= _NEARLY * len(rows))
+                    yield self._of_currents(changed, "shifted", max(odds, _LEAST_SHIFT_ODDS))
+
+    def _of_currents(self, currents: dict[int, float], cause: Cause, odds: float) -> Proposal:
+        trials = {k: Trial("current", current, "", odds) for k, current in currents.items()}
+        moved = {k: self._candidates[k].changed(trial) for k, trial in trials.items()}
+        members = [replace(m, over=moved[k].over) if k in moved else m for k, m in enumerate(self._members)]
+        gain = self.evidence.log_evidence(members) - self._own - odds
+        return Proposal({k: Explanation(replace(t, cause=cause), gain, moved[k]) for k, t in trials.items()}, gain)
+
+    def _refined_rows(self, proposal: Proposal, posterior: Posterior) -> Proposal:
+        moved = proposal.explanations
+        products = [moved[k].products if k in moved else p for k, p in enumerate(self._products)]
+        gain = self._adapted(products, posterior) - self._base - next(iter(moved.values())).trial.odds
+        return Proposal({k: replace(e, gain=gain) for k, e in moved.items()}, gain)
+
+    def _irregular(self, currents: Sequence[float]) -> int:
+        """Repeated tests, and empty cells of the matrix of currents and motions."""
+        sines = [track for track in self.tracks if not track.current_changes]
+        motions = [next(j for j, t in enumerate(sines) if t is track or t.is_at_motion(track)) for track in sines]
+        cells = set(zip(currents, motions, strict=True))
+        return len(sines) - len(cells) + len(set(currents)) * len(set(motions)) - len(cells)
+
+    def _review(self) -> None:
+        """Compare each explanation with all the other runs as they ended; drop those no longer needed."""
+        if any(e.cause == "shifted" for e in self.found.values()):
+            return
+        for i, now in list(self.found.items()):
+            if now.cause == "damper" and sum(e.cause == "damper" for e in self.found.values()) > 1:
+                continue
+            others = self.posterior([i])
+            alone, named = self._candidates[i].alone(others), self._candidates[i].explanations(others)
+            best = named[0] if named and alone.gain - named[0].gain < _EQUAL else alone
+            trials = [e.trial for k, e in self.found.items() if k != i]
+            usual = [e for e in named if best.gain - e.gain < _EQUAL and any(e.trial.is_like(t) for t in trials)]
+            best = usual[0] if usual else best
+            if best.gain >= _STAYS:
+                self.found[i] = replace(best, gain=max(best.gain, now.gain))
+                self._products[i] = best.products
+            else:
+                del self.found[i]
+                self._products[i] = self._candidates[i].own
+            self._members[i] = others.weigh(self._products[i])

@@ -20,6 +20,7 @@ _CYCLES = 3  # cycles of a sine that are compared
 _SAMPLES_PER_CYCLE = 96  # samples of the motion
 _MOST_SAMPLES = 1500  # samples of a motion that is no sine
 _ROWS = 144  # rows of the regression per run
+_SAME_MOTION = 0.04  # relative difference of frequencies and amplitudes that are one
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +41,10 @@ class Track:
         Samples that are rows of the regression.
     half_range : float
         Half the peak-to-peak force, without its outermost samples [N].
+    frequency, amplitude : float
+        Of a sine [Hz], [m]; zero for other motions.
+    step : float
+        Time between two samples of the run [s].
     """
 
     run: Run
@@ -51,6 +56,9 @@ class Track:
     current_changes: bool
     rows: np.ndarray
     half_range: float
+    frequency: float
+    amplitude: float
+    step: float
 
     def scaled(self, motion: float = 1.0, time: float = 1.0) -> Self:
         """The same test with displacement and time multiplied by factors; a negative one inverts the motion."""
@@ -59,15 +67,15 @@ class Track:
             displacement=self.displacement * motion,
             velocity=self.velocity * (motion / time),
             acceleration=self.acceleration * (motion / time**2),
+            frequency=self.frequency / time,
+            amplitude=self.amplitude * abs(motion),
+            step=self.step * time,
         )
 
-    def with_force(self, gain: float = 1.0, offset: float = 0.0) -> Self:
-        """The same test with another gain and offset [N] of the force."""
-        return replace(self, force=gain * self.force + offset, half_range=abs(gain) * self.half_range)
-
-    def with_current(self, current: float) -> Self:
-        """The same test at another constant current [A]."""
-        return replace(self, current=np.full(self.force.size, current), current_changes=False)
+    def is_at_motion(self, other: Track) -> bool:
+        """Tell whether two runs are sines of one frequency and amplitude."""
+        pairs = ((self.frequency, other.frequency), (self.amplitude, other.amplitude))
+        return self.frequency > 0 and all(abs(a - b) <= _SAME_MOTION * b for a, b in pairs)
 
 
 def tracks_of(runs: Sequence[Run]) -> list[Track]:
@@ -111,6 +119,9 @@ def _track(run: Run) -> Track:
         run.current_changes,
         rows,
         float(high - low) / 2,
+        sine.condition.frequency_Hz if sine.is_sine else 0.0,
+        sine.condition.amplitude_m if sine.is_sine else 0.0,
+        float(run.time[-1] - run.time[0]) / (run.time.size - 1),
     )
 
 
