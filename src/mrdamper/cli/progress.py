@@ -76,7 +76,7 @@ def watched(items: Sequence[Item], what: str) -> Iterator[Item]:
 
 
 def time_left(seconds: float, share: float) -> str:
-    """How long it will take from here if it goes on as before; empty where that cannot be said yet.
+    """Estimate the time left at the pace so far; empty while it cannot be estimated.
 
     Examples
     --------

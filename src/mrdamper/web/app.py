@@ -112,7 +112,7 @@ async def _sweep(sessions: Sessions) -> None:
 
 
 def _give_memory_back() -> None:
-    """What ended sessions held goes back to the system: the allocator would keep it."""
+    """Return the memory of ended sessions to the system; the allocator would keep it."""
     gc.collect()
     _of_the_allocator("malloc_trim", 0)
 
@@ -181,7 +181,7 @@ class _Faults:
 
 
 def _ended(scope: Scope) -> JSONResponse | None:
-    """What a request is told whose session, with its files, was ended under it."""
+    """Return the answer to a request whose session has ended; None where it named no session."""
     try:
         scope["app"].state.sessions.find(scope["path_params"]["session"])
     except InputError as error:

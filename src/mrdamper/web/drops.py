@@ -1,4 +1,4 @@
-"""What a drop is: files on their way in, what was said of each, and the data that come of them."""
+"""Uploads: the files, the result of checking each, and the data read from them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class DropError(InputError):
 
 @dataclass(frozen=True)
 class Verdict:
-    """What was said of one dropped file or run."""
+    """Result of checking one file or run."""
 
     name: str  # file or run, as it was called
     state: str  # "taken", "noted" (taken, with findings) or "refused"
@@ -70,7 +70,7 @@ class Drop:
     held_out: frozenset[str] | None = None  # runs held out on the page; None where nobody chose
 
     def place(self, name: str) -> Path:
-        """Where a file of that name is stored; raises `DropError` if there are too many."""
+        """Reserve the path of a file of that name; raises `DropError` if there are too many."""
         if self.places >= FILE_COUNT_LIMIT:
             raise DropError(
                 f"over {FILE_COUNT_LIMIT} files", mend="drop fewer at once, or use mrdamper import", code="E_DROP_COUNT"

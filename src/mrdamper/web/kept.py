@@ -41,7 +41,7 @@ class KeptError(InputError):
 
 @dataclass(frozen=True)
 class Kept:
-    """What such a file holds."""
+    """Content of a saved project."""
 
     intake: Intake | None  # data; None where there were none
     dampers: list[tuple[Damper, str, str]]  # with how each came to the bench and its note

@@ -88,7 +88,7 @@ def _by_name(drop: Drop) -> list[Path]:
 
 
 def _verdicts(drop: Drop) -> tuple[Verdict, ...]:
-    """What is said of each file, those to be mended first."""
+    """List the result of every file, refused ones first."""
     refused = [
         Verdict(_named(drop.names[path], refusals), "refused", reasons(drop, path, refusals))
         for path in _by_name(drop)
@@ -114,14 +114,14 @@ def reasons(drop: Drop, path: Path, refusals: Iterable[Refusal]) -> tuple[tuple[
 
 
 def _reason(error: InputError, path: Path) -> str:
-    """What an error says, without the file it names: the page says that beside it."""
+    """Return the text of an error without the name of its file, which the page shows beside it."""
     place = error.where.replace(str(path), "").removeprefix(path.name).strip(" :,")
     text = f"{place}: {error.found}" if place else error.found
     return f"{text}; {error.mend}" if error.mend else text
 
 
 def _name(drop: Drop, count: int) -> str:
-    """What the data are called: the folder they came in, or the one file."""
+    """Return the name of the data: that of their folder, or of the only file."""
     tops = {PurePosixPath(name).parts[0] for name in drop.names.values() if len(PurePosixPath(name).parts) > 1}
     if len(tops) == 1:
         return tops.pop()

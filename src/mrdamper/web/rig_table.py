@@ -1,4 +1,4 @@
-"""What the page knows of every run of a rig: condition, figures of its loop, whether it can be used."""
+"""Runs of a rig with condition, characteristics of the loop and reason of a refusal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who may talk to the bench, and what the page may load.
+"""Access to the server, and the content that the page may load.
 
 The bench listens on the loopback device, but any page in the same browser can reach that:
 a request must name this host (against DNS rebinding) and, if it changes something, come from

@@ -1,4 +1,4 @@
-"""What one open page works on, kept apart from every other.
+"""Sessions: the data, dampers, jobs and files of each open page.
 
 A session's name is made here and cannot be guessed; whoever knows it may use it. Its files
 live in a folder of its own that goes with it.
@@ -80,7 +80,7 @@ class Session:
         return self.intake.dataset
 
     def result(self, name: str, found: str, mend: str) -> Any:
-        """What work left under a name; raises `InputError` (E_NO_RESULT) where it left nothing."""
+        """Return the result of work under a name; raises `InputError` (E_NO_RESULT) where it left nothing."""
         if not self.results.get(name):
             raise InputError(found, mend=mend, code="E_NO_RESULT")
         return self.results[name]

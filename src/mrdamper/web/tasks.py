@@ -1,4 +1,4 @@
-"""What runs in worker processes: each task calls the package and reports on the way.
+"""Tasks of worker processes, with progress reports.
 
 A worker imports what its task takes and no more: it starts sooner.
 """

@@ -59,7 +59,7 @@ class Job:
 
     @property
     def ended(self) -> bool:
-        """Whether nothing more will come."""
+        """True once the work has ended."""
         return self.state not in ("waiting", "running")
 
     def cancel(self) -> None:
@@ -71,7 +71,7 @@ class Job:
             _end_group(process)
 
     def report(self) -> dict[str, Any]:
-        """What the page shows of it."""
+        """Return the state of the work as the page shows it."""
         seconds = self.seconds if self.ended else time.monotonic() - self.began
         return {
             "key": self.key,

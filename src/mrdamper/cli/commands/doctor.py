@@ -77,7 +77,7 @@ def _facts() -> dict[str, Any]:
 
 
 def _gain() -> float | None:
-    """How many times faster an integrated model runs compiled than interpreted; None without a usable compiler."""
+    """Measure how many times faster an integrated model runs compiled; None without a usable compiler."""
     import time
 
     import numpy as np

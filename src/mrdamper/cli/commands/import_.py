@@ -144,7 +144,7 @@ def _write_profile(files: list[Path], known: Profile, target: Path) -> None:
 
 
 def _alternatives(columns: tuple[str, ...]) -> str:
-    """What else a profile may say, as comments: the columns there are, and the keys that are used most."""
+    """List the columns and the most used keys of a profile as comments."""
     import json
 
     named = [f"#   {number}  {json.dumps(name, ensure_ascii=False)}" for number, name in enumerate(columns, 1) if name]
@@ -281,7 +281,7 @@ def _print(result: ImportResult, out: Path | None, total: int, *, dry: bool = Fa
 
 
 def _finding_lines(result: ImportResult, verbose: bool) -> list[str]:
-    """What was noticed: the same once, with the number of its tests; notes on the form of files only if asked for."""
+    """List the findings, each once with the number of its tests; notes on the form of files on request only."""
     if verbose:
         return [f"  {record.id}: {finding}" for record in result.records for finding in record.findings]
     alike: dict[str, list[tuple[str, str]]] = {}

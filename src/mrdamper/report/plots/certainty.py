@@ -1,4 +1,4 @@
-"""How sure a damper's numbers are: profiles of the likelihood, and samples against one another."""
+"""Figures of the uncertainty of parameters: profile likelihoods and pairs of posterior samples."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What was identified, and how it predicts."""
+"""Figures of identified parameters, predicted loops, errors and residuals."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ def score_strip(validations: Mapping[str, Validation]) -> Figure:
 
 
 def residual_map(damper: Damper, runs: Sequence[Run]) -> Figure:
-    """Where the residual lives: mean and spread over velocity and over phase, relative to peak-to-peak force."""
+    """Draw mean and spread of the residual over velocity and phase, relative to the peak-to-peak force."""
     with house_style():
         figure, (over_v, over_phase) = new_figure(1, 2, 2.8, right=1.1, sharey=True)
         steps = levels([run.mean_current for run in runs])

@@ -1,4 +1,4 @@
-"""How figures look: journal sizes, engineers' units, colours that survive colour blindness and grey print."""
+"""Style of figures: journal sizes, engineers' units, colours that are distinct in colour blindness and grey print."""
 
 from __future__ import annotations
 

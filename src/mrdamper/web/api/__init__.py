@@ -1,4 +1,4 @@
-"""What the page may ask, one file a view; every module with a `router` takes part."""
+"""Requests of the page, one module per view; every module with a `router` is included."""
 
 from __future__ import annotations
 

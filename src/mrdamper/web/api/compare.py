@@ -28,7 +28,7 @@ _NOTHING = ("nothing is compared yet", "start a comparison")
 
 
 class Choice(BaseModel, extra="forbid"):
-    """What to compare."""
+    """Rig and models to compare."""
 
     rig: int = Field(ge=0)
     models: list[str] = Field(min_length=1, max_length=100)
@@ -98,7 +98,7 @@ def start_files(rig: int, session: Current) -> dict[str, Any]:
 
 @router.get("/rigs/{rig}/files.zip")
 def files(rig: int, session: Current) -> Response:
-    """What was written, in one archive."""
+    """Return the written files in one archive."""
     missing = "the comparison is not written yet", "press “Page and tables” again"
     return archive(session.result(f"compared.files.{rig}", *missing), "mrdamper-comparison")
 

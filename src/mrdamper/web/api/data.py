@@ -87,7 +87,7 @@ def read(key: str, profile: Profile, session: Current) -> dict[str, Any]:
 
 @router.get("/data")
 def overview(session: Current) -> dict[str, Any]:
-    """What is on the bench, rig by rig."""
+    """Describe the loaded data, rig by rig."""
     intake: Intake = session.intake or bundled()
     data = session.dataset
     return {

@@ -30,7 +30,7 @@ router = APIRouter(prefix="/sessions/{session}")
 
 
 class Choice(BaseModel, extra="forbid", allow_inf_nan=False):
-    """What to identify."""
+    """Model, method and runs of an identification."""
 
     rig: int = Field(ge=0)
     model: str = Field(max_length=100)
@@ -42,7 +42,7 @@ class Choice(BaseModel, extra="forbid", allow_inf_nan=False):
 
 
 class Head(BaseModel, extra="forbid"):
-    """What the report says of the tests; the logo as base64."""
+    """Head of the report; the logo as base64."""
 
     about: dict[str, str] = Field(default_factory=dict, max_length=20)
     logo: str = Field(default="", max_length=1_000_000)

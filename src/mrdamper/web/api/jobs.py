@@ -29,7 +29,7 @@ def newest(session: Current) -> list[dict[str, Any]]:
 
 @router.get("/{key}")
 def look(key: str, session: Current) -> dict[str, Any]:
-    """How it stands."""
+    """Return the state of a job."""
     return session.job(key).report()
 
 

@@ -32,7 +32,7 @@ _BEYOND = 1.25  # sliders and curves reach past the tested conditions, where the
 
 
 class Ask(BaseModel, extra="forbid", allow_inf_nan=False):
-    """What the sliders say, SI."""
+    """Values of the sliders [SI units]."""
 
     current_A: float = Field(ge=0, le=1000)
     frequency_Hz: float = Field(gt=0, le=10_000)

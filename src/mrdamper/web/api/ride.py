@@ -37,7 +37,7 @@ _SLOWEST = 0.2  # Hz; what of the ground's motion is slower than this is left ou
 
 
 class Ask(BaseModel, extra="forbid", allow_inf_nan=False):
-    """What the panel says."""
+    """Choices of the panel."""
 
     damper: str = Field(max_length=64)
     system: str = Field(max_length=64)

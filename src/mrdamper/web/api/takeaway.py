@@ -38,7 +38,7 @@ class Held(BaseModel, extra="forbid", allow_inf_nan=False):
 
 @router.get("/files")
 def files(session: Current) -> list[dict[str, Any]]:
-    """What the last study wrote."""
+    """List the files that the last study wrote."""
     return [
         {"number": i, "name": path.name, "folder": path.parent.name == "figures", "bytes": path.stat().st_size}
         for i, path in enumerate(_written(session))
@@ -103,7 +103,7 @@ def start_export(key: str, name: str, held: Held, session: Current) -> dict[str,
 
 @router.get("/exported/{key}")
 def exported(key: str, session: Current) -> Response:
-    """What an export made: the file, or an archive of several."""
+    """Return an exported file, or an archive of several."""
     paths: list[Path] | None = session.results.get(f"exported.{key}")
     if not paths:
         raise InputError("no such export", mend="export again", code="E_NAME")
@@ -113,7 +113,7 @@ def exported(key: str, session: Current) -> Response:
 
 
 class State(BaseModel, extra="forbid"):
-    """What the page shows, the damper under its sliders, and the logo of the report as base64."""
+    """State of the page, the damper shown, and the logo of the report as base64."""
 
     state: str = Field(max_length=2_000_000)
     damper: str | None = Field(default=None, max_length=40)

@@ -38,7 +38,7 @@ class StatedCurrent(Strict):
 
 
 class ChosenColumn(Strict):
-    """Which column a channel is: counted from zero, its unit, its sign."""
+    """Column of a channel, counted from zero, with unit and sign."""
 
     column: int = Field(ge=0, le=1000)
     unit: str = Field(default="", max_length=40)
@@ -52,7 +52,7 @@ class Columns(Strict):
 
 
 class HeldOut(Strict):
-    """What to hold out, by the words of `mrdamper split`; nothing said is a stratified fifth."""
+    """Choice of validation runs as in `mrdamper split`; by default a stratified fifth."""
 
     runs: list[str] = Field(default=[], max_length=100_000)
     currents: list[float] = Field(default=[], max_length=1000)

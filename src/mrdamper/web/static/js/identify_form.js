@@ -38,7 +38,7 @@ export class IdentifyForm {
       h("h2", {}, "Identify"),
       h("fieldset", { class: "group" },
         h("legend", { class: "hidden-text" }, "What to identify"),
-        choice(this.whole, "Whole study", "all candidates, left-out conditions, report"),
+        choice(this.whole, "Whole study", "all candidates, cross-validation, report"),
         choice(this.one, "One model", "individual fits, with residuals")),
       this.details, this.button);
   }
