@@ -98,6 +98,14 @@ def test_a_noisy_current_is_the_level_a_test_plan_would_write(mean, written):
     assert str(replace(Condition(0, 1, 0.01), current_A=run.current_A)).startswith(f"{written} A")
 
 
+@pytest.mark.parametrize("current", [-0.0003, -0.0001, 0.0004])
+def test_a_current_near_zero_is_zero_without_a_sign(current):
+    t = np.arange(200) / 500
+    for channel in (current, current + 1e-5 * np.sin(300 * t)):
+        found = Run("r", t, 0.01 * np.sin(6 * t), np.cos(6 * t), channel).current_A
+        assert str(found) == "0.0"
+
+
 def test_the_direction_of_the_current_changes_nothing():
     """A coil connected the other way is no fault: models and conditions are given the magnitude."""
     t = np.arange(2000) / 500

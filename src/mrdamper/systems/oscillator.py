@@ -23,7 +23,8 @@ from mrdamper.statistics.levenberg_marquardt import least_squares
 from mrdamper.tracing import Tape, program
 from mrdamper.tracing.compiled import RecordProgram
 
-_STEPS = 20  # between two samples, by Runge and Kutta's fourth order
+_STEPS = 20  # steps between two samples, by Runge and Kutta's fourth order
+_SEARCH_STEPS = 5  # the same while the search is far from its end
 _LEAD = 0.5  # of a period, run before the one that counts: what the oscillator has to forget
 _WIDENED = 3  # times that a bound of the search is widened
 _FARTHEST = 1e6  # times the static deflection: a state beyond runs away
@@ -88,30 +89,33 @@ class Oscillator:
         StepError
             E_RUNAWAY if the state runs away.
         """
+        return self._response(force, sample_rate, periodic, _STEPS)
+
+    def _response(self, force: Floats, sample_rate: float, periodic: bool, steps: int) -> Floats:
         force = np.asarray(force, dtype=float)
         if force.ndim != 1 or force.size < 8 or not np.isfinite(force).all():
             raise RecordError("a force of under 8 samples, or not finite", mend="give an (N,) array of forces [N]")
-        fine = _refined(force, 2 * _STEPS, periodic)
-        lead = 2 * _STEPS * int(_LEAD * force.size) if periodic else 0
+        fine = _refined(force, 2 * steps, periodic)
+        lead = 2 * steps * int(_LEAD * force.size) if periodic else 0
         fine = np.concatenate([fine[-1 - lead : -1], fine])
         record = _march(self.n == 1)
         given = (
-            1 / (_STEPS * sample_rate), self.m, self.c, self.k, self.alpha,
+            1 / (steps * sample_rate), self.m, self.c, self.k, self.alpha,
             self.beta * self.gamma, self.beta * self.delta, self.n,
         )  # fmt: skip
         derived = record.prepare(given)
         assert derived is not None
         found = record.along(given, derived, record.starts, (fine[:-2:2], fine[1:-1:2], fine[2::2]))
         farthest = _FARTHEST * (np.abs(force).max() / self.k + 1e-9)
-        y = np.concatenate([[0.0], found.outputs[0, _STEPS - 1 :: _STEPS]])
+        y = np.concatenate([[0.0], found.outputs[0, steps - 1 :: steps]])
         lost = ~(np.abs(y) < farthest)
         if lost.any() or found.failed >= 0:
-            bad = int(np.flatnonzero(lost)[0]) if lost.any() else found.failed // _STEPS
+            bad = int(np.flatnonzero(lost)[0]) if lost.any() else found.failed // steps
             raise StepError(
                 f"the state runs away after {bad / sample_rate:.3g} s", where="oscillator",
                 mend="lower the force: an element with beta (gamma + delta) < 0 has no bound", code="E_RUNAWAY",
             )  # fmt: skip
-        start = lead // (2 * _STEPS)
+        start = lead // (2 * steps)
         return y[start : start + force.size]
 
 
@@ -210,6 +214,7 @@ class _OscillatorSearch:
     def __init__(self, force: Floats, displacement: Floats, sample_rate: float, n: float, most_delay: float) -> None:
         self.force, self.displacement, self.sample_rate, self.n = force, displacement, sample_rate, n
         self.spread = float(np.std(displacement))
+        self._steps = _SEARCH_STEPS
         self._omega = 2 * np.pi * np.fft.rfftfreq(displacement.size, 1 / sample_rate)
         m, c, k = self._linear()
         self._scale = np.array([m, max(c, 0.05 * np.sqrt(m * k)), k, k, 1 / self.spread, 1 / self.spread, 1.0])
@@ -233,7 +238,9 @@ class _OscillatorSearch:
                 break
             self.upper[wide] *= 5
             self.lower[narrow] = np.where(self.lower[narrow] > 0, self.lower[narrow] / 5, self.lower[narrow] * 5)
-        return point, evaluations
+        self._steps = _STEPS
+        last = least_squares(self.residual, point, self.lower, self.upper, 60, 1e-10)
+        return last.point, evaluations + last.evaluations
 
     def at_bounds(self, point: Floats) -> tuple[str, ...]:
         """Names of the parameters at a bound."""
@@ -253,7 +260,7 @@ class _OscillatorSearch:
         """(N,) error of the displacement over its spread and the root of its samples."""
         size = self.displacement.size
         try:
-            response = self.oscillator(point).response(self.force, self.sample_rate, periodic=True)
+            response = self.oscillator(point)._response(self.force, self.sample_rate, True, self._steps)
         except StepError:
             return np.full(size, 1e3)
         late = np.fft.irfft(np.fft.rfft(response) * np.exp(-1j * self._omega * self.delay(point)), size)
