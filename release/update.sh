@@ -7,5 +7,6 @@ common=(--quiet --no-header --no-emit-index-url --python-version 3.11)
 # Windows, macOS and Linux, and every Python that is admitted; the tested versions where constraints.txt names one.
 $uv pip compile "${common[@]}" pyproject.toml --universal --generate-hashes --no-annotate -c constraints.txt \
   -o release/lock.txt
-$uv pip compile "${common[@]}" pyproject.toml --extra all --extra fleet --extra fmu --group dev --no-annotate --resolution lowest-direct \
+# Without fmu: FMPy asks for a newer NumPy than this package does.
+$uv pip compile "${common[@]}" pyproject.toml --extra all --extra fleet --group dev --no-annotate --resolution lowest-direct \
   -o release/lowest.txt

@@ -53,6 +53,7 @@ def test_names_cannot_leave_the_folder_or_the_comment(model, tmp_path):
 
 @pytest.mark.skipif(not COMPILERS, reason="no C compiler, so no binary to check")
 def test_check_takes_an_fmu(tmp_path):
+    pytest.importorskip("fmpy", reason="FMPy is not installed")
     path = tmp_path / "damper.fmu"
     path.write_bytes(fmu_bytes("joint", 2))
     good = run.invoke(application(), ["check", str(path)])

@@ -13,6 +13,7 @@ from mrdamper.export.fmu_check import check_fmu
 from mrdamper.export.toolchain import build_library, here
 
 FMIS = (2, 3)
+pytest.importorskip("fmpy", reason="FMPy is not installed")
 pytestmark = pytest.mark.skipif(not COMPILERS or not here(), reason="no C compiler or an unknown platform")
 
 
