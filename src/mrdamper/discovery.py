@@ -192,10 +192,10 @@ class Registry(Generic[T]):
 
     def register(self, cls: type[T]) -> None:
         """Add a class of a script or notebook for this process; one of the same name and module is replaced."""
-        known = self.types.get(cls.name)  # type: ignore[attr-defined]
-        if known is not None and (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
+        earlier = self.types.get(cls.name)  # type: ignore[attr-defined]
+        if earlier is not None and (earlier.__module__, earlier.__qualname__) != (cls.__module__, cls.__qualname__):
             raise InputError(
-                f"the {self.kind} {cls.name!r} exists already ({known.__module__}.{known.__qualname__})",  # type: ignore[attr-defined]
+                f"the {self.kind} {cls.name!r} exists already ({earlier.__module__}.{earlier.__qualname__})",  # type: ignore[attr-defined]
                 mend="give the class another name",
                 code="E_ARGUMENT",
             )
@@ -284,14 +284,14 @@ def register(cls: type[T]) -> type[T]:
 
 def modules_with(group: str, function: str) -> tuple[tuple[ExtensionPart, ModuleType], ...]:
     """List the modules of a group that define a function of that name, as commands and checks do."""
-    found = []
+    modules = []
     for point, target in provided_modules(group):
         for module in target if isinstance(target, tuple) else ():
             if callable(getattr(module, function, None)):
                 name = module.__name__.rpartition(".")[2]
                 part = ExtensionPart(group, name, package_of(point.dist), module.__name__, own=_is_own(point))
-                found.append((part, module))
-    return tuple(found)
+                modules.append((part, module))
+    return tuple(modules)
 
 
 def all_parts() -> tuple[ExtensionPart, ...]:
@@ -299,5 +299,5 @@ def all_parts() -> tuple[ExtensionPart, ...]:
     for group in GROUPS:  # importing the module that holds a group's registry creates it
         provided_modules(group)
     modules = [part for group, function in HOOKS.items() for part, _ in modules_with(group, function)]
-    known = [part for registry in _registries.values() for part in registry.parts]
-    return tuple(sorted((*known, *modules, *_skipped), key=lambda part: (GROUPS.index(part.group), part.name)))
+    parts = [part for registry in _registries.values() for part in registry.parts]
+    return tuple(sorted((*parts, *modules, *_skipped), key=lambda part: (GROUPS.index(part.group), part.name)))

@@ -196,16 +196,16 @@ def series(**given: Any) -> tuple[NDArray[np.float64], ...]:
     """
     import numpy as np
 
-    found: list[NDArray[np.float64]] = []
+    arrays: list[NDArray[np.float64]] = []
     for name, value in given.items():
         with suppress(TypeError, ValueError, OverflowError):
             if is_series(value) and np.ndim(value) <= 1:
-                size = found[0].shape if found else np.atleast_1d(value).shape
-                found.append(np.ascontiguousarray(np.broadcast_to(value, size), dtype=float))
+                size = arrays[0].shape if arrays else np.atleast_1d(value).shape
+                arrays.append(np.ascontiguousarray(np.broadcast_to(value, size), dtype=float))
                 continue
         what = f"{name} is {shown(value)}"
         raise InputError(what, mend="give finite numbers, as many as for the others", code="E_ARGUMENT")
-    return tuple(found)
+    return tuple(arrays)
 
 
 def shown(value: object) -> str:
@@ -382,8 +382,8 @@ _RESOURCES = {
 def resource_error(error: BaseException, where: str = "") -> ResourceError | None:
     """Name the resource the machine has run out of, if that is what an exception says; None otherwise."""
     number = getattr(error, "errno", None)
-    if found := re.search(r"(?<=\(os error )(\d+)|(?<=Os \{ code: )(\d+)", str(error)):  # libraries in Rust
-        number = int(found[0])
+    if match := re.search(r"(?<=\(os error )(\d+)|(?<=Os \{ code: )(\d+)", str(error)):  # libraries in Rust
+        number = int(match[0])
     if isinstance(error, MemoryError) or "out of memory" in str(error).lower():
         number = errno.ENOMEM
     if isinstance(error, FileNotFoundError) and "temporary directory" in str(error):

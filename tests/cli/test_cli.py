@@ -225,3 +225,15 @@ def test_a_reader_that_goes_away_is_no_fault():
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.stderr == ""
+
+
+def test_a_prediction_is_drawn_and_another_kind_of_file_is_refused(model, tmp_path):
+    sine = ("predict", model, "--current", 0.5, "--frequency", 2, "--amplitude", 5)
+    picture, table, other = (tmp_path / name for name in ("force.svg", "force.csv", "other.csv"))
+    assert mrdamper(*sine, "--plot", picture, "--out", table).returncode == 0
+    assert "Displacement (mm)" in picture.read_text(encoding="utf-8")
+    assert table.is_file()
+    refused = mrdamper(*sine, "--plot", tmp_path / "force.gif", "--out", other)
+    assert refused.returncode == 2
+    assert "[E_NAME]" in refused.stderr
+    assert not other.exists()

@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import t as students_t
 
 from mrdamper.dampers import bands
-from mrdamper.dampers.bands import band, no_band, portable_band
+from mrdamper.dampers.bands import band, no_band, portable_band, session_band
 from mrdamper.dampers.base import Prediction
 from mrdamper.dampers.certainty import Certainty, unsure
 from mrdamper.dampers.joint import JointDamper
@@ -207,10 +207,10 @@ def test_gains_are_expected_of_other_runs_of_the_session_and_bands_follow():
     known = Expected(1.2, 0.01, 5.0, 2.0)
     assert known.corrected(PREDICTION).force == pytest.approx(1.2 * FORCE + 5)
     plain = band(damper(replace(KNOWN, gain=0.01, offset=2.0, run_gain=0.0, run_offset=0.0)), PREDICTION, 0.8)
-    moved = known.band(damper(), PREDICTION, 0.8)
+    moved = session_band(known, damper(), PREDICTION, 0.8)
     assert moved.low == pytest.approx(1.2 * plain.low + 5)
     assert moved.high == pytest.approx(1.2 * plain.high + 5)
     assert moved.peak == pytest.approx(tuple(1.2 * end for end in plain.peak))
     assert moved.known_session == pytest.approx(tuple(1.2 * end for end in plain.known_session))
     assert moved.energy == plain.energy
-    assert known.band(damper(None), PREDICTION, 0.8) is None
+    assert session_band(known, damper(None), PREDICTION, 0.8) is None

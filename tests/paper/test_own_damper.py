@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from export import c_bench
 from scipy.integrate import solve_ivp
 from scipy.optimize import curve_fit, minimize_scalar
 from support.command import mrdamper
@@ -15,9 +16,14 @@ from support.command import mrdamper
 from mrdamper.dampers.model_file import load_model
 from mrdamper.data import Condition, Dataset, Run
 from mrdamper.errors import IdentificationError, ParameterError
+from mrdamper.paper.claims import judge_all
 from mrdamper.paper.options import PaperOptions
+from mrdamper.paper.study import reproduce
 from mrdamper.physics.gas_spring import GasSpring
+from mrdamper.physics.motion import sine
 from mrdamper.rig_files.dataset_folder import save_dataset
+from mrdamper.study.comparison import compare
+from mrdamper.study.recipe import catalogue
 from mrdamper.study.workflow import run_study
 
 GAS = GasSpring(1.5e6, 1.5e-4, 3.14e-4)
@@ -159,6 +165,34 @@ def test_the_saved_model_is_the_papers_and_is_validated_and_exported(studied, tm
     assert f"{abs(coefficient):.0f}"[:4] in latex
 
 
+def at_phase(damper, condition, motion):
+    """Predicted force [N] of a damper at the phases of a sine."""
+    known, omega = damper.predict(condition), 2 * np.pi * condition.frequency_Hz
+    phase, wanted = (np.arctan2(m.displacement * omega, m.velocity) for m in (known.motion, motion))
+    order = np.argsort(phase)
+    return np.interp(wanted, phase[order], known.force[order], period=2 * np.pi)
+
+
+def sine_rows(motion):
+    """(N, 6) rows of x, v, a, current, dt, reset for the compiled model."""
+    columns = [motion.displacement, motion.velocity, motion.acceleration, motion.current]
+    rows = np.column_stack([*columns, np.full(len(motion), motion.time[1] - motion.time[0]), np.zeros(len(motion))])
+    rows[0, 5] = 1.0
+    return rows
+
+
+@pytest.mark.skipif(not c_bench.COMPILERS, reason="no C compiler on this machine")
+@pytest.mark.parametrize(("current", "frequency", "amplitude"), [(0.3, 1.0, 0.08), (1.7, 1.25, 0.05)])
+def test_the_exported_c_gives_the_predicted_force(studied, tmp_path, current, frequency, amplitude):
+    _, damper = studied
+    # The stream reads frequency and amplitude off the motion: it has them after some cycles.
+    motion = sine(Condition(current, frequency, amplitude), 8, 2000)
+    program = c_bench.build(damper, tmp_path / "c", c_bench.COMPILERS[0], "-O2")
+    force = c_bench.run(program, sine_rows(motion))[-2001:, 0]
+    wanted = at_phase(damper, Condition(current, frequency, amplitude), motion.part(slice(-2001, None)))
+    assert np.max(np.abs(force - wanted)) < 0.01 * np.ptp(wanted)
+
+
 def test_tests_that_do_not_determine_the_functions_name_them():
     few = matrix(motions=((0.020, 1.0), (0.020, 1.5), (0.020, 2.0)))
     options = PaperOptions(gas=GAS, search="optimum")
@@ -196,14 +230,41 @@ def test_amplitudes_far_over_the_yield_displacement_are_never_called_unseen():
         assert np.isfinite(found.standard_errors["beta"]) or found.at_bounds
 
 
-def test_a_damper_without_a_defect_at_the_stroke_end_does_not_show_one():
+def test_a_damper_without_a_defect_at_the_stroke_end_does_not_show_one(monkeypatch):
     """After a reversal a Bouc–Wen damper's force is back after the same distance at every speed."""
-    from mrdamper.paper.claims import judge
-    from mrdamper.paper.claims_on_tests import lost_length
+    monkeypatch.setattr("mrdamper.paper.study.SOBOL_SAMPLES", 4)
+    study = reproduce(matrix(currents=(1.0, 2.0)), GAS, with_comparators=False)
+    claim = next(claim for claim in judge_all(study) if claim.key == "stroke end")
+    assert (claim.verdict, claim.said) == ("differs", "differs from the paper on this damper"), claim.evidence
+    assert study.rig is None
 
-    def length(amplitude, frequency):
-        stiffness = GAS.stiffnesses("extension")[0] - MASS * (2 * np.pi * frequency) ** 2
-        return lost_length(recorded(2.0, frequency, amplitude, "train"), viscosity(2.0), stiffness)
 
-    ratio = length(0.05, 1.5) / length(0.02, 1.0)
-    assert judge("stroke end", [ratio]) == "differs", ratio
+def test_a_comparison_of_models_offers_the_method():
+    assert "paper" in catalogue()
+    (rig,) = compare(matrix(), ["paper", "bingham"], jobs=1).rigs
+    entry = next(entry for entry in rig.entries if entry.recipe.name == "paper")
+    assert entry.recipe.title == "Method of Qian et al. 2024"
+    assert entry.damper.functions["c"].form == "viscous-paper"
+    assert any("the gas spring is unknown" in note for note in entry.recipe.notes)
+    few = matrix(motions=((0.020, 1.0), (0.020, 1.5)), currents=(1.0,))
+    with pytest.raises(IdentificationError, match="fewer than three identification runs of a pure sine"):
+        catalogue()["paper"].for_runs(list(few.split("train")))
+
+
+@pytest.mark.slow
+def test_the_exported_fmu_gives_the_predicted_force(studied, tmp_path):
+    fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed")
+    place, damper = studied
+    done = mrdamper("export", place / "out" / "model.json", "--to", "fmu", "--out", tmp_path / "damper.fmu")
+    assert done.returncode == 0, done.stderr
+    motion = sine(Condition(1.0, 1.0, 0.08), 6, 1000)
+    names = ("time", "displacement", "velocity", "current")
+    table = np.array([*zip(*(getattr(motion, n) for n in names), strict=True)], dtype=[(n, float) for n in names])
+    result = fmpy.simulate_fmu(
+        str(tmp_path / "damper.fmu"), input=table, output_interval=motion.time[1], stop_time=motion.time[-1],
+        output=["force"],
+    )  # fmt: skip
+    last = slice(-1000, None)
+    wanted = at_phase(damper, Condition(1.0, 1.0, 0.08), motion.part(last))
+    error = result["force"][last] - wanted
+    assert np.sqrt(np.mean(error**2)) < 0.01 * np.ptp(wanted)

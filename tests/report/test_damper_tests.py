@@ -15,8 +15,10 @@ from mrdamper.data import Condition, Dataset, Run, current_levels
 from mrdamper.errors import IdentificationError
 from mrdamper.identification.characteristics import characterise
 from mrdamper.physics.motion import sine
-from mrdamper.report.about import AboutError, load_about, load_limits, parse_ladder
+from mrdamper.report.about import About, AboutError, about_of, load_about, load_limits, parse_ladder
 from mrdamper.report.damper_tests import facts_of_tests
+from mrdamper.report.page import render_page
+from mrdamper.report.pdf import pdf_of
 from mrdamper.rig_files.dataset_folder import save_dataset
 
 GAS, COULOMB, REBOUND, COMPRESSION = 80.0, 120.0, 3000.0, 1500.0  # N, N, N s/m, N s/m
@@ -100,7 +102,7 @@ def test_the_report_has_page_print_and_tables(folder, dataset, tmp_path):
     (tmp_path / "limits.toml").write_text(
         "".join(
             f'[[limit]]\ncurrent_A = {i}\nvelocity_m_s = {v}\nside = "rebound"\nlower_N = {low}\nupper_N = {high}\n'
-            for i, v, low, high in ((0.5, 0.1, 600, 800), (0.5, 0.1, 0, 100), (0.5, 9.0, 0, 100))
+            for i, v, low, high in ((0.5, 0.1, 600, 800), (0.5, 0.05, 0, 100), (0.5, 9.0, 0, 100))
         )
     )
     other = tmp_path / "worn"
@@ -178,6 +180,36 @@ def test_limits_that_cannot_hold_are_refused(tmp_path, change, said):
     with pytest.raises(AboutError, match="limit 1") as error:
         load_limits(tmp_path / "limits.toml")
     assert said in str(error.value)
+
+
+def test_limits_that_exclude_each_other_are_named(tmp_path):
+    first, second = ({**GOOD, "lower_N": low, "upper_N": high} for low, high in ((600, 800), (0, 100)))
+    text = "".join("[[limit]]\n" + "".join(f"{k} = {v}\n" for k, v in one.items()) for one in (first, second))
+    (tmp_path / "limits.toml").write_text(text)
+    with pytest.raises(AboutError, match=r"no force meets limit 1 \(600 to 800 N\) and limit 2 \(0 to 100 N\)"):
+        load_limits(tmp_path / "limits.toml")
+    (tmp_path / "limits.toml").write_text(text.replace("upper_N = 100", "upper_N = 700"))
+    assert len(load_limits(tmp_path / "limits.toml")) == 2
+
+
+@pytest.mark.parametrize("customer", ["c" * 5_000, "Wort " * 1_000, "שלום עולם " * 20, "عميل الاختبار"])
+def test_a_long_or_right_to_left_customer_stays_on_the_page_and_in_the_print(customer):
+    empty = {"summary": "", "ladder": (), "forces": [], "currents": [], "verdicts": []}
+    pictures = dict.fromkeys(("peak_velocity", "cycle", "energy"), b"<svg/>")
+    facts = {"provenance": [], "lead": "", "t": empty, "pictures": pictures, "passed_over": {}}
+    page = render_page("tests.html.j2", "Report", "footer", about=About(customer=customer), **facts)
+    assert f'dir="auto">{customer}' in page
+    printed = PdfReader(io.BytesIO(pdf_of(page, {})))
+    text = "".join("".join(sheet.extract_text().split()) for sheet in printed.pages)
+    if customer.isascii():
+        assert "".join(customer.split()) in text
+    else:
+        assert len(text) > 20  # its letters, or the sentence that names the missing ones
+
+
+def test_a_customer_of_more_letters_is_refused():
+    with pytest.raises(AboutError, match="5,001 letters"):
+        about_of({"customer": "c" * 5_001}, "about")
 
 
 def test_a_ladder_is_positive_numbers():

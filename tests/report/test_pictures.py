@@ -123,6 +123,13 @@ def test_no_heading_ends_a_printed_page(paper, texts):
         assert below or drawn, f"{title} stands alone at the foot of page {number + 1}"
 
 
+def test_every_printed_page_but_the_last_is_more_than_half_full(paper, texts):
+    for number, (page, (_, lines)) in enumerate(zip(paper.pages[:-1], texts[:-1], strict=True), 1):
+        lowest = min(y for y, _ in lines if y > 60)  # below is the footer; captions stand below their figures
+        assert lowest < float(page.mediabox.height) / 2, f"page {number} ends {lowest:.0f} pt above its foot"
+        assert page.mediabox.width < page.mediabox.height  # no page is turned
+
+
 def test_figures_are_drawn_in_the_print(paper, drawings):
     objects = [
         form.get_object()

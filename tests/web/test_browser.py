@@ -561,6 +561,20 @@ def test_columns_are_picked_by_eye(page, small_rig):
     assert page.locator(".message.bad").count() == 0
 
 
+def test_a_browser_that_blocks_storage_gets_a_sentence_and_the_app(profile, address):
+    page = profile.new_page()
+    for name in ("localStorage", "sessionStorage"):
+        refuse = "{ get() { throw new DOMException('denied', 'SecurityError'); } }"
+        page.add_init_script(f"Object.defineProperty(window, '{name}', {refuse})")
+    page.goto(address)
+    page.locator("html[data-ready]").wait_for()
+    page.get_by_text("This browser blocks storage").wait_for()
+    page.get_by_role("button", name="Use dark colours").click()
+    page.get_by_role("button", name="Open the bundled tests", exact=True).click()
+    page.locator(".matrix").wait_for()
+    page.close()
+
+
 def test_the_audit_of_pictures_sees_what_is_wrong(page):
     page.evaluate(
         """() => {

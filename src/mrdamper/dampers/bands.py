@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 from mrdamper.dampers.base import Damper, Prediction
 from mrdamper.dampers.calibration import Quantity
 from mrdamper.dampers.certainty import Certainty
+from mrdamper.dampers.sessions import Expected
 from mrdamper.dampers.slopes import force_slopes
 from mrdamper.data import SESSIONS_NEEDED, Floats
 from mrdamper.identification.intervals import student
 from mrdamper.statistics.metrics import dissipated_power, peak_force
+
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,3 +205,22 @@ def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
     t = float(np.mean(quantile))
     of_peak = t * float(np.sqrt(known.force**2 + np.mean(own)))
     return PortableBand(level, t * known.total_gain, t * known.total_offset, of_peak, scope(damper, level))
+
+
+def session_band(
+    expected: Expected, damper: Damper, prediction: Prediction, level: float, shown: Mask | None = None
+) -> Band | None:
+    """Calculate the interval of an uncorrected prediction about the corrected one, for a session of known runs.
+
+    None where the damper has no uncertainty.
+    """
+    if damper.certainty is None:
+        return None
+    spreads = {"gain": expected.gain_spread, "offset": expected.offset_spread, "run_gain": 0.0, "run_offset": 0.0}
+    left = replace(damper.certainty, **spreads)
+    uncorrected = band(replace(damper, certainty=left), prediction, level, shown)  # type: ignore[type-var]
+    if uncorrected is None:
+        return None
+    peaks = {n: tuple(expected.gain * v for v in getattr(uncorrected, n)) for n in ("peak", "known_session")}
+    ends = {n: expected.gain * getattr(uncorrected, n) + expected.offset for n in ("low", "high")}
+    return replace(uncorrected, **ends, **peaks)

@@ -337,6 +337,11 @@ class Damper(Displayable):
         return None
 
     @property
+    def followed_amplitudes(self) -> tuple[float, float]:
+        """Amplitudes [m] up to which the parameters follow a motion that is no known sine."""
+        return self.envelope.amplitude_m
+
+    @property
     def fitted_parameters(self) -> Mapping[str, FittedParameter]:
         """The numbers determined from the data; none where nobody could name them."""
         return {}

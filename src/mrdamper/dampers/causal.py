@@ -19,7 +19,7 @@ from mrdamper.tracing import Program, Tape, program
 from mrdamper.tracing.compiled import RecordProgram
 
 if TYPE_CHECKING:
-    from mrdamper.dampers.base import Damper
+    from mrdamper.dampers.protocols import DamperLike as Damper
     from mrdamper.physics.motion import Excitation
 
 SLACK = 0.02  # a test bench repeats a condition to a few per cent; within that nothing is extrapolated
@@ -38,7 +38,7 @@ def trace(damper: Damper, free: bool = False) -> Program:
     to force [N] and a flag of 8 where the frequency was not tested. One model for all conditions keeps
     its parameters free to be set. Where parameters follow the condition, frequency and amplitude come
     from the motion so far, averaged over about a cycle of the slowest tested frequency, and stay inside
-    the tested ranges.
+    the tested frequencies and `Damper.followed_amplitudes`.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def _running_condition(damper: Damper, motion: TracedMotion) -> tuple[Condition,
     amplitude = tape.select(moving, np.sqrt(2 * x2), math.sqrt(math.prod(envelope.amplitude_m)))
     flag = tape.select((frequency < low * (1 - SLACK)) | (frequency > high * (1 + SLACK)), 8.0, 0.0)
     f = tape.assume(np.clip(frequency, low, high), math.sqrt(low * high))
-    A = tape.assume(np.clip(amplitude, *envelope.amplitude_m), math.sqrt(math.prod(envelope.amplitude_m)))
+    A = tape.assume(np.clip(amplitude, *damper.followed_amplitudes), math.sqrt(math.prod(envelope.amplitude_m)))
     return Condition(motion.current, f, A), flag
 
 

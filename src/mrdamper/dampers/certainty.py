@@ -22,7 +22,7 @@ from mrdamper.errors import InputError
 from mrdamper.identification.intervals import NOT_IDENTIFIABLE, interval_about, weaknesses, written
 
 if TYPE_CHECKING:
-    from mrdamper.dampers.base import Damper
+    from mrdamper.dampers.protocols import DamperLike as Damper
 _MAX_LISTED = 6  # number of parameters named in one sentence
 _BADLY = 0.5  # standard error over the estimate from which a parameter is not significant
 

@@ -280,12 +280,12 @@ def _checked(schema: Any, raw: dict[str, Any], prefix: str, where: str) -> Any:
 
 
 def _kind(described: dict[str, Any], where: str) -> tuple[type[Damper], dict[str, Any]]:
-    name, known = str(described.get("kind")), all_kinds()
-    if name not in known:
+    name, kinds = str(described.get("kind")), all_kinds()
+    if name not in kinds:
         raise ModelFileError(
-            f"damper.kind is {name!r}", where=where, mend=f"known: {', '.join(known)}; write the model again"
+            f"damper.kind is {name!r}", where=where, mend=f"known: {', '.join(kinds)}; write the model again"
         )
-    return known[name], {key: value for key, value in described.items() if key != "kind"}
+    return kinds[name], {key: value for key, value in described.items() if key != "kind"}
 
 
 def _upgraded(raw: dict[str, Any]) -> dict[str, Any]:
@@ -300,24 +300,26 @@ def _upgraded(raw: dict[str, Any]) -> dict[str, Any]:
     return raw
 
 
-def _describe_certainty(known: Certainty | None) -> _Covariance | None:
-    if known is None:
+def _describe_certainty(certainty: Certainty | None) -> _Covariance | None:
+    if certainty is None:
         return None
     return _Covariance(
-        parameters=known.names,
-        logarithmic=known.logs,
-        matrix=tuple(tuple(row) for row in known.covariance.tolist()),
-        degrees_of_freedom=tuple(known.dof.tolist()),
-        one_sided=known.one_sided,
-        unknown=known.unknown,
-        session=_Session(gain=known.gain, offset_N=known.offset, degrees_of_freedom=known.session_dof),
-        model_error=_ModelError(force=known.force, peak=known.peak, energy=known.energy, left_out=known.left_out),
-        words=known.words,
-        taught=dict(known.taught),
-        effective=dict(known.effective),
-        sessions=known.sessions,
-        runs=_Session(gain=known.run_gain, offset_N=known.run_offset, degrees_of_freedom=known.run_dof),
-        calibration=known.calibration,
+        parameters=certainty.names,
+        logarithmic=certainty.logs,
+        matrix=tuple(tuple(row) for row in certainty.covariance.tolist()),
+        degrees_of_freedom=tuple(certainty.dof.tolist()),
+        one_sided=certainty.one_sided,
+        unknown=certainty.unknown,
+        session=_Session(gain=certainty.gain, offset_N=certainty.offset, degrees_of_freedom=certainty.session_dof),
+        model_error=_ModelError(
+            force=certainty.force, peak=certainty.peak, energy=certainty.energy, left_out=certainty.left_out
+        ),
+        words=certainty.words,
+        taught=dict(certainty.taught),
+        effective=dict(certainty.effective),
+        sessions=certainty.sessions,
+        runs=_Session(gain=certainty.run_gain, offset_N=certainty.run_offset, degrees_of_freedom=certainty.run_dof),
+        calibration=certainty.calibration,
     )
 
 
@@ -341,13 +343,13 @@ def _with_certainty(damper: Damper, saved: _Covariance, where: str) -> Damper:
                 f"covariance: the variance of {name} is {variance:.3g}", where=where, mend="write the model again"
             )
     runs = saved.runs or _Session(gain=0.0, offset_N=0.0, degrees_of_freedom=0.0)
-    known = Certainty(
+    certainty = Certainty(
         saved.parameters, saved.logarithmic, matrix, np.array(saved.degrees_of_freedom), saved.one_sided, saved.unknown,
         session.gain, session.offset_N, session.degrees_of_freedom, runs.gain, runs.offset_N, runs.degrees_of_freedom,
         model.force, model.peak, model.energy, model.left_out, saved.words, saved.taught,
         saved.effective, saved.sessions, saved.calibration,
     )  # fmt: skip
-    return replace(damper, certainty=known)  # type: ignore[type-var]
+    return replace(damper, certainty=certainty)  # type: ignore[type-var]
 
 
 def _describe_coil(coil: Coil | None) -> _Coil | None:
@@ -360,5 +362,5 @@ def _describe_coil(coil: Coil | None) -> _Coil | None:
 
 
 def _restore_coil(saved: _Coil) -> Coil:
-    known = saved.driver.model_dump(exclude_none=True) if saved.driver else None
-    return Coil(saved.rise_s, saved.fall_s, Driver(**known) if known else None)
+    driver = saved.driver.model_dump(exclude_none=True) if saved.driver else None
+    return Coil(saved.rise_s, saved.fall_s, Driver(**driver) if driver else None)

@@ -50,6 +50,10 @@ class SavedModified(Saved):
     tested_motions: tuple[tuple[float, float], ...] = ()  # corners: frequency [Hz], amplitude [m]; none: not held
 
 
+_EXTRAPOLATING_FORM = "viscous-paper"  # form of c that is meant for larger amplitudes [Qian et al. 2024, section 6]
+_EXTRAPOLATED_AMPLITUDE = 2.0  # largest amplitude over the largest tested one, for that form
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class ModifiedModel(Damper):
     """A model whose parameters are functions of current, frequency and amplitude.
@@ -101,6 +105,12 @@ class ModifiedModel(Damper):
     @property
     def tested_motions(self) -> MotionHull | None:
         return self.parameters.motions if self.parameters.follows_motion else None
+
+    @property
+    def followed_amplitudes(self) -> tuple[float, float]:
+        low, high = self.envelope.amplitude_m
+        extrapolates = any(function.form == _EXTRAPOLATING_FORM for function in self.functions.values())
+        return low, high * (_EXTRAPOLATED_AMPLITUDE if extrapolates else 1.0)
 
     def model_at(self, condition: Condition) -> Model:
         """The model at a condition."""

@@ -12,20 +12,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mrdamper.data import SESSIONS_NEEDED, Floats, Run, hour_of, session_of
 from mrdamper.errors import InputError
 
 if TYPE_CHECKING:
-    from mrdamper.dampers.bands import Band
-    from mrdamper.dampers.base import Damper, Prediction
+    from mrdamper.dampers.protocols import DamperLike as Damper
 
 STRICT = {"extra": "forbid", "allow_inf_nan": False}  # of what is read from a saved model
-Mask = NDArray[np.bool_]
+P = TypeVar("P")  # a prediction
 UNKNOWN, KNOWN = "unknown", "known"  # session of a score: predicted as it is, or corrected by other runs of the day
 _HOURS = (0.5, 1.0, 2.0, 4.0, 8.0)  # over which what an hour shares is forgotten
 _LEAST = 0.2  # of the spread: each run has at least so much of its own, for the model misses every condition anew
@@ -191,24 +189,10 @@ class Expected:
     offset: float
     offset_spread: float
 
-    def corrected(self, prediction: Prediction) -> Prediction:
-        """A prediction as this gain and offset make it."""
-        return replace(prediction, force=self.gain * prediction.force + self.offset)
-
-    def band(self, damper: Damper, prediction: Prediction, level: float, shown: Mask | None = None) -> Band | None:
-        """The band of an uncorrected prediction, laid about the corrected one, its session as sure as it is now."""
-        from mrdamper.dampers.bands import band
-
-        if damper.certainty is None:
-            return None
-        spreads = {"gain": self.gain_spread, "offset": self.offset_spread, "run_gain": 0.0, "run_offset": 0.0}
-        left = replace(damper.certainty, **spreads)
-        found = band(replace(damper, certainty=left), prediction, level, shown)  # type: ignore[type-var]
-        if found is None:
-            return None
-        peaks = {name: tuple(self.gain * v for v in getattr(found, name)) for name in ("peak", "known_session")}
-        ends = {name: self.gain * getattr(found, name) + self.offset for name in ("low", "high")}
-        return replace(found, **ends, **peaks)
+    def corrected(self, prediction: P) -> P:
+        """Correct a `Prediction` by this gain and offset."""
+        force = self.gain * prediction.force + self.offset  # type: ignore[attr-defined]
+        return replace(prediction, force=force)  # type: ignore[type-var]
 
 
 @dataclass(frozen=True)

@@ -151,15 +151,15 @@ class Stepper:
     @state.setter
     def state(self, values: Mapping[str, float]) -> None:
         require(values, Mapping, "a state", "set what `state` gave")
-        known, found = self.state, dict(zip(values, numbers(*values.values()), strict=True))
-        if values.keys() != known.keys() or not all(map(math.isfinite, found.values())):
+        present, changed = self.state, dict(zip(values, numbers(*values.values()), strict=True))
+        if values.keys() != present.keys() or not all(map(math.isfinite, changed.values())):
             raise ParameterError(
                 "a state of other names, or not finite", where=self.stream.title, mend="set what `state` gave"
             )
-        self._memory = tuple(found[name] for name in self.stream.step.tape.memory)
+        self._memory = tuple(changed[name] for name in self.stream.step.tape.memory)
         self._drive_memory = {
-            drive: tuple(found[f"{drive}.{name}"] for name in made.tape.memory)
-            for drive, made in self.stream.drives.items()
+            drive: tuple(changed[f"{drive}.{name}"] for name in drive_program.tape.memory)
+            for drive, drive_program in self.stream.drives.items()
         }
 
     @property
@@ -234,13 +234,13 @@ class Stepper:
         )
         steps = steps_of(t)
         record = self._record
-        found = record.along(self._given, self._derived, self._memory, (*channels, steps))
-        (force, flags), failed = found.outputs, found.failed
+        outputs = record.along(self._given, self._derived, self._memory, (*channels, steps))
+        (force, flags), failed = outputs.outputs, outputs.failed
         if failed >= 0 or not np.isfinite(force).all():
             raise ExcitationError(
                 f"no force at sample {failed}", where=self.stream.title, mend="check the motion there"
             )
-        self._memory, self._flags = found.memory, int(flags[-1])
+        self._memory, self._flags = outputs.memory, int(flags[-1])
         return force
 
     @cached_property

@@ -25,7 +25,7 @@ from mrdamper.statistics.levenberg_marquardt import forward_differences, least_s
 from mrdamper.statistics.linear import robust_weights, solve_bounded
 
 if TYPE_CHECKING:
-    from mrdamper.dampers.joint import JointProblem
+    from mrdamper.dampers.protocols import SearchSpace
 
 _ROWS = 400  # samples of a steady run that enter the least squares, about
 _TURNING, _RUNNING, _RESTING = 400, 60, 15  # samples of a cycle that are followed: where it turns, runs on, rests
@@ -206,7 +206,7 @@ class Strung:
 class Table:
     """Samples of some runs that were strung together, with the weight of each run."""
 
-    def __init__(self, problem: JointProblem, parts: Sequence[Part]):
+    def __init__(self, problem: SearchSpace, parts: Sequence[Part]):
         self.problem, self.strung = problem, Strung(parts)
         begins = self.strung.begins
         self.picked = np.concatenate([part.picked + at for part, at in zip(parts, begins, strict=True)])

@@ -89,11 +89,11 @@ def write_result(folder: str | Path, facts: Mapping[str, Any] | None = None) -> 
     final = Path(folder)
     with _beside(final) as work:
         yield work
-        made = {
+        contents = {
             "files": sorted(p.relative_to(work).as_posix() for p in work.rglob("*") if p.is_file()),
             **(facts or {}),
         }
-        (work / MADE).write_text(json.dumps(made, indent=1) + "\n", encoding="utf-8")
+        (work / MADE).write_text(json.dumps(contents, indent=1) + "\n", encoding="utf-8")
         _sync(work)
         _put(work, final, _earlier(final))
 
@@ -272,11 +272,11 @@ def _sync(folder: Path) -> None:
 def _sync_entry(folder: Path) -> None:
     if os.name != "posix":
         return
-    found = os.open(folder, os.O_RDONLY)
+    descriptor = os.open(folder, os.O_RDONLY)
     try:
-        os.fsync(found)
+        os.fsync(descriptor)
     except OSError as error:
         if error.errno not in (errno.EINVAL, errno.ENOTSUP, errno.EBADF):  # file systems that know none for folders
             raise
     finally:
-        os.close(found)
+        os.close(descriptor)

@@ -84,9 +84,9 @@ def current_levels(currents: Sequence[float]) -> list[float]:
     begins = np.diff(values, prepend=-np.inf) > 5e-3 + 0.02 * np.abs(values)
     level = np.cumsum(begins) - 1
     names = [float(f"{np.median(values[level == i]):.3g}") for i in range(level[-1] + 1)] if values.size else []
-    found = np.empty(values.size)
-    found[order] = [0.0 if abs(names[i]) < 5e-3 else names[i] for i in level]
-    return found.tolist()
+    levels = np.empty(values.size)
+    levels[order] = [0.0 if abs(names[i]) < 5e-3 else names[i] for i in level]
+    return levels.tolist()
 
 
 def same_condition(conditions: Sequence[Condition]) -> list[list[int]]:

@@ -49,11 +49,11 @@ class Dataset(Displayable):
         check_fields(self, "runs", "name")
         if not self.runs:
             raise RunError("no runs", where=f"dataset {self.name}", mend="give at least one")
-        seen: set[str] = set()
+        ids: set[str] = set()
         for run in self.runs:
-            if run.id in seen:
+            if run.id in ids:
                 raise RunError(f"two runs are called {run.id}", where=f"dataset {self.name}", mend="rename one")
-            seen.add(run.id)
+            ids.add(run.id)
 
     @property
     def headline(self) -> str:

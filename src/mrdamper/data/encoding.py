@@ -80,15 +80,15 @@ def file_names(texts: Iterable[str]) -> dict[str, str]:
     Letters, digits, dot, dash and underscore stay; a text that was changed otherwise than by
     replacing them, or would meet another's name, ends in a few digits of its hash.
     """
-    made: dict[str, str] = {}
+    names: dict[str, str] = {}
     taken: set[str] = set()
     for text in dict.fromkeys(texts):
         name = re.sub(r"[^\w.\-]+", "_", unicodedata.normalize("NFC", text)).strip("._-") or "_"
         if len(name) > _LONGEST_NAME or name.casefold() in taken or _DEVICES.fullmatch(name):
             name = f"{name[:_LONGEST_NAME]}_{sha256(text.encode('utf-8', 'replace')).hexdigest()[:8]}"
         taken.add(name.casefold())
-        made[text] = name
-    return made
+        names[text] = name
+    return names
 
 
 def _csv_field(value: object) -> str:

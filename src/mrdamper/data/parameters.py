@@ -96,18 +96,18 @@ def with_values(kind: type[T], values: Mapping[str, float]) -> T:
     ParameterError
         If there is no such parameter, one is missing, or a value lies outside its bounds.
     """
-    known = {info.name: info for info in parameters_of(kind)}
+    infos = {info.name: info for info in parameters_of(kind)}
     for name, value in values.items():
-        if name not in known:
+        if name not in infos:
             raise ParameterError(
-                f"no parameter {name!r}", where=kind.__name__, mend=f"known: {', '.join(known) or 'none'}"
+                f"no parameter {name!r}", where=kind.__name__, mend=f"known: {', '.join(infos) or 'none'}"
             )
-        low, high = known[name].bounds
+        low, high = infos[name].bounds
         if not low <= value <= high:
             raise ParameterError(
-                f"{name} = {value:g} {known[name].unit}", where=kind.__name__, mend=f"give {low:g} to {high:g}"
+                f"{name} = {value:g} {infos[name].unit}", where=kind.__name__, mend=f"give {low:g} to {high:g}"
             )
-    missing = [name for name, info in known.items() if info.default is None and name not in values]
+    missing = [name for name, info in infos.items() if info.default is None and name not in values]
     if missing:
         raise ParameterError(f"no {', '.join(missing)}", where=kind.__name__, mend="give it")
     return kind(**values)

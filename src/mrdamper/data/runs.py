@@ -287,13 +287,13 @@ def once_per_run(function: Callable[[K], T]) -> Callable[[K], T]:
     A study asks for the same run's motion dozens of times; runs are frozen, so the answer
     cannot change.
     """
-    known: WeakKeyDictionary[K, T] = WeakKeyDictionary()
+    results: WeakKeyDictionary[K, T] = WeakKeyDictionary()
 
     @wraps(function)
     def remembered(run: K) -> T:
-        if run not in known:
-            known[run] = function(run)
-        return known[run]
+        if run not in results:
+            results[run] = function(run)
+        return results[run]
 
     return remembered
 

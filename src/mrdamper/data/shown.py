@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from mrdamper.errors import MissingExtraError
+
 _ROWS_SHOWN = 30  # of a table in a notebook
 
 
@@ -48,11 +50,24 @@ class Displayable(ABC):
     # By name, so that the numerics depend on no library of tables: the caller asks for one.
     def to_polars(self) -> Any:
         """Return the table as a `polars.DataFrame`."""
-        return importlib.import_module("polars").DataFrame(dict(self.table))
+        return _library("polars").DataFrame(dict(self.table))
 
     def to_pandas(self) -> Any:
-        """Return the table as a `pandas.DataFrame`; pandas must be installed."""
-        return importlib.import_module("pandas").DataFrame(dict(self.table))
+        """Return the table as a `pandas.DataFrame`.
+
+        Raises
+        ------
+        MissingExtraError
+            If pandas is not installed.
+        """
+        return _library("pandas").DataFrame(dict(self.table))
+
+
+def _library(name: str) -> Any:
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        raise MissingExtraError(f"to_{name} requires {name}", mend=f"pip install {name}, or use .table") from error
 
 
 def _cell(value: Any) -> str:

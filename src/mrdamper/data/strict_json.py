@@ -17,24 +17,24 @@ def parse_json(text: str) -> Any:
     more than forty digits, and nesting beyond 64.
     """
     try:
-        made = json.loads(
+        value = json.loads(
             text, object_pairs_hook=_object, parse_constant=_refuse, parse_float=_number, parse_int=_whole
         )
     except json.JSONDecodeError as error:
         raise ValueError(f"not JSON at line {error.lineno}: {error.msg}") from error
     except RecursionError:
         raise ValueError(f"nested deeper than {_DEEPEST}") from None
-    if _depth(made) > _DEEPEST:
+    if _depth(value) > _DEEPEST:
         raise ValueError(f"nested deeper than {_DEEPEST}")
-    return made
+    return value
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    made = dict(pairs)
-    if len(made) < len(pairs):
+    members = dict(pairs)
+    if len(members) < len(pairs):
         names = [name for name, _ in pairs]
         raise ValueError(f"{next(n for n in names if names.count(n) > 1)!r:.60} stands twice")
-    return made
+    return members
 
 
 def _refuse(constant: str) -> NoReturn:

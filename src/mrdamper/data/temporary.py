@@ -25,23 +25,23 @@ def temporary_folder(parent: Path | None = None, prefix: str = _PREFIX, suffix: 
     """
     parent = Path(tempfile.gettempdir()) if parent is None else parent
     _sweep(parent, prefix, suffix)
-    made, lock = _locked(parent, prefix, suffix)
+    folder, lock = _locked(parent, prefix, suffix)
     try:
-        yield made
+        yield folder
     finally:
         if lock is not None:
             os.close(lock)  # first: looking into a folder takes a descriptor, and this may be the last one
-        shutil.rmtree(made, ignore_errors=True)
+        shutil.rmtree(folder, ignore_errors=True)
         with suppress(OSError):
-            made.rmdir()  # takes none
+            folder.rmdir()  # takes none
 
 
 def _locked(parent: Path, prefix: str, suffix: str) -> tuple[Path, int | None]:
     while True:
-        made = Path(tempfile.mkdtemp(prefix=prefix, suffix=suffix, dir=parent))
-        lock = _lock(made)
-        if made.exists():  # else another process swept it before it was locked
-            return made, lock
+        folder = Path(tempfile.mkdtemp(prefix=prefix, suffix=suffix, dir=parent))
+        lock = _lock(folder)
+        if folder.exists():  # else another process swept it before it was locked
+            return folder, lock
 
 
 def _lock(folder: Path) -> int | None:
@@ -51,15 +51,15 @@ def _lock(folder: Path) -> int | None:
     import fcntl
 
     try:
-        found = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     except OSError:
         return None
     try:
-        fcntl.flock(found, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
-        os.close(found)
+        os.close(descriptor)
         return None
-    return found
+    return descriptor
 
 
 def _sweep(parent: Path, prefix: str, suffix: str) -> None:

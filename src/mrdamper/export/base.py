@@ -66,13 +66,13 @@ def write_export(written: Written, out: str | Path, suffix: str) -> list[Path]:
 
 def identifier(text: str) -> str:
     """Make a name for files and symbols of any text; raises `InputError` (E_EXPORT_NAME) if nothing is left."""
-    made = re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_").lower()
-    if made and made[0].isdigit():
-        made = f"damper_{made}"
-    if not _NAME.fullmatch(made) or _RESERVED.fullmatch(made):
+    word = re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_").lower()
+    if word and word[0].isdigit():
+        word = f"damper_{word}"
+    if not _NAME.fullmatch(word) or _RESERVED.fullmatch(word):
         raise InputError(
             f"{text!r} makes no name in C",
             mend="give --name: a letter, then up to 40 letters, digits and underscores",
             code="E_EXPORT_NAME",
         )
-    return made
+    return word

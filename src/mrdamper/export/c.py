@@ -34,23 +34,23 @@ class CExporter(Exporter):
     title: ClassVar[str] = "C99 source"
 
     def export(self, damper: Damper | Model, name: str) -> Written:
-        made = stream(damper)
-        files = {**c_sources(made, name, damper_of(damper).rig), f"{name}_test.c": self_test(made, name)}
+        stepping = stream(damper)
+        files = {**c_sources(stepping, name, damper_of(damper).rig), f"{name}_test.c": self_test(stepping, name)}
         return Written({file: text.encode() for file, text in files.items()})
 
 
-def c_sources(made: Stream, name: str, rig: str) -> dict[str, str]:
+def c_sources(stepping: Stream, name: str, rig: str) -> dict[str, str]:
     """Header and source of a damper by file name, the rig in the comment at the top."""
-    facts = c_facts(made, identifier(name), rig)
+    facts = c_facts(stepping, identifier(name), rig)
     return {f"{name}.h": render("model.h.j2", **facts), f"{name}.c": render("model.c.j2", **facts)}
 
 
-def program_sources(made: Program, name: str, title: str) -> dict[str, str]:
+def program_sources(traced: Program, name: str, title: str) -> dict[str, str]:
     """Header and source of any program of one sample, by file name: a control law, an inverse.
 
     Parameters
     ----------
-    made : Program
+    traced : Program
         With dt among its inputs and no parameters.
     name : str
         Prefix of files and symbols.
@@ -58,11 +58,11 @@ def program_sources(made: Program, name: str, title: str) -> dict[str, str]:
         For the comment at the top.
     """
     word = identifier(name)
-    writer = CWriter(made)
+    writer = CWriter(traced)
     setup = writer.setup()
-    derived = [("int" if e.logical else f"{word}_real", writer.name(e).removeprefix("d->")) for e in made.derived]
+    derived = [("int" if e.logical else f"{word}_real", writer.name(e).removeprefix("d->")) for e in traced.derived]
     arguments = [(f"const {word}_derived *d", "d")] if derived else []
-    described = _program("model", writer, made, [*arguments, (f"{word}_state *s", "s")])
+    described = _program("model", writer, traced, [*arguments, (f"{word}_state *s", "s")])
     text = setup + described["body"] + described["results"]
     facts = {
         "name": word,
@@ -70,34 +70,34 @@ def program_sources(made: Program, name: str, title: str) -> dict[str, str]:
         "title": c_comment(title),
         "version": package_version(),
         "derived": derived,
-        "members": list(made.tape.starts),
-        "starts": [(member, repr(start)) for member, start in made.tape.starts.items()],
+        "members": list(traced.tape.starts),
+        "starts": [(member, repr(start)) for member, start in traced.tape.starts.items()],
         "main": described,
         "setup": setup,
         "helpers": {call: f"{call}(" in text for call in ("signum", "lesser", "greater")},
-        **_tables(made.tape.tables, writer.number),
+        **_tables(traced.tape.tables, writer.number),
     }
     return {f"{word}.h": render("program.h.j2", **facts), f"{word}.c": render("program.c.j2", **facts)}
 
 
-def write_program(made: Program, name: str, title: str, folder: str | Path) -> list[Path]:
+def write_program(traced: Program, name: str, title: str, folder: str | Path) -> list[Path]:
     """Write what `program_sources` gives into a folder, whole or not at all; raises `OutputError`."""
-    files = {file: text.encode() for file, text in program_sources(made, name, title).items()}
+    files = {file: text.encode() for file, text in program_sources(traced, name, title).items()}
     return write_export(Written(files), folder, "")
 
 
-def self_test(made: Stream, name: str) -> str:
+def self_test(stepping: Stream, name: str) -> str:
     """Write a program that steps the model through a motion and compares with forces computed here."""
-    x, current, dt = reference_motion(made)
-    steps = Stepper(made)
+    x, current, dt = reference_motion(stepping)
+    steps = Stepper(stepping)
     force = [steps.step(*sample, dt) for sample in zip(x.tolist(), current.tolist(), strict=True)]
     rows = [f"{{{x!r}, {i!r}, {f!r}}}" for x, i, f in zip(x.tolist(), current.tolist(), force, strict=True)]
     return render("model_test.c.j2", name=name, upper=name.upper(), rows=rows, dt=repr(dt), tolerance=TOLERANCE)
 
 
-def reference_motion(made: Stream, samples: int = _SAMPLES) -> tuple[np.ndarray, np.ndarray, float]:
+def reference_motion(stepping: Stream, samples: int = _SAMPLES) -> tuple[np.ndarray, np.ndarray, float]:
     """Displacement [m] and current [A] (N,) of a growing sine inside the tested ranges, and its time step [s]."""
-    envelope = made.envelope
+    envelope = stepping.envelope
     amplitude, frequency, (low, high) = 0.01, 1.0, (0.0, 1.0)
     if envelope is not None:
         amplitude, (low, high) = envelope.amplitude_m[1], envelope.current_A
@@ -108,18 +108,18 @@ def reference_motion(made: Stream, samples: int = _SAMPLES) -> tuple[np.ndarray,
     return x, current, float(2 / (frequency * (samples - 1)))
 
 
-def c_facts(made: Stream, name: str, rig: str, language: type[CWriter] = CWriter) -> dict[str, Any]:
+def c_facts(stepping: Stream, name: str, rig: str, language: type[CWriter] = CWriter) -> dict[str, Any]:
     """Collect the template values of a damper, for C or a language that shares its grammar."""
-    main = language(made.step)
-    drives = {quantity: language(drive, f"from_{quantity}_") for quantity, drive in made.drives.items()}
-    setup, infos = main.setup(), made.model.parameters() if made.model else ()
+    main = language(stepping.step)
+    drives = {quantity: language(drive, f"from_{quantity}_") for quantity, drive in stepping.drives.items()}
+    setup, infos = main.setup(), stepping.model.parameters() if stepping.model else ()
     derived = [
         ("int" if e.logical else f"{name}_real", main.name(e).removeprefix(f"d{main.member}"))
-        for e in made.step.derived
+        for e in stepping.step.derived
     ]
     arguments = [(f"const {name}_parameters *p", "&m->p")] if infos else []
     arguments += [(f"const {name}_derived *d", "&m->d")] if derived else []
-    described = _program("model", main, made.step, [*arguments, (f"{name}_state *s", "next")])
+    described = _program("model", main, stepping.step, [*arguments, (f"{name}_state *s", "next")])
     described_drives = [
         {
             **_program(f"from_{quantity}", writer, writer.program, [(f"{name}_state *s", "&next")]),
@@ -138,15 +138,15 @@ def c_facts(made: Stream, name: str, rig: str, language: type[CWriter] = CWriter
         "name": name,
         "upper": name.upper(),
         "rig": c_comment(rig),
-        "title": c_comment(made.title),
+        "title": c_comment(stepping.title),
         "version": package_version(),
-        "equation": textwrap.wrap(c_comment((type(made.model).__doc__ or "").split("\n\n")[0]), 96)
-        if made.model
+        "equation": textwrap.wrap(c_comment((type(stepping.model).__doc__ or "").split("\n\n")[0]), 96)
+        if stepping.model
         else [],
         "flags": FLAGS,
-        "envelope": _envelope(made),
-        "band": made.band,
-        "parameters": [_parameter(info, getattr(made.model, info.name)) for info in infos],
+        "envelope": _envelope(stepping),
+        "band": stepping.band,
+        "parameters": [_parameter(info, getattr(stepping.model, info.name)) for info in infos],
         "derived": derived,
         "members": [member for member, _ in starts],
         "starts": starts,
@@ -155,7 +155,7 @@ def c_facts(made: Stream, name: str, rig: str, language: type[CWriter] = CWriter
         "setup": setup,
         "has_setup": bool(setup),
         "helpers": {word: f"{word}(" in text for word in ("signum", "lesser", "greater")},
-        **_tables(made.step.tape.tables, main.number),
+        **_tables(stepping.step.tape.tables, main.number),
     }
 
 
@@ -208,13 +208,13 @@ def _parameter(info: Any, value: float) -> Mapping[str, str]:
     }
 
 
-def _envelope(made: Stream) -> list[tuple[str, str, str]]:
-    if made.envelope is None:
+def _envelope(stepping: Stream) -> list[tuple[str, str, str]]:
+    if stepping.envelope is None:
         return []
     return [
         (name.upper(), repr(float(low)), repr(float(high)))
         for name, (low, high) in (
-            (name, getattr(made.envelope, name))
+            (name, getattr(stepping.envelope, name))
             for name in ("current_A", "frequency_Hz", "amplitude_m", "peak_velocity_m_s")
         )
     ]

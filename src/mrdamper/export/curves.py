@@ -114,10 +114,10 @@ def force_velocity(
 def _curve(damper: Damper, current: float, amplitude: float, speeds: Floats) -> ForceVelocity:
     rows = []
     for speed in speeds:
-        made = damper.predict(Condition(current, float(speed / (2 * np.pi * amplitude)), amplitude))
-        v, force = made.motion.velocity, made.force
+        prediction = damper.predict(Condition(current, float(speed / (2 * np.pi * amplitude)), amplitude))
+        v, force = prediction.motion.velocity, prediction.force
         out, back = int(np.argmax(v)), int(np.argmin(v))
-        rows.append((force[back], force[out], force.min(), force.max(), not made.extrapolation))
+        rows.append((force[back], force[out], force.min(), force.max(), not prediction.extrapolation))
     back, out, lowest, highest, tested = (np.array(column) for column in zip(*rows, strict=True))
     return ForceVelocity(
         current,

@@ -62,8 +62,8 @@ class FMUExporter(Exporter):
             raise InputError(f"FMI {self.fmi}", mend="give 2 or 3", code="E_FMI_VERSION")
         unknown = set(self.platforms or ()) - {p.name for p in PLATFORMS}
         if unknown:
-            known = ", ".join(p.name for p in PLATFORMS)
-            raise InputError(f"no platform {', '.join(sorted(unknown))}", mend=f"known: {known}", code="E_PLATFORM")
+            names = ", ".join(p.name for p in PLATFORMS)
+            raise InputError(f"no platform {', '.join(sorted(unknown))}", mend=f"known: {names}", code="E_PLATFORM")
 
     def export(self, damper: Damper | Model, name: str) -> Written:
         return self.packed(fmu_texts(damper, identifier(name), self.fmi), identifier(name))
@@ -90,8 +90,8 @@ class FMUExporter(Exporter):
         return binaries, notes
 
     def _wanted(self) -> list[Platform]:
-        known = [p for p in PLATFORMS if self.fmi == 3 or p.fmi2]
-        return [p for p in known if self.platforms is None or p.name in self.platforms]
+        platforms = [p for p in PLATFORMS if self.fmi == 3 or p.fmi2]
+        return [p for p in platforms if self.platforms is None or p.name in self.platforms]
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,16 +107,16 @@ class Reference:
     flags: np.ndarray  # (N,) bits in the order of `FLAGS`
 
 
-def reference(made: Stream) -> Reference:
+def reference(stepping: Stream) -> Reference:
     """Two growing cycles inside the tested ranges, stepped here; the displacement drives."""
-    _, _, dt = reference_motion(made)
+    _, _, dt = reference_motion(stepping)
     turn = dt * 399 / 2  # of that motion's 400 samples
     step = 2.0 ** math.floor(math.log2(turn / _SAMPLES_A_CYCLE))
     internal_step = min(step, _INTERNAL_STEP)
-    x, current, _ = reference_motion(made, round(2 * turn / step) + 1)
+    x, current, _ = reference_motion(stepping, round(2 * turn / step) + 1)
     samples = [*zip(x.tolist(), current.tolist(), strict=True)]
-    rest = _walk(Stepper(made), samples[:1], internal_step, 1)
-    moved = _walk(Stepper(made), samples[:-1], step, round(step / internal_step))
+    rest = _walk(Stepper(stepping), samples[:1], internal_step, 1)
+    moved = _walk(Stepper(stepping), samples[:-1], step, round(step / internal_step))
     force, flags = (np.array(column) for column in zip(*rest, *moved, strict=True))
     return Reference(step, internal_step, x, np.gradient(x, step), current, force, flags)
 
@@ -137,11 +137,11 @@ def _walk(steps: Stepper, samples: list[tuple[float, float]], step: float, count
 
 def fmu_texts(damper: Damper | Model, name: str, fmi: int) -> dict[str, bytes]:
     """All of an FMU but its binaries, by path. The token is a hash of the rest."""
-    made = stream(damper)
-    known = reference(made)
+    stepping = stream(damper)
+    expected = reference(stepping)
     rig = damper_of(damper).rig
-    facts = _facts(made, name, rig, fmi, known)
-    return with_token(lambda token: _texts(made, facts, known, rig, token))
+    facts = _facts(stepping, name, rig, fmi, expected)
+    return with_token(lambda token: _texts(stepping, facts, expected, rig, token))
 
 
 def with_token(texts: Callable[[str], dict[str, bytes]]) -> dict[str, bytes]:
@@ -160,22 +160,22 @@ def token_of(files: Mapping[str, bytes]) -> str:
 
 def zipped(files: Mapping[str, bytes]) -> bytes:
     """Write a zip archive whose bytes depend on nothing but the files."""
-    made = io.BytesIO()
-    with zipfile.ZipFile(made, "w") as archive:
+    archive_bytes = io.BytesIO()
+    with zipfile.ZipFile(archive_bytes, "w") as archive:
         for path in sorted(files, key=lambda p: (p != "modelDescription.xml", p)):
             entry = zipfile.ZipInfo(path, _DATE)
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.create_system = 3
             entry.external_attr = (0o755 if path.startswith("binaries/") else 0o644) << 16
             archive.writestr(entry, files[path])
-    return made.getvalue()
+    return archive_bytes.getvalue()
 
 
-def _facts(made: Stream, name: str, rig: str, fmi: int, known: Reference) -> dict[str, Any]:
-    facts = c_facts(made, name, rig)
-    infos = parameters_of_stream(made)
-    envelope = made.envelope
-    facts |= description_facts(made, fmi, known.internal_step, envelope.current_A[0] if envelope else 0.0)
+def _facts(stepping: Stream, name: str, rig: str, fmi: int, expected: Reference) -> dict[str, Any]:
+    facts = c_facts(stepping, name, rig)
+    infos = parameters_of_stream(stepping)
+    envelope = stepping.envelope
+    facts |= description_facts(stepping, fmi, expected.internal_step, envelope.current_A[0] if envelope else 0.0)
     facts |= serial_fields(facts["members"], [info.name for info, _ in infos])
     facts["parameters"] = [{"name": i.name, "tunable": tunable, "bounds": c_bounds(i)} for i, tunable in infos]
     facts["envelope"] = [
@@ -186,17 +186,20 @@ def _facts(made: Stream, name: str, rig: str, fmi: int, known: Reference) -> dic
     return facts | {
         "fmi": fmi,
         "most_steps": MOST_STEPS,
-        "stop_time": repr(known.step * (known.force.size - 1)),
-        "about": f"{made.title}{f' of rig {rig}' if rig else ''}, made by mrdamper.",
+        "stop_time": repr(expected.step * (expected.force.size - 1)),
+        "about": f"{stepping.title}{f' of rig {rig}' if rig else ''}, written by mrdamper.",
     }
 
 
-def _texts(made: Stream, facts: Mapping[str, Any], known: Reference, rig: str, token: str) -> dict[str, bytes]:
-    time = known.step * np.arange(known.force.size, dtype=np.float64)
-    given = {"displacement": known.displacement, "velocity": known.velocity, "current": known.current}
-    found = {"force": known.force, **{f"outside_{flag}": known.flags >> bit & 1 for bit, flag in enumerate(FLAGS)}}
-    sources = c_sources(made, facts["name"], rig)
-    return all_texts({**facts, "token": token}, sources, "fmu_instance", "fmu_documentation", time, given, found)
+def _texts(stepping: Stream, facts: Mapping[str, Any], expected: Reference, rig: str, token: str) -> dict[str, bytes]:
+    time = expected.step * np.arange(expected.force.size, dtype=np.float64)
+    given = {"displacement": expected.displacement, "velocity": expected.velocity, "current": expected.current}
+    outputs = {
+        "force": expected.force,
+        **{f"outside_{flag}": expected.flags >> bit & 1 for bit, flag in enumerate(FLAGS)},
+    }
+    sources = c_sources(stepping, facts["name"], rig)
+    return all_texts({**facts, "token": token}, sources, "fmu_instance", "fmu_documentation", time, given, outputs)
 
 
 def all_texts(
@@ -206,7 +209,7 @@ def all_texts(
     page: str,
     time: Floats,
     given: Mapping[str, np.ndarray],
-    found: Mapping[str, np.ndarray],
+    outputs: Mapping[str, np.ndarray],
 ) -> dict[str, bytes]:
     """Collect the texts of an FMU by path: C sources and those of an instance, its description, its reference.
 
@@ -238,7 +241,7 @@ def all_texts(
         **{f"sources/{file}": text for file, text in sources.items()},
         "documentation/index.html": render(f"{page}.html.j2", **facts),
         "resources/reference_in.csv": _csv_table({"time": time, **given}),
-        "resources/reference_out.csv": _csv_table({"time": time, **found}),
+        "resources/reference_out.csv": _csv_table({"time": time, **outputs}),
     }
     return {path: text.encode() for path, text in texts.items()}
 

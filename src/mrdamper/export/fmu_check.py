@@ -75,8 +75,8 @@ def _unpacked(path: Path) -> dict[str, bytes]:
 
 
 def _token(files: Mapping[str, bytes]) -> list[FmuFinding]:
-    found = _TOKEN.search(files["modelDescription.xml"])
-    token = found[1] if found else b""
+    match = _TOKEN.search(files["modelDescription.xml"])
+    token = match[1] if match else b""
     texts = {path: text.replace(token, b"") for path, text in files.items() if not path.startswith("binaries/")}
     if token and token_of(texts).encode() == token:
         return []

@@ -58,9 +58,9 @@ class Variable:
         return {"real": "Float64", "flag": "Boolean", "choice": "Enumeration"}[self.kind]
 
 
-def description_facts(made: Stream, fmi: int, internal_step: float, current: float) -> dict[str, Any]:
+def description_facts(stepping: Stream, fmi: int, internal_step: float, current: float) -> dict[str, Any]:
     """Collect the template values of an FMU that the C source's facts do not hold."""
-    variables = _variables(made, fmi, internal_step, current)
+    variables = _variables(stepping, fmi, internal_step, current)
     return {
         "variables": variables,
         "units": units_of(v.unit for v in variables if v.unit),
@@ -77,7 +77,7 @@ def description_facts(made: Stream, fmi: int, internal_step: float, current: flo
     }
 
 
-def _variables(made: Stream, fmi: int, internal_step: float, current: float) -> list[Variable]:
+def _variables(stepping: Stream, fmi: int, internal_step: float, current: float) -> list[Variable]:
     """All variables, in the order of their value references; time exists in FMI 3 only."""
     named: list[dict[str, Any]] = []
 
@@ -96,12 +96,12 @@ def _variables(made: Stream, fmi: int, internal_step: float, current: float) -> 
     add("drive", "What makes the motion", "choice", "parameter", "fixed", type="Drive", start=1)
     step = {"unit": "s", "start": internal_step, "low": SHORTEST}
     add("internal_step", "Longest internal step", "real", "parameter", "tunable", **step)
-    for info, tunable in parameters_of_stream(made):
-        value, unit = getattr(made.model, info.name), unit_name(info, made)
+    for info, tunable in parameters_of_stream(stepping):
+        value, unit = getattr(stepping.model, info.name), unit_name(info, stepping)
         kind = ("parameter", "tunable") if tunable else ("local", "constant")
         bounds = {"low": info.bounds[0], "high": info.bounds[1]} if tunable else {}
-        said = info.meaning[:1].upper() + info.meaning[1:]
-        add(info.name, said, "real", *kind, unit=unit, start=value, symbol=f"p_{info.name}", **bounds)
+        meaning = info.meaning[:1].upper() + info.meaning[1:]
+        add(info.name, meaning, "real", *kind, unit=unit, start=value, symbol=f"p_{info.name}", **bounds)
     shown = [(reference, v) for reference, v in enumerate(named) if fmi == 3 or v["name"] != "time"]
     return [variable(v, reference, index) for index, (reference, v) in enumerate(shown, 1)]
 
@@ -128,30 +128,30 @@ def variable(v: dict[str, Any], reference: int, index: int) -> Variable:
     return Variable(**own, reference=reference, index=index, initial=initial, unit=unit, attributes=tuple(attributes))
 
 
-def parameters_of_stream(made: Stream) -> list[tuple[ParameterInfo, bool]]:
+def parameters_of_stream(stepping: Stream) -> list[tuple[ParameterInfo, bool]]:
     """List the model's parameters, and if each may change: tracing may have frozen a branch on it."""
-    if made.model is None:
+    if stepping.model is None:
         return []
-    return [(info, _is_free(made, info.name)) for info in made.model.parameters()]
+    return [(info, _is_free(stepping, info.name)) for info in stepping.model.parameters()]
 
 
-def _is_free(made: Stream, name: str) -> bool:
-    value = getattr(made.model, name)
+def _is_free(stepping: Stream, name: str) -> bool:
+    value = getattr(stepping.model, name)
     for near in (value * 1.01, value * 0.99) if value else (1e-3, -1e-3):
         try:
-            Stepper(made).set_parameters(**{name: near})
+            Stepper(stepping).set_parameters(**{name: near})
         except ParameterError:
             continue
         return True
     return False
 
 
-def unit_name(info: ParameterInfo, made: Stream) -> str:
+def unit_name(info: ParameterInfo, stepping: Stream) -> str:
     """Write the unit of a parameter; an exponent that is itself a parameter is filled in where it is whole."""
     if info.unit == "-":
         return "1"
     if info.unit.endswith("^-n"):
-        n = float(getattr(made.model, "n", math.nan))
+        n = float(getattr(stepping.model, "n", math.nan))
         return f"1/m^{n:.0f}" if n.is_integer() else info.unit
     return info.unit
 

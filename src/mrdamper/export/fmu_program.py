@@ -24,7 +24,7 @@ _USUAL = {"m": 0.01, "m/s": 0.1, "m/s2": 1.0, "N": 500.0}  # amplitudes of the r
 
 
 def write_program_fmu(
-    made: Program,
+    traced: Program,
     name: str,
     title: str,
     units: Mapping[str, str],
@@ -39,7 +39,7 @@ def write_program_fmu(
 
     Parameters
     ----------
-    made : Program
+    traced : Program
         With dt as its last input and no parameters.
     name, title : str
         Of files and symbols; for people.
@@ -59,8 +59,8 @@ def write_program_fmu(
         What was written; notes, such as platforms left out.
     """
     kind, word = exporter or FMUExporter(), identifier(name)
-    facts = _facts(made, word, title, units, period, tuple(start) or (0.0,) * len(made.outputs), kind.fmi)
-    sources, reference = program_sources(made, word, facts["title"]), _reference(made, facts)
+    facts = _facts(traced, word, title, units, period, tuple(start) or (0.0,) * len(traced.outputs), kind.fmi)
+    sources, reference = program_sources(traced, word, facts["title"]), _reference(traced, facts)
 
     def texts(token: str) -> dict[str, bytes]:
         return all_texts({**facts, "token": token}, sources, "fmu_program", "fmu_program", *reference)
@@ -70,7 +70,7 @@ def write_program_fmu(
 
 
 def _facts(
-    made: Program,
+    traced: Program,
     word: str,
     title: str,
     units: Mapping[str, str],
@@ -78,8 +78,12 @@ def _facts(
     start: Sequence[float],
     fmi: Literal[2, 3],
 ) -> dict[str, Any]:
-    seen = [name for name in made.tape.inputs if name != "dt"]
-    named = [("time", "independent"), *((name, "input") for name in seen), *((name, "output") for name in made.outputs)]
+    signals = [name for name in traced.tape.inputs if name != "dt"]
+    named = [
+        ("time", "independent"),
+        *((name, "input") for name in signals),
+        *((name, "output") for name in traced.outputs),
+    ]
     shown = [(reference, name, way) for reference, (name, way) in enumerate(named) if fmi == 3 or name != "time"]
     variables = [
         variable(
@@ -93,13 +97,13 @@ def _facts(
     ]
     place = {"independent": "time", "input": "set.{}", "output": "held.{}"}
     readable = [(v.reference, place[v.causality].format(v.name)) for v in variables]
-    serial = [("real", f"program.{member}") for member in made.tape.starts]
+    serial = [("real", f"program.{member}") for member in traced.tape.starts]
     serial += [("real", where) for _, where in readable if where != "time"] + [("real", "due"), ("real", "time")]
     return {
         "name": word,
         "upper": word.upper(),
         "title": c_comment(title),
-        "about": f"{title}, made by mrdamper.",
+        "about": f"{title}, written by mrdamper.",
         "version": package_version(),
         "fmi": fmi,
         "variables": variables,
@@ -110,14 +114,14 @@ def _facts(
         "sampled": period,
         "internal_step": repr(period or _STEP),
         "stop_time": repr((period or _STEP) * (_ROWS - 1)),
-        "held": [(name, repr(float(value))) for name, value in zip(made.outputs, start, strict=True)],
+        "held": [(name, repr(float(value))) for name, value in zip(traced.outputs, start, strict=True)],
         "readable": readable,
         "settable": [(v.reference, f"set.{v.name}") for v in variables if v.causality == "input"],
         "serial": [*serial, ("int", "program.samples"), ("int", "phase")],
     }
 
 
-def _reference(made: Program, facts: dict[str, Any]) -> tuple[Floats, dict[str, Floats], dict[str, Floats]]:
+def _reference(traced: Program, facts: dict[str, Any]) -> tuple[Floats, dict[str, Floats], dict[str, Floats]]:
     """Growing sines, and what the program answers: each row to the inputs of the row before."""
     step = facts["sampled"] or _STEP
     time = step * np.arange(_ROWS, dtype=np.float64)
@@ -125,12 +129,12 @@ def _reference(made: Program, facts: dict[str, Any]) -> tuple[Floats, dict[str, 
         v.name: _USUAL.get(v.unit, 1.0) * time / time[-1] * np.sin(2 * math.pi * (2 + 0.37 * i) * time / time[-1] * 2)
         for i, v in enumerate(v for v in facts["variables"] if v.causality == "input")
     }
-    prepare, advance = python_functions(made)
+    prepare, advance = python_functions(traced)
     _, derived = prepare(())
-    memory = tuple(made.tape.starts.values())
+    memory = tuple(traced.tape.starts.values())
     rows = [tuple(float(value) for _, value in facts["held"])]
     for sample in list(zip(*(column.tolist() for column in given.values()), strict=True))[:-1]:
         _, outputs, memory = advance((), derived, memory, (*sample, step))
         rows.append(outputs)
     columns = (np.array(column) for column in zip(*rows, strict=True))
-    return time, given, dict(zip(made.outputs, columns, strict=True))
+    return time, given, dict(zip(traced.outputs, columns, strict=True))

@@ -48,52 +48,57 @@ class PageExporter(Exporter):
     suffix: ClassVar[str] = ".html"
 
     def export(self, damper: Damper | Model, name: str) -> Written:
-        made, name = stream(damper), identifier(name)
-        built = build_webassembly(_web_sources(made, name))
+        stepping, name = stream(damper), identifier(name)
+        built = build_webassembly(_web_sources(stepping, name))
         notes = () if built.library else (f"computed in JavaScript, not WebAssembly: {built.reason}",)
-        page = render("page.html.j2", **_facts(damper, made, name, built.library))
+        page = render("page.html.j2", **_facts(damper, stepping, name, built.library))
         return Written({f"{name}{self.suffix}": page.encode()}, notes)
 
 
-def _web_sources(made: Stream, name: str) -> dict[str, bytes]:
+def _web_sources(stepping: Stream, name: str) -> dict[str, bytes]:
     wrapper = render("page_damper.c.j2", name=name, upper=name.upper())
-    return {file: text.encode() for file, text in {**c_sources(made, name, ""), f"{name}_page.c": wrapper}.items()}
+    return {file: text.encode() for file, text in {**c_sources(stepping, name, ""), f"{name}_page.c": wrapper}.items()}
 
 
-def _facts(damper: Damper | Model, made: Stream, name: str, library: bytes | None) -> dict[str, Any]:
+def _facts(damper: Damper | Model, stepping: Stream, name: str, library: bytes | None) -> dict[str, Any]:
     """Collect the template values of the page."""
     rig = damper_of(damper).rig
-    envelope = made.envelope
+    envelope = stepping.envelope
     computed = {
         "wasm": base64.b64encode(library).decode() if library else None,
-        "curves": [_curve(points, library) for points in shared_points(made.step.tape.tables)],
-        "test": _vectors(made),
+        "curves": [_curve(points, library) for points in shared_points(stepping.step.tape.tables)],
+        "test": _vectors(stepping),
         "tested": envelope and _tested(envelope),
         "slack": SLACK,
         "flags": FLAGS,
-        "band": made.band and asdict(made.band),
+        "band": stepping.band and asdict(stepping.band),
     }
     folder = files("mrdamper.export.templates")
     return {
-        "heading": f"Damper of rig {rig}" if rig else made.title,
-        "words": _words(damper, made),
+        "heading": f"Damper of rig {rig}" if rig else stepping.title,
+        "words": _words(damper, stepping),
         "knobs": _knobs(envelope),
         "parameters": [
-            {"meaning": info.meaning, "value": f"{getattr(made.model, info.name):.6g}", "unit": info.unit, "name": n}
-            for info in (made.model.parameters() if made.model else ())
+            {
+                "meaning": info.meaning,
+                "value": f"{getattr(stepping.model, info.name):.6g}",
+                "unit": info.unit,
+                "name": n,
+            }
+            for info in (stepping.model.parameters() if stepping.model else ())
             for n in (info.name,)
         ],
         "facts": json.dumps(computed).replace("<", "\\u003c"),  # no text can end the element it stands in
-        "damper": render("damper.js.j2", **c_facts(made, name, "", JavaScriptWriter)),
+        "damper": render("damper.js.j2", **c_facts(stepping, name, "", JavaScriptWriter)),
         "css": (folder / "page.css").read_text(encoding="utf-8"),
         "script": (folder / "page.js").read_text(encoding="utf-8"),
     }
 
 
-def _vectors(made: Stream) -> dict[str, Any]:
+def _vectors(stepping: Stream) -> dict[str, Any]:
     """Calculate a motion and the forces of the stepper here, all digits, for the page to repeat."""
-    x, current, step = reference_motion(made, _VECTORS)
-    stepper = Stepper(made)
+    x, current, step = reference_motion(stepping, _VECTORS)
+    stepper = Stepper(stepping)
     force = [stepper.step(*sample, step) for sample in zip(x.tolist(), current.tolist(), strict=True)]
     packed = {
         name: base64.b64encode(np.asarray(values, "<f8").tobytes()).decode()
@@ -120,26 +125,30 @@ def _tested(envelope: Envelope) -> list[dict[str, Any]]:
     ]
 
 
-def _words(damper: Damper | Model, made: Stream) -> list[str]:
+def _words(damper: Damper | Model, stepping: Stream) -> list[str]:
     """Describe the origin of the damper and its range of validity, in sentences."""
     from importlib.metadata import version
 
-    said = f"{made.title[:1].upper()}{made.title[1:]}, exported by mrdamper {version('mrdamper')}"
+    sentence = f"{stepping.title[:1].upper()}{stepping.title[1:]}, exported by mrdamper {version('mrdamper')}"
     if count := getattr(damper, "parameter_count", 0):  # a bare model was determined from nothing
         facts = "; ".join(f"{key}: {value}" for key, value in getattr(damper, "provenance", {}).items())
-        said += f" from a model with {count} parameters identified from tests"
-        said += f" ({facts})" if facts else ""
-    sentences = [f"{said}.", _SIGNS]
-    if made.envelope is not None:
-        parts = [f"{_span(getattr(made.envelope, field), factor)} {unit}" for _, field, _, unit, factor, *_ in _KNOBS]
-        top = 1e3 * made.envelope.peak_velocity_m_s[1]
+        sentence += f" from a model with {count} parameters identified from tests"
+        sentence += f" ({facts})" if facts else ""
+    sentences = [f"{sentence}.", _SIGNS]
+    if stepping.envelope is not None:
+        parts = [
+            f"{_span(getattr(stepping.envelope, field), factor)} {unit}" for _, field, _, unit, factor, *_ in _KNOBS
+        ]
+        top = 1e3 * stepping.envelope.peak_velocity_m_s[1]
         sentences.append(
             f"Tested at {', '.join(parts)}, up to {top:.3g} mm/s; dashed curves are extrapolated beyond this range."
         )
-        if made.model is None:
+        if stepping.model is None:
             sentences.append(_FUNCTIONS)
-        if made.band is not None:
-            sentences.append(f"Shaded: {100 * made.band.level:g} % prediction interval of the force {made.band.scope}.")
+        if stepping.band is not None:
+            sentences.append(
+                f"Shaded: {100 * stepping.band.level:g} % prediction interval of the force {stepping.band.scope}."
+            )
     else:
         sentences.append("A model that was not identified from tests.")
     return sentences

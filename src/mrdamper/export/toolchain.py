@@ -53,9 +53,9 @@ def compiler_for(wanted: Platform) -> tuple[str, ...]:
     """
     if wanted == here() and wanted.suffix != ".dll":
         for name in ("cc", "gcc", "clang"):
-            found = shutil.which(name)
-            if found:
-                return (found,)
+            path = shutil.which(name)
+            if path:
+                return (path,)
     if importlib.util.find_spec("ziglang"):
         return (sys.executable, "-m", "ziglang", "cc", "-target", wanted.target)
     return ()

@@ -118,13 +118,13 @@ def _resampled(values: Floats) -> Floats:
     The draws at some ranks of n uniform ones are beta distributed, each given the one below it.
     """
     rng, count, below, rank = np.random.default_rng(_SEED), values.size, np.zeros(_RESAMPLES), 0
-    found = []
+    percentiles = []
     for share in _PERCENTILES:
         at = round(share * (count - 1)) + 1
         below = below + (1 - below) * rng.beta(at - rank, count - at + 1, _RESAMPLES)
-        found.append(np.sort(values)[np.minimum((below * count).astype(int), count - 1)])
+        percentiles.append(np.sort(values)[np.minimum((below * count).astype(int), count - 1)])
         rank = at
-    return np.array(found)
+    return np.array(percentiles)
 
 
 def _nearest(percentiles: Floats, lower: float | None, upper: float | None) -> Floats:

@@ -135,12 +135,12 @@ class KillableWorker:
 
 def descendants(pid: int) -> list[int]:
     """List the processes that a process started, and those that they started; empty where the system has no list."""
-    found = []
+    processes = []
     with contextlib.suppress(OSError):
         for task in Path(f"/proc/{pid}/task").iterdir():
             for child in map(int, (task / "children").read_text().split()):
-                found += [child, *descendants(child)]
-    return found
+                processes += [child, *descendants(child)]
+    return processes
 
 
 def _start() -> subprocess.Popen[bytes]:

@@ -68,7 +68,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         return {"code": "E_JOB_MEMORY", "found": f"over {limits['memory_bytes'] / 2**30:.3g} GiB of memory"}
     except Exception:
         text = "".join(traceback.format_exc().splitlines(keepends=True)[-_LINES:])
-        return {"code": "E_JOB_FAULT", "found": text.strip(), "mend": "this is our fault, not yours; please report it"}
+        return {"code": "E_JOB_FAULT", "found": text.strip(), "mend": "internal error; please report it"}
 
 
 def _limit(seconds: float | None, size: int | None) -> None:
@@ -97,12 +97,12 @@ def _written() -> int:
 
 def _strangers() -> list[int]:
     """List the processes a job left behind, without the one that reads rig files."""
-    found = []
+    processes = []
     for pid in descendants(os.getpid()):
         with contextlib.suppress(OSError):
             if b"sandbox_worker" not in Path(f"/proc/{pid}/cmdline").read_bytes():
-                found.append(pid)
-    return found
+                processes.append(pid)
+    return processes
 
 
 def _adopt_orphans() -> None:

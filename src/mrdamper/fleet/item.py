@@ -65,8 +65,8 @@ def make_item(facts: dict[str, str], profile: FleetProfile, **where: Any) -> Ite
 
 def digest_of(item: Item) -> str:
     """Hash of the bytes of an item's files, and of what names the damper in them."""
-    seen = [(path, path.stat()) for path in _files(item)]
-    contents = [(path.name, _content(path, about.st_size, about.st_mtime_ns)) for path, about in seen]
+    states = [(path, path.stat()) for path in _files(item)]
+    contents = [(path.name, _content(path, about.st_size, about.st_mtime_ns)) for path, about in states]
     return hash_of(contents, sorted(item.facts.items()), item.rows, item.picks)
 
 

@@ -28,20 +28,20 @@ def find_items(source: str | Path, profile: FleetProfile) -> list[Item]:
     results = [p for p in lake if p.name == "dampers.parquet" and _holds_results(p.parent)]
     lake = [p for p in lake if p.name not in SAMPLE_FILES and p.is_file() and p not in results]
     if lake and is_lake(lake, profile):
-        found = lake_items(lake, profile)
+        items = lake_items(lake, profile)
     elif source.is_dir():
-        found = list(_in_folder(source, profile))
+        items = list(_in_folder(source, profile))
     else:
         raise FleetError(
             "neither a folder nor a Parquet file with a serial number", where=str(source), mend="give a folder",
             code="E_FLEET_EMPTY",
         )  # fmt: skip
-    if not found:
+    if not items:
         raise FleetError(
             "no damper in this folder", where=str(source), code="E_FLEET_EMPTY",
-            mend="a fleet is a folder of dataset folders, of rig files, or a Parquet lake",
+            mend="give a folder of dataset folders, of rig files, or of Parquet files",
         )  # fmt: skip
-    return _without_twins(sorted(found, key=lambda item: (item.serial, item.session, item.paths)))
+    return _without_twins(sorted(items, key=lambda item: (item.serial, item.session, item.paths)))
 
 
 def _holds_results(folder: Path) -> bool:
@@ -55,7 +55,7 @@ def _in_folder(folder: Path, profile: FleetProfile) -> Iterator[Item]:
     if (folder / "runs.csv").is_file():
         yield from _of_dataset(folder, profile)
         return
-    known = suffixes()
+    endings = suffixes()
     loose: list[Path] = []
     for path in sorted(folder.iterdir()):
         if path.name.startswith(".") or folder.resolve().is_relative_to(path.resolve()) or _holds_results(path):
@@ -63,9 +63,9 @@ def _in_folder(folder: Path, profile: FleetProfile) -> Iterator[Item]:
         if path.is_dir() and (path / "runs.csv").is_file():
             yield from _of_dataset(path, profile)
         elif path.is_dir():
-            inside = [p for p in sorted(path.rglob("*")) if p.is_file() and p.suffix.lower() in known]
+            inside = [p for p in sorted(path.rglob("*")) if p.is_file() and p.suffix.lower() in endings]
             yield _named(path.name, profile, "rig files", tuple(map(str, inside)), path)
-        elif path.suffix.lower() in known and path.is_file():  # a pipe would be waited for
+        elif path.suffix.lower() in endings and path.is_file():  # a pipe would be waited for
             loose.append(path)
     yield from _of_loose_files(loose, profile)
 
@@ -113,20 +113,20 @@ def _of_dataset(folder: Path, profile: FleetProfile) -> Iterator[Item]:
     if named.error is not None and not any(serial for serial, _ in groups):
         yield named
         return
-    known = {"serial": folder.name, **(profile.of_name(folder.name) or {})}
+    stated = {"serial": folder.name, **(profile.of_name(folder.name) or {})}
     columns = [profile.column_of(fact, table[0] if table else ()) for fact in ("serial", "session")]
     for key, facts in (groups or {("", ""): {}}).items():
         picks = [(c, cell) for c, cell in zip(columns, key, strict=True) if c] if len(groups) > 1 else []
-        yield make_item({**known, **facts}, profile, paths=(str(folder),), picks=tuple(picks))
+        yield make_item({**stated, **facts}, profile, paths=(str(folder),), picks=tuple(picks))
 
 
 def _without_twins(items: Sequence[Item]) -> list[Item]:
     """Two records of one serial number in one session: which is right nobody knows, so neither is used."""
-    seen: dict[tuple[str, str], list[Item]] = {}
+    items_by_key: dict[tuple[str, str], list[Item]] = {}
     for item in items:
-        seen.setdefault((item.serial, item.session), []).append(item)
+        items_by_key.setdefault((item.serial, item.session), []).append(item)
     checked = []
-    for twins in seen.values():
+    for twins in items_by_key.values():
         for item in twins:
             if len(twins) > 1 and item.error is None:
                 others = ", ".join(sorted(Path(p).name for t in twins for p in t.paths[:1]))

@@ -207,8 +207,8 @@ def _beside_the_line(fit: JointFit, own: list[Floats | None], plan: Plan) -> dic
 
 def _curvature(problem: JointProblem, fit: JointFit) -> list[list[float]]:
     """Second derivatives of the squared error along the search axes, linear parameters following, over that error."""
-    known = problem.linearised(fit)
-    residual, jacobian = known.residual, known.jacobian
+    linearised = problem.linearised(fit)
+    residual, jacobian = linearised.residual, linearised.jacobian
     own, linear = np.split(jacobian, [len(problem.axes)], axis=1)
     own = own - linear @ np.linalg.lstsq(linear, own, rcond=1e-10)[0]
     return (own.T @ own / (residual @ residual)).tolist()
@@ -216,8 +216,8 @@ def _curvature(problem: JointProblem, fit: JointFit) -> list[list[float]]:
 
 def _standard_errors(problem: JointProblem, fit: JointFit) -> dict[str, float]:
     """Of the parameters that this damper's own records determined, those held at the line's value being right."""
-    known = problem.linearised(fit)
-    residual, jacobian = known.residual, known.jacobian
+    linearised = problem.linearised(fit)
+    residual, jacobian = linearised.residual, linearised.jacobian
     model, held = fit.damper.model, set(fit.at_bounds)
     values = model.values()
     slopes = np.zeros((len(values), jacobian.shape[1]))
@@ -233,13 +233,13 @@ def _standard_errors(problem: JointProblem, fit: JointFit) -> dict[str, float]:
     kept = residual.size // _TOGETHER * _TOGETHER  # what is slower than a few samples is what makes errors large
     means = (a[:kept].reshape(-1, _TOGETHER, *a.shape[1:]).mean(axis=1) for a in (jacobian, residual))
     covariance = spread(*means).covariance
-    found = {}
+    errors = {}
     for name, slope in zip(values, slopes, strict=True):
         of = np.flatnonzero(slope)
         variance = float(slope[of] @ covariance[np.ix_(of, of)] @ slope[of])
         if of.size and name not in held and 0 < variance < np.inf:
-            found[name] = float(np.sqrt(variance))
-    return found
+            errors[name] = float(np.sqrt(variance))
+    return errors
 
 
 def _stands_for(model: Model, axis: str) -> list[str]:
@@ -261,14 +261,14 @@ def _study(dataset: Dataset) -> dict[str, Any]:
 
 
 def _usable(dataset: Dataset) -> list[Run]:
-    """Identification runs that are accepted, agree and move; a damper with none raises the cause of the first."""
+    """Return the identification runs that are accepted, agree and move; a damper with none raises the first cause."""
     agreed, contradictions = agreeing(dataset.only(dataset.split("train")))
     kept, refused = believed(agreed)
     refused |= {one.run_id: str(one) for one in contradictions}
     runs, unusable = usable(kept)
     if runs:
         return runs
-    why = next(iter({**refused, **unusable}.values()), "no train run; check the column split")
+    why = next(iter({**refused, **unusable}.values()), "no identification run; check the column split")
     raise FleetError(why, where=dataset.name, code="E_FLEET_EMPTY")
 
 

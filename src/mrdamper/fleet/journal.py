@@ -108,7 +108,9 @@ class Journal:
                 )  # fmt: skip
             application = base.execute("PRAGMA application_id").fetchone()[0]
             if application not in (0, _APPLICATION):
-                raise JournalError("a database of another program", where=str(self._path), mend="move it away")
+                raise JournalError(
+                    "a database of another program", where=str(self._path), mend="move the file to another folder"
+                )
             if base.execute("PRAGMA journal_mode = WAL").fetchone()[0] != "wal":
                 raise JournalError("no write-ahead log here", where=str(self._path), mend="choose a local disk")
             base.execute("PRAGMA synchronous = FULL")
@@ -138,7 +140,7 @@ class Journal:
             )  # fmt: skip
         if name.startswith(("SQLITE_CANTOPEN", "SQLITE_READONLY", "SQLITE_PERM")):
             return OutputError(str(error), where=str(self._path), mend="choose a folder you may write to")
-        return JournalError(str(error), where=str(self._path), mend="move it away and run again")
+        return JournalError(str(error), where=str(self._path), mend="move the file to another folder and run again")
 
 
 def _text(document: dict[str, Any]) -> str:

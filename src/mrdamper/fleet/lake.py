@@ -37,7 +37,7 @@ def lake_items(paths: Sequence[Path], profile: FleetProfile) -> list[Item]:
     """
     import polars as pl
 
-    found: dict[Item, list[tuple[str, tuple[int, int]]]] = {}
+    places_of: dict[Item, list[tuple[str, tuple[int, int]]]] = {}
     refused = []
     for path in paths:
         names = _columns(path)
@@ -65,9 +65,9 @@ def lake_items(paths: Sequence[Path], profile: FleetProfile) -> list[Item]:
                 continue
             picks = tuple((columns[f], row[f] or "") for f in ("serial", "session", "date") if f in columns)
             item = make_item(row, profile, kind="lake", picks=picks)
-            found.setdefault(item, []).append((str(path), (int(first), int(last - first + 1))))
+            places_of.setdefault(item, []).append((str(path), (int(first), int(last - first + 1))))
     items = []
-    for item, places in found.items():
+    for item, places in places_of.items():
         items.append(replace(item, paths=tuple(p for p, _ in places), rows=tuple(r for _, r in places)))
     return items + refused
 
@@ -110,9 +110,9 @@ def _refusing_damage(path: Path) -> Iterator[None]:
     except (InputError, KeyboardInterrupt, SystemExit, MemoryError):
         raise
     except BaseException as error:
-        found = (str(error).strip().splitlines() or ["unreadable"])[0][:120]
+        reason = (str(error).strip().splitlines() or ["unreadable"])[0][:120]
         raise FleetError(
-            f"damaged Parquet ({found})", where=str(path), mend="write it again", code="E_FORMAT"
+            f"damaged Parquet ({reason})", where=str(path), mend="write it again", code="E_FORMAT"
         ) from error
 
 

@@ -105,8 +105,8 @@ def run_fleet(
     parameters = [info.name for info in model_type(model).parameters()]
     require_writable(out)
     profile = profile or FleetProfile()
-    found = find_items(source, profile)
-    items = [replace(item, paths=tuple(str(Path(path).absolute()) for path in item.paths)) for item in found]
+    sources = find_items(source, profile)
+    items = [replace(item, paths=tuple(str(Path(path).absolute()) for path in item.paths)) for item in sources]
     settings = Settings(model, _rig_profile(profile), cold)
     journal = Journal(out)
     try:
@@ -137,8 +137,8 @@ class _Line:
                 try:
                     self._digests[number] = digest_of(item)
                 except OSError as error:
-                    found, mend = error.strerror or str(error), "mend the file or its rights"
-                    self._failed[number] = refused(InputError(found, where=item.paths[0], mend=mend))
+                    reason, mend = error.strerror or str(error), "correct the file or its permissions"
+                    self._failed[number] = refused(InputError(reason, where=item.paths[0], mend=mend))
             if number % 100 == 0:
                 self._progress(f"reading {len(self._items)} dampers", 0.0)
         self._make_plan(submit, slots)
@@ -180,27 +180,27 @@ class _Line:
             self.plan = Plan(**{k: _deep_tuple(v) for k, v in kept.items()})
             return
         order = sorted(self._digests, key=lambda n: hash_of(self._items[n].serial, self._items[n].session))
-        found: dict[str, dict[str, Any]] = {}
+        references: dict[str, dict[str, Any]] = {}
         for begin in range(0, len(order), REFERENCES):
             some = order[begin : begin + REFERENCES]
             self._measure(some, None, submit, slots)
             for number in some:
                 row = self._row(number)
-                if row["status"] == "done" and len(found) < REFERENCES:
-                    found[self._items[number].name] = row
-            if len(found) >= REFERENCES:
+                if row["status"] == "done" and len(references) < REFERENCES:
+                    references[self._items[number].name] = row
+            if len(references) >= REFERENCES:
                 break
-        if found:
-            tried = [(plan, self._under(plan, order, found, submit, slots)) for plan in drafts(found)]
+        if references:
+            tried = [(plan, self._under(plan, order, references, submit, slots)) for plan in drafts(references)]
             draft = holding(*min(tried, key=lambda t: sum(row["cost"] for row in t[1])))
-            self.plan = settled(draft, self._under(draft, order, found, submit, slots))
+            self.plan = settled(draft, self._under(draft, order, references, submit, slots))
             self._journal.keep_plan(key, self.plan.document)
 
     def _under(
-        self, plan: Plan, order: Sequence[int], found: dict[str, dict[str, Any]], submit: Submit, slots: int
+        self, plan: Plan, order: Sequence[int], references: dict[str, dict[str, Any]], submit: Submit, slots: int
     ) -> list[dict[str, Any]]:
         """Rows of the reference dampers under a draft of the plan."""
-        numbers = [n for n in order if self._items[n].name in found]
+        numbers = [n for n in order if self._items[n].name in references]
         self._measure(numbers, plan, submit, slots)
         rows = [self._journal.result(self._key(n, plan)) for n in numbers]
         return [row for row in rows if row is not None and row["status"] == "done"]

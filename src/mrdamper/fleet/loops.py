@@ -20,11 +20,11 @@ Test = tuple[float, float, float]  # current [A], frequency [Hz], amplitude [m]
 
 def measured_loop(run: Run) -> Floats:
     """(64,) mean measured force [N] by the phase of the motion, from mid-stroke in extension on."""
-    found = equivalent_sine(run)
+    equivalent = equivalent_sine(run)
     inside = run.in_window
     motion = measured_motion(run).part(inside)
-    omega = 2 * np.pi * found.condition.frequency_Hz
-    phase = np.arctan2(omega * (motion.displacement - found.centre), motion.velocity) % (2 * np.pi)
+    omega = 2 * np.pi * equivalent.condition.frequency_Hz
+    phase = np.arctan2(omega * (motion.displacement - equivalent.centre), motion.velocity) % (2 * np.pi)
     bins = np.minimum((phase * (PHASES / (2 * np.pi))).astype(int), PHASES - 1)
     counts = np.bincount(bins, minlength=PHASES)
     sums = np.bincount(bins, run.force[inside], minlength=PHASES)

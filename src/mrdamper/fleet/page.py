@@ -45,7 +45,7 @@ def write_page(table: Path, plan: Plan | None, limits: Mapping[str, ColumnLimits
         raise ColumnError(f"no column {unknown[0]} to limit", where="limits", mend=f"known: {', '.join(numbers)}")
     done = whole.filter(pl.col("status") == "done").sort("session", "serial", maintain_order=True)
     line, golden = done.filter(~pl.col("golden")), done.filter("golden")
-    found = suspects(line)
+    standing_out = suspects(line)
     features = {n: about for n, about in FEATURES.items() if line.height and line[n].null_count() < line.height}
     drifts = {n: _drift(done, n) for n in features if n.startswith("force")}
     verdicts = [_judged(line, name, limit) for name, limit in limits.items()]
@@ -53,8 +53,8 @@ def write_page(table: Path, plan: Plan | None, limits: Mapping[str, ColumnLimits
         "counts": {s: whole.filter(pl.col("status") == s).height for s in ("done", "refused", "failed")},
         "dampers": whole["serial"].n_unique(),
         "plan": plan,
-        "suspects": found[:_MOST_NAMED],
-        "more_suspects": max(0, len(found) - _MOST_NAMED),
+        "suspects": standing_out[:_MOST_NAMED],
+        "more_suspects": max(0, len(standing_out) - _MOST_NAMED),
         "drifts": {features[n][0]: d for n, d in drifts.items()},
         "notes": [*clock_findings(done), *_other_rigs(done, plan)],
         "limits": verdicts,
@@ -69,10 +69,12 @@ def write_page(table: Path, plan: Plan | None, limits: Mapping[str, ColumnLimits
             "fleet.html.j2", "A line of dampers", f"mrdamper {version('mrdamper')}; {table.name}", **facts
         )
         target.write_text(text, encoding="utf-8")
-    said = [f"stands out: {s.serial} {s.session}: {s.cause} ({', '.join(s.findings)})" for s in found[:_MOST_NAMED]]
-    said += [f"and {len(found) - _MOST_NAMED} more stand out"] * (len(found) > _MOST_NAMED)
-    said += [f"{features[n][0]}: {d.text}" for n, d in drifts.items() if d.verdict != "none"]
-    return said + [f"limits of {v['name']}: {v['outside']} of {v['count']} outside" for v in verdicts] + facts["notes"]
+    lines = [
+        f"stands out: {s.serial} {s.session}: {s.cause} ({', '.join(s.findings)})" for s in standing_out[:_MOST_NAMED]
+    ]
+    lines += [f"and {len(standing_out) - _MOST_NAMED} more stand out"] * (len(standing_out) > _MOST_NAMED)
+    lines += [f"{features[n][0]}: {d.text}" for n, d in drifts.items() if d.verdict != "none"]
+    return lines + [f"limits of {v['name']}: {v['outside']} of {v['count']} outside" for v in verdicts] + facts["notes"]
 
 
 def _other_rigs(done: pl.DataFrame, plan: Plan | None) -> list[str]:
@@ -90,9 +92,9 @@ def _values(frame: pl.DataFrame, name: str) -> Floats:
 
 
 def _drift(done: pl.DataFrame, name: str) -> Any:
-    known = done.drop_nulls(name)
-    columns = (known[c].to_list() for c in ("session", "serial", "golden"))
-    return drift(_values(known, name), *columns)
+    complete = done.drop_nulls(name)
+    columns = (complete[c].to_list() for c in ("session", "serial", "golden"))
+    return drift(_values(complete, name), *columns)
 
 
 def _gauge(golden: pl.DataFrame, line: pl.DataFrame, name: str) -> Gauge | None:

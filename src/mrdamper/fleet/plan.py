@@ -71,10 +71,10 @@ def drafts(rows: dict[str, dict[str, Any]]) -> list[Plan]:
     """
     tests = [[_as_test(t) for t in row["tests"]] for row in rows.values()]
     matrix = _matrix([test for some in tests for test in some], len(rows))
-    found: list[list[Floats]] = [[] for _ in matrix]
+    loops_by_test: list[list[Floats]] = [[] for _ in matrix]
     for some, row in zip(tests, rows.values(), strict=True):
         for number, like in enumerate(by_test(some, matrix)):
-            found[number] += [np.array(row["loops"][i]) for i in like]
+            loops_by_test[number] += [np.array(row["loops"][i]) for i in like]
     top = max(Condition(*test).peak_velocity for test in matrix)
     rigs = [row["rig"] for row in rows.values()]
     rig = max(sorted(set(rigs)), key=rigs.count)
@@ -88,7 +88,7 @@ def drafts(rows: dict[str, dict[str, Any]]) -> list[Plan]:
             deviation=0.0,
             deviation_spread=0.0,
             matrix=matrix,
-            loops=tuple(tuple(np.round(np.median(some, axis=0), 3).tolist()) for some in found),
+            loops=tuple(tuple(np.round(np.median(some, axis=0), 3).tolist()) for some in loops_by_test),
             speeds=tuple(float(f"{step * top:.2g}") for step in _SPEED_STEPS),
             rig=rig if 2 * rigs.count(rig) > len(rigs) else "",
             references=tuple(rows),

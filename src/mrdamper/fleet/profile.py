@@ -52,8 +52,8 @@ class FleetProfile(_ProfileTable):
     @classmethod
     def _pattern_names_the_serial(cls, names: str | None) -> str | None:
         if names is not None:
-            found = re.findall(r"\{(\w*)\}", names)
-            if "serial" not in found or len(set(found)) < len(found) or not set(found) <= set(FACTS):
+            fields = re.findall(r"\{(\w*)\}", names)
+            if "serial" not in fields or len(set(fields)) < len(fields) or not set(fields) <= set(FACTS):
                 raise ValueError(f"a pattern needs {{serial}}, and each of {', '.join(FACTS)} at most once")
         return names
 

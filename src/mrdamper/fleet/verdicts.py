@@ -72,7 +72,7 @@ def suspects(frame: pl.DataFrame) -> list[Suspect]:
         values = frame[name].cast(float).fill_null(np.nan).to_numpy().astype(float)
         values = np.log(np.maximum(values, 1e-12)) if name == _SHAPE else values
         away[name] = _away(values, sessions)
-    found = []
+    suspected = []
     for i, row in enumerate(frame.iter_rows(named=True)):
         far = {n: z[i] for n, z in away.items() if (z[i] if n == _SHAPE else abs(z[i])) > _OUT}
         if not far:
@@ -81,8 +81,8 @@ def suspects(frame: pl.DataFrame) -> list[Suspect]:
         cause = next((text for n, sign, text in _CAUSES if far.get(n, 0) * sign > 0), "")
         cause = cause or ("odd loop: air in the oil, a valve" if _SHAPE in far else "look at it")
         text = tuple(f"{FEATURES[n][0] if n in FEATURES else 'loop shape'} {away[n][i]:+.0f} σ" for n in order)
-        found.append(Suspect(row["serial"], row["session"] or "", cause, text))
-    return found
+        suspected.append(Suspect(row["serial"], row["session"] or "", cause, text))
+    return suspected
 
 
 def _away(values: Floats, sessions: np.ndarray) -> Floats:
@@ -127,9 +127,9 @@ def drift(values: Floats, sessions: Sequence[str], serials: Sequence[str], golde
     own = logs.copy()
     for name in np.unique(names[watch]):
         own[names == name] -= np.mean(logs[names == name])
-    seen = _by_session(own, at, watch, len(order))
+    watched = _by_session(own, at, watch, len(order))
     share = np.arange(len(order)) / (len(order) - 1)
-    if np.sum(np.isfinite(seen)) < 3:
+    if np.sum(np.isfinite(watched)) < 3:
         change, sure = _trend(share, everyone)
         if not sure:
             return Drift(
@@ -140,8 +140,8 @@ def drift(values: Floats, sessions: Sequence[str], serials: Sequence[str], golde
             )
         text = f"Forces change by {100 * change:+.1f} %, but cannot tell drift of the rig apart: test master dampers."
         return Drift("cannot tell", np.nan, np.nan, text)
-    rig, rig_sure = _trend(share, seen)
-    line, line_sure = _trend(share, everyone - seen)
+    rig, rig_sure = _trend(share, watched)
+    line, line_sure = _trend(share, everyone - watched)
     verdict = {(True, False): "rig", (False, True): "line", (True, True): "both"}.get((rig_sure, line_sure), "none")
     certain = "neither is certain" if verdict == "none" else f"certain: {verdict}"
     text = f"From the first session to the last the rig changes by {100 * rig:+.1f} %"
@@ -160,25 +160,25 @@ def _trend(share: Floats, means: Floats) -> tuple[float, bool]:
     """Change over the whole time, and whether it is certain."""
     from scipy.stats import linregress
 
-    known = np.isfinite(means)
-    if np.sum(known) < 3:
+    finite = np.isfinite(means)
+    if np.sum(finite) < 3:
         return np.nan, False
-    found: Any = linregress(share[known], means[known])
-    return float(found.slope), bool(found.pvalue < _SURE and abs(found.slope) > _MATTERS)
+    line: Any = linregress(share[finite], means[finite])
+    return float(line.slope), bool(line.pvalue < _SURE and abs(line.slope) > _MATTERS)
 
 
 def clock_findings(frame: pl.DataFrame) -> list[str]:
     """List dates that cannot be read, or that run backwards from session to session."""
-    last, found = None, []
+    last, findings = None, []
     for session, text in frame.select("session", "date").unique(maintain_order=True).sort("session").iter_rows():
         if not text:
             continue
         try:
             day = date.fromisoformat(text[:10])
         except ValueError:
-            found.append(f"session {session}: {text!r} is no date like 2024-05-31")
+            findings.append(f"session {session}: {text!r} is no date like 2024-05-31")
             continue
         if last is not None and day < last[1]:
-            found.append(f"the clock jumps back from {last[1]} in session {last[0]} to {day} in session {session}")
+            findings.append(f"the clock jumps back from {last[1]} in session {last[0]} to {day} in session {session}")
         last = (session, day)
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(findings))

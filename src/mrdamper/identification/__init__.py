@@ -99,16 +99,16 @@ def identify(
     refuse_negative_dissipation(run)
     where = f"run {run.id}"
     try:
-        found = conclude(problem, chosen_method, chosen_method.solve(problem))
+        result = conclude(problem, chosen_method, chosen_method.solve(problem))
     except (np.linalg.LinAlgError, ArithmeticError) as error:
         raise IdentificationError(
             f"the samples do not determine the parameters ({error})",
             where=where,
-            mend="record more cycles, or more samples a cycle, and check the units",
+            mend="record more cycles, or more samples per cycle, and check the units",
         ) from error
-    if not np.isfinite(found.scores.nrmse_pp):
+    if not np.isfinite(result.scores.nrmse_pp):
         raise IdentificationError("the error of the fit is no number", where=where, mend="check the units of the force")
-    return found
+    return result
 
 
 def refuse_clipped(run: Run, clipped: bool = False) -> None:
@@ -149,9 +149,9 @@ def refuse_negative_dissipation(run: Run) -> None:
 def conclude(problem: Problem, method: Method, solution: Solution) -> Identification:
     """Score a solution; how certain it is, it says when asked."""
     motion = problem.motion.delayed(solution.delay) if solution.delay else problem.motion
-    seen = motion.part(problem.scored)
+    scored = motion.part(problem.scored)
     state = solution.model.state(motion)[problem.scored]
-    predicted = solution.model.force(seen, state)
+    predicted = solution.model.force(scored, state)
     residual = predicted - problem.force
     return Identification(
         run_id=problem.run.id,
@@ -162,7 +162,7 @@ def conclude(problem: Problem, method: Method, solution: Solution) -> Identifica
         free=problem.free,
         at_bounds=solution.at_bounds,
         delay=solution.delay,
-        scores=score(problem.force, predicted, seen.velocity, seen.time),
+        scores=score(problem.force, predicted, scored.velocity, scored.time),
         floor=problem.run.repeatability,
         start=solution.start,
         end=solution.end,

@@ -41,28 +41,28 @@ def certainty_of_run(
     if not columns:
         return RunCertainty()
     condition = problem.analysis.condition
-    found = spread(np.column_stack(columns), residual, motion.part(problem.scored).time, condition.frequency_Hz)
+    estimate = spread(np.column_stack(columns), residual, motion.part(problem.scored).time, condition.frequency_Hz)
     errors, dof, effective = (
-        dict(zip(names, v.tolist(), strict=True)) for v in (found.errors, found.dof, found.effective)
+        dict(zip(names, v.tolist(), strict=True)) for v in (estimate.errors, estimate.dof, estimate.effective)
     )
-    for name, (variance, seen_by) in _of_parameters(problem, point, names, found.covariance).items():
+    for name, (variance, seen_by) in _of_parameters(problem, point, names, estimate.covariance).items():
         errors[name] = math.sqrt(variance)
-        dof[name], effective[name] = (min(known[n] for n in seen_by) for known in (dof, effective))
+        dof[name], effective[name] = (min(values[n] for n in seen_by) for values in (dof, effective))
     shown = {name: error for name, error in errors.items() if name != DELAY}
-    doubts = weaknesses(names, found.covariance, found.alike, [condition])
-    if unseen := _unseen(problem, names, np.column_stack(columns), residual, found):
+    doubts = weaknesses(names, estimate.covariance, estimate.alike, [condition])
+    if unseen := _unseen(problem, names, np.column_stack(columns), residual, estimate):
         doubts = [f"no yielding in this motion: {', '.join(unseen)} not identifiable", *doubts]
         shown |= {name: float("inf") for name in shown if name in unseen or name not in problem.free}
-    if found.memory < _SHORT and np.any(residual):
+    if estimate.memory < _SHORT and np.any(residual):
         doubts.append(
-            f"the record is only {found.memory:.1f} times as long as its noise remembers: "
+            f"the record is only {estimate.memory:.1f} times as long as its noise remembers: "
             "intervals are a guess, record longer"
         )
     return RunCertainty(shown, dof, {name: effective[name] for name in shown}, tuple(doubts))
 
 
 def _unseen(
-    problem: Problem, names: Sequence[str], columns: Floats, residual: Floats, found: ParameterCovariance
+    problem: Problem, names: Sequence[str], columns: Floats, residual: Floats, errors: ParameterCovariance
 ) -> list[str]:
     """Parameters of the hysteresis where the other columns alone explain the force as well [Davies 1987].
 
@@ -81,7 +81,7 @@ def _unseen(
         problem.force - some @ np.linalg.lstsq(some, problem.force, rcond=None)[0]
         for some in (table, np.column_stack([table, columns[:, place]]))
     )
-    independent = max(float(found.effective[place]), _AT_LEAST)
+    independent = max(float(errors.effective[place]), _AT_LEAST)
     least = min(float(residual @ residual), float(whole @ whole))
     gain = float(without @ without) / max(least, np.finfo(float).tiny) - 1
     return searched if gain < _WORTH * (1 + len(searched)) / independent else []
@@ -91,26 +91,28 @@ def _sensitivities(
     problem: Problem, solution: Solution, motion: Excitation, state: Floats, residual: Floats
 ) -> tuple[dict[str, float], list[str], list[Floats]]:
     """Calculate the point, its free coordinates, and derivatives of the force by them."""
-    seen = motion.part(problem.scored)
+    scored = motion.part(problem.scored)
     linear = {i.name: getattr(solution.model, i.name) for i in solution.model.parameters() if i.linear}
     searched = {name: value for name, value in solution.end.items() if name != DELAY}
     point = {**problem.fixed, **searched, **linear}
     names = [n for n in (*linear, *searched) if (n in problem.free or n in searched) and n not in solution.at_bounds]
     infos = [info for info in solution.model.parameters() if info.name in names and info.name in linear]
     bare = replace(solution.model, **{info.name: 0.0 for info in infos})
-    known = dict(zip([info.name for info in infos], linear_table(bare, infos, seen, state)[1].T, strict=True))
+    linear_columns = dict(
+        zip([info.name for info in infos], linear_table(bare, infos, scored, state)[1].T, strict=True)
+    )
     base = residual + problem.force
     columns = []
     for name in names:
-        if name in known:
-            columns.append(known[name])
+        if name in linear_columns:
+            columns.append(linear_columns[name])
             continue
         step = _STEP * abs(point[name]) or _STEP
         moved = problem.model_type.build({**point, name: point[name] + step})
-        columns.append((moved.force(seen, moved.state(motion)[problem.scored]) - base) / step)
+        columns.append((moved.force(scored, moved.state(motion)[problem.scored]) - base) / step)
     if DELAY in solution.end and DELAY not in solution.at_bounds:
         names.append(DELAY)
-        columns.append(-np.gradient(base, seen.time))
+        columns.append(-np.gradient(base, scored.time))
     return point, names, columns
 
 
@@ -128,10 +130,10 @@ def _of_parameters(
         step = _STEP * abs(point[names[i]]) or _STEP
         moved = problem.model_type.build({**point, names[i]: point[names[i]] + step})
         slopes[:, k] = [(getattr(moved, name) - getattr(at, name)) / step for name in missing]
-    block, found = covariance[np.ix_(searched, searched)], {}
+    block, errors = covariance[np.ix_(searched, searched)], {}
     for name, row in zip(missing, slopes, strict=True):
         if (used := row != 0).any():
             variance = float(row[used] @ block[np.ix_(used, used)] @ row[used])
             seen_by = [names[i] for i, u in zip(searched, used, strict=True) if u]
-            found[name] = variance if np.isfinite(variance) else np.inf, seen_by
-    return found
+            errors[name] = variance if np.isfinite(variance) else np.inf, seen_by
+    return errors

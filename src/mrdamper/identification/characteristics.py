@@ -205,5 +205,5 @@ def _friction(strokes: Sequence[Stroke]) -> tuple[float, str]:
     if np.ptp(speed) > 0.5 * speed.min() and speed.size >= 3:
         line = np.polyfit(speed, half, 1)
         if line[1] >= 0:
-            return float(line[1]), f"at {level}, drawn to zero velocity: it holds the fluid's remaining yield force too"
+            return float(line[1]), f"at {level}, extrapolated to zero velocity; includes the fluid's yield force"
     return float("nan"), "not known: no slow test, and too few velocities at the lowest current"

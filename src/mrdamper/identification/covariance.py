@@ -84,32 +84,32 @@ def spread(
         jacobian, residual = (a[:kept].reshape(-1, block, *a.shape[1:]).mean(axis=1) for a in (jacobian, residual))
         time = None if time is None else time[:kept].reshape(-1, block).mean(axis=1)
     scale = np.sqrt(np.sum(jacobian**2, axis=0))
-    known = scale > 0
+    active = scale > 0
     size, count = residual.size, scale.size
     covariance = np.diag(np.full(count, np.inf))
-    if not known.any():
+    if not active.any():
         return ParameterCovariance(covariance, np.ones(count), np.zeros(count), np.full(count, np.inf), np.inf)
-    unit = jacobian[:, known] / scale[known]
+    unit = jacobian[:, active] / scale[active]
     values, vectors = np.linalg.eigh(unit.T @ unit)
-    safe = np.maximum(values, np.finfo(float).eps * values[-1] * known.sum())
+    safe = np.maximum(values, np.finfo(float).eps * values[-1] * active.sum())
     inverse = (vectors / safe) @ vectors.T
     score, dof, memory = score_covariance(unit, residual, time, frequency, inverse)
     middle = inverse @ score @ inverse
     weak = values <= _NO_MORE * values[-1]
     lost = np.sum(vectors[:, weak] ** 2, axis=1) > 1e-6
-    rows = np.flatnonzero(known)
+    rows = np.flatnonzero(active)
     alike = tuple(tuple(int(rows[i]) for i in group) for group, _ in alike_groups(vectors[:, weak]))
-    covariance[np.ix_(rows, rows)] = middle / scale[known][:, None] / scale[known]
+    covariance[np.ix_(rows, rows)] = middle / scale[active][:, None] / scale[active]
     for row in rows[lost]:
         covariance[row, :] = covariance[:, row] = 0.0
         covariance[row, row] = np.inf
     textbook = np.full(count, np.inf)
-    variance = squares / max(whole - known.sum(), 1)
-    textbook[rows] = np.where(lost, np.inf, variance / block * np.diag(inverse) / scale[known] ** 2)
+    variance = squares / max(whole - active.sum(), 1)
+    textbook[rows] = np.where(lost, np.inf, variance / block * np.diag(inverse) / scale[active] ** 2)
     with np.errstate(invalid="ignore", divide="ignore"):
         effective = np.nan_to_num(whole * textbook / np.diag(covariance), nan=0.0, posinf=float(whole))
     free = np.ones(count)
-    free[rows] = np.clip(dof, 1.0, max(size - known.sum(), 1))
+    free[rows] = np.clip(dof, 1.0, max(size - active.sum(), 1))
     return ParameterCovariance(covariance, free, np.minimum(effective, whole), np.sqrt(textbook), memory, alike)
 
 
@@ -177,9 +177,9 @@ def _repeated(
     gram = waves @ waves.T
     amplitudes = np.linalg.solve(gram, waves @ (residual - residual.mean()))
     rest = residual - amplitudes @ waves
-    seen = (waves @ jacobian).T  # (P, 2K)
+    responses = (waves @ jacobian).T  # (P, 2K)
     # Share of every wave that the parameters can take up, and so have taken out of the residual.
-    taken = np.clip(np.sum(seen * (inverse @ seen), axis=0) / np.diag(gram), 0.0, 1.0)
+    taken = np.clip(np.sum(responses * (inverse @ responses), axis=0) / np.diag(gram), 0.0, 1.0)
     left = (1 - taken).reshape(most, 2).mean(axis=1)
     power = (amplitudes**2).reshape(most, 2).mean(axis=1)
     model = _autoregression(rest)
@@ -189,8 +189,8 @@ def _repeated(
     if np.sum(power) < (1 + 3 / np.sqrt(left.sum())) * np.sum(expected * left):
         return residual, []
     level, relative = _power_law(orders, power, expected, left)
-    lines = (seen * np.repeat(level, 2)) @ seen.T
-    pull = inverse @ seen
+    lines = (responses * np.repeat(level, 2)) @ responses.T
+    pull = inverse @ responses
     shares = (pull**2 * np.repeat(level, 2)).reshape(count, most, 2).sum(axis=2)
     weights = shares / np.maximum(shares.sum(axis=1, keepdims=True), np.finfo(float).tiny)
     if np.ptp(time) * frequency < _TELLING:
@@ -212,8 +212,8 @@ def _power_law(orders: Floats, power: Floats, expected: Floats, left: Floats) ->
     for group in groups:
         amount = np.sum(power[group] / shapes[:, group], axis=1) / left[group].sum()
         level[:, group] = amount[:, None] * shapes[:, group]
-    seen = np.logical_or.reduce(groups) if groups else np.zeros(orders.size, dtype=bool)
-    costs = np.log(np.maximum(level[:, seen], _NOTHING)) @ left[seen]
+    covered = np.logical_or.reduce(groups) if groups else np.zeros(orders.size, dtype=bool)
+    costs = np.log(np.maximum(level[:, covered], _NOTHING)) @ left[covered]
     best = level[int(np.argmin(costs))]
     columns = np.column_stack([*[group.astype(float) for group in groups], -logs])
     information = (columns * left[:, None]).T @ columns

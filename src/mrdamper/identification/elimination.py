@@ -79,10 +79,10 @@ class Elimination:
 
     def solved(self, point: Mapping[str, float]) -> Model | None:
         """Model at a point of the search; None where it takes the general way."""
-        found = self.projector.solve(self._state(point)) if self.projector else None
-        if found is None:
+        solution = self.projector.solve(self._state(point)) if self.projector else None
+        if solution is None:
             return None
-        shape, (size, others) = self.kind.shape(point), found
+        shape, (size, others) = self.kind.shape(point), solution
         values = dict(zip((i.name for i in self.kind.others), others, strict=True))
         values[self.kind.state.name] = size * shape[0] if shape else size  # the state is zeta/kappa
         return self.problem.model_type.build({**self.problem.fixed, **point, **values})
@@ -163,15 +163,15 @@ def linear_structure(
         bare = [model_type.build({**point, **{i.name: 0.0 for i in linear}}) for point in points]
     except ParameterError:  # what is held leaves no room at one of the places
         return None
-    found = LinearStructure(
+    structure = LinearStructure(
         tuple(axis.name for axis in axes), state, tuple(i for i in linear if i is not state), bare[0]
     )
     shape = bare[0].shape
-    if shape is None or not {_LENGTH} <= set(found.coordinates) <= {_LENGTH, _ASYMMETRY, _SHARPNESS}:
-        return found
-    shaped = replace(found, rho=float(shape.rho), n=float(shape.n), has_shape=True)
+    if shape is None or not {_LENGTH} <= set(structure.coordinates) <= {_LENGTH, _ASYMMETRY, _SHARPNESS}:
+        return structure
+    shaped = replace(structure, rho=float(shape.rho), n=float(shape.n), has_shape=True)
     # A gamma that is held bends the asymmetry with the length.
-    return shaped if all(_has_shape(shaped, *pair) for pair in zip(bare, points, strict=True)) else found
+    return shaped if all(_has_shape(shaped, *pair) for pair in zip(bare, points, strict=True)) else structure
 
 
 def _has_shape(kind: LinearStructure, model: Model, point: Mapping[str, float]) -> bool:
@@ -215,15 +215,15 @@ class Projector:
 
     def residual(self, state: Floats) -> Floats | None:
         """Fitted minus right side for the best coefficients; None where a bound or dependence interferes."""
-        found = self._fit(state)
-        return None if found is None else found[0] * found[1] - self.fixed.rest
+        fit = self._fit(state)
+        return None if fit is None else fit[0] * fit[1] - self.fixed.rest
 
     def residual_and_slope(self, state: Floats, change: Floats) -> tuple[Floats, Floats] | None:
         """`residual`, and its derivative where the state changes at a rate [Golub and Pereyra 1973]."""
-        found = self._fit(state)
-        if found is None:
+        fit = self._fit(state)
+        if fit is None:
             return None
-        size, beside, _ = found
+        size, beside, _ = fit
         basis, rest = self.fixed.basis, self.fixed.rest
         moved = change - basis @ (change @ basis)
         growth = (float(moved @ rest) - 2 * size * float(moved @ beside)) / float(beside @ beside)
@@ -231,8 +231,8 @@ class Projector:
 
     def solve(self, state: Floats) -> tuple[float, list[float]] | None:
         """Best coefficients of the state and of the columns; None as `residual`."""
-        found = self._fit(state)
-        return None if found is None else (found[0], found[2].tolist())
+        fit = self._fit(state)
+        return None if fit is None else (fit[0], fit[2].tolist())
 
     def _fit(self, state: Floats) -> tuple[float, Floats, Floats] | None:
         fixed = self.fixed

@@ -57,19 +57,19 @@ class SineRecord:
         ExcitationError
             If it holds under one cycle, or its motion is no sine.
         """
-        found = analyse_motion(run)
-        if not found.is_sine:
+        analysis = analyse_motion(run)
+        if not analysis.is_sine:
             raise ExcitationError(
-                f"the motion is no sine: distortion {100 * found.distortion:.1f} %, "
-                f"motion at other frequencies {100 * found.stray:.0f} %; "
+                f"the motion is no sine: distortion {100 * analysis.distortion:.1f} %, "
+                f"motion at other frequencies {100 * analysis.stray:.0f} %; "
                 f"harmonic balance takes up to {100 * SINE_DISTORTION_LIMIT:g} and {100 * STRAY_LIMIT:g} %",
                 where=f"run {run.id}",
                 mend="identify with method projection, which follows any motion",
             )
-        steady, series = run.steady(), found.series
+        steady, series = run.steady(), analysis.series
         omega = 2 * np.pi * series.frequency
         theta = omega * (steady.time - series.origin) + series.phase(1) % (2 * np.pi)
-        measured = found.condition
+        measured = analysis.condition
         condition = Condition(measured.current_A, series.frequency, series.amplitude(1))
         return cls(run.id, condition, theta, steady.force)
 
@@ -240,8 +240,8 @@ def separate_mass(
                 mend=f"add runs at another {name}, or give the gas spring",
             )
     columns = [np.ones_like(X), -(omega**2)] + ([0.75 * X**2] if with_cubic else [])
-    found = solve_linear(np.column_stack(columns), np.asarray(in_phase, dtype=float))
-    return StiffnessAndMass(float(found[0]), float(found[2]) if with_cubic else 0.0, float(found[1]))
+    solution = solve_linear(np.column_stack(columns), np.asarray(in_phase, dtype=float))
+    return StiffnessAndMass(float(solution[0]), float(solution[2]) if with_cubic else 0.0, float(solution[1]))
 
 
 class HarmonicProjection:

@@ -125,7 +125,7 @@ def weaknesses(
         Of the tests: what they have one of only is the likely reason.
     """
     reason = _only_one(conditions)
-    said = [
+    sentences = [
         f"{_listed([names[i] for i in group])} are not {_both(group)} identifiable{reason}: "
         "they do the same to the force"
         for group in alike
@@ -133,8 +133,8 @@ def weaknesses(
     grouped = {i for group in alike for i in group}
     lost = [n for i, n in enumerate(names) if np.isinf(covariance[i, i]) and i not in grouped]
     if lost:
-        said.append(f"{_listed(lost)}: not identifiable{reason}, the force does not depend on it")
-    return said + [
+        sentences.append(f"{_listed(lost)}: not identifiable{reason}, the force does not depend on it")
+    return sentences + [
         f"{_listed([names[i] for i in group])} are strongly correlated (|r| up to {largest:.3f})"
         if len(group) > 2
         else f"{names[group[0]]} and {names[group[1]]} are strongly correlated (r = {largest:.3f})"
@@ -156,11 +156,11 @@ def _correlated(covariance: Floats) -> list[tuple[list[int], float]]:
     for pair in links:
         joined = [group for group in groups if group & set(pair)]
         groups = [group for group in groups if group not in joined] + [set(pair).union(*joined)]
-    found = []
+    sentences = []
     for group in groups:
         largest = max((r for (i, _), r in links.items() if i in group), key=abs)
-        found.append((sorted(group), largest if len(group) == 2 else abs(largest)))
-    return found
+        sentences.append((sorted(group), largest if len(group) == 2 else abs(largest)))
+    return sentences
 
 
 def _both(group: Sequence[int]) -> str:

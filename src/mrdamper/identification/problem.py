@@ -258,7 +258,9 @@ class Identification(Displayable):
             return self.ask()
         except (np.linalg.LinAlgError, ArithmeticError) as error:
             unknown = dict.fromkeys(self.free, np.inf)
-            return RunCertainty(unknown, unknown, doubts=(f"how sure the parameters are {NOT_IDENTIFIABLE}: {error}",))
+            return RunCertainty(
+                unknown, unknown, doubts=(f"the uncertainty of the parameters is {NOT_IDENTIFIABLE}: {error}",)
+            )
 
     @property
     def standard_errors(self) -> Mapping[str, float]:
@@ -284,12 +286,12 @@ class Identification(Displayable):
     def details(self) -> Sequence[str]:
         """Free parameters with their 95 % intervals and units, and the independent samples these rest on."""
         infos = {info.name: info for info in self.model.parameters()}
-        made = []
+        lines = []
         for name in self.free:
             state, ends = self._state(name), self.interval(name)
             count = f"{self.certainty.effective[name]:.0f} of {self.residual.size} samples independent" if ends else ""
-            made.append(f"{name} = {written(getattr(self.model, name), ends, infos[name].unit)} ({count or state})")
-        return made
+            lines.append(f"{name} = {written(getattr(self.model, name), ends, infos[name].unit)} ({count or state})")
+        return lines
 
     def _state(self, name: str) -> str:
         """Describe the state of one parameter."""

@@ -206,8 +206,8 @@ class Model(ABC):
         """Make the model as `build` does, every parameter stopped at its bounds."""
         bounds = {info.name: info.bounds for info in cls.parameters()}
         inside = {name: plain(np.clip(value, *bounds[name])) for name, value in values.items() if name in bounds}
-        made = cls.resolved({**values, **inside})
-        return cls(**{n: plain(np.clip(value, *bounds[n])) if n in bounds else value for n, value in made.items()})
+        model = cls.resolved({**values, **inside})
+        return cls(**{n: plain(np.clip(value, *bounds[n])) if n in bounds else value for n, value in model.items()})
 
     @classmethod
     def map_forms(cls) -> Mapping[str, tuple[str, ...]]:

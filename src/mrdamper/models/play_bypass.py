@@ -64,17 +64,19 @@ class PlayBypass(Model):
     source: ClassVar[str] = "derived from the bundled tests"
 
     f0: float = param("N", "offset force", linear=True)
-    k: float = param("N/m", "stiffness while the seat is not loaded", linear=True)
+    k: float = param("N/m", "stiffness within the free play", linear=True)
     c0: float = param("N s/m", "post-yield viscous damping without current", bounds=(0, np.inf), linear=True)
     c1: float = param("N s/m/A", "rise of the viscous damping with current", bounds=(0, np.inf), linear=True)
     fy0: float = param("N", "yield force without current", bounds=(1e-6, 1e7), scale="log")
     fy1: float = param("N/A", "rise of the yield force with current", bounds=(0, 1e8), scale="log")
-    d: float = param("m", "half the play and seat: lost motion is 2 (d − e)", bounds=(1e-6, 1e-2), scale="log")
-    e: float = param("m", "elastic displacement of the seat", bounds=(1e-9, 1e-2), scale="log")
-    cb: float = param("N s/m", "viscous damping of the bypass in the play", bounds=(1e-2, 1e10), scale="log")
-    h0: float = param("-", "share of the seated force that fades with velocity", bounds=(-1, 2))
+    d: float = param(
+        "m", "half the free play and spring travel: the free play is 2 (d − e)", bounds=(1e-6, 1e-2), scale="log"
+    )
+    e: float = param("m", "elastic displacement of the series spring", bounds=(1e-9, 1e-2), scale="log")
+    cb: float = param("N s/m", "viscous damping of the bypass in the free play", bounds=(1e-2, 1e10), scale="log")
+    h0: float = param("-", "Stribeck amplitude: decreasing share of the yield force", bounds=(-1, 2))
     h1: float = param("1/A", "rise of that share with current", bounds=(-1e3, 1e3))
-    vh: float = param("m/s", "velocity at which that share has faded by half", bounds=(1e-7, 10), scale="log")
+    vh: float = param("m/s", "Stribeck velocity: the share has decreased by half", bounds=(1e-7, 10), scale="log")
     T: float = param("s", "lag of the yield force", bounds=(0, 0.2), scale="log")
     asymmetry: float = param(
         "-",
@@ -97,7 +99,7 @@ class PlayBypass(Model):
     )
     leak: float = param(
         "1/s",
-        "share of the seat's load lost in a second at rest",
+        "relaxation rate of the spring force at rest",
         bounds=(0, 1e5),
         scale="log",
         preset=True,
@@ -108,12 +110,12 @@ class PlayBypass(Model):
 
     @property
     def knee(self) -> float:
-        """Lost motion and seat, 2 d [m]."""
+        """Free play and spring travel, 2 d [m]."""
         return 2 * self.d
 
     @property
     def seat_share(self) -> float:
-        """e/d, what the seat takes of the way; from 1 on there is no lost motion [-]."""
+        """Share of the spring in the travel, e/d; from 1 on there is no free play [-]."""
         return self.e / self.d
 
     @classmethod

@@ -26,7 +26,7 @@ def recorded(state: S) -> S:
     The array code runs once on symbols; without a compiler, and for few samples, it runs as it is written. Both
     agree to rounding. For models whose state is one number a sample.
     """
-    known: dict[type, list[RecordProgram]] = {}
+    records_of: dict[type, list[RecordProgram]] = {}
 
     @wraps(state)
     def along(self: Any, motion: Excitation) -> Floats:
@@ -36,7 +36,7 @@ def recorded(state: S) -> S:
         if len(motion) < _WORTHWHILE or not all(isinstance(value, float | int) for value in values.values()):
             return state(self, motion)
         given = tuple(map(float, values.values()))
-        records = known.setdefault(type(self), [])
+        records = records_of.setdefault(type(self), [])
         for record in records:
             if (derived := record.prepare(given)) is not None:
                 break
@@ -44,8 +44,8 @@ def recorded(state: S) -> S:
             record = RecordProgram(_traced(type(self), values, state))
             derived = record.prepare(given)
             records.append(record)
-        found = derived is not None and record.compiled_along(given, derived, record.starts, channels(motion))
-        return found.outputs[0] if found and found.failed < 0 else state(self, motion)
+        states = derived is not None and record.compiled_along(given, derived, record.starts, channels(motion))
+        return states.outputs[0] if states and states.failed < 0 else state(self, motion)
 
     return cast(S, along)
 

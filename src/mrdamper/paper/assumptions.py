@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mrdamper.data import Condition, Run
+from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError
 from mrdamper.identification import Method, identify
 from mrdamper.identification.harmonic_balance import separate_mass
@@ -127,7 +127,9 @@ def require_paper_functions(train: Sequence[Run]) -> None:
 def _levels(conditions: Sequence[Condition]) -> tuple[int, int, int, int]:
     """Count currents, frequencies, amplitudes and their products that differ by more than a rig's repeatability."""
     currents = np.unique(np.round([c.current_A for c in conditions], 2)).size
-    frequency, amplitude = np.log([(c.frequency_Hz, c.amplitude_m) for c in conditions]).T
-    sides = (np.diff(np.sort(values)) for values in (frequency, amplitude, frequency + amplitude))
-    counts = [1 + int(np.count_nonzero(steps > _SAME_LEVEL)) for steps in sides]
-    return currents, counts[0], counts[1], counts[2]
+    frequency, amplitude = (np.log([getattr(c, name) for c in conditions]) for name in ("frequency_Hz", "amplitude_m"))
+
+    def count(logs: Floats) -> int:
+        return 1 + int(np.count_nonzero(np.diff(np.sort(logs)) > _SAME_LEVEL))
+
+    return currents, count(frequency), count(amplitude), count(frequency + amplitude)

@@ -83,15 +83,15 @@ def stroke_end(study: Reproduction) -> Measured:
     top = max(c.current_A for c in study.conditions)
     linear = zip(*(values(study, CONSISTENT, name).tolist() for name in ("c", "k1", "m")), strict=True)
     tests = [
-        (condition.peak_velocity, run, c, k1 - m * (2 * np.pi * condition.frequency_Hz) ** 2)
+        (condition.peak_velocity, (run, c, k1 - m * (2 * np.pi * condition.frequency_Hz) ** 2))
         for condition, run, (c, k1, m) in zip(study.conditions, study.train, linear, strict=True)
         if condition.current_A > top - 0.01
     ]
     ends = min(tests, key=lambda p: p[0]), max(tests, key=lambda p: p[0])
-    (slow, *_), (fast, *_) = ends
+    slow, fast = (speed for speed, _ in ends)
     if fast < 1.3 * slow:
         return unknown("one speed at the highest current")
-    short, long = (1e3 * lost_length(*test) for _, *test in ends)
+    short, long = (1e3 * lost_length(*test) for _, test in ends)
     return Measured.of(
         long / short,
         evidence=f"at {top:g} A 90 % of the hysteretic force is back after {short:.2f} mm at {slow:.2f} m/s and after "

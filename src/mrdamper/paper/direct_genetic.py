@@ -69,7 +69,8 @@ class DirectGenetic(Method):
                 mend="use model bouc-wen, or another method",
             )
         record, box = _thinned(problem), self._box(problem)
-        return genetic(_Errors(problem, record, box), *zip(*box.values(), strict=True), self.genetic)
+        lower, upper = zip(*box.values(), strict=True)
+        return genetic(_Errors(problem, record, box), lower, upper, self.genetic)
 
     def solution(self, problem: Problem, minimum: GeneticMinimum) -> Solution:
         """Complete the end of a search to a solution."""

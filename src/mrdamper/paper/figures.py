@@ -330,7 +330,8 @@ def _accuracy_rate(study: Reproduction, axes: Texts) -> Drawing:
         lines = []
         for method, colour in zip(dict.fromkeys(row["method"] for row in rows), PALETTE[1:], strict=False):
             own = [(r["current_A"], scale * r[name]) for r in rows if r["method"] == method and r[name] is not None]
-            lines.append(Line(*np.reshape(own, (-1, 2)).T, method, {**_POINTS, "color": colour}))
+            x, y = np.reshape(own, (-1, 2)).T
+            lines.append(Line(x, y, method, {**_POINTS, "color": colour}))
         panels.append(Panel(text, lines, log="y" if name == "forces_until_settled" else ""))
     return Chart(panels, 2.9, "above", margins={"top": 0.5})
 

@@ -8,7 +8,7 @@ from functools import partial
 from typing import ClassVar, Literal, get_args, get_origin, get_type_hints
 
 from mrdamper.data import Run
-from mrdamper.errors import ParameterError, UnknownNameError
+from mrdamper.errors import IdentificationError, ParameterError, UnknownNameError
 from mrdamper.identification.harmonic_balance import AmplitudeReading, OffsetReading, PhaseReading
 from mrdamper.paper.assumptions import PaperAssumptions, outside_paper_range, require_paper_functions
 from mrdamper.paper.functions import fit_paper_functions
@@ -20,6 +20,8 @@ from mrdamper.study.recipe import Recipe, StudyMethod, modified
 MassLaw = Literal["exponential", "inverse-square", "power"]
 FrictionTest = Literal["dry", "filled"]
 Search = Literal["genetic", "optimum"]
+_TITLE, _SOURCE = "Method of Qian et al. 2024", "Qian et al. 2024"
+_LIMITS = "sines only; the parameter functions need the frequency and amplitude of a sine"
 
 
 @dataclass(frozen=True)
@@ -132,9 +134,9 @@ class PaperOptions(StudyMethod):
             basis=assumptions.basis(self.method()),
             make=partial(fit_paper_functions, mass_law=self.mass_law),
             way="paper, literal",
-            title="Method of Qian et al. 2024",
-            source="Qian et al. 2024",
-            limits="sines only; the parameter functions need the frequency and amplitude of a sine",
+            title=_TITLE,
+            source=_SOURCE,
+            limits=_LIMITS,
             pure=True,
             notes=(*assumptions.notes, *outside_paper_range(train)),
         )
@@ -145,5 +147,13 @@ class PaperOptions(StudyMethod):
 
     @classmethod
     def compared(cls) -> Sequence[Recipe]:
-        """Bouc–Wen by the genetic searches, with parameter functions as of other models."""
-        return [replace(modified("bouc-wen", method), on_request=True) for method in ("paper", "direct-genetic")]
+        """Return the method itself, and Bouc–Wen by the genetic searches with functions as of other models."""
+        searches = [replace(modified("bouc-wen", method), on_request=True) for method in ("paper", "direct-genetic")]
+        heading = Recipe("paper", None, fit_paper_functions, "paper, literal", _TITLE, _SOURCE, _LIMITS)
+        return [replace(heading, complete=partial(_beside_others, cls)), *searches]
+
+
+def _beside_others(cls: type[PaperOptions], train: Sequence[Run]) -> Recipe:
+    if len(train) < 3:
+        raise IdentificationError("fewer than three identification runs of a pure sine", mend="test sines")
+    return cls().beside_others().recipe(train)

@@ -190,7 +190,7 @@ def _error_rows(study: Reproduction) -> Rows:
 def _model_rows(study: Reproduction) -> Rows:
     """List the modified model beside the models the paper names: parameters, data needed, limits [Table 5]."""
     literal = study.contender(LITERAL)
-    rows = [
+    rows: list[tuple[Any, ...]] = [
         ("modified model of Qian et al.", 2, len(literal.identifications[0].free) if literal else None,
          "sines at 3 currents, 3 frequencies and 2 amplitudes; the gas spring",
          "sines; double counting of the hysteretic force in c and m")
@@ -212,7 +212,7 @@ def parameter_rows(study: Reproduction) -> Rows:
     """
     rows: Rows = []
 
-    def add(title: str, values: str, run_id: str, condition: Condition, model: Model) -> None:
+    def add(title: str, values: str, run_id: str, condition: Condition, model: object) -> None:
         if isinstance(model, BoucWen):
             row = {"method": title, "values": values, "run_id": run_id, **_condition(condition)}
             rows.append({**row, **_parameters(study, model)})
@@ -244,8 +244,9 @@ def _parameters(study: Reproduction, model: Model) -> dict[str, float]:
 def _function_rows(study: Reproduction) -> Rows:
     rows = []
     for method in study.contenders:
-        fit = method.fit
-        for name, one in fit.functions.items() if isinstance(fit, ModifiedFit) else ():
+        if not isinstance(fit := method.fit, ModifiedFit):
+            continue
+        for name, one in fit.functions.items():
             # A parameter that was held has no variation to explain.
             varies = np.ptp(fit.values[name]) > 1e-9 * np.max(np.abs(fit.values[name]), initial=0.0)
             rows.append(

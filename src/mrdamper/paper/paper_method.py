@@ -94,7 +94,8 @@ class Paper(Method):
     def genetic_search(self, problem: Problem) -> GeneticMinimum:
         """Run the genetic search alone; errors as `solve`."""
         rest = _Remainder.of(self, problem).thinned(_SEARCH_SAMPLES)
-        return genetic(rest.costs, *zip(*self.bounds, strict=True), self.genetic)
+        lower, upper = zip(*self.bounds, strict=True)
+        return genetic(rest.costs, lower, upper, self.genetic)
 
     def cost(self, problem: Problem) -> Callable[[Floats], Floats]:
         """Return the RMS error [N] over all samples as a function of (P, 2) points (alpha, beta) [Eq. 21]."""

@@ -156,7 +156,8 @@ def sobol(
     first, total = indices(np.arange(samples))
     redrawn = [indices(rng.integers(samples, size=samples)) for _ in range(_BOOTSTRAP_SAMPLES)]
     low, high = np.quantile(redrawn, (0.025, 0.975), axis=0)
-    return Sobol(tuple(names), first, total, *((high - low) / 2), spread)
+    first_half, total_half = (high - low) / 2
+    return Sobol(tuple(names), first, total, first_half, total_half, spread)
 
 
 def _varied(model: BoucWen, factors: Mapping[str, float]) -> BoucWen:

@@ -9,7 +9,7 @@ import base64
 import io
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from difflib import get_close_matches
 from pathlib import Path
@@ -112,7 +112,7 @@ def about_of(table: Mapping[str, Any], where: str) -> About:
     for name, value in table.items():
         if name not in known:
             near = get_close_matches(name, known, n=1)
-            mend = f"did you mean {near[0]}?" if near else "mrdamper init about shows the fields"
+            mend = f"did you mean {near[0]}?" if near else f"the fields are {', '.join(known)}"
             raise AboutError(f"unknown field {name!r}", where=where, mend=mend)
         if isinstance(value, (dict, list, bool)):
             raise AboutError(f"{name} is no text", where=where, mend=f'write {name} = "..."')
@@ -142,8 +142,8 @@ def load_limits(path: str | Path) -> tuple[Limit, ...]:
     Raises
     ------
     AboutError
-        If it cannot be read, a key is unknown, or a limit is incomplete, no number, of no side, or its
-        lower force above the upper.
+        If it cannot be read, a key is unknown, a limit is incomplete, no number, of no side, or its
+        lower force above the upper, or two limits at one point exclude each other.
     """
     path = Path(path)
     table = _toml(path)
@@ -152,7 +152,26 @@ def load_limits(path: str | Path) -> tuple[Limit, ...]:
     if not isinstance(entries, list) or not entries:
         mend = f"write one [[limit]] table per limit with {_FIELDS} (mrdamper init limits)"
         raise AboutError("no [[limit]] tables", where=str(path), mend=mend)
-    return tuple(_limit(entry, f"{path}, limit {number}") for number, entry in enumerate(entries, 1))
+    limits = tuple(_limit(entry, f"{path}, limit {number}") for number, entry in enumerate(entries, 1))
+    _refuse_exclusion(limits, str(path))
+    return limits
+
+
+def _refuse_exclusion(limits: Sequence[Limit], where: str) -> None:
+    """Refuse two limits at the same point that no force meets."""
+    points: dict[tuple[float, float, str], list[tuple[int, Limit]]] = {}
+    for number, limit in enumerate(limits, 1):
+        others = points.setdefault((limit.current_A, limit.velocity_m_s, limit.side), [])
+        for before, other in others:
+            if max(limit.lower_N, other.lower_N) > min(limit.upper_N, other.upper_N):
+                raise AboutError(
+                    f"no force meets limit {before} ({other.lower_N:g} to {other.upper_N:g} N) and limit {number} "
+                    f"({limit.lower_N:g} to {limit.upper_N:g} N), both at {limit.current_A:g} A, "
+                    f"{limit.velocity_m_s:g} m/s, {limit.side}",
+                    where=where,
+                    mend="remove one of them",
+                )
+        others.append((number, limit))
 
 
 _FIELDS = "current_A, velocity_m_s, side, lower_N, upper_N"

@@ -25,8 +25,9 @@ from mrdamper.report.fonts import Fallback, fallback_fonts
 _MARGIN = 18.0  # mm
 _INK, _FAINT, _RULE = (27, 31, 36), (91, 101, 112), (217, 222, 227)
 _SIZES = {"h1": 18.0, "h2": 14.0, "h3": 11.0, "p": 9.5, "table": 8.0, "caption": 8.0}  # pt
-_SMALLEST = 6.0  # pt, below which a table turns its page instead
-_PADDING = 3.8  # mm beside a cell's text
+_SMALLEST = 6.0  # type size [pt] below which a table is split by columns
+_MIN_SCALE = 0.7  # of a figure that is made smaller to fit the rest of a page [-]
+_PADDING = 3.0  # mm beside a cell's text
 _NARROWEST = 28.0  # mm of a column whose text runs over lines
 _LOGO = (50.0, 14.0)  # mm, the room of a logo
 _KEEP = 42.0  # mm a heading wants below itself, so that it never ends a page
@@ -148,6 +149,7 @@ def pdf_of(page: str, figures: Mapping[str, bytes], paper: str = "a4") -> bytes:
     for part in ("header", "main", "footer"):
         for element in tree.root.elements(part):
             writer.block(element)
+    writer.place_waiting(all_of_them=True)
     if fallback.missing:
         writer.paragraph(_Element("p", {"class": "faint"}, [fallback.sentence]))
     return _with_figures(bytes(sheet.output()), writer.places, figures)
@@ -157,7 +159,7 @@ class _Writer:
     def __init__(self, paper: _Paper, figures: Mapping[str, bytes]) -> None:
         self.paper, self.figures = paper, figures
         self.kept = 0.0  # mm that a heading wants below itself for what follows it
-        self.wide = False  # what follows is a table that needs a page turned
+        self.waiting: list[_Element] = []  # figures that did not fit the rest of their page
         self.places: list[tuple[str, int, float, float, float]] = []  # figure, page, left, bottom [mm], width
 
     def block(self, element: _Element) -> None:
@@ -168,8 +170,6 @@ class _Writer:
         known |= {"figure": self.figure, "li": self.item, "p": self.paragraph, "summary": self.folded}
         known |= {"img": self.logo}
         if element.tag in known:
-            if self.turned and element.tag != "table" and not (element.tag in ("summary", "h3") and self.wide):
-                self.paper.add_page(orientation="P")
             known[element.tag](element)
         elif "big" in (element.attributes.get("class") or ""):
             self.numbers(element)
@@ -179,21 +179,33 @@ class _Writer:
                 self.paragraph(_Element("p", element.attributes, list(loose)))
             blocks = [c for c in element.children if isinstance(c, _Element) and c.tag not in _INLINE]
             for child, following in zip(blocks, [*blocks[1:], None], strict=False):
-                self.kept, self.wide = self._height(following), self._is_wide(following)
+                self.kept = _MIN_SCALE * self._height(following)
                 self.block(child)
+                if child.tag not in ("h2", "h3", "summary"):
+                    self.place_waiting()
 
-    @property
-    def turned(self) -> bool:
-        """Whether the page lies on its side."""
-        return self.paper.w > self.paper.h
+    def place_waiting(self, *, all_of_them: bool = False) -> None:
+        """Set the figures that wait, where they fit by now; all of them on further pages before a chapter ends."""
+        waiting, self.waiting = self.waiting, []
+        for number, element in enumerate(waiting):
+            if not all_of_them and not self._scale(element):
+                self.waiting += waiting[number:]  # they keep their order
+                return
+            if not self._scale(element):
+                self.paper.add_page()
+            self.figure(element)
 
-    def _is_wide(self, element: _Element | None) -> bool:
-        table = next(element.elements("table"), None) if element and element.tag in ("div", "details") else element
-        if table is None or table.tag != "table":
-            return False
-        rows = _cells(table)
-        upright = min(self.paper.w, self.paper.h) - 2 * _MARGIN
-        return bool(rows) and self._fitted([[cell.text for cell in row] for row in rows], rows, upright)[0] < _SMALLEST
+    def reserve(self, height: float) -> None:
+        """Begin a page, with the figures that wait at its top, where the rest of this one is lower [mm]."""
+        while self.paper.will_page_break(height):
+            self.paper.add_page()
+            self.place_waiting()
+
+    def _scale(self, element: _Element) -> float:
+        """Scale at which a figure fits the rest of the page; 0 where that is too small to be read."""
+        room = self.paper.page_break_trigger - self.paper.get_y() - self._height(element, caption_only=True)
+        scale = min(1.0, room / (self._height(element) - self._height(element, caption_only=True)))
+        return scale if scale >= _MIN_SCALE else 0.0
 
     def logo(self, element: _Element) -> None:
         """A picture that stands in the page itself, at the right margin."""
@@ -205,11 +217,10 @@ class _Writer:
     def heading(self, element: _Element) -> None:
         """A heading, with room below it for what it heads."""
         paper, size = self.paper, _SIZES[element.tag]
-        if self.wide and element.tag == "h3":
-            paper.add_page(orientation="L")
-        elif paper.will_page_break(max(_KEEP, self.kept + 0.8 * size)) and element.tag != "h1":
-            paper.add_page()
-        elif paper.get_y() > _MARGIN + 1:
+        if element.tag == "h2":
+            self.place_waiting(all_of_them=True)
+        self.reserve(max(_KEEP, self.kept + 0.8 * size) if element.tag != "h1" else 0.0)
+        if paper.get_y() > _MARGIN + 1:
             paper.ln(0.35 * size)
         paper.set_font("text", "B", size)
         if element.tag != "h1":
@@ -245,20 +256,17 @@ class _Writer:
 
     def folded(self, element: _Element) -> None:
         """What a folded part of the page is called; here the part stands open."""
-        if self.wide and not self.turned:
-            self.paper.add_page(orientation="L")
-        elif self.paper.will_page_break(_KEEP):
-            self.paper.add_page()
+        self.reserve(_KEEP)
         self.paragraph(_Element("p", {}, [_Element("b", {}, [element.text])]))
 
-    def _height(self, element: _Element | None) -> float:
-        """What a figure takes [mm]; nothing for other blocks, which may run over pages."""
+    def _height(self, element: _Element | None, *, caption_only: bool = False) -> float:
+        """Height of a figure with its caption, or of the caption [mm]; 0 of other blocks, which may run over pages."""
         if element is None or element.tag != "figure" or element.attributes.get("id") not in self.figures:
             return 0.0
         wide, tall = _size_of(self.figures[str(element.attributes["id"])])
         caption = next(element.elements("figcaption"), None)
         lines = len(caption.text) // 110 + 1 if caption else 0
-        return tall * min(1.0, self.paper.epw / wide) + 6.0 + 4.0 * lines
+        return 6.0 + 4.0 * lines + (0.0 if caption_only else tall * min(1.0, self.paper.epw / wide))
 
     def item(self, element: _Element) -> None:
         """An item of a list."""
@@ -271,16 +279,18 @@ class _Writer:
             self.paragraph(_Element("p", {}, [_Element("b", {}, [value]), f"  {next(box.elements('span')).text}"]))
 
     def figure(self, element: _Element) -> None:
-        """A figure and its caption, on one page."""
+        """A figure and its caption, on one page: smaller where it nearly fits, later where it does not."""
         name = element.attributes.get("id") or ""
         paper = self.paper
+        scale = self._scale(element) if name in self.figures else 1.0
+        if not scale:
+            self.waiting.append(element)
+            return
         caption = next(element.elements("figcaption"), None)
         if name in self.figures:
             wide, tall = _size_of(self.figures[name])
-            width = min(paper.epw, wide)
+            width = scale * min(paper.epw, wide)
             height = tall * width / wide
-            if paper.will_page_break(self._height(element)):
-                paper.add_page()
             bottom = paper.h - paper.get_y() - height
             self.places.append((name, paper.page_no() - 1, _MARGIN, bottom, width))
             paper.set_y(paper.get_y() + height + 1)
@@ -289,23 +299,32 @@ class _Writer:
 
     def table(self, element: _Element) -> None:
         """A table whose headings stand on every page it runs over."""
-        paper = self.paper
         caption = next(element.elements("caption"), None)
         rows = _cells(element)
         if not rows:
             return
-        texts = [[cell.text for cell in row] for row in rows]
-        size, widths = self._fitted(texts, rows)
-        if size < _SMALLEST and not self.turned:
-            paper.add_page(orientation="L")
-            size, widths = self._fitted(texts, rows)
-        elif paper.will_page_break(14 + 0.5 * size * min(len(rows), 4)):
-            paper.add_page()
+        parts = self._parts(rows)
+        self.reserve(14 + 0.5 * _SIZES["table"] * min(len(rows), 4))
         if caption:
             self.paragraph(_Element("p", {"class": "caption"}, caption.children), _SIZES["caption"])
-        size, room = max(size, _SMALLEST), paper.h - 2 * _MARGIN - 16
-        while size > _SMALLEST and room < len(rows) * (0.5 * size + 0.8) < 1.3 * room:
-            size -= 0.25  # a few rows more than a page holds: they need no page of their own
+        for part in parts:
+            self._part(part)
+
+    def _parts(self, rows: list[list[_Element]]) -> list[list[list[_Element]]]:
+        """Split the columns of a table that is too wide for the page; the first column stands in every part."""
+        columns = len(rows[0])
+        texts = [[cell.text for cell in row] for row in rows]
+        if columns < 4 or any(len(row) != columns for row in rows) or self._fitted(texts, rows)[0] >= _SMALLEST:
+            return [rows]
+        half = (columns + 1) // 2
+        left, right = [row[:half] for row in rows], [[row[0], *row[half:]] for row in rows]
+        return [*self._parts(left), *self._parts(right)]
+
+    def _part(self, rows: list[list[_Element]]) -> None:
+        """Set rows of cells that fit the width of the page."""
+        paper, texts = self.paper, [[cell.text for cell in row] for row in rows]
+        size, widths = self._fitted(texts, rows)
+        size = max(size, _SMALLEST)
         paper.set_font("text", size=size)
         paper.set_draw_color(*_RULE)
         headed = bool(rows[0]) and rows[0][0].tag == "th"
@@ -325,9 +344,7 @@ class _Writer:
                     line.cell(text, align=_alignment(cell, first=cell is row[0]))
         paper.ln(2)
 
-    def _fitted(
-        self, texts: list[list[str]], rows: list[list[_Element]], width: float | None = None
-    ) -> tuple[float, list[float]]:
+    def _fitted(self, texts: list[list[str]], rows: list[list[_Element]]) -> tuple[float, list[float]]:
         """Size of type at which a table fits the page, and its columns' widths [mm]."""
         paper, size = self.paper, _SIZES["table"]
         columns = max(len(row) for row in texts)
@@ -343,7 +360,7 @@ class _Writer:
                     words[i] = max(words[i], longest + _PADDING)
             free = sum(w for w, wrap in zip(widths, wraps, strict=True) if wrap)
             kept = sum(w for w, wrap in zip(widths, wraps, strict=True) if not wrap)
-            room = (width or paper.epw) - kept
+            room = paper.epw - kept
             if free <= room:
                 return size, widths
             least = {i: max(_NARROWEST, words[i]) for i, wrap in enumerate(wraps) if wrap}

@@ -24,7 +24,7 @@ from mrdamper.identification import Identification
 from mrdamper.identification.characteristics import Characteristics, characterise
 from mrdamper.identification.intervals import written
 from mrdamper.models import Model
-from mrdamper.report.about import About, Limit
+from mrdamper.report.about import About, Limit, about_of, load_about, load_limits
 from mrdamper.report.damper_tests import facts_of_tests, figures_of_tests, force_rows, provenance
 from mrdamper.report.limitations import Limitation, by_group, limitations
 from mrdamper.report.page import made_from, plain, render_page
@@ -48,8 +48,8 @@ def write_study(
     folder: str | Path,
     progress: Progress = lambda what, share: None,
     *,
-    about: About | None = None,
-    limits: Sequence[Limit] = (),
+    about: About | Mapping[str, Any] | str | Path | None = None,
+    limits: Sequence[Limit] | str | Path = (),
     also: Sequence[str] = (),
     drawn: Sequence[Mapping[str, Picture]] = (),
     paper: str = "a4",
@@ -63,10 +63,11 @@ def write_study(
         Made if missing; files of the same names are replaced together at the end.
     progress : callable
         Called with the name of the step and the share done, 0...1.
-    about : About, optional
-        Head of the report.
-    limits : sequence of Limit
-        Limits of the measured damping force; pass or fail is stated only against these.
+    about : About, mapping or path, optional
+        Head of the report: its fields, or a TOML file (`mrdamper init about`).
+    limits : sequence of Limit or path
+        Limits of the measured damping force, or a TOML file (`mrdamper init limits`); pass or fail is stated only
+        against these.
     also : sequence of str
         "png" and "pdf": every figure in that format too; with "pdf" comes report.pdf.
     drawn : sequence of mapping, optional
@@ -81,10 +82,14 @@ def write_study(
 
     Raises
     ------
+    AboutError
+        If `about` or `limits` cannot be read, or has an unknown field.
     OutputError
         If the folder cannot be written to.
     """
-    drawn = drawn or HERE.map(partial(_draw, also=tuple(also), limits=tuple(limits)), study.rigs, progress)
+    head = _head(about)
+    limits = load_limits(limits) if isinstance(limits, (str, Path)) else tuple(limits)
+    drawn = drawn or HERE.map(partial(_draw, also=tuple(also), limits=limits), study.rigs, progress)
 
     def fill(work: Path) -> None:
         (work / "figures").mkdir()
@@ -100,7 +105,6 @@ def write_study(
             forces += force_rows(chapters[-1]["measured"] or {})
         footer = f"{made_from(study.dataset)}."
         title = f"MR damper study: {', '.join(r.rig for r in study.rigs) or study.dataset.name}"
-        head = about or About()
         origin = provenance({rig.rig or rig.dataset.name: rig.dataset for rig in study.rigs})
         page = render_page(
             "study.html.j2", head.title or title, footer, chapters=chapters, about=head, provenance=origin
@@ -124,6 +128,13 @@ def write_study(
     written = publish(folder, "report.html", fill, {"seconds": {"in all": study.seconds, **took}})
     progress("written", 1.0)
     return written
+
+
+def _head(about: About | Mapping[str, Any] | str | Path | None) -> About:
+    """Return the head of a report in the form in which it is printed."""
+    if isinstance(about, (str, Path)):
+        return load_about(about)
+    return about if isinstance(about, About) else about_of(about or {}, "about")
 
 
 def study_and_draw(

@@ -20,7 +20,7 @@ from mrdamper.rig_files.column_names import (
     split_name,
     unknown_unit,
 )
-from mrdamper.rig_files.conditions import stated_rate
+from mrdamper.rig_files.conditions import rate_in_name, stated_rate
 from mrdamper.rig_files.readers.base import RawTable, RigFileError
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED
 from mrdamper.rig_files.units import DIMENSION, Unit, parse_unit
@@ -131,7 +131,8 @@ def rate_of(table: RawTable, profile: Profile) -> float | None:
         return profile.file.sample_rate_Hz
     decimal = table.form.get("decimal")
     try:
-        return stated_rate(table.remarks, table.constants, decimal if isinstance(decimal, str) else None)
+        stated = stated_rate(table.remarks, table.constants, decimal if isinstance(decimal, str) else None)
+        return stated or rate_in_name(table.source.name)
     except ValueError as error:
         raise table.source.refuse(
             "E_AMBIGUOUS", f"two sampling rates: {error}", "say [file] sample_rate_Hz = ... in a profile"

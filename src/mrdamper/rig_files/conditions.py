@@ -23,6 +23,7 @@ _IN_NAME = re.compile(
     r"([0-9]{1,4}(?:[.,xp][0-9]{1,4})?)[ _]?(m?)(?:A(?:mp(?:ere)?s?)?|amp(?:ere)?s?|(?<=m)a)"
     r"(?![A-Za-z0-9]|\s?/\s?[A-Za-z])"
 )
+_NEXT_NUMBER = re.compile(r"_A_[0-9.]+(?:_|\.[a-z]{2,4}$|$)")  # 2_A_20: the name of the next number
 _NEGATIVE = re.compile(r"[=:]\s*[-−]$")  # a dash elsewhere may stand between two parts of a name
 _NUMERIC_CELL = re.compile(r"[,;]\s*\"?[+-]?[0-9.]+\"?\s*$")
 _LINE = re.compile(
@@ -48,6 +49,14 @@ _STEP = re.compile(
     r"|^[hx][ _]?(?:resolution|interval|increment|step)$",
     re.IGNORECASE,
 )
+_SHARE = re.compile(
+    r"^[\s#%/\"]*(?:coil )?(?:current|drive|strom)\s*[:=;,\t]\s*(?P<number>[0-9]+(?:[.,][0-9]+)?)\s*%\s*of rated",
+    re.IGNORECASE,
+)
+_RATE_IN_NAME = re.compile(
+    r"(?<![A-Za-z0-9.])(?:fs[_=]?(?P<a>[0-9]+(?:[.,][0-9]+)?)[ _]?(?P<ka>k?)Hz"
+    r"|(?P<b>[0-9]+(?:[.,][0-9]+)?)[ _]?(?P<kb>k?)Hz[_ ]?fs(?![A-Za-z]))"
+)
 _SPACED = re.compile(
     r"^[\s#%/\"]*(?P<key>[^\d:=;,\t]{1,60}?)\s+(?P<number>[+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]{1,2})?)\s*(?P<unit>(?:1/)?[A-Za-zµ/]{1,9}(?:-1)?)\s*$"
 )
@@ -72,6 +81,7 @@ def currents_in(text: str) -> tuple[float, ...]:
         return ()
     # 04A may be four or 0.4 amperes; 0400mA is padded.
     stated = [match for match in _IN_NAME.finditer(text) if match[2] or not re.fullmatch("0[1-9]+", match[1])]
+    stated = [match for match in stated if not _NEXT_NUMBER.match(text, match.end(1))]
     signs = [-1.0 if _NEGATIVE.search(text[: match.start()]) else 1.0 for match in stated]
     found = [sign * amperes(match[1], f"{match[2]}A") + 0.0 for sign, match in zip(signs, stated, strict=True)]
     return tuple(dict.fromkeys(found))
@@ -98,12 +108,20 @@ def stated_by_lines(lines: Iterable[str], decimal: str | None = None) -> list[St
 
     With the file's decimal mark it is known which numbers have a thousands mark.
     """
-    found = []
+    lines, found, rated = list(lines), [], []
     for line in lines:
         for key, value, known in _quantities(line, decimal):
             coil = names_condition(key, "current") or (names_coil(key) and not _RATING.search(key))
-            if known.dimension == "current" and coil and not _OTHER_TIME.search(key):
+            if known.dimension != "current" or _OTHER_TIME.search(key):
+                continue
+            if re.search("rated", key, re.IGNORECASE):
+                rated.append(value)
+            elif coil and not _LABELLED_RATING.search(key):
                 found.append(Statement(value, f"the line {line.strip()[:60]!r}"))
+    shares = [(match, line) for line in lines if len(set(rated)) == 1 and (match := _SHARE.match(line[:_LONGEST_LINE]))]
+    for match, line in shares:
+        share = float(match["number"].replace(",", ".")) / 100
+        found.append(Statement(share * rated[0], f"the line {line.strip()[:60]!r}"))
     return found
 
 
@@ -115,6 +133,15 @@ def stated_in_titles(lines: Iterable[str]) -> list[Statement]:
         if len(stated) == 1:
             found.append(Statement(stated[0], f"the line {line.strip()[:60]!r}"))
     return found if len({statement.amperes for statement in found}) == 1 else []
+
+
+def rate_in_name(name: str) -> float | None:
+    """Sampling rate [Hz] in a file's name: 500Hz_fs, fs_2kHz; None if there is none."""
+    match = _RATE_IN_NAME.search(name[:255])
+    if match is None:
+        return None
+    number = float((match["a"] or match["b"]).replace(",", "."))
+    return 1000 * number if match["ka"] or match["kb"] else number
 
 
 def stated_rate(lines: Iterable[str], numbers: Mapping[str, float], decimal: str | None = None) -> float | None:

@@ -158,8 +158,8 @@ def runs_table(folder: Path) -> list[dict[str, Any]]:
         with path.open(encoding="utf-8-sig", newline="") as file:
             rows = _rows_of(csv.reader(file), path)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        found = str(error).splitlines()[0]
-        raise DatasetError(found, where=str(path), mend="write it as comma-separated UTF-8") from error
+        reason = str(error).splitlines()[0]
+        raise DatasetError(reason, where=str(path), mend="write it as comma-separated UTF-8") from error
     if not rows:
         raise DatasetError("no rows", where=str(path), mend="add one row a run")
     return rows
@@ -168,8 +168,8 @@ def runs_table(folder: Path) -> list[dict[str, Any]]:
 def _rows_of(lines: Iterable[list[str]], path: Path) -> list[dict[str, Any]]:
     """Rows by column; empty cells are None."""
 
-    def refuse(found: str) -> DatasetError:
-        return DatasetError(found, where=str(path), mend="write one row a run and one column a fact")
+    def refuse(reason: str) -> DatasetError:
+        return DatasetError(reason, where=str(path), mend="write one row a run and one column a fact")
 
     if path.stat().st_size > _RUNS_BYTES:
         raise refuse(f"over {_RUNS_BYTES // 2**20} MB")

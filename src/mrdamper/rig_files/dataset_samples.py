@@ -117,8 +117,8 @@ def _require(names: list[str], path: Path) -> None:
 
 
 def _in_order(names: Iterable[str]) -> list[str]:
-    known = [name for name in (*REQUIRED, *OPTIONAL) if name in names]
-    return known + [name for name in names if name not in (*known, "run_id")]
+    channels = [name for name in (*REQUIRED, *OPTIONAL) if name in names]
+    return channels + [name for name in names if name not in (*channels, "run_id")]
 
 
 def _refuse_text(name: str, path: Path) -> bool:

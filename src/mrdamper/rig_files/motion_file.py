@@ -70,17 +70,17 @@ def _numbers(table: pl.DataFrame, name: str, path: Path) -> Floats:
     if name not in table.columns:
         near = [column for column in table.columns if column.lower().startswith(name.split("_")[0])]
         if near:
-            found, mend = f"column {near[0]!r} where {name!r} is expected", "convert it to SI and rename it"
-            raise UnitError(found, where=str(path), mend=mend)
-        found = f"column {name} is missing (found {', '.join(table.columns)})"
-        raise ColumnError(found, where=str(path), mend="add it")
+            reason, mend = f"column {near[0]!r} where {name!r} is expected", "convert it to SI and rename it"
+            raise UnitError(reason, where=str(path), mend=mend)
+        reason = f"column {name} is missing (found {', '.join(table.columns)})"
+        raise ColumnError(reason, where=str(path), mend="add it")
     values = table[name]
     if not values.dtype.is_numeric():
         mend = "write plain numbers with a decimal point"
         raise ColumnError(f"column {name} holds text", where=str(path), mend=mend)
     if values.null_count():
-        found = f"column {name} has {values.null_count()} empty cells"
-        raise ColumnError(found, where=str(path), mend="remove those rows")
+        reason = f"column {name} has {values.null_count()} empty cells"
+        raise ColumnError(reason, where=str(path), mend="remove those rows")
     return values.to_numpy().astype(np.float64)
 
 
@@ -92,6 +92,6 @@ def _refuse_gap(time: Floats, path: Path) -> None:
         raise RunError(
             f"a gap of {steps[at]:.4g} s after {time[at]:.6g} s",
             where=str(path),
-            mend="predict the parts one by one: the damper's state is unknown after a gap",
+            mend="predict each part separately: the damper's state is unknown after a gap",
             code="E_TIME_GAP",
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -31,6 +32,8 @@ from mrdamper.rig_files.record import Record
 from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests
 
+_PADDED = re.compile(r"(?<![0-9.,xpA-Za-z])0[0-9]A(?![A-Za-z0-9])")
+_TWO_DIGITS = re.compile(r"(?<![0-9.,xpA-Za-z])[1-9][0-9]A(?![A-Za-z0-9])")
 _MAY_BE_PARTS = ("E_COLUMN", "E_UNITS_MISSING", "E_UNITS_DIMENSION", "E_AMBIGUOUS", "E_NO_DATA", "E_NUMBER")
 
 
@@ -227,19 +230,21 @@ class _Intake:
         others = [Path(refusal.file) for refusal in self.refusals if refusal.error.code in _MAY_BE_PARTS]
         others = [path for path in dict.fromkeys(others) if path.is_file()]
         used = self._join_channels(others)
+        self.refusals = [refusal for refusal in self.refusals if Path(refusal.file) not in used]
         files = [path for path, _ in self._pending]
         for path, record in self._pending:
             self._check(path, record, [], several=files.count(path) > 1)
+        self._refuse_names_without_point()
         for path in [path for path in others if path not in used and self._found]:
             results = results_of(path)
             refused = contradictions_with(self._tests(), results, path) if results else None
             if refused is not None:
                 self._refuse(refused)
-                used.add(path)
             elif path not in self._given and is_list(path):
                 self.notes += [refusal for refusal in self.refusals if Path(refusal.file) == path][:1]
-                used.add(path)
-        self.refusals = [refusal for refusal in self.refusals if Path(refusal.file) not in used]
+            else:
+                continue
+            self.refusals = [refusal for refusal in self.refusals if Path(refusal.file) != path]
         self._refuse(contradictions([record for _, record in self._tests()]))
 
     def _join_channels(self, others: list[Path]) -> set[Path]:
@@ -266,6 +271,18 @@ class _Intake:
                 self.notes = [note for note in self.notes if Path(note.file) != path]
                 return used | {path}
         return used
+
+    def _refuse_names_without_point(self) -> None:
+        """Refuse currents of two digits in names, where another name of the set begins such a number with a zero."""
+        if not any(_PADDED.search(Path(name).name) for name in self._order):
+            return
+        error = ColumnError(
+            "a current of two digits, beside names such as 05A: is the decimal point left out?",
+            mend="write the currents into tests.csv (--write-tests)",
+            code="E_AMBIGUOUS",
+        )
+        named = [file for _, (file, record) in enumerate(self._tests())]
+        self._refuse({i: error for i, file in enumerate(named) if _TWO_DIGITS.search(file.name)})
 
     def _tests(self) -> list[tuple[Path, Record]]:
         """The accepted tests with their files, in the order of these."""

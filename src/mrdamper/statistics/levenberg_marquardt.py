@@ -139,18 +139,18 @@ def newton_refine(gradient: Callable[[Floats], Floats], point: Floats, lower: Fl
     curvature = (curvature + curvature.T)[np.ix_(free, free)] / 2
     if not free.any() or _is_plain(curvature):
         return point
-    found, slope, moved = point, first, np.inf
+    refined, slope, moved = point, first, np.inf
     for _ in range(_POLISHING):
         step = np.zeros(point.size)
         step[free] = -np.linalg.solve(curvature, (slope * width)[free])
         moved = float(np.max(np.abs(step)))
         if moved < _AT_REST:
             break
-        found = np.clip(found + step * width, lower, upper)
-        if np.max(np.abs(found - point) / width) > _NEAR:
+        refined = np.clip(refined + step * width, lower, upper)
+        if np.max(np.abs(refined - point) / width) > _NEAR:
             return point
-        slope = gradient(found)
-    return found if moved < _ROUNDED else point
+        slope = gradient(refined)
+    return refined if moved < _ROUNDED else point
 
 
 def _is_plain(curvature: Floats) -> bool:
@@ -197,8 +197,8 @@ def _learnt_curvature(extra: Floats | None, moved: Floats, change: Floats, jacob
         return None
     if extra is None:
         extra = np.zeros((moved.size, moved.size))
-    known = float(moved @ extra @ moved)
-    shrunk = extra * min(1.0, abs(float(moved @ missing) / known)) if known else extra
+    curvature = float(moved @ extra @ moved)
+    shrunk = extra * min(1.0, abs(float(moved @ missing) / curvature)) if curvature else extra
     off = missing - shrunk @ moved
     pair = np.multiply.outer(off, change)
     return shrunk + (pair + pair.T) / along - float(off @ moved) / along**2 * np.multiply.outer(change, change)

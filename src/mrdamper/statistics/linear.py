@@ -45,8 +45,8 @@ def solve_linear(columns: Floats, right: Floats, rank_limit: float | None = None
     if _pivots(normal).min(initial=1.0) > _WELL_APART:
         # Normal equations, then once more for what they left: as good as a factorisation of N rows.
         inverse = np.linalg.inv(normal) / scale / scale[:, None]
-        found = inverse @ (right @ columns)
-        return found + inverse @ ((right - columns @ found) @ columns)
+        solution = inverse @ (right @ columns)
+        return solution + inverse @ ((right - columns @ solution) @ columns)
     return np.asarray(np.linalg.lstsq(columns / scale, right, rcond=rank_limit)[0], dtype=float) / scale
 
 

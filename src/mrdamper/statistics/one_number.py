@@ -46,11 +46,11 @@ def least_squares_in_one(
     u, before, best, evaluations = start, None, None, 0
     ending = StopReason.STEPS_SPENT
     for _ in range(most_steps):
-        found = evaluate(u)
+        value = evaluate(u)
         evaluations += 1
-        if found is None:
+        if value is None:
             return None
-        residual, slope = found
+        residual, slope = value
         cost, gradient, curvature = (float(a @ b) for a, b in ((residual, residual), (slope, residual), (slope, slope)))
         if best is None or cost <= best[0]:
             best = cost, u, residual

@@ -15,8 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrdamper.data import Dataset, Run
-from mrdamper.errors import IdentificationError
+from mrdamper.errors import IdentificationError, InputError
 from mrdamper.identification import Identification
+from mrdamper.physics.motion import analyse_motion
 from mrdamper.study.parallel import crew
 from mrdamper.study.recipe import Basis, IdentificationCache, Progress, Recipe, Scored, recipes
 from mrdamper.study.workflow import agreeing, believed, judged_on_all, usable, usable_sines
@@ -95,20 +96,21 @@ def compare(
     chosen = recipes(names, genetic)
     workers = jobs or os.cpu_count() or 1
     seen = [_seen(dataset.rig(name)) for name in dataset.rigs]
-    runs = [run for rig in seen for run in rig.sines]
-    bases = list(dict.fromkeys(recipe.basis for recipe in chosen if recipe.basis))
-    steps = [(recipe, rig.train if recipe.basis else rig.everything) for rig in seen for recipe in chosen]
+    completed = [_completed(chosen, rig) for rig in seen]
+    tasks, steps = [], []
+    for rig, (recipes_of_rig, _) in zip(seen, completed, strict=True):
+        bases = dict.fromkeys(recipe.basis for recipe in recipes_of_rig if recipe.basis)
+        tasks += [(basis, run) for basis in bases for run in rig.sines]
+        steps += [(recipe, rig.train if recipe.basis else rig.everything) for recipe in recipes_of_rig]
     with crew(dataset, workers) as processes:
-        found = processes.identify(
-            [(basis, run) for basis in bases for run in runs], lambda what, share: progress(what, 0.5 * share)
-        )
+        found = processes.identify(tasks, lambda what, share: progress(what, 0.5 * share))
         followed = processes.follow(
             [step for step in steps if step[1]],
             {rig.dataset.rigs[0]: rig.held_out for rig in seen},
             found,
             lambda what, share: progress(what, 0.5 + 0.5 * share),
         )
-    compared = tuple(_ranked(rig, chosen, followed, found) for rig in seen)
+    compared = tuple(_ranked(rig, *one, followed, found) for rig, one in zip(seen, completed, strict=True))
     progress("compared", 1.0)
     return Comparison(dataset, compared, time.perf_counter() - begin, workers)
 
@@ -143,11 +145,27 @@ def _seen(rig: Dataset) -> _Seen:
     return _Seen(rig, sines, train, [*train, *others], held_out, not_identified)
 
 
+def _completed(chosen: Sequence[Recipe], rig: _Seen) -> tuple[list[Recipe], dict[str, str]]:
+    """Complete the recipes for a rig; and why some cannot be followed on its runs."""
+    pure = [run for run in rig.train if analyse_motion(run).is_sine]
+    recipes_of_rig, refused = [], {}
+    for recipe in chosen:
+        try:
+            recipes_of_rig.append(recipe.for_runs(pure))
+        except InputError as error:
+            refused[recipe.name] = str(error)
+    return recipes_of_rig, refused
+
+
 def _ranked(
-    rig: _Seen, chosen: Sequence[Recipe], followed: Mapping[tuple[str, str], Scored | str], found: IdentificationCache
+    rig: _Seen,
+    chosen: Sequence[Recipe],
+    impossible: Mapping[str, str],
+    followed: Mapping[tuple[str, str], Scored | str],
+    found: IdentificationCache,
 ) -> RigComparison:
     name = rig.dataset.rigs[0]
-    made = {
+    made = dict(impossible) | {
         recipe.name: followed.get((name, recipe.name), "no identification runs with a steady sine") for recipe in chosen
     }
     refused = {recipe: why for recipe, why in made.items() if isinstance(why, str)}

@@ -127,6 +127,17 @@ class Recipe:
     pure: bool = False  # identified from pure sines only; scored on every run all the same
     on_request: bool = False  # takes most of the time of a comparison
     notes: tuple[str, ...] = ()  # for the reader of the result
+    complete: Callable[[Sequence[Run]], Recipe] | None = field(default=None, compare=False)  # from the runs of a rig
+
+    def for_runs(self, sines: Sequence[Run]) -> Recipe:
+        """Return the recipe for a rig, of which the pure sines of identification are given.
+
+        Raises
+        ------
+        InputError
+            If it cannot be followed on these runs.
+        """
+        return self if self.complete is None else self.complete(sines)
 
     @property
     def model(self) -> str:

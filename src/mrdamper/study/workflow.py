@@ -6,10 +6,12 @@ object that plots, reports and files take from there.
 
 from __future__ import annotations
 
+import importlib
 import time
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -175,6 +177,32 @@ class Study(Displayable):
             names = ", ".join(r.rig for r in self.rigs)
             raise IdentificationError(f"the dataset holds {len(self.rigs)} rigs", mend=f"use study.rig(name): {names}")
         return next(iter(self.rigs)).damper
+
+    def write_report(self, folder: str | Path, **options: Any) -> list[Path]:
+        """Write report.html, models, tables and figures.
+
+        Parameters
+        ----------
+        folder : path
+            Made if missing.
+        **options
+            Keywords of `mrdamper.report.study.write_study`: about, limits, also, paper. `about` is an `About`, a
+            mapping of its names to texts, or the path of a TOML file (`mrdamper init about`).
+
+        Returns
+        -------
+        list of Path
+            Written files, the report first.
+
+        Raises
+        ------
+        AboutError
+            If `about` has an unknown name.
+        OutputError
+            If the folder cannot be written to.
+        """
+        write = importlib.import_module("mrdamper.report.study").write_study  # draws: needed here only
+        return write(self, folder, **options)
 
     def rig(self, name: str) -> RigStudy:
         """The study of one rig."""

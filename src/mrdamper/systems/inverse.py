@@ -79,10 +79,10 @@ def check_monotone(damper: Damper, highest: float | None = None) -> float:
 
 def _forces(damper: Damper, grid: Floats) -> Floats:
     """Calculate (samples, currents) forces [N] along the second half of a tested sine."""
-    made = stream(replace(damper, coil=None))  # type: ignore[type-var]
-    prepare, step = python_functions(made.step)
-    given = tuple(float(e.value) for e in made.step.tape.parameters.values())
-    derived, memory = prepare(given)[1], tuple(made.step.tape.starts.values())
+    stepping = stream(replace(damper, coil=None))  # type: ignore[type-var]
+    prepare, step = python_functions(stepping.step)
+    given = tuple(float(e.value) for e in stepping.step.tape.parameters.values())
+    derived, memory = prepare(given)[1], tuple(stepping.step.tape.starts.values())
     amplitude = damper.envelope.amplitude_m[1]
     omega = min(2 * math.pi * damper.envelope.frequency_Hz[1], damper.envelope.peak_velocity_m_s[1] / amplitude)
     forces, dt = [], 2 * math.pi / omega / _MOTION * 2
@@ -188,13 +188,13 @@ class Inverse:
         if not (all(map(math.isfinite, sample)) and sample[-1] > 0):
             raise ParameterError(f"sample {sample}", where=self.title, mend="finite numbers, a positive time step")
         try:
-            status, found, memory = self._advance((), self._derived, self._memory, sample)
+            status, outputs, memory = self._advance((), self._derived, self._memory, sample)
         except (ValueError, ArithmeticError):
-            status, found, memory = 1, (), self._memory
+            status, outputs, memory = 1, (), self._memory
         if status:
             raise ParameterError(f"no force at {sample}", where=self.title, mend="come nearer to the last sample")
         self._memory = memory
-        return Demand(*found)
+        return Demand(*outputs)
 
     def along(
         self, time: Floats, displacement: Floats, velocity: Floats, acceleration: Floats, wanted: Floats
@@ -252,6 +252,6 @@ def invert(damper: Damper, highest: float | None = None) -> Inverse:
     inputs = {name: tape.input(name) for name in names}
     wanted = inputs.pop("wanted")
     most = damper.envelope.current_A[1] if highest is None else highest
-    found = invert_on(tape, damper, "", inputs, wanted, width, most)
-    outputs = {"current": found.current, "force": found.force, "lowest": found.lowest, "highest": found.highest}
+    demand = invert_on(tape, damper, "", inputs, wanted, width, most)
+    outputs = {"current": demand.current, "force": demand.force, "lowest": demand.lowest, "highest": demand.highest}
     return Inverse(program(tape, outputs), f"inverse of {damper.title}")

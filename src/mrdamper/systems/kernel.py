@@ -152,10 +152,10 @@ def _either(index: int, first: Any, rest: Any) -> Any:
 
 def _command(step: Step, given: Any, derived: Any, held: Any, inputs: Any, keep: Any) -> Any:
     def command(p, d, memory, y, out):
-        status, found, new = step(given(p), derived(d), held(memory), inputs(y))
+        status, outputs, new = step(given(p), derived(d), held(memory), inputs(y))
         keep(memory, new)
-        for i in range(len(found)):
-            out[i] = found[i]
+        for i in range(len(outputs)):
+            out[i] = outputs[i]
         return status
 
     return command
@@ -205,7 +205,7 @@ def search(evaluate, j, p, d, memory, later, state, free, compliance, current, d
 
 
 def walk(
-    evaluate, command, dt, every, P, Q, R, G, B, loads, road, road_rate, H, seen, p, d, memory, cp, cd, cm, currents,
+    evaluate, command, dt, every, P, Q, R, G, B, loads, road, road_rate, H, driven, p, d, memory, cp, cd, cm, currents,
     x, v, f, flags,
     ):  # fmt: skip
     """Fill x, v (N, n), f, currents, flags (N, E) from their first rows on; the step that failed, or −1.
@@ -224,7 +224,7 @@ def walk(
         if H.shape[0] > 0 and (i - 1) % every == 0:
             state = (*x[i - 1], *v[i - 1], *f[i - 1])
             for s in range(H.shape[0]):
-                signals[s] = _plus_product(seen[i - 1, s], H[s], state)
+                signals[s] = _plus_product(driven[i - 1, s], H[s], state)
             signals[H.shape[0]] = every * dt
             if command(cp, cd, cm, signals, held) != 0:
                 return i

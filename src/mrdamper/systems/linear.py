@@ -32,13 +32,13 @@ def aims(system: System) -> tuple[Aim, ...]:
     """
     lowest = 2 * math.pi * float(system.frequencies_Hz()[0])
     if system.ground is not None:
-        found = [Aim("acceleration", name, 1.0) for name in system.coordinates]
-        return (*found, *(Aim("span", name, lowest**2) for name in system.spans))
+        quantities = [Aim("acceleration", name, 1.0) for name in system.coordinates]
+        return (*quantities, *(Aim("span", name, lowest**2) for name in system.spans))
     tyres = {(link.above, link.below): 9.81 / link.gap for link in system.links if link.role == "tyre"}
-    found = [Aim("acceleration", link.above, 1.0) for link in system.dampers]
+    quantities = [Aim("acceleration", link.above, 1.0) for link in system.dampers]
     for name, ends in system.spans.items():
-        found.append(Aim("span", name, _TYRE * tyres[ends] if ends in tyres else _TRAVEL * lowest**2))
-    return tuple(found)
+        quantities.append(Aim("span", name, _TYRE * tyres[ends] if ends in tyres else _TRAVEL * lowest**2))
+    return tuple(quantities)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ def linear_system(system: System, dampers: Sequence[Link]) -> LinearSystem:
         e = inverse @ system.push[0]
     nothing = np.zeros((len(dampers), len(dampers)))
     still = np.zeros((len(dampers), n))
-    seen = (np.vstack([a, np.hstack([rows, still])]), np.vstack([b, nothing]))
+    outputs = (np.vstack([a, np.hstack([rows, still])]), np.vstack([b, nothing]))
     states, forces = [], []
     for aim in aims(system):
         if aim.kind == "acceleration":
@@ -84,7 +84,7 @@ def linear_system(system: System, dampers: Sequence[Link]) -> LinearSystem:
         np.vstack([np.hstack([np.zeros((n, n)), np.eye(n)]), a]),
         np.vstack([np.zeros((n, len(dampers))), b]),
         np.vstack([np.zeros((n, e.shape[1])), e]),
-        seen,
+        outputs,
         (np.array(states), np.array(forces)),
         mass,
     )

@@ -83,13 +83,13 @@ def _walk_of(library: ctypes.CDLL) -> Callable[..., int]:
     run.restype = ctypes.c_longlong
 
     def walk(
-        dt: float, every: int, P, Q, R, G, B, loads, road, road_rate, H, seen, p, d, memory, cp, cd, cm, currents,
+        dt: float, every: int, P, Q, R, G, B, loads, road, road_rate, H, driven, p, d, memory, cp, cd, cm, currents,
         x, v, f, flags,
     ) -> int:  # fmt: skip
         samples, n = x.shape
         count, signals = f.shape[1], H.shape[0]
         sizes = np.array([samples, n, count, signals, every, memory.size], dtype=np.int64)
-        given = [np.ascontiguousarray(a) for a in (P, Q, R, G, B, loads, road, road_rate, H, seen, p, d, cp, cd)]
+        given = [np.ascontiguousarray(a) for a in (P, Q, R, G, B, loads, road, road_rate, H, driven, p, d, cp, cd)]
         kept = cm.copy()
         work = np.zeros(3 * n + 5 * count + signals + memory.size + 1)
         inputs, outputs = (
@@ -116,7 +116,7 @@ def _alike(
     turns = np.linspace(0.0, 4.0, _TRIED)[:, None]
     loads = S[0, 0] * 500.0 * np.sin(turns)
     still = np.zeros((_TRIED, count))
-    found = []
+    results = []
     for walk in (one, other):
         x, v = np.zeros((2, _TRIED, 1))
         f, flags = np.zeros((2, _TRIED, count))
@@ -129,7 +129,7 @@ def _alike(
             )  # fmt: skip
         except (ValueError, ArithmeticError):
             return True  # of the interpreter, where compiled code goes on with what is not finite
-        found.append((failed, np.column_stack([x, v, f, currents])))
-    (failed, motion), (expected, reference) = found
+        results.append((failed, np.column_stack([x, v, f, currents])))
+    (failed, motion), (expected, reference) = results
     size = np.abs(reference).max(axis=0) + 1e-30
     return failed == expected and bool(np.all(np.abs(motion - reference) <= _ALIKE * size))

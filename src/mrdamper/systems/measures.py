@@ -48,29 +48,29 @@ def comfort(acceleration: Floats, step: float, weighting: str = "Wk") -> dict[st
 
 def measures(done: Simulation) -> dict[str, float]:
     """Every measure of a run by name, with its unit in the name."""
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     for name, column in zip(done.system.coordinates, done.a.T, strict=True):
-        found[f"{name}.peak_acceleration_m_s2"] = float(np.abs(column).max())
-        found[f"{name}.rms_acceleration_m_s2"] = _rms(column)
+        values[f"{name}.peak_acceleration_m_s2"] = float(np.abs(column).max())
+        values[f"{name}.rms_acceleration_m_s2"] = _rms(column)
     for name in done.system.spans:
         series = done.span(name)
-        found[f"{name}.peak_span_m"], found[f"{name}.rms_span_m"] = float(np.abs(series).max()), _rms(series)
+        values[f"{name}.peak_span_m"], values[f"{name}.rms_span_m"] = float(np.abs(series).max()), _rms(series)
     for i, link in enumerate(done.links):
         if link.role == "damper":
-            found[f"{link.name}.peak_force_N"] = float(np.abs(done.force[:, i]).max())
-            found[f"{link.name}.rms_force_N"] = _rms(done.force[:, i])
-            found[f"{link.name}.energy_J"] = float(done.energy[link.name][-1])
-            found[f"{link.name}.mean_current_A"] = float(done.current[:, i].mean())
+            values[f"{link.name}.peak_force_N"] = float(np.abs(done.force[:, i]).max())
+            values[f"{link.name}.rms_force_N"] = _rms(done.force[:, i])
+            values[f"{link.name}.energy_J"] = float(done.energy[link.name][-1])
+            values[f"{link.name}.mean_current_A"] = float(done.current[:, i].mean())
         elif link.role == "tyre":
             load = tyre_load(done, i)
             static = link.stiffness * link.gap
-            found[f"{link.name}.rms_load_share"] = _rms(load / static - 1)
-            found[f"{link.name}.lowest_load_share"] = float(load.min() / static)
+            values[f"{link.name}.rms_load_share"] = _rms(load / static - 1)
+            values[f"{link.name}.lowest_load_share"] = float(load.min() / static)
     if done.system.ground is None:
         for name in dict.fromkeys(link.above for link in done.system.dampers):
-            found |= {f"{name}.{k}": v for k, v in comfort(done.acceleration_of(name), done.step).items()}
-    found["cost_m_s2"] = cost(done) ** 0.5
-    return found
+            values |= {f"{name}.{k}": v for k, v in comfort(done.acceleration_of(name), done.step).items()}
+    values["cost_m_s2"] = cost(done) ** 0.5
+    return values
 
 
 def cost(done: Simulation) -> float:
@@ -106,17 +106,17 @@ def benchmark_ratios(done: Simulation, uncontrolled: Simulation) -> dict[str, fl
         return {"drift": drifts, "acceleration": run.a, "base": (run.a @ run.system.M).sum(axis=1, keepdims=True)}
 
     ours, theirs = three(done), three(uncontrolled)
-    found = {f"J{i}": np.abs(ours[k]).max() / np.abs(theirs[k]).max() for i, k in enumerate(ours, start=1)}
-    found |= {
+    ratios = {f"J{i}": np.abs(ours[k]).max() / np.abs(theirs[k]).max() for i, k in enumerate(ours, start=1)}
+    ratios |= {
         f"J{i}": np.sqrt((ours[k] ** 2).mean(axis=0)).max() / np.sqrt((theirs[k] ** 2).mean(axis=0)).max()
         for i, k in enumerate(ours, start=4)
     }
     dampers = [i for i, link in enumerate(done.links) if link.role == "damper"]
     if dampers:
         weight = 9.81 * float(np.trace(done.system.M))
-        found["J7"] = np.abs(done.force[:, dampers]).max() / weight
-        found["J8"] = np.abs(done.stroke[:, dampers]).max() / np.abs(theirs["drift"]).max()
-    return {name: float(value) for name, value in found.items()}
+        ratios["J7"] = np.abs(done.force[:, dampers]).max() / weight
+        ratios["J8"] = np.abs(done.stroke[:, dampers]).max() / np.abs(theirs["drift"]).max()
+    return {name: float(value) for name, value in ratios.items()}
 
 
 def _rms(series: Floats) -> float:

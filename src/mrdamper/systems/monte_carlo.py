@@ -68,38 +68,38 @@ def draw(dampers: Mapping[str, Damper], count: int, seed: int = 1) -> list[dict[
         raise InputError(f"{count} draws", mend=f"give 2 to {_MOST:,}", code="E_DRAWS")
     rng = np.random.default_rng(seed)
     shared: dict[int, list[dict[str, float]]] = {}
-    found: list[dict[str, Draw]] = [{} for _ in range(count)]
+    draws: list[dict[str, Draw]] = [{} for _ in range(count)]
     for link, damper in dampers.items():
-        known = damper.certainty
-        if known is None:
+        certainty = damper.certainty
+        if certainty is None:
             raise InputError(
-                f"how sure {damper.title} is was not saved with it",
+                f"{damper.title} was saved without its uncertainty",
                 where=link,
                 mend="give a model that study wrote from tests, or leave out --draws",
                 code="E_CERTAINTY",
             )
         if id(damper) not in shared:
             shared[id(damper)] = _numbers_drawn(damper, count, rng)
-        spread = np.array([known.total_gain, known.total_offset])
-        dof = known.session_dof if known.of_sessions else known.run_dof
+        spread = np.array([certainty.total_gain, certainty.total_offset])
+        dof = certainty.session_dof if certainty.of_sessions else certainty.run_dof
         sessions = (_student(rng, dof, count) * rng.standard_normal((count, 2)) * spread).tolist()
-        for row, numbers, (gain, offset) in zip(found, shared[id(damper)], sessions, strict=True):
+        for row, numbers, (gain, offset) in zip(draws, shared[id(damper)], sessions, strict=True):
             row[link] = Draw(numbers, gain, offset)
-    return found
+    return draws
 
 
 def _numbers_drawn(damper: Damper, count: int, rng: np.random.Generator) -> list[dict[str, float]]:
-    known, own = damper.certainty, damper.fitted_parameters
-    assert known is not None
-    if not known.names:
+    certainty, own = damper.certainty, damper.fitted_parameters
+    assert certainty is not None
+    if not certainty.names:
         return [{} for _ in range(count)]
-    nudges = rng.multivariate_normal(np.zeros(len(known.names)), known.covariance, count)
-    nudges *= _student(rng, float(np.min(known.dof)), count)
+    nudges = rng.multivariate_normal(np.zeros(len(certainty.names)), certainty.covariance, count)
+    nudges *= _student(rng, float(np.min(certainty.dof)), count)
     columns = []
-    for name, log, nudge in zip(known.names, known.logs, nudges.T, strict=True):
+    for name, log, nudge in zip(certainty.names, certainty.logs, nudges.T, strict=True):
         moved = own[name].value * np.exp(nudge) if log else own[name].value + nudge
         columns.append(np.clip(moved, *own[name].bounds).tolist())
-    return [dict(zip(known.names, row, strict=True)) for row in zip(*columns, strict=True)]
+    return [dict(zip(certainty.names, row, strict=True)) for row in zip(*columns, strict=True)]
 
 
 def _student(rng: np.random.Generator, dof: float, count: int) -> Floats:
@@ -132,7 +132,7 @@ def monte_carlo(
     """
     machine = len(draws) > 5 or None
     step = max(2 * mean.step, loop.first_step / 2)
-    peaks, found, lost = [], [], 0
+    peaks, values, lost = [], [], 0
     for number, one in enumerate(draws):
         progress(f"draw {number + 1} of {len(draws)}", number / len(draws))
         try:
@@ -141,7 +141,7 @@ def monte_carlo(
             lost += 1
             continue
         peaks.append(done.peaks)
-        found.append(measures(done))
+        values.append(measures(done))
     if lost > _MOST_LOST * len(draws):
         raise StepError(
             f"{lost} of {len(draws)} draws have no solution",
@@ -149,10 +149,10 @@ def monte_carlo(
             mend="the damper's numbers are too uncertain for bands: test more (mrdamper plan)",
             code="E_STEP_LOST",
         )
-    names = list(dict.fromkeys(name for row in found for name in row))
+    names = list(dict.fromkeys(name for row in values for name in row))
     return Bands(
         {name: np.array([row[name] for row in peaks]) for name in peaks[0]},
-        {name: np.array([row[name] for row in found]) for name in names},
+        {name: np.array([row[name] for row in values]) for name in names},
         lost,
         step,
         changed(loop.run(step, machine=machine), mean),

@@ -105,12 +105,12 @@ class Oscillator:
         )  # fmt: skip
         derived = record.prepare(given)
         assert derived is not None
-        found = record.along(given, derived, record.starts, (fine[:-2:2], fine[1:-1:2], fine[2::2]))
+        states = record.along(given, derived, record.starts, (fine[:-2:2], fine[1:-1:2], fine[2::2]))
         farthest = _FARTHEST * (np.abs(force).max() / self.k + 1e-9)
-        y = np.concatenate([[0.0], found.outputs[0, steps - 1 :: steps]])
+        y = np.concatenate([[0.0], states.outputs[0, steps - 1 :: steps]])
         lost = ~(np.abs(y) < farthest)
-        if lost.any() or found.failed >= 0:
-            bad = int(np.flatnonzero(lost)[0]) if lost.any() else found.failed // steps
+        if lost.any() or states.failed >= 0:
+            bad = int(np.flatnonzero(lost)[0]) if lost.any() else states.failed // steps
             raise StepError(
                 f"the state runs away after {bad / sample_rate:.3g} s", where="oscillator",
                 mend="lower the force: an element with beta (gamma + delta) < 0 has no bound", code="E_RUNAWAY",
@@ -194,16 +194,16 @@ def identify_oscillator(
     if not 0 <= most_delay < np.inf:
         raise RecordError(f"the largest delay is {most_delay:g} samples", mend="give zero or more")
     search = _OscillatorSearch(force, displacement, sample_rate, n, most_delay)
-    found, evaluations = search.best()
-    at_bounds = search.at_bounds(found)
+    minimum, evaluations = search.best()
+    at_bounds = search.at_bounds(minimum)
     if at_bounds:
         warnings.warn(
             f"{', '.join(at_bounds)} ended at a bound of the search: check the signs and units of both channels",
             BoundWarning,
             stacklevel=2,
         )
-    rmse = search.spread * float(np.linalg.norm(search.residual(found)))
-    return OscillatorFit(search.oscillator(found), search.delay(found), rmse, evaluations, at_bounds)
+    rmse = search.spread * float(np.linalg.norm(search.residual(minimum)))
+    return OscillatorFit(search.oscillator(minimum), search.delay(minimum), rmse, evaluations, at_bounds)
 
 
 class _OscillatorSearch:
@@ -226,9 +226,9 @@ class _OscillatorSearch:
     def best(self) -> tuple[Floats, int]:
         """Return the point of least error, and the evaluations; bounds that only limit the search are widened."""
         starts = [np.array([1.0, 0.3, share, 1 - share, 0.3, d, 0.0]) for share in (0.5, 0.2) for d in (0.0, -0.5)]
-        found = [least_squares(self.residual, start, self.lower, self.upper, 8, 1e-4) for start in starts]
-        evaluations = sum(minimum.evaluations for minimum in found)
-        point = min(found, key=lambda minimum: minimum.cost).point
+        minima = [least_squares(self.residual, start, self.lower, self.upper, 8, 1e-4) for start in starts]
+        evaluations = sum(minimum.evaluations for minimum in minima)
+        point = min(minima, key=lambda minimum: minimum.cost).point
         for _ in range(_WIDENED + 1):
             last = least_squares(self.residual, point, self.lower, self.upper, 60, 1e-10)
             point, evaluations = last.point, evaluations + last.evaluations

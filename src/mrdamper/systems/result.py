@@ -36,7 +36,7 @@ class Simulation:
     stroke: Floats  # (N, E) [m]
     stroke_rate: Floats  # (N, E) [m/s]
     current: Floats  # (N, E) commanded to each link [A]; zero for stops and tyres
-    # (N, E) of dampers: bits of `streaming.FLAGS`; of stops and tyres: touching; in the air
+    # (N, E) of dampers: bits of `streaming.FLAGS`; of stops: contact; of tyres: lift-off
     flags: NDArray[np.int64]
     road: Floats  # (N, q) height of the road by channel [m]; zero on the ground
     road_rate: Floats  # (N, q) [m/s]
@@ -64,26 +64,30 @@ class Simulation:
 
     @property
     def outside(self) -> dict[str, dict[str, float]]:
-        """Share of the time each damper spent outside its tests, by quantity; stops and tyres: in touch, in the air."""
-        found: dict[str, dict[str, float]] = {}
+        """Share of the time each damper spent outside its tests, by quantity; contact of stops, lift-off of wheels."""
+        shares_by_link: dict[str, dict[str, float]] = {}
         for i, link in enumerate(self.links):
-            words = FLAGS if link.role == "damper" else ({"stop": "touching", "tyre": "in the air"}[link.role],)
+            words = (
+                FLAGS
+                if link.role == "damper"
+                else ({"stop": "bump-stop contact", "tyre": "wheel lift-off"}[link.role],)
+            )
             shares = {word: float(np.mean(self.flags[:, i] >> bit & 1)) for bit, word in enumerate(words)}
             if kept := {word: share for word, share in shares.items() if share > 0}:
-                found[link.name] = kept
-        return found
+                shares_by_link[link.name] = kept
+        return shares_by_link
 
     @cached_property
     def peaks(self) -> dict[str, Floats]:
         """Largest magnitudes: displacement, drift, acceleration, force, by coordinate, span, damper."""
         dampers = [i for i, link in enumerate(self.links) if link.role == "damper"]
-        found = (
+        series = (
             np.abs(self.x).max(axis=0),
             np.array([np.abs(self.span(name)).max() for name in self.system.spans]),
             np.abs(self.a).max(axis=0),
             np.abs(self.force[:, dampers]).max(axis=0),
         )
-        return dict(zip(self.PEAKS, found, strict=True))
+        return dict(zip(self.PEAKS, series, strict=True))
 
     @checked()
     def span(self, name: str) -> Floats:
@@ -101,12 +105,12 @@ class Simulation:
     @property
     def unreachable(self) -> dict[str, float]:
         """Share of the time the force asked of a damper was out of its reach: its current at an end."""
-        found = {}
+        shares = {}
         for i, link in enumerate(self.links):
             if link.name in self.limits:
                 most, current = self.limits[link.name], self.current[1:, i]
-                found[link.name] = float(np.mean((current <= 0.01 * most) | (current >= 0.99 * most)))
-        return found
+                shares[link.name] = float(np.mean((current <= 0.01 * most) | (current >= 0.99 * most)))
+        return shares
 
     @property
     def timing(self) -> dict[str, float]:
@@ -115,7 +119,7 @@ class Simulation:
         Negative: firm just when it shakes that mass, as with a sign exchanged. Left out where the
         current does not change.
         """
-        found = {}
+        times = {}
         for i, link in enumerate(self.links):
             current = self.current[:, i]
             if link.role == "damper" and np.ptp(current) > 0:
@@ -123,8 +127,8 @@ class Simulation:
                 row, road = self.system.point(end)
                 power = sign * self.force[:, i] * (self.v @ row + self.road_rate @ road)
                 if np.ptp(power) > 0:
-                    found[link.name] = float(np.corrcoef(current, power)[0, 1])
-        return found
+                    times[link.name] = float(np.corrcoef(current, power)[0, 1])
+        return times
 
     @property
     def energy_gap(self) -> float:

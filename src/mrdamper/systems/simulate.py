@@ -178,7 +178,7 @@ class SystemLoop:
         R = S @ self.B.T
         mean_load = np.zeros_like(load)
         mean_load[1:] = 0.5 * (load[1:] + load[:-1]) @ S.T
-        H, seen = self._sight(ground, road, road_rate)
+        H, driven = self._sight(ground, road, road_rate)
         x, v = np.zeros((samples, n)), np.zeros((samples, n))
         force, current, flags = (np.zeros((samples, len(self.links))) for _ in range(3))
         current[:] = self.control.start
@@ -190,7 +190,7 @@ class SystemLoop:
             control = ElementParameters.of(self._controllers)
             every = max(1, round(self.period / dt))
             rows = (S @ (2 / dt * system.M), -S @ system.K, R, self.B @ R, self.B, mean_load)
-            rows = (*rows, road @ self.D.T, road_rate @ self.D.T, H, seen)
+            rows = (*rows, road @ self.D.T, road_rate @ self.D.T, H, driven)
             held = (numbers.given, numbers.derived, numbers.start.copy(), control.given, control.derived, control.start)
             written = (current, x, v, force, flags)
             try:
@@ -263,24 +263,24 @@ class SystemLoop:
         """Signals as H [x; v; f] + seen: (S, 2n + E) and (N, S)."""
         names = self.control.signals
         n, count = len(self.system.coordinates), len(self.links)
-        H, seen = np.zeros((len(names), 2 * n + count)), np.zeros((ground.size, len(names)))
+        H, driven = np.zeros((len(names), 2 * n + count)), np.zeros((ground.size, len(names)))
         inverse = np.linalg.inv(self.system.M)
         pushed = self._load(0 * ground, road, road_rate) @ inverse
         for s, name in enumerate(names):
             at, _, quantity = name.rpartition(".")
-            link = next((i for i, known in enumerate(self.links) if known.name == at), None)
+            link = next((i for i, other in enumerate(self.links) if other.name == at), None)
             if quantity == "force" and link is not None:
                 H[s, 2 * n + link] = 1.0
                 continue
             row, ways = (self.B[link], self.D[link]) if link is not None else self.system.point(at)
             if quantity in ("stroke", "position"):
-                H[s, :n], seen[:, s] = row, road @ ways
+                H[s, :n], driven[:, s] = row, road @ ways
             elif quantity in ("stroke_rate", "velocity"):
-                H[s, n : 2 * n], seen[:, s] = row, road_rate @ ways
+                H[s, n : 2 * n], driven[:, s] = row, road_rate @ ways
             else:
                 H[s] = row @ inverse @ np.hstack([-self.system.K, -self.system.C, -self.B.T])
-                seen[:, s] = pushed @ row
-        return H, seen
+                driven[:, s] = pushed @ row
+        return H, driven
 
     @cached_property
     def _controllers(self) -> list[LoopElement]:
@@ -308,12 +308,12 @@ class SystemLoop:
         work = mean(force) * (moved @ self.B.T + ways)
         entered = np.einsum("ij,ij->i", mean(load), moved) + (mean(force) * ways).sum(axis=1)
         stored = 0.5 * (np.einsum("ij,ij->i", v @ system.M, v) + np.einsum("ij,ij->i", x @ system.K, x))
-        found = {
+        energies = {
             "input": running(entered),
             "stored": stored,
             "structure": running(dt * np.einsum("ij,ij->i", middle @ system.C, middle)),
         }
-        return found | {link.name: running(work[:, i]) for i, link in enumerate(self.links)}
+        return energies | {link.name: running(work[:, i]) for i, link in enumerate(self.links)}
 
 
 def _fit(system: System, source: Input, dampers: Mapping[str, Damper]) -> None:
@@ -324,11 +324,11 @@ def _fit(system: System, source: Input, dampers: Mapping[str, Damper]) -> None:
             where=system.name,
             mend="give acceleration_m_s2 or acceleration_g" if wanted == "ground" else "give a road, or height_m",
         )
-    known = {link.name for link in system.dampers}
+    names = {link.name for link in system.dampers}
     for name in dampers:
-        if name not in known:
+        if name not in names:
             raise StructureError(
-                f"no damper is called {name!r}", where=system.name, mend=f"known: {', '.join(sorted(known)) or 'none'}"
+                f"no damper is called {name!r}", where=system.name, mend=f"known: {', '.join(sorted(names)) or 'none'}"
             )
 
 

@@ -58,9 +58,9 @@ class System:
         n = len(self.coordinates)
         for letter in "MCK":
             matrix = np.array(getattr(self, letter), dtype=float)
-            found = f"{letter} of shape {matrix.shape} for {n} coordinates, or not finite"
+            problem = f"{letter} of shape {matrix.shape} for {n} coordinates, or not finite"
             fits = matrix.shape == (n, n) and bool(np.isfinite(matrix).all())
-            self._require(fits, found, "give one row and one column a coordinate", StructureError.code)
+            self._require(fits, problem, "give one row and one column a coordinate", StructureError.code)
             equal = np.allclose(matrix, matrix.T, rtol=0, atol=_SYMMETRY * max(np.abs(matrix).max(), 1e-300))
             self._require(equal, f"{letter} is not symmetric", "forces between two points are equal", _CODES[letter])
             object.__setattr__(self, letter, matrix)
@@ -69,21 +69,21 @@ class System:
         for letter in "CK":
             matrix = getattr(self, letter)
             keeps = np.linalg.eigvalsh(matrix).min() >= -_SYMMETRY * max(np.abs(matrix).max(), 1e-300)
-            found = f"{letter} has a negative eigenvalue: it gives energy away"
-            self._require(keeps, found, "check the signs off the diagonal", _CODES[letter])
+            problem = f"{letter} has a negative eigenvalue: it gives energy away"
+            self._require(keeps, problem, "check the signs off the diagonal", _CODES[letter])
         highest = float(self.frequencies_Hz().max(initial=0.0))
-        found = f"a natural frequency of {highest:.3g} Hz"
-        self._require(highest < _FASTEST, found, "check the units of masses and stiffnesses", _CODES["K"])
+        problem = f"a natural frequency of {highest:.3g} Hz"
+        self._require(highest < _FASTEST, problem, "check the units of masses and stiffnesses", _CODES["K"])
         for link in self.links:
             for end in (link.above, link.below):
-                found = f"{link.role} {link.name} hangs on {end!r}, which does not exist"
-                self._require(end in self.known, found, f"known: {', '.join(self.known)}", "E_POINT")
-            found = f"{link.role} {link.name} hangs on {link.above!r} twice"
-            self._require(link.above != link.below, found, "give two points", "E_POINT")
+                problem = f"{link.role} {link.name} hangs on {end!r}, which does not exist"
+                self._require(end in self.known, problem, f"known: {', '.join(self.known)}", "E_POINT")
+            problem = f"{link.role} {link.name} hangs on {link.above!r} twice"
+            self._require(link.above != link.below, problem, "give two points", "E_POINT")
 
-    def _require(self, good: Any, found: str, mend: str, code: str) -> None:
+    def _require(self, good: Any, problem: str, mend: str, code: str) -> None:
         if not good:
-            raise StructureError(found, where=self.name, mend=mend, code=code)
+            raise StructureError(problem, where=self.name, mend=mend, code=code)
 
     @property
     def known(self) -> tuple[str, ...]:

@@ -139,13 +139,13 @@ def load_system(name: str | Path) -> SystemFile:
     >>> sorted(found.dampers)
     ['mr']
     """
-    known = bundled_systems()
+    systems = bundled_systems()
     given = path_of(name)
-    path = known.get(str(name), given)
+    path = systems.get(str(name), given)
     if not path.is_file():
         if path.suffix == ".toml":
             raise StructureError("no such file", where=str(path), mend="give a system TOML file")
-        raise UnknownNameError.of("system", str(name), known)
+        raise UnknownNameError.of("system", str(name), systems)
     document = load_toml(path, SystemDocument, StructureError, "see docs/how-to/simulate.md", 2**20)
     system = _build(document, path)
     models = {d.name: d.model for d in document.damper if d.model is not None}
@@ -166,8 +166,8 @@ def _build(document: SystemDocument, path: Path) -> System:
         own = {link.name for link in system.dampers}
         for damper in document.damper:
             if damper.name not in own or damper.above is not None:
-                found = f"damper {damper.name!r} in a car, which has {', '.join(sorted(own))} in their places"
-                raise StructureError(found, where=str(path), mend="use those names, with a model only")
+                problem = f"damper {damper.name!r} in a car, which has {', '.join(sorted(own))} in their places"
+                raise StructureError(problem, where=str(path), mend="use those names, with a model only")
         return system
     links = []
     for damper in document.damper:

@@ -74,9 +74,9 @@ def frequency_weighted(acceleration: Floats, step: float, weighting: str) -> Flo
         raise UnknownNameError.of("weighting", weighting, WEIGHTINGS)
     from scipy.fft import next_fast_len
 
-    known = WEIGHTINGS[weighting]
-    size = int(next_fast_len(acceleration.size + int(_MEMORY / known.f1 / step), real=True) or acceleration.size)
+    filters = WEIGHTINGS[weighting]
+    size = int(next_fast_len(acceleration.size + int(_MEMORY / filters.f1 / step), real=True) or acceleration.size)
     frequency = np.fft.rfftfreq(size, step)
     gain = np.zeros(frequency.size, dtype=complex)
-    gain[1:] = known.response(frequency[1:])
+    gain[1:] = filters.response(frequency[1:])
     return np.fft.irfft(np.fft.rfft(acceleration, size) * gain, size)[: acceleration.size]

@@ -33,10 +33,10 @@ class ProgramCopy:
     def __init__(self, source: Program, tape: Tape, prefix: str, varying: str, **inputs: Any):
         self.source, self.tape, self.varying = source, tape, varying
         self.inputs = inputs
-        made = source.tape
-        self.memory = {name: tape.remember(f"{prefix}{name}", made.starts[name]) for name in made.memory}
-        questions = [question for question, _ in made.guards if question.stage == SAMPLE]
-        self.order = postorder([*source.outputs.values(), *made.updates.values(), *questions])
+        source_tape = source.tape
+        self.memory = {name: tape.remember(f"{prefix}{name}", source_tape.starts[name]) for name in source_tape.memory}
+        questions = [question for question, _ in source_tape.guards if question.stage == SAMPLE]
+        self.order = postorder([*source.outputs.values(), *source_tape.updates.values(), *questions])
         self.moving = self._moving()
         self.still: dict[int, Any] = {}
 
@@ -46,19 +46,19 @@ class ProgramCopy:
 
     def settle(self, value: Any) -> dict[str, Any]:
         """Evaluate and remember the outputs for the present varying input; conditions of a sample are checked again."""
-        known = self._copied(value)
+        copies = self._copied(value)
         for name, memory in self.memory.items():
             if name in self.source.tape.updates:
                 update = self.source.tape.updates[name]
-                self.tape.update(memory, known[id(update)] if isinstance(update, Expression) else update)
+                self.tape.update(memory, copies[id(update)] if isinstance(update, Expression) else update)
         for question, wanted in self.source.tape.guards:
             if question.stage == SAMPLE and wanted:
-                self.tape.require(known[id(question)])
-        return self._outputs(known)
+                self.tape.require(copies[id(question)])
+        return self._outputs(copies)
 
-    def _outputs(self, known: dict[int, Any]) -> dict[str, Any]:
+    def _outputs(self, copies: dict[int, Any]) -> dict[str, Any]:
         outputs = self.source.outputs
-        return {n: known[id(value)] if isinstance(value, Expression) else value for n, value in outputs.items()}
+        return {n: copies[id(value)] if isinstance(value, Expression) else value for n, value in outputs.items()}
 
     def _moving(self) -> set[int]:
         """Nodes that depend on the varying input; a loop's carried values do if the loop does."""
@@ -78,17 +78,17 @@ class ProgramCopy:
                 return moving
 
     def _copied(self, value: Any) -> dict[int, Any]:
-        known, loops = dict(self.still), dict[int, TracedLoop]()
+        copies, loops = dict(self.still), dict[int, TracedLoop]()
         for node in self.order:
-            if id(node) not in known:
-                known[id(node)] = self._copy(node, known, loops, value)
+            if id(node) not in copies:
+                copies[id(node)] = self._copy(node, copies, loops, value)
                 if id(node) not in self.moving:
-                    self.still[id(node)] = known[id(node)]
-        return known
+                    self.still[id(node)] = copies[id(node)]
+        return copies
 
-    def _copy(self, node: Any, known: dict[int, Any], loops: dict[int, TracedLoop], value: Any) -> Any:
+    def _copy(self, node: Any, copies: dict[int, Any], loops: dict[int, TracedLoop], value: Any) -> Any:
         def of(part: Any) -> Any:
-            return known[id(part)] if isinstance(part, Expression) else part
+            return copies[id(part)] if isinstance(part, Expression) else part
 
         if isinstance(node, TracedLoop):
             loop = loops.setdefault(id(node), TracedLoop((), node.most))
@@ -100,7 +100,7 @@ class ProgramCopy:
             loop = loops.setdefault(id(node.args[0]), TracedLoop((), node.args[0].most))
             return Expression(self.tape, "carry", (loop, node.args[1]), SAMPLE)
         if node.op == "result":
-            return Expression(self.tape, "result", (known[id(node.args[0])], node.args[1]), SAMPLE)
+            return Expression(self.tape, "result", (copies[id(node.args[0])], node.args[1]), SAMPLE)
         if node.op == "parameter":
             return float(node.value)
         if node.op == "input":

@@ -65,14 +65,14 @@ class Program:
 
 def program(tape: Tape, outputs: Mapping[str, Any]) -> Program:
     """Order what a tape holds into a program with these outputs."""
-    made = Program(tape, outputs)
+    result = Program(tape, outputs)
     roots = [(value, False) for value in (*outputs.values(), *tape.updates.values())]
     roots += [(question, question.stage <= PARAMETER) for question, _ in tape.guards]
     order = postorder([root for root, _ in roots])
     scopes, uses = _scopes(roots, order)
-    _name(made, order, scopes, uses)
-    _fill(made, order, scopes)
-    return made
+    _name(result, order, scopes, uses)
+    _fill(result, order, scopes)
+    return result
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def dependencies(node: Expression | TracedLoop) -> Iterator[tuple[Any, int | Non
 
 def postorder(roots: list[Any]) -> list[Any]:
     """Nodes, each after what it is computed from."""
-    seen: set[int] = set()
+    visited: set[int] = set()
     order: list[Any] = []
     stack: list[tuple[Any, bool]] = [(root, False) for root in reversed(roots)]
     while stack:
@@ -108,8 +108,8 @@ def postorder(roots: list[Any]) -> list[Any]:
             continue
         if done:
             order.append(node)
-        elif id(node) not in seen:
-            seen.add(id(node))
+        elif id(node) not in visited:
+            visited.add(id(node))
             stack.append((node, True))
             stack.extend((part, False) for part, _ in reversed(list(dependencies(node))))
     return order
@@ -146,29 +146,29 @@ def _early(node: Any) -> bool:
     return isinstance(node, Expression) and node.stage <= PARAMETER
 
 
-def _name(made: Program, order: list[Any], scopes: dict[int, Scope], uses: dict[int, list[_Use]]) -> None:
+def _name(result: Program, order: list[Any], scopes: dict[int, Scope], uses: dict[int, list[_Use]]) -> None:
     """Name leaves, branches, loops, and what is used more than once or in another block.
 
     What is computed early and used late is derived from the parameters; what is used once, in
     the block it is computed in, is written where it is used.
     """
-    stored = {id(value) for value in made.tape.updates.values()}
+    stored = {id(value) for value in result.tape.updates.values()}
     for node in order:
         if isinstance(node, TracedLoop):
             continue
         if node.op in ("parameter", "input", "memory"):
-            made.names[id(node)] = node.name
+            result.names[id(node)] = node.name
             continue
         users, scope = uses[id(node)], scopes[id(node)]
         derived = not scope and _early(node) and any(not use.early for use in users)
         if derived:
-            made.derived.append(node)
+            result.derived.append(node)
         elsewhere = len(users) > 1 or users[0].scope != scope
         if derived or elsewhere or node.op in ("select", "carry", "result") or id(node) in stored:
-            made.names[id(node)] = f"{'d' if derived else 't'}{len(made.names)}"
+            result.names[id(node)] = f"{'d' if derived else 't'}{len(result.names)}"
 
 
-def _fill(made: Program, order: list[Any], scopes: dict[int, Scope]) -> None:
+def _fill(result: Program, order: list[Any], scopes: dict[int, Scope]) -> None:
     """Put what is named into blocks."""
     blocks: dict[tuple[Scope, bool], list[Statement]] = defaultdict(list)
     early_blocks: set[int] = set()
@@ -183,6 +183,6 @@ def _fill(made: Program, order: list[Any], scopes: dict[int, Scope]) -> None:
             home.append(Repeat(node, blocks[(*scope, (id(node), 0)), early]))
         elif node.op == "select":
             home.append(Branch(node, *(blocks[(*scope, (id(node), side)), early] for side in (0, 1))))
-        elif id(node) in made.names and node.op not in (*_LEAVES, "result"):
+        elif id(node) in result.names and node.op not in (*_LEAVES, "result"):
             home.append(Let(node))
-    made.setup, made.step = blocks[(), True], blocks[(), False]
+    result.setup, result.step = blocks[(), True], blocks[(), False]

@@ -132,7 +132,7 @@ class Tape:
     def settle(self, question: Expression) -> bool:
         """Answer a question by the value at hand, and keep the answer."""
         answer = bool(question.value)
-        if not any(known is question for known, _ in self.guards):
+        if not any(guard is question for guard, _ in self.guards):
             self.guards.append((question, answer))
         return answer
 
@@ -159,10 +159,10 @@ class Tape:
 
     def lookup(self, table: LookupTable, x: Any) -> Expression:
         """Value of a table at an expression."""
-        found = [i for i, known in enumerate(self.tables) if known is table]
-        if not found:
+        indices = [i for i, other in enumerate(self.tables) if other is table]
+        if not indices:
             self.tables.append(table)
-        return self._note("lookup", (found[0] if found else len(self.tables) - 1, x))
+        return self._note("lookup", (indices[0] if indices else len(self.tables) - 1, x))
 
     def loop(
         self,

@@ -41,6 +41,7 @@ def register(app: typer.Typer) -> None:
         data: Path | None = typer.Option(None, "--data", help="Dataset with the check runs; default: bundled tests."),
         level: float = typer.Option(0.9, "--level", help="Coverage of the prediction interval."),
         out: Path | None = typer.Option(None, "--out", help="CSV to write; default: standard output."),
+        plot: Path | None = typer.Option(None, "--plot", help="Figure of the force to write (.png, .svg or .pdf)."),
         as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
     ) -> None:
         """Predict the force at a test condition or along a motion.
@@ -69,6 +70,7 @@ def register(app: typer.Typer) -> None:
                 )
         student(level, 1.0)  # refuses a level that is none
         require_writable(out)
+        require_writable(plot)
         damper = load_model(model)
         if coil_lag is not None:
             driver = damper.coil.driver if damper.coil else None
@@ -90,6 +92,7 @@ def register(app: typer.Typer) -> None:
             )
         known = band(damper, prediction, level)
         if check_run:
+            from mrdamper.dampers.bands import session_band
             from mrdamper.dampers.sessions import When, sessions_known
             from mrdamper.rig_files.dataset_folder import load_dataset
 
@@ -97,7 +100,8 @@ def register(app: typer.Typer) -> None:
             runs = [dataset[name] for name in check_run]
             expected = sessions_known(damper, runs).expected(When.of(runs[-1]))
             assert expected is not None  # the last check run's own session
-            known, prediction = expected.band(damper, prediction, level), expected.corrected(prediction)
+            known = session_band(expected, damper, prediction, level)
+            prediction = expected.corrected(prediction)
             typer.echo(
                 f"session known by {', '.join(check_run)}: gain {expected.gain:.3f} ± {expected.gain_spread:.3f}, "
                 f"offset {expected.offset:.3g} ± {expected.offset_spread:.2g} N",
@@ -106,11 +110,27 @@ def register(app: typer.Typer) -> None:
         typer.echo(
             _said(prediction, known, level, scope(damper, level)) if known else f"note: {no_band(damper)}", err=True
         )
+        if plot is not None:
+            _write_figure(plot, prediction, known, level)
         put(prediction_rows(prediction, known), out, as_json, csv_text)
 
 
+def _write_figure(path: Path, prediction: Prediction, interval: Band | None, level: float) -> None:
+    """Write a figure of the predicted force; the file appears whole or not at all."""
+    from mrdamper.data.atomic import write_file
+    from mrdamper.errors import UnknownNameError
+    from mrdamper.report.plots.loops import predicted_force
+    from mrdamper.report.plots.style import HOW_SAVED
+
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in HOW_SAVED:
+        raise UnknownNameError.of("kind of figure", path.suffix, [f".{name}" for name in HOW_SAVED])
+    with write_file(path) as target:
+        predicted_force(prediction, interval, level).savefig(target, format=kind, **HOW_SAVED[kind])
+
+
 def _said(prediction: Prediction, known: Band, level: float, where: str) -> str:
-    """The peak force, its band, and where the band comes from."""
+    """Describe peak force, energy and damping with their intervals."""
     from mrdamper.statistics.metrics import dissipated_power, peak_force
 
     parts = ", ".join(
@@ -123,11 +143,13 @@ def _said(prediction: Prediction, known: Band, level: float, where: str) -> str:
     # Of the linear damper that takes as much out of the same sine: C = E/(π ω X²).
     damping = 2 * power / c.peak_velocity**2 if c.peak_velocity > 0 else math.nan
     low, high = (1 + share for share in known.energy)
-    return (
-        f"peak force {peak_force(prediction.force):.4g} N; "
-        f"{100 * level:g} % prediction interval {known.peak[0]:.4g} to "
-        f"{known.peak[1]:.4g} N {where}; {known.known_session[0]:.4g} to {known.known_session[1]:.4g} N "
-        f"once a session's gain is known; dissipated energy {energy:.4g} J a cycle ({energy * low:.4g} to "
-        f"{energy * high:.4g}), equivalent damping {damping:.4g} N s/m ({damping * low:.4g} to {damping * high:.4g}); "
-        f"standard deviations: {parts}"
+    return "\n".join(
+        (
+            f"peak force {peak_force(prediction.force):.4g} N, {100 * level:g} % prediction interval "
+            f"{known.peak[0]:.4g} to {known.peak[1]:.4g} N {where}; with gain and offset of the session corrected "
+            f"{known.known_session[0]:.4g} to {known.known_session[1]:.4g} N",
+            f"dissipated energy {energy:.4g} J per cycle ({energy * low:.4g} to {energy * high:.4g})",
+            f"equivalent damping {damping:.4g} N s/m ({damping * low:.4g} to {damping * high:.4g})",
+            f"standard deviation of the force: {parts}",
+        )
     )

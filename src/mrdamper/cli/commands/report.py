@@ -19,7 +19,7 @@ def register(app: typer.Typer) -> None:
         specimens: list[str] = typer.Argument(help="Dataset folders, one per damper; FOLDER:RIG if it holds several."),
         out: Path = typer.Option(..., "--out", help="Folder for report.html, report.pdf, tables and figures."),
         about: Path | None = typer.Option(
-            None, "--about", help="TOML file with customer, specimen, logo (mrdamper init about)."
+            None, "--about", help="TOML file with customer, type, serial, logo (mrdamper init about)."
         ),
         limits: Path | None = typer.Option(
             None, "--limits", help="TOML file with force limits (mrdamper init limits)."

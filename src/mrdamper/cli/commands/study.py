@@ -30,7 +30,7 @@ def register(app: typer.Typer) -> None:
             [], "--set", help="OPTION=VALUE of --model paper (n, gamma, mass_law, search, ...); may be repeated."
         ),
         about: Path | None = typer.Option(
-            None, "--about", help="TOML file with customer, specimen, logo (mrdamper init about)."
+            None, "--about", help="TOML file with customer, type, serial, logo (mrdamper init about)."
         ),
         limits: Path | None = typer.Option(
             None, "--limits", help="TOML file with force limits (mrdamper init limits)."

@@ -17,11 +17,11 @@ def render(template: str, **facts: Any) -> str:
 def _environment() -> Any:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    made = Environment(
+    environment = Environment(
         loader=PackageLoader("mrdamper.export", "templates"),
         undefined=StrictUndefined,
         keep_trailing_newline=True,
         autoescape=False,  # each place has its own encoding
     )
-    made.filters["xml"] = xml
-    return made
+    environment.filters["xml"] = xml
+    return environment

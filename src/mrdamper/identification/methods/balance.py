@@ -81,8 +81,8 @@ class Balance(Method):
         lower = np.array([axis.coordinate(axis.lower) for axis in axes])
         upper = np.array([axis.coordinate(axis.upper) for axis in axes])
         starts = [grid[i] for i in np.argsort(costs)[: min(len(axes), 2)]]
-        found = [(start, least_squares(residual, start, lower, upper)) for start in starts]
-        start, best = min(found, key=lambda pair: pair[1].cost)
+        minima = [(start, least_squares(residual, start, lower, upper)) for start in starts]
+        start, best = min(minima, key=lambda pair: pair[1].cost)
         model, _, held = balanced.at(point(best.point))
         edge = tuple(axis.name for axis, u in zip(axes, best.point, strict=True) if axis.at_bound(float(u)))
         return Solution(
@@ -91,7 +91,7 @@ class Balance(Method):
             at_bounds=(*held, *edge),
             start=point(start),
             end=point(best.point),
-            evaluations=len(grid) + sum(minimum.evaluations for _, minimum in found),
+            evaluations=len(grid) + sum(minimum.evaluations for _, minimum in minima),
             ending=best.ending,
         )
 

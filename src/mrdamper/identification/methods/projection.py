@@ -65,8 +65,8 @@ class Projection(Method):
             evaluated = piece.evaluations
         else:
             starts, evaluated = _best_of_grid(problem, axes, elimination, self.refine_best if len(axes) > 1 else 1)
-        found = [(start, _refined(problem, axes, elimination, start)) for start in starts]
-        start, best = min(found, key=lambda pair: pair[1].cost)
+        minima = [(start, _refined(problem, axes, elimination, start)) for start in starts]
+        start, best = min(minima, key=lambda pair: pair[1].cost)
         end = _point(axes, best.point)
         model, held = (elimination and elimination.solved(end)), ()
         if model is None:
@@ -78,7 +78,7 @@ class Projection(Method):
             at_bounds=(*held, *_axes_at_bounds(axes, best)),
             start=_point(axes, start),
             end=end,
-            evaluations=evaluated + sum(minimum.evaluations for _, minimum in found),
+            evaluations=evaluated + sum(minimum.evaluations for _, minimum in minima),
             ending=best.ending,
         )
 
@@ -100,9 +100,9 @@ def _project(problem: Problem, point: Mapping[str, float], thin: int = 1) -> Pro
     linear = [i for i in problem.model_type.parameters() if i.linear and i.name in problem.free]
     bare = problem.model_type.build({**problem.fixed, **shape, **{i.name: 0.0 for i in linear}})
     state = bare.state(motion)[problem.scored][::thin]
-    seen = motion.part(problem.scored) if delay else problem.seen
-    seen = seen.part(slice(None, None, thin)) if thin > 1 else seen
-    base, columns = linear_table(bare, linear, seen, state)
+    scored = motion.part(problem.scored) if delay else problem.seen
+    scored = scored.part(slice(None, None, thin)) if thin > 1 else scored
+    base, columns = linear_table(bare, linear, scored, state)
     measured = problem.force[::thin]
     solution, held = solve_bounded(columns, measured - base, *bounds_of(linear))
     names = [i.name for i in linear]
@@ -135,8 +135,8 @@ def _refined(problem: Problem, axes: tuple[SearchAxis, ...], elimination: Elimin
 
     def residual(u: Floats) -> Floats:
         point = _point(axes, u)
-        found = elimination.residual(point) if elimination else None
-        return _project(problem, point).residual if found is None else found
+        fit = elimination.residual(point) if elimination else None
+        return _project(problem, point).residual if fit is None else fit
 
     return least_squares(residual, start, lower, upper, curved=shaped)
 

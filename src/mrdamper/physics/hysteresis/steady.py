@@ -60,13 +60,13 @@ def steady_loop(shape: Shape, amplitude: float, theta: ArrayLike) -> Floats:
     loops = list(_loops(shape, amplitude))
     if not shape.is_many:
         return sign * loops[0].loading(share)
-    found = np.empty((len(loops), share.size))
+    forces = np.empty((len(loops), share.size))
     for rho in dict.fromkeys(loop.rho for loop in loops):  # alike: one curve for all of their samples
         alike = [i for i, loop in enumerate(loops) if loop.rho == rho]
         reach, to_zero = np.array([(loops[i].reach, loops[i].to_zero) for i in alike]).T[:, :, None]
         phi = 2 * reach * share - to_zero
-        found[alike] = on_curve(loops[alike[0]].curve, rho, phi.ravel()).reshape(phi.shape)
-    return sign * found
+        forces[alike] = on_curve(loops[alike[0]].curve, rho, phi.ravel()).reshape(phi.shape)
+    return sign * forces
 
 
 def loop_harmonics(shape: Shape, amplitude: ArrayLike, orders: Sequence[int] = (1, 3, 5, 7)) -> tuple[Floats, Floats]:

@@ -81,12 +81,14 @@ def integrate(
     steps = np.concatenate([[1.0], np.diff(time)])
     begin = {f"state{i}": float(value) for i, value in enumerate(start)}
     memory = [begin.get(name, value) for name, value in record.program.tape.starts.items()]
-    found = record.along(given, derived, memory, (x, v, current, steps))
-    out = found.outputs.T
+    states_along = record.along(given, derived, memory, (x, v, current, steps))
+    out = states_along.outputs.T
     limit = _RUNAWAY * np.asarray(scale, dtype=float)
-    lost = np.flatnonzero(~(np.abs(out[: found.failed if found.failed >= 0 else None]) <= limit).all(axis=1))
-    if lost.size or found.failed >= 0:
-        at = int(lost[0]) if lost.size else found.failed
+    lost = np.flatnonzero(
+        ~(np.abs(out[: states_along.failed if states_along.failed >= 0 else None]) <= limit).all(axis=1)
+    )
+    if lost.size or states_along.failed >= 0:
+        at = int(lost[0]) if lost.size else states_along.failed
         why = "runs away" if lost.size else f"needs more than {_MOST_STEPS:_} steps".replace("_", " ")
         raise ParameterError(
             f"the model's state {why} between samples {at - 1} and {at} ({time[at]:.4g} s)",
@@ -97,15 +99,15 @@ def integrate(
 
 def _record(rate: Rate, states: int, given: tuple[float, ...]) -> tuple[RecordProgram, tuple[float, ...]]:
     """Return the program of a rate that holds for some parameters, and the constants that follow from them."""
-    known = _programs(rate, states, len(given))
-    for record in known:
+    programs = _programs(rate, states, len(given))
+    for record in programs:
         if (derived := record.prepare(given)) is not None:
             return record, derived
-    known.append(RecordProgram(_traced(rate, states, given)))
-    derived = known[-1].prepare(given)
+    programs.append(RecordProgram(_traced(rate, states, given)))
+    derived = programs[-1].prepare(given)
     if derived is None:
         raise ParameterError(f"parameters {given}", mend="give finite numbers")
-    return known[-1], derived
+    return programs[-1], derived
 
 
 @lru_cache(maxsize=64)

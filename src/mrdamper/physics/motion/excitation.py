@@ -82,10 +82,10 @@ class Excitation:
     @checked()
     def with_current(self, current: ArrayLike) -> Excitation:
         """Return the same motion at another current [A], a scalar or one value per sample."""
-        made = replace(self, current=np.asarray(current, dtype=float))
+        motion = replace(self, current=np.asarray(current, dtype=float))
         if "path" in self.__dict__:
-            made.__dict__["path"] = self.path  # the current does not bend it
-        return made
+            motion.__dict__["path"] = self.path  # the current does not bend it
+        return motion
 
     @checked()
     def about(self, centre: float) -> Excitation:

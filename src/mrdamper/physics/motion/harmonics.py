@@ -134,8 +134,8 @@ def _refined(t: Floats, signal: Floats, frequency: float, orders: int, tolerance
 
     coefficients = _solved(t.size, signal, waves)
     for _ in range(30):
-        found = _solved(t.size, signal, with_slope)
-        coefficients, step = found[:-1], float(found[-1])
+        solution = _solved(t.size, signal, with_slope)
+        coefficients, step = solution[:-1], float(solution[-1])
         frequency += float(np.clip(step, -0.1 * frequency, 0.1 * frequency))
         if abs(step) < tolerance * frequency:
             break
@@ -163,8 +163,8 @@ def _single_sine_costs(t: Floats, signal: Floats, frequencies: Floats) -> Floats
     trend = np.broadcast_to(np.stack([np.ones_like(t), t / t[-1]]), (frequencies.size, 2, t.size))
     rows = np.concatenate([trend, np.sin(angle)[:, None], np.cos(angle)[:, None]], axis=1)
     right = rows @ signal
-    found = np.linalg.solve(rows @ rows.transpose(0, 2, 1), right[..., None])[..., 0]
-    return float(signal @ signal) - np.sum(right * found, axis=1)
+    coefficients = np.linalg.solve(rows @ rows.transpose(0, 2, 1), right[..., None])[..., 0]
+    return float(signal @ signal) - np.sum(right * coefficients, axis=1)
 
 
 def _spectral_line(time: Floats, signal: Floats) -> float:

@@ -120,23 +120,23 @@ def lately_along(function: Callable[..., Floats]) -> Callable[..., Floats]:
     A search moves one parameter at a time, to and fro: what the others lead to stays. It is forgotten
     with the path. Symbols, and records whose numbers are not worth their memory, are computed every time.
     """
-    known: dict[int, tuple[ref[Any], list[tuple[tuple[Any, ...], Floats]]]] = {}
+    memory: dict[int, tuple[ref[Any], list[tuple[tuple[Any, ...], Floats]]]] = {}
 
     @wraps(function)
     def remembered(first: Any, *given: Any) -> Floats:
         if not isinstance(first, np.ndarray | Path) or len(first) > LONG:
             return function(first, *given)
-        if id(first) not in known:
-            known[id(first)] = ref(first, lambda _, key=id(first): known.pop(key, None)), []
-        _, last = known[id(first)]
-        for place, (before, made) in enumerate(last):
+        if id(first) not in memory:
+            memory[id(first)] = ref(first, lambda _, key=id(first): memory.pop(key, None)), []
+        _, last = memory[id(first)]
+        for place, (before, result) in enumerate(last):
             if all(a is b or not (isinstance(a, np.ndarray) or a != b) for a, b in zip(before, given, strict=True)):
                 last.insert(0, last.pop(place))
-                return made
-        made = function(first, *given)
-        made.flags.writeable = False
-        last[:] = (given, made), *last[:1]
-        return made
+                return result
+        result = function(first, *given)
+        result.flags.writeable = False
+        last[:] = (given, result), *last[:1]
+        return result
 
     return remembered
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 from typing import Any, Literal
 
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
+from mrdamper.dampers.bands import Band
 from mrdamper.dampers.base import Prediction
 from mrdamper.data import Floats, Run
 from mrdamper.errors import InputError, UnknownNameError, require, shown
 from mrdamper.physics.motion import measured_motion
-from mrdamper.report.plots.style import KN, MM, house_style, label
+from mrdamper.report.plots.style import KN, MM, PREDICTED, house_style, label, new_figure
 
 _OVER = {"displacement": ("Displacement (mm)", MM), "velocity": ("Velocity (mm/s)", MM)}
 
@@ -84,6 +86,38 @@ def plot_force(what: Run | Prediction, axes: Axes | None = None, **line: Any) ->
     require(what, (Run, Prediction), "a run or a prediction")
     time = what.time if isinstance(what, Run) else what.motion.time
     return _drawn(axes, time, what.force, "Time (s)", line)
+
+
+def predicted_force(prediction: Prediction, interval: Band | None = None, level: float = 0.9) -> Figure:
+    """Draw a prediction with its interval: both loops of a sine, force over time of any other motion.
+
+    Parameters
+    ----------
+    prediction : Prediction
+    interval : Band, optional
+        Of that prediction, as `mrdamper.dampers.bands.band` gives it.
+    level : float
+        Coverage of the interval [-], for the legend.
+
+    Returns
+    -------
+    matplotlib Figure
+    """
+    motion = prediction.motion
+    abscissas = [("Time (s)", motion.time)]
+    if prediction.is_sine:
+        abscissas = [("Displacement (mm)", MM * motion.displacement), ("Velocity (m/s)", motion.velocity)]
+    with house_style():
+        figure, panels = new_figure(1, len(abscissas), 3.2)
+        for axes, (name, x) in zip(panels, abscissas, strict=True):
+            axes.plot(x, prediction.force, color=PREDICTED, label="predicted")
+            for number, edge in enumerate((interval.low, interval.high) if interval else ()):
+                text = "_" if number else f"{100 * level:g} % interval"
+                axes.plot(x, edge, color=PREDICTED, lw=0.6, ls=":", label=text)
+            label(axes, name, "Force (N)")
+        panels[0].set_title(str(prediction.condition), loc="left")
+        panels[-1].legend()
+    return figure
 
 
 def _drawn(axes: Axes | None, x: Floats, force: Floats, name: str, line: dict[str, Any]) -> Axes:

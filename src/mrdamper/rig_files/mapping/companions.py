@@ -12,14 +12,14 @@ import numpy as np
 
 from mrdamper.data import Floats, held_current
 from mrdamper.errors import ColumnError, InputError, printable
-from mrdamper.rig_files.coil_current import as_data, constant
+from mrdamper.rig_files.coil_current import as_data, constant, current_of
 from mrdamper.rig_files.columns import partly_assigned
 from mrdamper.rig_files.conditions import contradicts
 from mrdamper.rig_files.mapping.completion import completed
 from mrdamper.rig_files.mapping.results import Results, lines_of, results_in
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers import raw_tables
-from mrdamper.rig_files.record import REQUIRED, Finding, Record
+from mrdamper.rig_files.record import Finding, Record
 
 _FEWEST_ROWS = 50  # of a record
 _LARGEST_TEXT = 2**18  # bytes
@@ -34,6 +34,7 @@ class Part:
     path: Path
     time: Floats  # (N,) [s]
     channels: Mapping[str, Floats]  # by name, (N,) in SI
+    current: float | None = None  # [A] that the file states beside its columns
 
 
 def part_of(path: Path, profile: Profile) -> Part | None:
@@ -48,13 +49,14 @@ def part_of(path: Path, profile: Profile) -> Part | None:
                 return None
             raw = table.read([entry.column for entry in found.values()]).values
             channels = {role: e.factor * raw[e.column] + e.offset for role, e in found.items()}
+            current, _ = current_of(table, profile, path, channels.get("current"), slice(None))
     except InputError:
         return None
     time = channels.pop("time")
     there = np.isfinite(time)
     if np.count_nonzero(there) < 2 or np.any(np.diff(time[there]) <= 0):
         return None
-    return Part(path, time[there], {role: values[there] for role, values in channels.items()})
+    return Part(path, time[there], {role: values[there] for role, values in channels.items()}, current)
 
 
 def number_of(path: Path) -> tuple[str, ...]:
@@ -111,6 +113,9 @@ def joined_parts(parts: Sequence[Part], profile: Profile) -> list[tuple[Record, 
             for part in group
             for name, values in part.channels.items()
         }
+        stated = {part.current for part in group} - {None}
+        if "current" not in channels and len(stated) == 1:
+            channels["current"] = constant(stated.pop() or 0.0, clock)
         files = [part.path.name for part in group]
         stem = re.sub(r"[^\w.+=-]+", "_", loads[0].path.stem)
         remarks = {"file": as_data(files[0]), "files": as_data(", ".join(files)), "columns": ", ".join(names)}
@@ -181,12 +186,12 @@ def contradictions_with(
 
 
 def is_list(path: Path) -> bool:
-    """Whether a file holds only short tables without a time, a displacement or a force: a plan, a list of results."""
+    """Whether a file holds only short tables without a time, or a displacement and a force: a plan, peak values."""
     try:
         with raw_tables(path) as tables:
             rows = [table.words(0).codes.size if table.words is not None else _FEWEST_ROWS for table in tables]
             named = all(any(table.names) for table in tables)
-            roles = {header.role for table in tables for header in table.headers}
+            roles = [{header.role for header in table.headers} for table in tables]
     except InputError:
         return False
-    return named and max(rows) < _FEWEST_ROWS and not roles & {*REQUIRED}
+    return named and max(rows) < _FEWEST_ROWS and not any("time" in r or {"displacement", "force"} <= r for r in roles)

@@ -6,10 +6,19 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-from mrdamper.rig_files.column_names import names_weight, role_of, says_nothing, split_name, unknown_unit, words_of
+from mrdamper.rig_files.column_names import (
+    names_condition,
+    names_weight,
+    role_of,
+    says_nothing,
+    split_name,
+    unknown_unit,
+    words_of,
+)
 from mrdamper.rig_files.conditions import currents_in, without_currents
 from mrdamper.rig_files.readers.base import Content, RawTable
 from mrdamper.rig_files.record import Finding
+from mrdamper.rig_files.text.layout import cells_of
 from mrdamper.rig_files.text.spool import rescale
 from mrdamper.rig_files.units import DIMENSION, is_unit, parse_unit
 
@@ -26,12 +35,19 @@ _TIME_UNIT = re.compile(
     r"(?i)^[\s\"#%]*(?:horizontal|x[ -]?|h|time[ _-]?)\s*units?\"?\s*[:=,;\t]\s*\"?(?P<unit>[a-zµ]{1,12})\"?[\s,;]*$"
 )
 _PER_COUNT = re.compile(
-    r"(?P<number>[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]+)?)\s*(?P<unit>[A-Za-zµ/]{1,6}?)\s*(?:/|per)\s*"
-    r"(?:counts?|cnts?|cts?|digits?|bits?|lsb|incs?|increments?|inkr?|steps?|pulses?|imp)",
+    r"(?P<number>[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]+)?)\s*(?P<unit>[A-Za-zµ/]{1,6}?)(?:\s*(?:/|per)\s*"
+    r"(?:counts?|cnts?|cts?|digits?|bits?|lsb|incs?|increments?|inkr?|steps?|pulses?|imp|ticks?))?",
     re.IGNORECASE,
 )
 _UNITS_KEY = re.compile(r"(?:vertical|channel|y|signal|data)?[ _-]*units?", re.IGNORECASE)
 _MONITOR = frozenset(("mon", "monitor", "imon", "iout", "i", "current", "curr", "strom", "amp", "amplifier", "shunt"))
+_LONGEST_CONDITIONS = 4000
+_PLAIN = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")
+_LISTED = re.compile(
+    r"^[\s\"#%]*(?:ch(?:annel)?|column|col|spalte|kanal)?[\s#._]*(?P<number>[0-9]{1,3})\"?\s*[=:;,\t]\s*\"?"
+    r"(?P<name>[^\d\W][^;,\t\[\](){}=]*?)\"?\s*[;,\t\[({]\s*\"?(?P<unit>[^;,\t\[\](){}\"]{1,12})\"?[\])}]?[\s;,\"]*$",
+    re.IGNORECASE,
+)
 _SIGNALS = ("voltage", "count")  # what a scale leads from
 _LONGEST_LINE = 300
 
@@ -39,11 +55,35 @@ _LONGEST_LINE = 300
 def completed(table: RawTable) -> RawTable:
     """The table with the names, units and scales that the file states above, below or beside its row of names."""
     if not any(table.names):
+        table = _with_listed_names(table)
+    if not any(table.names):
         return table
-    table = _with_titles(_with_keyed_units(table))
+    table = _with_titles(_with_keyed_units(_with_row_of_currents(table)))
     table = _with_stated_time_unit(_with_listed_units(table))
     table = _with_clocks_and_weights(table)
     return _with_scales(_with_counts(table))
+
+
+def _with_row_of_currents(table: RawTable) -> RawTable:
+    """Titles with the currents of a line above the names: current (A), 0, , 0.5, , one for a column or a group."""
+    width = len(table.names)
+    for line in table.remarks if width > 2 else ():
+        for separator in _SEPARATORS:
+            key, *cells = cells_of(line[:_LONGEST_CONDITIONS], separator)
+            header = split_name(key.strip('"'))
+            stated = [cell for cell in cells if cell]
+            if header.dimension != "current" or not names_condition(header.name, "current") or len(stated) < 2:
+                continue
+            if not width - 2 <= len(cells) <= width or not all(map(_PLAIN.fullmatch, stated)):
+                continue
+            titles, last = [""], ""
+            for cell in cells[: width - 1]:
+                last = f"{cell.replace(',', '.')} {header.unit}" if cell else last
+                titles.append(last)
+            titles += [last] * (width - len(titles))
+            over = table.over or ("",) * width
+            return replace(table, over=tuple(f"{a} {b}".strip() for a, b in zip(over, titles, strict=True)))
+    return table
 
 
 def _with_keyed_units(table: RawTable) -> RawTable:
@@ -57,6 +97,16 @@ def _with_keyed_units(table: RawTable) -> RawTable:
             if _UNITS_KEY.fullmatch(key) and len(known) == len(table.names) - 1 and all(known):
                 return replace(table, units=("", *known))
     return table
+
+
+def _with_listed_names(table: RawTable) -> RawTable:
+    """Names and units of columns without any, where numbered lines above state them: 1=Time;min."""
+    matches = [match for line in table.remarks if (match := _LISTED.match(line[:_LONGEST_LINE]))]
+    listed = {int(match["number"]): match for match in matches if is_unit(match["unit"].strip())}
+    if len(listed) < len(matches) or set(listed) != set(range(1, len(table.names) + 1)):
+        return table
+    names, units = (tuple(listed[i][key].strip() for i in sorted(listed)) for key in ("name", "unit"))
+    return replace(table, names=names, units=units)
 
 
 def _with_titles(table: RawTable) -> RawTable:

@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 
+from mrdamper.data import held_current
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.readers.base import Content, RawTable, Words
 
@@ -66,6 +67,8 @@ def _pivoted(
     def of_channel(number: int) -> np.ndarray:
         own = rows[number]
         same = own.size == base.size and all(np.allclose(column(i)[own], column(i)[base]) for i in clocks)
+        if not same and len(clocks) == 1 and split_name(labels[number]).role == "current":
+            return _on_clock(column(clocks[0])[base], column(clocks[0])[own], column(value)[own])
         if not same:
             raise table.source.refuse(
                 "E_RASTER", f"{labels[number]!r} has other times than the force", "export one column a channel"
@@ -85,6 +88,15 @@ def _pivoted(
     names = (*(table.names[i] for i in others), *labels)
     own = (*(table.units[i] for i in others), *units)
     return replace(table, names=names, units=own, read=read, words=words, odd=(), over=(), remarks=())
+
+
+def _on_clock(clock: np.ndarray, own: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """A current recorded more rarely: the one that is held, else interpolated onto the force's clock."""
+    there = np.isfinite(own) & np.isfinite(values)
+    held, change = held_current(values[there])
+    if not change:
+        return np.full(clock.shape, held)
+    return np.interp(clock, own[there], values[there])
 
 
 def _units(table: RawTable, words: Words, column: list[int]) -> list[str] | None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from mrdamper.rig_files.column_names import names_condition, split_name
 from mrdamper.rig_files.readers.base import RawTable
+from mrdamper.rig_files.text.layout import cells_of
 from mrdamper.rig_files.units import is_unit, parse_unit
 
 _SEPARATORS = ("\t", ";", ",", "|")
@@ -65,9 +66,10 @@ def with_results(tables: list[RawTable]) -> list[RawTable]:
     results = results_in(lines) if len(lines) > _FEWEST_ROWS else None
     others = tables
     if results is None:
+        tables = [table for table in tables if not table.fallback]
         stated = [(table, r) for table in tables if _may_be_results(table) and (r := results_in(lines_of(table)))]
         if len(stated) != 1 or len(tables) < 2:
-            return tables
+            return others
         results = stated[0][1]
         tables = [table for table in tables if table is not stated[0][0]]
     shared = set(tables[0].remarks).intersection(*(table.remarks for table in tables[1:])) if len(tables) > 1 else set()
@@ -111,7 +113,7 @@ def _last_lines(table: RawTable, shared: set[str]) -> list[str]:
 
 
 def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
-    rows = [[cell.strip().strip('"').strip() for cell in line[:_LONGEST_LINE].split(separator)] for line in lines]
+    rows = [[cell.strip('"').strip() for cell in cells_of(line[:_LONGEST_LINE], separator)] for line in lines]
     for at, row in enumerate(rows):
         columns = [i for i, cell in enumerate(row) if cell and _is_current(cell)]
         if len(row) < 2 or not columns or sum(map(bool, row)) < 2:

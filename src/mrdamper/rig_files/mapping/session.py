@@ -39,8 +39,9 @@ def stretches_of_session(time: Floats, displacement: Floats, current: Floats | N
     current = np.zeros(time.size) if current is None else current
     if not there.all() or not 400 <= time.size <= _LONGEST or np.any(np.diff(time) <= 0):
         return whole
-    borders = _borders(time, displacement) or _steps(time, displacement, current)
-    parts = [slice(a, b) for a, b in pairwise([0, *borders, time.size])]
+    borders = [(at, at) for at in _borders(time, displacement)] or _steps(time, displacement, current)
+    ends = [*(stop for stop, _ in borders), time.size]
+    parts = [slice(a, b) for a, b in zip([0, *(start for _, start in borders)], ends, strict=True)]
     parts = [part for part in parts if _moves(displacement[part], displacement)]
     if len(parts) < 2:
         return whole
@@ -60,8 +61,8 @@ def stretches_of_session(time: Floats, displacement: Floats, current: Floats | N
     return parts
 
 
-def _steps(time: Floats, x: Floats, current: Floats) -> list[int]:
-    """Where the current goes from one held value to another while the motion goes on; empty if it is never held.
+def _steps(time: Floats, x: Floats, current: Floats) -> list[tuple[int, int]]:
+    """First and last sample of every change of the current from one held value to another while the motion goes on.
 
     Between two steps the motion turns back several times: a shorter stretch is a test of the coil's response.
     """
@@ -80,8 +81,8 @@ def _steps(time: Floats, x: Floats, current: Floats) -> list[int]:
     if not found or any(not 0.5 * size <= b - a <= 2 * size for a, b in found):
         return []
     # The first sample of which the one `size` ahead differs stands `size` before the step.
-    borders = [a + size for a, _ in found]
-    bounds = [0, *borders, time.size]
+    borders = [(a + size, max(b, a + size)) for a, b in found]
+    bounds = [0, *(start for _, start in borders), time.size]
     longest = [np.count_nonzero((strokes.reversals >= a) & (strokes.reversals < b)) for a, b in pairwise(bounds)]
     return borders if min(longest) >= _FEWEST_REVERSALS_HELD else []
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -58,7 +59,10 @@ def hdf5_tables(source: Source, title: str) -> list[RawTable]:
         source.keep.callback(file.close)
         found = _Found(source)
         _walk(file, "", found)
-    groups = {group: _titled(columns, found.lists.get(group, [])) for group, columns in found.groups.items()}
+    groups = {
+        group: _frame(columns) or _titled(columns, found.lists.get(group, []))
+        for group, columns in found.groups.items()
+    }
     objects = found.objects
     tables = []
     for group, columns in groups.items():
@@ -172,6 +176,23 @@ def _follow(references: Any, name: str, path: str, found: _Found) -> None:
             found.groups[inner] += columns
     if cell and len(words) == cells:
         found.lists[path].append(words)
+
+
+def _frame(columns: list[tuple]) -> list[tuple]:
+    """The columns of a group that holds a pandas frame in its fixed format; empty if it holds none."""
+    datasets = {dataset.name.rpartition("/")[2]: dataset for _, _, dataset, _ in columns if dataset is not None}
+    if "axis1" not in datasets or "block0_items" not in datasets:
+        return []
+    index = datasets["axis1"]
+    name = _text(index.attrs.get("name"))
+    framed: list[tuple] = [("index" if name in ("", "N.") else name, "", index, None)]
+    for key, dataset in datasets.items():
+        if not re.fullmatch(r"block[0-9]+_values", key) or key.replace("values", "items") not in datasets:
+            continue
+        items = _words(datasets[key.replace("values", "items")][()])
+        parts = [None] if len(items) == 1 else range(len(items))
+        framed += [(item, "", dataset, part) for item, part in zip(items, parts, strict=True)]
+    return framed
 
 
 def _titled(columns: list[tuple], words: list[list[str]]) -> list[tuple]:

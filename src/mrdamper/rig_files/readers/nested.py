@@ -52,6 +52,7 @@ class _Node:
     lists: list[list[str]] = field(default_factory=list)
     constants: dict[str, float] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
+    units: Mapping[str, str] = field(default_factory=dict)  # by column, as this node or one above states them
 
 
 def nested_tables(source: Source, tree: Mapping[str, Any], title: str) -> list[RawTable]:
@@ -62,7 +63,8 @@ def nested_tables(source: Source, tree: Mapping[str, Any], title: str) -> list[R
 
 def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Node]:
     inner: list[tuple[str, Any]] = []
-    for key, value in _paired(tree).items():
+    node.units = {**node.units, **_stated_units(tree)}
+    for key, value in _paired(tree, node.units).items():
         if isinstance(value, list) and all(isinstance(item, str) for item in value):
             if value and split_name(key).role is None:
                 node.lists.append(value)
@@ -85,21 +87,26 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
     yield node
     for key, value in inner if depth < DEEPEST else ():
         label = f"{node.label}/{key}" if node.label and key else node.label or key
-        yield from _walk(value, _Node(label, [], [], dict(node.constants), list(node.remarks)), depth + 1)
+        yield from _walk(value, _Node(label, [], [], dict(node.constants), list(node.remarks), node.units), depth + 1)
 
 
-def _paired(tree: Mapping[str, Any]) -> Mapping[str, Any]:
+def _stated_units(tree: Mapping[str, Any]) -> dict[str, str]:
+    """Units that a mapping called units gives the columns by their names."""
+    stated = next((value for key, value in tree.items() if key.casefold() in _UNITS and isinstance(value, Mapping)), {})
+    return {key: value for key, value in stated.items() if isinstance(value, str) and is_unit(value)}
+
+
+def _paired(tree: Mapping[str, Any], units: Mapping[str, str]) -> Mapping[str, Any]:
     """The mapping with arrays joined to what describes them: Channel_1_Data to Channel_1_Header, units by name."""
     heads = {_HEAD.sub("", key): key for key, value in tree.items() if _HEAD.search(key) and isinstance(value, Mapping)}
     pairs = {key: heads[stem] for key in tree if (stem := _BODY.sub("", key)) in heads and _BODY.search(key)}
-    units = next((v for k, v in tree.items() if k.casefold() in _UNITS and isinstance(v, Mapping)), {})
     used = set(pairs.values())
     found = {}
     for key, value in tree.items():
         if key in pairs and isinstance(value, np.ndarray):
             found[key] = {**tree[pairs[key]], "data": value}
-        elif isinstance(value, np.ndarray) and is_unit(str(units.get(key, ""))):
-            found[key] = {"name": key, "unit": str(units[key]), "data": value}
+        elif isinstance(value, np.ndarray) and key in units:
+            found[key] = {"name": key, "unit": units[key], "data": value}
         elif key not in used:
             found[key] = value
     return found
@@ -206,6 +213,7 @@ def _tell(node: _Node, says: Mapping[str, Any], above: str) -> None:
         if isinstance(value, Mapping):
             _tell(node, value, key)
         elif isinstance(value, float) and len(node.constants) < MOST_COLUMNS:
+            key = f"{key} [{node.units[key]}]" if key in node.units else key
             known = node.constants.get(key, value)
             node.constants[key if known == value else f"{above} {key}"] = value
         elif isinstance(value, str) and len(node.remarks) < MOST_COLUMNS:

@@ -141,7 +141,7 @@ def _levels(above: Sequence[str], separator: str, width: int) -> list[tuple[str,
     for line in reversed(above[-_MOST_LEVELS:]):
         if not line.strip() or is_comment(line) or separator == SPACES:
             break
-        cells = _try_split(line, separator)
+        cells = cells_of(line, separator)
         if len(cells) != width or sum(map(bool, cells)) < 2:
             break
         found.append(tuple(cell.strip('"') for cell in cells))
@@ -183,14 +183,14 @@ def _stated_for_all(above: Sequence[str], separator: str, width: int) -> list[st
 def _without_units(lines: Sequence[str]) -> Sequence[str]:
     """The lines without the units behind their numbers, where no line is a row of plain numbers."""
     last = [line for line in lines if line.strip()][-_SAMPLE:]
-    if any(_is_row(_try_split(line, mark)) for line in last for mark in _SEPARATORS):
+    if any(_is_row(cells_of(line, mark)) for line in last for mark in _SEPARATORS):
         return lines
     return [next(filter(None, (_bare_row(line, mark) for mark in _SEPARATORS[:-1])), line) for line in lines]
 
 
 def _bare_row(line: str, separator: str) -> str:
     """A row of which at least two cells are numbers with units, without the units; empty if it is none."""
-    matches = [_QUANTITY.fullmatch(cell) for cell in _try_split(line, separator) if cell]
+    matches = [_QUANTITY.fullmatch(cell) for cell in cells_of(line, separator) if cell]
     if len(matches) < 2 or not all(match and is_unit(match[2]) for match in matches):
         return ""
     return separator.join(match[1] for match in matches if match)
@@ -241,7 +241,7 @@ def _notes_beside(rows: Sequence[Sequence[str]]) -> tuple[str, ...]:
 
 def is_footer(line: str, layout: Layout) -> bool:
     """Whether a line that stands where rows do begins with a word in a column of numbers: Maximum; 12.5; 3.4."""
-    cells = _try_split(line, layout.separator)
+    cells = cells_of(line, layout.separator)
     if not any(cells):
         return False
     at = next(i for i, cell in enumerate(cells) if cell)
@@ -253,7 +253,7 @@ def _titles(above: Sequence[str], separator: str, width: int) -> tuple[str, ...]
     """Titles of groups of columns, one a column: each stands over its group's first column."""
     if not above or separator == SPACES or is_comment(above[-1]):
         return ()
-    cells = _try_split(above[-1], separator)[:width]
+    cells = cells_of(above[-1], separator)[:width]
     if sum(map(bool, cells)) < 2 or not cells[0] or len(cells) < width // 2:
         return ()
     titles = [""] * width
@@ -284,7 +284,8 @@ def is_comment(line: str) -> bool:
     return line.lstrip()[:1] in _MARKS and _COMMENT.match(line) is not None
 
 
-def _try_split(line: str, separator: str) -> list[str]:
+def cells_of(line: str, separator: str) -> list[str]:
+    """The stripped cells of a line, quotes or no quotes."""
     try:
         return split(line, separator)
     except csv.Error:
@@ -315,7 +316,7 @@ def _separator(lines: Sequence[str], content: Sequence[tuple[int, str]], source:
 
 
 def _evenness(lines: Sequence[str], separator: str) -> float:
-    rows = [cells for cells in (_try_split(line, separator) for line in lines) if len(cells) > 1]
+    rows = [cells for cells in (cells_of(line, separator) for line in lines) if len(cells) > 1]
     numeric = [sum(bool(cell) and looks_numeric(cell) for cell in row) for row in rows]
     data = [len(row) for row, count in zip(rows, numeric, strict=True) if count >= 2 or 2 * count > len(row)]
     if not data:
@@ -336,7 +337,7 @@ def _first_row(content: Sequence[tuple[int, str]], above: int, separator: str, s
     """Index of the first row of data from an index on, number of columns, whether rows end with a separator."""
     before = [entry for entry in content if entry[0] < above]
     content = content[len(before) :]
-    sample = [_try_split(line, separator) for _, line in content[-_SAMPLE:]]
+    sample = [cells_of(line, separator) for _, line in content[-_SAMPLE:]]
     rows = [cells for cells in sample if _is_row(cells)]
     if separator == SPACES and len(content) < _FEWEST_LINES and all(map(_is_prose, rows)):
         raise NoTableError("E_NO_DATA", "text with numbers in it, but no rows of numbers", file=source.name)
@@ -349,7 +350,7 @@ def _first_row(content: Sequence[tuple[int, str]], above: int, separator: str, s
     first, cells = _first_of(content, width, separator)
     trailing = width > 1 and separator != SPACES and not cells[-1] and not any(r[-1] for r in rows if len(r) == width)
     if trailing:
-        over = (_try_split(line, separator) for i, line in (*before, *content) if i < first)
+        over = (cells_of(line, separator) for i, line in (*before, *content) if i < first)
         header = [cells for cells in over if len(cells) in (width, width - 1)]
         trailing = not header or len(header[-1]) == width - 1 or not header[-1][-1]
     return first, width - trailing, trailing
@@ -365,7 +366,7 @@ def _first_of(content: Sequence[tuple[int, str]], width: int, separator: str) ->
     worded: tuple[int, list[str]] | None = None
     keyed: tuple[int, list[str]] | None = None
     for i, line in content:
-        cells = _try_split(line, separator)
+        cells = cells_of(line, separator)
         if not _is_row(cells):
             keyed, worded = None, worded or (i, cells)
         elif len(cells) == width and not _WORD.match(cells[0].strip('"')):
@@ -381,7 +382,7 @@ def _first_of(content: Sequence[tuple[int, str]], width: int, separator: str) ->
 
 def _rows(lines: Sequence[str], separator: str, width: int, trailing: bool) -> list[list[str]]:
     content = [line for _, line in _content([*lines[:_SAMPLE], *lines[_SAMPLE:][-_SAMPLE:]])]
-    rows = [_try_split(line, separator) for line in content]
+    rows = [cells_of(line, separator) for line in content]
     return [row[:width] for row in rows if len(row) == width + trailing]
 
 
@@ -453,7 +454,7 @@ def _header_lines(
 
 
 def _names_columns(line: str, separator: str) -> bool:
-    cells = _try_split(line, separator)
+    cells = cells_of(line, separator)
     return len([cell for cell in cells if cell]) >= 3 and not any(looks_numeric(cell) for cell in cells if cell)
 
 
@@ -466,7 +467,7 @@ def _fields(line: str, separator: str, width: int) -> list[str]:
         narrow = line.split()
         with_units = _NAME_AND_UNIT.findall(line.strip()) if len(narrow) != width else narrow
         return next((cells for cells in (wide, with_units) if len(cells) == width), narrow)
-    cells = _try_split(line, separator)
+    cells = cells_of(line, separator)
     return cells[:-1] if len(cells) == width + 1 and not cells[-1] else cells
 
 

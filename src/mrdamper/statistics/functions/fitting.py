@@ -158,11 +158,11 @@ def _replaces(longer: FunctionFit, shorter: FunctionFit, dissipating: str, condi
 
 def assess(function: ParameterFunction, conditions: Sequence[Condition], values: ArrayLike) -> FunctionFit:
     """Calculate how well a function from a global fit describes values identified run by run."""
-    target, found = np.asarray(values, dtype=float), function(*features(conditions))
+    target, fitted = np.asarray(values, dtype=float), function(*features(conditions))
     if function.log:
-        target, found = np.log(target), np.log(found)
+        target, fitted = np.log(target), np.log(fitted)
     spread = float(np.sum((target - target.mean()) ** 2))
-    return FunctionFit(function, 1.0 - float(np.sum((found - target) ** 2)) / spread if spread else 1.0, float("nan"))
+    return FunctionFit(function, 1.0 - float(np.sum((fitted - target) ** 2)) / spread if spread else 1.0, float("nan"))
 
 
 def require_determined(form: str, conditions: Sequence[Condition]) -> None:
@@ -200,12 +200,12 @@ def _best_rates(
         return columns, solve_linear(columns, right)
 
     def residual(u: Floats) -> Floats:
-        columns, found = fitted(u)
-        return columns @ found - right
+        columns, fit = fitted(u)
+        return columns @ fit - right
 
     def slopes(u: Floats) -> Floats:
-        columns, found = fitted(u)
-        by_rate = (form.slopes(columns, I, f, tuple(np.exp(u))) @ found).T
+        columns, fit = fitted(u)
+        by_rate = (form.slopes(columns, I, f, tuple(np.exp(u))) @ fit).T
         return project_out_columns(columns, by_rate)  # the coefficients move along [Kaufman 1975]
 
     grid = np.array(list(product(*(np.linspace(low, high, 6) for low, high in zip(lower, upper, strict=True)))))
@@ -213,8 +213,8 @@ def _best_rates(
     size = np.linalg.norm(tables, axis=1, keepdims=True)
     explained = np.sum((right @ np.linalg.qr(tables / np.where(size > 0, size, 1.0))[0]) ** 2, axis=-1)
     starts = grid[np.argsort(-explained, kind="stable")[:3]]
-    found = [least_squares(residual, u, lower, upper, most_steps=15, slopes=slopes) for u in starts]
-    best = min(found, key=lambda minimum: minimum.cost)
+    fit = [least_squares(residual, u, lower, upper, most_steps=15, slopes=slopes) for u in starts]
+    best = min(fit, key=lambda minimum: minimum.cost)
     settled = newton_refine(lambda u: residual(u) @ slopes(u), best.point, lower, upper)
     return tuple(np.exp(settled).tolist())
 
@@ -266,11 +266,11 @@ def _fold_errors(
 
 def _weights(uncertainty: ArrayLike | None, target: Floats) -> Floats:
     errors = np.full(target.size, np.inf) if uncertainty is None else np.asarray(uncertainty, dtype=float)
-    known = errors[np.isfinite(errors)]
-    floor = float(np.quantile(known, 0.25)) if known.size else 0.0
+    finite = errors[np.isfinite(errors)]
+    floor = float(np.quantile(finite, 0.25)) if finite.size else 0.0
     if not floor:
         return np.ones(target.size)
-    return floor / np.maximum(np.where(np.isfinite(errors), errors, known.max()), floor)
+    return floor / np.maximum(np.where(np.isfinite(errors), errors, finite.max()), floor)
 
 
 def _determined(columns: Floats) -> bool:
@@ -281,10 +281,10 @@ def _determined(columns: Floats) -> bool:
     return bool(singular[-1] > _RANK_LIMIT * singular[0])
 
 
-def _undetermined(form: Form, found: str, I: Floats, f: Floats, A: Floats) -> IdentificationError:
+def _undetermined(form: Form, reason: str, I: Floats, f: Floats, A: Floats) -> IdentificationError:
     levels = [len(np.unique(np.round(column, 3))) for column in (I, f, 1e3 * A)]
     return IdentificationError(
-        f"{form.name} has {len(form.terms) + len(form.rate_bounds)} coefficients and {found}: "
+        f"{form.name} has {len(form.terms) + len(form.rate_bounds)} coefficients and {reason}: "
         f"{levels[0]} currents, {levels[1]} frequencies, {levels[2]} amplitudes",
         mend="test more conditions or choose a shorter form",
     )

@@ -83,10 +83,10 @@ class Sensors:
 
     def signal(self, name: str) -> Any:
         """Return a signal by name: POINT.position, .velocity, .acceleration; DAMPER.stroke, .stroke_rate, .force."""
-        known: dict[str, Any] = self.shared.setdefault("signals", {})
-        if name not in known:
-            known[name] = self.tape.input(identifier(name, self.tape.inputs))
-        return known[name]
+        signals: dict[str, Any] = self.shared.setdefault("signals", {})
+        if name not in signals:
+            signals[name] = self.tape.input(identifier(name, self.tape.inputs))
+        return signals[name]
 
 
 def identifier(name: str, taken: Container[str] = ()) -> str:

@@ -96,8 +96,8 @@ class ClippedOptimal(Controller):
         y = [see(name, "acceleration") for name in design.coordinates]
         y += [see.signal(f"{name}.stroke") for name in design.dampers]
         gap = [
-            size * seen - _sum(c, z) - _sum(d, f)
-            for size, seen, c, d in zip(design.size, y, design.C, design.D, strict=True)
+            size * value - _sum(c, z) - _sum(d, f)
+            for size, value, c, d in zip(design.size, y, design.C, design.D, strict=True)
         ]
         for i, (a, b, gain) in enumerate(zip(design.A, design.B, design.L, strict=True)):
             tape.update(z[i], _sum(a, z) + _sum(b, f) + _sum(gain, gap))

@@ -68,10 +68,10 @@ class NonCausalOptimum(Controller):
             push = P[:, :n] @ driven[k] + p
             gains[k], offsets[k] = K, short @ push
             P, p = before, closed.T @ push + Y.T @ aimed[k - 1]
-        state, found = np.zeros(n + count), np.zeros((samples, count))
+        state, optimum = np.zeros(n + count), np.zeros((samples, count))
         for k in range(1, samples):
             u = -gains[k] @ state - offsets[k]
             state = F @ state + G @ u
             state[:n] += driven[k]
-            found[k] = u
-        return found
+            optimum[k] = u
+        return optimum

@@ -36,11 +36,11 @@ def bundled_records() -> dict[str, Path]:
 
 def made_inputs() -> dict[str, tuple[type[Input], Mapping[str, float]]]:
     """List the synthetic inputs by every name they go by, with the parameters the name stands for."""
-    found: dict[str, tuple[type[Input], Mapping[str, float]]] = {}
+    inputs: dict[str, tuple[type[Input], Mapping[str, float]]] = {}
     for name, kind in input_types().items():
         if parameters_of(kind):
-            found |= {name: (kind, {}), **{variant: (kind, values) for variant, values in kind.variants().items()}}
-    return found
+            inputs |= {name: (kind, {}), **{variant: (kind, values) for variant, values in kind.variants().items()}}
+    return inputs
 
 
 @checked("name")
@@ -69,15 +69,15 @@ def load_input(name: str | Path, values: Mapping[str, float] | None = None, time
     from mrdamper.systems.inputs.record import load_record
 
     path_of(name)
-    made = made_inputs()
-    if str(name) in made:
+    synthetic = made_inputs()
+    if str(name) in synthetic:
         if time_scale != 1.0:
             raise RecordError("a time scale for a made input", where=str(name), mend="set its own parameters instead")
-        kind, preset = made[str(name)]
+        kind, preset = synthetic[str(name)]
         return with_values(kind, {**preset, **(values or {})})
     if values:
         raise RecordError(f"{', '.join(values)} for a record", where=str(name), mend="leave them out")
-    known = bundled_records()
-    if str(name) not in known and Path(name).suffix != ".csv" and not Path(name).exists():
-        raise UnknownNameError.of("input", str(name), [*made, *known])
-    return load_record(known.get(str(name), name), time_scale)
+    records = bundled_records()
+    if str(name) not in records and Path(name).suffix != ".csv" and not Path(name).exists():
+        raise UnknownNameError.of("input", str(name), [*synthetic, *records])
+    return load_record(records.get(str(name), name), time_scale)

@@ -63,20 +63,20 @@ def load_record(path: str | Path, time_scale: float = 1.0) -> RecordedInput:
     path = Path(path)
     table = read_table(path, "give a CSV with time_s and acceleration_m_s2")
     table = table.rename({column: column.strip().lstrip("\ufeff") for column in table.columns})
-    found = [name for name in _COLUMNS if name in table.columns]
-    if len(found) > 1:
-        raise ColumnError(f"both {' and '.join(found)}", where=str(path), mend="keep one")
-    if "time_s" not in table.columns or not found:
-        missing = f"no column {'time_s' if found else ' or '.join(_COLUMNS)} (found {', '.join(table.columns)})"
+    present = [name for name in _COLUMNS if name in table.columns]
+    if len(present) > 1:
+        raise ColumnError(f"both {' and '.join(present)}", where=str(path), mend="keep one")
+    if "time_s" not in table.columns or not present:
+        missing = f"no column {'time_s' if present else ' or '.join(_COLUMNS)} (found {', '.join(table.columns)})"
         likely = any(c.lower().startswith(("time", "t_", "acc", "a_", "height")) for c in table.columns)
         mend = "say the unit in the name: time_s, and acceleration_m_s2 or acceleration_g"
         raise (UnitError if likely else ColumnError)(missing, where=str(path), mend=mend)
     columns = {}
-    for name in ("time_s", found[0]):
+    for name in ("time_s", present[0]):
         if not table[name].dtype.is_numeric() or table[name].null_count():
             raise ColumnError(f"column {name} holds text or empty cells", where=str(path), mend="write plain numbers")
         columns[name] = table[name].to_numpy().astype(np.float64)
-    return record(columns["time_s"], columns[found[0]], found[0], time_scale, where=str(path))
+    return record(columns["time_s"], columns[present[0]], present[0], time_scale, where=str(path))
 
 
 def record(

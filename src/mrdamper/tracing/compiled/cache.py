@@ -63,10 +63,10 @@ def load(source: str, holds: Callable[[ctypes.CDLL], bool]) -> ctypes.CDLL | Non
         return None
     key = hashlib.sha256((compiler.identity + source).encode()).hexdigest()[:32]
     if key not in _loaded:
-        found = _kept(key) or _compiled(compiler, key, source, holds)
-        if found is None:
+        library = _kept(key) or _compiled(compiler, key, source, holds)
+        if library is None:
             return None
-        _loaded[key] = found
+        _loaded[key] = library
     return _loaded[key]
 
 
@@ -80,12 +80,12 @@ def unusable_reason() -> str:
 
 def clear_cache() -> int:
     """Remove all compiled libraries; how many there were."""
-    found = [*_libraries(cache_folder()), *_notes(cache_folder())]
-    for path in found:
+    files = [*_libraries(cache_folder()), *_notes(cache_folder())]
+    for path in files:
         with suppress(OSError):
             path.unlink()
     _unusable.clear()
-    return sum(path.suffix == _SUFFIX for path in found)
+    return sum(path.suffix == _SUFFIX for path in files)
 
 
 def cache_size() -> tuple[int, int]:
@@ -100,14 +100,14 @@ def cache_size() -> tuple[int, int]:
 def private(folder: Path) -> bool:
     """Tell if a folder is this user's, and nobody else can write to it."""
     try:
-        found = folder.lstat()
+        status = folder.lstat()
     except OSError:
         return False
-    if not stat.S_ISDIR(found.st_mode):
+    if not stat.S_ISDIR(status.st_mode):
         return False
     if os.name != "posix":
         return True
-    return found.st_uid == os.getuid() and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    return status.st_uid == os.getuid() and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
 def _libraries(folder: Path) -> list[Path]:
@@ -245,11 +245,11 @@ def _bound(folder: Path) -> None:
             if time.time() - path.stat().st_mtime > _DAY:
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
     kept = 0
-    known = []
+    sizes = []
     for path in _libraries(folder):
         with suppress(OSError):
-            known.append((path.stat().st_mtime, path.stat().st_size, path))
-    for _, size, path in sorted(known, key=lambda entry: entry[0], reverse=True):
+            sizes.append((path.stat().st_mtime, path.stat().st_size, path))
+    for _, size, path in sorted(sizes, key=lambda entry: entry[0], reverse=True):
         kept += size
         if kept > _LARGEST:
             with suppress(OSError):

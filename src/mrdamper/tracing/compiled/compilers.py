@@ -93,12 +93,12 @@ def _found(wanted: str, path: str) -> Compiler | None:
 def _identity(command: Sequence[str], program: Path) -> str:
     """Hash of the command, its flags, the machine, and the size and time of the program behind it."""
     try:
-        found = program.resolve()
-        facts = (str(found), found.stat().st_size, found.stat().st_mtime_ns)
+        resolved = program.resolve()
+        facts = (str(resolved), resolved.stat().st_size, resolved.stat().st_mtime_ns)
     except OSError:
         facts = (str(program), 0, 0)
-    known = (*command, *_FLAGS, *_VISUAL, platform.machine(), sys.platform, *facts)
-    return hashlib.sha256("\0".join(map(str, known)).encode()).hexdigest()[:16]
+    parts = (*command, *_FLAGS, *_VISUAL, platform.machine(), sys.platform, *facts)
+    return hashlib.sha256("\0".join(map(str, parts)).encode()).hexdigest()[:16]
 
 
 def compiled_file(command: Sequence[str], folder: Path, output: str, patience: float) -> Built:

@@ -139,16 +139,16 @@ class RecordProgram:
         derived = self.prepare(given)
         if derived is None:
             return True
-        found = _compiled_along(library, self.program, given, derived, self.starts, arrays)
+        outputs = _compiled_along(library, self.program, given, derived, self.starts, arrays)
         expected = self.interpreted_along(given, derived, self.starts, arrays)
-        if found.failed != expected.failed:
+        if outputs.failed != expected.failed:
             return False
         size = _TRIED if expected.failed < 0 else expected.failed
         wanted = expected.outputs[:, :size]
         if not np.isfinite(wanted).all():
             return True
         room = _ALIKE * np.abs(wanted).max(axis=1, keepdims=True, initial=0.0)
-        return bool(np.all(np.abs(found.outputs[:, :size] - wanted) <= room))
+        return bool(np.all(np.abs(outputs.outputs[:, :size] - wanted) <= room))
 
 
 def address(array: np.ndarray) -> ctypes.c_void_p:

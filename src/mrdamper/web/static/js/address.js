@@ -1,6 +1,7 @@
 // The state of the page in its address, so that a link, a bookmark or loading it again brings it back.
 
 import { fromFragment, imported, portable, toFragment } from "./state.js";
+import { tabStorage } from "./storage.js";
 
 const LAST = "mrdamper.last"; // state and damper of this page as it was left, for loading it again
 const BETWEEN = 400; // milliseconds between two writings while a slider moves: browsers refuse many in a row
@@ -9,8 +10,8 @@ const pause = (milliseconds) => new Promise((done) => setTimeout(done, milliseco
 
 export class Address {
   constructor(bench) {
-    const last = JSON.parse(sessionStorage.getItem(LAST) ?? "null");
-    sessionStorage.removeItem(LAST);
+    const last = JSON.parse(tabStorage.getItem(LAST) ?? "null");
+    tabStorage.removeItem(LAST);
     Object.assign(this, { bench, behind: false, writing: false, opened: { hash: location.hash, last } });
     addEventListener("pagehide", () => this.keep());
   }
@@ -53,7 +54,7 @@ export class Address {
   /** Leaving: loading the page again finds the state as it is, even one the address does not hold yet. */
   keep() {
     const { state } = this.bench;
-    sessionStorage.setItem(LAST, JSON.stringify({ hash: location.hash, damper: state.damper, state: portable(state) }));
+    tabStorage.setItem(LAST, JSON.stringify({ hash: location.hash, damper: state.damper, state: portable(state) }));
   }
 
   /** The state to begin with, or null; where the same page is loaded again its damper is there too. */

@@ -1,5 +1,7 @@
 // Asking the bench. Every answer that is no success becomes a BenchError with what to show.
 
+import { tabStorage } from "./storage.js";
+
 export class BenchError extends Error {
   constructor(said, status) {
     super(said.text);
@@ -14,10 +16,10 @@ const TOKEN = "mrdamper.token";
 function token() {
   const given = new URLSearchParams(location.search).get("token");
   if (given) {
-    sessionStorage.setItem(TOKEN, given);
+    tabStorage.setItem(TOKEN, given);
     history.replaceState(history.state, "", location.pathname + location.hash);
   }
-  return sessionStorage.getItem(TOKEN) ?? "";
+  return tabStorage.getItem(TOKEN) ?? "";
 }
 
 const RETRIES = 4; // of a progress stream that broke off

@@ -6,6 +6,7 @@ import { Bench } from "./bench.js";
 import { library } from "./chart.js";
 import { h, note, problem, put } from "./dom.js";
 import { openSession } from "./session.js";
+import { tabStorage } from "./storage.js";
 import { theme } from "./theme.js";
 import * as data from "./views/data.js";
 import * as identify from "./views/identify.js";
@@ -48,6 +49,7 @@ async function start() {
     bench.fail(error instanceof BenchError ? error : new Error(`The link could not be read: ${error.message}`));
   }
   tools.update();
+  if (tabStorage.blocked) bench.say(note("warn", "This browser blocks storage: loading the page again starts a new session. Save the project on the Export page to keep it."), 15000);
   document.documentElement.dataset.ready = "yes";
   setInterval(() => api.get("").catch((error) => bench.fail(error)), BEAT);
   (window.requestIdleCallback ?? setTimeout)(() => library().catch((error) => bench.fail(error)));

@@ -1,12 +1,13 @@
 // The session of this page on the bench, found again when the page is loaded again.
 
 import { Api } from "./api.js";
+import { tabStorage } from "./storage.js";
 
 const SESSION = "mrdamper.session";
 
 /** {api, limits, there}: `there` says what lies on the bench already. */
 export async function openSession() {
-  const known = sessionStorage.getItem(SESSION);
+  const known = tabStorage.getItem(SESSION);
   if (known) {
     const { session, limits } = JSON.parse(known);
     const api = new Api(session);
@@ -18,11 +19,11 @@ export async function openSession() {
     }
   }
   const opened = await Api.open();
-  sessionStorage.setItem(SESSION, JSON.stringify({ session: opened.session, limits: opened.limits }));
+  tabStorage.setItem(SESSION, JSON.stringify({ session: opened.session, limits: opened.limits }));
   return { api: new Api(opened.session), limits: opened.limits, there: { data: null, dampers: 0 } };
 }
 
 /** It has ended. */
 export function forgetSession() {
-  sessionStorage.removeItem(SESSION);
+  tabStorage.removeItem(SESSION);
 }

@@ -1,13 +1,14 @@
 // Light or dark: as the system says, until the reader says otherwise.
 
 import { h, put } from "./dom.js";
+import { browserStorage } from "./storage.js";
 
 const KEY = "mrdamper.theme";
 const system = matchMedia("(prefers-color-scheme: dark)");
 
 export function theme() {
-  apply(localStorage.getItem(KEY) ?? wished());
-  system.addEventListener("change", () => localStorage.getItem(KEY) ?? apply(wished()));
+  apply(browserStorage.getItem(KEY) ?? wished());
+  system.addEventListener("change", () => browserStorage.getItem(KEY) ?? apply(wished()));
 }
 
 theme.button = () => {
@@ -24,7 +25,7 @@ theme.button = () => {
 
 function toggle() {
   const next = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
-  localStorage.setItem(KEY, next);
+  browserStorage.setItem(KEY, next);
   apply(next);
 }
 

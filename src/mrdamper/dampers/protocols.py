@@ -1,0 +1,86 @@
+"""Interfaces of dampers and searches for the modules below them, which must not import them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+from mrdamper.data import Condition, Floats, Run
+from mrdamper.data.parameters import ParameterInfo
+
+
+class DamperLike(Protocol):
+    """Properties and methods of a `Damper` that its parts use."""
+
+    @property
+    def title(self) -> str:
+        """Name of the damper."""
+        ...
+
+    @property
+    def envelope(self) -> Any:
+        """Tested ranges."""
+        ...
+
+    @property
+    def coil(self) -> Any:
+        """Response of the field to the current."""
+        ...
+
+    @property
+    def certainty(self) -> Any:
+        """Uncertainty of the parameters, or None."""
+        ...
+
+    @property
+    def streams(self) -> bool:
+        """True if it has a form for one sample."""
+        ...
+
+    @property
+    def one_model(self) -> Any:
+        """Model for all conditions, or None."""
+        ...
+
+    @property
+    def fitted_parameters(self) -> Mapping[str, Any]:
+        """Parameters determined from data."""
+        ...
+
+    @property
+    def followed_amplitudes(self) -> tuple[float, float]:
+        """Amplitudes within which the parameters follow the motion [m]."""
+        ...
+
+    def with_parameters(self, values: Mapping[str, float]) -> Any:
+        """Return the damper with other parameters."""
+        ...
+
+    def model_at(self, condition: Condition) -> Any:
+        """Return the model at a condition."""
+        ...
+
+    def predict_run(self, run: Run) -> Any:
+        """Predict the force along a run."""
+        ...
+
+
+class SearchSpace(Protocol):
+    """Coordinates of a global fit, and the model each point stands for."""
+
+    @property
+    def linear(self) -> Sequence[ParameterInfo]:
+        """Parameters that enter the force linearly."""
+        ...
+
+    def box(self) -> tuple[Floats, Floats]:
+        """Return the lower and upper bounds of the coordinates."""
+        ...
+
+    def coil_at(self, point: Floats) -> Any:
+        """Return the response of the field at a point."""
+        ...
+
+    def without_linear(self, point: Floats) -> Any:
+        """Return the model of a point with its linear parameters at zero."""
+        ...
