@@ -12,7 +12,7 @@ from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.paper import output
 from mrdamper.paper.claims import Claim
-from mrdamper.paper.figures import SECONDS, Entry
+from mrdamper.paper.figures import Entry
 from mrdamper.paper.options import PaperOptions
 from mrdamper.paper.output import all_tables, method_rows
 from mrdamper.paper.recipes import CONSISTENT, LITERAL
@@ -109,7 +109,7 @@ def test_everything_is_written_and_shown_in_its_place(monkeypatch, tmp_path):
         return "<p>page</p>"
 
     monkeypatch.setattr(output, "judge_all", lambda study: (claim,))
-    figures = {name: Entry(name, "Eq. 1", (), None) for name in ("fig09", "fig12", SECONDS)}
+    figures = {name: Entry(name, "Eq. 1", (), None) for name in ("fig09", "fig12", "seeds")}
     monkeypatch.setattr(output, "FIGURES", figures)
     monkeypatch.setattr(output, "caption", lambda name: f"caption of {name}")
     monkeypatch.setattr(output, "pictures", drawn)
@@ -122,10 +122,10 @@ def test_everything_is_written_and_shown_in_its_place(monkeypatch, tmp_path):
     assert written[0].read_text(encoding="utf-8") == "<p>page</p>"
     assert (tmp_path / "out" / "figures" / "fig12.svg").is_file()
     assert (tmp_path / "out" / "tables" / "claims.csv").read_text(encoding="utf-8").startswith("key,text,source")
-    assert (tmp_path / "out" / "figures" / f"{SECONDS}.svg").is_file()
+    assert (tmp_path / "out" / "figures" / "seeds.svg").is_file()
     assert [also for also, _ in asked] == [(), ()]
     assert sorted(name for _, names in asked for name in names) == sorted(figures)
-    assert page["pictures"] == {"fig12": ("caption of fig12", b"fig12")}
+    assert page["pictures"] == {name: (f"caption of {name}", name.encode()) for name in ("fig12", "seeds")}
     tables, absent = all_tables(made, (claim,))
     assert page["tables"] == tables
     assert page["claims"] == (claim,)

@@ -1,4 +1,4 @@
-"""Charts as data, panels of lines and bars, and one function that draws them in the style of the reports."""
+"""Charts as data, panels of lines, and one function that draws them in the style of the reports."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import ArrayLike
 
-from mrdamper.report.plots.style import PALETTE, house_style, label, new_figure
+from mrdamper.report.plots.style import house_style, label, new_figure
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Panel:
-    """Axes with lines over them, and horizontal bars where `bars` are given.
+    """Axes with lines over them.
 
     Attributes
     ----------
@@ -41,11 +41,6 @@ class Panel:
         Names on the vertical axis, from the top; row k lies at −k.
     columns : sequence of str
         Names on the horizontal axis; column k lies at k.
-    bars : sequence of float
-        One a row.
-    half_widths : sequence of float
-        Of intervals about the bars.
-    bar_label : str
     low : float or None
         Lower end of the axis of values.
     """
@@ -56,9 +51,6 @@ class Panel:
     log: str = ""
     rows: Sequence[str] = ()
     columns: Sequence[str] = ()
-    bars: Sequence[float] = ()
-    half_widths: Sequence[float] | None = None
-    bar_label: str = ""
     low: float | None = None
 
 
@@ -90,9 +82,6 @@ def draw(chart: Chart) -> Figure:
 
 
 def _fill(panel: Panel, axes: Axes) -> None:
-    if len(panel.bars):
-        places = -np.arange(len(panel.bars))
-        axes.barh(places, panel.bars, xerr=panel.half_widths, color=PALETTE[6], label=panel.bar_label or None)
     for line in panel.lines:
         axes.plot(line.x, line.y, label=line.label or None, **{"lw": 0.9, **line.style})
     for name in panel.log:

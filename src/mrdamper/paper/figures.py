@@ -20,7 +20,7 @@ from mrdamper.identification.loop_analysis import dynamic_ranges
 from mrdamper.paper.charts import Chart, Line, Panel, draw
 from mrdamper.paper.claims_on_tests import friction_along
 from mrdamper.paper.recipes import CONSISTENT, LITERAL, TRADITIONAL
-from mrdamper.paper.results import SAME, Reproduction, cost_per_run, function_of, motions, rate_rows, values
+from mrdamper.paper.results import SAME, Reproduction, function_of, motions, rate_rows, values
 from mrdamper.physics.motion import equivalent_sine, measured_motion
 from mrdamper.physics.simulation import simulate
 from mrdamper.report.plots.comparison import overlaid_loops
@@ -30,7 +30,6 @@ from mrdamper.statistics.functions.fitting import fit_function
 from mrdamper.statistics.functions.forms import ParameterFunction, features
 from mrdamper.study.recipe import Progress
 
-SECONDS = "seconds"  # name of the figure that differs from run to run; it stands beside the page
 _MOST_LOOPS, _LOOP_POINTS = 9, 400  # loops in one panel, points of a loop
 _LIST = {"right": 2.3}  # margin for a list of motions [inches]
 _POINTS = {"marker": "o", "ms": 3.5}
@@ -336,27 +335,6 @@ def _accuracy_rate(study: Reproduction, axes: Texts) -> Drawing:
     return Chart(panels, 2.9, "above", margins={"top": 0.5})
 
 
-def _methods(study: Reproduction, axes: Texts) -> Drawing:
-    methods = [c for c in study.contenders if c.validation.runs]
-    if not methods:
-        return "nothing predicts a validation run"
-    rows, worst = [c.recipe.title for c in methods], [100 * c.validation.worst().scores.nrmse_pp for c in methods]
-    marks = Line(worst, -np.arange(len(methods)), "worst run", {"marker": "|", "ms": 8, "ls": "", "color": MEASURED})
-    error = [100 * c.validation.median() for c in methods]
-    cost = [cost_per_run(study, c)[0] for c in methods]
-    panels = [Panel(axes[0], [marks], rows=rows, bars=error, bar_label="median"),
-              Panel(axes[1], rows=[""] * len(rows), bars=cost, log="x")]  # fmt: skip
-    return Chart(panels, 1.15 + 0.26 * len(rows), "above", margins={"left": 2.4, "top": 0.45})
-
-
-def _seconds(study: Reproduction, axes: Texts) -> Drawing:
-    methods = [c for c in study.contenders if c.identifications]
-    if not methods:
-        return "nothing was identified from single runs"
-    rows, bars = [c.recipe.title for c in methods], [cost_per_run(study, c)[1] for c in methods]
-    return Chart([Panel(axes[0], rows=rows, bars=bars)], 0.8 + 0.26 * len(rows), "", margins={"left": 2.4})
-
-
 def _errors(study: Reproduction, axes: Texts) -> Drawing:
     lines = []
     for number, method in enumerate(study.contenders):
@@ -395,11 +373,14 @@ def _sensitivity(study: Reproduction, axes: Texts) -> Drawing:
     if not effects or indices is None:
         return "no run was identified by the consistent method"
     rows, left = [e.name.replace("_", " ") for e in effects], [max(e.left, 1e-8) for e in effects]
-    marks = Line(left, -np.arange(len(rows)), "others identified anew", {**_POINTS, "ls": "", "color": PALETTE[2]})
-    single = Panel(axes[0], [marks], log="x", rows=rows, bars=[e.effect for e in effects], bar_label="others held")
+    series = ([e.effect for e in effects], "others held", PALETTE[6]), (left, "others identified anew", PALETTE[2])
+    marks = [Line(x, -np.arange(len(rows)), text, {**_POINTS, "ls": "", "color": colour}) for x, text, colour in series]
+    ends = zip(indices.total - indices.total_confidence, indices.total + indices.total_confidence, strict=True)
+    spans = [Line(pair, [-row, -row], style={"color": PALETTE[6]}) for row, pair in enumerate(ends)]
+    total = Line(indices.total, -np.arange(len(spans)), "", {**_POINTS, "ls": "", "color": PALETTE[6]})
     names = [name.replace("_", " ") for name in indices.names]
-    total = Panel(axes[1], rows=names, bars=indices.total.tolist(), half_widths=indices.total_confidence.tolist())
-    return Chart([single, total], 3.2, "above", margins={"left": 1.3, "gap": 1.3, "top": 0.45})
+    panels = [Panel(axes[0], marks, log="x", rows=rows), Panel(axes[1], [total, *spans], rows=names)]
+    return Chart(panels, 3.2, "above", margins={"left": 1.3, "gap": 1.3, "top": 0.45})
 
 
 _X, _V, _F = "Displacement (mm)", "Velocity (m/s)", "Force (N)"
@@ -453,7 +434,6 @@ FIGURES: Mapping[str, Entry] = MappingProxyType({
                    "traditional model, by least squares, until its end", "section 6, Eq. 44",
                    ((_I, "nrmse_pp (%)"), (_I, "Relative error, Eq. 44 (%)"), (_I, "Forces computed (–)")),
                    _accuracy_rate),
-    SECONDS: Entry("Identification, in seconds", "", (("Identification (s per run)", ""),), _seconds),
     "matrix": Entry("Test matrix; hollow marks are validation runs", "", (), lambda s, _: test_matrix(s.loops)),
     "analysis": Entry("Peak force, energy, equivalent damping and dynamic range before any model", "", (),
                       lambda s, _: test_analysis(s.loops, dynamic_ranges(s.loops))),
@@ -472,8 +452,6 @@ FIGURES: Mapping[str, Entry] = MappingProxyType({
     "predicted": Entry("Validation runs: tested, and predicted by three methods", "", _LOOPS, _methods_at_currents),
     "genetic": Entry("Genetic search with the paper's settings, 500 generations of 100 in each box", "section 4.3",
                      (("Generation", "Error above the least (–)"),), _genetic),
-    "methods": Entry("Error on validation runs, and forces computed to identify from one run, median", "",
-                     (("Validation nrmse_pp (%)", ""), ("Forces computed per run (–)", "")), _methods),
     "errors": Entry("Error of every validation run", "", ((_I, "Validation nrmse_pp (%)"),), _errors),
     "seeds": Entry("Median validation error over noise seeds", "",
                    (("Median validation nrmse_pp (%), one mark a seed", ""),), _seeds),
