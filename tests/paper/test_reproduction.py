@@ -199,6 +199,19 @@ def test_boxes_that_hold_no_optimum_leave_searches_unjudged(quick, undrawn, tmp_
         assert ",inf" not in path.read_text(encoding="utf-8"), path.name
 
 
+@pytest.mark.parametrize("comparators", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_two_runs_write_the_same_bytes_but_for_the_seconds(quick, undrawn, tmp_path, comparators):
+    few = virtual_dataset(currents=(0.0, 2.0), cycles=2)
+    chosen = few.only([*list(few.split("train"))[:4], next(iter(few.split("validate")))])
+    for name in ("one", "two"):
+        study = reproduce(chosen, VirtualRig().gas, with_comparators=comparators)
+        write_reproduction(study, tmp_path / name)
+    files = [path.relative_to(tmp_path / "one") for path in (tmp_path / "one").rglob("*") if path.is_file()]
+    assert len(files) > 30
+    differ = {str(f) for f in files if (tmp_path / "one" / f).read_bytes() != (tmp_path / "two" / f).read_bytes()}
+    assert differ <= {"made.json", str(Path("tables") / "seconds.csv")}
+
+
 def test_switches_out_of_range_are_refused():
     with pytest.raises(ParameterError, match="preset n"):
         PaperOptions(n=0.5)
