@@ -5,7 +5,7 @@ import math
 import pytest
 
 from mrdamper.errors import UnknownNameError
-from mrdamper.paper.claims import ROWS, Limit, _above, _below, judge, steadiness, thresholds
+from mrdamper.paper.claims import ROWS, ClaimLimit, _above, _below, judge, steadiness, thresholds
 
 LIMITS = {key: row.limits for key, row in ROWS.items()}
 
@@ -72,7 +72,7 @@ def test_one_number_that_misses_makes_a_claim_hold_in_part(key, place):
 
 @pytest.mark.parametrize(("sense", "values"), [("below", (1.0, 1.5, 2.1)), ("above", (2.1, 1.5, 0.9))])
 def test_a_limit_grades_by_its_sense(sense, values):
-    limit = Limit("x", sense, 1.0 if sense == "below" else 2.0, 2.0 if sense == "below" else 1.0)
+    limit = ClaimLimit("x", sense, 1.0 if sense == "below" else 2.0, 2.0 if sense == "below" else 1.0)
     assert [limit.grade(v) for v in values] == [2, 1, 0]
 
 
@@ -97,8 +97,8 @@ def test_how_well_a_function_fits_says_nothing_by_itself():
 
 def test_a_limit_without_a_wider_one_is_its_own():
     for make, sense in ((_below, "below"), (_above, "above")):
-        assert make("a number", 2.0) == Limit("a number", sense, 2.0, 2.0)
-        assert make("a number", 2.0, 3.0) == Limit("a number", sense, 2.0, 3.0)
+        assert make("a number", 2.0) == ClaimLimit("a number", sense, 2.0, 2.0)
+        assert make("a number", 2.0, 3.0) == ClaimLimit("a number", sense, 2.0, 3.0)
 
 
 @pytest.mark.parametrize(

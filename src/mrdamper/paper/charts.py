@@ -1,4 +1,4 @@
-"""Charts as data, panels of lines, and one function that draws them in the style of the reports."""
+"""Figures as data, panels of lines, and one function that draws them in the style of the reports."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mrdamper.report.plots.style import house_style, label, new_figure
 
 
 @dataclass(frozen=True)
-class Line:
+class Series:
     """One series: points, label, and properties of the line."""
 
     x: ArrayLike
@@ -33,7 +33,7 @@ class Panel:
     ----------
     axes : (str, str)
         Texts of the two axes: quantity and unit.
-    lines : sequence of Line
+    lines : sequence of Series
     title : str
     log : str
         Axes with a logarithmic scale: "x", "y".
@@ -46,7 +46,7 @@ class Panel:
     """
 
     axes: tuple[str, str]
-    lines: Sequence[Line] = ()
+    lines: Sequence[Series] = ()
     title: str = ""
     log: str = ""
     rows: Sequence[str] = ()
@@ -55,7 +55,7 @@ class Panel:
 
 
 @dataclass(frozen=True)
-class Chart:
+class FigureLayout:
     """Panels of one figure; `legend` is "right", "above" or "", `margins` are those of `new_figure`."""
 
     panels: Sequence[Panel]
@@ -65,8 +65,8 @@ class Chart:
     margins: Mapping[str, float] = field(default_factory=dict)
 
 
-def draw(chart: Chart) -> Figure:
-    """Draw a chart."""
+def draw(chart: FigureLayout) -> Figure:
+    """Draw a figure."""
     with house_style():
         columns = len(chart.panels) // chart.rows
         figure, axes = new_figure(chart.rows, columns, chart.height, **chart.margins)

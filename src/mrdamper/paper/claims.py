@@ -27,8 +27,8 @@ _RECOVERED = {"agrees": "recovered", "agrees in part": "recovered in part", "dif
 
 
 @dataclass(frozen=True)
-class Limit:
-    """Limit of one value.
+class ClaimLimit:
+    """ClaimLimit of one value.
 
     Attributes
     ----------
@@ -62,12 +62,12 @@ class Limit:
         return f"{self.value} {sign} {self.holds:g}{wider}"
 
 
-def _below(value: str, holds: float, near: float | None = None, *, alone: bool = True) -> Limit:
-    return Limit(value, "below", holds, holds if near is None else near, alone)
+def _below(value: str, holds: float, near: float | None = None, *, alone: bool = True) -> ClaimLimit:
+    return ClaimLimit(value, "below", holds, holds if near is None else near, alone)
 
 
-def _above(value: str, holds: float, near: float | None = None, *, alone: bool = True) -> Limit:
-    return Limit(value, "above", holds, holds if near is None else near, alone)
+def _above(value: str, holds: float, near: float | None = None, *, alone: bool = True) -> ClaimLimit:
+    return ClaimLimit(value, "above", holds, holds if near is None else near, alone)
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class _Row:
     figure: str
     kind: Kind
     measure: Callable[[Reproduction], Measured]
-    limits: tuple[Limit, ...]
+    limits: tuple[ClaimLimit, ...]
 
 
 _RATIO = 1.1, 1.5  # error over another method's: comparable, comparable in part

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError
 from mrdamper.identification.loop_analysis import dynamic_ranges
-from mrdamper.paper.charts import Chart, Line, Panel, draw
+from mrdamper.paper.charts import FigureLayout, Panel, Series, draw
 from mrdamper.paper.claims_on_tests import friction_along
 from mrdamper.paper.recipes import CONSISTENT, LITERAL, TRADITIONAL
 from mrdamper.paper.results import SAME, Reproduction, function_of, motions, rate_rows, values
@@ -35,7 +35,7 @@ _LIST = {"right": 2.3}  # margin for a list of motions [inches]
 _POINTS = {"marker": "o", "ms": 3.5}
 
 Texts = Sequence[tuple[str, str]]  # of the axes of each panel
-Drawing = Chart | Figure | str  # or why there is none
+Drawing = FigureLayout | Figure | str  # or why there is none
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def pictures(
         progress(f"figure {name}", number / len(names))
         made = FIGURES[name].make(study, FIGURES[name].axes)
         drawn[name] = (
-            made if isinstance(made, str) else Picture.of(draw(made) if isinstance(made, Chart) else made, also)
+            made if isinstance(made, str) else Picture.of(draw(made) if isinstance(made, FigureLayout) else made, also)
         )
     return drawn
 
@@ -94,9 +94,9 @@ def _friction(study: Reproduction, axes: Texts) -> Drawing:
         return "the data hold no friction test"
     x, force = (thin(channel, 1500) for channel in (study.friction.displacement, study.friction.force))
     at, friction = friction_along(study.friction)
-    slow = Line(MM * x, force, style={"color": MEASURED, "lw": 0.6})
-    along = Line(MM * at, friction, style={"color": PALETTE[1]})
-    return Chart([Panel(axes[0], [slow]), Panel(axes[1], [along], low=0.0)], 2.9, "")
+    slow = Series(MM * x, force, style={"color": MEASURED, "lw": 0.6})
+    along = Series(MM * at, friction, style={"color": PALETTE[1]})
+    return FigureLayout([Panel(axes[0], [slow]), Panel(axes[1], [along], low=0.0)], 2.9, "")
 
 
 def _loops_by(vary: str, place: int, study: Reproduction, axes: Texts) -> Drawing:
@@ -126,7 +126,7 @@ def _loops_by(vary: str, place: int, study: Reproduction, axes: Texts) -> Drawin
         for k, (run, condition) in enumerate(group)
     ]
     over_x, over_v = zip(*lines, strict=True)
-    return Chart([Panel(axes[0], over_x, same), Panel(axes[1], over_v)], margins={"right": 1.5})
+    return FigureLayout([Panel(axes[0], over_x, same), Panel(axes[1], over_v)], margins={"right": 1.5})
 
 
 def _identified(place: int, study: Reproduction, axes: Texts) -> Drawing:
@@ -149,7 +149,7 @@ def _predicted(title: str, study: Reproduction, axes: Texts) -> Drawing:
     return _tested_and_model(axes, runs, [method.damper.predict_run(run).force for run in runs])
 
 
-def _tested_and_model(axes: Texts, runs: Sequence[Run], forces: Sequence[Floats]) -> Chart:
+def _tested_and_model(axes: Texts, runs: Sequence[Run], forces: Sequence[Floats]) -> FigureLayout:
     """Draw force over displacement and over velocity, a column a frequency, a colour a current; the model dashed."""
     conditions = [equivalent_sine(run).condition for run in runs]
     columns: dict[float, list[int]] = {}
@@ -159,7 +159,7 @@ def _tested_and_model(axes: Texts, runs: Sequence[Run], forces: Sequence[Floats]
     shades = current_colours([round(c.current_A, 2) for c in conditions])
     above, below = [], []
     for members in list(columns.values())[:3]:
-        lines: list[tuple[Line, Line]] = []
+        lines: list[tuple[Series, Series]] = []
         for i in sorted(members, key=lambda i: conditions[i].current_A):
             style = {"color": shades[round(conditions[i].current_A, 2)]}
             lines.append(_loop(runs[i], runs[i].force, style, f"{conditions[i].current_A:.3g} A"))
@@ -169,16 +169,16 @@ def _tested_and_model(axes: Texts, runs: Sequence[Run], forces: Sequence[Floats]
         title = f"{first.frequency_Hz:.2g} Hz, {MM * first.amplitude_m:.3g} mm"
         above.append(Panel((axes[0][0], name and axes[0][1]), over_x, title))
         below.append(Panel((axes[1][0], name and axes[1][1]), over_v))
-    return Chart([*above, *below], 5.2, rows=2, margins={"right": 0.9})
+    return FigureLayout([*above, *below], 5.2, rows=2, margins={"right": 0.9})
 
 
-def _loop(run: Run, force: Floats, style: Mapping[str, object], text: str = "") -> tuple[Line, Line]:
+def _loop(run: Run, force: Floats, style: Mapping[str, object], text: str = "") -> tuple[Series, Series]:
     """Return the last cycle of a force inside a run's steady window, over displacement and over velocity."""
     end = run.window[1] if run.window else float(run.time[-1])
     last = (run.time <= end) & (run.time >= end - 1.02 / equivalent_sine(run).condition.frequency_Hz)
     motion = measured_motion(run)
     x, v, force = (thin(channel[last], _LOOP_POINTS) for channel in (motion.displacement, motion.velocity, force))
-    return Line(MM * x, force, text, style), Line(v, force, text, style)
+    return Series(MM * x, force, text, style), Series(v, force, text, style)
 
 
 def _methods_at_currents(study: Reproduction, axes: Texts) -> Drawing:
@@ -216,17 +216,17 @@ def _over_current(name: str, form: str, study: Reproduction, axes: Texts) -> Dra
         first, currents = conditions[0], np.array([c.current_A for c in conditions])
         style = {"color": shades[first.peak_velocity]}
         function, text = _function_at(study, name, form, conditions, found[group])
-        lines.append(Line(currents, power * found[group], style={**style, **_POINTS, "ls": "" if form else "-"}))
+        lines.append(Series(currents, power * found[group], style={**style, **_POINTS, "ls": "" if form else "-"}))
         if function is not None:
             dense = np.linspace(currents.min(), currents.max(), 60)
             scale = power * (study.options.scaled(name, 1.0) if form == "whole" else 1.0)
             lines.append(
-                Line(dense, scale * function(dense, first.frequency_Hz, first.amplitude_m) * np.ones(60), style=style)
+                Series(dense, scale * function(dense, first.frequency_Hz, first.amplitude_m) * np.ones(60), style=style)
             )
         style |= {**_POINTS, "ls": "" if function is None else "-"}
-        lines.append(Line([], [], f"{_named(first)}: {text}" if text else _named(first), style))
+        lines.append(Series([], [], f"{_named(first)}: {text}" if text else _named(first), style))
     title = f"R² {whole.r2:.3f} over all runs" if whole and form == "whole" else ""
-    return Chart([Panel((x, y), lines, title, "y" if log else "")], 3.4, margins=_LIST)
+    return FigureLayout([Panel((x, y), lines, title, "y" if log else "")], 3.4, margins=_LIST)
 
 
 def _function_at(
@@ -263,8 +263,8 @@ def _r2_over_motions(name: str, form: str, study: Reproduction, axes: Texts) -> 
             shares[_named(conditions[0]).replace(", ", "\n")] = fit.r2
     if not shares:
         return "too few currents at every motion"
-    marks = Line(range(len(shares)), list(shares.values()), "R²", {**_POINTS, "ls": ":", "color": MEASURED})
-    return Chart([Panel(axes[0], [marks], columns=list(shares), low=min(0.0, *shares.values()))], 2.6, "")
+    marks = Series(range(len(shares)), list(shares.values()), "R²", {**_POINTS, "ls": ":", "color": MEASURED})
+    return FigureLayout([Panel(axes[0], [marks], columns=list(shares), low=min(0.0, *shares.values()))], 2.6, "")
 
 
 def _constant_term(name: str, form: str, study: Reproduction, axes: Texts) -> Drawing:
@@ -287,17 +287,17 @@ def _constant_term(name: str, form: str, study: Reproduction, axes: Texts) -> Dr
     shades, dash = current_colours([c.peak_velocity for c in firsts]), {"marker": "_", "ms": 11, "mew": 1.4, "ls": ""}
     lines = []
     for c, at, value, curve in zip(firsts, u, power * level, power * fitted, strict=True):
-        lines.append(Line([at], [value], _named(c), {**_POINTS, "ls": "", "color": shades[c.peak_velocity]}))
-        lines.append(Line([at], [curve], style={**dash, "color": shades[c.peak_velocity]}))
+        lines.append(Series([at], [value], _named(c), {**_POINTS, "ls": "", "color": shades[c.peak_velocity]}))
+        lines.append(Series([at], [curve], style={**dash, "color": shades[c.peak_velocity]}))
     dense = np.linspace(min(u), max(u), 40)
     amplitudes = {round(np.log(c.amplitude_m) / SAME): c.amplitude_m for c in firsts}
     pairs = [(np.ones(40), dense / MM)] if by_speed else [(dense, A) for A in amplitudes.values()]
-    lines += [Line(dense, power * function(0.0, f, A) * np.ones(40), style={"lw": 0.7, "color": MEASURED, "alpha": 0.6})
-              for f, A in pairs]  # fmt: skip
-    lines.append(Line([], [], "by the function", {**dash, "color": MEASURED}))
+    thin_line = {"lw": 0.7, "color": MEASURED, "alpha": 0.6}
+    lines += [Series(dense, power * function(0.0, f, A) * np.ones(40), style=thin_line) for f, A in pairs]
+    lines.append(Series([], [], "by the function", {**dash, "color": MEASURED}))
     r2 = _r2(level, fitted)
     title = f"R² {r2:.3f} over the motions" if np.isfinite(r2) else "one motion: no R²"
-    return Chart([Panel((x, y), lines, title)], 3.0, margins={"right": 2.0})
+    return FigureLayout([Panel((x, y), lines, title)], 3.0, margins={"right": 2.0})
 
 
 def beside_current_law(function: ParameterFunction, conditions: Sequence[Condition], found: Floats) -> Floats:
@@ -330,9 +330,9 @@ def _accuracy_rate(study: Reproduction, axes: Texts) -> Drawing:
         for method, colour in zip(dict.fromkeys(row["method"] for row in rows), PALETTE[1:], strict=False):
             own = [(r["current_A"], scale * r[name]) for r in rows if r["method"] == method and r[name] is not None]
             x, y = np.reshape(own, (-1, 2)).T
-            lines.append(Line(x, y, method, {**_POINTS, "color": colour}))
+            lines.append(Series(x, y, method, {**_POINTS, "color": colour}))
         panels.append(Panel(text, lines, log="y" if name == "forces_until_settled" else ""))
-    return Chart(panels, 2.9, "above", margins={"top": 0.5})
+    return FigureLayout(panels, 2.9, "above", margins={"top": 0.5})
 
 
 def _errors(study: Reproduction, axes: Texts) -> Drawing:
@@ -342,10 +342,10 @@ def _errors(study: Reproduction, axes: Texts) -> Drawing:
         runs = sorted(method.validation.runs, key=lambda r: r.condition.current_A)
         errors = [100 * r.scores.nrmse_pp for r in runs]
         style = {**_POINTS, "color": PALETTE[place], "ls": ("-", "--", ":")[min(again, 2)]}
-        lines.append(Line([r.condition.current_A for r in runs], errors, method.recipe.title, style))
+        lines.append(Series([r.condition.current_A for r in runs], errors, method.recipe.title, style))
     if not study.held_out:
         return "nothing predicts a validation run"
-    return Chart([Panel(axes[0], lines, log="y")], 3.4, margins={"right": 2.6})
+    return FigureLayout([Panel(axes[0], lines, log="y")], 3.4, margins={"right": 2.6})
 
 
 def _genetic(study: Reproduction, axes: Texts) -> Drawing:
@@ -356,16 +356,16 @@ def _genetic(study: Reproduction, axes: Texts) -> Drawing:
         # The search sees a part of the samples; its error is carried over to all of them.
         carried = check.minimum.history * check.reached / check.minimum.cost
         excess = np.maximum(carried / check.optimum - 1, 1e-6)
-        lines.append(Line(np.arange(1, excess.size + 1), excess, str(check.condition), {"color": colour}))
-    return Chart([Panel(axes[0], lines, log="y")], 2.8, "above", margins={"top": 0.5})
+        lines.append(Series(np.arange(1, excess.size + 1), excess, str(check.condition), {"color": colour}))
+    return FigureLayout([Panel(axes[0], lines, log="y")], 2.8, "above", margins={"top": 0.5})
 
 
 def _seeds(study: Reproduction, axes: Texts) -> Drawing:
     if not study.seed_errors:
         return "noise seeds need a virtual rig"
     style = {"marker": "|", "ms": 9, "ls": "", "color": PALETTE[1]}
-    lines = [Line(100 * e, np.full(e.size, -row), style=style) for row, e in enumerate(study.seed_errors.values())]
-    return Chart([Panel(axes[0], lines, rows=list(study.seed_errors), low=0.0)], 2.4, "", margins={"left": 2.2})
+    lines = [Series(100 * e, np.full(e.size, -row), style=style) for row, e in enumerate(study.seed_errors.values())]
+    return FigureLayout([Panel(axes[0], lines, rows=list(study.seed_errors), low=0.0)], 2.4, "", margins={"left": 2.2})
 
 
 def _sensitivity(study: Reproduction, axes: Texts) -> Drawing:
@@ -374,13 +374,15 @@ def _sensitivity(study: Reproduction, axes: Texts) -> Drawing:
         return "no run was identified by the consistent method"
     rows, left = [e.name.replace("_", " ") for e in effects], [max(e.left, 1e-8) for e in effects]
     series = ([e.effect for e in effects], "others held", PALETTE[6]), (left, "others identified anew", PALETTE[2])
-    marks = [Line(x, -np.arange(len(rows)), text, {**_POINTS, "ls": "", "color": colour}) for x, text, colour in series]
+    marks = [
+        Series(x, -np.arange(len(rows)), text, {**_POINTS, "ls": "", "color": colour}) for x, text, colour in series
+    ]
     ends = zip(indices.total - indices.total_confidence, indices.total + indices.total_confidence, strict=True)
-    spans = [Line(pair, [-row, -row], style={"color": PALETTE[6]}) for row, pair in enumerate(ends)]
-    total = Line(indices.total, -np.arange(len(spans)), "", {**_POINTS, "ls": "", "color": PALETTE[6]})
+    spans = [Series(pair, [-row, -row], style={"color": PALETTE[6]}) for row, pair in enumerate(ends)]
+    total = Series(indices.total, -np.arange(len(spans)), "", {**_POINTS, "ls": "", "color": PALETTE[6]})
     names = [name.replace("_", " ") for name in indices.names]
     panels = [Panel(axes[0], marks, log="x", rows=rows), Panel(axes[1], [total, *spans], rows=names)]
-    return Chart(panels, 3.2, "above", margins={"left": 1.3, "gap": 1.3, "top": 0.45})
+    return FigureLayout(panels, 3.2, "above", margins={"left": 1.3, "gap": 1.3, "top": 0.45})
 
 
 _X, _V, _F = "Displacement (mm)", "Velocity (m/s)", "Force (N)"
