@@ -158,3 +158,9 @@ def test_so_many_contradictions_are_refused_with_both_groups(sound):
     with pytest.raises(ContradictionError, match=r"runs contradict the other .*E_FORCE_SCALE.* against t0") as refusal:
         find_contradictions(wrong)
     assert refusal.value.code == "E_CONTRADICTIONS"
+
+
+def test_runs_of_which_none_agrees_with_another_are_refused(sound):
+    factors = np.exp(np.random.default_rng(4).uniform(-2, 2, len(sound)))
+    with pytest.raises(ContradictionError):
+        find_contradictions([replace(run, force=g * run.force) for run, g in zip(sound, factors, strict=True)])

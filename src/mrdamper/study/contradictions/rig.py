@@ -18,6 +18,8 @@ from mrdamper.study.contradictions.tracks import Track, tracks_of
 
 FEWEST_RUNS = 4  # identification runs from which one can contradict the others
 _MOST_SHARE = 0.34  # share of the runs that may contradict the others; beyond, nobody knows which are right
+_MANY = 0.2  # share of the runs from which they are refused if the others do not agree either
+_INCOHERENT = 4.0  # factor of the usual model error at which runs do not agree
 _INVERSE = 0.1  # logarithm of the product of two factors up to which one is the inverse of the other
 _MILLIAMPERES = 50.0  # ratio of a current to the usual one from which it is in milliamperes
 
@@ -66,7 +68,8 @@ def _among(train: Sequence[Track], keep: Collection[str]) -> dict[str, Contradic
     search.run(int(_MOST_SHARE * len(train)))
     found = {train[i].run.id: describe(train[i].run, e, len(train) - 1) for i, e in sorted(search.found.items())}
     found = {name: one for name, one in found.items() if name not in keep}
-    if len(found) > _MOST_SHARE * len(train) or _opposed(list(found.values())):
+    incoherent = len(found) > _MANY * len(train) and search.evidence.spread.misfit >= _INCOHERENT
+    if len(found) > _MOST_SHARE * len(train) or incoherent or _opposed(list(found.values())):
         raise _disagreement(train, found)
     return found
 
