@@ -15,7 +15,8 @@ _HELD_LATE = 0.005  # of the period
 _STRAIGHT = 0.25  # of the samples on a line through their neighbours: clean 16-bit records reach 0.14
 _EXACT, _SLOPE = 1e-9, 1e-6  # of the range: a bend that is none, and a step that is one
 _BENDS = 6  # per cycle, at least: a triangular motion has two
-_UNEVEN = 0.35  # standard deviation over mean of the lengths of the lines; those of a slower clock are alike
+_UNEVEN = 0.55  # standard deviation over mean of the lengths of the lines; those of a slower clock are alike
+_SLOPES = 0.6  # different slopes, of the number of lines: a coarse converter has fewer
 _SHORT_LINE = 2  # samples: shorter ones are the two sides of a bend between samples
 _LEAP, _STANDS_OUT = 0.02, 6.0  # of the peak-to-peak force; times the steps around it
 _FAST = 0.3  # of the peak velocity: slower, friction makes a force leap
@@ -55,11 +56,15 @@ def is_not_stored_on_change(view: View) -> Iterator[Finding]:
         values = getattr(view.steady, name)
         steps, span = np.diff(values), float(np.ptp(values))
         bends = np.abs(np.diff(steps)) >= _EXACT * span
-        straight = float(np.mean(~bends & (np.abs(steps[1:]) > _SLOPE * span)))
+        on_line = ~bends & (np.abs(steps[1:]) > _SLOPE * span)
+        straight = float(np.mean(on_line))
         if straight < _STRAIGHT:
             continue
         lines = np.diff(np.flatnonzero(bends))
         lines = lines[lines > _SHORT_LINE]
+        slopes = np.unique(np.round(steps[1:][on_line] / (_SLOPE * span))).size
+        if slopes < _SLOPES * lines.size:
+            continue
         if lines.size > _BENDS * motion.cycles and float(np.std(lines)) > _UNEVEN * float(np.mean(lines)):
             yield Finding(
                 "W_HELD",
@@ -77,10 +82,13 @@ def no_bit_is_stuck(view: View) -> Iterator[Finding]:
     if float(np.max(steps)) < _LEAP * cycles.force.span:
         return
     start, stop = view.strokes.steady or (0, view.run.time.size)
-    speed = np.abs(view.moving.velocity[start:stop])[1:]
+    velocity = view.moving.velocity[start:stop][1:]
     around = np.max([np.roll(steps, shift) for shift in _AROUND], axis=0)
-    leaps = (steps > _STANDS_OUT * around) & (steps > _LEAP * cycles.force.span) & (speed > _FAST * np.max(speed))
-    count = int(np.count_nonzero(leaps))
+    at = np.flatnonzero((steps > _STANDS_OUT * around) & (steps > _LEAP * cycles.force.span))
+    beside = velocity[np.clip(at[:, None] + np.arange(-4, 5), 0, velocity.size - 1)]  # a reversal is not near
+    limit = _FAST * float(np.max(np.abs(velocity)))
+    leaps = at[(np.min(beside, axis=1) > limit) | (np.max(beside, axis=1) < -limit)]
+    count = leaps.size
     if count >= max(_LEAPS, _LEAPS_A_CYCLE * len(cycles.starts)):
         size = float(np.median(steps[leaps]))
         yield Finding(
