@@ -7,10 +7,12 @@ import pytest
 from support.dampers import joint_damper
 
 from mrdamper.dampers.joint import JointFit, Valley
+from mrdamper.data import Condition
 from mrdamper.report.limitations import RANGE, by_group, limitations
 from mrdamper.statistics.ending import StopReason
+from mrdamper.statistics.metrics import Scores
 from mrdamper.study.recipe import Scored, play_and_bypass
-from mrdamper.study.validation import Validation
+from mrdamper.study.validation import RunScore, Validation
 
 NONE = Validation("none", ())
 
@@ -68,3 +70,13 @@ def test_limitations_are_grouped_and_the_tested_range_stands_last():
     assert list(groups)[-1] == RANGE
     assert [one.text for one in found] == [text for texts in groups.values() for text in texts]
     assert found[0].text.startswith("No validation runs")
+
+
+def test_the_worst_run_tells_its_kind_of_motion_apart_from_its_range():
+    def run(error, flags=()):
+        return RunScore("chirp", "rig", Condition(0.0, 5.3, 0.0017), Scores(error, *5 * (0.0,)), None, flags)
+
+    runs = Validation("worst", (run(0.02), run(0.02), run(0.11, ("amplitude", "not a sine"))))
+    fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), StopReason.SETTLED, 9, 0.1)
+    text = next(s.text for s in limitations(replace(scored(fit), validation=runs), ()) if "Largest error" in s.text)
+    assert "5.3 Hz, 1.7 mm, not a sine; amplitude outside the tested range)" in text

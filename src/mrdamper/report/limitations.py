@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mrdamper.dampers.base import Damper
+from mrdamper.dampers.base import NOT_A_SINE, Damper
 from mrdamper.dampers.certainty import unsure
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
@@ -100,7 +100,9 @@ def _prediction(cross_validated: Validation, validation: Validation) -> list[str
             continue
         worst = scores.worst()
         if worst.scores.nrmse_pp > 2 * scores.median():
-            outside = f", {', '.join(worst.extrapolation)} outside the tested range" if worst.extrapolation else ""
+            flags = [flag for flag in worst.extrapolation if flag != NOT_A_SINE]
+            outside = ", not a sine" if NOT_A_SINE in worst.extrapolation else ""
+            outside += f"; {' and '.join(flags)} outside the tested range" if flags else ""
             sentences.append(
                 f"Largest error of a {name}: {100 * worst.scores.nrmse_pp:.1f} % in {worst.run_id} "
                 f"({worst.condition}{outside}); median {100 * scores.median():.1f} %."
