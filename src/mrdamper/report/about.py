@@ -1,4 +1,4 @@
-"""What a report says of the tests beyond their records: specimen, rig, customer, limits.
+"""Head of a report and limits: specimen, rig, customer, force limits.
 
 Both come from small TOML files a user writes. Nothing is required and nothing is invented.
 """
@@ -57,7 +57,7 @@ class About:
 
     @property
     def rows(self) -> list[tuple[str, str]]:
-        """What is known, with its name on the page."""
+        """Fields that were given, with their names on the page."""
         named = {"temperature_C": "temperature", "type": "type", "rig": "test rig"}
         given = [(f.name, getattr(self, f.name)) for f in fields(self) if f.name not in ("title", "logo")]
         return [(named.get(n, n), f"{v} °C" if n == "temperature_C" else v) for n, v in given if v]

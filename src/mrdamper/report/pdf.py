@@ -255,7 +255,7 @@ class _Writer:
                 self._runs(child, size, {"b": "B", "strong": "B", "code": "code"}.get(child.tag, style))
 
     def folded(self, element: _Element) -> None:
-        """What a folded part of the page is called; here the part stands open."""
+        """Set the title of a folded part of the page; in print the part is open."""
         self.reserve(_KEEP)
         self.paragraph(_Element("p", {}, [_Element("b", {}, [element.text])]))
 
