@@ -27,7 +27,7 @@ _CURRENTS = 31  # currents that are tried
 # Logarithms of prior odds against an explanation: one that names a unit, a tested level or a tested motion is simpler.
 _UNIT, _LEVEL, _FREE, _SIGN, _ODD, _ALONE = 4.0, 4.0, 7.0, 4.0, 12.0, 10.0
 _TESTED_MOTION = 5.0  # what a motion of other runs lowers them by, and losing such a motion raises them by
-_EDGE = 8.0  # what the only run at the lowest or highest current raises those of a factor or another current by
+_EDGE = 14.0  # what the only run at the lowest or highest current raises those of a factor or another current by
 _USUAL_STEP = 3.0  # the same of the time between two samples
 _SAME_STEP = 0.01  # relative difference of times between samples that are one
 

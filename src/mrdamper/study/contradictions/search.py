@@ -23,6 +23,7 @@ _LOOKED_AT = 12  # runs whose explanations are tried in a round, at least
 _STAYS = 3.0  # logarithm of the odds from which an accepted explanation stays
 _SHIFT_ODDS = 12.0  # logarithm of the prior odds against shifted rows
 _EXCHANGE_ODDS = 6.0  # the same against two exchanged rows
+_SPARSE_ODDS = 20.0  # the same where the tests are no matrix of currents and motions
 _REGULAR = 6.0  # what an empty cell of the matrix of tests that is filled lowers them by
 _NEARLY = 0.5  # repeated and missing tests of a matrix that is nearly complete, over its tests
 _LEAST_SHIFT_ODDS = 0.0  # prior odds of shifted rows at least
@@ -327,7 +328,8 @@ class Search:
         empty = self._irregular(written)
         for i, j in combinations(rows, 2):
             if (order[i] in suspects or order[j] in suspects) and abs(written[i] - written[j]) > _SAME_CURRENT:
-                yield self._of_currents({order[i]: written[j], order[j]: written[i]}, "current", _EXCHANGE_ODDS)
+                odds = _EXCHANGE_ODDS if empty <= _NEARLY * len(rows) else _SPARSE_ODDS
+                yield self._of_currents({order[i]: written[j], order[j]: written[i]}, "current", odds)
         for step in (-1, 1):
             for first in range(last):
                 moved = [written[k if k < first else min(max(k + step, first), last)] for k in rows]
