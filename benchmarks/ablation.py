@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from mrdamper.dampers.fold_fits import FoldFits
 from mrdamper.dampers.joint import JointProblem
+from mrdamper.data import current_levels, same_condition
 from mrdamper.rig_files.dataset_folder import load_dataset
-from mrdamper.study.validation import leave_one_condition_out, validate
+from mrdamper.study.validation import leave_out, validate
 
 WITHOUT = {
     "nothing: the whole model": {},
@@ -38,15 +40,15 @@ def scores(dataset, fixed) -> str:
     problem = JointProblem(train, "play-bypass", fixed)
     fit = problem.fit(most_steps=25)
     conditions = [part.condition for part in problem.parts]
-    left_out = leave_one_condition_out(
-        train, conditions, lambda rest: problem.fit(rest, fit.point, rounds=2, most_steps=6).damper, name(fixed)
-    )
+    levels = current_levels([c.current_A for c in conditions])
+    inner = [[i for i, own in enumerate(levels) if own == level] for level in sorted(set(levels))[1:-1]]
+    groups = same_condition(conditions)
+    without = FoldFits(problem, [*groups, *inner])
+    left_out = leave_out(train, groups, lambda rest: without.refit(rest).damper, name(fixed))
     errors = []
-    for current in sorted({c.current_A for c in conditions})[1:-1]:
-        rest = [i for i, c in enumerate(conditions) if c.current_A != current]
-        unseen = [train[i] for i, c in enumerate(conditions) if c.current_A == current]
-        damper = problem.fit(rest, fit.point, rounds=2).damper
-        errors += [run.scores.nrmse_pp for run in validate(damper, unseen).runs]
+    for level in inner:
+        damper = without.refit([i for i in range(len(train)) if i not in level]).damper
+        errors += [run.scores.nrmse_pp for run in validate(damper, [train[i] for i in level]).runs]
     figures = (validate(fit.damper, train).median(), left_out.median(), float(np.median(errors)))
     return " / ".join(f"{100 * f:.2f}" for f in figures)
 

@@ -1,8 +1,8 @@
 """Errors of the joint model on what was left out of train runs: `python -m benchmarks.left_out [RIG ...]`.
 
-A condition (every run of it), an interior current (every run at it) and a whole record, ramps and
-rests included, are each predicted by a fit to the other train runs; medians of nrmse_pp. Held-out
-runs are not looked at.
+A condition (every run of it), an interior current (every run at it) and a whole record, ramps and rests included, are
+each predicted by a fit to the other train runs, begun from starts that never saw what is left out; medians of nrmse_pp.
+Held-out runs are not looked at.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ import time
 import numpy as np
 
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.choice import JointChoice, identify_jointly, levels_of
+from mrdamper.dampers.choice import SEARCHED, JointChoice, identify_jointly, levels_of
+from mrdamper.dampers.fold_fits import FoldFits
 from mrdamper.data import Dataset, Run, same_condition
 from mrdamper.rig_files.dataset_folder import load_dataset
 
@@ -29,20 +30,21 @@ def errors(rig: Dataset) -> tuple[JointChoice, dict[str, list[float]]]:
     choice = identify_jointly(runs)
     problem, fit = choice.problem, choice.fit
     found: dict[str, list[float]] = {"current": [], "condition": [], "whole record": []}
-    for level in levels_of(problem)[1:-1]:
-        damper = _without(choice, level)
+    levels, conditions = levels_of(problem)[1:-1], same_condition([part.condition for part in problem.parts])
+    fits = FoldFits(problem, [*levels, *conditions], SEARCHED)
+    for level in levels:
+        damper = _without(fits, level)
         found["current"] += [_error(damper, runs[i]) for i in level]
-    for group in same_condition([part.condition for part in problem.parts]):
-        damper = _without(choice, group)
+    for group in conditions:
+        damper = _without(fits, group)
         found["condition"] += [_error(damper, runs[i]) for i in group]
         found["whole record"] += [_error(damper, runs[i], whole=True) for i in group]
     found["train"] = [_error(fit.damper, run) for run in runs]
     return choice, found
 
 
-def _without(choice: JointChoice, group: list[int]) -> Damper:
-    rest = [i for i in range(len(choice.problem.parts)) if i not in group]
-    return choice.problem.fit(rest, choice.fit.point, rounds=2, most_steps=6, settled=1e-5).damper
+def _without(fits: FoldFits, group: list[int]) -> Damper:
+    return fits.refit([i for i in range(len(fits.problem.parts)) if i not in group]).damper
 
 
 def _error(damper: Damper, run: Run, whole: bool = False) -> float:

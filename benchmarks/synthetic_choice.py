@@ -19,8 +19,8 @@ import numpy as np
 from benchmarks.synthetic_dampers import DESIGNS, Design, SyntheticDamper, asked_of, drawn, in_future_session, tests_of
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Dataset, Run
+from mrdamper.study.validation import peak_band, score_run
 from mrdamper.study.workflow import RigStudy, study_rig
-from mrdamper.validation import peak_band, score_run
 
 LEVEL = 0.9
 ASKED = ("corner", "current")
@@ -98,7 +98,7 @@ def _covered(damper: Damper, runs: Sequence[Run]) -> tuple[tuple[float, float], 
 
 def run_cases(count: int, designs: Sequence[Design], processes: int) -> list[Case]:
     """Study some dampers by some designs."""
-    jobs = [(damper, design) for damper in drawn(count) for design in designs]
+    jobs: list[tuple[SyntheticDamper, Design]] = [(damper, design) for damper in drawn(count) for design in designs]
     if processes < 2:
         return [studied(*job) for job in jobs]
     with ProcessPoolExecutor(processes) as pool:

@@ -321,7 +321,7 @@ def _recorded(
         runs.append(
             Run(
                 f"{kind}{k}", time, motions.x[k, kept], clean,
-                float(current[0]) if kind == "sine" else current,
+                float(current[0]) if kind == "sine" else current,  # type: ignore[arg-type]
                 rig="synthetic", excitation=kind, window=window, notes={"session": f"s{session}"},
             )
         )  # fmt: skip

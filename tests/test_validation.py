@@ -8,7 +8,8 @@ import pytest
 from support.dampers import joint_damper
 from support.synthetic import synthetic_run
 
-from mrdamper.data import Condition, Run
+from mrdamper.dampers.distance import AT_TESTS
+from mrdamper.data import Condition, Run, same_condition
 from mrdamper.errors import InputError
 from mrdamper.physics.motion import analyse_motion, sine
 from mrdamper.statistics.metrics import dissipated_power
@@ -16,7 +17,7 @@ from mrdamper.study import validation
 from mrdamper.study.validation import (
     RunScore,
     Validation,
-    leave_one_condition_out,
+    leave_out,
     peak_band,
     score_run,
     session_drift,
@@ -33,10 +34,14 @@ class Said:
     condition: Condition
     extrapolation: tuple = ()
 
+    def distance(self, tested):
+        return AT_TESTS
+
 
 class Memory:
     """Knows the force of every run it was made of, and of every run at their conditions; says zero of all others."""
 
+    envelope = None
     title = "memory"
 
     def __init__(self, runs):
@@ -67,7 +72,7 @@ def test_no_fold_knows_the_condition_it_is_scored_on():
         asked.append(tuple(rows))
         return Memory([RUNS[i] for i in rows])
 
-    found = leave_one_condition_out(RUNS, [run.nominal for run in RUNS], fit, "memory")
+    found = leave_out(RUNS, same_condition([run.nominal for run in RUNS]), fit, "memory")
     assert [score.run_id for score in found.runs] == [run.id for run in RUNS]
     for score in found.runs:
         # Zero was predicted: every absolute error is the force itself. A leak makes it none.
@@ -83,12 +88,13 @@ def test_no_fold_knows_the_condition_it_is_scored_on():
 
 def test_runs_at_one_condition_leave_nothing_to_score():
     alone = [run for run in RUNS if run.nominal == RUNS[0].nominal]
-    found = leave_one_condition_out(alone, [run.nominal for run in alone], Memory, "memory")
+    found = leave_out(alone, same_condition([run.nominal for run in alone]), Memory, "memory")
     assert found.runs == ()
     assert np.isnan(found.median())
 
 
 class Exact:
+    envelope = None
     title = "exact"
 
     def predict_run(self, run):

@@ -10,7 +10,9 @@ from scipy.stats import t as students_t
 from mrdamper.dampers import bands
 from mrdamper.dampers.bands import band, no_band, portable_band, session_band
 from mrdamper.dampers.base import Prediction
+from mrdamper.dampers.calibration import Growth
 from mrdamper.dampers.certainty import Certainty, unsure
+from mrdamper.dampers.distance import Distance
 from mrdamper.dampers.joint import JointDamper
 from mrdamper.dampers.sessions import Expected, Sessions, Spread, When
 from mrdamper.data import Condition
@@ -23,15 +25,22 @@ MOTION = sine(CONDITION, 1, 80)
 FORCE = 300 * np.cos(2 * np.pi * 2.0 * MOTION.time) + 60 * np.sin(2 * np.pi * 2.0 * MOTION.time) + 25
 SLOPES = np.column_stack([MOTION.velocity, np.sign(MOTION.velocity + 1e-9)])
 COVARIANCE = np.array([[90.0, -4.0], [-4.0, 30.0]])
+AWAY = Distance(between=0.02, beyond=0.1, motion=0.5)
+GROWN = {  # by each way away from the tests
+    "force": 0.008**2 + 0.005**2 + 0.03**2,
+    "peak": 0.01**2 + 0.002**2 + 0.015**2,
+    "energy": 0.012**2 + 0.007**2 + 0.04**2,
+}
 KNOWN = Certainty(
     ("c", "fy"), (False, False), COVARIANCE, np.array([12.0, 5.0]), gain=0.03, offset=4.0, session_dof=3.0,
     run_gain=0.012, run_offset=2.5, run_dof=8.0, force=0.02, peak=0.015, energy=0.05, left_out=9,
+    growth=Growth((0.4, 0.05, 0.06), (0.5, 0.02, 0.03), (0.6, 0.07, 0.08)),
 )  # fmt: skip
 
 
 def damper(known=KNOWN):
     model = Bingham(c=2000.0, fy=100.0, f0=25.0)
-    envelope = SimpleNamespace()
+    envelope = SimpleNamespace(distance=lambda condition, current: AWAY)
     return JointDamper("rig", model, ("c", "fy"), envelope, certainty=known)  # type: ignore[arg-type]
 
 
@@ -57,7 +66,7 @@ def test_a_band_adds_numbers_sessions_and_form(level, shown):
     found, force, slopes = band(damper(), PREDICTION, level, shown), FORCE[at], SLOPES[at]
     half = (force.max() - force.min()) / 2
     own = np.array([s @ COVARIANCE @ s for s in slopes])
-    session, form = (0.03 * force) ** 2 + 16.0, (0.012 * force) ** 2 + 2.5**2 + (0.02 * half) ** 2
+    session, form = (0.03 * force) ** 2 + 16.0, (0.012 * force) ** 2 + 2.5**2 + (0.02**2 + GROWN["force"]) * half**2
     assert found.parameter == pytest.approx(np.sqrt(own))
     assert found.session == pytest.approx(np.sqrt(session))
     assert found.model == pytest.approx(np.sqrt(form))
@@ -66,14 +75,14 @@ def test_a_band_adds_numbers_sessions_and_form(level, shown):
     assert found.high - force == pytest.approx(t * np.sqrt(whole))
     assert force - found.low == pytest.approx(t * np.sqrt(whole))
     swing = (slopes[force.argmax()] - slopes[force.argmin()]) / 2
-    parts = swing @ COVARIANCE @ swing, (0.03 * half) ** 2, (0.012**2 + 0.015**2) * half**2
+    parts = swing @ COVARIANCE @ swing, (0.03 * half) ** 2, (0.012**2 + 0.015**2 + GROWN["peak"]) * half**2
     unseen, seen = reach(level, *parts), reach(level, parts[0], 0.0, parts[2])
     assert found.peak == pytest.approx((half - unseen, half + unseen))
     assert found.known_session == pytest.approx((half - seen, half + seen))
     time, v = MOTION.time[at], MOTION.velocity[at]
     power, *turned = (np.trapezoid(f * v, time) for f in (force, slopes[:, 0], slopes[:, 1]))
     share = np.array(turned) / power
-    loss = reach(level, share @ COVARIANCE @ share, 0.03**2, 0.012**2 + 0.05**2)
+    loss = reach(level, share @ COVARIANCE @ share, 0.03**2, 0.012**2 + 0.05**2 + GROWN["energy"])
     assert found.energy == pytest.approx((-loss, loss))
 
 
@@ -92,7 +101,7 @@ def test_where_nothing_is_known_there_is_no_band_and_its_reason():
     assert band(damper(wild), PREDICTION).peak[0] == 0.0
 
 
-def test_a_band_in_three_numbers_is_that_of_loops_at_three_currents(monkeypatch):
+def test_a_portable_band_is_that_of_loops_at_three_currents(monkeypatch):
     asked, widths = [], {0.0: 30.0, 1.0: 60.0, 2.0: 130.0}
     made = damper()
 
@@ -107,7 +116,8 @@ def test_a_band_in_three_numbers_is_that_of_loops_at_three_currents(monkeypatch)
 
     monkeypatch.setattr(JointDamper, "predict", predict)
     monkeypatch.setattr(bands, "band", found)
-    tested = SimpleNamespace(tested=True, middle=CONDITION, current_A=(0.0, 2.0), peak_velocity_m_s=(0.0, 0.9))
+    tested = SimpleNamespace(tested=True, middle=CONDITION, current_A=(0.0, 2.0), peak_velocity_m_s=(0.0, 0.9),
+        farthest=[CONDITION, replace(CONDITION, current_A=2.0)], distance=lambda condition, current: AWAY)  # fmt: skip
     portable = portable_band(replace(made, envelope=tested), 0.8)
     t = np.mean([30.0, 60.0, 130.0]) / 13
     own = np.mean([9 / (100 + 50 * I) ** 2 for I in widths])
@@ -115,6 +125,7 @@ def test_a_band_in_three_numbers_is_that_of_loops_at_three_currents(monkeypatch)
         0.8, pytest.approx(np.hypot(0.03, 0.012) * t), pytest.approx(np.hypot(4, 2.5) * t),
     )  # fmt: skip
     assert portable.of_peak == pytest.approx(t * np.sqrt(0.02**2 + own))
+    assert portable.of_peak_untested == pytest.approx(t * np.sqrt(0.02**2 + own + GROWN["force"]))
     assert asked == [replace(CONDITION, current_A=I) for I in widths]
     slow = SimpleNamespace(**(vars(tested) | {"peak_velocity_m_s": (0.0, 0.05)}))  # slower than the middle of all
     portable_band(replace(made, envelope=slow), 0.8)

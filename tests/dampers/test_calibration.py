@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from mrdamper.dampers.calibration import LEVELS, Calibration, PredictedRun, Scored, model_error
+from mrdamper.dampers.calibration import LEVELS, Calibration, Growth, ModelError, PredictedRun, Scored, model_error
+from mrdamper.dampers.distance import Distance
 from mrdamper.data import Run
 
 TIME = np.linspace(0.0, 1.0, 201)
@@ -140,3 +141,24 @@ def test_errors_are_over_their_standard_deviations():
     exact = Scored.of(run("r"), np.zeros(TIME.size), 0.0, 0.0)
     assert not np.any([*exact.force, *exact.peak, *exact.energy])
     assert np.isinf(Scored.of(replace(run("r"), energy=np.inf), np.ones(TIME.size), 1.0, 1.0).energy).all()
+
+
+def test_errors_grow_with_the_distance_from_the_tests_as_they_were_made():
+    at_tests = ModelError(force=0.02, peak=0.01, energy=0.03, gain=0.0, offset=0.0)
+    ways = [Distance(b, e, m) for b, e, m in ((0.0, 0.0, 0.0), (0.06, 0.0, 0.0), (0.0, 0.4, 0.0), (0.0, 0.3, 0.8))]
+    runs = []
+    for way in ways:
+        peak, energy = (1 + np.sqrt(own**2 + g @ way.squares) for own, g in ((0.01, PEAK**2), (0.03, ENERGY**2)))
+        error = np.sqrt(0.02**2 + FORCE**2 @ way.squares) * np.ptp(SWING) / 2
+        runs.append(replace(run("r", error, peak=peak, energy=energy), distance=way))
+    found = Growth.of(runs, at_tests)
+    assert found.force == pytest.approx(FORCE)
+    assert found.peak == pytest.approx(PEAK)
+    assert found.energy == pytest.approx(ENERGY)
+    assert found.variance("peak", ways[2]) == pytest.approx((0.4 * PEAK[1]) ** 2)
+    assert Growth.of(runs[:1], at_tests) == Growth()
+    none = Growth.of([replace(run("r"), distance=way) for way in ways], at_tests)  # better than at the tests
+    assert none == Growth()
+
+
+FORCE, PEAK, ENERGY = np.array([0.5, 0.2, 0.1]), np.array([0.4, 0.3, 0.15]), np.array([0.8, 0.1, 0.25])

@@ -36,7 +36,7 @@ def left_out(active, residual=RESIDUAL, groups=GROUPS):
         rest = np.setdiff1d(np.arange(N), group)
         step = np.linalg.lstsq(JACOBIAN[np.ix_(rest, on)], -base[rest], rcond=None)[0]
         errors.append(np.sqrt(np.mean((base[group] + JACOBIAN[np.ix_(group, on)] @ step) ** 2)))
-    return float(np.mean(errors))
+    return np.array(errors)
 
 
 @pytest.mark.parametrize("active", [NAMES, ("d", "f0"), ("d", "h1", "f0")])
@@ -47,12 +47,13 @@ def test_what_is_left_out_is_predicted_by_the_rest_alone(active):
     # A group that is nothing but a leverage point of its own says how wrong its prediction is, not its fit.
     lonely = RESIDUAL.copy()
     lonely[GROUPS[1]] += 50.0
-    assert evidence(lonely).scores(frozenset(active))["condition"] > 10.0
+    assert evidence(lonely).scores(frozenset(active))["condition"].mean() > 10.0
 
 
 def test_lags_of_the_coil_stay_whatever_is_taken_away():
     coil = evidence(names=("coil.rise_s", "h1", "c1", "f0"))
-    assert coil.scores(frozenset(("f0",))) == pytest.approx(evidence().scores(frozenset(("d", "f0"))))
+    without = evidence().scores(frozenset(("d", "f0")))["condition"]
+    assert coil.scores(frozenset(("f0",)))["condition"] == pytest.approx(without)
 
 
 def test_a_term_stays_where_without_it_more_is_missed():
@@ -65,22 +66,6 @@ def test_a_term_stays_where_without_it_more_is_missed():
     # Of a term that is kept the error without it, beside the error with it; of another the other way round.
     assert tried[0].left_out["condition"] > 10 * tried[0].before["condition"]
     assert tried[1].left_out["condition"] >= 0.98 * tried[1].before["condition"]
-
-
-@pytest.mark.parametrize(
-    ("scores", "before", "better"),
-    [
-        ({"condition": 0.98}, {"condition": 1.0}, True),
-        ({"condition": 0.99}, {"condition": 1.0}, False),  # not worth a number
-        ({"condition": 1.02}, {"condition": 1.0}, False),
-        ({"condition": 0.9, "current": 1.009}, {"condition": 1.0, "current": 1.0}, True),
-        ({"condition": 0.9, "current": 1.011}, {"condition": 1.0, "current": 1.0}, False),  # harm done
-        ({"condition": 0.018}, {"condition": 0.02}, True),
-        ({}, {}, False),
-    ],
-)
-def test_a_term_must_earn_its_place_and_harm_nothing(scores, before, better):
-    assert choice._better(scores, before) is better
 
 
 def part(current, changes=False, is_sine=True):
@@ -96,16 +81,15 @@ def test_levels_are_runs_of_constant_current_a_two_hundredth_apart():
 
 
 @pytest.mark.parametrize(
-    ("levels", "changes", "forms"), [(2, False, 0), (3, False, 2), (4, False, 2), (2, True, 2), (1, False, 0)]
+    ("levels", "changes", "forms"),
+    [(1, False, 0), (2, False, 0), (3, False, 0), (4, False, 2), (5, False, 3), (2, True, 3)],
 )
-def test_as_many_numbers_of_the_level_law_as_there_are_currents(levels, changes, forms):
+def test_the_law_of_the_current_has_a_number_fewer_than_there_are_levels(levels, changes, forms):
     problem = SimpleNamespace(parts=[part(0.5 * k) for k in range(levels)] + [part(0.1, changes=True)] * changes)
     found = choice._level_laws(problem)
     assert len(found) == forms
-    if levels > 3 or changes:
-        assert [term.names for term in found] == [("Ic",), ("Ic", "si")]
-    elif forms:
-        assert [term.names for term in found] == [("Ic",), ("si",)]
+    straight = 2  # yield force without current, and its rise
+    assert changes or all(straight + len(term.names) <= levels - 1 for term in found)
 
 
 def test_one_level_determines_no_rise_with_current():
@@ -141,15 +125,18 @@ def test_sessions_are_left_out_where_some_hold_several_runs():
     assert asked("a", "b", "c") == []  # a run each
 
 
-def test_an_inner_current_is_predicted_by_the_others():
+def test_a_current_is_predicted_by_a_fit_to_the_others_from_a_start_that_never_saw_it():
     asked = []
 
     class Problem:
         def __init__(self):
             self.parts = [part(I) for I in (0.0, 0.5, 1.0, 0.5, 2.0)]
 
-        def refit(self, fit, rest, settled):
-            asked.append(rest)
+        def from_point(self, start):
+            return f"point of {start}"
+
+        def fit(self, rest, point, **effort):
+            asked.append((rest, point))
             return tuple(rest)
 
         def errors(self, without, level):
@@ -157,6 +144,6 @@ def test_an_inner_current_is_predicted_by_the_others():
             return np.array([0.1 * i for i in level])
 
     problem = Problem()
-    found = choice._left_out_current(problem, "fit", levels_of(problem))
-    assert asked == [[0, 2, 4], [0, 1, 3, 4]]
-    assert found == pytest.approx((0.1 + 0.3 + 0.2) / 3)
+    found = choice._left_out_current(problem, ["a", "b"], levels_of(problem)[1:-1])
+    assert asked == [([0, 2, 4], "point of a"), ([0, 1, 3, 4], "point of b")]
+    assert found == pytest.approx([0.1, 0.3, 0.2])

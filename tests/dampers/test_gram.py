@@ -15,7 +15,7 @@ from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.physics.motion import sweep
 from mrdamper.physics.simulation import simulate
 from mrdamper.statistics.functions.forms import ParameterFunction
-from mrdamper.study.validation import leave_one_condition_out, validate
+from mrdamper.study.validation import leave_out, validate
 
 MATRIX = [Condition(i, f, a) for i in (0.0, 0.5, 1.0, 1.5) for f, a in ((1.0, 0.02), (2.0, 0.02), (0.5, 0.05))]
 FORMS = {
@@ -119,7 +119,7 @@ def test_forms_are_chosen_short(runs, identifications):
 
 def test_a_condition_left_out_is_predicted(runs, identifications):
     fit, refit = fit_modified_jointly(runs, identifications)
-    left_out = leave_one_condition_out(runs, [i.condition for i in identifications], refit, "joint")
+    left_out = leave_out(runs, same_condition([i.condition for i in identifications]), refit, "joint")
     assert left_out.median() < 0.01
     assert len(left_out.runs) == len(runs)
     assert fit.damper.envelope == Envelope.of([i.condition for i in identifications])

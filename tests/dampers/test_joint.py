@@ -124,9 +124,9 @@ def test_of_each_length_the_best_start_and_the_first_length_first_unless_another
         monkeypatch.setattr(
             JointProblem, "_downhill", lambda self, u, left=left: Minimum(u, u, next(left), 1, StopReason.SETTLED)
         )
-        assert [u[at] for u in other._promising[:3]] == [lengths[k] for k in order]
-        assert np.array_equal(other.start, other._promising[0])
-    for u in other._promising:
+        assert [u[at] for u in other.promising[:3]] == [lengths[k] for k in order]
+        assert np.array_equal(other.start, other.promising[0])
+    for u in other.promising:
         alike = [v for v in grid if v[at] == u[at]]
         assert np.array_equal(u, min(alike, key=lambda v: float(np.sum(other._few.solve(v).nrmse_pp))))
 
@@ -152,7 +152,7 @@ def ended(error, knee):
 def test_a_search_ends_in_the_best_valley_and_names_the_next(problem, monkeypatch, ends, best, second):
     made = [ended(*end) for end in ends]
     other = JointProblem(problem.runs, "play-bypass", parts=problem.parts)
-    other.__dict__["_promising"] = [np.array([k]) for k in range(2)][: len(made)]
+    other.__dict__["promising"] = [np.array([k]) for k in range(2)][: len(made)]
     monkeypatch.setattr(JointProblem, "_downhill", lambda self, u: SimpleNamespace(point=u))
     asked = []
     monkeypatch.setattr(JointProblem, "fit", lambda self, start, **how: asked.append(how) or made[int(start[0])])
@@ -251,14 +251,14 @@ def test_starts_are_tried_on_six_runs_and_a_single_start_is_taken_as_it_is(runs,
     assert len(few._few.strung.parts) == 4
     monkeypatch.setattr(JointProblem, "_downhill", lambda self, u: pytest.fail("one start needs no trial"))
     held = problem.with_free((), {"d": 3e-4, "cb": 3e4})
-    (start,) = held._promising
+    (start,) = held.promising
     assert start.tolist() == [axis.coordinate(axis.grid[0]) for axis in held.axes]
 
 
 def test_the_third_valley_is_not_looked_into(problem, monkeypatch):
     made = [ended(0.03, 1e-3), ended(0.031, 2e-3), ended(0.01, 3e-3)]
     other = JointProblem(problem.runs, "play-bypass", parts=problem.parts)
-    other.__dict__["_promising"] = [np.array([k]) for k in range(3)]
+    other.__dict__["promising"] = [np.array([k]) for k in range(3)]
     monkeypatch.setattr(JointProblem, "fit", lambda self, start, **how: made[int(start[0])])
     assert other.search().error == pytest.approx(0.03)
 

@@ -9,6 +9,7 @@ import pytest
 from support.dampers import joint_damper
 from support.synthetic import synthetic_run
 
+from mrdamper.dampers.distance import AT_TESTS
 from mrdamper.dampers.published import all_published
 from mrdamper.data import Condition, Run
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError
@@ -45,10 +46,14 @@ class Said:
     condition: Condition
     extrapolation: tuple = ()
 
+    def distance(self, tested):
+        return AT_TESTS
+
 
 class Memory:
     """Knows the force of the runs it was made of, and says zero of all others."""
 
+    envelope = None
     title = "memory"
     one_model = None
 
@@ -215,6 +220,7 @@ def test_a_stretch_has_a_dozen_cycles_and_a_lead_in_of_one_and_a_half(seconds, c
 
 
 class Zero:
+    envelope = None
     title, one_model = "zero", None
 
     def predict_run(self, run):
@@ -224,18 +230,18 @@ class Zero:
 def test_records_that_are_no_sine_are_cut_and_left_out_by_themselves(monkeypatch):
     asked = {}
 
-    def leave(pieces, conditions, refit, title, alone):
-        asked.update(ids=[p.id for p in pieces], alone=list(alone), conditions=len(conditions))
+    def leave(pieces, folds, refit, title):
+        asked.update(ids=[p.id for p in pieces], folds=list(folds))
         return Validation(title, ())
 
-    monkeypatch.setattr(cross_validation, "leave_one_condition_out", leave)
+    monkeypatch.setattr(cross_validation, "leave_out", leave)
     changing = replace(TRAIN[1], id="changing", current=np.linspace(0, 1, TRAIN[1].time.size))
     train = [TRAIN[0], noise_record(40.0), changing]
     parts = [part.id for part in stretches(train[1])]
     zero = FitResult(Zero(), lambda rows: Zero())
     fit_and_score(Recipe("zero", None, lambda runs, _: zero), train, [], [])
     ids = [TRAIN[0].id, *parts, "changing"]
-    assert asked == {"ids": ids, "alone": list(range(1, len(ids))), "conditions": len(ids)}
+    assert asked == {"ids": ids, "folds": [[i] for i in range(len(ids))]}
     assert len(parts) > 1
     fit_and_score(Recipe("zero", Basis("bingham"), lambda runs, _: zero), train, [], [])
     assert asked["ids"] == [TRAIN[0].id, "sweep", "changing"]
@@ -262,10 +268,13 @@ def test_joint_ways_hand_on_what_their_fits_make(monkeypatch):
     made_ = recipes.fit_functions_jointly("ab", identifications)
     assert (made_.damper, made_.refit, made_.fit) == ("damper", "refit", fit)
     assert asked == [("ab", identifications, {"method": "balance", "train runs": "2", "functions": "global fit"})]
-    problem = SimpleNamespace(refit=lambda fit, rows: SimpleNamespace(damper=(fit, rows)))
-    monkeypatch.setattr(recipes, "identify_jointly", lambda runs: SimpleNamespace(problem=problem, fit=fit))
+    folds = SimpleNamespace(refit=lambda rows: SimpleNamespace(damper=("without", rows)))
+    monkeypatch.setattr(recipes, "identify_jointly", lambda runs: SimpleNamespace(problem="problem", fit=fit))
+    monkeypatch.setattr(recipes, "all_folds", lambda runs: [[0], [1]])
+    monkeypatch.setattr(recipes, "FoldFits", lambda *given: asked.append(given[:2]) or folds)
     made_ = recipes.fit_global_model("ab", [])
-    assert (made_.damper, made_.fit, made_.refit([1])) == ("damper", fit, (fit, [1]))
+    assert (made_.damper, made_.fit, made_.refit([1])) == ("damper", fit, ("without", [1]))
+    assert asked[-1] == ("problem", [[0], [1]])
     law = SimpleNamespace(basis="spencer", fit=lambda *given: given)
     made_ = recipes.fit_published(law, "abc", [7, 8, 9])
     assert made_.damper == (["a", "b", "c"], [7, 8, 9], {"train runs": "3"})

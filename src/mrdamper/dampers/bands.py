@@ -77,10 +77,15 @@ def band(
     seen_at = slice(None) if shown is None else shown
     force, motion = prediction.force[seen_at], prediction.motion.part(seen_at)
     slopes = force_slopes(damper, prediction, known.names)[seen_at]
+    distance = prediction.distance(damper.envelope)
     half = peak_force(force)
     parameter = np.einsum("np,pq,nq->n", slopes, known.covariance, slopes)
     session = (known.gain * force) ** 2 + known.offset**2
-    model = (known.run_gain * force) ** 2 + known.run_offset**2 + (known.force * half) ** 2
+    model = (
+        (known.run_gain * force) ** 2
+        + known.run_offset**2
+        + (known.force**2 + known.growth.variance("force", distance)) * half**2
+    )
     top, bottom = int(np.argmax(force)), int(np.argmin(force))
     swing = (slopes[top] - slopes[bottom]) / 2
     own = float(swing @ known.covariance @ swing)
@@ -97,14 +102,13 @@ def band(
     t = reach("force", [float(np.mean(v)) for v in (parameter, session, model)])
     mean = float(np.mean(parameter + session + model))
     width = (t / np.sqrt(mean) if mean > 0 else 0.0) * np.sqrt(parameter + session + model)
-    of_run = (known.run_gain**2 + known.peak**2) * half**2
+    of_run = (known.run_gain**2 + known.peak**2 + known.growth.variance("peak", distance)) * half**2
     unseen = reach("peak", [own, (known.gain * half) ** 2, of_run])
     seen = reach("peak", [own, 0.0, of_run])
     power = dissipated_power(force, motion.velocity, motion.time) or 1.0
     turned = np.array([dissipated_power(column, motion.velocity, motion.time) for column in slopes.T]) / power
-    loss = reach(
-        "energy", [float(turned @ known.covariance @ turned), known.gain**2, known.run_gain**2 + known.energy**2]
-    )
+    lost = known.run_gain**2 + known.energy**2 + known.growth.variance("energy", distance)
+    loss = reach("energy", [float(turned @ known.covariance @ turned), known.gain**2, lost])
     return Band(
         force - width, force + width, np.sqrt(parameter), np.sqrt(session), np.sqrt(model),
         (max(half - unseen, 0.0), half + unseen), (-loss, loss), (max(half - seen, 0.0), half + seen),
@@ -150,7 +154,7 @@ def no_band(damper: Damper) -> str:
 
 @dataclass(frozen=True)
 class PortableBand:
-    """A band in three parameters, for exports of a damper without its covariance.
+    """A band in four parameters, for exports of a damper without its covariance.
 
     The force F of a loop with half its peak-to-peak force P lies within
     sqrt((gain F)² + offset_N² + (of_peak P)²) of the prediction, in a future test session.
@@ -164,6 +168,8 @@ class PortableBand:
         [N]
     of_peak : float
         Of half the peak-to-peak force: the model's own error and that of its parameters.
+    of_peak_untested : float
+        In its place at combinations inside the tested ranges that were not tested: that of the farthest one.
     scope : str
         Sessions it holds for, as a phrase.
     """
@@ -172,11 +178,12 @@ class PortableBand:
     gain: float
     offset_N: float
     of_peak: float
+    of_peak_untested: float
     scope: str = ""
 
 
 def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
-    """The band of a damper in three parameters, from loops at the lowest, middle and highest tested current.
+    """The band of a damper in four parameters, from loops at the lowest, middle and highest tested current.
 
     None where there is no band. The error that comes from the damper's parameters is taken at its
     root mean square over these loops, so a band may differ by some per cent from `band`.
@@ -203,8 +210,11 @@ def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
         own.append(np.mean(found.parameter**2) / peak_force(prediction.force) ** 2)
         quantile.append(np.mean(found.high - prediction.force) / (np.mean(parts) or 1.0))
     t = float(np.mean(quantile))
-    of_peak = t * float(np.sqrt(known.force**2 + np.mean(own)))
-    return PortableBand(level, t * known.total_gain, t * known.total_offset, of_peak, scope(damper, level))
+    grown = [known.growth.variance("force", tested.distance(c, np.array([c.current_A]))) for c in tested.farthest]
+    at_tests, untested = (
+        t * float(np.sqrt(known.force**2 + np.mean(own) + more)) for more in (0.0, max(grown, default=0.0))
+    )
+    return PortableBand(level, t * known.total_gain, t * known.total_offset, at_tests, untested, scope(damper, level))
 
 
 def session_band(

@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import pairwise, product
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -18,6 +18,7 @@ import numpy as np
 from mrdamper.dampers.causal import SLACK, causal_force
 from mrdamper.dampers.certainty import Certainty, FittedParameter, table
 from mrdamper.dampers.coil import Coil
+from mrdamper.dampers.distance import Distance, distance_from
 from mrdamper.data import Condition, Displayable, Floats, Run, same_condition
 from mrdamper.errors import InputError, checked
 from mrdamper.models import Model
@@ -101,6 +102,17 @@ class Envelope:
         """The conditions at the ends of the ranges."""
         return [Condition(*ends) for ends in product(self.current_A, self.frequency_Hz, self.amplitude_m)]
 
+    @property
+    def farthest(self) -> list[Condition]:
+        """Combinations inside the ranges that may be far from any test: corners of the motions, currents between."""
+        levels = sorted({point[0] for point in self.conditions}) or list(self.current_A)
+        currents = [*levels, *((one + other) / 2 for one, other in pairwise(levels))]
+        fastest = self.peak_velocity_m_s[1]
+        motions = [
+            (f, min(A, fastest / (2 * np.pi * max(f, _LEAST)))) for f, A in product(self.frequency_Hz, self.amplitude_m)
+        ]
+        return [Condition(current, *motion) for current in currents for motion in motions]
+
     def flags(self, condition: Condition) -> tuple[str, ...]:
         """Which quantities of a condition lie outside: empty inside the envelope."""
         checks = (
@@ -113,6 +125,18 @@ class Envelope:
             name for name, value, (low, high) in checks if value < low - SLACK * high or value > high * (1 + SLACK)
         )
         return outside or (() if self._combined(condition) else (COMBINATION,))
+
+    def distance(self, condition: Condition, current: Floats) -> Distance:
+        """Distance of a condition and the currents (N,) [A] along its motion; zero where only ranges are known."""
+        if not self.conditions or condition.frequency_Hz <= 0 or condition.amplitude_m <= 0:
+            return Distance()
+        tested = [Condition(*point) for point in self.conditions]
+        found = distance_from(tested, condition, current, any_current=self.any_motion)
+        if not self.any_motion:
+            return found
+        larger = max(0.0, np.log(condition.amplitude_m / self.amplitude_m[1]))
+        faster = max(0.0, np.log(condition.peak_velocity / self.peak_velocity_m_s[1]))
+        return replace(found, motion=min(found.motion, float(np.hypot(larger, faster))))
 
     def _combined(self, condition: Condition) -> bool:
         """Whether a condition lies in the convex hull of the tested ones, in I, log f and log A (and log f·A)."""
@@ -180,6 +204,10 @@ class Prediction(Displayable):
     condition: Condition
     extrapolation: tuple[str, ...]
     steady: bool = False
+
+    def distance(self, tested: Envelope) -> Distance:
+        """Distance from tests."""
+        return tested.distance(self.condition, self.motion.current)
 
     @property
     def is_sine(self) -> bool:

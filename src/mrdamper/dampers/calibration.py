@@ -17,6 +17,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from mrdamper.dampers.distance import AT_TESTS, Distance
 from mrdamper.data import Floats, Run, session_of
 from mrdamper.statistics.metrics import dissipated_power, peak_force
 
@@ -27,6 +28,7 @@ REPORTED_LEVEL = 0.9  # of the coverage that a study states
 _MAX_SAMPLES = 400  # of a run
 _ENOUGH_UNITS = 9  # independent units that reach a level of 90 %
 _MAX_FACTOR = 1e3  # standard deviations; an error beyond is no longer told apart
+_MAX_GROWTH = 10.0  # relative error per unit of distance; one beyond is no longer told apart
 _NORMAL_MEDIAN = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
 
 
@@ -45,6 +47,8 @@ class PredictedRun:
         Measured over predicted peak-to-peak force.
     energy : float
         Measured over predicted dissipated energy.
+    distance : Distance
+        From the runs that the model was identified from.
     """
 
     run_id: str
@@ -53,9 +57,10 @@ class PredictedRun:
     measured: Floats
     peak: float
     energy: float
+    distance: Distance = AT_TESTS
 
     @classmethod
-    def of(cls, run: Run, predicted: Floats, velocity: Floats) -> PredictedRun:
+    def of(cls, run: Run, predicted: Floats, velocity: Floats, distance: Distance = AT_TESTS) -> PredictedRun:
         """From the prediction (N,) [N] along the whole run; raises E_CLOCK as `session_of`."""
         at = np.flatnonzero(run.in_window)
         measured, force, time, v = run.force[at], predicted[at], run.time[at], velocity[at]
@@ -68,6 +73,7 @@ class PredictedRun:
             measured[::step],
             peak_force(measured) / max(peak_force(force), 1e-300),
             dissipated_power(measured, v, time) / power if power else np.inf,
+            distance,
         )
 
     @classmethod
@@ -81,6 +87,7 @@ class PredictedRun:
             np.concatenate([part.measured[thin] for part in parts]),
             float(np.mean([part.peak for part in parts])),
             float(np.mean([part.energy for part in parts])),
+            parts[0].distance,
         )
 
     @property
@@ -143,6 +150,64 @@ def model_error(runs: Sequence[PredictedRun]) -> ModelError:
         return _NORMAL_MEDIAN * float(np.median(np.abs(values)))
 
     return ModelError(float(np.sqrt(np.mean(rests))), root(peaks), root(energies), spread(gains), spread(offsets))
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Standard deviations by which the error of the form grows with the distance from the tests.
+
+    Attributes
+    ----------
+    force, peak, energy : (float, float, float)
+        Per unit of `Distance.between`, `beyond` and `motion`: of the force over half its peak-to-peak value, of the
+        peak force and of the dissipated energy, relative.
+    """
+
+    __pydantic_config__: ClassVar = {"extra": "forbid", "allow_inf_nan": False}
+
+    force: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    peak: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    energy: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def variance(self, quantity: Quantity, distance: Distance) -> float:
+        """Relative variance that a distance adds."""
+        return float(np.square(getattr(self, quantity)) @ distance.squares)
+
+    @classmethod
+    def of(cls, runs: Sequence[PredictedRun], at_tests: ModelError) -> Growth:
+        """Least squares of the squared errors in excess of those at the tests, by the squared distances.
+
+        Parameters
+        ----------
+        runs : sequence of PredictedRun
+            Predicted by models identified without a condition, a current, or the fastest motions.
+        at_tests : ModelError
+        """
+        from scipy.optimize import nnls
+
+        away = [run for run in runs if run.distance.squares.any()]
+        if not away:
+            return cls()
+        table = np.array([run.distance.squares for run in away])
+        size = np.sqrt(np.mean(table**2, axis=0))
+        size[size == 0] = 1.0
+        excess = np.array([_squared_errors(run) - _expected(run, at_tests) for run in away])
+        found = [np.sqrt(nnls(table / size, np.maximum(column, 0.0))[0] / size) for column in excess.T]
+        return cls(*(tuple(np.minimum(value, _MAX_GROWTH).tolist()) for value in found))
+
+
+def _squared_errors(run: PredictedRun) -> Floats:
+    """(3,) squared relative errors of the force, the peak and the energy; what is not finite counts as one."""
+    force = float(np.mean((run.measured - run.predicted) ** 2)) / run.half**2
+    found = np.square([np.sqrt(force), run.peak - 1, run.energy - 1])
+    return np.where(np.isfinite(found), found, 1.0)
+
+
+def _expected(run: PredictedRun, at_tests: ModelError) -> Floats:
+    """(3,) their expectation at the tests."""
+    gain = at_tests.gain**2
+    moved = gain * float(np.mean(run.predicted**2)) / run.half**2 + (at_tests.offset / run.half) ** 2
+    return np.array([moved + at_tests.force**2, gain + at_tests.peak**2, gain + at_tests.energy**2])
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mrdamper.dampers.calibration import Calibration
+from mrdamper.dampers.calibration import Calibration, Growth
 from mrdamper.dampers.sessions import Sessions
 from mrdamper.data import Floats
 from mrdamper.errors import InputError
@@ -69,6 +69,8 @@ class Certainty:
         peak-to-peak value, of the peak force and of the dissipated energy, relative.
     left_out : int
         Cross-validated runs behind them; zero where the residuals of the fit stand in.
+    growth : Growth
+        Of the model's error with the distance from the tests.
     calibration : Calibration or None
         Of prediction intervals, on cross-validated runs.
     sessions : Sessions or None
@@ -102,6 +104,7 @@ class Certainty:
     effective: Mapping[str, float] = field(default_factory=dict)
     sessions: Sessions | None = None
     calibration: Calibration | None = None
+    growth: Growth = field(default_factory=Growth)
 
     @property
     def of_sessions(self) -> bool:

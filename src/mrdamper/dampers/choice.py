@@ -1,4 +1,4 @@
-"""Which terms of a joint model the tests show: chosen by what is predicted when it was left out.
+"""Terms of a joint model that the tests show, chosen by what is predicted when it was left out.
 
 Terms are tried on the linearisation of one fit: leaving out a condition, a current or a
 session, with a term or without it, is then linear algebra on a few thousand rows, and only the
@@ -14,19 +14,19 @@ from typing import Literal
 import numpy as np
 
 from mrdamper.dampers.coil import Coil
+from mrdamper.dampers.fold_fits import FoldFits
 from mrdamper.dampers.joint import FALL, RISE, JointFit, JointProblem, Valley
 from mrdamper.data import SESSIONS_NEEDED, Floats, Run, same_condition, session_of
 from mrdamper.errors import InputError
+from mrdamper.statistics.functions.selection import Errors, smaller_wins
 from mrdamper.statistics.linear import on_one_blas_thread, solve_linear
 
 _ROUGHLY = 1e-4  # relative gain of a step that is enough to tell forms apart
-_WORTH = 0.985  # a term must lower the left-out error to this share of it
-_HARM = 1.01  # and raise it by no more in any way of leaving out
 _NO_PLAY = 1e-2  # seat longer than any play: none is left [m]
 _BLOCK = 12.0  # cycles of a record that is no sine that are left out together
 _LEVEL = 5e-3  # currents closer than this share of the largest are one level
 MODEL = "play-bypass"
-_FREE = ("leak", "cq", "qb")  # presets free from the first fit on: without them others make up for what they do
+SEARCHED = ("leak", "cq", "qb")  # presets free from the first fit on: without them others make up for what they do
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ def identify_jointly(
     laws = () if fixed else _level_laws(problem)
     progress("one model, steady ends first", 0.0)
     ends = [part.steady_end() for part in problem.parts]
-    short = JointProblem(runs, MODEL, fixed, free=(*_FREE, *(_LAW if laws else ())), parts=ends)
+    short = JointProblem(runs, MODEL, fixed, free=(*SEARCHED, *(_LAW if laws else ())), parts=ends)
     fit = short.search(rounds=2, most_steps=15, settled=_ROUGHLY)
     short, fit, tried = _lost_motion(short, fit)
     second = fit.second
@@ -132,7 +132,7 @@ def identify_jointly(
     law, fit, more, current = _level_law(short, fit, laws)
     tried = (*tried, *more)
     progress("whole records", 0.5)
-    problem = problem.with_free((*_FREE, *law), short.fixed)
+    problem = problem.with_free((*SEARCHED, *law), short.fixed)
     fit = problem.fit(start=problem.from_point(fit), rounds=2, most_steps=8, settled=_ROUGHLY / 10)
     progress("which terms the tests show", 0.8)
     evidence = Evidence.of(problem, fit)
@@ -150,12 +150,14 @@ def identify_jointly(
         final = JointProblem(runs, MODEL, fixed, free=final.free, coil=coil, parts=final.parts)
         found = final.fit(start=final.from_point(found), rounds=1, settled=_ROUGHLY / 10)
     left_out, before = (Evidence.of(p, f).everything() for p, f in ((final, found), (problem, fit)))
-    if _better(before, left_out):  # what one step promised, the search did not keep: terms earn their place here too
+    if not smaller_wins(
+        left_out, before
+    ):  # what one step promised, the search did not keep: terms earn their place here too
         final, found = problem, fit
     found = final.fit(start=found.point, rounds=1, settled=_ROUGHLY / 10, to_the_last_digit=True)
     progress("one model for all runs", 1.0)
     left_out = Evidence.of(final, found).everything()
-    left_out = {**left_out, **current, **Evidence.of(final, found, _by_session).everything()}
+    left_out = _means({**left_out, **current, **Evidence.of(final, found, _by_session).everything()})
     tried = (*tried, *more)
     kept = "; ".join(t.term for t in tried if t.kept)
     about = {**found.damper.provenance, "terms": kept or "none beyond the plain form"}
@@ -171,8 +173,8 @@ def _lost_motion(problem: JointProblem, fit: JointFit) -> tuple[JointProblem, Jo
     fits = [without.fit(start=start, rounds=1, most_steps=10, settled=_ROUGHLY) for start in starts]
     found = min(fits, key=lambda each: float(np.sum(each.nrmse_pp)))
     now, scores = (Evidence.of(p, f).everything() for p, f in ((problem, fit), (without, found)))
-    kept = _better(now, scores)
-    said = Tried("lost motion after a reversal", kept, scores if kept else now, now if kept else scores)
+    kept = not smaller_wins(scores, now)
+    said = _tried("lost motion after a reversal", kept, now, scores)
     if kept:
         return problem, fit, (said,)
     return without, replace(found, second=Valley.beside(found, [fit])), (said,)
@@ -190,39 +192,43 @@ def _absent(problem: JointProblem, fit: JointFit) -> tuple[Coil | Literal["deter
 
 
 def _level_laws(problem: JointProblem) -> tuple[Term, ...]:
-    """Forms of the level law that the currents of the tests can determine, the shortest first."""
-    if any(part.changes for part in problem.parts) or len(levels_of(problem)) > 3:
-        return LEVEL_LAWS[0], LEVEL_LAWS[-1]
-    return LEVEL_LAWS[:2] if len(levels_of(problem)) > 2 else ()
+    """Forms of the level law beyond a straight line that the currents of the tests determine, the shortest first.
+
+    A law has a parameter fewer than there are levels; a current that changes passes through all.
+    """
+    if any(part.changes for part in problem.parts) or len(levels_of(problem)) > 4:
+        return LEVEL_LAWS
+    return LEVEL_LAWS[:2] if len(levels_of(problem)) > 3 else ()
 
 
 def _level_law(
     longest: JointProblem, fit: JointFit, forms: Sequence[Term]
-) -> tuple[tuple[str, ...], JointFit, tuple[Tried, ...], dict[str, float]]:
+) -> tuple[tuple[str, ...], JointFit, tuple[Tried, ...], dict[str, Floats]]:
     """Form of the yield force over current that predicts what is left out, the shortest first.
 
-    Currents are left out where there are inner ones: one step does not carry a form from current
-    to current, so these are refitted. The search began with every parameter of the law, for the
-    others make up for a form that is too short.
+    Inner currents are left out where there are some: one step does not carry a form from current to current, so these
+    are fitted, from starts that never saw them. The search began with every parameter of the law, for the others make
+    up for a form that is too short.
     """
-    levels = levels_of(longest)
+    levels = levels_of(longest)[1:-1]
+    without = FoldFits(longest, levels)
+    starts = [without.refit([i for i in range(len(longest.parts)) if i not in level]) for level in levels]
     tried: list[Tried] = []
-    best: tuple[tuple[str, ...], JointFit, Mapping[str, float]] | None = None
+    best: tuple[tuple[str, ...], JointFit, Errors] | None = None
     for term in (None, *forms):
         form = term.names if term else ()
         problem = longest.with_free([n for n in longest.free if n not in _LAW or n in form])
         found = fit
         if set(problem.free) != set(longest.free):
             found = problem.fit(start=problem.from_point(fit), rounds=1, most_steps=10, settled=_ROUGHLY)
-        scores: Mapping[str, float] = Evidence.of(problem, found).everything()
-        if len(levels) > 2:
-            # Two levels that are left determine no form with a parameter more: conditions have a say.
-            scores = {**(scores if len(levels) == 3 else {}), "current": _left_out_current(problem, found, levels)}
+        scores: Errors = Evidence.of(problem, found).everything()
+        if levels:
+            scores = {**scores, "current": _left_out_current(problem, starts, levels)}
         if term is None or best is None:
             best = form, found, scores
             continue
-        kept = _better(scores, best[2])
-        tried.append(Tried(term.title, kept, best[2] if kept else scores, scores if kept else best[2]))
+        kept = not smaller_wins(best[2], scores)
+        tried.append(_tried(term.title, kept, scores, best[2]))
         if kept:
             best = form, found, scores
     assert best is not None
@@ -230,14 +236,14 @@ def _level_law(
     return best[0], best[1], tuple(tried), current
 
 
-def _left_out_current(problem: JointProblem, fit: JointFit, levels: Sequence[Sequence[int]]) -> float:
-    """Mean nrmse_pp of the runs at inner currents, each level predicted by a fit without it."""
-    errors = []
-    for level in levels[1:-1]:
+def _left_out_current(problem: JointProblem, starts: Sequence[JointFit], levels: Sequence[Sequence[int]]) -> Floats:
+    """Errors nrmse_pp of the runs at some currents, each level predicted by a fit without it begun from its start."""
+    errors: list[Floats] = []
+    for level, start in zip(levels, starts, strict=True):
         rest = [i for i in range(len(problem.parts)) if i not in level]
-        without = problem.refit(fit, rest, _ROUGHLY)
-        errors += problem.errors(without, level).tolist()
-    return float(np.mean(errors))
+        without = problem.fit(rest, problem.from_point(start), rounds=1, most_steps=8, settled=_ROUGHLY)
+        errors.append(problem.errors(without, level))
+    return np.concatenate(errors)
 
 
 def levels_of(problem: JointProblem) -> list[list[int]]:
@@ -302,12 +308,12 @@ class Evidence:
 
         return cls(names, values, neutral, known.residual, known.jacobian, rows, error)
 
-    def everything(self) -> dict[str, float]:
-        """Mean left-out errors with all parameters."""
+    def everything(self) -> dict[str, Floats]:
+        """Left-out errors with all parameters."""
         return self.scores(frozenset(self.names))
 
-    def scores(self, active: frozenset[str]) -> dict[str, float]:
-        """Mean left-out error by what is left out, with the other parameters neutral."""
+    def scores(self, active: frozenset[str]) -> dict[str, Floats]:
+        """Left-out error of every group by what is left out, with the other parameters neutral."""
         on = np.array([n in active or n.startswith("coil.") for n in self.names])
         shift = np.where(on, 0.0, self.neutral - self.values)
         base = self.residual + self.jacobian @ shift
@@ -319,7 +325,7 @@ class Evidence:
                 J = self.jacobian[np.ix_(group, on)]
                 step = _damped(normal - J.T @ J, -(right - J.T @ base[group]))
                 errors.append(self.error_of(base[group] + J @ step, group))
-            found[what] = float(np.mean(errors))
+            found[what] = np.array(errors)
         return found
 
     def error_of(self, weighted: Floats, group: np.ndarray) -> float:
@@ -335,8 +341,8 @@ class Evidence:
         for term in removable:
             if set(term.names) <= active:
                 without = self.scores(active - set(term.names))
-                keep = _better(now, without)
-                tried.append(Tried(term.title, keep, without if keep else now, now if keep else without))
+                keep = not smaller_wins(without, now)
+                tried.append(_tried(term.title, keep, now, without))
                 if not keep:
                     active, now = active - set(term.names), without
         self.active = active
@@ -363,12 +369,13 @@ def _damped(normal: Floats, right: Floats) -> Floats:
     return np.linalg.solve(stiff, right / scale) / scale
 
 
-def _total(scores: Mapping[str, float], before: Mapping[str, float]) -> float:
-    return float(np.mean([scores[what] / before[what] for what in scores])) if scores else 1.0
+def _tried(title: str, kept: bool, larger: Errors, smaller: Errors) -> Tried:
+    """Evidence on a term from the left-out errors of the model with it and of that without it."""
+    return Tried(title, kept, _means(smaller if kept else larger), _means(larger if kept else smaller))
 
 
-def _better(scores: Mapping[str, float], before: Mapping[str, float]) -> bool:
-    return _total(scores, before) < _WORTH and all(scores[w] < _HARM * before[w] for w in scores)
+def _means(errors: Errors) -> dict[str, float]:
+    return {kind: float(np.mean(values)) for kind, values in errors.items()}
 
 
 def _by_condition(problem: JointProblem, owner: np.ndarray) -> dict[str, list[np.ndarray]]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.calibration import Calibration, PredictedRun, Scored, model_error
+from mrdamper.dampers.calibration import QUANTITIES, Calibration, Growth, PredictedRun, Scored, model_error
 from mrdamper.dampers.certainty import Certainty, FittedParameter
 from mrdamper.dampers.random_effects import Effects, GainsAndOffsets
 from mrdamper.dampers.run_residuals import RunResiduals, normal_matrix
@@ -29,6 +29,8 @@ def certain(
     cross_validated: Sequence[PredictedRun] = (),
     held: Collection[str] = (),
     *,
+    away: Sequence[PredictedRun] = (),
+    other_sessions: Sequence[PredictedRun] = (),
     bounded: bool = True,
 ) -> Damper:
     """Estimate the uncertainty of a damper.
@@ -41,6 +43,11 @@ def certain(
     cross_validated : sequence of PredictedRun
         Runs predicted by models identified without their condition: the error of the form itself, and the
         calibration of prediction intervals. Without them the residuals of the runs stand in, uncalibrated.
+    away : sequence of PredictedRun
+        Runs predicted by models identified without their current, or without the fastest motions: how the error grows
+        away from the tests.
+    other_sessions : sequence of PredictedRun
+        Runs predicted by models identified without their session: the scatter between sessions is not below theirs.
     held : collection of str
         Parameters that ended at a limit of what was searched, inside their bounds.
     bounded : bool
@@ -85,7 +92,9 @@ def certain(
         taught=dict(zip([p.run.id for p in parts], _shares(spread.information), strict=True)),
         effective=dict(zip(spread.names, spread.effective.tolist(), strict=True)),
     )  # fmt: skip
-    return replace(damper, certainty=_with_model_error(made, parts, spread.slopes, cross_validated))  # type: ignore[type-var]
+    return replace(
+        damper, certainty=_with_model_error(made, parts, spread.slopes, cross_validated, away, other_sessions)
+    )  # type: ignore[type-var]
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,7 +228,12 @@ def _inside(part: RunResiduals) -> PredictedRun:
 
 
 def _with_model_error(
-    made: Certainty, parts: Sequence[RunResiduals], slopes: Sequence[Floats], cross_validated: Sequence[PredictedRun]
+    made: Certainty,
+    parts: Sequence[RunResiduals],
+    slopes: Sequence[Floats],
+    cross_validated: Sequence[PredictedRun],
+    away: Sequence[PredictedRun],
+    other_sessions: Sequence[PredictedRun],
 ) -> Certainty:
     """Error of the form: what is left after each run's own gain and offset; and the calibration on it."""
     own = {  # mean variance of the force by the parameters, over the square of half the peak-to-peak force
@@ -232,12 +246,16 @@ def _with_model_error(
     made = replace(made, force=error.force, peak=error.peak, energy=error.energy)
     if not cross_validated:
         return made
+    if other_sessions and made.of_sessions:
+        outer = model_error(other_sessions)
+        made = replace(made, gain=max(made.gain, outer.gain), offset=max(made.offset, outer.offset))
     made = replace(
         made,
         left_out=len(cross_validated),
         run_gain=float(np.sqrt(max(error.gain**2 - made.gain**2, 0.0))),
         run_offset=float(np.sqrt(max(error.offset**2 - made.offset**2, 0.0))),
         run_dof=max(len(cross_validated) - 1.0, 1.0),
+        growth=Growth.of([*cross_validated, *away], error),
     )
     usual = float(np.median(list(own.values())))
     scores = []
@@ -245,7 +263,8 @@ def _with_model_error(
         share = own.get(run.run_id, usual)
         # A fold that saw other runs of the session has taken part of its gain up: the scatter that is left counts.
         gain = error.gain**2
-        force = gain * run.predicted**2 + error.offset**2 + (share + made.force**2) * run.half**2
-        peak, energy = (np.sqrt(share + gain + e**2) for e in (made.peak, made.energy))
+        grown = {quantity: share + made.growth.variance(quantity, run.distance) for quantity in QUANTITIES}
+        force = gain * run.predicted**2 + error.offset**2 + (grown["force"] + made.force**2) * run.half**2
+        peak, energy = (np.sqrt(grown[q] + gain + getattr(made, q) ** 2) for q in ("peak", "energy"))
         scores.append(Scored.of(run, np.sqrt(force), float(peak), float(energy)))
     return replace(made, calibration=Calibration.of(cross_validated, scores))

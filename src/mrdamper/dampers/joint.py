@@ -33,9 +33,10 @@ RISE, FALL = "coil.rise_s", "coil.fall_s"  # names of the coil's lags on the sea
 _SETTLED = 1e-6  # relative gain of a step at which the search ends
 _LAGS, _LAG = (1e-4, 0.2), 8e-3  # of a coil's field [s]
 _FEW, _FEW_STEPS = 6, 5  # runs on which starts are tried, and steps from each
-_AGAIN, _AGAIN_STEPS = 5e-4, 6  # relative gain of a step at which a fit without some runs ends, and its steps
+_AGAIN, _AGAIN_STEPS = 5e-4, 15  # relative gain of a step at which a fit without some runs ends, and its steps
 _CLEARLY = 0.85  # share of the first start's cost that another one must come below
 _BETTER = 0.995  # share of the first end's error that another one must come below
+_REMEMBERED = 8  # linearisations
 _OTHER_KNEE = 0.1  # relative difference from which knees are two
 _NEARLY = 1.25  # times the error: a valley that describes the tests nearly as well
 
@@ -282,10 +283,10 @@ class JointProblem:
     @property
     def start(self) -> Floats:
         """(D,) the most promising of the model's starts on the search axes."""
-        return self._promising[0]
+        return self.promising[0]
 
     @cached_property
-    def _promising(self) -> list[Floats]:
+    def promising(self) -> list[Floats]:
         """Points some steps down from the model's starts, the most promising first.
 
         Each length of lost motion has a valley of its own: the best start in each. The first is the
@@ -331,7 +332,7 @@ class JointProblem:
         JointFit
             The best end; the next best of another knee is its `second`.
         """
-        starts = [*self._promising[:2], *([] if start is None else [self._downhill(start).point])]
+        starts = [*self.promising[:2], *([] if start is None else [self._downhill(start).point])]
         ends = [self.fit(start=u, rounds=rounds, most_steps=most_steps, settled=settled) for u in starts]
         best = min(ends, key=lambda end: _BETTER * end.error if end is ends[0] else end.error)
         return replace(best, second=Valley.beside(best, ends))
@@ -429,14 +430,16 @@ class JointProblem:
         return self._search(table, [self.parts[i] for i in rows], point, 1, _AGAIN_STEPS, settled, begin)
 
     def linearised(self, fit: JointFit) -> Linearised:
-        """All runs linearised at a fit, weighted by the errors it left; remembered for the last fit."""
-        if self._linearisation is None or self._linearisation[0] is not fit:
+        """All runs linearised at a fit, weighted by the errors it left; remembered for the last fits."""
+        known = next((made for one, made in self._linearisations if one is fit), None)
+        if known is None:
             table = Table(self, self.parts)
             table.weigh(fit.nrmse_pp)
-            self._linearisation = fit, Linearised(table, fit.point, *table.linearise(fit.point, fit.damper.model))
-        return self._linearisation[1]
+            known = Linearised(table, fit.point, *table.linearise(fit.point, fit.damper.model))
+            self._linearisations = [*self._linearisations[1 - _REMEMBERED :], (fit, known)]
+        return known
 
-    _linearisation: tuple[JointFit, Linearised] | None = None
+    _linearisations: Sequence[tuple[JointFit, Linearised]] = ()
 
     def _damper(self, model: Model, point: Floats, parts: Sequence[Part]) -> JointDamper:
         about = {"runs": str(len(parts)), "fit": "global fit, all runs"}

@@ -17,7 +17,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, 
 
 from mrdamper.dampers import all_kinds
 from mrdamper.dampers.base import Damper, Envelope
-from mrdamper.dampers.calibration import Calibration
+from mrdamper.dampers.calibration import Calibration, Growth
 from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.coil import Coil, Driver
 from mrdamper.dampers.sessions import Sessions
@@ -118,6 +118,7 @@ class _Covariance(_SavedPart):
     sessions: Sessions | None = None  # since 1.4
     runs: _Session | None = None  # since 1.5
     calibration: Calibration | None = None  # since 1.5
+    growth: Growth = Growth()  # since 1.5
 
 
 class _Document(_SavedPart):
@@ -320,6 +321,7 @@ def _describe_certainty(certainty: Certainty | None) -> _Covariance | None:
         sessions=certainty.sessions,
         runs=_Session(gain=certainty.run_gain, offset_N=certainty.run_offset, degrees_of_freedom=certainty.run_dof),
         calibration=certainty.calibration,
+        growth=certainty.growth,
     )
 
 
@@ -347,7 +349,7 @@ def _with_certainty(damper: Damper, saved: _Covariance, where: str) -> Damper:
         saved.parameters, saved.logarithmic, matrix, np.array(saved.degrees_of_freedom), saved.one_sided, saved.unknown,
         session.gain, session.offset_N, session.degrees_of_freedom, runs.gain, runs.offset_N, runs.degrees_of_freedom,
         model.force, model.peak, model.energy, model.left_out, saved.words, saved.taught,
-        saved.effective, saved.sessions, saved.calibration,
+        saved.effective, saved.sessions, saved.calibration, saved.growth,
     )  # fmt: skip
     return replace(damper, certainty=certainty)  # type: ignore[type-var]
 

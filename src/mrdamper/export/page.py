@@ -70,6 +70,7 @@ def _facts(damper: Damper | Model, stepping: Stream, name: str, library: bytes |
         "test": _vectors(stepping),
         "tested": envelope and _tested(envelope),
         "slack": SLACK,
+        "conditions": envelope.conditions if envelope else (),
         "flags": FLAGS,
         "band": stepping.band and asdict(stepping.band),
     }

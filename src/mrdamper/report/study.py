@@ -270,6 +270,7 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
         "tests": _tests(rig),
         "chosen": chosen,
         "candidates": rig.candidates,
+        "folds": rig.folds,
         "floor": float(np.median(floors)) if floors else None,
         "limitations": by_group([*limitations(chosen, rig.loops), Limitation("Prediction", _scatter(rig))]),
         "loops": rig.loops,
@@ -360,7 +361,11 @@ def _scatter(rig: RigStudy) -> str:
 
 def _choice(rig: RigStudy) -> str:
     chosen, others = rig.candidates[0], rig.candidates[1:]
-    reason = "Chosen by the user" if rig.asked_for else "Chosen by leave-one-condition-out cross-validation"
+    reason = (
+        "Chosen by the user"
+        if rig.asked_for
+        else "Chosen by cross-validation over conditions, currents, fastest motions and sessions"
+    )
     text = (
         f"{reason}: {chosen.title}, {chosen.damper.parameter_count} parameters, "
         f"error {100 * chosen.cross_validated.median():.1f} %"
@@ -369,7 +374,9 @@ def _choice(rig: RigStudy) -> str:
         best = min(others, key=lambda other: other.cross_validated.median())
         error = 100 * best.cross_validated.median()
         text += f"; next {best.title}, {best.damper.parameter_count} parameters, {error:.1f} %"
-    return text + ". Within one standard error of the best, the model with the fewest parameters is chosen."
+    titles = {other.recipe.name: other.title for other in others}
+    refused = "".join(f" Not eligible: {titles[name]}, {why}." for name, why in rig.refused.items() if name in titles)
+    return f"{text}. Within one standard error of the best, the model with the fewest parameters is chosen.{refused}"
 
 
 def _tests(rig: RigStudy) -> str:

@@ -1,4 +1,4 @@
-"""What is left out together: the runs of a condition, a stretch of a long record; and scored as whole runs again."""
+"""Cross-validation of a damper by kind of fold: runs that are left out together, scored as whole runs again."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.calibration import PredictedRun
-from mrdamper.data import Run
+from mrdamper.data import SESSIONS_NEEDED, Condition, Run, current_levels, same_condition, same_motion, session_of
+from mrdamper.errors import InputError
 from mrdamper.physics.motion import equivalent_sine
-from mrdamper.study.validation import RunScore, Validation, leave_one_condition_out
+from mrdamper.study.validation import RunScore, Validation, leave_out, score_run
 
+_MOTIONS = 0.05  # frequencies and amplitudes this close are one motion
+_FAST = 0.8  # of the largest peak velocity, from which a motion is among the fastest
 _STRETCH, _STRETCHES = 12, 8  # cycles of a long record that are left out together, at least; stretches at most
 _RECORD = "stretch of"  # note of a stretch: the record it was cut from
 
@@ -29,10 +32,99 @@ def cross_validate(pieces: Sequence[Run], refit: Callable[[Sequence[int]], Dampe
         Makes a damper of the pieces at some indices.
     title : str
     """
+    return _whole_again(leave_out(pieces, condition_folds(pieces), refit, title), pieces)
+
+
+def folds_by_kind(pieces: Sequence[Run]) -> dict[str, list[list[int]]]:
+    """Indices of runs that are left out together, by kind of fold beyond a single condition.
+
+    Parameters
+    ----------
+    pieces : sequence of Run
+        Runs, and stretches of long records.
+
+    Returns
+    -------
+    dict
+        "inner current": every level of sines between others; "edge current": the lowest and the highest; "fastest
+        motions": those whose peak velocity is within a fifth of the largest; "session": every session of several;
+        "other records": everything that is no sine at one current. A kind is absent where it would leave fewer than
+        two levels, two motions or two sessions.
+    """
     motions = [equivalent_sine(piece) for piece in pieces]
-    others = [i for i, piece in enumerate(pieces) if not motions[i].is_sine or piece.current_changes]
-    scored = leave_one_condition_out(pieces, [m.condition for m in motions], refit, title, others)
-    return _whole_again(scored, pieces)
+    sines = [i for i, motion in enumerate(motions) if motion.is_sine and not pieces[i].current_changes]
+    conditions = [motions[i].condition for i in sines]
+    found: dict[str, list[list[int]]] = {}
+    levels = np.array(current_levels([abs(c.current_A) for c in conditions]))
+    by_level = [[sines[k] for k in np.flatnonzero(levels == level)] for level in np.unique(levels)]
+    if len(by_level) > 2:
+        found["inner current"], found["edge current"] = by_level[1:-1], [by_level[0], by_level[-1]]
+    if fastest := _fastest([motions[i].condition for i in sines]):
+        found["fastest motions"] = [[sines[k] for k in fastest]]
+    if sessions := _sessions(pieces):
+        found["session"] = sessions
+    others = [i for i in range(len(pieces)) if i not in set(sines)]
+    if others and len(sines) > 2:
+        found["other records"] = [others]
+    return found
+
+
+def all_folds(pieces: Sequence[Run]) -> list[list[int]]:
+    """Indices left out together in any kind of fold."""
+    return [*condition_folds(pieces), *(group for groups in folds_by_kind(pieces).values() for group in groups)]
+
+
+def condition_folds(pieces: Sequence[Run]) -> list[list[int]]:
+    """Indices of the runs of every condition; records that are no sine at one current are a condition each."""
+    motions = [equivalent_sine(piece) for piece in pieces]
+    sines = [i for i, motion in enumerate(motions) if motion.is_sine and not pieces[i].current_changes]
+    groups = same_condition([motions[i].condition for i in sines])
+    alone = [[i] for i in range(len(pieces)) if i not in set(sines)]
+    return [[sines[k] for k in group] for group in groups] + alone
+
+
+def _fastest(conditions: Sequence[Condition]) -> list[int]:
+    """The sines of the largest peak velocities, those of one motion at least; empty where they leave fewer than two."""
+    groups = same_motion(conditions, _MOTIONS) if conditions else []
+    groups.sort(key=lambda group: -max(conditions[k].peak_velocity for k in group))
+    if len(groups) < 3:
+        return []
+    speeds = [max(conditions[k].peak_velocity for k in group) for group in groups]
+    count = int(np.clip(np.sum(np.array(speeds) >= _FAST * speeds[0]), 1, len(groups) - 2))
+    return [k for group in groups[:count] for k in group]
+
+
+def _sessions(pieces: Sequence[Run]) -> list[list[int]]:
+    """Runs of every session; none where a session is unknown, where there are fewer than three, or one a run."""
+    try:
+        named = [session_of(piece) for piece in pieces]
+    except InputError:
+        return []  # a clock that is no date is refused where sessions are asked for
+    names = sorted({name for name in named if name is not None})
+    if len(names) < SESSIONS_NEEDED or len(names) == len(pieces) or None in named:
+        return []
+    return [[i for i, own in enumerate(named) if own == name] for name in names]
+
+
+def cross_validate_by_kind(
+    pieces: Sequence[Run], refit: Callable[[Sequence[int]], Damper], title: str
+) -> dict[str, Validation]:
+    """Score runs with dampers made without their fold, by kind of fold (`folds_by_kind`); arguments as there.
+
+    Runs of a fold without which no damper can be made are among the refused.
+    """
+    found = {}
+    for kind, groups in folds_by_kind(pieces).items():
+        scored: list[RunScore] = []
+        refused: dict[str, str] = {}
+        for group in groups:
+            try:
+                damper = refit([i for i in range(len(pieces)) if i not in set(group)])
+                scored += [score_run(damper, pieces[i]) for i in group]
+            except InputError as error:
+                refused |= {pieces[i].notes.get(_RECORD, pieces[i].id): str(error) for i in group}
+        found[kind] = replace(_whole_again(Validation(title, tuple(scored)), pieces), refused=refused)
+    return found
 
 
 def stretches(run: Run) -> list[Run]:

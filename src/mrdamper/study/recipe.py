@@ -17,7 +17,8 @@ from typing import ClassVar
 import numpy as np
 
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.choice import identify_jointly
+from mrdamper.dampers.choice import SEARCHED, identify_jointly
+from mrdamper.dampers.fold_fits import FoldFits
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit, fit_modified, fit_modified_jointly
 from mrdamper.dampers.published import Published, all_published
@@ -29,7 +30,7 @@ from mrdamper.identification.methods import values_of_fields
 from mrdamper.models import Scale, all_models, model_type
 from mrdamper.physics.gas_spring import GasSpring
 from mrdamper.physics.motion import analyse_motion
-from mrdamper.study.cross_validation import cross_validate, stretches
+from mrdamper.study.cross_validation import all_folds, cross_validate, cross_validate_by_kind, stretches
 from mrdamper.study.validation import Validation, validate
 
 Progress = Callable[[str, float], None]
@@ -162,6 +163,8 @@ class Scored:
         Train runs; train runs predicted without their condition; held-out runs.
     seconds : float
         Spent on identification and the fit over conditions.
+    by_kind : mapping of str to Validation
+        Train runs predicted without their fold, by kind of fold (`cross_validation.folds_by_kind`).
     spread : mapping of str to (float, float)
         Lowest and highest value of a parameter that holds everywhere, each condition left out in turn.
     """
@@ -175,6 +178,7 @@ class Scored:
     cross_validated: Validation
     validation: Validation
     seconds: float
+    by_kind: Mapping[str, Validation] = field(default_factory=dict)
     spread: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
@@ -203,6 +207,7 @@ def fit_and_score(
     *,
     spent: float = 0.0,
     leave_out: bool = True,
+    kinds: bool = False,
 ) -> Scored:
     """Make a recipe's damper and score it.
 
@@ -219,6 +224,8 @@ def fit_and_score(
         Seconds the identifications took.
     leave_out : bool
         Predict every train run without its condition, too.
+    kinds : bool
+        And without its current, the fastest motions, its session and other records.
 
     Raises
     ------
@@ -249,6 +256,7 @@ def fit_and_score(
         cross_validated=left_out or Validation(title, ()),
         validation=validate(made.damper, held_out),
         seconds=seconds,
+        by_kind=cross_validate_by_kind(pieces, made.refit, title) if kinds else {},
         spread=_spread(without),
     )
 
@@ -265,6 +273,7 @@ def fit_and_score_all(
     progress: Progress = lambda what, share: None,
     *,
     leave_out: bool = True,
+    kinds: bool = False,
     found: IdentificationCache | None = None,
 ) -> tuple[list[Scored], dict[str, str]]:
     """Follow several recipes on one rig; what more than one of them starts from is identified once.
@@ -274,7 +283,8 @@ def fit_and_score_all(
     steps : sequence of (Recipe, train runs)
     held_out : sequence of Run
     progress : callable
-    leave_out : bool
+    leave_out, kinds : bool
+        As `fit_and_score` takes them.
     found : mapping, optional
         Identifications there are already, by basis and run id; added to.
 
@@ -295,7 +305,9 @@ def fit_and_score_all(
             seen = [run for run in runs if analyse_motion(run).is_sine] if recipe.pure else runs
             identifications, spent = identified(recipe.basis, seen, found, lambda what, share: tell(what, 0.5 * share))
             tell("over all conditions", 0.5)
-            scored.append(fit_and_score(recipe, runs, identifications, held_out, spent=spent, leave_out=leave_out))
+            scored.append(
+                fit_and_score(recipe, runs, identifications, held_out, spent=spent, leave_out=leave_out, kinds=kinds)
+            )
         except InputError as error:
             refused[recipe.name] = str(error)
     return scored, refused
@@ -350,9 +362,8 @@ def fit_current_laws(runs: Sequence[Run], identifications: Sequence[Identificati
 def fit_global_model(runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
     """One set of parameters for every condition, of the model that takes the current as an input."""
     choice = identify_jointly(runs)
-    problem, fit = choice.problem, choice.fit
-
-    return FitResult(fit.damper, lambda rows: problem.refit(fit, rows).damper, fit)
+    without = FoldFits(choice.problem, all_folds(runs), SEARCHED)
+    return FitResult(choice.fit.damper, lambda rows: without.refit(rows).damper, choice.fit)
 
 
 def fit_published(cls: Published, runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:

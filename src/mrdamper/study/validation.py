@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from mrdamper.dampers.bands import band
+from mrdamper.dampers.bands import band, session_band
 from mrdamper.dampers.base import Damper, Prediction
 from mrdamper.dampers.calibration import PredictedRun
 from mrdamper.dampers.sessions import KNOWN, UNKNOWN, Expected, Reading, Sessions, When
-from mrdamper.data import Condition, Displayable, Run, same_condition
+from mrdamper.data import Condition, Displayable, Run
 from mrdamper.errors import InputError, RunError, UnknownNameError, checked, require
 from mrdamper.statistics.metrics import Scores, dissipated_power, peak_force, score
 
@@ -181,7 +181,8 @@ def score_run(damper: Damper, run: Run, known: Sessions | None = None) -> RunSco
     prediction = damper.predict_run(run)
     inside = run.in_window
     reading = Reading.of(run.force[inside], prediction.force[inside])
-    beside = PredictedRun.of(run, prediction.force, prediction.motion.velocity)
+    away = prediction.distance(damper.envelope)
+    beside = PredictedRun.of(run, prediction.force, prediction.motion.velocity, away)
     expected = known.expected(When.of(run), without=run.id) if known else None
     if expected is not None:
         prediction = expected.corrected(prediction)
@@ -212,7 +213,10 @@ def peak_band(damper: Damper, run: Run, level: float = 0.9, expected: Expected |
     The ends are missing where the damper does not know how sure it is.
     """
     prediction, inside = damper.predict_run(run), run.in_window
-    known = (expected.band if expected else band)(damper, prediction, level, inside)
+    if expected is None:
+        known = band(damper, prediction, level, inside)
+    else:
+        known = session_band(expected, damper, prediction, level, inside)
     prediction = expected.corrected(prediction) if expected else prediction
     velocity, time = prediction.motion.velocity[inside], run.time[inside]
     cycles = max(prediction.condition.frequency_Hz, 1e-9)
@@ -226,35 +230,26 @@ def peak_band(damper: Damper, run: Run, level: float = 0.9, expected: Expected |
     return {**row, "energy_low_J": low, "energy_high_J": high}
 
 
-def leave_one_condition_out(
-    runs: Sequence[Run],
-    conditions: Sequence[Condition],
-    fit: Callable[[Sequence[int]], Damper],
-    title: str,
-    alone: Sequence[int] = (),
+def leave_out(
+    runs: Sequence[Run], folds: Iterable[Sequence[int]], fit: Callable[[Sequence[int]], Damper], title: str
 ) -> Validation:
-    """Score every run with a damper identified without any run at its condition.
+    """Score every run with a damper identified without its fold.
 
     Parameters
     ----------
     runs : sequence of Run, length N
-    conditions : sequence of Condition, length N
-        Measured conditions of the runs.
+    folds : iterable of sequence of int
+        Indices of the runs left out together.
     fit : callable
         Makes a damper from the runs at the given indices.
     title : str
-    alone : sequence of int
-        Runs that are a condition each, whatever sine they amount to: records that are no sine.
     """
     scored: dict[int, RunScore] = {}
-    sines = [i for i in range(len(runs)) if i not in set(alone)]
-    groups = [[sines[k] for k in group] for group in same_condition([conditions[i] for i in sines])]
-    for group in [*groups, *([i] for i in alone)]:
-        rest = [i for i in range(len(runs)) if i not in group]
-        if not rest:
-            continue
-        damper = fit(rest)
-        scored |= {i: score_run(damper, runs[i]) for i in group}
+    for fold in folds:
+        rest = [i for i in range(len(runs)) if i not in set(fold)]
+        if rest:
+            damper = fit(rest)
+            scored |= {i: score_run(damper, runs[i]) for i in fold}
     return Validation(title, tuple(scored[i] for i in sorted(scored)))
 
 

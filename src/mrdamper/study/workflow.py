@@ -31,6 +31,7 @@ from mrdamper.physics.motion import analyse_motion, equivalent_sine
 from mrdamper.rig_files.quality.table import judged
 from mrdamper.statistics.functions.selection import mean_error, smaller_wins
 from mrdamper.study.contradictions import Contradiction, find_contradictions
+from mrdamper.study.dissipation import gains_energy
 from mrdamper.study.parallel import HERE, Processes
 from mrdamper.study.recipe import (
     JOINTLY,
@@ -45,7 +46,7 @@ from mrdamper.study.recipe import (
     play_and_bypass,
     study_methods,
 )
-from mrdamper.study.validation import Validation, validate
+from mrdamper.study.validation import RunScore, Validation, validate
 
 _SAMPLES_A_CYCLE = 8  # below, neither the velocity nor a loop can be told
 _DISTORTED = 0.35  # harmonics over the fundamental: a triangle has 0.12, a square wave 0.48
@@ -56,6 +57,8 @@ _SIZES = (
     ("stroke", "m", 300, lambda run: float(np.ptp(run.displacement))),
     ("current", "A", 12, lambda run: float(np.median(np.abs(run.current)))),
 )
+CONDITION = "condition"  # kind of fold: the runs of one condition, a stretch of another record
+AWAY = ("inner current", "edge current", "fastest motions")  # kinds that tell how errors grow away from the tests
 STUDIED = ("bouc-wen", "bingham")  # the model of the method, and the one everybody compares with
 
 
@@ -71,10 +74,10 @@ class RigStudy(Displayable):
         Of every sine run.
     ranges : tuple of DynamicRange
     candidates : tuple of Scored
-        The chosen one first, the others by their error on left-out conditions.
+        The chosen one first, the others by their mean error over the kinds of fold.
     not_identified : mapping of run id to the reason
     refused : mapping of recipe name to the reason
-        Recipes whose damper could not be determined from this rig's data.
+        Recipes whose damper could not be determined from this rig's data, or whose loops gain energy somewhere.
     asked_for : bool
         The user named the model; the evidence did not choose it.
     session_known : float or str
@@ -115,8 +118,16 @@ class RigStudy(Displayable):
         }
 
     @property
+    def folds(self) -> Sequence[Mapping[str, tuple[float, float]]]:
+        """Median and largest cross-validated nrmse_pp of every candidate, by kind of fold."""
+        return [
+            {kind: (float(np.median(errors)), float(np.max(errors))) for kind, errors in each.items()}
+            for each in errors_by_kind(self.candidates)
+        ]
+
+    @property
     def chosen(self) -> Scored:
-        """The candidate with the fewest numbers among those that predict left-out conditions about best."""
+        """The candidate with the fewest parameters among those of about the smallest error over all kinds of fold."""
         return self.candidates[0]
 
     @property
@@ -315,6 +326,7 @@ def study_rig(
         _steps(train, everything, method, model if method is None else None),
         [run for run in trusted if run.split == "validate"],
         lambda what, share: progress(f"{rig or 'rig'}: {what}", share),
+        kinds=True,
     )
     candidates = [judged_on_all(c, everything) for c in candidates]
     eligible = [c for c in candidates if model in (None, c.recipe.model)]
@@ -325,16 +337,25 @@ def study_rig(
             where=f"rig {rig or dataset.name}",
             mend="test more conditions, or leave this rig out of the dataset",
         )
-    common = set.intersection(*({run.run_id for run in c.cross_validated.runs} for c in candidates))
-    errors = {id(c): _cross_validated(c, common, {run.id for run in train}) for c in candidates}
+    errors = dict(zip(map(id, candidates), errors_by_kind(candidates), strict=True))
     candidates.sort(key=lambda c: mean_error(errors[id(c)]))
+    unphysical = {c.recipe.name: why for c in candidates if (why := gains_energy(c.damper))}
+    eligible = [c for c in eligible if c.recipe.name not in unphysical] or eligible
+    impossible |= unphysical
     best = next(c for c in candidates if c in eligible)
     smaller = sorted(eligible, key=lambda c: c.damper.parameter_count)
     chosen = next(c for c in smaller if c is best or smaller_wins(errors[id(c)], errors[id(best)]))
     candidates.sort(key=lambda c: c is not chosen)
     held = chosen.fit.at_bounds if isinstance(chosen.fit, JointFit | ModifiedFit) else ()
     beside = [score.predicted for score in chosen.cross_validated.runs if score.predicted is not None]
-    chosen = replace(chosen, damper=certain(chosen.damper, train if chosen.recipe.basis else everything, beside, held))
+    away, other_sessions = (
+        [score.predicted for kind in kinds for score in _runs(chosen, kind) if score.predicted is not None]
+        for kinds in (AWAY, ("session",))
+    )
+    taken = train if chosen.recipe.basis else everything
+    chosen = replace(
+        chosen, damper=certain(chosen.damper, taken, beside, held, away=away, other_sessions=other_sessions)
+    )
     candidates[0], known = _with_sessions(chosen, dataset)
     return RigStudy(
         rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), refused, impossible, model is not None, known,
@@ -371,12 +392,33 @@ def judged_on_all(candidate: Scored, everything: Sequence[Run]) -> Scored:
     )
 
 
-def _cross_validated(candidate: Scored, common: Collection[str], sines: Collection[str]) -> dict[str, Floats]:
-    """Cross-validated errors of runs that all candidates have, by kind of run, in the order of their names."""
-    scores = {run.run_id: abs(run.scores.nrmse_pp) for run in candidate.cross_validated.runs if run.run_id in common}
-    kinds = {"sines": sines, "other records": scores.keys() - set(sines)}
-    found = {kind: np.array([scores[name] for name in sorted(scores.keys() & set(ids))]) for kind, ids in kinds.items()}
-    return {kind: errors for kind, errors in found.items() if errors.size}
+def errors_by_kind(candidates: Sequence[Scored]) -> list[dict[str, Floats]]:
+    """Cross-validated errors of the runs that all candidates have, by kind of fold, in the order of their names.
+
+    A run that a candidate cannot take was left out of it in every way; one that no damper could be made without
+    counts as infinitely wrong.
+    """
+    found: list[dict[str, Floats]] = [{} for _ in candidates]
+    for kind in dict.fromkeys(name for c in candidates for name in (CONDITION, *c.by_kind)):
+        errors = []
+        for candidate in candidates:
+            own = {run.run_id: abs(run.scores.nrmse_pp) for run in candidate.cross_validated.runs}
+            left_out = {run.run_id: abs(run.scores.nrmse_pp) for run in _runs(candidate, kind)}
+            refused = candidate.by_kind[kind].refused if kind in candidate.by_kind else {}
+            errors.append({**own, **left_out, **dict.fromkeys(refused, np.inf)})
+        left_out = set().union(*({run.run_id for run in _runs(c, kind)} for c in candidates))
+        common = sorted(left_out.intersection(*errors))
+        for errors_of, row in zip(found, errors, strict=True):
+            if common:
+                errors_of[kind] = np.array([row[name] for name in common])
+    return found
+
+
+def _runs(candidate: Scored, kind: str) -> Sequence[RunScore]:
+    """Scores of runs whose fold of a kind was left out."""
+    if kind == CONDITION:
+        return candidate.cross_validated.runs
+    return candidate.by_kind[kind].runs if kind in candidate.by_kind else ()
 
 
 def usable(runs: Iterable[Run], clipped: bool = False) -> tuple[list[Run], dict[str, str]]:

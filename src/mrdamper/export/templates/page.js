@@ -103,9 +103,16 @@
   const number = (v, digits = 3) => (Number.isFinite(v) ? Number(v.toPrecision(digits)).toLocaleString("en", { maximumSignificantDigits: digits }).replace("-", "−") : "–");
 
   // Half the width of the band around each force of a loop.
-  function widths(force) {
-    const [low, high] = extremes(force), { gain, offset_N, of_peak } = facts.band;
-    return force.map((F) => Math.hypot(gain * F, offset_N, of_peak * (high - low) / 2));
+  function widths(force, known) {
+    const [low, high] = extremes(force), { gain, offset_N, of_peak, of_peak_untested } = facts.band;
+    return force.map((F) => Math.hypot(gain * F, offset_N, (known ? of_peak : of_peak_untested) * (high - low) / 2));
+  }
+
+  // Whether a sine is one of the tested conditions: sessions repeat a level to some per cent.
+  function wasTested(current, frequency, amplitude) {
+    const near = (one, other, share) => Math.abs(one - other) <= share * Math.abs(other);
+    const largest = Math.max(...facts.conditions.map(([I]) => I));
+    return facts.conditions.some(([I, f, A]) => Math.abs(current - I) <= 0.02 * largest && near(frequency, f, 0.05) && near(amplitude, A, 0.05));
   }
 
   // Which quantities of a sine lie outside the tests, with what was tested.
@@ -215,7 +222,7 @@
     if (!found) return say("outside", "The model has no force at this condition: come nearer to the tests.", "bad");
     shown = found;
     const [low, high] = extremes(found.force), kind = away.length ? "outside" : "";
-    const spread = facts.band && !away.length ? widths(found.force) : null;  // nothing is known of it where nobody measured
+    const spread = facts.band && !away.length ? widths(found.force, wasTested(current, frequency, amplitude)) : null;  // nothing is known of it where nobody measured
     const within = (peak) => `${number(peak)}${spread ? ` ± ${number(spread[found.force.indexOf(peak)], 2)}` : ""} N`;
     show([
       ["Peak force, extension", within(high)], ["Peak force, compression", within(low)],

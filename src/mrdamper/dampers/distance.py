@@ -1,0 +1,81 @@
+"""Distance of a prediction from the tests a damper was identified from.
+
+Three numbers, none of them with a unit: how far a current lies between two tested ones, how far beyond them, and how
+far a motion lies outside the convex hull of the tested motions in log f and log A, where lines of equal peak velocity
+are straight. They are zero at the tests, and the error of a form of model grows with each (`calibration.Growth`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrdamper.data import Condition, Floats, current_levels
+from mrdamper.statistics.functions.motion_hull import MotionHull
+
+_SLACK = 0.02  # of the largest current: sessions repeat a level to some per cent
+_MOST = 400  # samples of a current that are looked at
+
+
+@dataclass(frozen=True)
+class Distance:
+    """Distance from the tests, by what is away from them.
+
+    Attributes
+    ----------
+    between : float
+        Product of the distances of a current from its two tested neighbours, over the square of the largest tested
+        current: the error of interpolation grows with it.
+    beyond : float
+        Distance of a current from the tested ones, over the largest.
+    motion : float
+        Euclidean distance from the hull of tested motions in ln f and ln A.
+    """
+
+    between: float = 0.0
+    beyond: float = 0.0
+    motion: float = 0.0
+
+    @property
+    def squares(self) -> Floats:
+        """(3,) squared distances."""
+        return np.square([self.between, self.beyond, self.motion])
+
+
+AT_TESTS = Distance()
+
+
+def distance_from(
+    tested: Sequence[Condition], at: Condition, current: Floats, *, any_current: bool = False
+) -> Distance:
+    """Distance of a condition and the currents along its motion from tested conditions.
+
+    Parameters
+    ----------
+    tested : sequence of Condition
+        Not empty.
+    at : Condition
+        That the motion amounts to.
+    current : (N,) array
+        [A]
+    any_current : bool
+        The current changed in tests, so that none between the levels is far from them.
+    """
+    levels = np.unique(current_levels([abs(c.current_A) for c in tested]))
+    between, beyond = _current_distances(np.abs(current[:: max(1, current.size // _MOST)]), levels)
+    frequency, amplitude = MotionHull.of(tested).nearest(at.frequency_Hz, at.amplitude_m)
+    motion = np.hypot(np.log(at.frequency_Hz / frequency), np.log(at.amplitude_m / amplitude))
+    gaps = 0.0 if any_current else float(np.sqrt(np.mean(between**2)))
+    return Distance(gaps, float(np.sqrt(np.mean(beyond**2))), float(motion))
+
+
+def _current_distances(current: Floats, levels: Floats) -> tuple[Floats, Floats]:
+    """Product of distances to the neighbouring levels, and distance beyond the outer ones; over the largest level."""
+    largest = float(levels[-1]) or 1.0
+    after = np.clip(np.searchsorted(levels, current), 1, max(levels.size - 1, 1))
+    lower, upper = levels[after - 1], levels[np.minimum(after, levels.size - 1)]
+    between = np.maximum(current - lower, 0) * np.maximum(upper - current, 0) / largest**2
+    beyond = np.maximum(np.maximum(levels[0] - current, current - levels[-1]) / largest - _SLACK, 0)
+    return between, beyond

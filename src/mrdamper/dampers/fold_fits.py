@@ -1,0 +1,85 @@
+"""Fits of one model to parts of the runs, each begun from starts that never saw what it leaves out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+from mrdamper.dampers.joint import JointFit, JointProblem, Valley
+
+_MOST_LEFT_OUT = 0.5  # share of the runs that a search may be without
+_STARTS = 3  # of the model, from which a search goes
+_ROUNDS, _STEPS, _ROUGHLY = 1, 10, 1e-4  # of a search on steady ends, and relative gain of a step at which it ends
+_SETTLED = 1e-4  # relative gain of a step at which a fit without a fold ends
+
+
+class FoldFits:
+    """Fits without folds of runs.
+
+    Folds are gathered into a few blocks. For each block one search goes from the model's own starts over the steady
+    ends of the runs outside it; the fits without the folds of the block begin where it ended.
+
+    Parameters
+    ----------
+    problem : JointProblem
+        Of all runs.
+    folds : iterable of sequence of int
+        Indices of runs that will be left out together.
+    searched : sequence of str
+        Presets that are free in the search as well, as in that over all runs: without them others make up for what
+        they do, and the search ends in another valley.
+    """
+
+    def __init__(self, problem: JointProblem, folds: Iterable[Sequence[int]], searched: Sequence[str] = ()):
+        self.problem, self.searched = problem, tuple(searched)
+        self.blocks = _blocks(folds, len(problem.parts))
+        self._starts: dict[frozenset[int], list[JointFit]] = {}
+
+    def refit(self, rows: Sequence[int]) -> JointFit:
+        """Fit the runs at some indices: of the ends from all starts the one that describes these runs best."""
+        left = frozenset(range(len(self.problem.parts))) - set(rows)
+        block = next((block for block in self.blocks if left <= block), left)
+        if block not in self._starts:
+            self._starts[block] = self._search(block)
+        return min((self.problem.refit(start, rows, _SETTLED) for start in self._starts[block]), key=lambda f: f.error)
+
+    def _search(self, block: frozenset[int]) -> list[JointFit]:
+        """Ends of the search without a block: the best, and the best of other knees that come near it."""
+        whole = self.problem
+        rows = [i for i in range(len(whole.parts)) if i not in block]
+        short = JointProblem(
+            [whole.runs[i] for i in rows],
+            whole.model_type,
+            {name: value for name, value in whole.fixed.items() if name not in self.searched},
+            free=(*whole.free, *self.searched),
+            coil=whole.given_coil,
+            parts=[whole.parts[i].steady_end() for i in rows],
+        )
+        ends = [
+            short.fit(start=start, rounds=_ROUNDS, most_steps=_STEPS, settled=_ROUGHLY)
+            for start in short.promising[:_STARTS]
+        ]
+        ends.sort(key=lambda end: end.error)
+        kept = [ends[0], *(end for end in ends[1:] if Valley.beside(ends[0], [end]))]
+        return [self._in_whole(end) for end in kept[:_STARTS]]
+
+    def _in_whole(self, end: JointFit) -> JointFit:
+        """The end of a search as a start for fits of this problem."""
+        whole, point = self.problem, self.problem.from_point(end)
+        linear = {info.name: getattr(end.damper.model, info.name) for info in whole.linear}
+        damper = replace(end.damper, model=replace(whole.without_linear(point), **linear))
+        start = replace(end, point=point, damper=damper)
+        return replace(start, nrmse_pp=whole.errors(start, range(len(whole.parts))))
+
+
+def _blocks(folds: Iterable[Sequence[int]], count: int) -> tuple[frozenset[int], ...]:
+    """Few sets that contain every fold and at most half of the runs, unless a fold is larger by itself."""
+    blocks: list[frozenset[int]] = []
+    for fold in sorted((frozenset(fold) for fold in folds), key=len, reverse=True):
+        able = [i for i, block in enumerate(blocks) if len(block | fold) <= _MOST_LEFT_OUT * count or fold <= block]
+        if not able:
+            blocks.append(fold)
+            continue
+        best = min(able, key=lambda i: len(blocks[i] | fold) - len(blocks[i]))
+        blocks[best] |= fold
+    return tuple(blocks)

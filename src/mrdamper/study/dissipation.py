@@ -1,0 +1,40 @@
+"""Check of a damper against the second law: every steady loop in and a fifth beyond the tests dissipates energy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from mrdamper.dampers.base import Damper
+from mrdamper.errors import InputError
+from mrdamper.statistics.functions.selection import BEYOND
+from mrdamper.statistics.metrics import dissipated_power
+
+
+def gains_energy(damper: Damper) -> str:
+    """Find a condition at which a steady loop of a damper does not dissipate.
+
+    Looked at are the lowest and the highest tested current and a fifth more, at the corners of the tested ranges of
+    frequency and amplitude and a fifth beyond these.
+
+    Returns
+    -------
+    str
+        Where, as a sentence; empty where every loop dissipates.
+    """
+    tested = damper.envelope
+    if not tested.tested:
+        return ""
+    lowest, highest = tested.current_A
+    for condition in (c for c in tested.farthest if c.frequency_Hz > 0 and c.amplitude_m > 0):
+        if condition.current_A not in (lowest, highest):
+            continue
+        for current in {condition.current_A, BEYOND * highest}:
+            for share in (1.0, BEYOND):
+                at = replace(condition, current_A=current, amplitude_m=share * condition.amplitude_m)
+                try:
+                    loop = damper.predict(at)
+                except InputError as error:
+                    return f"no force at {at}: {error.found}"
+                if dissipated_power(loop.force, loop.motion.velocity, loop.motion.time) <= 0:
+                    return f"a loop that gains energy at {at}"
+    return ""

@@ -1,0 +1,50 @@
+"""Distance from the tests: zero at them, symmetric, and written out for a current and a motion outside."""
+
+import numpy as np
+import pytest
+
+from mrdamper.dampers.base import Envelope
+from mrdamper.dampers.distance import Distance
+from mrdamper.data import Condition
+
+LEVELS, MOTIONS = (0.0, 0.5, 2.0), ((0.5, 0.02), (1.0, 0.02), (2.0, 0.008))
+TESTS = [Condition(current, *motion) for current in LEVELS for motion in MOTIONS]
+TESTED = Envelope.of(TESTS)
+
+
+def away(current, frequency, amplitude, tested=TESTED):
+    return tested.distance(Condition(current, frequency, amplitude), np.array([current]))
+
+
+@pytest.mark.parametrize("test", TESTS)
+def test_a_test_is_nowhere_away(test):
+    assert away(test.current_A, test.frequency_Hz, test.amplitude_m).squares == pytest.approx(np.zeros(3), abs=1e-20)
+
+
+def test_a_current_between_two_levels_is_away_by_the_product_of_its_distances():
+    assert away(1.0, 1.0, 0.02).between == pytest.approx(0.5 * 1.0 / 2.0**2)
+    assert away(1.0, 1.0, 0.02).beyond == 0
+    assert away(1.0, 1.0, 0.02) == away(-1.0, 1.0, 0.02)
+
+
+def test_a_current_beyond_the_levels_is_away_by_its_distance():
+    assert away(2.6, 1.0, 0.02) == Distance(0.0, pytest.approx(0.3 - 0.02), pytest.approx(0.0, abs=1e-12))
+    assert away(2.02, 1.0, 0.02).beyond == 0  # sessions repeat a level to some per cent
+
+
+def test_a_motion_is_away_by_the_distance_from_the_hull_in_logarithms():
+    assert away(0.5, 0.25, 0.02).motion == pytest.approx(np.log(2))
+    u, w = np.log(2.0), np.log(0.4)  # the edge from 1 Hz, 20 mm to 2 Hz, 8 mm, seen from 2 Hz, 20 mm
+    assert away(0.5, 2.0, 0.02).motion == pytest.approx(abs(u * w) / np.hypot(u, w))
+    assert away(0.5, 1.0, 0.015).motion == pytest.approx(0.0, abs=1e-12)
+
+
+def test_records_with_a_current_that_changes_pass_through_all_currents():
+    record = TESTED.with_motion(np.array([0.0, 2.0]), np.array([-0.02, 0.02]), np.array([0.3]))
+    assert away(1.0, 1.0, 0.02, record).between == 0
+    assert away(1.0, 2.0, 0.02, record).motion < away(1.0, 2.0, 0.02).motion
+    assert away(1.0, 4.0, 0.02, record).motion == pytest.approx(np.log(2 * np.pi * 4 * 0.02 / 0.3))
+
+
+def test_where_only_ranges_are_known_no_distance_is():
+    assert away(9.0, 9.0, 0.5, Envelope((0.0, 2.0), (0.5, 2.0), (0.01, 0.02), (0.0, 0.3))) == Distance()

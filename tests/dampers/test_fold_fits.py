@@ -1,0 +1,44 @@
+"""Fits without a fold: their starts never saw it, and every fold lies in a block."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from mrdamper.dampers import fold_fits
+from mrdamper.dampers.fold_fits import FoldFits
+
+FOLDS = [[0, 1, 2], [3, 4, 5], [6, 7, 8], [9, 10, 11], [0, 3, 6, 9], [1, 4], [11]]
+COUNT = 12
+
+
+def test_blocks_hold_every_fold_and_at_most_half_of_the_runs():
+    blocks = fold_fits._blocks(FOLDS, COUNT)
+    assert all(any(set(fold) <= block for block in blocks) for fold in FOLDS)
+    assert all(len(block) <= COUNT / 2 for block in blocks)
+    assert len(blocks) < len(FOLDS)
+    whole = list(range(10))  # a fold may be larger by itself
+    assert frozenset(whole) in fold_fits._blocks([whole, [1]], COUNT)
+
+
+@pytest.mark.parametrize("fold", [*FOLDS, [0, 11]])
+def test_no_start_saw_what_is_left_out_and_the_best_end_is_taken(fold, monkeypatch):
+    searched = []
+
+    class Problem:
+        parts = tuple(range(COUNT))
+
+        def refit(self, start, rows, settled):
+            return SimpleNamespace(error=start.error, rows=rows)
+
+    def search(self, block):
+        searched.append(block)
+        return [SimpleNamespace(error=0.3), SimpleNamespace(error=0.2)]
+
+    monkeypatch.setattr(FoldFits, "_search", search)
+    fits = FoldFits(Problem(), FOLDS)
+    rows = [i for i in range(COUNT) if i not in fold]
+    found = fits.refit(rows)
+    assert (found.error, found.rows) == (0.2, rows)
+    assert set(fold) <= searched[0]
+    fits.refit(rows)
+    assert len(searched) == 1
