@@ -230,7 +230,8 @@ def test_the_band_of_the_peak_is_told_beside_the_measured_peak_of_the_window(mon
     assert (asked["level"], asked["title"], asked["predicted"]) == (0.9, "exact", run.nominal)
     assert np.array_equal(asked["shown"], run.in_window)
     assert peak_band(Exact(), run, 0.3) == pytest.approx(measured)
-    shifted = SimpleNamespace(band=said, corrected=lambda p: replace(p, force=2 * p.force))
+    monkeypatch.setattr(validation, "session_band", lambda expected, *given: said(*given))
+    shifted = SimpleNamespace(corrected=lambda p: replace(p, force=2 * p.force))
     known = peak_band(Exact(), run, expected=shifted)
     assert known == pytest.approx({**measured, **band, "energy_low_J": 1.8 * expected, "energy_high_J": 2.4 * expected})
 
