@@ -62,7 +62,7 @@ def test_state_restores_the_future_and_reset_the_past(name):
 @pytest.mark.parametrize("name", ["bouc-wen", "bouc-wen, n = 1.6", "play-bypass", "spencer", "modified"])
 def test_compiled_equals_interpreted_however_it_is_cut(name, monkeypatch):
     motion, interpreted, compiled = wander(), stepper(DAMPERS[name]), stepper(DAMPERS[name])
-    monkeypatch.setattr("mrdamper.tracing.compiled.record._WORTHWHILE", 0)
+    monkeypatch.setattr("mrdamper.tracing.compiled.record._MIN_COMPILED_LINES", 0)
     force = stepped(interpreted, motion)
     assert np.array_equal(compiled.run(*channels(motion)), force)
     assert compiled.state.keys() == interpreted.state.keys()
@@ -75,7 +75,7 @@ def test_compiled_equals_interpreted_however_it_is_cut(name, monkeypatch):
 def test_without_a_compiler_a_run_is_stepped_and_gives_the_same_forces(monkeypatch):
     motion, stream = wander(), stepper(joint_damper())
     monkeypatch.setenv("MRDAMPER_COMPILER", "none")
-    monkeypatch.setattr("mrdamper.tracing.compiled.record._WORTHWHILE", 0)
+    monkeypatch.setattr("mrdamper.tracing.compiled.record._MIN_COMPILED_LINES", 0)
     assert np.array_equal(stream.run(*channels(motion)), stepped(stepper(joint_damper()), motion))
     assert stream.state["started"] == 1.0
 

@@ -125,7 +125,7 @@ def test_a_binary_that_crashes_takes_nobody_along(check, fmi, function):
 
 
 def test_a_binary_that_hangs_is_given_up(check, monkeypatch):
-    monkeypatch.setattr(fmu_check, "_PATIENCE", 1)
+    monkeypatch.setattr(fmu_check, "_CHECK_TIMEOUT_S", 1)
     hang = in_function(b"fmi3DoStep", b"    for (;;) { if (time < -1.0) { break; } }\n")
     codes, text = check(rebuilt(unpacked(fmu_bytes("joint", 3)), hang))
     assert codes == {"E_FMU_BINARY"}

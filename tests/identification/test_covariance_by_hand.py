@@ -213,7 +213,7 @@ def test_what_two_parameters_do_alike_is_lost_and_says_so():
 
 
 def test_three_samples_of_a_thousand_become_one(monkeypatch):
-    monkeypatch.setattr(covariance, "_MOST", 10)
+    monkeypatch.setattr(covariance, "_MAX_SAMPLES", 10)
     J, residual, time = RNG.standard_normal((35, 2)), RNG.standard_normal(35), np.arange(35) / 7
     thin = [np.array([a[3 * k : 3 * k + 3].mean(axis=0) for k in range(11)]) for a in (J, residual, time)]
     monkeypatch.setattr(covariance, "score_covariance", lambda *given: (given[0].T @ given[0], np.ones(2), 1.0))

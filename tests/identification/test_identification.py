@@ -168,7 +168,7 @@ def test_a_long_record_of_a_stepped_model_is_searched_on_its_end_first(monkeypat
     run = Run("long", motion.time, motion.displacement, force + np.sin(40 * motion.time), 1.0)
     held = {name: EXAMPLES["spencer"][name] for name in ("k0_rate", "yield_displacement")}
     whole = identify(run, "spencer", fixed=held)
-    monkeypatch.setattr(projection, "_LONG", 3000)
+    monkeypatch.setattr(projection, "_LONG_RECORD_SAMPLES", 3000)
     rehearsed = identify(run, "spencer", fixed=held)
     for name in ("c1", "c0_ratio", "creep"):
         assert getattr(rehearsed.model, name) == pytest.approx(getattr(whole.model, name), rel=1e-4)

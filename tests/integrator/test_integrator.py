@@ -124,7 +124,7 @@ def test_step_halving_at_the_search_bounds():
 def test_the_interpreter_gives_the_same_states_as_compiled_code(monkeypatch):
     short = tuple(channel[:60] for channel in CHANNELS)
     p = np.array([300.0])
-    monkeypatch.setattr("mrdamper.tracing.compiled.record._WORTHWHILE", 0)
+    monkeypatch.setattr("mrdamper.tracing.compiled.record._MIN_COMPILED_LINES", 0)
     compiled = integrate(bouc_wen, p, short, np.zeros(1), np.ones(1))
     monkeypatch.setenv("MRDAMPER_COMPILER", "none")
     interpreted = integrate(lambda *given: bouc_wen(*given), p, short, np.zeros(1), np.ones(1))

@@ -30,14 +30,14 @@ def damper(**changed: float) -> PlayBypass:
 @pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-3])
 @pytest.mark.parametrize("changed", [{}, {"T": 0.0}, {"leak": 5.0, "qb": 0.2}, {"si": 0.3, "Ic": 0.5}])
 def test_compiled_states_are_those_of_the_arrays(noise, changed, monkeypatch):
-    monkeypatch.setattr(recorded, "_WORTHWHILE", 0)
+    monkeypatch.setattr(recorded, "_MIN_COMPILED_SAMPLES", 0)
     motion, model = wandering(noise), damper(**changed)
     found, expected = model.state(motion), PlayBypass.state.__wrapped__(model, motion)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
 
 
 def test_without_a_compiler_the_arrays_answer(monkeypatch):
-    monkeypatch.setattr(recorded, "_WORTHWHILE", 0)
+    monkeypatch.setattr(recorded, "_MIN_COMPILED_SAMPLES", 0)
     monkeypatch.setenv("MRDAMPER_COMPILER", "none")
     motion, model = wandering(1e-6), damper(cq=3.0)
     np.testing.assert_array_equal(model.state(motion), PlayBypass.state.__wrapped__(model, motion))

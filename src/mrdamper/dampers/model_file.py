@@ -31,7 +31,7 @@ from mrdamper.models import model_parts
 FORMAT = "mrdamper-model"
 _PACKAGE = "package of the model"  # key of the provenance
 MAJOR, MINOR = 1, 5
-_LARGEST = 64_000_000  # bytes of a file
+_MAX_FILE_BYTES = 64_000_000  # bytes of a file
 _MAX_DEVIATION = 1e4  # standard deviation of a parameter over its size, or of its logarithm
 UNITS = {
     "time": "s",
@@ -218,9 +218,9 @@ def load_model(path: str | Path) -> Damper:
     path = path_of(path)
     try:
         with open_regular(path) as file:
-            content = file.read(_LARGEST + 1)
-        if len(content) > _LARGEST:
-            raise ModelFileError(f"over {_LARGEST // 10**6} MB", where=str(path), mend="is this a model.json?")
+            content = file.read(_MAX_FILE_BYTES + 1)
+        if len(content) > _MAX_FILE_BYTES:
+            raise ModelFileError(f"over {_MAX_FILE_BYTES // 10**6} MB", where=str(path), mend="is this a model.json?")
         text = content.decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"

@@ -24,9 +24,9 @@ from mrdamper.data.temporary import temporary_folder
 from mrdamper.errors import OutputError, resource_error, shown
 
 MADE = "made.json"  # which files of a folder are a result's, and what differs from run to run: times
-_LONGEST_NAME = 255  # bytes, of a file or folder
-_FEW = 200  # foreign files of a folder that are carried over into its successor
-_ELSEWHERE = "choose a folder you may write to"
+_MAX_NAME_BYTES = 255  # bytes, of a file or folder
+_MAX_FOREIGN_FILES = 200  # foreign files of a folder that are carried over into its successor
+_REMEDY = "choose a folder you may write to"
 
 
 def path_of(path: object) -> Path:
@@ -34,7 +34,7 @@ def path_of(path: object) -> Path:
     if isinstance(path, str | os.PathLike):
         with contextlib.suppress(UnicodeEncodeError):
             parts = os.fsencode(path).split(os.sep.encode())
-            if b"\0" not in os.fsencode(path) and max(map(len, parts)) <= _LONGEST_NAME:
+            if b"\0" not in os.fsencode(path) and max(map(len, parts)) <= _MAX_NAME_BYTES:
                 return Path(path)
     raise OutputError(f"{shown(path)} is no path", mend="give the name of a file or folder", code="E_PATH")
 
@@ -140,7 +140,7 @@ def require_writable(path: str | Path | None) -> None:
     with _beside(final) as work:
         (work / "tried").write_bytes(b"\0")
     if final.exists() and not os.access(final, os.W_OK):
-        raise OutputError("not writable", where=str(final), mend=_ELSEWHERE)
+        raise OutputError("not writable", where=str(final), mend=_REMEDY)
 
 
 @contextmanager
@@ -171,7 +171,7 @@ def _coded(final: Path) -> Iterator[None]:
         place = final.absolute().parent
         names = [os.fsdecode(name) for name in (error.filename, error.filename2) if isinstance(name, str | bytes)]
         if any(Path(name).absolute().is_relative_to(place) for name in names):
-            raise OutputError(error.strerror or str(error), where=str(final), mend=_ELSEWHERE) from error
+            raise OutputError(error.strerror or str(error), where=str(final), mend=_REMEDY) from error
         raise
 
 
@@ -202,7 +202,7 @@ def _put(work: Path, final: Path, stale: frozenset[str]) -> None:
             if not final.is_dir():  # else another process was first
                 raise
     if not final.is_dir():
-        raise OutputError("is no folder", where=str(final), mend=_ELSEWHERE)
+        raise OutputError("is no folder", where=str(final), mend=_REMEDY)
     final = final.resolve()
     if _carried(final, work, stale) and _exchange(work, final):
         _sync_entry(final.parent)
@@ -220,7 +220,7 @@ def _carried(old: Path, new: Path, stale: frozenset[str]) -> bool:
         here = Path(folder).relative_to(old)
         names = [here / name for name in files]
         foreign += [p for p in names if p.as_posix() not in stale and not os.path.lexists(new / p)]
-        if len(foreign) > _FEW or any((old / here / name).is_symlink() for name in folders):
+        if len(foreign) > _MAX_FOREIGN_FILES or any((old / here / name).is_symlink() for name in folders):
             return False
         if not names and not folders and str(here) != "." and not (new / here).exists():
             foreign.append(here)

@@ -26,7 +26,7 @@ _LATEX = str.maketrans(
 _MARKDOWN = str.maketrans({c: f"\\{c}" for c in "!\"#$%&'()*+,-./:;<=>?@[\\]^_`{|}~"})
 _FORMULA = re.compile(r"'*[=+\-@\t\r]")  # what a spreadsheet computes instead of showing
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)  # that Windows keeps for itself
-_LONGEST_NAME = 48  # characters; of four bytes each, with prefix, suffix and hash, below 255
+_MAX_NAME_PART = 48  # characters; of four bytes each, with prefix, suffix and hash, below 255
 
 
 def c_comment(text: str) -> str:
@@ -84,8 +84,8 @@ def file_names(texts: Iterable[str]) -> dict[str, str]:
     taken: set[str] = set()
     for text in dict.fromkeys(texts):
         name = re.sub(r"[^\w.\-]+", "_", unicodedata.normalize("NFC", text)).strip("._-") or "_"
-        if len(name) > _LONGEST_NAME or name.casefold() in taken or _DEVICES.fullmatch(name):
-            name = f"{name[:_LONGEST_NAME]}_{sha256(text.encode('utf-8', 'replace')).hexdigest()[:8]}"
+        if len(name) > _MAX_NAME_PART or name.casefold() in taken or _DEVICES.fullmatch(name):
+            name = f"{name[:_MAX_NAME_PART]}_{sha256(text.encode('utf-8', 'replace')).hexdigest()[:8]}"
         taken.add(name.casefold())
         names[text] = name
     return names

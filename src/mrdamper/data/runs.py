@@ -35,7 +35,7 @@ Floats = NDArray[np.float64]
 K = TypeVar("K")
 T = TypeVar("T")
 Split = Literal["train", "validate"]
-_LONGEST_NAME = 255
+_MAX_NAME_CHARACTERS = 255
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -274,10 +274,10 @@ def require_name(what: str, name: object) -> None:
     RunError
         Unless it is printable text of one line.
     """
-    if not isinstance(name, str) or len(name) > _LONGEST_NAME or printable(name) != name:
+    if not isinstance(name, str) or len(name) > _MAX_NAME_CHARACTERS or printable(name) != name:
         raise RunError(
             f"the {what} is {shown(name)}",
-            mend=f"name it in printable text on one line, at most {_LONGEST_NAME} characters",
+            mend=f"name it in printable text on one line, at most {_MAX_NAME_CHARACTERS} characters",
         )
 
 
@@ -298,16 +298,25 @@ def once_per_run(function: Callable[[K], T]) -> Callable[[K], T]:
     return remembered
 
 
-_MOST = 2_000_000  # samples of a current looked at
+_MAX_CURRENT_SAMPLES = 2_000_000  # samples of a current looked at
 _BLOCKS = 64  # stretches of a record whose mean currents are compared
-_TREND_A, _TREND = 0.01, 0.03  # a current may differ by so much from begin to end: [A], and of its mean
-_SLOW_A, _SLOW = 0.016, 0.01  # RMS of its slow part: a rectifier's or a chopper's ripple, seen at a slow rate
-_FAST_A, _FAST = 0.03, 0.02  # RMS of all of it
+_MAX_TREND_A, _MAX_RELATIVE_TREND = (
+    0.01,
+    0.03,
+)  # a current may differ by so much from begin to end: [A], and of its mean
+_MAX_WANDER_A, _MAX_RELATIVE_WANDER = (
+    0.016,
+    0.01,
+)  # RMS of its slow part: a rectifier's or a chopper's ripple, seen at a slow rate
+_MAX_RMS_A, _MAX_RELATIVE_RMS = 0.03, 0.02  # RMS of all of it
 _LEVEL_STEP = 5e-3  # step of currents in a test plan [A]
-_LEVEL_A, _LEVEL = 5e-4, 2e-3  # measured means may differ from a level by so much: [A], and of the mean
-_COARSEST = 0.1  # [A]: a channel of such steps flickers by half a step
-_WHITE_MORE = 4  # times as much where it has no memory from sample to sample: no coil follows that
-_WHITE = 1.0  # von Neumann's ratio: two for white noise, near zero for a current that keeps its levels
+_LEVEL_TOLERANCE_A, _LEVEL_TOLERANCE = (
+    5e-4,
+    2e-3,
+)  # measured means may differ from a level by so much: [A], and of the mean
+_MAX_RESOLUTION_A = 0.1  # [A]: a channel of such steps flickers by half a step
+_WHITE_NOISE_FACTOR = 4  # times as much where it has no memory from sample to sample: no coil follows that
+_VON_NEUMANN_RATIO = 1.0  # von Neumann's ratio: two for white noise, near zero for a current that keeps its levels
 
 
 @once_per_run
@@ -315,7 +324,7 @@ def _held_current(run: Run) -> tuple[float, str]:
     first, last = run.window or (-math.inf, math.inf)
     start, stop = int(np.searchsorted(run.time, first)), int(np.searchsorted(run.time, last, "right"))
     start, stop = (start, stop) if stop - start >= 3 else (0, run.time.size)
-    return held_current(taken(run.current, np.arange(start, stop, 1 + (stop - start) // _MOST)))
+    return held_current(taken(run.current, np.arange(start, stop, 1 + (stop - start) // _MAX_CURRENT_SAMPLES)))
 
 
 def as_written(current: float) -> float:
@@ -324,7 +333,7 @@ def as_written(current: float) -> float:
     Values within 0.5 mA + 0.2 % of a multiple of 5 mA are that multiple: −0.0003 A is 0 A, 0.4997 A is 0.5 A.
     """
     level = _LEVEL_STEP * round(current / _LEVEL_STEP)
-    near = abs(current - level) <= _LEVEL_A + _LEVEL * abs(current)
+    near = abs(current - level) <= _LEVEL_TOLERANCE_A + _LEVEL_TOLERANCE * abs(current)
     return round(level if near else current, 4) + 0.0
 
 
@@ -342,7 +351,7 @@ def held_current(current: Floats) -> tuple[float, str]:
     """
     low, high = float(current.min()), float(current.max())
     if low == high:
-        return (0.0 if abs(low) <= _LEVEL_A else round(low, 9)), ""
+        return (0.0 if abs(low) <= _LEVEL_TOLERANCE_A else round(low, 9)), ""
     mean, size = float(np.mean(current)), current.size
     count = min(_BLOCKS, max(3, size // 8))
     bounds = np.linspace(0, size, count, endpoint=False).astype(int)
@@ -352,11 +361,13 @@ def held_current(current: Floats) -> tuple[float, str]:
     wander = float(np.sqrt(max(0.0, np.var(levels, ddof=1) - within * count / size)))
     trend = abs(float(np.mean(current[: size // 3]) - np.mean(current[size - size // 3 :])))
     total = float(np.std(current))
-    white = float(np.mean(np.diff(current) ** 2)) > _WHITE * total**2
-    allowed = (_FAST_A + _FAST * abs(mean)) * (_WHITE_MORE if white else 1) + 0.5 * _resolution(current)
+    white = float(np.mean(np.diff(current) ** 2)) > _VON_NEUMANN_RATIO * total**2
+    allowed = (_MAX_RMS_A + _MAX_RELATIVE_RMS * abs(mean)) * (_WHITE_NOISE_FACTOR if white else 1) + 0.5 * _resolution(
+        current
+    )
     steady = (
-        trend <= _TREND_A + _TREND * abs(mean) + 4 * float(np.sqrt(6 * within / size))
-        and wander <= _SLOW_A + _SLOW * abs(mean)
+        trend <= _MAX_TREND_A + _MAX_RELATIVE_TREND * abs(mean) + 4 * float(np.sqrt(6 * within / size))
+        and wander <= _MAX_WANDER_A + _MAX_RELATIVE_WANDER * abs(mean)
         and total <= allowed
     )
     if steady:
@@ -368,4 +379,4 @@ def _resolution(current: Floats) -> float:
     """Step in which a coarse channel counts [A]; zero where it is fine, or coarser than any channel of currents."""
     levels = np.unique(current[:: max(1, current.size // 2000)])
     step = float(np.min(np.diff(levels))) if 1 < levels.size < 10 else 0.0
-    return step if step <= _COARSEST * 1.001 else 0.0
+    return step if step <= _MAX_RESOLUTION_A * 1.001 else 0.0

@@ -6,8 +6,8 @@ import json
 import math
 from typing import Any, NoReturn
 
-_DEEPEST = 64  # objects and arrays inside each other
-_LONGEST = 40  # characters of a whole number
+_MAX_DEPTH = 64  # objects and arrays inside each other
+_MAX_DIGITS = 40  # characters of a whole number
 
 
 def parse_json(text: str) -> Any:
@@ -23,9 +23,9 @@ def parse_json(text: str) -> Any:
     except json.JSONDecodeError as error:
         raise ValueError(f"not JSON at line {error.lineno}: {error.msg}") from error
     except RecursionError:
-        raise ValueError(f"nested deeper than {_DEEPEST}") from None
-    if _depth(value) > _DEEPEST:
-        raise ValueError(f"nested deeper than {_DEEPEST}")
+        raise ValueError(f"nested deeper than {_MAX_DEPTH}") from None
+    if _depth(value) > _MAX_DEPTH:
+        raise ValueError(f"nested deeper than {_MAX_DEPTH}")
     return value
 
 
@@ -49,7 +49,7 @@ def _number(text: str) -> float:
 
 
 def _whole(text: str) -> int:
-    if len(text) > _LONGEST:
+    if len(text) > _MAX_DIGITS:
         raise ValueError(f"a whole number of {len(text)} digits")
     return int(text)
 

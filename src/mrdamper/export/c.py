@@ -23,7 +23,7 @@ from mrdamper.tracing.c_writer import CWriter
 from mrdamper.tracing.tape import LookupTable
 
 TOLERANCE = 1e-9  # of the largest force: the self-test forgives other compilers and libraries this much
-_SAMPLES = 400
+_TEST_SAMPLES = 400
 _SINGLE_STRIDE = 4  # points of a table per point kept for single precision: still within its rounding
 
 
@@ -95,7 +95,7 @@ def self_test(stepping: Stream, name: str) -> str:
     return render("model_test.c.j2", name=name, upper=name.upper(), rows=rows, dt=repr(dt), tolerance=TOLERANCE)
 
 
-def reference_motion(stepping: Stream, samples: int = _SAMPLES) -> tuple[np.ndarray, np.ndarray, float]:
+def reference_motion(stepping: Stream, samples: int = _TEST_SAMPLES) -> tuple[np.ndarray, np.ndarray, float]:
     """Displacement [m] and current [A] (N,) of a growing sine inside the tested ranges, and its time step [s]."""
     envelope = stepping.envelope
     amplitude, frequency, (low, high) = 0.01, 1.0, (0.0, 1.0)

@@ -20,7 +20,7 @@ from mrdamper.models import Model
 
 COLUMNS = ("current_A", "amplitude_m", "velocity_m_s", "force_N", "peak_force_N", "tested")
 _SPEEDS, _CURRENTS = 12, 6
-_SLOWEST = 0.02  # of the highest tested velocity
+_MIN_VELOCITY_SHARE = 0.02  # of the highest tested velocity
 
 
 class TableExporter(Exporter):
@@ -105,7 +105,9 @@ def force_velocity(
     amplitude = float(np.sqrt(np.prod(envelope.amplitude_m)))
     highest = envelope.peak_velocity_m_s[1]
     chosen = (
-        np.geomspace(_SLOWEST * highest, highest, _SPEEDS) if speeds is None else np.sort(np.asarray(speeds, float))
+        np.geomspace(_MIN_VELOCITY_SHARE * highest, highest, _SPEEDS)
+        if speeds is None
+        else np.sort(np.asarray(speeds, float))
     )
     levels = np.unique(np.linspace(*envelope.current_A, _CURRENTS)) if currents is None else currents
     return [_curve(damper, float(current), amplitude, chosen) for current in levels]

@@ -25,7 +25,7 @@ from mrdamper.export.templates import render
 from mrdamper.export.toolchain import PLATFORMS, Platform, build_library
 from mrdamper.models import Model
 
-_SAMPLES_A_CYCLE = 200
+_SAMPLES_PER_CYCLE = 200
 _INTERNAL_STEP = 2.0**-9  # s; two milliseconds, so that the usual communication step of one is taken whole
 MOST_STEPS = 1_000_000  # internal ones, in a communication step
 _DATE = (1980, 1, 1, 0, 0, 0)  # the earliest a zip file knows: the same FMU has the same bytes
@@ -111,7 +111,7 @@ def reference(stepping: Stream) -> Reference:
     """Two growing cycles inside the tested ranges, stepped here; the displacement drives."""
     _, _, dt = reference_motion(stepping)
     turn = dt * 399 / 2  # of that motion's 400 samples
-    step = 2.0 ** math.floor(math.log2(turn / _SAMPLES_A_CYCLE))
+    step = 2.0 ** math.floor(math.log2(turn / _SAMPLES_PER_CYCLE))
     internal_step = min(step, _INTERNAL_STEP)
     x, current, _ = reference_motion(stepping, round(2 * turn / step) + 1)
     samples = [*zip(x.tolist(), current.tolist(), strict=True)]

@@ -26,8 +26,8 @@ from mrdamper.export.c import TOLERANCE
 from mrdamper.export.fmu import token_of
 from mrdamper.export.toolchain import build_library, here
 
-_PATIENCE = 60  # s
-_LARGEST = 200_000_000  # bytes, unpacked
+_CHECK_TIMEOUT_S = 60  # s
+_MAX_UNPACKED_BYTES = 200_000_000  # bytes, unpacked
 _UNREADABLE = (OSError, zipfile.BadZipFile, zlib.error, EOFError, ValueError, RuntimeError)
 _TOKEN = re.compile(rb'(?:guid|instantiationToken)="([^"]*)"')
 
@@ -67,8 +67,8 @@ def _unpacked(path: Path) -> dict[str, bytes]:
     with zipfile.ZipFile(path) as archive:
         entries = [entry for entry in archive.infolist() if not entry.is_dir()]
         names = [entry.filename for entry in entries]
-        if sum(entry.file_size for entry in entries) > _LARGEST:
-            raise ValueError(f"it holds over {_LARGEST // 10**6} MB")
+        if sum(entry.file_size for entry in entries) > _MAX_UNPACKED_BYTES:
+            raise ValueError(f"it holds over {_MAX_UNPACKED_BYTES // 10**6} MB")
         if unsafe := [n for n in names if names.count(n) > 1 or not re.fullmatch(r"(?!.*\.\.)\w[\w.\-/]*", n)]:
             raise ValueError(f"a path in it is unsafe or twice there: {unsafe[0]!r}")
         return {entry.filename: archive.read(entry) for entry in entries}
@@ -113,10 +113,10 @@ def _probed(files: Mapping[str, bytes], loadable: bool) -> list[FmuFinding]:
         command = [sys.executable, "-I", fmu_probe.__file__, str(unpacked), str(report), repr(TOLERANCE)]
         try:
             command += ["binary"] if loadable else []
-            done = subprocess.run(command, capture_output=True, timeout=_PATIENCE, check=False)
+            done = subprocess.run(command, capture_output=True, timeout=_CHECK_TIMEOUT_S, check=False)
             died = f"crashed (signal {-done.returncode})" if done.returncode < 0 else "ended the check early"
         except subprocess.TimeoutExpired:
-            died = f"did not answer within {_PATIENCE} s"
+            died = f"did not answer within {_CHECK_TIMEOUT_S} s"
         lines = [json.loads(line) for line in report.read_text().splitlines()] if report.exists() else []
     findings = [FmuFinding(code, text) for code, text in lines if code.startswith("E_")]
     if lines and lines[-1][0] == "end":

@@ -18,8 +18,8 @@ from mrdamper.export.fmu_description import units_of, variable
 from mrdamper.tracing import Program
 from mrdamper.tracing.python import python_functions
 
-_STEP = 2.0**-10  # s, of the reference where the program has no clock of its own
-_ROWS = 401
+_REFERENCE_STEP_S = 2.0**-10  # s, of the reference where the program has no clock of its own
+_REFERENCE_ROWS = 401
 _USUAL = {"m": 0.01, "m/s": 0.1, "m/s2": 1.0, "N": 500.0}  # amplitudes of the reference's inputs
 
 
@@ -112,8 +112,8 @@ def _facts(
         "most_steps": MOST_STEPS,
         "period": repr(float(period)),
         "sampled": period,
-        "internal_step": repr(period or _STEP),
-        "stop_time": repr((period or _STEP) * (_ROWS - 1)),
+        "internal_step": repr(period or _REFERENCE_STEP_S),
+        "stop_time": repr((period or _REFERENCE_STEP_S) * (_REFERENCE_ROWS - 1)),
         "held": [(name, repr(float(value))) for name, value in zip(traced.outputs, start, strict=True)],
         "readable": readable,
         "settable": [(v.reference, f"set.{v.name}") for v in variables if v.causality == "input"],
@@ -123,8 +123,8 @@ def _facts(
 
 def _reference(traced: Program, facts: dict[str, Any]) -> tuple[Floats, dict[str, Floats], dict[str, Floats]]:
     """Growing sines, and what the program answers: each row to the inputs of the row before."""
-    step = facts["sampled"] or _STEP
-    time = step * np.arange(_ROWS, dtype=np.float64)
+    step = facts["sampled"] or _REFERENCE_STEP_S
+    time = step * np.arange(_REFERENCE_ROWS, dtype=np.float64)
     given = {
         v.name: _USUAL.get(v.unit, 1.0) * time / time[-1] * np.sin(2 * math.pi * (2 + 0.37 * i) * time / time[-1] * 2)
         for i, v in enumerate(v for v in facts["variables"] if v.causality == "input")

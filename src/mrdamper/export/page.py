@@ -22,7 +22,7 @@ from mrdamper.models import Model
 from mrdamper.tracing.c_writer import JavaScriptWriter
 
 _VECTORS = 240  # samples of the self-test
-_STEPS = 100  # of a slider from the lowest to the highest tested value
+_SLIDER_STEPS = 100  # of a slider from the lowest to the highest tested value
 # Field of the envelope, name, unit, factor to it, and how far sliders leave the tests below and above.
 _KNOBS = (
     ("current", "current_A", "Current", "A", 1.0, 0.0, 1.5),
@@ -161,7 +161,7 @@ def _knobs(envelope: Envelope | None) -> list[dict[str, Any]]:
     knobs = []
     for key, field, label, unit, factor, below, above in _KNOBS:
         low, high = (factor * bound for bound in getattr(ranges, field))
-        step = 10.0 ** math.floor(math.log10(max(high, 1e-9) / _STEPS))
+        step = 10.0 ** math.floor(math.log10(max(high, 1e-9) / _SLIDER_STEPS))
         middle = (low + high) / 2 if key == "current" else math.sqrt(low * high)
         least, most = _on(step, below * low, 0 if key == "current" else 1), _on(step, above * high)
         share = 100 / (most - least)

@@ -16,7 +16,7 @@ from mrdamper.tracing.compiled.compilers import Built, compiled_file
 _EXACT = ("-std=c99", "-O2", "-ffp-contract=off")
 FLAGS = (*_EXACT, "-fvisibility=hidden", "-fPIC", "-shared")
 _WEB = (*_EXACT, "-target", "wasm32-wasi", "-mexec-model=reactor", "-Wl,--no-entry", "-s")
-_PATIENCE = 600  # s; a cross compiler builds its C library the first time
+_BUILD_TIMEOUT_S = 600  # s; a cross compiler builds its C library the first time
 
 
 @dataclass(frozen=True)
@@ -84,4 +84,4 @@ def _built(sources: Mapping[str, bytes], command: Sequence[str], libraries: Sequ
         for name, text in sources.items():
             (folder / name).write_bytes(text)
         files = sorted(name for name in sources if name.endswith(".c"))
-        return compiled_file([*command, *files, "-o", "library", *libraries], folder, "library", _PATIENCE)
+        return compiled_file([*command, *files, "-o", "library", *libraries], folder, "library", _BUILD_TIMEOUT_S)

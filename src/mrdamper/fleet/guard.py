@@ -21,7 +21,7 @@ from typing import Any
 
 from mrdamper.errors import InputError
 
-_GLANCE = 0.25  # seconds between looks at the memory of a job that takes long
+_MEMORY_CHECK_S = 0.25  # seconds between looks at the memory of a job that takes long
 _KILLED_TRIES, _CRASHED_TRIES = 8, 2  # of a job whose process somebody killed, or that died by itself
 _START = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from mrdamper.fleet.guarded import serve; serve()"
 
@@ -111,7 +111,7 @@ class KillableWorker:
     def _watch(self, process: subprocess.Popen[bytes]) -> tuple[str, str] | None:
         """Wait for an answer; which limit is broken, and how, if one is."""
         begin, answers = time.monotonic(), process.stdout.fileno()  # type: ignore[union-attr]
-        while not select.select([answers], [], [], _GLANCE)[0]:
+        while not select.select([answers], [], [], _MEMORY_CHECK_S)[0]:
             if time.monotonic() - begin > self._limits.wall_s:
                 return "E_JOB_TIME", f"not done after {self._limits.wall_s:g} s"
             if sum(map(_resident, [process.pid, *descendants(process.pid)])) > self._limits.memory_bytes:

@@ -18,8 +18,8 @@ from typing import Any
 from mrdamper.errors import InputError
 from mrdamper.fleet.guard import descendants
 
-_LEFT = 256 * 2**20  # bytes that jobs may leave behind before a fresh process takes over
-_LINES = 12  # of a traceback that an answer carries
+_MAX_LEFTOVER_BYTES = 256 * 2**20  # bytes that jobs may leave behind before a fresh process takes over
+_TRACEBACK_LINES = 12  # of a traceback that an answer carries
 
 
 def serve() -> None:
@@ -37,7 +37,7 @@ def serve() -> None:
             os._exit(0)  # a fork of a job that came back: it has no say here
         held = _written()
         first = held if first is None else first
-        answer["spent"] = held - first > _LEFT or bool(_strangers())
+        answer["spent"] = held - first > _MAX_LEFTOVER_BYTES or bool(_strangers())
         replies.write(json.dumps(answer).encode() + b"\n")
         replies.flush()
 
@@ -67,7 +67,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         gc.collect()
         return {"code": "E_JOB_MEMORY", "found": f"over {limits['memory_bytes'] / 2**30:.3g} GiB of memory"}
     except Exception:
-        text = "".join(traceback.format_exc().splitlines(keepends=True)[-_LINES:])
+        text = "".join(traceback.format_exc().splitlines(keepends=True)[-_TRACEBACK_LINES:])
         return {"code": "E_JOB_FAULT", "found": text.strip(), "mend": "internal error; please report it"}
 
 

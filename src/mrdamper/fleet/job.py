@@ -34,13 +34,17 @@ from mrdamper.study.workflow import agreeing, believed, study_rig, usable
 
 VERSION = version("mrdamper")  # asked once: the answer takes a millisecond
 OTHER_RIG = "W_OTHER_RIG"  # tested on another rig than most of the line: compared with them all the same
-_KILLED, _TRIES = "E_READER_KILLED", 8  # of a job whose reading process somebody killed
+_KILLED, _READER_TRIES = "E_READER_KILLED", 8  # of a job whose reading process somebody killed
 _PASSING = ("E_EXTRA", "E_FLEET_CHANGED", "E_CLUSTER_VERSION", _KILLED)
-_ROUNDS, _STEPS, _SETTLED = 1, 40, 1e-8  # one least squares without reweighting, searched to its end: the optimum
+_ROUNDS, _MAX_STEPS, _COST_TOLERANCE = (
+    1,
+    40,
+    1e-8,
+)  # one least squares without reweighting, searched to its end: the optimum
 # is then the same to 1e-6 whatever near start it was found from
-_TOGETHER = 4  # samples that are averaged for the standard errors
-_STEP = 1e-4  # of a search axis's coordinate, for slopes of parameters
-_FAR = 6.0  # robust standard deviations from the line at which a damper is studied in full
+_AVERAGED_SAMPLES = 4  # samples that are averaged for the standard errors
+_DIFFERENCE_STEP = 1e-4  # of a search axis's coordinate, for slopes of parameters
+_OUTLIER_DEVIATIONS = 6.0  # robust standard deviations from the line at which a damper is studied in full
 
 
 @dataclass(frozen=True)
@@ -84,7 +88,7 @@ def measure(job: dict[str, Any]) -> dict[str, Any]:
 def attempt(job: dict[str, Any]) -> dict[str, Any]:
     """`measure`, with what is wrong with the records as a row too; if the process that reads is killed, once more."""
     row: dict[str, Any] = {}
-    for _ in range(_TRIES):
+    for _ in range(_READER_TRIES):
         try:
             return {"status": "done", "code": "", "reason": "", **measure(job)}
         except InputError as error:
@@ -184,7 +188,7 @@ def _identify(dataset: Dataset, settings: Settings, plan: Plan | None) -> dict[s
 
 
 def _fit(problem: JointProblem, start: Floats | None) -> JointFit:
-    return problem.fit(start=start, rounds=_ROUNDS, most_steps=_STEPS, settled=_SETTLED)
+    return problem.fit(start=start, rounds=_ROUNDS, most_steps=_MAX_STEPS, settled=_COST_TOLERANCE)
 
 
 def _test_of(run: Run) -> Test:
@@ -225,13 +229,15 @@ def _standard_errors(problem: JointProblem, fit: JointFit) -> dict[str, float]:
     own = {axis.name: axis.value(float(u)) for axis, u in zip(problem.axes, fit.point, strict=True) if axis in axes}
     for i, (axis, u) in enumerate(zip(problem.axes, fit.point, strict=True)):
         if axis in axes:
-            step = _STEP if axis.value(float(u) + _STEP) <= axis.upper else -_STEP
+            step = _DIFFERENCE_STEP if axis.value(float(u) + _DIFFERENCE_STEP) <= axis.upper else -_DIFFERENCE_STEP
             moved = type(model).build({**values, **own, axis.name: axis.value(float(u) + step)}).values()
             slopes[:, i] = [(moved[name] - values[name]) / step for name in values]
     for i, info in enumerate(problem.linear):
         slopes[list(values).index(info.name), len(problem.axes) + i] = 1.0
-    kept = residual.size // _TOGETHER * _TOGETHER  # what is slower than a few samples is what makes errors large
-    means = (a[:kept].reshape(-1, _TOGETHER, *a.shape[1:]).mean(axis=1) for a in (jacobian, residual))
+    kept = (
+        residual.size // _AVERAGED_SAMPLES * _AVERAGED_SAMPLES
+    )  # what is slower than a few samples is what makes errors large
+    means = (a[:kept].reshape(-1, _AVERAGED_SAMPLES, *a.shape[1:]).mean(axis=1) for a in (jacobian, residual))
     covariance = spread(*means).covariance
     errors = {}
     for name, slope in zip(values, slopes, strict=True):
@@ -276,8 +282,8 @@ def _stands_out(fit: JointFit, away: float, plan: Plan) -> bool:
     """Tell if a damper lies so far from the population that it needs a full study."""
     if plan.draft:
         return False
-    poor = float(np.median(fit.nrmse_pp)) > plan.error + _FAR * max(plan.error_spread, 0.1 * plan.error)
-    odd = away > plan.deviation + _FAR * max(plan.deviation_spread, 0.5 * plan.deviation)
+    poor = float(np.median(fit.nrmse_pp)) > plan.error + _OUTLIER_DEVIATIONS * max(plan.error_spread, 0.1 * plan.error)
+    odd = away > plan.deviation + _OUTLIER_DEVIATIONS * max(plan.deviation_spread, 0.5 * plan.deviation)
     return bool(poor or odd or not fit.ending.converged)
 
 

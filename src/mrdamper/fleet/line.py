@@ -26,7 +26,7 @@ from mrdamper.rig_files.profile import load_profile
 
 Progress = Callable[[str, float], None]
 REFERENCES = 11  # dampers that make the plan
-_AHEAD = 2  # jobs that wait for each that runs
+_QUEUED_PER_WORKER = 2  # jobs that wait for each that runs
 
 
 @dataclass(frozen=True)
@@ -215,7 +215,7 @@ class _Line:
         running: dict[Future[dict[str, Any]], int] = {}
         todo, done, begin = iter(waiting), 0, time.monotonic()
         while True:
-            while len(running) < _AHEAD * slots and (number := next(todo, None)) is not None:
+            while len(running) < _QUEUED_PER_WORKER * slots and (number := next(todo, None)) is not None:
                 job = as_job(self._items[number], self._digests[number], self._for(plan), plan)
                 running[submit(job)] = number
             if not running:

@@ -24,9 +24,9 @@ from mrdamper.report.plots.style import PALETTE, Picture, label, new_figure
 if TYPE_CHECKING:
     import polars as pl
 
-_MOST_POINTS = 500  # of a chart; more dampers are charted by medians of a few
+_MAX_CHART_POINTS = 500  # of a chart; more dampers are charted by medians of a few
 _WORST = 10
-_MOST_NAMED = 50  # refused or failed dampers, and suspects, that the page lists
+_MAX_LISTED = 50  # refused or failed dampers, and suspects, that the page lists
 
 
 def write_page(table: Path, plan: Plan | None, limits: Mapping[str, ColumnLimits], path: Path) -> list[str]:
@@ -53,8 +53,8 @@ def write_page(table: Path, plan: Plan | None, limits: Mapping[str, ColumnLimits
         "counts": {s: whole.filter(pl.col("status") == s).height for s in ("done", "refused", "failed")},
         "dampers": whole["serial"].n_unique(),
         "plan": plan,
-        "suspects": standing_out[:_MOST_NAMED],
-        "more_suspects": max(0, len(standing_out) - _MOST_NAMED),
+        "suspects": standing_out[:_MAX_LISTED],
+        "more_suspects": max(0, len(standing_out) - _MAX_LISTED),
         "drifts": {features[n][0]: d for n, d in drifts.items()},
         "notes": [*clock_findings(done), *_other_rigs(done, plan)],
         "limits": verdicts,
@@ -62,7 +62,7 @@ def write_page(table: Path, plan: Plan | None, limits: Mapping[str, ColumnLimits
         "golden": sorted(set(golden["serial"].to_list())),
         "features": [_described(line, n, about) for n, about in features.items()],
         "worst": _worst(table, line, plan),
-        "troubled": whole.filter(pl.col("status") != "done").head(_MOST_NAMED).rows(named=True),
+        "troubled": whole.filter(pl.col("status") != "done").head(_MAX_LISTED).rows(named=True),
     }
     with write_file(path) as target:
         text = render_page(
@@ -70,9 +70,9 @@ def write_page(table: Path, plan: Plan | None, limits: Mapping[str, ColumnLimits
         )
         target.write_text(text, encoding="utf-8")
     lines = [
-        f"stands out: {s.serial} {s.session}: {s.cause} ({', '.join(s.findings)})" for s in standing_out[:_MOST_NAMED]
+        f"stands out: {s.serial} {s.session}: {s.cause} ({', '.join(s.findings)})" for s in standing_out[:_MAX_LISTED]
     ]
-    lines += [f"and {len(standing_out) - _MOST_NAMED} more stand out"] * (len(standing_out) > _MOST_NAMED)
+    lines += [f"and {len(standing_out) - _MAX_LISTED} more stand out"] * (len(standing_out) > _MAX_LISTED)
     lines += [f"{features[n][0]}: {d.text}" for n, d in drifts.items() if d.verdict != "none"]
     return lines + [f"limits of {v['name']}: {v['outside']} of {v['count']} outside" for v in verdicts] + facts["notes"]
 
@@ -112,15 +112,15 @@ def _judged(line: pl.DataFrame, name: str, limit: ColumnLimits) -> dict[str, Any
     serials = [s for s, out in zip(line.drop_nulls(name)["serial"].to_list(), outside, strict=True) if out]
     return {
         "name": name, "limit": limit, "capability": capability(values, limit.lower, limit.upper),
-        "outside": len(serials), "count": values.size, "serials": serials[:_MOST_NAMED],
+        "outside": len(serials), "count": values.size, "serials": serials[:_MAX_LISTED],
     }  # fmt: skip
 
 
 def _described(line: pl.DataFrame, name: str, about: tuple[str, str]) -> dict[str, Any]:
     values = _values(line, name)
     charted, what = values, "dampers in the order of sessions and serial numbers"
-    if values.size > _MOST_POINTS:
-        together = -(-values.size // _MOST_POINTS)
+    if values.size > _MAX_CHART_POINTS:
+        together = -(-values.size // _MAX_CHART_POINTS)
         charted = np.array([np.median(values[i : i + together]) for i in range(0, values.size, together)])
         what = f"medians of {together} {what}"
     quantiles = np.quantile(values, [0.00135, 0.05, 0.5, 0.95, 0.99865]).tolist()

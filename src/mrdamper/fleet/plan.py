@@ -15,7 +15,7 @@ from mrdamper.fleet.loops import Test, by_test
 
 _SPEED_STEPS = (0.25, 0.5, 0.75, 1.0)  # of the velocity ladder, over the line's highest test speed
 _CANDIDATES = 2  # of the line's start
-_WORTH = 0.02  # relative rise of the squared error by which a parameter counts as determined
+_MIN_COST_RISE = 0.02  # relative rise of the squared error by which a parameter counts as determined
 _RIDGE = 1e-12  # keeps the curvature of what changes nothing invertible
 
 
@@ -117,7 +117,7 @@ def holding(plan: Plan, rows: Sequence[dict[str, Any]]) -> Plan:
         rises = np.median([1 / np.diag(i) for i in inverse], axis=0)
         rises = rises * np.array([rows[0]["changes"][i] for i in free]) ** 2
         rises[[len(parts[i]) > 1 for i in free]] = np.inf
-        if rises.min() > _WORTH:
+        if rises.min() > _MIN_COST_RISE:
             break
         del free[int(np.argmin(rises))]
     held = {parts[i][0] for i in range(len(names)) if i not in free}

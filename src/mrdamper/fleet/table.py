@@ -14,7 +14,7 @@ from mrdamper.fleet.plan import Plan
 if TYPE_CHECKING:
     import polars as pl
 
-_AT_ONCE, _GROUP = 1_000, 10_000  # rows held in memory, and rows of a group in the file
+_ROWS_IN_MEMORY, _ROWS_PER_GROUP = 1_000, 10_000  # rows held in memory, and rows of a group in the file
 TIMES = ("wall_time_s", "cpu_time_s", "finished_time_utc", "host_name")  # differ from run to run; nothing else does
 _TEXT = (
     "serial", "session", "batch", "date", "golden", "rig", "status", "code", "reason", "findings", "lane", "model",
@@ -43,13 +43,13 @@ def write_table(rows: Iterable[dict[str, Any]], parameters: Iterable[str], plan:
         for number, some in enumerate(_chunks(rows)):
             part = pl.DataFrame([_flat(row, forces) for row in some], schema=schema)
             part.write_parquet(parts / f"{number:06}.parquet", compression="zstd")
-        pl.scan_parquet(parts / "*.parquet").sink_parquet(target, compression="zstd", row_group_size=_GROUP)
+        pl.scan_parquet(parts / "*.parquet").sink_parquet(target, compression="zstd", row_group_size=_ROWS_PER_GROUP)
         shutil.rmtree(parts)
 
 
 def _chunks(rows: Iterable[dict[str, Any]]) -> Iterator[list[dict[str, Any]]]:
     left = iter(rows)
-    while some := list(islice(left, _AT_ONCE)):
+    while some := list(islice(left, _ROWS_IN_MEMORY)):
         yield some
 
 

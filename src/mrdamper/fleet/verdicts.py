@@ -21,10 +21,10 @@ FEATURES = {  # by column: what it is called, its unit
     "friction_N": ("friction", "N"),
 }
 _SHAPE = "shape_deviation"
-_FEWEST = 8  # dampers of a line below which nothing stands out, and of a session below which it is no reference
-_OUT = 4.0  # robust standard deviations
-_SURE = 0.01  # significance of a drift
-_MATTERS = 0.005  # relative drift over the whole time below which none is reported
+_MIN_DAMPERS = 8  # dampers of a line below which nothing stands out, and of a session below which it is no reference
+_OUTLIER_DEVIATIONS = 4.0  # robust standard deviations
+_SIGNIFICANCE = 0.01  # significance of a drift
+_MIN_DRIFT = 0.005  # relative drift over the whole time below which none is reported
 _CAUSES = (
     ("gas_force_N", -1, "low gas"),
     ("force_rise_N", -1, "wrong coil or weak fluid"),
@@ -63,7 +63,7 @@ class Suspect:
 
 def suspects(frame: pl.DataFrame) -> list[Suspect]:
     """Dampers more than four robust standard deviations from the line, the rig's sessions taken off."""
-    if frame.height < _FEWEST:
+    if frame.height < _MIN_DAMPERS:
         return []
     names = [name for name in (*FEATURES, _SHAPE) if frame[name].null_count() < frame.height]
     sessions = np.array(frame["session"].to_list())
@@ -74,7 +74,7 @@ def suspects(frame: pl.DataFrame) -> list[Suspect]:
         away[name] = _away(values, sessions)
     suspected = []
     for i, row in enumerate(frame.iter_rows(named=True)):
-        far = {n: z[i] for n, z in away.items() if (z[i] if n == _SHAPE else abs(z[i])) > _OUT}
+        far = {n: z[i] for n, z in away.items() if (z[i] if n == _SHAPE else abs(z[i])) > _OUTLIER_DEVIATIONS}
         if not far:
             continue
         order = sorted(far, key=lambda n: -abs(far[n]))
@@ -90,7 +90,7 @@ def _away(values: Floats, sessions: np.ndarray) -> Floats:
     centred = values - np.nanmedian(values)
     for session in np.unique(sessions):
         inside = sessions == session
-        if np.sum(inside) >= _FEWEST:
+        if np.sum(inside) >= _MIN_DAMPERS:
             centred[inside] = values[inside] - np.nanmedian(values[inside])
     spread = 1.4826 * np.nanmedian(np.abs(centred))
     return np.nan_to_num(centred / max(spread, 1e-300))
@@ -164,7 +164,7 @@ def _trend(share: Floats, means: Floats) -> tuple[float, bool]:
     if np.sum(finite) < 3:
         return np.nan, False
     line: Any = linregress(share[finite], means[finite])
-    return float(line.slope), bool(line.pvalue < _SURE and abs(line.slope) > _MATTERS)
+    return float(line.slope), bool(line.pvalue < _SIGNIFICANCE and abs(line.slope) > _MIN_DRIFT)
 
 
 def clock_findings(frame: pl.DataFrame) -> list[str]:

@@ -16,10 +16,10 @@ from mrdamper.identification.problem import DELAY, Problem, RunCertainty, Soluti
 from mrdamper.physics.motion import Excitation
 from mrdamper.statistics.linear import on_one_blas_thread
 
-_STEP = 1e-6  # of a coordinate, for derivatives
-_WORTH = 4.0  # times what noise gives away to the columns of a hysteresis that is not there
+_DIFFERENCE_STEP = 1e-6  # of a coordinate, for derivatives
+_NOISE_FACTOR = 4.0  # times what noise gives away to the columns of a hysteresis that is not there
 _AT_LEAST = 20.0  # independent samples that any record of a cycle has for this question
-_SHORT = 3.0  # lags of its residual below which a record says little of its own noise
+_MIN_LAGS = 3.0  # lags of its residual below which a record says little of its own noise
 
 
 @on_one_blas_thread
@@ -53,7 +53,7 @@ def certainty_of_run(
     if unseen := _unseen(problem, names, np.column_stack(columns), residual, estimate):
         doubts = [f"no yielding in this motion: {', '.join(unseen)} not identifiable", *doubts]
         shown |= {name: float("inf") for name in shown if name in unseen or name not in problem.free}
-    if estimate.memory < _SHORT and np.any(residual):
+    if estimate.memory < _MIN_LAGS and np.any(residual):
         doubts.append(
             f"the record is only {estimate.memory:.1f} times as long as its noise remembers: "
             "intervals are a guess, record longer"
@@ -84,7 +84,7 @@ def _unseen(
     independent = max(float(errors.effective[place]), _AT_LEAST)
     least = min(float(residual @ residual), float(whole @ whole))
     gain = float(without @ without) / max(least, np.finfo(float).tiny) - 1
-    return searched if gain < _WORTH * (1 + len(searched)) / independent else []
+    return searched if gain < _NOISE_FACTOR * (1 + len(searched)) / independent else []
 
 
 def _sensitivities(
@@ -107,7 +107,7 @@ def _sensitivities(
         if name in linear_columns:
             columns.append(linear_columns[name])
             continue
-        step = _STEP * abs(point[name]) or _STEP
+        step = _DIFFERENCE_STEP * abs(point[name]) or _DIFFERENCE_STEP
         moved = problem.model_type.build({**point, name: point[name] + step})
         columns.append((moved.force(scored, moved.state(motion)[problem.scored]) - base) / step)
     if DELAY in solution.end and DELAY not in solution.at_bounds:
@@ -127,7 +127,7 @@ def _of_parameters(
     at = problem.model_type.build(point)
     slopes = np.zeros((len(missing), len(searched)))
     for k, i in enumerate(searched):
-        step = _STEP * abs(point[names[i]]) or _STEP
+        step = _DIFFERENCE_STEP * abs(point[names[i]]) or _DIFFERENCE_STEP
         moved = problem.model_type.build({**point, names[i]: point[names[i]] + step})
         slopes[:, k] = [(getattr(moved, name) - getattr(at, name)) / step for name in missing]
     block, errors = covariance[np.ix_(searched, searched)], {}

@@ -18,8 +18,8 @@ from mrdamper.identification.loop_analysis import analyse_loop, whole_cycles
 from mrdamper.physics.motion import equivalent_sine, measured_motion
 
 SIDES = ("rebound", "compression")
-_STEPS = 6  # velocities of a ladder nobody gave
-_SLOW = 0.010  # peak velocity [m/s] up to which a test counts as slow: viscous force is then a few newtons
+_DEFAULT_VELOCITIES = 6  # velocities of a ladder nobody gave
+_SLOW_VELOCITY = 0.010  # peak velocity [m/s] up to which a test counts as slow: viscous force is then a few newtons
 _MIDDLE = 0.25  # share of the amplitude around mid-stroke where the force at mid-stroke is read
 
 
@@ -108,7 +108,7 @@ class Characteristics:
         low, high = float(np.median(slowest)), float(np.median(fastest))
         for step in (10.0**power * mantissa for power in range(-5, 3) for mantissa in (1, 2, 2.5, 5)):
             count = np.floor(high / step + 1e-9) - np.ceil(low / step - 1e-9) + 1
-            if 1 <= count <= _STEPS:
+            if 1 <= count <= _DEFAULT_VELOCITIES:
                 return tuple(float(f"{step * (np.ceil(low / step - 1e-9) + i):.6g}") for i in range(int(count)))
         return (float(f"{high:.3g}"),)
 
@@ -188,9 +188,9 @@ def _zero_force_velocity(velocity: Floats, force: Floats) -> float:
 
 
 def _gas_force(strokes: Sequence[Stroke]) -> tuple[float, str]:
-    slow = [s for s in strokes if max(s.peak_velocity) <= _SLOW]
+    slow = [s for s in strokes if max(s.peak_velocity) <= _SLOW_VELOCITY]
     if slow:
-        tests = f"from {len(slow)} slow tests, up to {1e3 * _SLOW:g} mm/s"
+        tests = f"from {len(slow)} slow tests, up to {1e3 * _SLOW_VELOCITY:g} mm/s"
         return float(np.median([s.gas_force for s in slow])), tests
     return float(np.median([s.gas_force for s in strokes])), "from the symmetry of the loops at mid-stroke, median"
 
@@ -200,8 +200,8 @@ def _friction(strokes: Sequence[Stroke]) -> tuple[float, str]:
     half = np.array([(s.mid_force[0] - s.mid_force[1]) / 2 for s in lowest])
     speed = np.array([s.condition.peak_velocity for s in lowest])
     level = f"{lowest[0].condition.current_A:g} A"
-    if speed.min() <= _SLOW:
-        return float(half[speed <= _SLOW].mean()), f"from slow tests at {level}"
+    if speed.min() <= _SLOW_VELOCITY:
+        return float(half[speed <= _SLOW_VELOCITY].mean()), f"from slow tests at {level}"
     if np.ptp(speed) > 0.5 * speed.min() and speed.size >= 3:
         line = np.polyfit(speed, half, 1)
         if line[1] >= 0:

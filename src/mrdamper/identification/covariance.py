@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from mrdamper.data import Floats
 
-_NOTHING = 1e-200  # a variance of nothing, that shares of it can still be divided by
+_MIN_VARIANCE = 1e-200  # a variance of nothing, that shares of it can still be divided by
 _HIGHEST_ORDER = 12  # of the autoregression
 _HARMONICS = 24  # of the motion in which model error is looked for
 _REPEATS = 0.95  # cycles from which harmonics of the motion can be told apart
-_TELLING = 1.9  # cycles from which repeats are seen as such
-_MOST = 2001  # samples that are looked at
-_LONGEST = 0.9995  # correlation of neighbours
+_MIN_CYCLES = 1.9  # cycles from which repeats are seen as such
+_MAX_SAMPLES = 2001  # samples that are looked at
+_MAX_NEIGHBOUR_CORRELATION = 0.9995  # correlation of neighbours
 _TAKES_PART = 0.1  # in a direction, of its unit vector
 _NO_MORE = 1e-12  # of the largest: eigenvalue of the scaled normal matrix below which nothing is known
 
@@ -79,7 +79,7 @@ def spread(
         Of the motion, where it repeats [Hz].
     """
     whole, squares = residual.size, float(residual @ residual)
-    if (block := max(1, whole // _MOST)) > 1:  # means over a few samples keep all that is slower than them
+    if (block := max(1, whole // _MAX_SAMPLES)) > 1:  # means over a few samples keep all that is slower than them
         kept = whole // block * block
         jacobian, residual = (a[:kept].reshape(-1, block, *a.shape[1:]).mean(axis=1) for a in (jacobian, residual))
         time = None if time is None else time[:kept].reshape(-1, block).mean(axis=1)
@@ -151,7 +151,7 @@ def score_covariance(
     total = np.sum([score for score, _ in parts], axis=0)
     # Relative variances of the parts, each by its share of a parameter's variance [Satterthwaite 1946].
     shares = [np.diag(inverse @ score @ inverse) for score, _ in parts]
-    whole = np.maximum(np.sum(shares, axis=0), _NOTHING)
+    whole = np.maximum(np.sum(shares, axis=0), _MIN_VARIANCE)
     doubt = np.sum(
         [np.clip(share / whole, -1e3, 1e3) ** 2 * relative for share, (_, relative) in zip(shares, parts, strict=True)],
         axis=0,
@@ -193,7 +193,7 @@ def _repeated(
     pull = inverse @ responses
     shares = (pull**2 * np.repeat(level, 2)).reshape(count, most, 2).sum(axis=2)
     weights = shares / np.maximum(shares.sum(axis=1, keepdims=True), np.finfo(float).tiny)
-    if np.ptp(time) * frequency < _TELLING:
+    if np.ptp(time) * frequency < _MIN_CYCLES:
         rest = residual  # what does not repeat cannot be told from what would
     return rest, [(lines, np.sum(weights @ relative * weights, axis=1))]
 
@@ -213,7 +213,7 @@ def _power_law(orders: Floats, power: Floats, expected: Floats, left: Floats) ->
         amount = np.sum(power[group] / shapes[:, group], axis=1) / left[group].sum()
         level[:, group] = amount[:, None] * shapes[:, group]
     covered = np.logical_or.reduce(groups) if groups else np.zeros(orders.size, dtype=bool)
-    costs = np.log(np.maximum(level[:, covered], _NOTHING)) @ left[covered]
+    costs = np.log(np.maximum(level[:, covered], _MIN_VARIANCE)) @ left[covered]
     best = level[int(np.argmin(costs))]
     columns = np.column_stack([*[group.astype(float) for group in groups], -logs])
     information = (columns * left[:, None]).T @ columns
@@ -265,7 +265,7 @@ def _autoregression(residual: Floats) -> Floats:
             break
         reflection = -2 * float(ahead @ behind) / power
         if order == 1:  # what a mean taken out hides of a long memory [Kendall 1954, Marriott and Pope 1954]
-            reflection = max(reflection - max(1 - 3 * reflection, 0.0) / size, -_LONGEST)
+            reflection = max(reflection - max(1 - 3 * reflection, 0.0) / size, -_MAX_NEIGHBOUR_CORRELATION)
         forward, backward = ahead + reflection * behind, behind + reflection * ahead
         coefficients = np.concatenate([coefficients + reflection * coefficients[::-1], [reflection]])
         variance *= 1 - reflection**2

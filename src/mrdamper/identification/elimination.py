@@ -23,7 +23,7 @@ from mrdamper.models import Model, Scale, SearchAxis
 from mrdamper.physics.hysteresis.batch import follow_quickly, follow_with_slope
 from mrdamper.statistics.linear import FixedColumns
 
-_DEPENDENT = 1e-10  # share of a squared column below which the others explain all of it
+_MIN_UNEXPLAINED_SHARE = 1e-10  # share of a squared column below which the others explain all of it
 _LENGTH, _ASYMMETRY, _SHARPNESS = "yield_displacement", "asymmetry", "n"  # search coordinates of a shape
 
 
@@ -239,7 +239,7 @@ class Projector:
         along = state @ fixed.basis
         beside = state - fixed.basis @ along
         square = float(beside @ beside)
-        if not square > _DEPENDENT * float(state @ state):
+        if not square > _MIN_UNEXPLAINED_SHARE * float(state @ state):
             return None
         size = float(beside @ fixed.rest) / square
         others = fixed.inverse @ (fixed.along - size * along)

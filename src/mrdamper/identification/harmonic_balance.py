@@ -25,7 +25,7 @@ from mrdamper.statistics.linear import solve_linear
 AmplitudeReading = Literal["first-harmonic", "half-peak-to-peak", "maximum"]
 PhaseReading = Literal["harmonic", "peaks"]
 OffsetReading = Literal["extremes", "mean"]
-_ORDERS = 9  # the first is wanted; the next few must not leak into it where the last cycle is broken
+_FORCE_HARMONICS = 9  # the first is wanted; the next few must not leak into it where the last cycle is broken
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +123,7 @@ def read_force(
         f0 is the mid-point of maximum and minimum (the paper's), or the mean over the cycles.
     """
     # No drift: over a few cycles a line is not orthogonal to the sines and would take part of them.
-    series = fit_harmonics(record.theta, record.force, _ORDERS, frequency=1 / (2 * np.pi), drift=False)
+    series = fit_harmonics(record.theta, record.force, _FORCE_HARMONICS, frequency=1 / (2 * np.pi), drift=False)
     top, bottom = _extremes(record)
     sizes = {
         "first-harmonic": series.amplitude(1),

@@ -12,13 +12,13 @@ from mrdamper.data import Condition, Floats
 from mrdamper.errors import InputError
 from mrdamper.physics.hysteresis.master_curve import gauss_legendre
 
-_ALIKE = 0.98  # correlation from which two parameters are strongly correlated
-_SAME = 0.03  # frequencies and amplitudes this close are one
+_STRONG_CORRELATION = 0.98  # correlation from which two parameters are strongly correlated
+_SAME_MOTION = 0.03  # frequencies and amplitudes this close are one
 _MAX_RATIO = 1e3  # of an interval's half width to its estimate, or of its ends: beyond, it is not identifiable
 NOT_IDENTIFIABLE = "not identifiable from these runs"
-_MANY = 1000.0  # degrees of freedom from which the series of the quantile is exact to rounding
+_SERIES_DEGREES_OF_FREEDOM = 1000.0  # degrees of freedom from which the series of the quantile is exact to rounding
 _NODES = 80  # of Gauss and Legendre's rule
-_MOST_STEPS = 200  # of Newton's method
+_MAX_NEWTON_STEPS = 200  # of Newton's method
 _LOPSIDED = 0.1  # of an interval's half width: shifted by less, it is written with ±
 
 
@@ -42,7 +42,7 @@ def student(level: float, dof: float) -> float:
 @lru_cache(maxsize=256)
 def _student(level: float, dof: float) -> float:
     """Quantile t = √dof tan θ from the integral of cos^(dof − 1) θ; for many degrees of freedom by its series."""
-    if dof > _MANY:
+    if dof > _SERIES_DEGREES_OF_FREEDOM:
         from statistics import NormalDist
 
         z = NormalDist().inv_cdf((1 + level) / 2)
@@ -51,7 +51,7 @@ def _student(level: float, dof: float) -> float:
     whole = 0.5 * math.sqrt(math.pi) * math.exp(math.lgamma(dof / 2) - math.lgamma((dof + 1) / 2))
     nodes, weights = gauss_legendre(_NODES)
     angle = 0.0
-    for _ in range(_MOST_STEPS):  # the integral is concave: Newton's steps come from below
+    for _ in range(_MAX_NEWTON_STEPS):  # the integral is concave: Newton's steps come from below
         reached = angle / 2 * float(weights @ np.cos(angle / 2 * (nodes + 1)) ** (dof - 1))
         step = (level * whole - reached) / max(math.cos(angle) ** (dof - 1), 1e-300)
         angle = min(angle + step, math.pi / 2 - 1e-12)
@@ -151,7 +151,7 @@ def _correlated(covariance: Floats) -> list[tuple[list[int], float]]:
         for a, i in enumerate(finite)
         for j in finite[a + 1 :]
     }
-    links = {pair: r for pair, r in links.items() if abs(r) > _ALIKE}
+    links = {pair: r for pair, r in links.items() if abs(r) > _STRONG_CORRELATION}
     groups: list[set[int]] = []
     for pair in links:
         joined = [group for group in groups if group & set(pair)]
@@ -180,7 +180,7 @@ def _only_one(conditions: Sequence[Condition]) -> str:
         "amplitude": [c.amplitude_m for c in conditions],
         "current": [abs(c.current_A) for c in conditions],
     }
-    single = [name for name, v in values.items() if max(v) - min(v) <= _SAME * max(v)]
+    single = [name for name, v in values.items() if max(v) - min(v) <= _SAME_MOTION * max(v)]
     if "current" in single and max(values["current"]) == 0:
         return " without current" if len(single) == 1 else " from one motion without current"
     if not single or len(single) == 3:

@@ -17,7 +17,7 @@ from mrdamper.tracing.compiled import RecordProgram
 
 _CHANNELS = ("displacement", "velocity", "acceleration", "current", "dt", "turn", "turn_back", "move")
 S = TypeVar("S", bound=Callable[..., Floats])
-_WORTHWHILE = 5_000  # samples of a motion, from which compiled code is used; never the history of the process
+_MIN_COMPILED_SAMPLES = 5_000  # samples of a motion, from which compiled code is used; never the history of the process
 
 
 def recorded(state: S) -> S:
@@ -33,7 +33,7 @@ def recorded(state: S) -> S:
         if not isinstance(motion, Excitation):
             return state(self, motion)
         values = self.values()
-        if len(motion) < _WORTHWHILE or not all(isinstance(value, float | int) for value in values.values()):
+        if len(motion) < _MIN_COMPILED_SAMPLES or not all(isinstance(value, float | int) for value in values.values()):
             return state(self, motion)
         given = tuple(map(float, values.values()))
         records = records_of.setdefault(type(self), [])

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 BUNDLED = "two_rigs"
-_PIECE = 2**18  # samples written at once
+_SAMPLES_PER_CHUNK = 2**18  # samples written at once
 _MOST_RUNS, _RUNS_BYTES = 100_000, 2**26  # of a table of runs
 _KNOWN_RUN_COLUMNS = (
     "run_id", "rig", "excitation", "current_A", "nominal_frequency_Hz", "nominal_amplitude_m",
@@ -303,7 +303,7 @@ def _write_samples(dataset: Dataset, folder: Path) -> None:
     import polars as pl
 
     path = folder / "samples.parquet"
-    if sum(run.time.size for run in dataset) <= 8 * _PIECE:
+    if sum(run.time.size for run in dataset) <= 8 * _SAMPLES_PER_CHUNK:
         pl.concat(_samples(dataset), how="diagonal").write_parquet(path, compression="zstd", statistics=False)
         return
     parts = []
@@ -317,7 +317,7 @@ def _write_samples(dataset: Dataset, folder: Path) -> None:
         for part, schema in zip(parts, schemas, strict=True)
     ]
     pl.concat([table.select(names) for table in tables]).sink_parquet(
-        path, compression="zstd", statistics=False, row_group_size=_PIECE
+        path, compression="zstd", statistics=False, row_group_size=_SAMPLES_PER_CHUNK
     )
     for part in parts:
         part.unlink()
@@ -335,8 +335,8 @@ def _samples(dataset: Dataset) -> Iterable[pl.DataFrame]:
         if run.velocity is not None:
             channels["velocity_m_s"] = run.velocity
         channels |= run.further
-        for start in range(0, run.time.size, _PIECE):
-            inside = slice(start, min(start + _PIECE, run.time.size))
+        for start in range(0, run.time.size, _SAMPLES_PER_CHUNK):
+            inside = slice(start, min(start + _SAMPLES_PER_CHUNK, run.time.size))
             size = inside.stop - inside.start
             columns = {name: np.array(values[inside]) for name, values in channels.items()}
             for values in channels.values():

@@ -15,12 +15,15 @@ from numpy.typing import NDArray
 from mrdamper.statistics.ending import StopReason
 from mrdamper.statistics.linear import Floats
 
-_STEP = 1e-6  # forward difference, relative to the width of the box
+_DIFFERENCE_STEP = 1e-6  # forward difference, relative to the width of the box
 _STIFFEST = 1e12  # damping at which no step is left to try
 _CURVED = 1e-7  # difference of gradients, relative to the width of the box
-_NEAR = 2e-2  # of the box: where a search ended, its minimum is nearer
-_AT_REST, _ROUNDED = 1e-13, 1e-10  # of the box: the end, and where rounding may keep steps from shrinking on
-_PLAIN = 1e-12  # share of the largest curvature
+_NEIGHBOURHOOD = 2e-2  # of the box: where a search ended, its minimum is nearer
+_STEP_TOLERANCE, _ROUNDING_STEP = (
+    1e-13,
+    1e-10,
+)  # of the box: the end, and where rounding may keep steps from shrinking on
+_FLAT_CURVATURE = 1e-12  # share of the largest curvature
 _POLISHING = 25  # steps
 _WORTHLESS = 1e-3  # share of the tolerated gain below which a step is not even tried
 
@@ -144,19 +147,19 @@ def newton_refine(gradient: Callable[[Floats], Floats], point: Floats, lower: Fl
         step = np.zeros(point.size)
         step[free] = -np.linalg.solve(curvature, (slope * width)[free])
         moved = float(np.max(np.abs(step)))
-        if moved < _AT_REST:
+        if moved < _STEP_TOLERANCE:
             break
         refined = np.clip(refined + step * width, lower, upper)
-        if np.max(np.abs(refined - point) / width) > _NEAR:
+        if np.max(np.abs(refined - point) / width) > _NEIGHBOURHOOD:
             return point
         slope = gradient(refined)
-    return refined if moved < _ROUNDED else point
+    return refined if moved < _ROUNDING_STEP else point
 
 
 def _is_plain(curvature: Floats) -> bool:
     """Tell if some direction costs nothing within rounding, or leads down."""
     values = np.linalg.eigvalsh(curvature)
-    return not values[0] > _PLAIN * values[-1]
+    return not values[0] > _FLAT_CURVATURE * values[-1]
 
 
 def forward_differences(
@@ -164,7 +167,7 @@ def forward_differences(
 ) -> Floats:
     """(N, D) derivatives of a residual, which is r at the point, by steps that stay inside the box."""
     width = upper - lower
-    steps = np.where(point + _STEP * width > upper, -_STEP, _STEP) * width
+    steps = np.where(point + _DIFFERENCE_STEP * width > upper, -_DIFFERENCE_STEP, _DIFFERENCE_STEP) * width
     return np.column_stack([(residual(point + s) - r) / d for s, d in zip(np.diag(steps), steps, strict=True)])
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]  # as in `data`, which this room does without
 _WELL_APART = 1e-4  # smallest pivot of equilibrated columns at which the normal equations keep their digits
-_DEPENDENT = 1e-5  # pivot over the largest below which a column is explained by the others
+_MIN_RELATIVE_PIVOT = 1e-5  # pivot over the largest below which a column is explained by the others
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -146,7 +146,7 @@ class FixedColumns:
     def independent(self) -> bool:
         """True if no column is explained by the others."""
         pivots = np.abs(np.diag(self.triangle))
-        return bool(pivots.min(initial=1.0) > _DEPENDENT * pivots.max(initial=1.0))
+        return bool(pivots.min(initial=1.0) > _MIN_RELATIVE_PIVOT * pivots.max(initial=1.0))
 
     @cached_property
     def rest_squared(self) -> float:

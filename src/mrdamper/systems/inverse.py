@@ -27,10 +27,10 @@ from mrdamper.tracing.python import python_functions
 
 _ROUNDS = 2  # of the search after the two ends
 _BLUNT = 0.01  # of the widest reachable interval: below, the current is kept
-_QUICK = 0.1  # of the coil's lag in which the field is brought to where it should be
+_FIELD_TIME_RATIO = 0.1  # of the coil's lag in which the field is brought to where it should be
 _TURNS_BACK = 5e-3  # of the interval that a force may fall back with more current
 _GRID, _MOTION = 6, 960  # currents, samples of the motion they are tried on
-_LARGEST = 1e150  # force whose square is still a number [N]
+_MAX_FORCE_N = 1e150  # force whose square is still a number [N]
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def check_monotone(damper: Damper, highest: float | None = None) -> float:
     except ArithmeticError as error:
         raise ParameterError(f"no force at {high:g} A", where=damper.title, mend="stay within the tests") from error
     width = np.ptp(table, axis=1)
-    if not 0 < width.max() < _LARGEST:
+    if not 0 < width.max() < _MAX_FORCE_N:
         raise ParameterError(
             "the force does not follow the current, or runs away", where=damper.title,
             mend="identify it from tests at several currents", code="E_NOT_MONOTONE",
@@ -130,7 +130,7 @@ def invert_on(
         return Demand(steady, copy.settle(steady)["force"], lowest, most)
     field = tape.remember(f"{prefix}field")
     lag = tape.select(steady > field, coil.rise_s, coil.fall_s)
-    ahead = steady + (steady - field) * lag / np.maximum(_QUICK * lag, 2 * motion["dt"])
+    ahead = steady + (steady - field) * lag / np.maximum(_FIELD_TIME_RATIO * lag, 2 * motion["dt"])
     command = np.minimum(np.maximum(ahead, 0.0), highest)
     felt = field_step(tape, motion["dt"], command, coil.rise_s, coil.fall_s)
     tape.update(field, felt)

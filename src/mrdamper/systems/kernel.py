@@ -22,9 +22,9 @@ from mrdamper.data import Floats
 from mrdamper.errors import ParameterError
 from mrdamper.tracing import Program
 
-_MOST_TRIES = 60  # evaluations of one element in one search
-_MOST_SWEEPS = 50  # over all elements in one step
-_TOLERANCE = 1e-8  # of an element's largest force so far
+_MAX_EVALUATIONS = 60  # evaluations of one element in one search
+_MAX_SWEEPS = 50  # over all elements in one step
+_FORCE_TOLERANCE = 1e-8  # of an element's largest force so far
 
 Step = Callable[..., Any]
 
@@ -174,7 +174,7 @@ def search(evaluate, j, p, d, memory, later, state, free, compliance, current, d
     u = (free * stiff + slope * u0 - f0) / (slope + stiff)  # as if the force went on along its slope
     last_u, last_gap = u, 0.0
     f, flags = f0, 0.0
-    for k in range(_MOST_TRIES):
+    for k in range(_MAX_EVALUATIONS):
         status, f, flags = evaluate(
             j, p, d, memory, later, x0 + 0.5 * dt * (u + u0) + drift, u, (u - u0) / dt, current, dt
         )
@@ -182,7 +182,7 @@ def search(evaluate, j, p, d, memory, later, state, free, compliance, current, d
             return 1, u, f, flags, slope
         line = (free - u) * stiff
         gap = f - line
-        if abs(gap) <= _TOLERANCE * scale or abs(gap) * compliance <= 1e-14 * (abs(u) + abs(free)):
+        if abs(gap) <= _FORCE_TOLERANCE * scale or abs(gap) * compliance <= 1e-14 * (abs(u) + abs(free)):
             return 0, u, line, flags, slope
         if k > 0 and u != last_u:
             slope = max((gap - last_gap) / (u - last_u) - stiff, -0.5 * stiff)
@@ -237,7 +237,7 @@ def walk(
         for j in range(count):
             free[j] = _plus_product(road_rate[i, j], B[j], 2.0 * mean - v[i - 1])
         f[i] = f[i - 1]
-        for _ in range(_MOST_SWEEPS):
+        for _ in range(_MAX_SWEEPS):
             moved = 0.0
             for j in range(count):
                 began = _start_of(j, i, dt, B, road, road_rate, x, v, f)
@@ -252,7 +252,7 @@ def walk(
                 if j > 0:  # the elements before it were solved with its former force
                     moved = max(moved, abs(force - f[i, j]) / scale[j])
                 f[i, j], flags[i, j] = force, flag
-            if moved <= 10 * _TOLERANCE:
+            if moved <= 10 * _FORCE_TOLERANCE:
                 break
         memory[:] = later
         for r in range(n):

@@ -15,8 +15,8 @@ from mrdamper.tracing.compiled.record import address
 from mrdamper.tracing.compiled.writer import PREAMBLE, functions
 
 _LOOP = Path(__file__).with_name("loop.c")
-_TRIED = 40  # steps over which a new library is compared with the interpreter
-_ALIKE = 1e-9  # relative difference allowed there
+_STEPS = 40  # steps over which a new library is compared with the interpreter
+_MAX_RELATIVE_DIFFERENCE = 1e-9  # relative difference allowed there
 
 _EVALUATE = """
 static int evaluate(whole j, const real *p, const real *d, const real *memory, real *later, real x, real v, real a,
@@ -113,18 +113,18 @@ def _alike(
     S = np.array([[1 / (2 / dt * mass + dt / 2 * stiffness)]])
     B, H = np.ones((count, 1)), np.zeros((0 if control is None else len(control.program.tape.inputs) - 1, 2 + count))
     R = S @ B.T
-    turns = np.linspace(0.0, 4.0, _TRIED)[:, None]
+    turns = np.linspace(0.0, 4.0, _STEPS)[:, None]
     loads = S[0, 0] * 500.0 * np.sin(turns)
-    still = np.zeros((_TRIED, count))
+    still = np.zeros((_STEPS, count))
     results = []
     for walk in (one, other):
-        x, v = np.zeros((2, _TRIED, 1))
-        f, flags = np.zeros((2, _TRIED, count))
-        currents = np.full((_TRIED, count), 0.1)
+        x, v = np.zeros((2, _STEPS, 1))
+        f, flags = np.zeros((2, _STEPS, count))
+        currents = np.full((_STEPS, count), 0.1)
         try:
             failed = walk(
                 dt, 1, S * 2 / dt * mass, -S * stiffness, R, B @ R, B, loads, still, still.copy(), H,
-                np.zeros((_TRIED, H.shape[0])), numbers.given, numbers.derived, numbers.start.copy(), law.given,
+                np.zeros((_STEPS, H.shape[0])), numbers.given, numbers.derived, numbers.start.copy(), law.given,
                 law.derived, law.start, currents, x, v, f, flags,
             )  # fmt: skip
         except (ValueError, ArithmeticError):
@@ -132,4 +132,4 @@ def _alike(
         results.append((failed, np.column_stack([x, v, f, currents])))
     (failed, motion), (expected, reference) = results
     size = np.abs(reference).max(axis=0) + 1e-30
-    return failed == expected and bool(np.all(np.abs(motion - reference) <= _ALIKE * size))
+    return failed == expected and bool(np.all(np.abs(motion - reference) <= _MAX_RELATIVE_DIFFERENCE * size))

@@ -17,7 +17,7 @@ from mrdamper.systems.result import Simulation
 from mrdamper.systems.simulate import SystemLoop, changed
 
 LEVELS = (0.05, 0.5, 0.95)
-_MOST = 100_000
+_MAX_DRAWS = 100_000
 _MOST_LOST = 0.1  # share of draws without a solution, from which bands say nothing
 _LEAST_DOF = 3.0  # below, a Student spread has no variance
 
@@ -64,8 +64,8 @@ def draw(dampers: Mapping[str, Damper], count: int, seed: int = 1) -> list[dict[
         By link, with `certainty`.
     count, seed : int
     """
-    if not 2 <= count <= _MOST:
-        raise InputError(f"{count} draws", mend=f"give 2 to {_MOST:,}", code="E_DRAWS")
+    if not 2 <= count <= _MAX_DRAWS:
+        raise InputError(f"{count} draws", mend=f"give 2 to {_MAX_DRAWS:,}", code="E_DRAWS")
     rng = np.random.default_rng(seed)
     shared: dict[int, list[dict[str, float]]] = {}
     draws: list[dict[str, Draw]] = [{} for _ in range(count)]

@@ -10,7 +10,7 @@ from mrdamper.dampers.base import Damper
 from mrdamper.dampers.streaming import stepper
 from mrdamper.errors import ParameterError
 
-_SAMPLES = 4000
+_STEP_SAMPLES = 4000
 _SETTLE = 12.0  # lags of the coil after which nothing changes any more
 
 
@@ -41,8 +41,8 @@ def rise_times(damper: Damper, current: float | None = None, velocity: float | N
     current = damper.envelope.current_A[1] if current is None else current
     velocity = 0.5 * damper.envelope.peak_velocity_m_s[1] if velocity is None else velocity
     lag = max(damper.coil.rise_s, damper.coil.fall_s, 1e-3) if damper.coil else 1e-3
-    dt = 2 * _SETTLE * lag / _SAMPLES
-    half = _SAMPLES // 2
+    dt = 2 * _SETTLE * lag / _STEP_SAMPLES
+    half = _STEP_SAMPLES // 2
     steps = stepper(damper)
     travel = 3.0  # settled in the knee and at constant speed, before anything is switched
     begin = np.linspace(-travel * _SETTLE * lag, 0.0, 2000)

@@ -25,13 +25,13 @@ from mrdamper.systems.result import HALVING, Simulation
 from mrdamper.systems.structure import System
 
 PERIOD = 1e-3  # s between two looks of a control law, as usual on a real-time target
-_COARSEST, _FINEST = 1e-3, 1e-5  # s
-_FALLS = 0.7  # of the change before, to which a change has to fall from the third halving on
-_MOST_HALVED = 1_000_000  # samples, beyond which a step is not halved again
-_STEPS_A_PERIOD = 40  # of the highest natural frequency, to begin with
-_LINES = 1_000_000  # that the interpreter may walk; more is worth compiling
-_LINES_A_STEP = 60  # of the loop itself
-_MOST_STEPS = 20_000_000
+_MAX_STEP_S, _MIN_STEP_S = 1e-3, 1e-5  # s
+_MAX_CHANGE_RATIO = 0.7  # of the change before, to which a change has to fall from the third halving on
+_MAX_HALVED_SAMPLES = 1_000_000  # samples, beyond which a step is not halved again
+_STEPS_PER_PERIOD = 40  # of the highest natural frequency, to begin with
+_MAX_INTERPRETED_LINES = 1_000_000  # that the interpreter may walk; more is worth compiling
+_LINES_PER_STEP = 60  # of the loop itself
+_MAX_STEPS = 20_000_000
 
 
 @checked("step")
@@ -86,8 +86,10 @@ def simulate_system(
         fine = loop.run(dt / 2)
         change = changed(coarse, fine)
         first = change if first is None else first
-        lost = dt <= first_step / 4 and change > _FALLS * last  # sensitive to the smallest change: no step will do
-        if change <= HALVING or dt / 2 <= _FINEST or fine.time.size > _MOST_HALVED or lost:
+        lost = (
+            dt <= first_step / 4 and change > _MAX_CHANGE_RATIO * last
+        )  # sensitive to the smallest change: no step will do
+        if change <= HALVING or dt / 2 <= _MIN_STEP_S or fine.time.size > _MAX_HALVED_SAMPLES or lost:
             break
         coarse, dt, last = fine, dt / 2, change
     if step is not None and dt < step:
@@ -142,7 +144,7 @@ class SystemLoop:
     def first_step(self) -> float:
         """The step to begin with: the input's, the highest mode's share, or a millisecond."""
         highest = float(self.system.frequencies_Hz().max())
-        step = min(_COARSEST, self.source.step, 1 / (_STEPS_A_PERIOD * highest) if highest else _COARSEST)
+        step = min(_MAX_STEP_S, self.source.step, 1 / (_STEPS_PER_PERIOD * highest) if highest else _MAX_STEP_S)
         whole = self.period if self.control.program else self.source.step
         return whole / math.ceil(whole / step - 1e-9)
 
@@ -161,16 +163,16 @@ class SystemLoop:
             Other parameters of the links than the dampers' own.
         """
         system, n = self.system, len(self.system.coordinates)
-        samples = int(min(self.source.duration / dt, 2.0 * _MOST_STEPS) + 1e-6) + 1 if 0 < dt < math.inf else 0
-        if not 2 < samples <= _MOST_STEPS:
+        samples = int(min(self.source.duration / dt, 2.0 * _MAX_STEPS) + 1e-6) + 1 if 0 < dt < math.inf else 0
+        if not 2 < samples <= _MAX_STEPS:
             raise StepError(
                 f"{self.source.duration:g} s in steps of {dt:g} s",
                 where=system.name,
-                mend=f"between two and {_MOST_STEPS:,} steps",
+                mend=f"between two and {_MAX_STEPS:,} steps",
             )
         if machine is None:
-            lines = _LINES_A_STEP + 3 * sum(stage.lines for stage in (*self.stages, *self._controllers))
-            machine = 3 * samples * lines > _LINES  # this run, and one at half
+            lines = _LINES_PER_STEP + 3 * sum(stage.lines for stage in (*self.stages, *self._controllers))
+            machine = 3 * samples * lines > _MAX_INTERPRETED_LINES  # this run, and one at half
         time: Floats = dt * np.arange(samples, dtype=np.float64)
         ground, road, road_rate = self._driven(time)
         load = self._load(ground, road, road_rate)

@@ -15,7 +15,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import StructureError, UnknownNameError, check_fields, checked
 
-_FASTEST = 2e3  # natural frequency [Hz]: beyond, a unit is wrong, and a second takes over 80,000 steps
+_MAX_FREQUENCY_HZ = 2e3  # natural frequency [Hz]: beyond, a unit is wrong, and a second takes over 80,000 steps
 _SYMMETRY = 1e-9  # relative difference of K and K' that rounding may leave
 
 
@@ -73,7 +73,7 @@ class System:
             self._require(keeps, problem, "check the signs off the diagonal", _CODES[letter])
         highest = float(self.frequencies_Hz().max(initial=0.0))
         problem = f"a natural frequency of {highest:.3g} Hz"
-        self._require(highest < _FASTEST, problem, "check the units of masses and stiffnesses", _CODES["K"])
+        self._require(highest < _MAX_FREQUENCY_HZ, problem, "check the units of masses and stiffnesses", _CODES["K"])
         for link in self.links:
             for end in (link.above, link.below):
                 problem = f"{link.role} {link.name} hangs on {end!r}, which does not exist"

@@ -26,7 +26,7 @@ def own_cache(tmp_path, monkeypatch):
     """A cache of this test, and nothing remembered from another."""
     monkeypatch.setenv(cache.FOLDER, str(tmp_path / "cache"))
     monkeypatch.delenv(compilers.VARIABLE, raising=False)
-    monkeypatch.setattr(record, "_WORTHWHILE", 0)
+    monkeypatch.setattr(record, "_MIN_COMPILED_LINES", 0)
     for name in ("_loaded", "_unusable"):
         monkeypatch.setattr(cache, name, {})
     return tmp_path / "cache"
@@ -176,7 +176,7 @@ def test_the_cache_is_bounded_and_the_oldest_go_first(own_cache, monkeypatch):
     along(lag())
     (old,) = libraries(own_cache)
     os.utime(old, (1, 1))
-    monkeypatch.setattr(cache, "_LARGEST", int(1.5 * old.stat().st_size))
+    monkeypatch.setattr(cache, "_MAX_CACHE_BYTES", int(1.5 * old.stat().st_size))
     along(lag(7.0))
     assert len(libraries(own_cache)) == 1
     assert not old.exists()
@@ -194,7 +194,7 @@ def test_two_processes_compile_the_same_at_once(own_cache):
     code = (
         "import sys; sys.path.insert(0, sys.argv[1]); import test_cache as t;"
         "from mrdamper.tracing.compiled import record;"
-        "record._WORTHWHILE = 0; import hashlib; print(hashlib.sha256(t.along(t.lag()).tobytes()).hexdigest())"
+        "record._MIN_COMPILED_LINES = 0; import hashlib; print(hashlib.sha256(t.along(t.lag()).tobytes()).hexdigest())"
     )
     command = [sys.executable, "-c", code, str(Path(__file__).parent)]
     running = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(2)]

@@ -25,7 +25,7 @@ from mrdamper.statistics.ending import StopReason
 from mrdamper.statistics.levenberg_marquardt import least_squares
 from mrdamper.statistics.linear import solve_bounded
 
-_FEWEST = 3  # one harmonic gives two equations, for at least four unknowns
+_MIN_HARMONICS = 3  # one harmonic gives two equations, for at least four unknowns
 
 
 @dataclass(frozen=True)
@@ -49,10 +49,10 @@ class Balance(Method):
     harmonics: int = 15
 
     def __post_init__(self) -> None:
-        if self.harmonics < _FEWEST:
+        if self.harmonics < _MIN_HARMONICS:
             raise IdentificationError(
                 f"{self.harmonics} harmonics cannot determine viscosity, stiffness and two numbers of a loop",
-                mend=f"use {_FEWEST} or more",
+                mend=f"use {_MIN_HARMONICS} or more",
             )
 
     def solve(self, problem: Problem) -> Solution:

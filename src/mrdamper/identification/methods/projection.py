@@ -32,7 +32,7 @@ from mrdamper.statistics.one_number import least_squares_in_one
 
 _GRID_SAMPLES = 1500  # the grid only has to find the valley
 _GRID_SAMPLES_A_CYCLE, _GRID_CYCLES = 100, 3  # where all shapes are tried at once
-_LONG = 40_000  # samples from which the search of a model that is stepped is rehearsed on a piece
+_LONG_RECORD_SAMPLES = 40_000  # samples from which the search of a model that is stepped is rehearsed on a piece
 _PIECE_CYCLES, _PIECE_SAMPLES_A_CYCLE = 5, 500
 
 
@@ -59,7 +59,7 @@ class Projection(Method):
             projected = _project(problem, {})
             return Solution(projected.model, 0.0, projected.at_bounds, {}, {}, 1, StopReason.SOLVED)
         elimination = Elimination.of(problem, axes)
-        if problem.model_type.integrated and problem.force.size > _LONG:
+        if problem.model_type.integrated and problem.force.size > _LONG_RECORD_SAMPLES:
             piece = self.solve(_last_cycles(problem))
             starts = [np.array([axis.coordinate(piece.end[axis.name]) for axis in axes])]
             evaluated = piece.evaluations

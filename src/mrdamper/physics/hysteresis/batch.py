@@ -20,7 +20,7 @@ from mrdamper.physics.hysteresis.shape import Shape
 from mrdamper.physics.motion import Path
 from mrdamper.statistics.linear import FixedColumns
 
-_AT_ONCE = 2**17  # states held at a time
+_MAX_STATES = 2**17  # states held at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,7 @@ def products(path: Path, fixed: FixedColumns, shapes: Shape) -> Products:
     sums = np.empty((kappa.size, fixed.basis.shape[1] + 2))
     for value in dict.fromkeys(rho.tolist()):
         alike = np.flatnonzero(rho == value)
-        few = max(1, _AT_ONCE // len(path))
+        few = max(1, _MAX_STATES // len(path))
         for part in (alike[i : i + few] for i in range(0, alike.size, few)):
             zeta = follow_alike(shapes.n, value, kappa[part], path)[:, first:]
             sums[part, :-2] = zeta @ fixed.basis

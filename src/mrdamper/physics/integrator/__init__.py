@@ -22,7 +22,7 @@ from mrdamper.tracing.compiled import RecordProgram
 from mrdamper.tracing.functions import Step
 
 _RUNAWAY = 1e6  # state over its scale
-_MOST_STEPS = 20_000  # between two samples of a record
+_MAX_STEPS_PER_SAMPLE = 20_000  # between two samples of a record
 
 
 @streamed(integrate_step)
@@ -89,7 +89,7 @@ def integrate(
     )
     if lost.size or states_along.failed >= 0:
         at = int(lost[0]) if lost.size else states_along.failed
-        why = "runs away" if lost.size else f"needs more than {_MOST_STEPS:_} steps".replace("_", " ")
+        why = "runs away" if lost.size else f"needs more than {_MAX_STEPS_PER_SAMPLE:_} steps".replace("_", " ")
         raise ParameterError(
             f"the model's state {why} between samples {at - 1} and {at} ({time[at]:.4g} s)",
             mend="its parameters are too stiff or unstable; bring them nearer to the data's scales",
@@ -130,6 +130,6 @@ def _traced(rate: Rate, states: int, given: tuple[float, ...]) -> Any:
         (0.0,) * states,
         numbers[own:-1],
         tolerance=numbers[-1],
-        most=_MOST_STEPS,
+        most=_MAX_STEPS_PER_SAMPLE,
     )
     return program(tape, {f"state{i}": value for i, value in enumerate(out)})

@@ -15,7 +15,7 @@ from mrdamper.tracing import Tape
 
 Rate = Callable[[Any, Any, Any, Any, Any, Any], None]
 MOST_STEPS = 400  # between two samples; a sound model takes a handful
-_NUDGE, _LATER = 1e-7, 1e-5  # for derivatives by differences
+_STATE_DIFFERENCE, _TIME_DIFFERENCE = 1e-7, 1e-5  # for derivatives by differences
 
 
 class _Columns(list):
@@ -100,11 +100,11 @@ def _rodas3(
     f = slopes(t, y)
     columns = []
     for j in order:
-        nudge = _NUDGE * sizes[j]
+        nudge = _STATE_DIFFERENCE * sizes[j]
         moved = slopes(t, [y[i] + nudge if i == j else y[i] for i in order])
         columns.append([(moved[i] - f[i]) / nudge for i in order])
-    later = slopes(t + _LATER * h, y)
-    slope = [(later[i] - f[i]) / _LATER for i in order]
+    later = slopes(t + _TIME_DIFFERENCE * h, y)
+    slope = [(later[i] - f[i]) / _TIME_DIFFERENCE for i in order]
     solve = _solver([[columns[j][i] for j in order] for i in order], h)
     k0 = solve([f[i] + 0.5 * slope[i] for i in order])
     k1 = solve([f[i] + 4 / h * k0[i] + 1.5 * slope[i] for i in order])

@@ -16,9 +16,11 @@ from mrdamper.data import Floats
 from mrdamper.statistics.linear import solve_linear
 
 _FEW = 250  # samples on which a frequency is found to begin with
-_BLOCK = 50_000  # samples whose waves are held at a time
-_ENOUGH = 16  # samples between two changes of sign that the strongest line of a long record is found with
-_PADDED = 2**20  # samples of a spectrum, at most, for the sake of finer lines
+_SAMPLES_PER_BLOCK = 50_000  # samples whose waves are held at a time
+_SAMPLES_PER_HALF_PERIOD = (
+    16  # samples between two changes of sign that the strongest line of a long record is found with
+)
+_MAX_SPECTRUM_SAMPLES = 2**20  # samples of a spectrum, at most, for the sake of finer lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +49,7 @@ class HarmonicSeries:
     def __call__(self, time: ArrayLike, derivative: int = 0) -> Floats:
         """Evaluate the series (or a derivative with respect to time) at the given times."""
         given = np.asarray(time, dtype=float)
-        if given.ndim == 1 and given.size > _BLOCK:
+        if given.ndim == 1 and given.size > _SAMPLES_PER_BLOCK:
             return np.concatenate([self(given[part], derivative) for part in _blocks(given.size)])
         t = given - self.origin
         omega = 2 * np.pi * self.frequency
@@ -144,7 +146,7 @@ def _refined(t: Floats, signal: Floats, frequency: float, orders: int, tolerance
 
 def _solved(size: int, signal: Floats, rows: Callable[[slice], Floats]) -> Floats:
     """Least-squares coefficients of some rows over the samples; long records block by block, as triangles."""
-    if size <= _BLOCK:
+    if size <= _SAMPLES_PER_BLOCK:
         return solve_linear(rows(slice(None)).T, signal)
     triangle: Floats = np.empty((0, rows(slice(0, 1)).shape[0] + 1))
     for part in _blocks(size):
@@ -154,7 +156,7 @@ def _solved(size: int, signal: Floats, rows: Callable[[slice], Floats]) -> Float
 
 
 def _blocks(size: int) -> Iterator[slice]:
-    return (slice(begin, begin + _BLOCK) for begin in range(0, size, _BLOCK))
+    return (slice(begin, begin + _SAMPLES_PER_BLOCK) for begin in range(0, size, _SAMPLES_PER_BLOCK))
 
 
 def _single_sine_costs(t: Floats, signal: Floats, frequencies: Floats) -> Floats:
@@ -172,16 +174,16 @@ def _spectral_line(time: Floats, signal: Floats) -> float:
 
     A long record is thinned to the samples its changes of sign need.
     """
-    if time.size > _BLOCK:
+    if time.size > _SAMPLES_PER_BLOCK:
         often = _crossings(signal - float(np.mean(signal)))
-        every = max(1, time.size // max(_BLOCK, _ENOUGH * often))
+        every = max(1, time.size // max(_SAMPLES_PER_BLOCK, _SAMPLES_PER_HALF_PERIOD * often))
         time, signal = time[::every], signal[::every]
     size = time.size
     wave = np.interp(np.linspace(time[0], time[-1], size), time, signal)
     place = np.arange(size) - (size - 1) / 2
     wave = wave - wave.mean() - place * (place @ wave / (place @ place))
     window = np.hanning(size + 2)[1:-1] if _crossings(wave) > 4 else np.ones(size)
-    padded = max(size, min(8 * size, _PADDED))
+    padded = max(size, min(8 * size, _MAX_SPECTRUM_SAMPLES))
     power = np.abs(np.fft.rfft(wave * window, padded)) ** 2
     power[: max(1, padded // size // 2)] = 0.0
     peak = int(np.argmax(power))

@@ -14,8 +14,8 @@ from mrdamper.physics.motion.measured import measured_motion
 
 SINE_DISTORTION_LIMIT = 0.05  # above it a motion is no sine for harmonic balance
 STRAY_LIMIT = 0.3  # of the RMS displacement; what no harmonic explains: above it another motion runs beside the sine
-_ORDERS = 7  # harmonics a measured motion is described by
-_STILL = 1e-9  # a displacement that moves less does not move [m]
+_MEASURED_HARMONICS = 7  # harmonics a measured motion is described by
+_MIN_DISPLACEMENT_M = 1e-9  # a displacement that moves less does not move [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,13 +68,15 @@ def analyse_motion(run: Run) -> MotionAnalysis:
     """
     run = run.steady()
     where = f"run {run.id}"
-    if np.ptp(run.displacement) < _STILL:
+    if np.ptp(run.displacement) < _MIN_DISPLACEMENT_M:
         raise ExcitationError("the displacement does not move", where=where, mend="check the channel")
     try:
         frequency = fundamental_frequency(run.time, run.displacement)
     except np.linalg.LinAlgError as error:
         raise ExcitationError("too few samples for a sine", where=where, mend="record a full cycle") from error
-    orders = _ORDERS if np.ptp(run.time) * frequency > 2 else 3  # harmonics of a short record overlap its drift
+    orders = (
+        _MEASURED_HARMONICS if np.ptp(run.time) * frequency > 2 else 3
+    )  # harmonics of a short record overlap its drift
     series = fit_harmonics(run.time, run.displacement, orders, frequency=frequency)
     cycles = float(np.ptp(run.time) * series.frequency)
     if cycles < 0.95:
@@ -128,7 +130,7 @@ def equivalent_sine(run: Run) -> EquivalentSine:
     try:
         analysis = analyse_motion(run)
     except ExcitationError:
-        if np.ptp(centred) < _STILL:
+        if np.ptp(centred) < _MIN_DISPLACEMENT_M:
             raise
         analysis = None
     # A ramp leaves no residual either: its drift explains it all, and the swing is nothing.

@@ -18,7 +18,7 @@ import numpy as np
 from mrdamper.data import Condition, Floats, same_motion
 
 _SLEEK = 0.05  # width of a hull in the logarithm below which it is a segment: tests repeat a motion to some per cent
-_LEAST = 1e-12  # frequency [Hz] and amplitude [m] that stand for zero in the logarithm
+_ZERO_IN_LOGARITHM = 1e-12  # frequency [Hz] and amplitude [m] that stand for zero in the logarithm
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class MotionHull:
         """Frequency [Hz] and amplitude [m] of the nearest motion of the hull; arrays and traced numbers alike."""
         if len(self.corners) == 1:
             return self.corners[0]
-        u, w = (np.log(np.maximum(value, _LEAST)) for value in (frequency, amplitude))
+        u, w = (np.log(np.maximum(value, _ZERO_IN_LOGARITHM)) for value in (frequency, amplitude))
         corners = np.log(self.corners)
         inside: Any = None
         nearest: tuple[Any, Any, Any] | None = None

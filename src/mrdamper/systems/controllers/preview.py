@@ -14,7 +14,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.systems.controllers.base import Controller, Sensors
 
-_SETTLED = 1e-13  # relative change at which the Riccati recursion has ended
+_RICCATI_TOLERANCE = 1e-13  # relative change at which the Riccati recursion has ended
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class NonCausalOptimum(Controller):
                 closed = F - G @ K
                 before = closed.T @ P @ closed + Y.T @ Y
                 before = 0.5 * (before + before.T)
-                settled = bool(np.abs(before - P).max() <= _SETTLED * np.abs(P).max())
+                settled = bool(np.abs(before - P).max() <= _RICCATI_TOLERANCE * np.abs(P).max())
             push = P[:, :n] @ driven[k] + p
             gains[k], offsets[k] = K, short @ push
             P, p = before, closed.T @ push + Y.T @ aimed[k - 1]

@@ -23,7 +23,7 @@ from mrdamper.tracing.compiled.compilers import SCRATCH, Compiler, find_compiler
 
 FOLDER = "MRDAMPER_CACHE"  # environment variable: where compiled libraries are kept
 _SUFFIX = ".lib"
-_LARGEST = 64 * 2**20  # bytes of all libraries
+_MAX_CACHE_BYTES = 64 * 2**20  # bytes of all libraries
 _DAY = 86_400.0  # s
 _GIVEN_UP = 3_600.0  # s for which a compiler that failed is not tried again
 _KEY = "mrdamper_source"  # name of the constant by which a library says what it was made of
@@ -251,6 +251,6 @@ def _bound(folder: Path) -> None:
             sizes.append((path.stat().st_mtime, path.stat().st_size, path))
     for _, size, path in sorted(sizes, key=lambda entry: entry[0], reverse=True):
         kept += size
-        if kept > _LARGEST:
+        if kept > _MAX_CACHE_BYTES:
             with suppress(OSError):
                 path.unlink()

@@ -23,7 +23,7 @@ _NAMES = ("cc", "gcc", "clang", "cl")
 # No contraction and no unsafe mathematics: the same numbers as the interpreter's, on every processor.
 _FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden", "-fPIC", "-shared", "-w")
 _VISUAL = ("/nologo", "/O2", "/fp:precise", "/LD", "/w")
-_PATIENCE = 60.0  # s, after which a compiler is given up
+_COMPILE_TIMEOUT_S = 60.0  # s, after which a compiler is given up
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Compiler:
         """The command as it is typed."""
         return " ".join(self.command)
 
-    def compile(self, source: str, parent: Path | None = None, patience: float = _PATIENCE) -> Built:
+    def compile(self, source: str, parent: Path | None = None, patience: float = _COMPILE_TIMEOUT_S) -> Built:
         """Make a shared library of one source in a folder beneath `parent`; stops after `patience` [s]."""
         with tempfile.TemporaryDirectory(prefix=SCRATCH, dir=parent, ignore_cleanup_errors=True) as name:
             folder = Path(name)

@@ -17,9 +17,9 @@ from mrdamper.tracing.compiled.writer import record_source
 from mrdamper.tracing.python import python_functions, python_source
 
 Floats = NDArray[np.float64]
-_WORTHWHILE = 1_000_000  # lines of a program walked in the interpreter, from which compiling pays
-_TRIED = 24  # samples on which a new library is compared with the interpreter
-_ALIKE = 1e-9  # relative difference allowed there
+_MIN_COMPILED_LINES = 1_000_000  # lines of a program walked in the interpreter, from which compiling pays
+_COMPARED_SAMPLES = 24  # samples on which a new library is compared with the interpreter
+_MAX_DIFFERENCE = 1e-9  # relative difference allowed there
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ class RecordProgram:
         arrays = [np.asarray(channel, dtype=float) for channel in channels]
         size = arrays[0].size
         self._walked += size * self._lines
-        if self._walked > _WORTHWHILE and (library := self._library) is not None:
+        if self._walked > _MIN_COMPILED_LINES and (library := self._library) is not None:
             return _compiled_along(library, self.program, given, derived, memory, arrays)
         return self.interpreted_along(given, derived, memory, arrays)
 
@@ -132,8 +132,8 @@ class RecordProgram:
 
     def _holds(self, library: ctypes.CDLL) -> bool:
         """Tell if a library computes the same as the interpreter on a short motion."""
-        turns = np.linspace(0.1, 6.0, _TRIED)
-        values: Mapping[str, Floats] = {"dt": np.full(_TRIED, 1e-3), "current": 0.5 + 0.1 * turns}
+        turns = np.linspace(0.1, 6.0, _COMPARED_SAMPLES)
+        values: Mapping[str, Floats] = {"dt": np.full(_COMPARED_SAMPLES, 1e-3), "current": 0.5 + 0.1 * turns}
         arrays = [values.get(name, (1 + k) * 1e-2 * np.sin(turns)) for k, name in enumerate(self.program.tape.inputs)]
         given = [float(e.value) for e in self.program.tape.parameters.values()]
         derived = self.prepare(given)
@@ -143,11 +143,11 @@ class RecordProgram:
         expected = self.interpreted_along(given, derived, self.starts, arrays)
         if outputs.failed != expected.failed:
             return False
-        size = _TRIED if expected.failed < 0 else expected.failed
+        size = _COMPARED_SAMPLES if expected.failed < 0 else expected.failed
         wanted = expected.outputs[:, :size]
         if not np.isfinite(wanted).all():
             return True
-        room = _ALIKE * np.abs(wanted).max(axis=1, keepdims=True, initial=0.0)
+        room = _MAX_DIFFERENCE * np.abs(wanted).max(axis=1, keepdims=True, initial=0.0)
         return bool(np.all(np.abs(outputs.outputs[:, :size] - wanted) <= room))
 
 

@@ -168,7 +168,7 @@ class ArrayWriter(CWriter):
         return "".join(f"    {line}\n" for line in lines)
 
 
-_SLOW = frozenset({"dt", "current"})  # inputs that stay the same from sample to sample more often than not
+_SLOW_INPUTS = frozenset({"dt", "current"})  # inputs that stay the same from sample to sample more often than not
 _DEAR = frozenset({"divide", "power", "sqrt", "exp", "expm1", "log", "log1p", "tan", "arctan", "tanh", "arctanh"})
 
 
@@ -180,7 +180,7 @@ def _slow_needs(program: Program) -> tuple[dict[Expression, frozenset[str]], dic
         if not isinstance(node, Expression) or node.op in ("memory", "carry", "result", "lookup"):
             continue
         if node.op == "input":
-            if node.name in _SLOW:
+            if node.name in _SLOW_INPUTS:
                 needs[node] = frozenset({node.name})
             continue
         parts = [part for part in node.args if isinstance(part, Expression)]
