@@ -82,8 +82,8 @@ EXPLAINED = (
         "Div → Mult",
         "the space columns span does not depend on their lengths",
     ),
-    Explained("functions.fitting", "or 1.0)", "1.0 → 10.0", "nothing over any number is nothing"),
-    Explained("functions.fitting", "grid", "", _BUDGET),
+    Explained("statistics.functions.fitting", "or 1.0)", "1.0 → 10.0", "nothing over any number is nothing"),
+    Explained("statistics.functions.fitting", "grid", "", _BUDGET),
     Explained("identification.harmonic_balance", '"peaks":', "arguments", _ORDER),
     Explained(
         "identification.harmonic_balance", '"peaks":', "Sub → Add", "half a turn forth or back is the same angle"
