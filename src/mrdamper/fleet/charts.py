@@ -26,7 +26,7 @@ _RESAMPLES, _SEED = 1000, 20240813  # of the bootstrap
 
 
 @dataclass(frozen=True, eq=False)
-class Chart:
+class ControlChart:
     """A control chart."""
 
     values: Floats  # (N,) what is charted
@@ -40,16 +40,16 @@ class Chart:
         return tuple(np.flatnonzero((self.values < self.lower) | (self.values > self.upper)).tolist())
 
 
-def individuals(values: Floats) -> tuple[Chart, Chart]:
+def individuals(values: Floats) -> tuple[ControlChart, ControlChart]:
     """Individuals and moving ranges of two [NIST 6.3.2.2]."""
     ranges = np.abs(np.diff(values))
     mean, spread = float(np.mean(values)), float(np.mean(ranges)) if ranges.size else 0.0
     ones = np.ones(values.size)
-    first = Chart(values, (mean - 3 * spread / _D2) * ones, (mean + 3 * spread / _D2) * ones, mean)
-    return first, Chart(ranges, 0 * ranges, _D4 * spread * np.ones(ranges.size), spread)
+    first = ControlChart(values, (mean - 3 * spread / _D2) * ones, (mean + 3 * spread / _D2) * ones, mean)
+    return first, ControlChart(ranges, 0 * ranges, _D4 * spread * np.ones(ranges.size), spread)
 
 
-def ewma(values: Floats, target: float, deviation: float, weight: float = 0.2, width: float = 3.0) -> Chart:
+def ewma(values: Floats, target: float, deviation: float, weight: float = 0.2, width: float = 3.0) -> ControlChart:
     """Exponentially weighted moving average, limits for each point's own age [NIST 6.3.2.4].
 
     Target and deviation are the mean and standard deviation of the process in control, `weight` is λ of the newest
@@ -60,7 +60,7 @@ def ewma(values: Floats, target: float, deviation: float, weight: float = 0.2, w
         averages[i] = last = weight * value + (1 - weight) * last
     age = np.arange(1, values.size + 1)
     half = width * deviation * np.sqrt(weight / (2 - weight) * (1 - (1 - weight) ** (2 * age)))
-    return Chart(averages, target - half, target + half, target)
+    return ControlChart(averages, target - half, target + half, target)
 
 
 @dataclass(frozen=True)
