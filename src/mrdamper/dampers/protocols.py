@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.data.parameters import ParameterInfo
@@ -11,6 +11,8 @@ from mrdamper.data.parameters import ParameterInfo
 
 class DamperLike(Protocol):
     """Properties and methods of a `Damper` that its parts use."""
+
+    streams: ClassVar[bool]  # it has a form for one sample
 
     @property
     def title(self) -> str:
@@ -30,11 +32,6 @@ class DamperLike(Protocol):
     @property
     def certainty(self) -> Any:
         """Uncertainty of the parameters, or None."""
-        ...
-
-    @property
-    def streams(self) -> bool:
-        """True if it has a form for one sample."""
         ...
 
     @property
