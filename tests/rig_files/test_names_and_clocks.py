@@ -39,6 +39,13 @@ def test_units_in_capitals_are_read(tmp_path, heading, value):
     assert np.mean(record.current) == pytest.approx(0.5)
 
 
+def test_a_unit_in_capitals_against_the_size_of_the_current_is_refused(tmp_path):
+    heads = ("TIME [S]", "DISPLACEMENT [MM]", "FORCE [N]", "CURRENT [MA]")
+    columns = (TIME, 20 * np.sin(PHASE), force(PHASE), np.full(TIME.size, 0.5))
+    result = imported(tmp_path, "test.csv", heads, columns)
+    assert [refusal.error.code for refusal in result.refusals] == ["E_AMBIGUOUS"]
+
+
 @pytest.mark.parametrize("late", [0.02, -0.02])
 def test_two_clocks_are_never_paired_by_row(tmp_path, late):
     """The force's own stamps are 20 ms off: its samples are taken at the times of the displacement, or refused."""

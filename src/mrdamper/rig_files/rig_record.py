@@ -27,6 +27,7 @@ from mrdamper.rig_files.units import Unit
 _KEPT = {"temperature": "C", "pressure": "Pa", "voltage": "V", "acceleration": "m_s2", "length": "m", "force": "N"}
 _SCALES = frozenset(("scale", "scaling", "gain", "factor", "sensitivity", "slope", "calibration", "lsb", "faktor"))
 _SAMPLE = 10_000  # samples looked at
+_LEAST_CURRENT = 0.02  # [A] largest of a record: less is no current of a coil
 _MOST_FURTHER = 12  # channels
 _LEFT_OUT = "the current channel is left out"
 _LENIENT = ("acceleration", "voltage", "temperature", "pressure")  # a damaged cell there costs the channel, not the run
@@ -45,6 +46,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
     raw, findings, lines = _read(table, found)
     channels = {name: rescale(raw[of.column], of.factor, of.offset) for name, of in found.items()}
     size, rate = next(iter(raw.values())).size, ""
+    _refuse_tiny_currents(table, found, channels)
     if "time" not in channels:
         channels["time"], rate = _counted_time(table, profile, size)
     further = _further(table, found, size)
@@ -131,6 +133,21 @@ def _refuse_unscaled(table: RawTable, found: dict[str, Assigned], raw: dict[int,
                 f"{role} is whole numbers, and {key} is {value:g}: are they scaled?",
                 f"say [channels.{role}] unit and scale in a profile",
             )
+
+
+def _refuse_tiny_currents(table: RawTable, found: dict[str, Assigned], channels: dict[str, Floats]) -> None:
+    """Refuse currents in MA, written in capitals, that are amperes by their size."""
+    if "current" not in found or found["current"].unit != "MA":
+        return
+    largest = max((float(np.max(np.abs(piece), initial=0.0, where=np.isfinite(piece)))
+                   for _, piece in pieces(channels["current"])), default=0.0)  # fmt: skip
+    if 0 < largest < _LEAST_CURRENT:
+        raise table.source.refuse(
+            "E_AMBIGUOUS",
+            f"the current in MA is {1e3 * largest:.3g} at most: milliamperes would be no current of a coil",
+            'say [channels.current] unit = "A" or unit = "mA" in a profile',
+            column=found["current"].column + 1,
+        )
 
 
 def _counted_time(table: RawTable, profile: Profile, size: int) -> tuple[Floats, str]:
