@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from mrdamper.dampers.calibration import LEVELS, Calibration, Growth, ModelError, PredictedRun, Scored, model_error
+from mrdamper.dampers.calibration import (
+    LEVELS,
+    Calibration,
+    Growth,
+    ModelError,
+    PredictedRun,
+    Scored,
+    model_error,
+    scatter_between_sessions,
+)
 from mrdamper.dampers.distance import Distance
 from mrdamper.data import Run
 
@@ -162,3 +171,14 @@ def test_errors_grow_with_the_distance_from_the_tests_as_they_were_made():
 
 
 FORCE, PEAK, ENERGY = np.array([0.5, 0.2, 0.1]), np.array([0.4, 0.3, 0.15]), np.array([0.8, 0.1, 0.25])
+
+
+def test_the_scatter_between_sessions_is_that_of_their_means():
+    gains = {"a": (1.02, 1.06), "b": (0.9, 0.94, 0.98), "c": (1.0,)}
+    runs = [
+        replace(run("r", session=name), measured=g * SWING + 10 * (g - 1)) for name, each in gains.items() for g in each
+    ]
+    gain, offset = scatter_between_sessions(runs)
+    assert gain == pytest.approx(np.sqrt((0.04**2 + 0.06**2 + 0.0) / 3))
+    assert offset == pytest.approx(10 * gain)
+    assert scatter_between_sessions(runs[::-1]) == pytest.approx((gain, offset))

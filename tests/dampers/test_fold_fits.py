@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from mrdamper.dampers import fold_fits
@@ -9,6 +10,7 @@ from mrdamper.dampers.fold_fits import FoldFits
 
 FOLDS = [[0, 1, 2], [3, 4, 5], [6, 7, 8], [9, 10, 11], [0, 3, 6, 9], [1, 4], [11]]
 COUNT = 12
+STARTS = ((0.3, 1.0), (0.2, 1.04), (0.1, 1.06))  # error of the end, and of the start on every run
 
 
 def test_blocks_hold_every_fold_and_at_most_half_of_the_runs():
@@ -22,17 +24,18 @@ def test_blocks_hold_every_fold_and_at_most_half_of_the_runs():
 
 @pytest.mark.parametrize("fold", [*FOLDS, [0, 11]])
 def test_no_start_saw_what_is_left_out_and_the_best_end_is_taken(fold, monkeypatch):
-    searched = []
+    searched, followed = [], []
 
     class Problem:
         parts = tuple(range(COUNT))
 
         def refit(self, start, rows, settled):
+            followed.append(start.error)
             return SimpleNamespace(error=start.error, rows=rows)
 
     def search(self, block):
         searched.append(block)
-        return [SimpleNamespace(error=0.3), SimpleNamespace(error=0.2)]
+        return [SimpleNamespace(error=error, nrmse_pp=np.full(COUNT, near)) for error, near in STARTS]
 
     monkeypatch.setattr(FoldFits, "_search", search)
     fits = FoldFits(Problem(), FOLDS)
@@ -42,3 +45,4 @@ def test_no_start_saw_what_is_left_out_and_the_best_end_is_taken(fold, monkeypat
     assert set(fold) <= searched[0]
     fits.refit(rows)
     assert len(searched) == 1
+    assert followed == [0.3, 0.2] * 2  # the third start describes the remaining runs worse by more than a twentieth

@@ -152,6 +152,22 @@ def model_error(runs: Sequence[PredictedRun]) -> ModelError:
     return ModelError(float(np.sqrt(np.mean(rests))), root(peaks), root(energies), spread(gains), spread(offsets))
 
 
+def scatter_between_sessions(runs: Sequence[PredictedRun]) -> tuple[float, float]:
+    """Root mean square of the mean gain, less one, and of the mean offset [N] of each session.
+
+    Parameters
+    ----------
+    runs : sequence of PredictedRun
+        Predicted by models identified without their session.
+    """
+    own: dict[str | None, list[tuple[float, float]]] = {}
+    for run in runs:
+        own.setdefault(run.session, []).append(run.gain_and_offset)
+    means = np.array([np.mean(values, axis=0) for values in own.values()]) - [1.0, 0.0]
+    gain, offset = np.sqrt(np.mean(means**2, axis=0)).tolist()
+    return gain, offset
+
+
 @dataclass(frozen=True)
 class Growth:
     """Standard deviations by which the error of the form grows with the distance from the tests.

@@ -210,6 +210,8 @@ def _level_law(
     are fitted, from starts that never saw them. The search began with every parameter of the law, for the others make
     up for a form that is too short.
     """
+    if not forms:
+        return (), fit, (), {}
     levels = levels_of(longest)[1:-1]
     without = FoldFits(longest, levels)
     starts = [without.refit([i for i in range(len(longest.parts)) if i not in level]) for level in levels]

@@ -8,7 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.calibration import QUANTITIES, Calibration, Growth, PredictedRun, Scored, model_error
+from mrdamper.dampers.calibration import (
+    QUANTITIES,
+    Calibration,
+    Growth,
+    PredictedRun,
+    Scored,
+    model_error,
+    scatter_between_sessions,
+)
 from mrdamper.dampers.certainty import Certainty, FittedParameter
 from mrdamper.dampers.random_effects import Effects, GainsAndOffsets
 from mrdamper.dampers.run_residuals import RunResiduals, normal_matrix
@@ -247,8 +255,8 @@ def _with_model_error(
     if not cross_validated:
         return made
     if other_sessions and made.of_sessions:
-        outer = model_error(other_sessions)
-        made = replace(made, gain=max(made.gain, outer.gain), offset=max(made.offset, outer.offset))
+        gain, offset = scatter_between_sessions(other_sessions)
+        made = replace(made, gain=max(made.gain, gain), offset=max(made.offset, offset))
     made = replace(
         made,
         left_out=len(cross_validated),

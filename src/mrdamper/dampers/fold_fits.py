@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from mrdamper.dampers.joint import JointFit, JointProblem, Valley
 
 _MOST_LEFT_OUT = 0.5  # share of the runs that a search may be without
 _STARTS = 3  # of the model, from which a search goes
 _ROUNDS, _STEPS, _ROUGHLY = 1, 10, 1e-4  # of a search on steady ends, and relative gain of a step at which it ends
+_NEAR = 1.05  # times the smallest error on the remaining runs, up to which a start is followed
 _SETTLED = 1e-4  # relative gain of a step at which a fit without a fold ends
 
 
@@ -36,12 +39,14 @@ class FoldFits:
         self._starts: dict[frozenset[int], list[JointFit]] = {}
 
     def refit(self, rows: Sequence[int]) -> JointFit:
-        """Fit the runs at some indices: of the ends from all starts the one that describes these runs best."""
+        """Fit the runs at some indices: of the ends from the best starts the one that describes these runs best."""
         left = frozenset(range(len(self.problem.parts))) - set(rows)
         block = next((block for block in self.blocks if left <= block), left)
         if block not in self._starts:
             self._starts[block] = self._search(block)
-        return min((self.problem.refit(start, rows, _SETTLED) for start in self._starts[block]), key=lambda f: f.error)
+        known = {float(np.mean(start.nrmse_pp[list(rows)])): start for start in self._starts[block]}
+        able = [start for error, start in known.items() if error <= _NEAR * min(known)]
+        return min((self.problem.refit(start, rows, _SETTLED) for start in able), key=lambda fit: fit.error)
 
     def _search(self, block: frozenset[int]) -> list[JointFit]:
         """Ends of the search without a block: the best, and the best of other knees that come near it."""
