@@ -72,7 +72,7 @@ class Virtual:
     rate: float = 120.0
     noise: float = 3e-3
     current_noise: float = 0.0
-    levels: tuple[float, ...] = (0.0, 0.33, 0.67, 1.0)
+    levels: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75, 1.0)  # the law of the yield force has four parameters
     onset: float = 0.12
     saturation: float = 0.5
     leak: float = 18.0
@@ -188,7 +188,8 @@ DAMPERS = (
     Virtual("knee 2 mm", 3e3, 0.03, 0.2, 1.5, lost=2e-3),
     Virtual("knee 8 mm, random", 5e3, 0.06, 0.4, 2.0, lost=8e-3, tests="random"),
     Virtual("slow clock", 2e3, 0.03, 0.2, 1.0, lost=1e-3, rate=50),
-    Virtual("fast clock, few currents", 2e3, 0.03, 0.2, 1.0, rate=600, levels=(0.0, 0.5, 1.0), tests="random"),
+    Virtual("fast clock, few currents", 2e3, 0.03, 0.2, 1.0, rate=600, levels=(0.0, 0.5, 1.0), tests="random",
+            saturation=0.0),
     Virtual("one current", 1e3, 0.02, 0.2, 0.6, levels=(1.0,)),
     Virtual("hard saturation", 4e3, 0.03, 0.3, 3.0, onset=0.3, saturation=2.0, levels=(0.0, 0.2, 0.4, 0.7, 1.0)),
     Virtual("20 kN, ramps and stops", 2e4, 0.05, 0.2, 2.0, lost=1e-3, tests="ramps", leak=5.0),

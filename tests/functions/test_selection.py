@@ -36,6 +36,14 @@ def test_the_worst_kind_of_fold_has_a_say():
     assert not smaller_wins(small, large)  # better on the whole, worse where it is worst
 
 
+def test_few_scattered_units_do_not_hide_what_many_show():
+    generator = np.random.default_rng(4)
+    large = {"condition": 0.3 + 0.05 * generator.random(30), "current": np.array([1.0, 2.4, 0.4])}
+    small = {"condition": 4 * large["condition"], "current": np.array([2.9, 1.0, 1.2])}
+    assert not smaller_wins(small, large)
+    assert smaller_wins({**small, "condition": large["condition"]}, large)
+
+
 def test_an_error_without_end_never_wins():
     finite, endless = {"condition": np.array([1.0])}, {"condition": np.array([np.inf])}
     assert smaller_wins(finite, endless)

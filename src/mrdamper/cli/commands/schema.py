@@ -16,7 +16,7 @@ def register(app: typer.Typer) -> None:
     def schema(
         name: str = typer.Argument(..., help=f"File format: {', '.join(_FORMATS)}."),
     ) -> None:
-        """Print the JSON Schema of a saved model, or of a file that is written by hand."""
+        """Print the JSON Schema of a model, a profile or a limits file."""
         from mrdamper.errors import UnknownNameError
 
         if name not in _FORMATS:

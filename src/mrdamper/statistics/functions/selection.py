@@ -3,9 +3,11 @@
 A model, a form of a parameter function or a term of a model is chosen by cross-validation: the
 smaller one wins within one standard error of the difference [Breiman et al. 1984, §3.4.3; Hastie,
 Tibshirani and Friedman 2009, §7.10], provided that it is no worse in the kind of fold in which it
-is worst. A form is no candidate where the tests cannot support it: at most one parameter fewer
-than current levels in a law over the current, and two fewer than distinct motions over the
-motion; nor where it breaks a law of physics within the tested box or 20 % beyond it.
+is worst, and worse by more than two standard errors in no kind: a kind of few, scattered units must
+not hide what another kind shows clearly. A form is no candidate where the tests cannot support
+it: at most one parameter fewer than current levels in a law over the current, and two fewer than
+distinct motions over the motion; nor where it breaks a law of physics within the tested box or
+20 % beyond it.
 """
 
 from __future__ import annotations
@@ -20,6 +22,8 @@ from mrdamper.statistics.functions.motion_hull import MotionHull
 
 Errors = Mapping[str, Floats]  # by kind of fold: the error of every unit left out, in one order for all models
 BEYOND = 1.2  # largest current [of the largest tested] up to which a function obeys physics
+_CLEAR = 2.0  # standard errors of a difference that no other kind of fold outweighs
+_SEVERAL = 5  # units of a kind from which its standard error is its own
 _MOTIONS = 0.05  # frequencies and amplitudes this close are one motion
 _FALL = 0.01  # fall of a yield force [of its largest value] below which it does not fall
 
@@ -42,7 +46,7 @@ def smaller_wins(smaller: Errors, larger: Errors) -> bool:
     -------
     bool
         Whether the smaller model is within one standard error of the larger one, over all kinds
-        and in the kind in which it is worst.
+        and in the kind in which it is worst, and within two in every kind of several units.
     """
     kinds = [kind for kind in smaller if kind in larger and len(smaller[kind])]
     if not kinds:
@@ -56,7 +60,10 @@ def smaller_wins(smaller: Errors, larger: Errors) -> bool:
     variance = {kind: _variance_of_mean(values) for kind, values in excess.items()}
     over_kinds = float(np.mean([np.mean(values) for values in excess.values()]))
     standard_error = float(np.sqrt(np.sum(list(variance.values())))) / len(kinds)
-    return over_kinds <= standard_error and float(np.mean(excess[worst])) <= np.sqrt(variance[worst])
+    clearly = any(
+        np.mean(values) > _CLEAR * np.sqrt(variance[kind]) for kind, values in excess.items() if len(values) >= _SEVERAL
+    )
+    return not clearly and over_kinds <= standard_error and float(np.mean(excess[worst])) <= np.sqrt(variance[worst])
 
 
 def _variance_of_mean(values: Floats) -> float:
