@@ -100,9 +100,8 @@ def certain(
         taught=dict(zip([p.run.id for p in parts], _shares(spread.information), strict=True)),
         effective=dict(zip(spread.names, spread.effective.tolist(), strict=True)),
     )  # fmt: skip
-    return replace(
-        damper, certainty=_with_model_error(made, parts, spread.slopes, cross_validated, away, other_sessions)
-    )  # type: ignore[type-var]
+    certainty = _with_model_error(made, parts, spread.slopes, cross_validated, away, other_sessions)
+    return replace(damper, certainty=certainty)  # type: ignore[type-var]
 
 
 @dataclass(frozen=True, eq=False)
