@@ -1,5 +1,6 @@
 """From what is in files to tests: clocks, units, results, groups and two files a test, as the files state them."""
 
+import json
 import re
 
 import numpy as np
@@ -11,6 +12,7 @@ from typer.testing import CliRunner
 from benchmarks.foreign_labs import faults
 from mrdamper.cli import application
 from mrdamper.errors import InputError
+from mrdamper.rig_files.conditions import currents_in
 from mrdamper.rig_files.mapping.proposals import damping_share
 from mrdamper.rig_files.mapping.questions import question_of
 from mrdamper.rig_files.mapping.results import results_in
@@ -241,3 +243,14 @@ def test_a_plan_that_contradicts_the_names_is_refused(tests, tmp_path):
     found = import_files([tmp_path])
     assert {refusal.error.code for refusal in found.refusals} == {"E_CURRENT_CONTRADICTS"}
     assert len(found.records) < len(tests)
+
+
+def test_conditions_beside_a_mapping_of_data_and_in_a_path_are_read(tests, tmp_path):
+    for k, q in enumerate(tests):
+        data = {"time_s": q.t.tolist(), "displacement_mm": (1e3 * q.x).tolist(), "force_N": q.f.tolist()}
+        (tmp_path / f"test_{k}.json").write_text(json.dumps({"meta": {"current_A": q.current}, "data": data}))
+    found = import_files([tmp_path])
+    assert not found.refusals
+    assert faults(tests, to_dataset(found.records)) == []
+    assert currents_in("res/I_0p6A/f_0p5Hz") == (0.6,)
+    assert currents_in("coil 2 A/V") == ()

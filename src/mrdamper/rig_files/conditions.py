@@ -21,7 +21,7 @@ _AGREE_A, _AGREE = 0.05, 0.15  # a nominal and a measured current may differ by 
 _IN_NAME = re.compile(
     r"(?<![0-9A-Za-z.,])(?:[iI](?:_?(?:[cC]oil|[sS]pule))?|(?:[sS]pulen|[cC]oil)?(?:[sS]trom|[cC]urr(?:ent)?|[cC]ur))?"
     r"([0-9]{1,4}(?:[.,xp][0-9]{1,4})?)[ _]?(m?)(?:A(?:mp(?:ere)?s?)?|amp(?:ere)?s?|(?<=m)a)"
-    r"(?![A-Za-z0-9]|\s?/\s?[A-Za-z])"
+    r"(?![A-Za-z0-9]|\s?/\s?(?:m?V|%|div|s)\b)"
 )
 _NEXT_NUMBER = re.compile(r"_A_[0-9.]+(?:_|\.[a-z]{2,4}$|$)")  # 2_A_20: the name of the next number
 _NEGATIVE = re.compile(r"[=:]\s*[-−]$")  # a dash elsewhere may stand between two parts of a name

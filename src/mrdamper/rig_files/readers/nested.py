@@ -99,7 +99,11 @@ def _stated_units(tree: Mapping[str, Any]) -> dict[str, str]:
 def _paired(tree: Mapping[str, Any], units: Mapping[str, str]) -> Mapping[str, Any]:
     """The mapping with arrays joined to what describes them: Channel_1_Data to Channel_1_Header, units by name."""
     heads = {_HEAD.sub("", key): key for key, value in tree.items() if _HEAD.search(key) and isinstance(value, Mapping)}
-    pairs = {key: heads[stem] for key in tree if (stem := _BODY.sub("", key)) in heads and _BODY.search(key)}
+    pairs = {
+        key: heads[stem]
+        for key in tree
+        if (stem := _BODY.sub("", key)) in heads and _BODY.search(key) and isinstance(tree[key], np.ndarray)
+    }
     used = set(pairs.values())
     found = {}
     for key, value in tree.items():
