@@ -1,7 +1,7 @@
 """Errors of the joint model on what was left out of train runs: `python -m benchmarks.left_out [RIG ...]`.
 
 A condition (every run of it), an interior current (every run at it) and a whole record, ramps and rests included, are
-each predicted by a fit to the other train runs, begun from starts that never saw what is left out; medians of nrmse_pp.
+each predicted by a fit to the other train runs, with starting values from these runs alone; medians of nrmse_pp.
 Held-out runs are not looked at.
 """
 

@@ -174,7 +174,7 @@ def validation_errors(
 
 
 def folds(runs: Sequence[Run]) -> dict[str, list[list[int]]]:
-    """Groups of runs left out together, beside single conditions: a current, a session, the fastest motions."""
+    """Folds of cross-validation beside single conditions: a current, a session, the fastest motions."""
     levels = current_levels([run.mean_current for run in runs])
     sessions = [session_of(run) for run in runs]
     speeds = np.array([equivalent_sine(run).condition.peak_velocity for run in runs])

@@ -126,7 +126,7 @@ def modules() -> dict[str, ast.Module]:
 
 @cache
 def imports() -> dict[str, frozenset[str]]:
-    """List what every module imports of the package, anywhere in it; the lazy names of mrdamper itself are left out."""
+    """List the imports of every module within the package, except the lazily loaded names of the package itself."""
     names = modules()
     graph = {}
     for name, tree in names.items():

@@ -1,4 +1,4 @@
-"""Choice of the model and its intervals where nobody tested: `python -m benchmarks.synthetic_choice`.
+"""Choice of the model and its intervals at untested conditions: `python -m benchmarks.synthetic_choice`.
 
 Dampers of six families and known truth (`benchmarks.synthetic_dampers`), each tested by three designs and studied as a
 user studies it. Scored are untested corners of frequency and amplitude, and currents between the tested ones: the error

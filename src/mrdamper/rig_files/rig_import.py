@@ -281,8 +281,7 @@ class _Intake:
             mend="write the currents into tests.csv (--write-tests)",
             code="E_AMBIGUOUS",
         )
-        named = [file for _, (file, record) in enumerate(self._tests())]
-        self._refuse({i: error for i, file in enumerate(named) if _TWO_DIGITS.search(file.name)})
+        self._refuse({i: error for i, (file, _) in enumerate(self._tests()) if _TWO_DIGITS.search(file.name)})
 
     def _tests(self) -> list[tuple[Path, Record]]:
         """The accepted tests with their files, in the order of these."""
