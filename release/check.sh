@@ -6,7 +6,7 @@ SOURCE_DATE_EPOCH=$(git log -1 --format=%ct)
 export SOURCE_DATE_EPOCH PIP_CONSTRAINT=constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1
 bin=.venv-release/bin
 table=$(mktemp)
-trap 'rm -f "$table"; rm -rf .venv-locked' EXIT
+trap 'rm -f "$table"*; rm -rf .venv-locked' EXIT
 started=$SECONDS
 row() {  # CHECK RESULT: one line of the table, with the seconds since the last one
   printf '%-34s %6d s  %s\n' "$1" $((SECONDS - started)) "$2" | tee -a "$table"
@@ -31,7 +31,8 @@ for turn in first second; do
 done
 diff <(cd dist/first && sha256sum ./*) <(cd dist/second && sha256sum ./*) || { echo "two builds differ" >&2; exit 1; }
 mv dist/first/* dist/ && rm -r dist/first dist/second
-$bin/python -m zipfile --list dist/*.whl | grep -q 'mrdamper/py.typed' || { echo "py.typed is missing" >&2; exit 1; }
+$bin/python -m zipfile --list dist/*.whl >"$table.wheel"  # a file, as grep -q would close a pipe early
+grep -q 'mrdamper/py.typed' "$table.wheel" || { echo "py.typed is missing" >&2; exit 1; }
 row "wheel and sdist, built twice" "the same bytes"
 $bin/twine check --strict dist/*.whl dist/*.tar.gz >/dev/null
 row "twine check" "passed"
