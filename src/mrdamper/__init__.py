@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from mrdamper.errors import InputError
     from mrdamper.export import export_model
     from mrdamper.fleet.line import run_fleet
-    from mrdamper.identification import identify
     from mrdamper.paper.study import reproduce
     from mrdamper.physics.gas_spring import GasSpring
     from mrdamper.physics.motion import Excitation, sine, sweep
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
     from mrdamper.report.plots.loops import plot_force, plot_loop
     from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
     from mrdamper.rig_files.rig_import import import_files
-    from mrdamper.study.check import check
+    from mrdamper.study.check import check, identify
     from mrdamper.study.comparison import compare
     from mrdamper.study.plan import plan_tests
     from mrdamper.study.validation import validate
@@ -52,7 +51,7 @@ _HOME = {
     "check": "study.check",
     "compare": "study.comparison",
     "export_model": "export",
-    "identify": "identification",
+    "identify": "study.check",
     "import_files": "rig_files.rig_import",
     "invert": "systems.inverse",
     "load_dataset": "rig_files.dataset_folder",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mrdamper import Dataset, Run, check, identify
-from mrdamper.errors import QualityError
+from mrdamper.errors import IdentificationError, QualityError
 
 
 @pytest.fixture(scope="module")
@@ -41,11 +41,34 @@ def test_a_run_of_another_unit_is_set_aside(bundled):
     assert "lbf" in finding.text
 
 
-def test_a_loop_that_gives_energy_is_not_identified():
+@pytest.fixture
+def channels():
     t = np.arange(2000) / 500
     x = 0.01 * np.sin(2 * np.pi * t)
-    force = 5000 * np.gradient(x, t) + 300 * np.sign(np.cos(2 * np.pi * t))
+    return t, x, 5000 * np.gradient(x, t) + 300 * np.sign(np.cos(2 * np.pi * t))
+
+
+def test_arrays_that_the_import_refuses_are_not_identified(channels):
+    t, x, force = channels
     identify(Run("right", t, x, force, 0.0), "bingham")
-    with pytest.raises(QualityError, match="sign of force or displacement inverted") as refusal:
-        identify(Run("left", t, -x, force, 0.0), "bingham")
-    assert refusal.value.code == "E_DISSIPATION_SIGN"
+    noise = np.random.default_rng(0).normal(size=t.size)
+    for code, made in {
+        "E_DISSIPATION_SIGN": Run("left", t, -x, force, 0.0),
+        "E_RECTIFIED": Run("absolute", t, x, np.abs(force), 0.0),
+        "E_NOISE": Run("noise", t, x, noise, 0.0),
+    }.items():
+        with pytest.raises(QualityError) as refusal:
+            identify(made, "bingham")
+        assert refusal.value.code == code
+        assert [one.code for one in check(Dataset((made,))).findings] == [code]
+
+
+def test_findings_on_arrays_are_noted_or_refused_by_identification(channels):
+    t, x, force = channels
+    drifting = Run("drifts", t, x + 0.002 * t, force, 0.0)
+    (finding,) = (one for one in check(Dataset((drifting,))).findings if one.code == "W_DRIFT")
+    assert finding.text in identify(drifting, "bingham").notes
+    clipped = Run("clipped", t, x, force.clip(max=0.8 * force.max()), 0.0)
+    with pytest.raises(IdentificationError, match="W_CLIPPED"):
+        identify(clipped, "bingham")
+    identify(clipped, "bingham", clipped=True)

@@ -8,20 +8,16 @@ from functools import partial
 import numpy as np
 
 from mrdamper.data import Run
-from mrdamper.errors import IdentificationError, QualityError, checked
+from mrdamper.errors import IdentificationError, checked
 from mrdamper.identification.certainty import certainty_of_run
-from mrdamper.identification.loop_analysis import damping_share
 from mrdamper.identification.methods import all_methods, method_named
 from mrdamper.identification.problem import Identification, Method, Problem, Solution
 from mrdamper.models import Model, model_type
 from mrdamper.physics.gas_spring import GasSpring
-from mrdamper.physics.motion import measured_motion
 from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.statistics.metrics import score
 
 __all__ = ["Identification", "Method", "Problem", "Solution", "all_methods", "identify"]
-
-_GIVING_SHARE = 0.05  # of the force's standard deviation, in phase with the velocity: the loop gives energy
 
 
 @on_one_blas_thread
@@ -69,7 +65,7 @@ def identify(
     IdentificationError
         If the run cannot determine what is asked for.
     QualityError
-        E_DISSIPATION_SIGN if the loop gives energy instead of dissipating it.
+        As `mrdamper.identify`, if the record is refused by a quality check.
 
     Examples
     --------
@@ -96,7 +92,6 @@ def identify(
     run.current_A  # noqa: B018  refuses a varying current before anything is computed
     if np.ptp(problem.force) == 0:
         raise IdentificationError("the force does not change", where=f"run {run.id}", mend="check the channel")
-    refuse_negative_dissipation(run)
     where = f"run {run.id}"
     try:
         result = conclude(problem, chosen_method, chosen_method.solve(problem))
@@ -124,25 +119,6 @@ def refuse_clipped(run: Run, clipped: bool = False) -> None:
             "a channel is cut off at its extreme (W_CLIPPED)",
             where=f"run {run.id}",
             mend="record it again with a wider range, or identify with clipped=True (--clipped)",
-        )
-
-
-def refuse_negative_dissipation(run: Run) -> None:
-    """Refuse a run whose loop gives energy instead of dissipating it.
-
-    Raises
-    ------
-    QualityError
-        E_DISSIPATION_SIGN
-    """
-    share = damping_share(measured_motion(run).part(run.in_window), run.force[run.in_window])
-    if share < -_GIVING_SHARE:
-        raise QualityError(
-            f"negative dissipated energy ({-100 * share:.0f} % of the force pushes along with the motion): sign of "
-            "force or displacement inverted",
-            where=f"run {run.id}",
-            mend="invert one of the two channels",
-            code="E_DISSIPATION_SIGN",
         )
 
 

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import wraps
+from typing import Any, Concatenate, Literal, ParamSpec
 
+from mrdamper import identification
 from mrdamper.data import Dataset, Displayable, Run
 from mrdamper.errors import InputError, checked
-from mrdamper.rig_files.quality.table import judged
+from mrdamper.rig_files.quality.table import judged, with_findings
 from mrdamper.study.contradictions import ContradictionError, find_contradictions
 from mrdamper.study.workflow import believed
 
 Severity = Literal["refused", "set aside", "noted"]
+P = ParamSpec("P")
 
 
 @dataclass(frozen=True)
@@ -133,3 +136,24 @@ def _of_rig(rig: str, runs: Sequence[Run]) -> list[DatasetFinding]:
     except ContradictionError as refusal:
         return [DatasetFinding("", rig, refusal.code, "refused", str(refusal))]
     return [DatasetFinding(one.run_id, rig, one.code, "set aside", str(one)) for one in contradictions]
+
+
+def _of_accepted_runs(
+    identify_run: Callable[Concatenate[Run, P], identification.Identification],
+) -> Callable[Concatenate[Run, P], identification.Identification]:
+    """Check the run as the import does before it is identified; findings are among the notes of the result."""
+
+    @wraps(identify_run)
+    def identify_accepted(run: Run, *args: P.args, **kwargs: P.kwargs) -> identification.Identification:
+        if not isinstance(run, Run):
+            return identify_run(run, *args, **kwargs)  # says what to give instead
+        refusal, noted = judged(run)
+        if refusal is not None:
+            raise refusal
+        found = identify_run(with_findings(run), *args, **kwargs)
+        return replace(found, notes=(*found.notes, *map(str, noted)))
+
+    return identify_accepted
+
+
+identify = _of_accepted_runs(identification.identify)

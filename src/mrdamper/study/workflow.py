@@ -28,7 +28,7 @@ from mrdamper.identification import refuse_clipped
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, at_levels, dynamic_ranges
 from mrdamper.models import all_models
 from mrdamper.physics.motion import analyse_motion, equivalent_sine
-from mrdamper.rig_files.quality.table import judged
+from mrdamper.rig_files.quality.table import judged, with_findings
 from mrdamper.statistics.functions.selection import mean_error, smaller_wins
 from mrdamper.study.contradictions import Contradiction, find_contradictions
 from mrdamper.study.dissipation import gains_energy
@@ -426,7 +426,7 @@ def usable(runs: Iterable[Run], clipped: bool = False) -> tuple[list[Run], dict[
     found, refused = [], {}
     for run in runs:
         try:
-            _refuse_clipped(run, clipped)
+            refuse_clipped(with_findings(run), clipped)
             if np.ptp(run.force[run.in_window]) == 0:
                 raise IdentificationError("the force does not change", where=f"run {run.id}", mend="check the channel")
             equivalent_sine(run)  # refuses a run that does not move
@@ -434,12 +434,6 @@ def usable(runs: Iterable[Run], clipped: bool = False) -> tuple[list[Run], dict[
         except InputError as error:
             refused[run.id] = str(error)
     return found, refused
-
-
-def _refuse_clipped(run: Run, clipped: bool) -> None:
-    """As the identification, but seen today: a dataset written elsewhere says nothing."""
-    seen = " ".join(finding.code for finding in judged(run)[1])
-    refuse_clipped(replace(run, notes={**run.notes, "findings": f"{run.notes.get('findings', '')} {seen}"}), clipped)
 
 
 def agreeing(dataset: Dataset, keep: Collection[str] = ()) -> tuple[Dataset, tuple[Contradiction, ...]]:
@@ -510,7 +504,7 @@ def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], di
     kept, refused = believed(dataset)
     for run in kept:
         try:
-            _refuse_clipped(run, clipped)
+            refuse_clipped(with_findings(run), clipped)
             run.current_A  # noqa: B018
             found = equivalent_sine(run)
             rate = (run.time.size - 1) / float(run.time[-1] - run.time[0])

@@ -87,6 +87,12 @@ def judged(run: Run) -> tuple[QualityError | None, tuple[Finding, ...]]:
         return error, ()
 
 
+def with_findings(run: Run) -> Run:
+    """The run with the codes of what is noticed today: a dataset written elsewhere, or arrays, state none."""
+    seen = dict.fromkeys([*run.findings, *(finding.code for finding in judged(run)[1])])
+    return replace(run, notes={**run.notes, "findings": " ".join(seen)}) if len(seen) > len(run.findings) else run
+
+
 def row(quality: Quality) -> dict[str, Any]:
     """A verdict as a row of numbers and words, in engineers' units; None where there is no figure."""
     condition = quality.condition
