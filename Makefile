@@ -46,7 +46,7 @@ mutants: $(VENV)/.dev  ## plant faults where results are judged: the tests notic
 lint: $(VENV)/.dev  ## format check, lint, types, import order of the layers
 	$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/pyright --pythonpath $(BIN)/python && $(BIN)/lint-imports
 
-format: $(VENV)/.dev  ## format and mend what ruff can mend
+format: $(VENV)/.dev  ## format, and correct what ruff can correct
 	$(BIN)/ruff format . && $(BIN)/ruff check --fix .
 
 docs: $(VENV)/.docs  ## build the documentation site, offline, and check links and accessibility

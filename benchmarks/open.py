@@ -297,18 +297,20 @@ def read_forecasts(folder: Path, wanted: Mapping[str, Target]) -> dict[str, Fore
     table = _table(folder)
     missing = [name for name in COLUMNS if name not in table.columns]
     if missing:
-        raise ColumnError(f"no column {missing[0]}", where="predictions", mend=f"write {', '.join(COLUMNS)}")
+        raise ColumnError(f"no column {missing[0]}", where="predictions", remedy=f"write {', '.join(COLUMNS)}")
     try:
         table = table.with_columns(pl.col("run_id").cast(pl.String), pl.exclude("run_id").cast(pl.Float64))
     except pl.exceptions.PolarsError as error:
-        raise ColumnError("a cell is no number", where="predictions", mend="write plain numbers") from error
+        raise ColumnError("a cell is no number", where="predictions", remedy="write plain numbers") from error
     parts = table.partition_by("run_id", as_dict=True, maintain_order=True)
     forecasts = {str(name): _forecast(str(name), part, wanted) for (name,), part in parts.items()}
     begun = {wanted[name].rig for name in forecasts}
     absent = [name for name, target in wanted.items() if target.rig in begun and name not in forecasts]
     if absent or not forecasts:
         listed = ", ".join(absent[:5]) or "all"
-        raise DatasetError(f"runs without prediction: {listed}", where="predictions", mend="predict every run of a rig")
+        raise DatasetError(
+            f"runs without prediction: {listed}", where="predictions", remedy="predict every run of a rig"
+        )
     return forecasts
 
 
@@ -318,8 +320,8 @@ def _table(folder: Path) -> pl.DataFrame:
             return pl.read_parquet(folder / "predictions.parquet")
         return pl.read_csv(folder / "predictions.csv", infer_schema=False)
     except (OSError, pl.exceptions.PolarsError) as error:
-        mend = "write predictions.csv or predictions.parquet there"
-        raise DatasetError("no predictions that can be read", where=str(folder), mend=mend) from error
+        remedy = "write predictions.csv or predictions.parquet there"
+        raise DatasetError("no predictions that can be read", where=str(folder), remedy=remedy) from error
 
 
 def _forecast(name: str, part: pl.DataFrame, wanted: Mapping[str, Target]) -> Forecast:
@@ -328,18 +330,20 @@ def _forecast(name: str, part: pl.DataFrame, wanted: Mapping[str, Target]) -> Fo
     target, where = wanted[name], f"run {name}"
     columns = {column: part[column].to_numpy() for column in part.columns if column in (*COLUMNS[1:], "low", "high")}
     if ("low" in columns) != ("high" in columns):
-        raise ColumnError("an interval with one end", where=where, mend="write both low and high, or neither")
+        raise ColumnError("an interval with one end", where=where, remedy="write both low and high, or neither")
     for column, values in columns.items():
         if not np.isfinite(values).all():
             raise NonFiniteError(
-                f"{column} is not finite in {np.sum(~np.isfinite(values))} samples", where=where, mend="write a number"
+                f"{column} is not finite in {np.sum(~np.isfinite(values))} samples",
+                where=where,
+                remedy="write a number",
             )
     clock = columns["time_s"]
     if clock.size != target.time.size or np.abs(clock - target.time).max() > _CLOCK:
         raise RunError(
             f"{clock.size} samples on another clock than the {target.time.size} of the run",
             where=where,
-            mend="predict at time_s of the inputs",
+            remedy="predict at time_s of the inputs",
         )
     return Forecast(columns["predicted"], columns.get("low"), columns.get("high"))
 

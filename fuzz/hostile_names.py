@@ -58,7 +58,7 @@ def attack_names(share: float) -> list[Count]:
             counts["name in a file name"].check((folder / f"model-{made}.json").is_file(), name)
         except (OSError, ValueError):
             counts["name in a file name"].check(False, name)
-        line = str(InputError(name, where=name, mend=name))
+        line = str(InputError(name, where=name, remedy=name))
         counts["name in a terminal"].check(
             len(line.splitlines()) == 1 and not re.search(r"[\x00-\x1f\x7f-\x9f]", line), name
         )

@@ -52,7 +52,7 @@ class Trial:
         files = {str(path_of(fault.module)) for fault in self.faults}
         answer = in_fork(lambda: self._healthy(session, files), 600)
         if not isinstance(answer, tuple):
-            self.why = f"fail without any fault ({answer}): mend them first"
+            self.why = f"fail without any fault ({answer}): correct them first"
             return True
         self.seconds, self.through = answer
         gc.unfreeze()  # what the tests' conftest froze is not among the objects otherwise

@@ -82,7 +82,7 @@ def test_conditions_agree_to_three_per_cent():
 def test_conditions_no_test_can_have_are_refused(values):
     with pytest.raises(ConditionError) as error:
         Condition(*values)
-    assert "give" in error.value.mend
+    assert "give" in error.value.remedy
 
 
 def test_a_measured_current_may_be_negative():

@@ -45,7 +45,7 @@ REWRITTEN = (
     "src/mrdamper/web/static/js/views/takeaway.js",
 )
 CORE = ("data", "export", "fleet", "identification", "models", "physics", "statistics", "systems", "tracing")
-SKIPPED = ("fleet/guard.py", "fleet/guarded.py", "fleet/generator.py")  # "mend" and "knee" are names there, no texts
+SKIPPED = ("fleet/generator.py",)  # "knee" is a name there, no text
 DECISIONS = tuple(str(path.relative_to(ROOT)) for path in sorted((ROOT / "docs" / "decisions").glob("*.md")))
 READERS = {str(path.relative_to(ROOT)): (path, reader) for path, reader in all_texts()}
 SOURCES = tuple(

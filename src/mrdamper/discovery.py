@@ -196,7 +196,7 @@ class Registry(Generic[T]):
         if earlier is not None and (earlier.__module__, earlier.__qualname__) != (cls.__module__, cls.__qualname__):
             raise InputError(
                 f"the {self.kind} {cls.name!r} exists already ({earlier.__module__}.{earlier.__qualname__})",  # type: ignore[attr-defined]
-                mend="give the class another name",
+                remedy="give the class another name",
                 code="E_ARGUMENT",
             )
         self._types.pop(cls.name, None)  # type: ignore[attr-defined]
@@ -275,7 +275,7 @@ def register(cls: type[T]) -> type[T]:
     if registry is None or not isinstance(getattr(cls, "name", None), str) or inspect.isabstract(cls):
         raise InputError(
             f"{shown(cls)} cannot be registered",
-            mend="give a complete subclass of Model, Method, Exporter, Controller, Input or Reader with a name",
+            remedy="give a complete subclass of Model, Method, Exporter, Controller, Input or Reader with a name",
             code="E_ARGUMENT",
         )
     registry.register(cls)

@@ -1,6 +1,6 @@
 """Everything a user can get wrong, one exception each, with a code that never changes.
 
-A message says what was found, where, and how to mend it, in one line.
+A message says what was found, where, and how to correct it, in one line.
 Anything that is not an `InputError` is our fault, not the user's.
 """
 
@@ -41,7 +41,7 @@ class InputError(ValueError):
         What was found.
     where : str, optional
         File, line, column, run or argument it was found in.
-    mend : str, optional
+    remedy : str, optional
         What the user can do about it.
     code : str, optional
         Replaces the class's code where one exception serves a family of findings.
@@ -58,19 +58,19 @@ class InputError(ValueError):
 
     code = "E_INPUT"
 
-    def __init__(self, found: str, *, where: str = "", mend: str = "", code: str | None = None):
-        self.found, self.where, self.mend = found, where, mend
+    def __init__(self, found: str, *, where: str = "", remedy: str = "", code: str | None = None):
+        self.found, self.where, self.remedy = found, where, remedy
         self.code = code or type(self).code
         super().__init__(found)
 
     def __str__(self) -> str:
         text = f"{self.where}: {self.found}" if self.where else self.found
-        if self.mend:
-            text += f"; {self.mend}"
+        if self.remedy:
+            text += f"; {self.remedy}"
         return printable(f"{text} [{self.code}]")
 
 
-def require(value: object, kind: type | tuple[type, ...], wanted: str, mend: str = "") -> None:
+def require(value: object, kind: type | tuple[type, ...], wanted: str, remedy: str = "") -> None:
     """Refuse an argument of another kind at the door of a public function.
 
     Raises
@@ -79,7 +79,7 @@ def require(value: object, kind: type | tuple[type, ...], wanted: str, mend: str
         E_ARGUMENT, naming what came and what is wanted.
     """
     if not isinstance(value, kind):
-        raise InputError(f"a {type(value).__name__} in place of {wanted}", mend=mend, code="E_ARGUMENT")
+        raise InputError(f"a {type(value).__name__} in place of {wanted}", remedy=remedy, code="E_ARGUMENT")
 
 
 def checked(*but: str) -> Callable[[Door], Door]:
@@ -131,7 +131,7 @@ def _require_fit(name: str, value: object, kind: object) -> None:
         fits = False
     if not fits:
         wanted = getattr(kind, "__name__", str(kind)).replace("typing.", "")
-        raise InputError(f"{name} is {shown(value)}", mend=f"give it as {wanted}", code="E_ARGUMENT")
+        raise InputError(f"{name} is {shown(value)}", remedy=f"give it as {wanted}", code="E_ARGUMENT")
 
 
 def _fits(value: Any, kind: Any) -> bool:
@@ -183,7 +183,7 @@ def numbers(*values: object) -> tuple[float, ...]:
         return tuple(map(float, values))  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError) as error:
         what = f"not all numbers: {', '.join(map(shown, values))}"
-        raise InputError(what, mend="give a number for each", code="E_ARGUMENT") from error
+        raise InputError(what, remedy="give a number for each", code="E_ARGUMENT") from error
 
 
 def series(**given: Any) -> tuple[NDArray[np.float64], ...]:
@@ -204,7 +204,7 @@ def series(**given: Any) -> tuple[NDArray[np.float64], ...]:
                 arrays.append(np.ascontiguousarray(np.broadcast_to(value, size), dtype=float))
                 continue
         what = f"{name} is {shown(value)}"
-        raise InputError(what, mend="give finite numbers, as many as for the others", code="E_ARGUMENT")
+        raise InputError(what, remedy="give finite numbers, as many as for the others", code="E_ARGUMENT")
     return tuple(arrays)
 
 
@@ -228,7 +228,7 @@ class CombinedError(InputError):
     def __init__(self, errors: Iterable[InputError]):
         self.errors = tuple(errors)
         first = self.errors[0]
-        super().__init__(first.found, where=first.where, mend=first.mend, code=first.code)
+        super().__init__(first.found, where=first.where, remedy=first.remedy, code=first.code)
 
     def __str__(self) -> str:
         return "; also: ".join(map(str, self.errors))
@@ -293,8 +293,8 @@ class UnknownNameError(InputError):
         """Build the error with the near matches as the remedy."""
         known = sorted(known)
         near = get_close_matches(name, known, n=3, cutoff=0.5)
-        mend = f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(known)}"
-        return cls(f"no {kind} is called {name!r}", mend=mend)
+        remedy = f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(known)}"
+        return cls(f"no {kind} is called {name!r}", remedy=remedy)
 
 
 class ConditionError(InputError):
@@ -388,11 +388,11 @@ def resource_error(error: BaseException, where: str = "") -> ResourceError | Non
         number = errno.ENOMEM
     if isinstance(error, FileNotFoundError) and "temporary directory" in str(error):
         return ResourceError(
-            "there is no folder for temporary files", mend="set TMPDIR to one you may write to", code="E_TEMP"
+            "there is no folder for temporary files", remedy="set TMPDIR to one you may write to", code="E_TEMP"
         )
     if isinstance(error, RuntimeError) and "start new thread" in str(error):
         number = errno.EAGAIN
     if number not in _RESOURCES:
         return None
-    code, text, mend = _RESOURCES[number]
-    return ResourceError(text, where=where, mend=mend, code=code)
+    code, text, remedy = _RESOURCES[number]
+    return ResourceError(text, where=where, remedy=remedy, code=code)

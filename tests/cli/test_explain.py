@@ -78,6 +78,6 @@ def test_the_page_holds_every_code():
 
 
 def test_an_error_keeps_its_one_line():
-    assert str(InputError("no tables", where="a.toml", mend="write one", code="E_LIMITS")) == (
+    assert str(InputError("no tables", where="a.toml", remedy="write one", code="E_LIMITS")) == (
         "a.toml: no tables; write one [E_LIMITS]"
     )

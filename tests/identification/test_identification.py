@@ -158,7 +158,7 @@ def test_a_clipped_record_is_refused_unless_wanted(bundled):
 def test_a_dataset_in_place_of_a_run_is_told_what_to_call(bundled):
     with pytest.raises(IdentificationError) as error:
         identify(bundled)
-    assert "run_study(dataset)" in error.value.mend
+    assert "run_study(dataset)" in error.value.remedy
 
 
 def test_a_long_record_of_a_stepped_model_is_searched_on_its_end_first(monkeypatch):

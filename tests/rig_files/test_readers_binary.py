@@ -182,7 +182,7 @@ def test_what_cannot_be_read_is_refused(tmp_path, name):
     with pytest.raises(InputError) as caught:
         read_run(write(tmp_path, name, make()))
     assert caught.value.code == code, str(caught.value)
-    assert caught.value.mend
+    assert caught.value.remedy
     assert name in str(caught.value)
 
 

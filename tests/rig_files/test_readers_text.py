@@ -147,7 +147,7 @@ def test_refused_with_code_line_and_remedy(tmp_path, case):
         read_run(write(tmp_path, "a.csv", content))
     assert caught.value.code == code, str(caught.value)
     assert "a.csv" in str(caught.value)
-    assert caught.value.mend
+    assert caught.value.remedy
     if line is not None:
         assert getattr(caught.value, "line", None) == line, str(caught.value)
 

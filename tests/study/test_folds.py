@@ -58,7 +58,7 @@ def test_records_with_a_current_that_changes_are_omitted_together():
 
 def test_a_fold_without_which_there_is_no_damper_is_refused_by_its_runs():
     def refit(rows):
-        raise IdentificationError("nothing to fit", mend="test more")
+        raise IdentificationError("nothing to fit", remedy="test more")
 
     found = cross_validate_by_kind(rig_tests((0.0, 0.4, 1.0)), refit, "none")
     assert all(not each.runs for each in found.values())

@@ -172,5 +172,5 @@ def test_a_record_of_too_many_samples_is_refused_and_the_remedy_works():
     with pytest.raises(InputError, match=r"1.2e\+08 samples") as caught:
         replace(LIMITS, sample_rate_Hz=1e7)
     assert caught.value.code == "E_LIMITS"
-    most = int(caught.value.mend.split("at most ")[1].split()[0].replace(",", ""))
+    most = int(caught.value.remedy.split("at most ")[1].split()[0].replace(",", ""))
     assert replace(LIMITS, sample_rate_Hz=most * LIMITS.frequency_Hz[0] / LIMITS.cycles).sample_rate_Hz > 1e4

@@ -75,7 +75,7 @@ def killed_once(path):
 
 
 def refuse(_):
-    raise ColumnError("no force", where="a.csv", mend="add it")
+    raise ColumnError("no force", where="a.csv", remedy="add it")
 
 
 def slip(_):

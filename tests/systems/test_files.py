@@ -70,7 +70,7 @@ def test_a_system_that_is_impossible_is_refused(case, tmp_path):
     with pytest.raises(InputError) as refused:
         load_system(tmp_path / "s.toml")
     assert refused.value.code == code
-    assert refused.value.mend
+    assert refused.value.remedy
 
 
 def test_what_ships_with_the_package_can_be_read():
@@ -140,4 +140,4 @@ def test_a_tyre_in_a_wrong_unit_is_refused_instead_of_simulated_for_ever(tmp_pat
     stiff.write_text(re.sub(r"tyre_N_m = .*", "tyre_N_m = 1e12", text))
     with pytest.raises(InputError, match="natural frequency") as caught:
         load_system(stiff)
-    assert "units" in caught.value.mend
+    assert "units" in caught.value.remedy

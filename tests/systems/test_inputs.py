@@ -64,7 +64,7 @@ def test_a_record_that_cannot_be_used_is_refused(case, tmp_path):
     with pytest.raises(InputError) as refused:
         load_record(tmp_path / "r.csv")
     assert refused.value.code == code
-    assert refused.value.mend
+    assert refused.value.remedy
 
 
 def test_a_record_in_g_and_in_si_at_another_speed(tmp_path):

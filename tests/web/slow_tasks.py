@@ -15,7 +15,7 @@ def count(tell, steps):
 
 
 def refuse(tell):
-    raise IdentificationError("too few runs", where="rig x", mend="record more")
+    raise IdentificationError("too few runs", where="rig x", remedy="record more")
 
 
 def break_down(tell):

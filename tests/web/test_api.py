@@ -387,7 +387,7 @@ def test_input_a_model_cannot_use_is_told_with_its_remedy(client, bench):
     report = wait(client, bench, client.post(f"{bench}/identify", json=choice).json())
     assert report["state"] == "refused"
     assert report["error"]["code"] == "E_NAME"
-    assert "bingham" in report["error"]["mend"]
+    assert "bingham" in report["error"]["remedy"]
 
 
 def test_downloads_have_harmless_names(client, bench, joint):

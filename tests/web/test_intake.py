@@ -89,7 +89,7 @@ def test_what_cannot_be_read_is_refused_by_name(drop, files, code):
     with pytest.raises(InputError) as caught:
         read_drop(drop)
     assert caught.value.code == code
-    assert caught.value.mend
+    assert caught.value.remedy
     assert str(drop.folder) not in str(caught.value)
 
 

@@ -95,7 +95,7 @@ def test_a_taken_port_is_said():
         with pytest.raises(InputError, match=f"port {port} cannot be used") as caught:
             server._listen(port)
     assert caught.value.code == "E_PORT"
-    assert "--port" in caught.value.mend
+    assert "--port" in caught.value.remedy
 
 
 @pytest.mark.parametrize("lacking", ["fastapi", "uvicorn", "plotly"])

@@ -42,7 +42,7 @@ def test_a_refusal_keeps_what_where_and_remedy():
     job = ended(run(slow_tasks.refuse))
     assert job.state == "refused"
     assert job.error["code"] == "E_IDENTIFICATION"
-    assert (job.error["found"], job.error["where"], job.error["mend"]) == ("too few runs", "rig x", "record more")
+    assert (job.error["found"], job.error["where"], job.error["remedy"]) == ("too few runs", "rig x", "record more")
 
 
 def test_a_fault_of_ours_is_said_to_be_ours(capsys):

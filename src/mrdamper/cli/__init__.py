@@ -74,7 +74,7 @@ def _require_memory() -> None:
     if limit != resource.RLIM_INFINITY and limit < _MIN_ADDRESS_SPACE and not {"--help", "--version"} & set(sys.argv):
         raise ResourceError(
             f"the limit of address space is {limit / 2**20:.0f} MiB",
-            mend=f"raise it to {_MIN_ADDRESS_SPACE / 2**20:.0f} MiB or more (ulimit -v)",
+            remedy=f"raise it to {_MIN_ADDRESS_SPACE / 2**20:.0f} MiB or more (ulimit -v)",
             code="E_MEMORY",
         )
 

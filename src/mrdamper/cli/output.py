@@ -53,7 +53,7 @@ def parse_pairs(pairs: Sequence[str], option: str) -> dict[str, str]:
     for pair in pairs:
         name, equals, text = pair.partition("=")
         if not equals or not name.strip():
-            raise InputError(f"{option} {pair}", mend=f"write {option} NAME=VALUE")
+            raise InputError(f"{option} {pair}", remedy=f"write {option} NAME=VALUE")
         found[name.strip()] = text.strip()
     return found
 
@@ -66,13 +66,13 @@ def parse_named(text: str, option: str) -> tuple[str, dict[str, float]]:
     return name, _numbers(rest.split(","), option, "give a number in SI units")
 
 
-def _numbers(pairs: Sequence[str], option: str, mend: str) -> dict[str, float]:
+def _numbers(pairs: Sequence[str], option: str, remedy: str) -> dict[str, float]:
     values = {}
     for name, text in parse_pairs(pairs, option).items():
         try:
             values[name] = float(text)
         except ValueError as error:
-            raise InputError(f"{option} {name}={text}", mend=mend) from error
+            raise InputError(f"{option} {name}={text}", remedy=remedy) from error
     return values
 
 
@@ -86,7 +86,7 @@ def parse_gas(text: str | None) -> GasSpring | None:
         pressure, volume, area = (float(part) for part in text.split(","))
     except ValueError as error:
         raise InputError(
-            f"--gas {text}", mend="write --gas P,V,A in MPa, cm³ and mm², for example 1.5,150,314"
+            f"--gas {text}", remedy="write --gas P,V,A in MPa, cm³ and mm², for example 1.5,150,314"
         ) from error
     return GasSpring(1e6 * pressure, 1e-6 * volume, 1e-6 * area)
 

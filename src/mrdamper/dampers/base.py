@@ -391,7 +391,7 @@ class Damper(Displayable):
         InputError
             If it is of a kind that lives in one study only.
         """
-        raise InputError("this kind of damper is not saved", where=self.title, mend="save another damper")
+        raise InputError("this kind of damper is not saved", where=self.title, remedy="save another damper")
 
     @classmethod
     def from_saved(
@@ -474,6 +474,6 @@ def not_held(damper: Damper, names: Iterable[str]) -> InputError:
     return InputError(
         f"{', '.join(names)} cannot be held in a saved model of this kind",
         where=damper.title,
-        mend="release it on the Model page, or save the state of the bench instead",
+        remedy="release it on the Model page, or save the state of the bench instead",
         code="E_HELD",
     )

@@ -47,7 +47,7 @@ def trace(damper: Damper, free: bool = False) -> Program:
     """
     if not damper.streams:
         raise ParameterError(
-            "no form for one sample", where=damper.title, mend="stream a damper with a model behind it"
+            "no form for one sample", where=damper.title, remedy="stream a damper with a model behind it"
         )
     tape = Tape()
     middle = float(np.mean(damper.envelope.current_A)) if damper.envelope.tested else 0.0
@@ -134,6 +134,6 @@ def causal_force(damper: Damper, motion: Excitation) -> Floats:
     if failed >= 0 or not np.isfinite(force).all():
         at = failed if failed >= 0 else int(np.flatnonzero(~np.isfinite(force))[0])
         raise ExcitationError(
-            f"no force at {motion.time[at]:.6g} s", where=damper.title, mend="bring the motion nearer to the tests"
+            f"no force at {motion.time[at]:.6g} s", where=damper.title, remedy="bring the motion nearer to the tests"
         )
     return force

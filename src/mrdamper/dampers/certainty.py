@@ -140,7 +140,7 @@ class Certainty:
         if ends := self.ends(damper, name, level):
             return ends
         why = "is held by a bound" if name in self.one_sided else NOT_IDENTIFIABLE
-        raise InputError(f"{name} {why}", mend="test where it matters", code="E_CERTAINTY")
+        raise InputError(f"{name} {why}", remedy="test where it matters", code="E_CERTAINTY")
 
 
 def unsure(damper: Damper) -> list[str]:

@@ -55,7 +55,9 @@ class Driver:
         ):
             if not good:
                 raise ParameterError(
-                    f"{name} = {value:g}", where="coil driver", mend="a gain, R, L >= 0 (R with L), a limit above zero"
+                    f"{name} = {value:g}",
+                    where="coil driver",
+                    remedy="a gain, R, L >= 0 (R with L), a limit above zero",
                 )
 
     @property
@@ -93,7 +95,7 @@ class Coil:
     def __post_init__(self) -> None:
         for name, value in (("rise_s", self.rise_s), ("fall_s", self.fall_s)):
             if not 0 <= value <= _LONGEST:
-                raise ParameterError(f"{name} = {value:g} s", where="coil", mend=f"give 0 to {_LONGEST:g} s")
+                raise ParameterError(f"{name} = {value:g} s", where="coil", remedy=f"give 0 to {_LONGEST:g} s")
 
     def along(self, time: Floats, current: Floats) -> Floats:
         """(N,) current [A] whose steady field is there at (N,) times [s]; see `field_current`."""

@@ -127,13 +127,13 @@ def condense(runs: Sequence[Run], model_type: type[Model], more: Sequence[str] =
         If the model has no such single axis, or there are no runs.
     """
     if not runs:
-        raise IdentificationError("no runs", mend="give at least one")
+        raise IdentificationError("no runs", remedy="give at least one")
     problems = [Problem.of(run, model_type) for run in runs]
     axes = model_type.search_axes(Scale(1.0, 1.0), problems[0].free)
     coordinates = tuple(model_type.map_forms())
     if len(axes) > 1 or not {axis.name for axis in axes} <= set(coordinates):
         raise IdentificationError(
-            f"{model_type.title} is searched along {len(axes)} axes", mend="fix all shape parameters but one"
+            f"{model_type.title} is searched along {len(axes)} axes", remedy="fix all shape parameters but one"
         )
     shape = axes[0].name if axes else ""
     linear = (*(name for name in coordinates if name != shape), *more)

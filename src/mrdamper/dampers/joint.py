@@ -135,7 +135,7 @@ class JointDamper(Damper):
         try:
             model = model_type(saved.model)(**saved.parameters)
         except TypeError as error:
-            raise ParameterError(f"parameters do not fit the model: {error}", mend="write the model again") from error
+            raise ParameterError(f"parameters do not fit the model: {error}", remedy="write the model again") from error
         return cls(rig, model, saved.free, envelope, provenance, coil)
 
 
@@ -245,10 +245,10 @@ class JointProblem:
         parts: Sequence[Part] = (),
     ):
         if not runs:
-            raise IdentificationError("no runs", mend="give at least one")
+            raise IdentificationError("no runs", remedy="give at least one")
         rigs = {run.rig for run in runs}
         if len(rigs) > 1:
-            raise IdentificationError(f"runs of {len(rigs)} rigs", mend="identify one rig at a time")
+            raise IdentificationError(f"runs of {len(rigs)} rigs", remedy="identify one rig at a time")
         self.rig, self.runs = rigs.pop(), tuple(runs)
         self.model_type = model_type(model) if isinstance(model, str) else model
         self.fixed = dict(fixed or {})

@@ -121,7 +121,7 @@ class KernelDamper(Damper):
     ) -> Self:
         """Fit to the last cycle of every run, each run by its own force scale."""
         if len(runs) < 2:
-            raise IdentificationError(f"{len(runs)} runs", where=cls.heading, mend="give two or more")
+            raise IdentificationError(f"{len(runs)} runs", where=cls.heading, remedy="give two or more")
         pieces = [Piece.of(run) for run in runs]
         raw = np.concatenate([_inputs(piece.motion.part(piece.scored)) for piece in pieces])
         spread = np.where(raw.std(axis=0) > 1e-12, raw.std(axis=0), 1.0)
@@ -154,7 +154,7 @@ class KernelDamper(Damper):
         except ValueError:
             centres, weights, spread = np.zeros((0, 0)), np.zeros(0), np.zeros(0)
         if spread.shape != (_INPUTS,) or centres.shape != (weights.size, _INPUTS) or not np.all(spread > 0):
-            raise ParameterError("centres, weights and spreads do not fit together", mend="write the model again")
+            raise ParameterError("centres, weights and spreads do not fit together", remedy="write the model again")
         return cls(rig, KernelLaw(centres, weights, spread, saved.mean, saved.size), envelope, provenance, coil)
 
 

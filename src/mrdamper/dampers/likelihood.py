@@ -74,7 +74,7 @@ class Likelihood:
         known: Certainty | None = whole.certainty
         if known is None or not known.names:
             raise InputError(
-                "these runs determine no number of the damper", mend="give its train runs", code="E_CERTAINTY"
+                "these runs determine no number of the damper", remedy="give its train runs", code="E_CERTAINTY"
             )
         names, numbers = known.names, damper.fitted_parameters
         parts = tuple(RunResiduals.of(damper, run) for run in runs)
@@ -190,7 +190,7 @@ def profile(likelihood: Likelihood, name: str) -> Profile:
     own = likelihood.damper.fitted_parameters.get(name)
     if own is None:
         known = ", ".join(likelihood.damper.fitted_parameters)
-        raise InputError(f"no number {name}", mend=f"known: {known}", code="E_CERTAINTY")
+        raise InputError(f"no number {name}", remedy=f"known: {known}", code="E_CERTAINTY")
     if name not in likelihood.names or name in (likelihood.damper.certainty or _NONE).unknown:
         flat = np.array([own.value])
         return Profile(name, own.unit, flat, np.zeros(1), own.value, (-np.inf, np.inf), "flat")

@@ -220,11 +220,11 @@ def load_model(path: str | Path) -> Damper:
         with open_regular(path) as file:
             content = file.read(_MAX_FILE_BYTES + 1)
         if len(content) > _MAX_FILE_BYTES:
-            raise ModelFileError(f"over {_MAX_FILE_BYTES // 10**6} MB", where=str(path), mend="is this a model.json?")
+            raise ModelFileError(f"over {_MAX_FILE_BYTES // 10**6} MB", where=str(path), remedy="is this a model.json?")
         text = content.decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
-        raise ModelFileError(reason, where=str(path), mend="give a model.json written by mrdamper") from error
+        raise ModelFileError(reason, where=str(path), remedy="give a model.json written by mrdamper") from error
     return parse_model(text, where=str(path))
 
 
@@ -233,22 +233,22 @@ def parse_model(text: str, where: str = "model") -> Damper:
     try:
         raw = parse_json(text)
     except ValueError as error:
-        raise ModelFileError(str(error), where=where, mend="copy the file again") from error
+        raise ModelFileError(str(error), where=where, remedy="copy the file again") from error
     if not isinstance(raw, dict) or raw.get("format") != FORMAT:
-        raise ModelFileError("not a saved model", where=where, mend="give a model.json written by mrdamper")
+        raise ModelFileError("not a saved model", where=where, remedy="give a model.json written by mrdamper")
     version = re.fullmatch(r"(\d{1,4})\.\d{1,4}", str(raw.get("version")))
     if version and int(version[1]) > MAJOR:
         raise ModelFileError(
             f"written by a newer mrdamper (format {raw['version']}, this one reads {MAJOR}.x)",
             where=where,
-            mend="update mrdamper",
+            remedy="update mrdamper",
         )
     if version is None or int(version[1]) < 1:
-        raise ModelFileError(f"version is {raw.get('version')!r:.40}", where=where, mend="write the model again")
+        raise ModelFileError(f"version is {raw.get('version')!r:.40}", where=where, remedy="write the model again")
     raw = _upgraded(raw)
     document = _checked(_Document, raw, "", where)
     if document.units != UNITS:
-        raise ModelFileError("units are not those of the format", where=where, mend="convert the model to SI units")
+        raise ModelFileError("units are not those of the format", where=where, remedy="convert the model to SI units")
     kind, own = _kind(document.damper, where)
     saved = _checked(kind.saved, own, "damper.", where)
     try:
@@ -259,8 +259,8 @@ def parse_model(text: str, where: str = "model") -> Damper:
         return _with_certainty(damper, document.covariance, where) if document.covariance else damper
     except InputError as error:
         package = document.provenance.get(_PACKAGE)
-        mend = f"install the package that the file names: {package!r:.80}" if package else error.mend
-        raise ModelFileError(error.found, where=where, mend=mend) from error
+        remedy = f"install the package that the file names: {package!r:.80}" if package else error.remedy
+        raise ModelFileError(error.found, where=where, remedy=remedy) from error
 
 
 def _outside_package(damper: Damper) -> dict[str, str]:
@@ -277,14 +277,14 @@ def _checked(schema: Any, raw: dict[str, Any], prefix: str, where: str) -> Any:
     except ValidationError as error:
         first = error.errors()[0]
         field = prefix + ".".join(str(part) for part in first["loc"])
-        raise ModelFileError(f"{field}: {first['msg']}", where=where, mend="write the model again") from error
+        raise ModelFileError(f"{field}: {first['msg']}", where=where, remedy="write the model again") from error
 
 
 def _kind(described: dict[str, Any], where: str) -> tuple[type[Damper], dict[str, Any]]:
     name, kinds = str(described.get("kind")), all_kinds()
     if name not in kinds:
         raise ModelFileError(
-            f"damper.kind is {name!r}", where=where, mend=f"known: {', '.join(kinds)}; write the model again"
+            f"damper.kind is {name!r}", where=where, remedy=f"known: {', '.join(kinds)}; write the model again"
         )
     return kinds[name], {key: value for key, value in described.items() if key != "kind"}
 
@@ -337,12 +337,12 @@ def _with_certainty(damper: Damper, saved: _Covariance, where: str) -> Damper:
         or not np.allclose(matrix, matrix.T, rtol=1e-6)
         or np.any(np.diag(matrix) < 0)
     ):
-        raise ModelFileError("covariance: it does not fit the damper", where=where, mend="write the model again")
+        raise ModelFileError("covariance: it does not fit the damper", where=where, remedy="write the model again")
     for name, log, variance in zip(saved.parameters, saved.logarithmic, np.diag(matrix).tolist(), strict=True):
         widest = 1.0 if log else max(abs(damper.fitted_parameters[name].value), 1.0)
         if variance > (_MAX_DEVIATION * widest) ** 2:
             raise ModelFileError(
-                f"covariance: the variance of {name} is {variance:.3g}", where=where, mend="write the model again"
+                f"covariance: the variance of {name} is {variance:.3g}", where=where, remedy="write the model again"
             )
     runs = saved.runs or _Session(gain=0.0, offset_N=0.0, degrees_of_freedom=0.0)
     certainty = Certainty(

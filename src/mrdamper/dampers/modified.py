@@ -124,7 +124,7 @@ class ModifiedModel(Damper):
         for name, value in values.items():
             log = functions[name].log
             if log and not value > 0:
-                raise ParameterError(f"{name} = {value:g}", where=self.title, mend="give a value over zero")
+                raise ParameterError(f"{name} = {value:g}", where=self.title, remedy="give a value over zero")
             functions[name] = ParameterFunction("constant", (math.log(value) if log else value,), log=log)
         return replace(self, parameters=replace(self.parameters, functions=functions), certainty=None)
 
@@ -161,7 +161,7 @@ class ModifiedModel(Damper):
         try:
             made.model_at(envelope.middle)
         except (TypeError, KeyError) as error:
-            raise ParameterError(f"functions do not fit the model: {error}", mend="write the model again") from error
+            raise ParameterError(f"functions do not fit the model: {error}", remedy="write the model again") from error
         return made
 
 
@@ -215,12 +215,12 @@ def fit_modified(
         If there is nothing to fit, or the identifications mix models or rigs.
     """
     if not identifications:
-        raise IdentificationError("no identifications", mend="identify at least one run")
+        raise IdentificationError("no identifications", remedy="identify at least one run")
     types = {type(i.model) for i in identifications}
     rigs = {i.rig for i in identifications}
     if len(types) > 1 or len(rigs) > 1:
         raise IdentificationError(
-            f"identifications of {len(types)} models and {len(rigs)} rigs", mend="fit one model of one rig at a time"
+            f"identifications of {len(types)} models and {len(rigs)} rigs", remedy="fit one model of one rig at a time"
         )
     model_type, rig = types.pop(), rigs.pop()
     conditions = tuple(i.condition for i in identifications)

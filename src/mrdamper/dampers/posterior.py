@@ -62,7 +62,7 @@ def posterior(likelihood: Likelihood, steps: int = 2000, walkers: int = 0, seed:
         E_CONVERGENCE below 50 autocorrelation times or above a split-R̂ of 1.01.
     """
     if importlib.util.find_spec("emcee") is None:
-        raise MissingExtraError("samples need emcee", mend="pip install 'mrdamper[uq]'")
+        raise MissingExtraError("samples need emcee", remedy="pip install 'mrdamper[uq]'")
     import emcee
 
     size = len(likelihood.names)
@@ -95,7 +95,7 @@ def posterior(likelihood: Likelihood, steps: int = 2000, walkers: int = 0, seed:
     if not (len(kept) > _TIMES * time and rhat <= _RHAT):
         raise InputError(
             f"not converged: {len(kept)} steps of {time:.0f} autocorrelation times each, split-R̂ {rhat:.3f}",
-            mend=f"take {int(70 * time * 1.25)} steps or more; more than 50 times and 1.01 at most are asked for",
+            remedy=f"take {int(70 * time * 1.25)} steps or more; more than 50 times and 1.01 at most are asked for",
             code="E_CONVERGENCE",
         )
     flat = kept[:: max(1, int(time))].reshape(-1, size)

@@ -225,7 +225,7 @@ class Sessions:
 
     def __post_init__(self) -> None:
         if len({len(each) for each in (self.run_ids, self.when, self.gains, self.offsets)}) > 1:
-            raise InputError("sessions: the lists differ in length", mend="write the model again")
+            raise InputError("sessions: the lists differ in length", remedy="write the model again")
 
     @classmethod
     def of(cls, runs: Sequence[Run], left_out: Sequence[Reading], own: Sequence[Reading]) -> Sessions:
@@ -251,7 +251,7 @@ class Sessions:
         if count < SESSIONS_NEEDED or count == len(names):
             found = "every session holds one run" if count >= SESSIONS_NEEDED else f"{count} known sessions"
             raise InputError(
-                f"{found}: the scatter between sessions cannot be estimated", mend=_NEEDED, code="E_SESSION"
+                f"{found}: the scatter between sessions cannot be estimated", remedy=_NEEDED, code="E_SESSION"
             )
         gain = Spread.likeliest(when, np.array([r.gain - 1 for r in left_out]))
         offset = Spread.likeliest(when, np.array([r.offset for r in left_out]))
@@ -307,7 +307,10 @@ def sessions_known(damper: Damper, runs: Iterable[Run] = (), own: bool = False) 
     known = damper.certainty.sessions if damper.certainty else None
     if known is None:
         raise InputError(
-            "its tests could not tell what runs of a session share", where=damper.title, mend=_NEEDED, code="E_SESSION"
+            "its tests could not tell what runs of a session share",
+            where=damper.title,
+            remedy=_NEEDED,
+            code="E_SESSION",
         )
     return known.seen(damper, runs, own)
 
@@ -346,6 +349,6 @@ def _refuse_disorder(runs: Sequence[Run], when: Sequence[When]) -> None:
                 raise InputError(
                     f"session {when[j].session!r} goes on after session {when[i].session!r} began",
                     where=f"run {runs[j].id}",
-                    mend="check recorded_at, or give each session a name of its own",
+                    remedy="check recorded_at, or give each session a name of its own",
                     code="E_CLOCK",
                 )

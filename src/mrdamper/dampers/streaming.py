@@ -136,7 +136,7 @@ class Stepper:
             raise ParameterError(
                 ", ".join(f"{name} = {value:g}" for name, value in (values or wanted).items()),
                 where=self.stream.title,
-                mend="keep within the bounds and on the branch (n, symmetry) it was traced for, or trace again",
+                remedy="keep within the bounds and on the branch (n, symmetry) it was traced for, or trace again",
             )
         self._parameters, self._given, self._derived = wanted, given, derived
 
@@ -154,7 +154,7 @@ class Stepper:
         present, changed = self.state, dict(zip(values, numbers(*values.values()), strict=True))
         if values.keys() != present.keys() or not all(map(math.isfinite, changed.values())):
             raise ParameterError(
-                "a state of other names, or not finite", where=self.stream.title, mend="set what `state` gave"
+                "a state of other names, or not finite", where=self.stream.title, remedy="set what `state` gave"
             )
         self._memory = tuple(changed[name] for name in self.stream.step.tape.memory)
         self._drive_memory = {
@@ -196,7 +196,7 @@ class Stepper:
             raise ExcitationError(
                 f"no force at x = {inputs[0]:g} m, v = {inputs[1]:g} m/s, I = {inputs[3]:g} A, dt = {inputs[4]:g} s",
                 where=self.stream.title,
-                mend="bring the sample nearer to the last one and into the tested ranges",
+                remedy="bring the sample nearer to the last one and into the tested ranges",
             )
         self._memory, self._flags = memory, int(flags)
         return force
@@ -216,7 +216,7 @@ class Stepper:
             raise ExcitationError(
                 f"sample {tuple(inputs)}, time step {dt:g} s",
                 where=self.stream.title,
-                mend="give finite numbers and a positive time step",
+                remedy="give finite numbers and a positive time step",
             )
 
     def run(
@@ -238,7 +238,7 @@ class Stepper:
         (force, flags), failed = outputs.outputs, outputs.failed
         if failed >= 0 or not np.isfinite(force).all():
             raise ExcitationError(
-                f"no force at sample {failed}", where=self.stream.title, mend="check the motion there"
+                f"no force at sample {failed}", where=self.stream.title, remedy="check the motion there"
             )
         self._memory, self._flags = outputs.memory, int(flags[-1])
         return force
@@ -263,7 +263,7 @@ def steps_of(time: Floats) -> Floats:
     """
     steps = np.diff(time, prepend=2 * time[0] - time[1]) if time.size > 1 else np.zeros(1)
     if not np.all(steps > 0):
-        raise ExcitationError("time does not increase", mend="sort the samples; two are the fewest")
+        raise ExcitationError("time does not increase", remedy="sort the samples; two are the fewest")
     return steps
 
 

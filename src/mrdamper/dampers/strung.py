@@ -71,7 +71,7 @@ class Part:
         first, last = int(window[0]), int(window[-1])
         scale = float(np.ptp(run.force[first : last + 1]))
         if scale == 0:
-            raise RunError("the force does not change", where=f"run {run.id}", mend="leave the run out")
+            raise RunError("the force does not change", where=f"run {run.id}", remedy="leave the run out")
         period, time = 1 / found.condition.frequency_Hz, run.time
         information = 1.0
         followed = _carrying(motion, found.condition)

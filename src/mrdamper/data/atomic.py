@@ -36,7 +36,7 @@ def path_of(path: object) -> Path:
             parts = os.fsencode(path).split(os.sep.encode())
             if b"\0" not in os.fsencode(path) and max(map(len, parts)) <= _MAX_NAME_BYTES:
                 return Path(path)
-    raise OutputError(f"{shown(path)} is no path", mend="give the name of a file or folder", code="E_PATH")
+    raise OutputError(f"{shown(path)} is no path", remedy="give the name of a file or folder", code="E_PATH")
 
 
 @contextmanager
@@ -116,7 +116,7 @@ def write_file(path: str | Path) -> Iterator[Path]:
     """
     final = Path(path).resolve() if Path(path).is_symlink() else Path(path)
     if final.is_dir():
-        raise OutputError("is a folder", where=str(final), mend="give a file name")
+        raise OutputError("is a folder", where=str(final), remedy="give a file name")
     if final.exists() and not final.is_file():  # a device or a pipe: nothing to replace
         with _coded(final), temporary_folder() as folder:
             yield folder / final.name
@@ -140,7 +140,7 @@ def require_writable(path: str | Path | None) -> None:
     with _beside(final) as work:
         (work / "tried").write_bytes(b"\0")
     if final.exists() and not os.access(final, os.W_OK):
-        raise OutputError("not writable", where=str(final), mend=_REMEDY)
+        raise OutputError("not writable", where=str(final), remedy=_REMEDY)
 
 
 @contextmanager
@@ -171,13 +171,15 @@ def _coded(final: Path) -> Iterator[None]:
         place = final.absolute().parent
         names = [os.fsdecode(name) for name in (error.filename, error.filename2) if isinstance(name, str | bytes)]
         if any(Path(name).absolute().is_relative_to(place) for name in names):
-            raise OutputError(error.strerror or str(error), where=str(final), mend=_REMEDY) from error
+            raise OutputError(error.strerror or str(error), where=str(final), remedy=_REMEDY) from error
         raise
 
 
 def _require_absent(final: Path) -> None:
     if final.exists() and (not final.is_dir() or any(final.iterdir())):
-        raise OutputError("exists already and is not empty", where=str(final), mend="choose another name or remove it")
+        raise OutputError(
+            "exists already and is not empty", where=str(final), remedy="choose another name or remove it"
+        )
 
 
 def _earlier(final: Path) -> frozenset[str]:
@@ -202,7 +204,7 @@ def _put(work: Path, final: Path, stale: frozenset[str]) -> None:
             if not final.is_dir():  # else another process was first
                 raise
     if not final.is_dir():
-        raise OutputError("is no folder", where=str(final), mend=_REMEDY)
+        raise OutputError("is no folder", where=str(final), remedy=_REMEDY)
     final = final.resolve()
     if _carried(final, work, stale) and _exchange(work, final):
         _sync_entry(final.parent)

@@ -56,13 +56,13 @@ class Condition:
         for name, value, least in (*given, ("amplitude", self.amplitude_m, 0.0)):
             no_number = isinstance(value, _NO_NUMBERS) or (isinstance(value, np.ndarray) and value.ndim > 0)
             if no_number or (isinstance(value, Real) and not (least < value < math.inf or value == 0.0)):
-                raise ConditionError(f"{name} is {shown(value)}", mend="give a number, zero or more")
+                raise ConditionError(f"{name} is {shown(value)}", remedy="give a number, zero or more")
         if isinstance(self.current_A, Real) and abs(self.current_A) > _MOST_CURRENT:
-            raise ConditionError(f"current is {shown(self.current_A)} A", mend="give amperes: 500 mA are 0.5")
+            raise ConditionError(f"current is {shown(self.current_A)} A", remedy="give amperes: 500 mA are 0.5")
         if isinstance(self.amplitude_m, Real) and self.amplitude_m > _LONGEST:
-            raise ConditionError(f"amplitude is {shown(self.amplitude_m)} m", mend="give metres: 10 mm are 0.01")
+            raise ConditionError(f"amplitude is {shown(self.amplitude_m)} m", remedy="give metres: 10 mm are 0.01")
         if isinstance(self.frequency_Hz, Real) and self.frequency_Hz and not _SLOWEST <= self.frequency_Hz <= _FASTEST:
-            raise ConditionError(f"frequency is {shown(self.frequency_Hz)} Hz", mend="give hertz; zero for none")
+            raise ConditionError(f"frequency is {shown(self.frequency_Hz)} Hz", remedy="give hertz; zero for none")
 
     @property
     def peak_velocity(self) -> float:

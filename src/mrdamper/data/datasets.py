@@ -48,11 +48,11 @@ class Dataset(Displayable):
         object.__setattr__(self, "runs", tuple(self.runs) if np.iterable(self.runs) else self.runs)
         check_fields(self, "runs", "name")
         if not self.runs:
-            raise RunError("no runs", where=f"dataset {self.name}", mend="give at least one")
+            raise RunError("no runs", where=f"dataset {self.name}", remedy="give at least one")
         ids: set[str] = set()
         for run in self.runs:
             if run.id in ids:
-                raise RunError(f"two runs are called {run.id}", where=f"dataset {self.name}", mend="rename one")
+                raise RunError(f"two runs are called {run.id}", where=f"dataset {self.name}", remedy="rename one")
             ids.add(run.id)
 
     @property

@@ -100,16 +100,16 @@ def with_values(kind: type[T], values: Mapping[str, float]) -> T:
     for name, value in values.items():
         if name not in infos:
             raise ParameterError(
-                f"no parameter {name!r}", where=kind.__name__, mend=f"known: {', '.join(infos) or 'none'}"
+                f"no parameter {name!r}", where=kind.__name__, remedy=f"known: {', '.join(infos) or 'none'}"
             )
         low, high = infos[name].bounds
         if not low <= value <= high:
             raise ParameterError(
-                f"{name} = {value:g} {infos[name].unit}", where=kind.__name__, mend=f"give {low:g} to {high:g}"
+                f"{name} = {value:g} {infos[name].unit}", where=kind.__name__, remedy=f"give {low:g} to {high:g}"
             )
     missing = [name for name, info in infos.items() if info.default is None and name not in values]
     if missing:
-        raise ParameterError(f"no {', '.join(missing)}", where=kind.__name__, mend="give it")
+        raise ParameterError(f"no {', '.join(missing)}", where=kind.__name__, remedy="give it")
     return kind(**values)
 
 

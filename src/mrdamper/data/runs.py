@@ -111,7 +111,7 @@ class Run(Displayable):
         time = self._channel("time", self.time)
         size = time.size
         if size < 3:
-            raise RunError(f"{size} samples", where=self._where, mend="a run needs at least 3")
+            raise RunError(f"{size} samples", where=self._where, remedy="a run needs at least 3")
         for at, piece in pieces(time, overlap=1):
             backwards = np.flatnonzero(np.diff(piece) <= 0)
             if not backwards.size:
@@ -120,7 +120,7 @@ class Run(Displayable):
             raise TimeOrderError(
                 f"time goes from {time[i - 1]:.6g} s to {time[i]:.6g} s at sample {i}",
                 where=self._where,
-                mend="sort the samples or drop the repeated ones",
+                remedy="sort the samples or drop the repeated ones",
             )
         channels = {name: self._channel(name, getattr(self, name), size) for name in ("displacement", "force")}
         channels["current"] = self._channel("current", self.current, size)
@@ -132,11 +132,11 @@ class Run(Displayable):
             if np.shape(values) != (size,):
                 raise RunError(
                     f"{name} has {np.size(values)} samples, time has {size}", where=self._where,
-                    mend="trim or resample the run",
+                    remedy="trim or resample the run",
                 )  # fmt: skip
         object.__setattr__(self, "further", {name: np.asarray(v, dtype=float) for name, v in self.further.items()})
         if not isinstance(self.split, str) or self.split not in ("train", "validate"):
-            raise RunError(f"split is {shown(self.split)}", where=self._where, mend="use train or validate")
+            raise RunError(f"split is {shown(self.split)}", where=self._where, remedy="use train or validate")
         object.__setattr__(self, "segments", tuple(self.segments) or ((0, size),))
         object.__setattr__(self, "notes", dict(self.notes))
 
@@ -169,7 +169,7 @@ class Run(Displayable):
             raise RunError(
                 change,
                 where=self._where,
-                mend="use a joint model, which takes a current channel",
+                remedy="use a joint model, which takes a current channel",
                 code="E_CURRENT_VARIES",
             )
         return current
@@ -215,7 +215,7 @@ class Run(Displayable):
             raise RunError(
                 f"the steady window {self.window} s holds {inside.size} samples",
                 where=self._where,
-                mend="correct steady_t0_s and steady_t1_s",
+                remedy="correct steady_t0_s and steady_t1_s",
             )
         return self.part(int(inside[0]), int(inside[-1]) + 1)
 
@@ -247,19 +247,21 @@ class Run(Displayable):
             if name == "current" and given.ndim == 0 and size is not None:
                 array = np.full(size, array)
         except (TypeError, ValueError):
-            raise RunError(f"{name} is no array of numbers", where=self._where, mend="pass 1-D arrays") from None
+            raise RunError(f"{name} is no array of numbers", where=self._where, remedy="pass 1-D arrays") from None
         if array.ndim != 1:
-            raise RunError(f"{name} has {array.ndim} dimensions", where=self._where, mend="pass 1-D arrays")
+            raise RunError(f"{name} has {array.ndim} dimensions", where=self._where, remedy="pass 1-D arrays")
         if size is not None and array.size != size:
             raise RunError(
-                f"{name} has {array.size} samples, time has {size}", where=self._where, mend="trim or resample the run"
+                f"{name} has {array.size} samples, time has {size}",
+                where=self._where,
+                remedy="trim or resample the run",
             )
         bad = [at + i for at, piece in pieces(array) for i in np.flatnonzero(~np.isfinite(piece))]
         if bad:
             raise NonFiniteError(
                 f"{name} has {len(bad)} values that are not finite, the first at sample {bad[0]}",
                 where=self._where,
-                mend="remove these samples",
+                remedy="remove these samples",
             )
         array = array.view()
         array.flags.writeable = False
@@ -277,7 +279,7 @@ def require_name(what: str, name: object) -> None:
     if not isinstance(name, str) or len(name) > _MAX_NAME_CHARACTERS or printable(name) != name:
         raise RunError(
             f"the {what} is {shown(name)}",
-            mend=f"name it in printable text on one line, at most {_MAX_NAME_CHARACTERS} characters",
+            remedy=f"name it in printable text on one line, at most {_MAX_NAME_CHARACTERS} characters",
         )
 
 

@@ -56,5 +56,5 @@ def _clock_of(run: Run) -> datetime | None:
         return datetime.fromisoformat(text).replace(tzinfo=None)
     except ValueError:
         raise InputError(
-            f"recorded_at is {text!r}", where=f"run {run.id}", mend="write 2024-05-31T14:05:00", code="E_CLOCK"
+            f"recorded_at is {text!r}", where=f"run {run.id}", remedy="write 2024-05-31T14:05:00", code="E_CLOCK"
         ) from None

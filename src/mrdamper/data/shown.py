@@ -67,7 +67,7 @@ def _library(name: str) -> Any:
     try:
         return importlib.import_module(name)
     except ModuleNotFoundError as error:
-        raise MissingExtraError(f"to_{name} requires {name}", mend=f"pip install {name}, or use .table") from error
+        raise MissingExtraError(f"to_{name} requires {name}", remedy=f"pip install {name}, or use .table") from error
 
 
 def _cell(value: Any) -> str:

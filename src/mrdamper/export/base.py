@@ -72,7 +72,7 @@ def identifier(text: str) -> str:
     if not _NAME.fullmatch(word) or _RESERVED.fullmatch(word):
         raise InputError(
             f"{text!r} makes no name in C",
-            mend="give --name: a letter, then up to 40 letters, digits and underscores",
+            remedy="give --name: a letter, then up to 40 letters, digits and underscores",
             code="E_EXPORT_NAME",
         )
     return word

@@ -100,7 +100,7 @@ def force_velocity(
     """
     damper = damper_of(damper)
     if not damper.envelope.tested:
-        raise InputError("a model without tested ranges", mend="export a saved damper", code="E_EXPORT")
+        raise InputError("a model without tested ranges", remedy="export a saved damper", code="E_EXPORT")
     envelope = damper.envelope
     amplitude = float(np.sqrt(np.prod(envelope.amplitude_m)))
     highest = envelope.peak_velocity_m_s[1]

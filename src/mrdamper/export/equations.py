@@ -19,7 +19,9 @@ def equations(damper: Damper) -> list[str]:
     Raises `ParameterError` if there is no equation behind the damper that anybody could read.
     """
     if not damper.equation:
-        raise ParameterError("no equations to print", where=damper.title, mend="export a damper with a model behind it")
+        raise ParameterError(
+            "no equations to print", where=damper.title, remedy="export a damper with a model behind it"
+        )
     model: Any = damper.model_at(damper.envelope.middle if damper.envelope.tested else NOWHERE)
     symbols = {name: letter for name, (letter, _) in type(model).coordinates.items()}
     symbols |= {info.name: info.symbol for info in model.parameters()}

@@ -59,11 +59,11 @@ class FMUExporter(Exporter):
 
     def __post_init__(self) -> None:
         if self.fmi not in (2, 3):
-            raise InputError(f"FMI {self.fmi}", mend="give 2 or 3", code="E_FMI_VERSION")
+            raise InputError(f"FMI {self.fmi}", remedy="give 2 or 3", code="E_FMI_VERSION")
         unknown = set(self.platforms or ()) - {p.name for p in PLATFORMS}
         if unknown:
             names = ", ".join(p.name for p in PLATFORMS)
-            raise InputError(f"no platform {', '.join(sorted(unknown))}", mend=f"known: {names}", code="E_PLATFORM")
+            raise InputError(f"no platform {', '.join(sorted(unknown))}", remedy=f"known: {names}", code="E_PLATFORM")
 
     def export(self, damper: Damper | Model, name: str) -> Written:
         return self.packed(fmu_texts(damper, identifier(name), self.fmi), identifier(name))

@@ -51,7 +51,7 @@ def check_fmu(path: str | Path) -> list[FmuFinding]:
     without FMPy.
     """
     if importlib.util.find_spec("fmpy") is None:
-        raise MissingExtraError("FMPy is not installed", mend="pip install 'mrdamper[fmu]'")
+        raise MissingExtraError("FMPy is not installed", remedy="pip install 'mrdamper[fmu]'")
     try:
         files = _unpacked(Path(path))
     except _UNREADABLE as error:

@@ -61,12 +61,12 @@ def outcome(future: Future[Row]) -> Row:
         return future.result()
     except CancelledError as error:
         raise ClusterError(
-            "the scheduler is lost", mend="start it again and run the same command; what was finished is safe"
+            "the scheduler is lost", remedy="start it again and run the same command; what was finished is safe"
         ) from error
     except Exception as error:
         if type(error).__name__ != "KilledWorker":
             raise
-        return refused(JobError(_first_line(error), mend="run the same command again"))
+        return refused(JobError(_first_line(error), remedy="run the same command again"))
 
 
 def guarded(guard: KillableWorker, job: Row) -> Row:
@@ -95,7 +95,7 @@ def cluster_engine(
     try:
         import distributed
     except ModuleNotFoundError as error:
-        raise MissingExtraError("Dask is not installed", mend="pip install 'mrdamper[fleet]'") from error
+        raise MissingExtraError("Dask is not installed", remedy="pip install 'mrdamper[fleet]'") from error
     options: dict[str, Any] = {}
     if tls is not None:
         ca, cert, key = (str(Path(tls) / name) for name in ("ca.pem", "cert.pem", "key.pem"))
@@ -107,7 +107,7 @@ def cluster_engine(
     except (OSError, TypeError, ValueError, RuntimeError) as error:
         raise ClusterError(
             f"no scheduler answers: {_first_line(error)}", where=address,
-            mend="mrdamper cluster shows how to start one",
+            remedy="mrdamper cluster shows how to start one",
         ) from error  # fmt: skip
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what it would say comes as an error of ours
     try:
@@ -115,7 +115,7 @@ def cluster_engine(
         slots = sum(worker["nthreads"] for worker in workers.values())
         if not slots:
             raise ClusterError(
-                "the cluster has no worker", where=address, mend="mrdamper cluster shows how to start one"
+                "the cluster has no worker", where=address, remedy="mrdamper cluster shows how to start one"
             )
         executor: Executor = client.get_executor(pure=False, retries=_LOST_TRIES)
         yield lambda job: executor.submit(on_cluster, job, asdict(limits)), slots

@@ -71,7 +71,7 @@ class KillableWorker:
             killed += died == signal.SIGKILL
             crashed += died != signal.SIGKILL
             if self._closed or killed >= _KILLED_TRIES or crashed >= _CRASHED_TRIES:
-                raise JobError(_how(died), mend="look at its files; run it alone to see more")
+                raise JobError(_how(died), remedy="look at its files; run it alone to see more")
 
     def close(self) -> None:
         """Kill the process and all it started."""
@@ -159,7 +159,7 @@ def _result(answer: dict[str, Any]) -> Any:
     if "result" in answer:
         return answer["result"]
     error = JobError if answer["code"].startswith("E_JOB") else InputError
-    raise error(answer["found"], where=answer.get("where", ""), mend=answer.get("mend", ""), code=answer["code"])
+    raise error(answer["found"], where=answer.get("where", ""), remedy=answer.get("remedy", ""), code=answer["code"])
 
 
 def _how(died: int) -> str:

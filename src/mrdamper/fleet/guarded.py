@@ -62,13 +62,13 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         finally:
             _limit(None, None)
     except InputError as error:
-        return {"code": error.code, "found": error.found, "where": error.where, "mend": error.mend}
+        return {"code": error.code, "found": error.found, "where": error.where, "remedy": error.remedy}
     except MemoryError:
         gc.collect()
         return {"code": "E_JOB_MEMORY", "found": f"over {limits['memory_bytes'] / 2**30:.3g} GiB of memory"}
     except Exception:
         text = "".join(traceback.format_exc().splitlines(keepends=True)[-_TRACEBACK_LINES:])
-        return {"code": "E_JOB_FAULT", "found": text.strip(), "mend": "internal error; please report it"}
+        return {"code": "E_JOB_FAULT", "found": text.strip(), "remedy": "internal error; please report it"}
 
 
 def _limit(seconds: float | None, size: int | None) -> None:

@@ -23,7 +23,7 @@ def find_items(source: str | Path, profile: FleetProfile) -> list[Item]:
     """
     source = Path(source)
     if not source.exists():
-        raise FleetError("no such folder", where=str(source), mend="give a folder of datasets", code="E_FLEET_EMPTY")
+        raise FleetError("no such folder", where=str(source), remedy="give a folder of datasets", code="E_FLEET_EMPTY")
     lake = sorted(source.rglob("*.parquet")) if source.is_dir() else [source]
     results = [p for p in lake if p.name == "dampers.parquet" and _holds_results(p.parent)]
     lake = [p for p in lake if p.name not in SAMPLE_FILES and p.is_file() and p not in results]
@@ -33,13 +33,13 @@ def find_items(source: str | Path, profile: FleetProfile) -> list[Item]:
         items = list(_in_folder(source, profile))
     else:
         raise FleetError(
-            "neither a folder nor a Parquet file with a serial number", where=str(source), mend="give a folder",
+            "neither a folder nor a Parquet file with a serial number", where=str(source), remedy="give a folder",
             code="E_FLEET_EMPTY",
         )  # fmt: skip
     if not items:
         raise FleetError(
             "no damper in this folder", where=str(source), code="E_FLEET_EMPTY",
-            mend="give a folder of dataset folders, of rig files, or of Parquet files",
+            remedy="give a folder of dataset folders, of rig files, or of Parquet files",
         )  # fmt: skip
     return _without_twins(sorted(items, key=lambda item: (item.serial, item.session, item.paths)))
 
@@ -89,12 +89,12 @@ def _named(name: str, profile: FleetProfile, kind: Kind, paths: tuple[str, ...],
     if facts is None:
         error = FleetError(
             f"the name does not follow the pattern {profile.names!r}", where=str(where), code="E_FLEET_NAME",
-            mend="rename it, or correct names in the fleet profile",
+            remedy="rename it, or correct names in the fleet profile",
         )  # fmt: skip
         return Item(name, kind=kind, paths=paths, error=error)
     item = make_item(facts, profile, kind=kind, paths=paths)
     if not paths:
-        error = FleetError("no rig's file in this folder", where=str(where), mend="add them", code="E_NO_DATA")
+        error = FleetError("no rig's file in this folder", where=str(where), remedy="add them", code="E_NO_DATA")
         return replace(item, error=error)
     return item
 
@@ -133,7 +133,7 @@ def _without_twins(items: Sequence[Item]) -> list[Item]:
                 error = FleetError(
                     f"{len(twins)} datasets have serial number {item.name}: {others}",
                     where=item.paths[0], code="E_FLEET_SERIAL",
-                    mend="remove or rename all but one, or state the session of each",
+                    remedy="remove or rename all but one, or state the session of each",
                 )  # fmt: skip
                 item = replace(item, error=error)
             checked.append(item)

@@ -65,7 +65,7 @@ def measure(job: dict[str, Any]) -> dict[str, Any]:
     if job["version"] != VERSION:
         raise FleetError(
             f"mrdamper {VERSION} here, {job['version']} where the fleet was started",
-            where=socket.gethostname(), mend="install the same version on every machine", code="E_CLUSTER_VERSION",
+            where=socket.gethostname(), remedy="install the same version on every machine", code="E_CLUSTER_VERSION",
         )  # fmt: skip
     item = item_of(job)
     settings = Settings(**job["settings"])
@@ -73,7 +73,7 @@ def measure(job: dict[str, Any]) -> dict[str, Any]:
     if job["digest"] and digest_of(item) != job["digest"]:
         raise FleetError(
             "the records changed since the run began, or differ on this machine", where=item.paths[0],
-            mend="run the same command again", code="E_FLEET_CHANGED",
+            remedy="run the same command again", code="E_FLEET_CHANGED",
         )  # fmt: skip
     dataset, findings = read(item, settings)
     if plan is not None and plan.rig and dataset.rigs[0] != plan.rig:
@@ -134,7 +134,7 @@ def read(item: Item, settings: Settings) -> tuple[Dataset, tuple[str, ...]]:
     if len(dataset.rigs) > 1:
         raise FleetError(
             f"records of {len(dataset.rigs)} rigs: {', '.join(dataset.rigs)}", where=item.name, code="E_FLEET_RIGS",
-            mend="one damper is tested on one rig a session; state the session of each, or split it",
+            remedy="one damper is tested on one rig a session; state the session of each, or split it",
         )  # fmt: skip
     findings += [code for run in dataset for code in run.findings]
     return dataset, tuple(dict.fromkeys(findings))

@@ -49,7 +49,9 @@ class Journal:
             _refuse_network(folder)
             self._lock = _locked(folder / "journal.lock")
         except OSError as error:
-            raise OutputError(error.strerror or str(error), where=str(folder), mend="choose another folder") from error
+            raise OutputError(
+                error.strerror or str(error), where=str(folder), remedy="choose another folder"
+            ) from error
         try:
             self._open()
         except BaseException:
@@ -104,15 +106,15 @@ class Journal:
             if version > FORMAT:
                 raise JournalError(
                     f"written by a newer mrdamper (format {version}, this one writes {FORMAT})",
-                    where=str(self._path), mend="update mrdamper, or choose another --out", code="E_JOURNAL_NEWER",
+                    where=str(self._path), remedy="update mrdamper, or choose another --out", code="E_JOURNAL_NEWER",
                 )  # fmt: skip
             application = base.execute("PRAGMA application_id").fetchone()[0]
             if application not in (0, _APPLICATION):
                 raise JournalError(
-                    "a database of another program", where=str(self._path), mend="move the file to another folder"
+                    "a database of another program", where=str(self._path), remedy="move the file to another folder"
                 )
             if base.execute("PRAGMA journal_mode = WAL").fetchone()[0] != "wal":
-                raise JournalError("no write-ahead log here", where=str(self._path), mend="choose a local disk")
+                raise JournalError("no write-ahead log here", where=str(self._path), remedy="choose a local disk")
             base.execute("PRAGMA synchronous = FULL")
             base.executescript(_TABLES)
             base.execute(f"PRAGMA application_id = {_APPLICATION}")
@@ -136,11 +138,11 @@ class Journal:
         if name == "SQLITE_FULL" or name.startswith("SQLITE_IOERR_WRITE"):
             return ResourceError(
                 "the disk is full", where=str(self._path), code="E_DISK_FULL",
-                mend="make room and run the same command again; what was finished is safe",
+                remedy="make room and run the same command again; what was finished is safe",
             )  # fmt: skip
         if name.startswith(("SQLITE_CANTOPEN", "SQLITE_READONLY", "SQLITE_PERM")):
-            return OutputError(str(error), where=str(self._path), mend="choose a folder you may write to")
-        return JournalError(str(error), where=str(self._path), mend="move the file to another folder and run again")
+            return OutputError(str(error), where=str(self._path), remedy="choose a folder you may write to")
+        return JournalError(str(error), where=str(self._path), remedy="move the file to another folder and run again")
 
 
 def _text(document: dict[str, Any]) -> str:
@@ -159,7 +161,7 @@ def _locked(path: Path) -> int:
         os.close(lock)
         raise JournalError(
             f"in use by {owner}", where=str(path.parent), code="E_JOURNAL_TAKEN",
-            mend="wait until it ends, or choose another --out",
+            remedy="wait until it ends, or choose another --out",
         ) from error  # fmt: skip
     second = os.open(path, os.O_RDWR)
     try:
@@ -185,7 +187,7 @@ def _refuse_network(folder: Path) -> None:
 def _untrusted(folder: Path, why: str) -> JournalError:
     return JournalError(
         f"{why}: its locks cannot be trusted", where=str(folder), code="E_JOURNAL_NETWORK",
-        mend="choose an --out on a local disk and copy the results",
+        remedy="choose an --out on a local disk and copy the results",
     )  # fmt: skip
 
 

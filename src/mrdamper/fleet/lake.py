@@ -59,7 +59,7 @@ def lake_items(paths: Sequence[Path], profile: FleetProfile) -> list[Item]:
             first, last = row.pop("first"), row.pop("last")
             if row["serial"] is None:
                 error = FleetError(
-                    "rows without a serial number", where=str(path), mend="fill it in", code="E_FLEET_NAME"
+                    "rows without a serial number", where=str(path), remedy="fill it in", code="E_FLEET_NAME"
                 )
                 refused.append(Item(path.stem, kind="lake", paths=(str(path),), error=error))
                 continue
@@ -96,7 +96,7 @@ def _run(rows: pl.DataFrame, path: Path) -> Run:
     for name in {*REQUIRED, *OPTIONAL} & set(rows.columns):
         if not rows[name].dtype.is_numeric():
             where = f"{path}, run {rows['run_id'][0]}"
-            raise ColumnError(f"column {name} holds text", where=where, mend="write plain numbers")
+            raise ColumnError(f"column {name} holds text", where=where, remedy="write plain numbers")
         channels[name] = np.array(rows[name].cast(float).fill_null(float("nan")).to_numpy())
     facts = {name: None if cell is None else str(cell) for name, cell in rows.row(0, named=True).items()}
     return run_of({name: cell for name, cell in facts.items() if name not in channels}, channels, path)
@@ -112,7 +112,7 @@ def _refusing_damage(path: Path) -> Iterator[None]:
     except BaseException as error:
         reason = (str(error).strip().splitlines() or ["unreadable"])[0][:120]
         raise FleetError(
-            f"damaged Parquet ({reason})", where=str(path), mend="write it again", code="E_FORMAT"
+            f"damaged Parquet ({reason})", where=str(path), remedy="write it again", code="E_FORMAT"
         ) from error
 
 
@@ -128,9 +128,9 @@ def _columns(path: Path) -> list[str] | None:
 
 def _refusal(path: Path, names: Sequence[str] | None, profile: FleetProfile) -> FleetError | ColumnError | None:
     if names is None:
-        return FleetError("no Parquet file", where=str(path), mend="write it again", code="E_FORMAT")
+        return FleetError("no Parquet file", where=str(path), remedy="write it again", code="E_FORMAT")
     if profile.column_of("serial", names) is None:
-        return ColumnError("no column for the serial number", where=str(path), mend="add a column serial")
+        return ColumnError("no column for the serial number", where=str(path), remedy="add a column serial")
     missing = [name for name in ("run_id", *REQUIRED, "current_A") if name not in names]
     if not missing:
         return None
@@ -138,6 +138,6 @@ def _refusal(path: Path, names: Sequence[str] | None, profile: FleetProfile) -> 
     for other in names:
         if other.lower().startswith(quantity + "_"):
             return UnitError(  # type: ignore[return-value]
-                f"column {other!r} where {missing[0]!r} is expected", where=str(path), mend="convert it to SI"
+                f"column {other!r} where {missing[0]!r} is expected", where=str(path), remedy="convert it to SI"
             )
-    return ColumnError(f"column {missing[0]} is missing", where=str(path), mend="add it to this file")
+    return ColumnError(f"column {missing[0]} is missing", where=str(path), remedy="add it to this file")

@@ -137,8 +137,8 @@ class _Line:
                 try:
                     self._digests[number] = digest_of(item)
                 except OSError as error:
-                    reason, mend = error.strerror or str(error), "correct the file or its permissions"
-                    self._failed[number] = refused(InputError(reason, where=item.paths[0], mend=mend))
+                    reason, remedy = error.strerror or str(error), "correct the file or its permissions"
+                    self._failed[number] = refused(InputError(reason, where=item.paths[0], remedy=remedy))
             if number % 100 == 0:
                 self._progress(f"reading {len(self._items)} dampers", 0.0)
         self._make_plan(submit, slots)

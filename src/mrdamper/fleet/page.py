@@ -42,7 +42,7 @@ def write_page(table: Path, plan: Plan | None, limits: Mapping[str, ColumnLimits
     unknown = [name for name in limits if name not in whole.columns or not whole[name].dtype.is_numeric()]
     if unknown:
         numbers = sorted(c for c in whole.columns if whole[c].dtype.is_numeric())
-        raise ColumnError(f"no column {unknown[0]} to limit", where="limits", mend=f"known: {', '.join(numbers)}")
+        raise ColumnError(f"no column {unknown[0]} to limit", where="limits", remedy=f"known: {', '.join(numbers)}")
     done = whole.filter(pl.col("status") == "done").sort("session", "serial", maintain_order=True)
     line, golden = done.filter(~pl.col("golden")), done.filter("golden")
     standing_out = suspects(line)

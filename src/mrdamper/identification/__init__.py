@@ -83,15 +83,15 @@ def identify(
     7000.0
     """
     if not isinstance(run, Run):
-        mend = 'identify one run, identify(dataset["ID"]); run_study(dataset) identifies them all'
-        raise IdentificationError(f"a {type(run).__name__} in place of a run", mend=mend)
+        remedy = 'identify one run, identify(dataset["ID"]); run_study(dataset) identifies them all'
+        raise IdentificationError(f"a {type(run).__name__} in place of a run", remedy=remedy)
     refuse_clipped(run, clipped)
     chosen_model = model_type(model) if isinstance(model, str) else model
     chosen_method = method_named(method) if isinstance(method, str) else method
     problem = Problem.of(run, chosen_model, free=free, fixed=fixed, gas=gas, with_delay=with_delay)
     run.current_A  # noqa: B018  refuses a varying current before anything is computed
     if np.ptp(problem.force) == 0:
-        raise IdentificationError("the force does not change", where=f"run {run.id}", mend="check the channel")
+        raise IdentificationError("the force does not change", where=f"run {run.id}", remedy="check the channel")
     where = f"run {run.id}"
     try:
         result = conclude(problem, chosen_method, chosen_method.solve(problem))
@@ -99,10 +99,12 @@ def identify(
         raise IdentificationError(
             f"the samples do not determine the parameters ({error})",
             where=where,
-            mend="record more cycles, or more samples per cycle, and check the units",
+            remedy="record more cycles, or more samples per cycle, and check the units",
         ) from error
     if not np.isfinite(result.scores.nrmse_pp):
-        raise IdentificationError("the error of the fit is no number", where=where, mend="check the units of the force")
+        raise IdentificationError(
+            "the error of the fit is no number", where=where, remedy="check the units of the force"
+        )
     return result
 
 
@@ -118,7 +120,7 @@ def refuse_clipped(run: Run, clipped: bool = False) -> None:
         raise IdentificationError(
             "a channel is cut off at its extreme (W_CLIPPED)",
             where=f"run {run.id}",
-            mend="record it again with a wider range, or identify with clipped=True (--clipped)",
+            remedy="record it again with a wider range, or identify with clipped=True (--clipped)",
         )
 
 

@@ -137,7 +137,7 @@ def characterise(runs: Sequence[Run]) -> Characteristics:
         except InputError as error:
             passed_over[run.id] = f"{error.found} [{error.code}]"
     if not usable:
-        raise IdentificationError("no run holds a steady cycle at one current", mend="see what mrdamper check says")
+        raise IdentificationError("no run holds a steady cycle at one current", remedy="see what mrdamper check says")
     levels = current_levels([run.current_A for run in usable])
     strokes = [_stroke(run, level) for run, level in zip(usable, levels, strict=True)]
     strokes.sort(key=lambda s: (s.condition.current_A, s.condition.peak_velocity))

@@ -64,7 +64,7 @@ class SineRecord:
                 f"motion at other frequencies {100 * analysis.stray:.0f} %; "
                 f"harmonic balance takes up to {100 * SINE_DISTORTION_LIMIT:g} and {100 * STRAY_LIMIT:g} %",
                 where=f"run {run.id}",
-                mend="identify with method projection, which follows any motion",
+                remedy="identify with method projection, which follows any motion",
             )
         steady, series = run.steady(), analysis.series
         omega = 2 * np.pi * series.frequency
@@ -237,7 +237,7 @@ def separate_mass(
             raise IdentificationError(
                 f"{values.size} runs at one {name}: it takes two to tell "
                 + ("mass from stiffness" if name == "frequency" else "k3 from k1"),
-                mend=f"add runs at another {name}, or give the gas spring",
+                remedy=f"add runs at another {name}, or give the gas spring",
             )
     columns = [np.ones_like(X), -(omega**2)] + ([0.75 * X**2] if with_cubic else [])
     solution = solve_linear(np.column_stack(columns), np.asarray(in_phase, dtype=float))

@@ -35,7 +35,7 @@ def student(level: float, dof: float) -> float:
     Abramowitz and Stegun (1972), "Handbook of Mathematical Functions", 26.7.3, 26.7.5.
     """
     if not 0 < level < 1:
-        raise InputError(f"level {level:g}", mend="give a share between 0 and 1, as 0.9", code="E_LEVEL")
+        raise InputError(f"level {level:g}", remedy="give a share between 0 and 1, as 0.9", code="E_LEVEL")
     return _student(float(level), max(float(dof), 1.0))
 
 

@@ -94,7 +94,7 @@ class Problem:
             raise IdentificationError(
                 "m and k1 are both free, and at one frequency a = −ω² x makes them one parameter",
                 where=f"run {run.id}",
-                mend="fix one, give a gas spring, or identify over several frequencies jointly",
+                remedy="fix one, give a gas spring, or identify over several frequencies jointly",
             )
         presets = {n: i.default for n, i in infos.items() if n not in chosen and i.default is not None}
         return cls(run, model_type, chosen, MappingProxyType({**presets, **held}), with_delay)

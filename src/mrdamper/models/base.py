@@ -132,12 +132,12 @@ class Model(ABC):
                 continue  # searches make models by the thousand
             no_float = isinstance(value, int) and value.bit_length() > 1023
             if no_float or not is_number(value):
-                raise ParameterError(f"{info.name} = {shown(value)}", where=self.title, mend="give a number")
+                raise ParameterError(f"{info.name} = {shown(value)}", where=self.title, remedy="give a number")
             if not (low <= value <= high and -math.inf < value < math.inf):
                 raise ParameterError(
                     f"{info.name} = {value:g} {info.unit}",
                     where=self.title,
-                    mend=f"{info.meaning} lies between {low:g} and {high:g} {info.unit}",
+                    remedy=f"{info.meaning} lies between {low:g} and {high:g} {info.unit}",
                 )
 
     @abstractmethod
@@ -233,4 +233,4 @@ def require_positive(where: str, **values: float) -> None:
     """
     for name, value in values.items():
         if not 0 < value < math.inf:
-            raise ParameterError(f"{name} = {value:g}", where=where, mend="give a positive, finite value in SI units")
+            raise ParameterError(f"{name} = {value:g}", where=where, remedy="give a positive, finite value in SI units")

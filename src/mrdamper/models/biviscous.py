@@ -78,7 +78,7 @@ class Biviscous(Model):
             raise ParameterError(
                 f"cpo = {cpo:g}, cpr = {cpr:g} N s/m, fy = {fy:g} N, v0 = {v0:g} m/s",
                 where=cls.title,
-                mend="the branches meet only if cpr > cpo and fy > cpr v0",
+                remedy="the branches meet only if cpr > cpo and fy > cpr v0",
             )
         return cls(cpo=cpo, fy=fy, vy=fy / (cpr - cpo), vh=cpr * v0 / (cpr - cpo), f0=f0)
 

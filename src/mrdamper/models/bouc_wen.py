@@ -106,7 +106,7 @@ class BoucWen(Model):
             raise IdentificationError(
                 "gamma is held while n is free, and its unit m^-n changes with n",
                 where=cls.title,
-                mend="hold n as well, or free gamma",
+                remedy="hold n as well, or free gamma",
             )
         limit = (1 - 1e-12) * gamma ** (-1 / fixed["n"])  # rounding must not make beta negative
         return tuple(axis.below(limit) if axis.name == "yield_displacement" else axis for axis in axes)

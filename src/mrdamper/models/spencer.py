@@ -127,7 +127,7 @@ class Spencer(Model):
             raise ParameterError(
                 f"c1 = {c1:g}, A = {A:g}, gamma = {gamma:g}, beta = {beta:g}",
                 where=cls.title,
-                mend="c1, A and beta + gamma are positive; gamma, the coefficient of |v|, is not negative",
+                remedy="c1, A and beta + gamma are positive; gamma, the coefficient of |v|, is not negative",
             )
         require_positive(cls.title, n=n)
         z_max = (A / (beta + gamma)) ** (1 / n)

@@ -118,8 +118,8 @@ def require_paper_functions(train: Sequence[Run]) -> None:
         text = ", ".join(f"{count} {one if count == 1 else several}" for count, (one, several) in levels)
         raise IdentificationError(
             f"the tests have {text}: the paper's functions of {'; of '.join(missing)} cannot be made",
-            mend="test at least 3 currents, 3 frequencies and 2 amplitudes, or take shorter functions in their place: "
-            "--set functions=shorter",
+            remedy="test at least 3 currents, 3 frequencies and 2 amplitudes, or take shorter functions "
+            "in their place: --set functions=shorter",
             code="E_PAPER_TESTS",
         )
 

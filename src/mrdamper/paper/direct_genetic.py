@@ -66,7 +66,7 @@ class DirectGenetic(Method):
         if not issubclass(problem.model_type, BoucWen) or problem.with_delay:
             raise IdentificationError(
                 f"method {self.name} identifies the Bouc–Wen model, without a delay",
-                mend="use model bouc-wen, or another method",
+                remedy="use model bouc-wen, or another method",
             )
         record, box = _thinned(problem), self._box(problem)
         lower, upper = zip(*box.values(), strict=True)

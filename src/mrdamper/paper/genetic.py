@@ -58,11 +58,11 @@ class GeneticSettings:
         if self.population < 4 or self.generations < 1 or self.narrowings < 0:
             raise ParameterError(
                 f"population {self.population}, generations {self.generations}, narrowings {self.narrowings}",
-                mend="use a population of 4 or more, at least one generation, and no negative count",
+                remedy="use a population of 4 or more, at least one generation, and no negative count",
             )
         for name in ("crossover_fraction", "mutation", "elite", "narrow_to"):
             if not 0 <= getattr(self, name) <= 1:
-                raise ParameterError(f"{name} is {getattr(self, name)}", mend="give a share between 0 and 1")
+                raise ParameterError(f"{name} is {getattr(self, name)}", remedy="give a share between 0 and 1")
 
     @property
     def children(self) -> tuple[int, int, int]:
@@ -124,7 +124,7 @@ def genetic(
     low, high = np.array(lower, dtype=float), np.array(upper, dtype=float)
     for i in np.flatnonzero(~(low < high)).tolist():
         raise ParameterError(
-            f"bounds of coordinate {i} run from {low[i]:g} to {high[i]:g}", mend="give the lower bound first"
+            f"bounds of coordinate {i} run from {low[i]:g} to {high[i]:g}", remedy="give the lower bound first"
         )
     outer, boxes, history = (low, high), [], []
     best, best_cost = (low + high) / 2, np.inf

@@ -74,14 +74,14 @@ class PaperOptions(StudyMethod):
 
     def __post_init__(self) -> None:
         if not 0 < self.A < float("inf"):
-            raise ParameterError(f"preset A is {self.A:g}", mend="give a positive number")
+            raise ParameterError(f"preset A is {self.A:g}", remedy="give a positive number")
         if not 1 <= self.n <= 10:
-            raise ParameterError(f"preset n is {self.n:g}", mend="give a number from 1 to 10")
+            raise ParameterError(f"preset n is {self.n:g}", remedy="give a number from 1 to 10")
         if self.gamma is not None and not 0 <= self.gamma < float("inf"):
-            raise ParameterError(f"preset gamma is {self.gamma:g}", mend="give a number that is not negative")
+            raise ParameterError(f"preset gamma is {self.gamma:g}", remedy="give a number that is not negative")
         for name, (low, high) in (("alpha", self.alpha_box), ("beta", self.beta_box)):
             if not 0 <= low < high < float("inf"):
-                raise ParameterError(f"the box of {name} runs from {low:g} to {high:g}", mend="give 0 <= LOW < HIGH")
+                raise ParameterError(f"the box of {name} runs from {low:g} to {high:g}", remedy="give 0 <= LOW < HIGH")
         for name, kind in get_type_hints(type(self)).items():
             if get_origin(kind) is Literal and getattr(self, name) not in get_args(kind):
                 raise UnknownNameError.of(name.replace("_", " "), getattr(self, name), get_args(kind))
@@ -155,5 +155,5 @@ class PaperOptions(StudyMethod):
 
 def _beside_others(cls: type[PaperOptions], train: Sequence[Run]) -> Recipe:
     if len(train) < 3:
-        raise IdentificationError("fewer than three identification runs of a pure sine", mend="test sines")
+        raise IdentificationError("fewer than three identification runs of a pure sine", remedy="test sines")
     return cls().beside_others().recipe(train)

@@ -219,17 +219,17 @@ def _require_bouc_wen(problem: Problem) -> None:
     if not issubclass(problem.model_type, BoucWen):
         raise IdentificationError(
             f"method paper identifies the Bouc–Wen model, not {problem.model_type.title}",
-            mend="use model bouc-wen, or another method",
+            remedy="use model bouc-wen, or another method",
         )
     if problem.with_delay:
-        raise IdentificationError("method paper determines no delay", mend="leave out the delay")
+        raise IdentificationError("method paper determines no delay", remedy="leave out the delay")
     for name in ("alpha", "beta"):
         if name not in problem.free:
-            raise IdentificationError(f"{name} is held, but the method searches it", mend=f"leave {name} free")
+            raise IdentificationError(f"{name} is held, but the method searches it", remedy=f"leave {name} free")
     for name in ("gamma", "n"):
         if name in problem.free:
             raise IdentificationError(
-                f"{name} is free, but the paper presets it", mend=f"leave {name} preset, or use method balance"
+                f"{name} is free, but the paper presets it", remedy=f"leave {name} preset, or use method balance"
             )
 
 

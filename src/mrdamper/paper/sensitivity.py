@@ -133,7 +133,7 @@ def sobol(
         If the spread is not within 0...1.
     """
     if not 0 < spread < 1:
-        raise ParameterError(f"spread is {spread}", mend="give a share between 0 and 1")
+        raise ParameterError(f"spread is {spread}", remedy="give a share between 0 and 1")
     from scipy.stats import qmc, sobol_indices
 
     rng, count, base = np.random.default_rng(seed), len(names), _loop(model, condition)

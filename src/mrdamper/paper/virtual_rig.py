@@ -72,7 +72,7 @@ class VirtualRig:
             value = getattr(self, info.name)
             if not info.bounds[0] <= value <= info.bounds[1]:
                 raise ParameterError(
-                    f"{info.name} is {value:g} {info.unit}", where="virtual rig", mend="see its bounds"
+                    f"{info.name} is {value:g} {info.unit}", where="virtual rig", remedy="see its bounds"
                 )
 
     @classmethod

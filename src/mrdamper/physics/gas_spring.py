@@ -84,7 +84,7 @@ class GasSpring:
             limit = self.volume / self.rod_area
             raise ParameterError(
                 f"a compression of {1e3 * np.max(x):.4g} mm leaves no gas volume (limit {1e3 * limit:.4g} mm)",
-                mend="check V0 and the rod area, or stay below the limit",
+                remedy="check V0 and the rod area, or stay below the limit",
             )
         return self.pressure * self._force_area * (left**-self.exponent - 1.0)
 
@@ -114,4 +114,4 @@ class GasSpring:
 
 def _require_positive(name: str, value: object) -> None:
     if not (isinstance(value, numbers.Real) and not isinstance(value, bool) and 0 < value < math.inf):  # type: ignore[operator]
-        raise ParameterError(f"gas {name} is {shown(value)}", mend="give a positive SI value")
+        raise ParameterError(f"gas {name} is {shown(value)}", remedy="give a positive SI value")

@@ -113,5 +113,5 @@ def steady_loop(model: ForceLaw, condition: Condition, samples_per_cycle: int = 
     raise ExcitationError(
         f"the loop does not close within {_MOST_CYCLES} cycles",
         where=str(condition),
-        mend="raise the amplitude: it is far below the yield displacement",
+        remedy="raise the amplitude: it is far below the yield displacement",
     )

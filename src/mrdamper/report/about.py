@@ -112,12 +112,12 @@ def about_of(table: Mapping[str, Any], where: str) -> About:
     for name, value in table.items():
         if name not in known:
             near = get_close_matches(name, known, n=1)
-            mend = f"did you mean {near[0]}?" if near else f"the fields are {', '.join(known)}"
-            raise AboutError(f"unknown field {name!r}", where=where, mend=mend)
+            remedy = f"did you mean {near[0]}?" if near else f"the fields are {', '.join(known)}"
+            raise AboutError(f"unknown field {name!r}", where=where, remedy=remedy)
         if isinstance(value, (dict, list, bool)):
-            raise AboutError(f"{name} is no text", where=where, mend=f'write {name} = "..."')
+            raise AboutError(f"{name} is no text", where=where, remedy=f'write {name} = "..."')
         if len(str(value)) > (_LONGEST if name != "logo" else 2 * _LARGEST_LOGO):
-            raise AboutError(f"{name} has {len(str(value)):,} letters", where=where, mend=f"at most {_LONGEST:,}")
+            raise AboutError(f"{name} has {len(str(value)):,} letters", where=where, remedy=f"at most {_LONGEST:,}")
     return About(**{name: str(value).strip() for name, value in table.items()})
 
 
@@ -132,7 +132,7 @@ def logo_of(text: str) -> str:
     try:
         data = base64.b64decode(text, validate=True)
     except ValueError as error:
-        raise AboutError("is no base64", where="logo", mend="choose the picture again") from error
+        raise AboutError("is no base64", where="logo", remedy="choose the picture again") from error
     return _picture(data, "logo")
 
 
@@ -150,8 +150,8 @@ def load_limits(path: str | Path) -> tuple[Limit, ...]:
     require_known_keys(table, AboutError, str(path))
     entries = table.get(FORCE_LIMITS)
     if not isinstance(entries, list) or not entries:
-        mend = f"write one [[limit]] table per limit with {_FIELDS} (mrdamper init limits)"
-        raise AboutError("no [[limit]] tables", where=str(path), mend=mend)
+        remedy = f"write one [[limit]] table per limit with {_FIELDS} (mrdamper init limits)"
+        raise AboutError("no [[limit]] tables", where=str(path), remedy=remedy)
     limits = tuple(_limit(entry, f"{path}, limit {number}") for number, entry in enumerate(entries, 1))
     _refuse_exclusion(limits, str(path))
     return limits
@@ -169,7 +169,7 @@ def _refuse_exclusion(limits: Sequence[Limit], where: str) -> None:
                     f"({limit.lower_N:g} to {limit.upper_N:g} N), both at {limit.current_A:g} A, "
                     f"{limit.velocity_m_s:g} m/s, {limit.side}",
                     where=where,
-                    mend="remove one of them",
+                    remedy="remove one of them",
                 )
         others.append((number, limit))
 
@@ -179,16 +179,16 @@ _FIELDS = "current_A, velocity_m_s, side, lower_N, upper_N"
 
 def _limit(entry: Any, where: str) -> Limit:
     if not isinstance(entry, dict) or set(entry) != set(_FIELDS.split(", ")):
-        raise AboutError(f"fields {', '.join(sorted(map(str, entry)))}", where=where, mend=f"give just {_FIELDS}")
+        raise AboutError(f"fields {', '.join(sorted(map(str, entry)))}", where=where, remedy=f"give just {_FIELDS}")
     if entry["side"] not in ("rebound", "compression"):
-        raise AboutError(f"side is {entry['side']!r}", where=where, mend="write rebound or compression")
+        raise AboutError(f"side is {entry['side']!r}", where=where, remedy="write rebound or compression")
     numbers = {name: value for name, value in entry.items() if name != "side"}
     for name, value in numbers.items():
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value) or value < 0:
-            raise AboutError(f"{name} is {value!r}", where=where, mend="give a number, zero or more")
+            raise AboutError(f"{name} is {value!r}", where=where, remedy="give a number, zero or more")
     if entry["lower_N"] > entry["upper_N"]:
         raise AboutError(
-            f"lower_N {entry['lower_N']:g} lies above upper_N {entry['upper_N']:g}", where=where, mend="exchange them"
+            f"lower_N {entry['lower_N']:g} lies above upper_N {entry['upper_N']:g}", where=where, remedy="exchange them"
         )
     return Limit(side=entry["side"], **{name: float(value) for name, value in numbers.items()})
 
@@ -197,10 +197,12 @@ def _toml(path: Path) -> Mapping[str, Any]:
     try:
         return read_toml_file(path)
     except OSError as error:
-        raise AboutError(error.strerror or str(error), where=str(path), mend="give a TOML file that exists") from error
+        raise AboutError(
+            error.strerror or str(error), where=str(path), remedy="give a TOML file that exists"
+        ) from error
     except tomllib.TOMLDecodeError as error:
-        mend = 'write one `name = "text"` a line, in UTF-8'
-        raise AboutError(f"is no TOML: {str(error).splitlines()[0]}", where=str(path), mend=mend) from error
+        remedy = 'write one `name = "text"` a line, in UTF-8'
+        raise AboutError(f"is no TOML: {str(error).splitlines()[0]}", where=str(path), remedy=remedy) from error
 
 
 def _logo_file(path: Path) -> tuple[bytes, str]:
@@ -210,7 +212,7 @@ def _logo_file(path: Path) -> tuple[bytes, str]:
             data = file.read(_LARGEST_LOGO + 1)
     except (OSError, ValueError) as error:
         said = getattr(error, "strerror", None) or str(error)
-        raise AboutError(said, where=where, mend="correct its path") from error
+        raise AboutError(said, where=where, remedy="correct its path") from error
     return data, where
 
 
@@ -219,19 +221,19 @@ def _picture(data: bytes, where: str) -> str:
 
     if len(data) > _LARGEST_LOGO:
         limit = _LARGEST_LOGO // 1000
-        raise AboutError(f"is over {limit} kB", where=where, mend=f"give a picture under {limit} kB")
+        raise AboutError(f"is over {limit} kB", where=where, remedy=f"give a picture under {limit} kB")
     kind = next((kind for start, kind in _PICTURES.items() if data.startswith(start)), None)
     if kind is None:
-        raise AboutError("neither PNG nor JPEG", where=where, mend="save it as PNG")
+        raise AboutError("neither PNG nor JPEG", where=where, remedy="save it as PNG")
     try:
         with Image.open(io.BytesIO(data)) as picture:
             size = picture.size
             if max(size) <= _LONGEST_SIDE:
                 picture.load()
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-        raise AboutError("is damaged", where=where, mend="save it as PNG again") from error
+        raise AboutError("is damaged", where=where, remedy="save it as PNG again") from error
     if max(size) > _LONGEST_SIDE:
-        raise AboutError(f"has {size[0]} x {size[1]} points", where=where, mend=f"make it {_LONGEST_SIDE} at most")
+        raise AboutError(f"has {size[0]} x {size[1]} points", where=where, remedy=f"make it {_LONGEST_SIDE} at most")
     return f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"
 
 
@@ -249,5 +251,5 @@ def parse_ladder(text: str) -> tuple[float, ...]:
     except ValueError:
         steps = [math.nan]
     if any(not (0 < step < math.inf) for step in steps) or len(steps) > 20:
-        raise AboutError(f"velocities {text!r}", where="--velocities", mend="give up to 20 positive numbers in m/s")
+        raise AboutError(f"velocities {text!r}", where="--velocities", remedy="give up to 20 positive numbers in m/s")
     return tuple(sorted(set(steps)))

@@ -186,7 +186,7 @@ def _characterised(name: str, dataset: Dataset) -> Characteristics:
         raise IdentificationError(
             f"holds the tests of {len(dataset.rigs)} dampers: {', '.join(dataset.rigs)}",
             where=name,
-            mend="name one: FOLDER:RIG",
+            remedy="name one: FOLDER:RIG",
         )
     try:
         return characterise(dataset.runs)

@@ -49,7 +49,7 @@ def current_of(
         if found is None and channel is None:
             raise ColumnError(
                 printable(f"the pattern {profile.current.pattern!r} does not match {places[-2].rstrip('/')!r}"),
-                where=printable(table.source.name), mend="correct [current] pattern of the profile",
+                where=printable(table.source.name), remedy="correct [current] pattern of the profile",
                 code="E_CURRENT_MISSING",
             )  # fmt: skip
         statements = [] if found is None else [Statement(found, "name by the profile's pattern")]
@@ -58,18 +58,18 @@ def current_of(
         if not statements and channel is None:
             statements = _set_points(table, rows) or stated_in_titles(table.remarks) or _folders(table, path)
     where = printable(table.source.name)
-    mend = "correct the name or the line that is wrong"
+    remedy = "correct the name or the line that is wrong"
     try:
         stated = agreed(statements)
     except ValueError as error:
         code = "E_RANGE" if "no coil current" in str(error) else "E_AMBIGUOUS"
-        raise ColumnError(printable(str(error)), where=where, mend=mend, code=code) from None
+        raise ColumnError(printable(str(error)), where=where, remedy=remedy, code=code) from None
     if channel is not None and stated is not None:
         mean = contradicted(channel, stated.amperes)
         if mean is not None:
             raise ColumnError(
                 printable(f"{stated.whence} gives {stated.amperes:g} A, the current channel {mean:g} A"), where=where,
-                mend="if the channel is right, rename; else leave the channel out of the export",
+                remedy="if the channel is right, rename; else leave the channel out of the export",
                 code="E_CURRENT_CONTRADICTS",
             )  # fmt: skip
     if channel is not None or stated is None:
@@ -85,7 +85,7 @@ def _refuse_contradiction(value: float, channel: Floats | None, statements: list
     if others:
         raise ColumnError(
             printable(f"the profile says {value:g} A, {others[0]}"), where=where,
-            mend="leave [current] out of the profile; if the file is wrong, correct it, or rename it",
+            remedy="leave [current] out of the profile; if the file is wrong, correct it, or rename it",
             code="E_CURRENT_CONTRADICTS",
         )  # fmt: skip
 

@@ -249,14 +249,16 @@ def _missing(table: RawTable, found: Mapping[str, int], profile: Profile) -> lis
     missing = [r for r in REQUIRED if r not in found and not (r == "time" and rate_of(table, profile))]
     if missing and not any(table.names):
         what = f"{len(table.names)} columns without names or units"
-        mend = "name them in a profile: [file] names = [...], [channels.force] unit = ..."
-        return [_refusal(UnitError, table, what, mend, "E_UNITS_MISSING")]
+        remedy = "name them in a profile: [file] names = [...], [channels.force] unit = ..."
+        return [_refusal(UnitError, table, what, remedy, "E_UNITS_MISSING")]
     shown = ", ".join(name or f"column {i}" for i, name in enumerate(table.names, 1))
     shown += "" if any(header.unit for header in table.headers) else ", without units"
-    mend = 'say [channels.{}] column = "..."{} in a profile'
+    remedy = 'say [channels.{}] column = "..."{} in a profile'
     fixed = {"time": " or, with a fixed rate, [file] sample_rate_Hz = ..."}
     return [
-        _refusal(ColumnError, table, f"no column is known to be {r} (found {shown})", mend.format(r, fixed.get(r, "")))
+        _refusal(
+            ColumnError, table, f"no column is known to be {r} (found {shown})", remedy.format(r, fixed.get(r, ""))
+        )
         for r in missing
     ]
 
@@ -308,18 +310,18 @@ def _unit_problem(table: RawTable, role: str, column: int, unit: str) -> UnitErr
     if parsed is None:
         unit = unit or unknown_unit(table.names[column])
         found = f"{named} has no unit" if not unit else f"{named} has the unit {unit!r}, which is not known"
-        mend = f'write it into the header, or say [channels.{role}] unit = "..." in a profile'
-        return _refusal(UnitError, table, found, mend, "E_UNITS_MISSING")
+        remedy = f'write it into the header, or say [channels.{role}] unit = "..." in a profile'
+        return _refusal(UnitError, table, found, remedy, "E_UNITS_MISSING")
     if parsed.dimension == DIMENSION[role]:
         return None
-    mend = f'say [channels.{role}] unit = "..." in a profile, or name another column'
+    remedy = f'say [channels.{role}] unit = "..." in a profile, or name another column'
     if parsed.dimension == "mass" and role == "force":
         force = "kgf" if parsed.factor == 1 else "lbf"
-        mend = f'if the force of that weight is meant, say [channels.force] unit = "{force}" in a profile'
+        remedy = f'if the force of that weight is meant, say [channels.force] unit = "{force}" in a profile'
     if parsed.dimension == "voltage":
-        mend = f"give the calibration: [channels.{role}] unit and scale (unit per {unit}) in a profile"
+        remedy = f"give the calibration: [channels.{role}] unit and scale (unit per {unit}) in a profile"
     found = f"{named} is in {unit}, which is no unit of {DIMENSION[role]}"
-    return _refusal(UnitError, table, found, mend, "E_UNITS_DIMENSION")
+    return _refusal(UnitError, table, found, remedy, "E_UNITS_DIMENSION")
 
 
 def _refuse_two_units(table: RawTable, role: str, column: int, unit: str) -> None:
@@ -394,6 +396,6 @@ def _agree(a: Floats, one: Header, b: Floats, other: Header) -> bool:
     return bool(np.allclose(one.known.factor * a, other.known.factor * b, rtol=0, atol=1e-3 * spread, equal_nan=True))
 
 
-def _refusal(kind: type, table: RawTable, found: str, mend: str, code: str | None = None):
+def _refusal(kind: type, table: RawTable, found: str, remedy: str, code: str | None = None):
     where = table.source.name + (f", line {table.line}" if table.line else "")
-    return kind(printable(found), where=printable(where), mend=mend, code=code)
+    return kind(printable(found), where=printable(where), remedy=remedy, code=code)

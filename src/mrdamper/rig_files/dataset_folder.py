@@ -100,7 +100,7 @@ def save_dataset(
         _write_samples(dataset, target)
         for name, text in (extra_files or {}).items():
             if Path(name).name != name:
-                raise OutputError(f"{shown(name)} is no name of a file", mend="leave folders out", code="E_PATH")
+                raise OutputError(f"{shown(name)} is no name of a file", remedy="leave folders out", code="E_PATH")
             (target / name).write_text(text, encoding="utf-8")
 
 
@@ -125,14 +125,14 @@ def _load(folder: Path, name: str, *, trusted: bool = False) -> Dataset:
         raise DatasetError(
             f"run {missing[0]} has no samples" + (f" (and {len(missing) - 1} more)" if missing[1:] else ""),
             where=str(folder),
-            mend="add them, or remove the row from runs.csv",
+            remedy="add them, or remove the row from runs.csv",
         )
     strangers = set(samples) - {row["run_id"] for row in table}
     if strangers:
         raise DatasetError(
             f"samples name run {min(strangers)[:80]!r}, which runs.csv does not",
             where=str(folder),
-            mend="add a row to runs.csv, or correct the run_id",
+            remedy="add a row to runs.csv, or correct the run_id",
         )
     path = folder / "runs.csv"
     return Dataset(tuple(run_of(row, samples[row["run_id"]], path) for row in table), name)
@@ -144,24 +144,24 @@ def runs_table(folder: Path) -> list[dict[str, Any]]:
     Raises `DatasetError` or `ColumnError` if it is missing, cannot be read, or holds no run.
     """
     if folder.is_file():
-        mend = "give the folder that holds runs.csv; files of a rig become one with mrdamper import"
-        raise DatasetError("a file, no dataset folder", where=str(folder), mend=mend)
+        remedy = "give the folder that holds runs.csv; files of a rig become one with mrdamper import"
+        raise DatasetError("a file, no dataset folder", where=str(folder), remedy=remedy)
     if not folder.is_dir():
-        raise DatasetError("no such folder", where=str(folder), mend="give a folder that holds runs.csv")
+        raise DatasetError("no such folder", where=str(folder), remedy="give a folder that holds runs.csv")
     path = folder / "runs.csv"
     if not path.is_file():
         hint = "write one row a run: run_id, current_A, ... (README, what a dataset is)"
         if _holds_rig_files(folder):
             hint = f"are these files of a rig? mrdamper import {folder.name or folder} --out DATASET makes a dataset"
-        raise DatasetError("runs.csv is missing", where=str(folder), mend=hint)
+        raise DatasetError("runs.csv is missing", where=str(folder), remedy=hint)
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             rows = _rows_of(csv.reader(file), path)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = str(error).splitlines()[0]
-        raise DatasetError(reason, where=str(path), mend="write it as comma-separated UTF-8") from error
+        raise DatasetError(reason, where=str(path), remedy="write it as comma-separated UTF-8") from error
     if not rows:
-        raise DatasetError("no rows", where=str(path), mend="add one row a run")
+        raise DatasetError("no rows", where=str(path), remedy="add one row a run")
     return rows
 
 
@@ -169,7 +169,7 @@ def _rows_of(lines: Iterable[list[str]], path: Path) -> list[dict[str, Any]]:
     """Rows by column; empty cells are None."""
 
     def refuse(reason: str) -> DatasetError:
-        return DatasetError(reason, where=str(path), mend="write one row a run and one column a fact")
+        return DatasetError(reason, where=str(path), remedy="write one row a run and one column a fact")
 
     if path.stat().st_size > _RUNS_BYTES:
         raise refuse(f"over {_RUNS_BYTES // 2**20} MB")
@@ -221,7 +221,7 @@ def run_of(row: Mapping[str, str | None], samples: Channels, path: Path) -> Run:
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            raise ColumnError(f"{column} is {text!r}", where=where, mend="give a number or leave the cell empty")
+            raise ColumnError(f"{column} is {text!r}", where=where, remedy="give a number or leave the cell empty")
         return value
 
     channels = {n: values for n, values in samples.items() if n in REQUIRED or not np.isnan(values).all()}
@@ -257,12 +257,12 @@ def _driven(channels: Channels, number: Callable[[str], float | None], where: st
 
     volts, gain = channels.get("voltage_V", number("voltage_V")), number("amperes_per_volt")
     if volts is None:
-        raise ColumnError("no current_A", where=where, mend="add the column current_A to runs.csv or to the samples")
+        raise ColumnError("no current_A", where=where, remedy="add the column current_A to runs.csv or to the samples")
     if gain is None:
         raise ColumnError(
             "voltage_V without a gain",
             where=where,
-            mend="add amperes_per_volt to runs.csv: the amplifier's, or one over the coil's resistance",
+            remedy="add amperes_per_volt to runs.csv: the amplifier's, or one over the coil's resistance",
             code="E_DRIVER",
         )
     time, limit = channels["time_s"], number("limit_A")

@@ -46,7 +46,7 @@ def read_samples(folder: Path, *, trusted: bool = False) -> dict[str, Channels]:
     """
     path = next((folder / name for name in SAMPLE_FILES if (folder / name).is_file()), None)
     if path is None:
-        raise DatasetError(f"none of {', '.join(SAMPLE_FILES)} is there", where=str(folder), mend="add the samples")
+        raise DatasetError(f"none of {', '.join(SAMPLE_FILES)} is there", where=str(folder), remedy="add the samples")
     try:
         with opened(path) as source:
             if path.suffix == ".parquet":
@@ -59,7 +59,7 @@ def read_samples(folder: Path, *, trusted: bool = False) -> dict[str, Channels]:
                     return _of_parquet(tables[0], path)
             return _of_text(source, path)
     except RigFileError as error:
-        raise DatasetError(error.found, where=str(path), mend=error.mend, code=error.code) from error
+        raise DatasetError(error.found, where=str(path), remedy=error.remedy, code=error.code) from error
 
 
 def _of_parquet(table: RawTable, path: Path) -> dict[str, Channels]:
@@ -88,12 +88,12 @@ def _of_text(source: Source, path: Path) -> dict[str, Channels]:
     try:
         names = next(csv.reader(io.StringIO(_first_line_of(source).decode("utf-8-sig"))), [])
         if len(names) > MOST_COLUMNS:
-            raise source.refuse("E_TOO_MANY_COLUMNS", f"{len(names)} columns", mend="keep only the channels needed")
+            raise source.refuse("E_TOO_MANY_COLUMNS", f"{len(names)} columns", remedy="keep only the channels needed")
         _require(names, path)
         kinds = {c: pl.Float64 for c in (*REQUIRED, *OPTIONAL) if c in names}
         table = pl.read_csv(source.file, schema_overrides={"run_id": pl.String, **kinds})
     except (pl.exceptions.PolarsError, OSError, UnicodeDecodeError, csv.Error) as error:
-        raise DatasetError(first_line(error), where=str(path), mend="write the file again") from error
+        raise DatasetError(first_line(error), where=str(path), remedy="write the file again") from error
     ids = words_in(table["run_id"])
     channels = {
         name: table[name].cast(pl.Float64).fill_null(float("nan")).to_numpy()
@@ -106,7 +106,7 @@ def _of_text(source: Source, path: Path) -> dict[str, Channels]:
 def _first_line_of(source: Source) -> bytes:
     head = source.head(_HEADER)
     if len(head) == _HEADER and b"\n" not in head:
-        raise source.refuse("E_TOO_MANY_COLUMNS", "no end of the first line", mend="begin with a line of names")
+        raise source.refuse("E_TOO_MANY_COLUMNS", "no end of the first line", remedy="begin with a line of names")
     return head.split(b"\n", 1)[0]
 
 
@@ -124,7 +124,9 @@ def _in_order(names: Iterable[str]) -> list[str]:
 def _refuse_text(name: str, path: Path) -> bool:
     """Further columns may hold text, and are left out."""
     if name in (*REQUIRED, *OPTIONAL):
-        raise ColumnError(f"column {name} holds text", where=str(path), mend="write plain numbers with a decimal point")
+        raise ColumnError(
+            f"column {name} holds text", where=str(path), remedy="write plain numbers with a decimal point"
+        )
     return False
 
 
@@ -134,8 +136,10 @@ def _refuse_bomb(size: int, path: Path) -> None:
     if size > most:
         raise DatasetError(
             f"{packed:,} bytes unpack to over {most:,}",
-            where=str(path), mend="a test does not compress like that; write the samples again", code="E_ARCHIVE_RATIO",
-        )  # fmt: skip
+            where=str(path),
+            remedy="a test does not compress like that; write the samples again",
+            code="E_ARCHIVE_RATIO",
+        )
 
 
 def _by_run(codes: np.ndarray, labels: tuple[str, ...], channels: Channels) -> dict[str, Channels]:
@@ -160,10 +164,10 @@ def missing_column(column: str, present: list[str], path: Path) -> ColumnError |
             return UnitError(
                 f"column {other!r} where {column!r} is expected",
                 where=str(path),
-                mend="convert it to SI and rename it",
+                remedy="convert it to SI and rename it",
             )
     shown = ", ".join(name[:40] for name in present[:20])
-    return ColumnError(f"column {column} is missing (found {shown})", where=str(path), mend="add it")
+    return ColumnError(f"column {column} is missing (found {shown})", where=str(path), remedy="add it")
 
 
 def first_line(error: Exception) -> str:

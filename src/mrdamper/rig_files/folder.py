@@ -43,8 +43,8 @@ def files_in(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:
     if not files:
         where = ", ".join(path.name for path in paths)
         found = f"no rig's file in this folder (found {', '.join(file.name for file in others[:5]) or 'nothing'})"
-        mend = "export them as CSV, or give another folder" if others else "give another folder"
-        raise RigFileError("E_NO_DATA", found, file=where, mend=mend)
+        remedy = "export them as CSV, or give another folder" if others else "give another folder"
+        raise RigFileError("E_NO_DATA", found, file=where, remedy=remedy)
     return files, others
 
 

@@ -40,5 +40,5 @@ def require_known_keys(table: Mapping[str, Any], refuse: type[InputError], where
             same = [key for key in RIG_LIMITS if key.split("_")[0] == name.split("_")[0]]
             near = same[:1] or get_close_matches(name, _KEYS, 1, 0.5)
             unit = ": the unit is part of the name" if same else ""
-            mend = f"did you mean {near[0]}?{unit}" if near else "mrdamper init limits shows the keys"
-            raise refuse(f"unknown key {name}", where=where, mend=mend)
+            remedy = f"did you mean {near[0]}?{unit}" if near else "mrdamper init limits shows the keys"
+            raise refuse(f"unknown key {name}", where=where, remedy=remedy)

@@ -37,7 +37,7 @@ def load_motion(path: str | Path, current: float | None = None) -> Run:
     wanted = [*_NAMES, *(["current_A"] if current is None and "current_A" in table.columns else [])]
     columns = {name: _numbers(table, name, path) for name in wanted}
     if current is None and "current_A" not in columns:
-        raise ColumnError("no current", where=str(path), mend="give --current A, or a column current_A")
+        raise ColumnError("no current", where=str(path), remedy="give --current A, or a column current_A")
     _refuse_gap(columns["time_s"], path)
     return Run(
         id=path.stem,
@@ -49,7 +49,7 @@ def load_motion(path: str | Path, current: float | None = None) -> Run:
     )
 
 
-def read_table(path: Path, mend: str) -> pl.DataFrame:
+def read_table(path: Path, remedy: str) -> pl.DataFrame:
     """Read a small table from CSV, packed or not, within the bounds of a rig's file.
 
     Raises `DatasetError` if it is no such table.
@@ -60,9 +60,9 @@ def read_table(path: Path, mend: str) -> pl.DataFrame:
         with opened(path) as source:
             return pl.read_csv(source.file, infer_schema_length=10_000)
     except RigFileError as error:
-        raise DatasetError(error.found, where=str(path), mend=error.mend if path.is_file() else mend) from error
+        raise DatasetError(error.found, where=str(path), remedy=error.remedy if path.is_file() else remedy) from error
     except (pl.exceptions.PolarsError, OSError) as error:
-        raise DatasetError(first_line(error), where=str(path), mend="write it as comma-separated UTF-8") from error
+        raise DatasetError(first_line(error), where=str(path), remedy="write it as comma-separated UTF-8") from error
 
 
 def _numbers(table: pl.DataFrame, name: str, path: Path) -> Floats:
@@ -70,17 +70,17 @@ def _numbers(table: pl.DataFrame, name: str, path: Path) -> Floats:
     if name not in table.columns:
         near = [column for column in table.columns if column.lower().startswith(name.split("_")[0])]
         if near:
-            reason, mend = f"column {near[0]!r} where {name!r} is expected", "convert it to SI and rename it"
-            raise UnitError(reason, where=str(path), mend=mend)
+            reason, remedy = f"column {near[0]!r} where {name!r} is expected", "convert it to SI and rename it"
+            raise UnitError(reason, where=str(path), remedy=remedy)
         reason = f"column {name} is missing (found {', '.join(table.columns)})"
-        raise ColumnError(reason, where=str(path), mend="add it")
+        raise ColumnError(reason, where=str(path), remedy="add it")
     values = table[name]
     if not values.dtype.is_numeric():
-        mend = "write plain numbers with a decimal point"
-        raise ColumnError(f"column {name} holds text", where=str(path), mend=mend)
+        remedy = "write plain numbers with a decimal point"
+        raise ColumnError(f"column {name} holds text", where=str(path), remedy=remedy)
     if values.null_count():
         reason = f"column {name} has {values.null_count()} empty cells"
-        raise ColumnError(reason, where=str(path), mend="remove those rows")
+        raise ColumnError(reason, where=str(path), remedy="remove those rows")
     return values.to_numpy().astype(np.float64)
 
 
@@ -92,6 +92,6 @@ def _refuse_gap(time: Floats, path: Path) -> None:
         raise RunError(
             f"a gap of {steps[at]:.4g} s after {time[at]:.6g} s",
             where=str(path),
-            mend="predict each part separately: the damper's state is unknown after a gap",
+            remedy="predict each part separately: the damper's state is unknown after a gap",
             code="E_TIME_GAP",
         )

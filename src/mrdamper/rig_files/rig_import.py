@@ -82,7 +82,7 @@ def read_run(path: str | Path, profile: Profile | str | Path | None = None) -> R
             "E_BLOCKS",
             f"holds {len(records)} tests",
             file=Path(path).name,
-            mend='use read_runs, or say blocks = "join" under [file] of a profile',
+            remedy='use read_runs, or say blocks = "join" under [file] of a profile',
         )
     return records[0]
 
@@ -278,7 +278,7 @@ class _Intake:
             return
         error = ColumnError(
             "a current of two digits, beside names such as 05A: is the decimal point left out?",
-            mend="write the currents into tests.csv (--write-tests)",
+            remedy="write the currents into tests.csv (--write-tests)",
             code="E_AMBIGUOUS",
         )
         self._refuse({i: error for i, (file, _) in enumerate(self._tests()) if _TWO_DIGITS.search(file.name)})
@@ -336,7 +336,7 @@ def _with_current(record: Record) -> Record:
     raise ColumnError(
         why[0] if why else "no coil current in a column or in the file name",
         where=Path(record.provenance.get("file", record.id)).name,
-        mend='write the currents into tests.csv (--write-tests), or say [current] pattern = "*_{current}A_*", '
+        remedy='write the currents into tests.csv (--write-tests), or say [current] pattern = "*_{current}A_*", '
         '[channels.current] column = "..." or, if all tests have one, [current] value = 0.5 in a profile',
         code="E_CURRENT_MISSING",
     )

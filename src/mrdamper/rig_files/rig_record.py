@@ -247,7 +247,7 @@ def _aligned(channels: dict[str, Floats], found: dict[str, Assigned], lines):
         return channels, lines
     keep = np.flatnonzero((time + late <= np.nanmax(time)) & (time + early >= np.nanmin(time)))
     if not keep.size:
-        raise ColumnError("the delays of the profile are longer than the record", mend="correct delay_ms")
+        raise ColumnError("the delays of the profile are longer than the record", remedy="correct delay_ms")
     inside = slice(int(keep[0]), int(keep[-1]) + 1)
     cut = {name: values[inside] for name, values in {**channels, **shifted}.items()}
     return cut, None if lines is None else lines.part(inside.start, inside.stop)

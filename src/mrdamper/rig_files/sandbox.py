@@ -101,7 +101,7 @@ class _Asked:
                 "copy or export the file again",
             )
         if "missing" in answer:
-            raise MissingExtraError(answer["missing"], where=self._source.name, mend=answer["mend"])
+            raise MissingExtraError(answer["missing"], where=self._source.name, remedy=answer["remedy"])
         CombinedError.raise_from(
             (NoTableError if told.pop("no_table") else RigFileError)(file=self._source.name, **told)
             for told in answer.get("wrong", ())

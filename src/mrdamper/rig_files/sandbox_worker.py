@@ -18,7 +18,7 @@ from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import NoTableError, RawTable, Reader, RigFileError, Source
 
 _SAYS = ("names", "units", "line", "label", "form", "fallback", "constants", "odd", "remarks", "over")
-_TOLD = ("code", "found", "line", "column", "mend")
+_TOLD = ("code", "found", "line", "column", "remedy")
 
 
 def serve() -> None:
@@ -43,7 +43,7 @@ def serve() -> None:
             except MissingExtraError as error:
                 if "prepare" in request:
                     continue
-                _send(replies, {"missing": error.found, "mend": error.mend})
+                _send(replies, {"missing": error.found, "remedy": error.remedy})
             except (RigFileError, CombinedError) as error:
                 _send(
                     replies,

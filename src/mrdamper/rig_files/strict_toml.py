@@ -37,12 +37,12 @@ def load_toml(path: Path, kind: type[T], refuse: type[InputError], help: str, la
         with open_regular(path) as file:
             content = file.read(largest + 1)  # no more, whatever it is
         if len(content) > largest:
-            raise refuse(f"over {largest // 1024} KiB", where=path.name, mend=f"is this the file? {help}")
+            raise refuse(f"over {largest // 1024} KiB", where=path.name, remedy=f"is this the file? {help}")
         text = content.decode("utf-8-sig")
     except OSError as error:
-        raise refuse(error.strerror or str(error), where=str(path), mend="give a TOML file") from error
+        raise refuse(error.strerror or str(error), where=str(path), remedy="give a TOML file") from error
     except UnicodeDecodeError as error:
-        raise refuse("is no UTF-8 text", where=path.name, mend="save it as UTF-8") from error
+        raise refuse("is no UTF-8 text", where=path.name, remedy="save it as UTF-8") from error
     return parse_toml(text, kind, refuse, help, path.name)
 
 
@@ -51,7 +51,7 @@ def parse_toml(text: str, kind: type[T], refuse: type[InputError], help: str, wh
     try:
         return kind.model_validate(read_toml(text))
     except tomllib.TOMLDecodeError as error:
-        raise refuse(str(error) or "nested too deeply", where=where, mend="correct the TOML") from error
+        raise refuse(str(error) or "nested too deeply", where=where, remedy="correct the TOML") from error
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False)[0]
         place = ".".join(str(part) for part in first["loc"])
@@ -59,7 +59,7 @@ def parse_toml(text: str, kind: type[T], refuse: type[InputError], help: str, wh
         unknown = first["type"] == "extra_forbidden"
         found = f"unknown key {place}" if unknown else f"{place}: {first['msg'].removeprefix('Value error, ')}"
         near = _nearest(kind, first["loc"]) if unknown else ""
-        raise refuse(found + near + more, where=where, mend=help) from error
+        raise refuse(found + near + more, where=where, remedy=help) from error
 
 
 def _nearest(kind: type[BaseModel], place: tuple[int | str, ...]) -> str:

@@ -83,7 +83,7 @@ class TestsTable:
                 raise TestsTableError(
                     f"{what!r} names tests of {len(fitting)} files: {shown}",
                     where=f"{self.path.name}, line {row.line}",
-                    mend="write the file with its folder, and one row for each",
+                    remedy="write the file with its folder, and one row for each",
                 )  # fmt: skip
         absent = [
             row
@@ -95,7 +95,7 @@ class TestsTable:
             shown = ", ".join(f"{' '.join(filter(None, (r.file, r.run)))!r} (line {r.line})" for r in absent[:10])
             raise TestsTableError(
                 f"no such test: {shown}{' ...' if absent[10:] else ''}", where=self.path.name,
-                mend="correct the names, or remove the rows",
+                remedy="correct the names, or remove the rows",
             )  # fmt: skip
 
 
@@ -124,8 +124,8 @@ def load_tests(path: str | Path) -> TestsTable:
     keys = [_key(name) for name in names]
     problems: list[InputError] = []
 
-    def wrong(line: int, found: str, mend: str) -> None:
-        problems.append(TestsTableError(found, where=f"{path.name}, line {line}", mend=mend))
+    def wrong(line: int, found: str, remedy: str) -> None:
+        problems.append(TestsTableError(found, where=f"{path.name}, line {line}", remedy=remedy))
 
     if "file" not in keys and "run" not in keys:
         wrong(1, "neither a column file nor a column run", f"name one of {', '.join(COLUMNS)}")
@@ -156,10 +156,10 @@ def _with_current(record: Record, current: float, table: TestsTable, line: int) 
     whence = record.provenance.get("current_from", "current channel")
     mean = None if record.current is None else contradicted(record.current, current)
     if mean is not None:
-        mend = "correct the cell, or leave it empty; if the file is wrong, correct or rename it"
+        remedy = "correct the cell, or leave it empty; if the file is wrong, correct or rename it"
         raise TestsTableError(
             f"line {line} gives {current:g} A, {record.id} by its {whence} {mean:g} A",
-            where=table.path.name, mend=mend, code="E_CURRENT_CONTRADICTS",
+            where=table.path.name, remedy=remedy, code="E_CURRENT_CONTRADICTS",
         )  # fmt: skip
     if record.current is not None and "current_from" not in record.provenance:
         return record
@@ -199,24 +199,24 @@ def _cells(path: Path) -> list[tuple[int, list[str]]]:
         with open_regular(path) as file:
             content = file.read(_LARGEST + 1)  # no more, whatever it is
         if len(content) > _LARGEST:
-            raise TestsTableError("over 4 MiB", where=path.name, mend="is this a table of tests?")
+            raise TestsTableError("over 4 MiB", where=path.name, remedy="is this a table of tests?")
         text = _decoded(content)
     except OSError as error:
-        raise TestsTableError(error.strerror or str(error), where=str(path), mend="give a CSV file") from error
+        raise TestsTableError(error.strerror or str(error), where=str(path), remedy="give a CSV file") from error
     except UnicodeDecodeError as error:
-        raise TestsTableError("is no text", where=path.name, mend="save it as CSV UTF-8") from error
+        raise TestsTableError("is no text", where=path.name, remedy="save it as CSV UTF-8") from error
     first = text.split("\n", 1)[0]
     separator = max(";\t,", key=first.count)
     try:
         reader = csv.reader(io.StringIO(text), delimiter=separator, strict=True)
         rows = [(reader.line_num, cells) for cells in reader if any(cell.strip() for cell in cells)]
     except csv.Error as error:
-        raise TestsTableError(str(error), where=path.name, mend="save it as CSV again") from error
+        raise TestsTableError(str(error), where=path.name, remedy="save it as CSV again") from error
     if len(rows) > _MOST_ROWS + 1:
         found = f"{len(rows) - 1} rows; a table of tests has at most {_MOST_ROWS}"
-        raise TestsTableError(found, where=path.name, mend="is this a table of tests, or of samples? Import in parts")
+        raise TestsTableError(found, where=path.name, remedy="is this a table of tests, or of samples? Import in parts")
     if len(rows) < 2:
-        raise TestsTableError("no rows", where=path.name, mend=f"write one row a test: {', '.join(COLUMNS)}")
+        raise TestsTableError("no rows", where=path.name, remedy=f"write one row a test: {', '.join(COLUMNS)}")
     return rows
 
 

@@ -41,7 +41,7 @@ def to_run(record: Record) -> Run:
     if not record.segments:
         record = judge(record)
     if record.current is None:
-        raise ColumnError("no current", where=f"run {record.id}", mend="name its column or value in the rig profile")
+        raise ColumnError("no current", where=f"run {record.id}", remedy="name its column or value in the rig profile")
     keep = _kept(record)
     count = np.count_nonzero(keep)
     sizes = [int(np.count_nonzero(keep[start:stop])) for start, stop in record.segments]
@@ -49,7 +49,7 @@ def to_run(record: Record) -> Run:
     if count == keep.size:
         keep = slice(None)  # nothing is copied: a long record lies in a file
     if count < 3:
-        raise RunError(f"{count} samples", where=f"run {record.id}", mend="a run needs at least 3")
+        raise RunError(f"{count} samples", where=f"run {record.id}", remedy="a run needs at least 3")
     view = View(record)
     scatter = repeatability(view)
     codes = " ".join(dict.fromkeys(finding.code for finding in record.findings))

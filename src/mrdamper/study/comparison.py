@@ -139,7 +139,7 @@ def _seen(rig: Dataset) -> _Seen:
         raise IdentificationError(
             "fewer than three identification runs with a steady sine",
             where=f"rig {rig.name}",
-            mend="check the split column",
+            remedy="check the split column",
         )
     held_out = [run for run in trusted if run.split == "validate"]
     return _Seen(rig, sines, train, [*train, *others], held_out, not_identified)
@@ -175,7 +175,7 @@ def _ranked(
         raise IdentificationError(
             f"no model could be compared; {recipe}: {reason}",
             where=f"rig {name or rig.dataset.name}",
-            mend="choose other models with --models, or leave this rig out of the dataset",
+            remedy="choose other models with --models, or leave this rig out of the dataset",
         )
     entries = [replace(entry, per_run=_per_run(entry.recipe.basis, rig.sines, found)) for entry in entries]
     entries.sort(key=lambda entry: entry.cross_validated.median())

@@ -108,7 +108,7 @@ class Limits:
             given = read_toml_file(path)
         except (OSError, tomllib.TOMLDecodeError) as error:
             found = str(error).splitlines()[0]
-            raise LimitsError(found, where=str(path), mend="give a TOML file of limits") from error
+            raise LimitsError(found, where=str(path), remedy="give a TOML file of limits") from error
         require_known_keys(given, LimitsError, str(path))
         given = {name: value for name, value in given.items() if name in RIG_LIMITS}
         for name, value in given.items():
@@ -163,6 +163,6 @@ class Limits:
         return allowed
 
 
-def bad_limits(found: str, mend: str) -> LimitsError:
+def bad_limits(found: str, remedy: str) -> LimitsError:
     """Return the error for limits that cannot be used."""
-    return LimitsError(found, where="limits", mend=mend)
+    return LimitsError(found, where="limits", remedy=remedy)

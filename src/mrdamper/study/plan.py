@@ -128,8 +128,8 @@ class Reckoning:
         """Of a damper with its covariance; raises as `plan_tests`."""
         known: Certainty | None = damper.certainty
         if known is None or not known.names:
-            mend = "study the tests again, or plan without a model"
-            raise InputError("the model does not know how sure it is", mend=mend, code="E_CERTAINTY")
+            remedy = "study the tests again, or plan without a model"
+            raise InputError("the model does not know how sure it is", remedy=remedy, code="E_CERTAINTY")
         # What no run could tell is planned for too: anything within a factor, or what moves the force by all of it.
         unknown = [n for n in damper.fitted_parameters if n not in known.names and n not in known.one_sided]
         names = (*known.names, *unknown)

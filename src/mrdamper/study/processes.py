@@ -46,7 +46,7 @@ def processes(
         if isinstance(error, BrokenProcessPool):
             raise ResourceError(
                 "a worker process was ended from outside",
-                mend="close other programs, raise the memory limit, or take fewer runs or processes",
+                remedy="close other programs, raise the memory limit, or take fewer runs or processes",
                 code="E_WORKER",
             ) from error
         raise

@@ -62,7 +62,9 @@ def hold_out(
     where = f"dataset {dataset.name}"
     before = [run.id for run in dataset if run.split == "validate"]
     if before and not replace:
-        raise SplitError(f"{len(before)} runs are held out already", where=where, mend="give --replace to choose anew")
+        raise SplitError(
+            f"{len(before)} runs are held out already", where=where, remedy="give --replace to choose anew"
+        )
     known = {run.id: _condition(run) for run in dataset}
     held: set[str] = set()
     reasons = []
@@ -76,14 +78,16 @@ def hold_out(
         found = [run.id for run in dataset if abs(run.mean_current - amperes) <= _NEAR_A + _NEAR * abs(amperes)]
         if not found:
             levels = sorted({round(run.mean_current, 2) for run in dataset})
-            raise SplitError(f"no run at {amperes:g} A", where=where, mend=f"currents: {', '.join(map(str, levels))} A")
+            raise SplitError(
+                f"no run at {amperes:g} A", where=where, remedy=f"currents: {', '.join(map(str, levels))} A"
+            )
         held.update(found)
         reasons.append(f"all at {amperes:g} A")
     for text in conditions:
         wanted = _stated(text)
         found = [name for name, c in known.items() if c is not None and len(same_condition([wanted, c])) == 1]
         if not found:
-            raise SplitError(f"no run at {wanted}", where=where, mend="mrdamper check shows the conditions")
+            raise SplitError(f"no run at {wanted}", where=where, remedy="mrdamper check shows the conditions")
         held.update(found)
         reasons.append(f"all at {wanted}")
     if every is not None:
@@ -95,7 +99,7 @@ def hold_out(
     left = [c for name, c in known.items() if name not in held and c is not None]
     if held and len(same_condition(left)) < _FEWEST:
         raise SplitError(
-            f"{len(same_condition(left))} conditions left to identify from", where=where, mend="hold fewer runs out"
+            f"{len(same_condition(left))} conditions left to identify from", where=where, remedy="hold fewer runs out"
         )
     shown = {name: "no sine" if c is None else str(c) for name, c in known.items()}
     return Chosen(frozenset(held), ", ".join(reasons) or "nothing", shown)
@@ -112,7 +116,7 @@ def _stated(text: str) -> Condition:
     try:
         current, frequency, amplitude = (float(part) for part in text.split(","))
     except ValueError as error:
-        raise SplitError(f"{text!r} is no condition", mend="write A,Hz,mm: 0.5,1,20") from error
+        raise SplitError(f"{text!r} is no condition", remedy="write A,Hz,mm: 0.5,1,20") from error
     return Condition(current, frequency, amplitude / 1e3)
 
 
@@ -154,7 +158,7 @@ def _stratified(known: dict[str, Condition | None], where: str) -> tuple[set[str
     if not chosen:
         raise SplitError(
             "no condition can be held out without losing a current or a motion", where=where,
-            mend="say which: --run, --current or --condition",
+            remedy="say which: --run, --current or --condition",
         )  # fmt: skip
     held = {names[i] for group in chosen for i in group}
     return held, f"stratified, {len(chosen)} of {len(groups)} conditions; every current and every motion stays in"

@@ -101,7 +101,7 @@ class Validation(Displayable):
         """The run with the largest magnitude of a score."""
         magnitudes = self._magnitudes(name)
         if not magnitudes:
-            raise RunError("no run was scored", where=self.title, mend="see `refused`")
+            raise RunError("no run was scored", where=self.title, remedy="see `refused`")
         return self.runs[int(np.argmax(magnitudes))]
 
     @checked()
@@ -177,7 +177,7 @@ def score_run(damper: Damper, run: Run, known: Sessions | None = None) -> RunSco
     swing = float(np.ptp(run.force[run.in_window]))
     if not _LEAST_SWING < swing < 1 / _LEAST_SWING:
         found = f"the force changes by {swing:.3g} N" if swing else "the force does not change"
-        raise RunError(found, where=f"run {run.id}", mend="check the channel")
+        raise RunError(found, where=f"run {run.id}", remedy="check the channel")
     prediction = damper.predict_run(run)
     inside = run.in_window
     reading = Reading.of(run.force[inside], prediction.force[inside])

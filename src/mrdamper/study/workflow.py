@@ -186,7 +186,9 @@ class Study(Displayable):
         """
         if len(self.rigs) > 1:
             names = ", ".join(r.rig for r in self.rigs)
-            raise IdentificationError(f"the dataset holds {len(self.rigs)} rigs", mend=f"use study.rig(name): {names}")
+            raise IdentificationError(
+                f"the dataset holds {len(self.rigs)} rigs", remedy=f"use study.rig(name): {names}"
+            )
         return next(iter(self.rigs)).damper
 
     def write_report(self, folder: str | Path, **options: Any) -> list[Path]:
@@ -314,13 +316,13 @@ def study_rig(
         raise IdentificationError(
             "no identification run passes the checks",
             where=f"rig {rig or dataset.name}",
-            mend="check the split column of runs.csv" if not unusable else next(iter(unusable.values())),
+            remedy="check the split column of runs.csv" if not unusable else next(iter(unusable.values())),
         )
     if len(everything) == len(train) < 2:
         raise IdentificationError(
             f"{len(train)} identification runs with a steady sine",
             where=f"rig {rig or dataset.name}",
-            mend="a model over conditions needs at least two, or a record of other motion; check the split column",
+            remedy="a model over conditions needs at least two, or a record of other motion; check the split column",
         )
     candidates, impossible = fit_and_score_all(
         _steps(train, everything, method, model if method is None else None),
@@ -335,7 +337,7 @@ def study_rig(
         raise IdentificationError(
             f"no damper could be determined; {name}: {reason}",
             where=f"rig {rig or dataset.name}",
-            mend="test more conditions, or leave this rig out of the dataset",
+            remedy="test more conditions, or leave this rig out of the dataset",
         )
     errors = dict(zip(map(id, candidates), errors_by_kind(candidates), strict=True))
     candidates.sort(key=lambda c: mean_error(errors[id(c)]))
@@ -428,7 +430,9 @@ def usable(runs: Iterable[Run], clipped: bool = False) -> tuple[list[Run], dict[
         try:
             refuse_clipped(with_findings(run), clipped)
             if np.ptp(run.force[run.in_window]) == 0:
-                raise IdentificationError("the force does not change", where=f"run {run.id}", mend="check the channel")
+                raise IdentificationError(
+                    "the force does not change", where=f"run {run.id}", remedy="check the channel"
+                )
             equivalent_sine(run)  # refuses a run that does not move
             found.append(run)
         except InputError as error:
@@ -512,7 +516,7 @@ def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], di
                 raise IdentificationError(
                     f"{rate / found.condition.frequency_Hz:.1f} samples per cycle",
                     where=f"run {run.id}",
-                    mend=f"record at least {_SAMPLES_A_CYCLE}",
+                    remedy=f"record at least {_SAMPLES_A_CYCLE}",
                 )
         except InputError as error:
             refused[run.id] = str(error)

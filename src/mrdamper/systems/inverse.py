@@ -51,18 +51,18 @@ def check_monotone(damper: Damper, highest: float | None = None) -> float:
     low, high = 0.0, damper.envelope.current_A[1] if highest is None else highest
     if not high > low:
         raise ParameterError(
-            "no range of currents", where=damper.title, mend="tests at several currents", code="E_NOT_MONOTONE"
+            "no range of currents", where=damper.title, remedy="tests at several currents", code="E_NOT_MONOTONE"
         )
     grid = np.linspace(low, high, _GRID)
     try:
         table = _forces(damper, grid)
     except ArithmeticError as error:
-        raise ParameterError(f"no force at {high:g} A", where=damper.title, mend="stay within the tests") from error
+        raise ParameterError(f"no force at {high:g} A", where=damper.title, remedy="stay within the tests") from error
     width = np.ptp(table, axis=1)
     if not 0 < width.max() < _MAX_FORCE_N:
         raise ParameterError(
             "the force does not follow the current, or runs away", where=damper.title,
-            mend="identify it from tests at several currents", code="E_NOT_MONOTONE",
+            remedy="identify it from tests at several currents", code="E_NOT_MONOTONE",
         )  # fmt: skip
     wide = width > 0.2 * width.max()
     back = np.diff(table[wide], axis=1) * -np.sign(table[wide, -1] - table[wide, 0])[:, None] / width[wide][:, None]
@@ -71,7 +71,7 @@ def check_monotone(damper: Damper, highest: float | None = None) -> float:
         raise ParameterError(
             f"the force falls back by {100 * back.max():.2g} % of its range above {at:.3g} A",
             where=damper.title,
-            mend="cap the current there, or identify with forms that rise with current",
+            remedy="cap the current there, or identify with forms that rise with current",
             code="E_NOT_MONOTONE",
         )
     return float(width.max())
@@ -186,13 +186,13 @@ class Inverse:
         """
         sample = numbers(displacement, velocity, acceleration, wanted, dt)
         if not (all(map(math.isfinite, sample)) and sample[-1] > 0):
-            raise ParameterError(f"sample {sample}", where=self.title, mend="finite numbers, a positive time step")
+            raise ParameterError(f"sample {sample}", where=self.title, remedy="finite numbers, a positive time step")
         try:
             status, outputs, memory = self._advance((), self._derived, self._memory, sample)
         except (ValueError, ArithmeticError):
             status, outputs, memory = 1, (), self._memory
         if status:
-            raise ParameterError(f"no force at {sample}", where=self.title, mend="come nearer to the last sample")
+            raise ParameterError(f"no force at {sample}", where=self.title, remedy="come nearer to the last sample")
         self._memory = memory
         return Demand(*outputs)
 

@@ -64,7 +64,7 @@ class LoopElement:
         """
         status, derived = self.prepare(given)
         if status or len(given) != len(self.given):
-            raise ParameterError("parameters that need another program", mend="trace that damper by itself")
+            raise ParameterError("parameters that need another program", remedy="trace that damper by itself")
         return replace(self, given=given, derived=tuple(derived))
 
 

@@ -65,7 +65,7 @@ def draw(dampers: Mapping[str, Damper], count: int, seed: int = 1) -> list[dict[
     count, seed : int
     """
     if not 2 <= count <= _MAX_DRAWS:
-        raise InputError(f"{count} draws", mend=f"give 2 to {_MAX_DRAWS:,}", code="E_DRAWS")
+        raise InputError(f"{count} draws", remedy=f"give 2 to {_MAX_DRAWS:,}", code="E_DRAWS")
     rng = np.random.default_rng(seed)
     shared: dict[int, list[dict[str, float]]] = {}
     draws: list[dict[str, Draw]] = [{} for _ in range(count)]
@@ -75,7 +75,7 @@ def draw(dampers: Mapping[str, Damper], count: int, seed: int = 1) -> list[dict[
             raise InputError(
                 f"{damper.title} was saved without its uncertainty",
                 where=link,
-                mend="give a model that study wrote from tests, or leave out --draws",
+                remedy="give a model that study wrote from tests, or leave out --draws",
                 code="E_CERTAINTY",
             )
         if id(damper) not in shared:
@@ -146,7 +146,7 @@ def monte_carlo(
         raise StepError(
             f"{lost} of {len(draws)} draws have no solution",
             where=loop.system.name,
-            mend="the damper's numbers are too uncertain for bands: test more (mrdamper plan)",
+            remedy="the damper's numbers are too uncertain for bands: test more (mrdamper plan)",
             code="E_STEP_LOST",
         )
     names = list(dict.fromkeys(name for row in values for name in row))

@@ -61,14 +61,14 @@ class Oscillator:
     n: float = 1.0
 
     def __post_init__(self) -> None:
-        for name, good, mend in (
+        for name, good, remedy in (
             ("m", 0 < self.m < np.inf, "a mass is positive"),
             ("gamma", self.beta * self.gamma >= 0, "beta gamma >= 0, or the element feeds energy in"),
             ("n", 1 <= self.n <= 20, "n lies between 1 and 20"),
             ("k", np.isfinite([self.c, self.k, self.alpha, self.beta, self.delta]).all(), "give finite numbers"),
         ):
             if not good:
-                raise ParameterError(f"{name} = {getattr(self, name):g}", where="oscillator", mend=mend)
+                raise ParameterError(f"{name} = {getattr(self, name):g}", where="oscillator", remedy=remedy)
 
     def response(self, force: Floats, sample_rate: float, *, periodic: bool = False) -> Floats:
         """Displacement [m] under a force, from rest; of a periodic force, over one settled period.
@@ -94,7 +94,7 @@ class Oscillator:
     def _response(self, force: Floats, sample_rate: float, periodic: bool, steps: int) -> Floats:
         force = np.asarray(force, dtype=float)
         if force.ndim != 1 or force.size < 8 or not np.isfinite(force).all():
-            raise RecordError("a force of under 8 samples, or not finite", mend="give an (N,) array of forces [N]")
+            raise RecordError("a force of under 8 samples, or not finite", remedy="give an (N,) array of forces [N]")
         fine = _refined(force, 2 * steps, periodic)
         lead = 2 * steps * int(_LEAD * force.size) if periodic else 0
         fine = np.concatenate([fine[-1 - lead : -1], fine])
@@ -113,7 +113,7 @@ class Oscillator:
             bad = int(np.flatnonzero(lost)[0]) if lost.any() else states.failed // steps
             raise StepError(
                 f"the state runs away after {bad / sample_rate:.3g} s", where="oscillator",
-                mend="lower the force: an element with beta (gamma + delta) < 0 has no bound", code="E_RUNAWAY",
+                remedy="lower the force: an element with beta (gamma + delta) < 0 has no bound", code="E_RUNAWAY",
             )  # fmt: skip
         start = lead // (2 * steps)
         return y[start : start + force.size]
@@ -190,9 +190,9 @@ def identify_oscillator(
     """
     force, displacement = (np.asarray(a, dtype=float) for a in (force, displacement))
     if force.shape != displacement.shape or np.ptp(displacement) == 0 or not np.isfinite(displacement).all():
-        raise RecordError("force and displacement differ in length, or nothing moves", mend="give one period of both")
+        raise RecordError("force and displacement differ in length, or nothing moves", remedy="give one period of both")
     if not 0 <= most_delay < np.inf:
-        raise RecordError(f"the largest delay is {most_delay:g} samples", mend="give zero or more")
+        raise RecordError(f"the largest delay is {most_delay:g} samples", remedy="give zero or more")
     search = _OscillatorSearch(force, displacement, sample_rate, n, most_delay)
     minimum, evaluations = search.best()
     at_bounds = search.at_bounds(minimum)

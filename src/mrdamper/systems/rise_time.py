@@ -56,7 +56,7 @@ def rise_times(damper: Damper, current: float | None = None, velocity: float | N
     forces -= still + (end - still) * (np.arange(2 * half) + 1) / (2 * half)
     top = forces[half - 1]
     if not abs(top) > 0:
-        raise ParameterError("the force does not change with the current", where=damper.title, mend="another damper")
+        raise ParameterError("the force does not change with the current", where=damper.title, remedy="another damper")
 
     def when(part: np.ndarray, share: float) -> float:
         return float((np.argmax(part >= share) + 0.5) * dt)  # the step itself takes a sample

@@ -96,7 +96,7 @@ def simulate_system(
         raise StepError(
             f"halving the step of {step:g} s changes a peak by {100 * first:.2g} %",
             where=system.name,
-            mend=f"give --step {dt:.3g} or less, or none" if change <= HALVING else "leave --step out",
+            remedy=f"give --step {dt:.3g} or less, or none" if change <= HALVING else "leave --step out",
             code="E_STEP_COARSE",
         )
     return replace(fine, halving=change)
@@ -168,7 +168,7 @@ class SystemLoop:
             raise StepError(
                 f"{self.source.duration:g} s in steps of {dt:g} s",
                 where=system.name,
-                mend=f"between two and {_MAX_STEPS:,} steps",
+                remedy=f"between two and {_MAX_STEPS:,} steps",
             )
         if machine is None:
             lines = _LINES_PER_STEP + 3 * sum(stage.lines for stage in (*self.stages, *self._controllers))
@@ -203,7 +203,7 @@ class SystemLoop:
             raise StepError(
                 f"no solution at {time[max(failed, 0)]:.6g} s",
                 where=system.name,
-                mend="shorten the step, and check the damper's range against the motion",
+                remedy="shorten the step, and check the damper's range against the motion",
                 code="E_STEP_LOST",
             )
         relative = (load - v @ system.C - x @ system.K - force @ self.B) @ np.linalg.inv(system.M)
@@ -324,13 +324,15 @@ def _fit(system: System, source: Input, dampers: Mapping[str, Damper]) -> None:
         raise ExcitationError(
             f"a {source.kind} input for a system on a {wanted}",
             where=system.name,
-            mend="give acceleration_m_s2 or acceleration_g" if wanted == "ground" else "give a road, or height_m",
+            remedy="give acceleration_m_s2 or acceleration_g" if wanted == "ground" else "give a road, or height_m",
         )
     names = {link.name for link in system.dampers}
     for name in dampers:
         if name not in names:
             raise StructureError(
-                f"no damper is called {name!r}", where=system.name, mend=f"known: {', '.join(sorted(names)) or 'none'}"
+                f"no damper is called {name!r}",
+                where=system.name,
+                remedy=f"known: {', '.join(sorted(names)) or 'none'}",
             )
 
 

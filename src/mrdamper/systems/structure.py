@@ -81,9 +81,9 @@ class System:
             problem = f"{link.role} {link.name} hangs on {link.above!r} twice"
             self._require(link.above != link.below, problem, "give two points", "E_POINT")
 
-    def _require(self, good: Any, problem: str, mend: str, code: str) -> None:
+    def _require(self, good: Any, problem: str, remedy: str, code: str) -> None:
         if not good:
-            raise StructureError(problem, where=self.name, mend=mend, code=code)
+            raise StructureError(problem, where=self.name, remedy=remedy, code=code)
 
     @property
     def known(self) -> tuple[str, ...]:

@@ -144,7 +144,7 @@ def load_system(name: str | Path) -> SystemFile:
     path = systems.get(str(name), given)
     if not path.is_file():
         if path.suffix == ".toml":
-            raise StructureError("no such file", where=str(path), mend="give a system TOML file")
+            raise StructureError("no such file", where=str(path), remedy="give a system TOML file")
         raise UnknownNameError.of("system", str(name), systems)
     document = load_toml(path, SystemDocument, StructureError, "see docs/how-to/simulate.md", 2**20)
     system = _build(document, path)
@@ -158,7 +158,7 @@ def _build(document: SystemDocument, path: Path) -> System:
         raise StructureError(
             f"{len(shapes)} structures: {', '.join(shapes) or 'none'}",
             where=str(path),
-            mend="give one of [building], [[storey]], [quarter_car], [half_car]",
+            remedy="give one of [building], [[storey]], [quarter_car], [half_car]",
         )
     car = document.quarter_car or document.half_car
     if car is not None:
@@ -167,15 +167,17 @@ def _build(document: SystemDocument, path: Path) -> System:
         for damper in document.damper:
             if damper.name not in own or damper.above is not None:
                 problem = f"damper {damper.name!r} in a car, which has {', '.join(sorted(own))} in their places"
-                raise StructureError(problem, where=str(path), mend="use those names, with a model only")
+                raise StructureError(problem, where=str(path), remedy="use those names, with a model only")
         return system
     links = []
     for damper in document.damper:
         if damper.above is None:
-            raise StructureError(f"damper {damper.name!r} hangs nowhere", where=str(path), mend="give above and below")
+            raise StructureError(
+                f"damper {damper.name!r} hangs nowhere", where=str(path), remedy="give above and below"
+            )
         links.append(Link(damper.name, damper.above, damper.below))
     if len({link.name for link in links}) < len(links):
-        raise StructureError("two dampers of one name", where=str(path), mend="name each differently")
+        raise StructureError("two dampers of one name", where=str(path), remedy="name each differently")
     if document.building is not None:
         return document.building.build(path.stem, document.title, links)
     storeys = document.storey or []
@@ -187,4 +189,4 @@ def _array(rows: list[list[float]]) -> Floats:
     try:
         return np.array(rows, dtype=float)
     except ValueError as error:
-        raise StructureError("rows of a matrix differ in length", mend="give it square") from error
+        raise StructureError("rows of a matrix differ in length", remedy="give it square") from error

@@ -100,7 +100,7 @@ def plotly_script() -> Path:
     found = importlib.util.find_spec("plotly")
     script = Path(found.origin).parent / "package_data" / "plotly.min.js" if found and found.origin else None
     if script is None or not script.is_file():
-        raise MissingExtraError("the app requires plotly", mend="pip install 'mrdamper[web]'")
+        raise MissingExtraError("the app requires plotly", remedy="pip install 'mrdamper[web]'")
     return script
 
 

@@ -27,7 +27,7 @@ def held_model(damper: Damper, condition: Condition, held: Mapping[str, float]) 
     known = model.values()
     for name in held:
         if name not in known:
-            raise ParameterError(f"this damper has no parameter {name!r}", mend="load the page again")
+            raise ParameterError(f"this damper has no parameter {name!r}", remedy="load the page again")
     return replace(model, **held)  # type: ignore[type-var]
 
 

@@ -39,7 +39,9 @@ class NothingTakenError(DropError):
     code = "E_DROP_REFUSED"
 
     def __init__(self, found: str, verdicts: tuple[Verdict, ...], profile: str):
-        super().__init__(found, mend="see each file below; where the form was guessed wrongly, correct the rig profile")
+        super().__init__(
+            found, remedy="see each file below; where the form was guessed wrongly, correct the rig profile"
+        )
         self.verdicts, self.profile = verdicts, profile
 
 
@@ -73,7 +75,9 @@ class Drop:
         """Reserve the path of a file of that name; raises `DropError` if there are too many."""
         if self.places >= FILE_COUNT_LIMIT:
             raise DropError(
-                f"over {FILE_COUNT_LIMIT} files", mend="drop fewer at once, or use mrdamper import", code="E_DROP_COUNT"
+                f"over {FILE_COUNT_LIMIT} files",
+                remedy="drop fewer at once, or use mrdamper import",
+                code="E_DROP_COUNT",
             )
         # Run ids and currents are read off file names, so what is harmless of the name is kept.
         safe = _NOT_SAFE.sub("_", PurePosixPath(name.replace("\\", "/")).name).lstrip(".")[-_NAME_LENGTH:]

@@ -51,7 +51,7 @@ def read_drop(drop: Drop, profile: str = "", refused_only: bool = False, only: P
     that were taken before are kept and the refused ones read; with `only`, that file is, and the others stay.
     """
     if not drop.names:
-        raise DropError("no files", mend="drop rig files, or a dataset folder")
+        raise DropError("no files", remedy="drop rig files, or a dataset folder")
     try:
         parts = _dataset_parts(drop.names)
         return _read_dataset(drop, parts) if parts else read_rig_files(drop, profile, refused_only, only)
@@ -59,7 +59,7 @@ def read_drop(drop: Drop, profile: str = "", refused_only: bool = False, only: P
         raise
     except InputError as error:
         raise InputError(
-            drop.named(error.found), where=drop.named(error.where), mend=drop.named(error.mend), code=error.code
+            drop.named(error.found), where=drop.named(error.where), remedy=drop.named(error.remedy), code=error.code
         ) from error
 
 

@@ -101,7 +101,7 @@ def keep(session: Session, state: str, shown: str | None, logo: str = "") -> byt
     if packed.tell() > FILE_LIMIT:
         raise KeptError(
             f"the bench is {packed.tell() / 1e6:.0f} MB, over the {FILE_LIMIT / 1e6:.0f} MB a bench takes back",
-            mend="keep its dataset folder and save the state alone",
+            remedy="keep its dataset folder and save the state alone",
         )
     return packed.getvalue()
 
@@ -128,7 +128,7 @@ def open_kept(path: Path, place: Path) -> Kept:
         with zipfile.ZipFile(path) as archive:
             return _read(archive, place / "kept")
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError, zlib.error) as error:
-        raise KeptError(f"is damaged: {error}", where="the saved project", mend="copy it again") from error
+        raise KeptError(f"is damaged: {error}", where="the saved project", remedy="copy it again") from error
 
 
 def _read(archive: zipfile.ZipFile, place: Path) -> Kept:
@@ -136,14 +136,14 @@ def _read(archive: zipfile.ZipFile, place: Path) -> Kept:
     try:
         about = _List.model_validate(parse_json(_part(archive, LIST).decode("utf-8")))
     except ValueError as error:
-        raise KeptError("has another version", where=LIST, mend="update mrdamper, or save it again") from error
+        raise KeptError("has another version", where=LIST, remedy="update mrdamper, or save it again") from error
     data = [f"{DATA}/{name}" for name in ("runs.csv", *SAMPLE_FILES)]
     known = {LIST, STATE, LOGO, *(d.file for d in about.dampers), *data}
     if len(set(names)) != len(names) or not set(names) <= known:
         odd = next((n for n in names if n not in known), "one name twice")
-        raise KeptError(f"holds {PurePosixPath(odd).name!r:.60}", where="the saved project", mend="save it again")
+        raise KeptError(f"holds {PurePosixPath(odd).name!r:.60}", where="the saved project", remedy="save it again")
     if about.current is not None and about.current >= len(about.dampers):
-        raise KeptError("names a damper it does not hold", where=LIST, mend="save it again")
+        raise KeptError("names a damper it does not hold", where=LIST, remedy="save it again")
     dampers = [
         (parse_model(_part(archive, d.file).decode("utf-8", "replace"), where=d.file), d.origin, d.note)
         for d in about.dampers
@@ -152,7 +152,7 @@ def _read(archive: zipfile.ZipFile, place: Path) -> Kept:
     try:
         parse_json(state)
     except ValueError as error:
-        raise KeptError(str(error), where=STATE, mend="save it again") from error
+        raise KeptError(str(error), where=STATE, remedy="save it again") from error
     logo = base64.b64encode(_part(archive, LOGO)).decode("ascii") if LOGO in names else ""
     _picture(logo)
     intake = _data(archive, about, [n for n in data if n in names], place)
@@ -188,7 +188,7 @@ def _part(archive: zipfile.ZipFile, name: str, limit: int = _SMALL_LIMIT) -> byt
         with archive.open(name) as part:
             content = part.read(limit + 1)
     except KeyError as error:
-        raise KeptError(f"holds no {name}", where="the saved project", mend="save it again") from error
+        raise KeptError(f"holds no {name}", where="the saved project", remedy="save it again") from error
     if len(content) > limit:
-        raise KeptError(f"{name} is over {limit / 1e6:.0f} MB", where="the saved project", mend="save it again")
+        raise KeptError(f"{name} is over {limit / 1e6:.0f} MB", where="the saved project", remedy="save it again")
     return content

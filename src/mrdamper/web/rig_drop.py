@@ -117,7 +117,7 @@ def _reason(error: InputError, path: Path) -> str:
     """Return the text of an error without the name of its file, which the page shows beside it."""
     place = error.where.replace(str(path), "").removeprefix(path.name).strip(" :,")
     text = f"{place}: {error.found}" if place else error.found
-    return f"{text}; {error.mend}" if error.mend else text
+    return f"{text}; {error.remedy}" if error.remedy else text
 
 
 def _name(drop: Drop, count: int) -> str:

@@ -80,7 +80,7 @@ class RigTable:
         for row in self.rows:
             if row.key == key:
                 return row
-        raise InputError("no such run on the bench", mend="choose one from the table", code="E_NAME")
+        raise InputError("no such run on the bench", remedy="choose one from the table", code="E_NAME")
 
     def nearest(self, condition: Condition, most: int = _NEAREST, anywhere: bool = False) -> list[Row]:
         """Steady sines measured nearest to a condition, the nearest first; the far ones only if `anywhere`."""

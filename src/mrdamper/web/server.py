@@ -127,7 +127,7 @@ def _listen(port: int) -> socket.socket:
         listener.close()
         raise InputError(
             f"port {port} cannot be used: {getattr(error, 'strerror', None) or error}",
-            mend="choose another with --port, or --port 0 for any that is free",
+            remedy="choose another with --port, or --port 0 for any that is free",
             code="E_PORT",
         ) from error
     return listener

@@ -76,13 +76,13 @@ class Session:
     def dataset(self) -> Dataset:
         """The data on the bench; raises `InputError` if there is none yet."""
         if self.intake is None:
-            raise InputError("no data on the bench", mend="open the bundled tests, or drop files", code="E_NO_DATA")
+            raise InputError("no data on the bench", remedy="open the bundled tests, or drop files", code="E_NO_DATA")
         return self.intake.dataset
 
-    def result(self, name: str, found: str, mend: str) -> Any:
+    def result(self, name: str, found: str, remedy: str) -> Any:
         """Return the result of work under a name; raises `InputError` (E_NO_RESULT) where it left nothing."""
         if not self.results.get(name):
-            raise InputError(found, mend=mend, code="E_NO_RESULT")
+            raise InputError(found, remedy=remedy, code="E_NO_RESULT")
         return self.results[name]
 
     def put(self, intake: Intake) -> None:
@@ -96,7 +96,7 @@ class Session:
         """The runs of the rig of that number, analysed once."""
         rigs = self.dataset.rigs
         if not 0 <= number < len(rigs):
-            raise UnknownNameError("no such rig on the bench", mend="choose one from the list")
+            raise UnknownNameError("no such rig on the bench", remedy="choose one from the list")
         return rig_table(self.dataset, rigs[number])
 
     def table_of(self, rig: str) -> RigTable | None:
@@ -126,7 +126,7 @@ class Session:
     def damper(self, key: str, sure: bool = False) -> Bench:
         """A damper on the bench by its key, with its covariance where that is asked for and can be known."""
         if key not in self.dampers:
-            raise UnknownNameError("that damper is no longer on the bench", mend="choose another on the Model page")
+            raise UnknownNameError("that damper is no longer on the bench", remedy="choose another on the Model page")
         bench = self.dampers[key]
         if sure and bench.learn is not None:
             bench = self.dampers[key] = replace(bench, damper=bench.learn(), learn=None)
@@ -155,7 +155,7 @@ class Session:
         for job in (*self.newest.values(), *self.jobs.values()):
             if job.key == key:
                 return job
-        raise UnknownNameError("that work is not known here", mend="start it again")
+        raise UnknownNameError("that work is not known here", remedy="start it again")
 
     def cancel(self) -> None:
         """Stop whatever is being worked on."""
@@ -201,7 +201,7 @@ class Sessions:
         """The session of that name; raises `InputError` if it has ended."""
         session = self._open.get(name)
         if session is None:
-            raise InputError("this session has ended", mend="load the page again", code="E_SESSION_ENDED")
+            raise InputError("this session has ended", remedy="load the page again", code="E_SESSION_ENDED")
         session.seen = time.monotonic()
         return session
 

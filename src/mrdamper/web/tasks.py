@@ -87,7 +87,7 @@ def identify_rig(
     runs = [run for run in sines if (run.id in run_ids if run_ids else run.split == "train")]
     if not runs:
         reason = next((refused[i] for i in run_ids if i in refused), "no identification run is a steady sine")
-        raise IdentificationError(reason, where=f"rig {dataset.name}", mend="choose other runs")
+        raise IdentificationError(reason, where=f"rig {dataset.name}", remedy="choose other runs")
     if model == JOINTLY:
         recipe = play_and_bypass()
     else:

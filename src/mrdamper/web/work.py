@@ -150,7 +150,7 @@ class Job:
         how = f"by signal {-code}" if code and code < 0 else f"with code {code}"
         lost = InputError(
             f"the worker process was ended from outside, {how}",
-            mend="start it again; where memory ran short, close other programs or take fewer runs",
+            remedy="start it again; where memory ran short, close other programs or take fewer runs",
             code="E_WORKER",
         )
         self.error = refusal(lost)
@@ -175,7 +175,7 @@ def refusal(error: InputError) -> dict[str, str]:
         "text": str(error),
         "found": error.found,
         "where": error.where,
-        "mend": error.mend,
+        "remedy": error.remedy,
         "code": error.code,
     }
 

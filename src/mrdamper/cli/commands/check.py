@@ -55,7 +55,7 @@ def register(app: typer.Typer) -> None:
 
         if data is not None and data.suffix.lower() == ".fmu":
             if figure is not None:
-                raise InputError("--figure for an FMU", mend="omit --figure, which draws test runs", code="E_OPTION")
+                raise InputError("--figure for an FMU", remedy="omit --figure, which draws test runs", code="E_OPTION")
             _check_fmu(data, as_json)
             return
         if figure is not None:
@@ -105,7 +105,7 @@ def _require_format(figure: Path) -> None:
 
     if figure.suffix.lower() not in (".png", ".svg", ".pdf"):
         raise OutputError(
-            f"{figure.suffix or 'no suffix'}", where=str(figure), mend="end the name in .png, .svg or .pdf"
+            f"{figure.suffix or 'no suffix'}", where=str(figure), remedy="end the name in .png, .svg or .pdf"
         )
 
 

@@ -25,8 +25,8 @@ def register(app: typer.Typer) -> None:
         name = code.strip().strip("[]").upper()
         if name not in codes:
             near = " or ".join(get_close_matches(name, codes, n=3, cutoff=0.5))
-            mend = f"did you mean {near}?" if near else "mrdamper explain lists all codes"
-            raise UnknownNameError(f"no code is called {name!r}", mend=mend)
+            remedy = f"did you mean {near}?" if near else "mrdamper explain lists all codes"
+            raise UnknownNameError(f"no code is called {name!r}", remedy=remedy)
         told = codes[name]
         print(f"{name}\n\n{told['meaning']}\n\nExample: {told['example']}\n\nWhat to do: {told['remedy']}")
 

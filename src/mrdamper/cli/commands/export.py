@@ -36,7 +36,9 @@ def register(app: typer.Typer) -> None:
 
         kind = exporter(to)
         if fmi is not None and to != "fmu":
-            raise InputError(f"--fmi {fmi} with --to {to}", mend="leave --fmi out, or export --to fmu", code="E_OPTION")
+            raise InputError(
+                f"--fmi {fmi} with --to {to}", remedy="leave --fmi out, or export --to fmu", code="E_OPTION"
+            )
         options = {} if fmi is None else {"fmi": fmi}
         made = kind(**options)
         require_writable(out)
@@ -67,4 +69,4 @@ def _inverse(damper: Damper, name: str, to: str, exporter: Exporter, out: Path) 
         return write_program(turned.program, name, turned.title, out), ()
     if isinstance(exporter, FMUExporter):
         return write_program_fmu(turned.program, name, turned.title, turned.units, out, exporter=exporter)
-    raise InputError(f"--inverse with --to {to}", mend="export --to c or fmu", code="E_OPTION")
+    raise InputError(f"--inverse with --to {to}", remedy="export --to c or fmu", code="E_OPTION")

@@ -93,11 +93,11 @@ def _refuse_taken(out: Path | None, add: bool) -> None:
     if out is None:
         return
     if add and not (out / "runs.csv").is_file():
-        raise OutputError("no dataset to add to", where=str(out), mend="leave --add out to write a new one")
+        raise OutputError("no dataset to add to", where=str(out), remedy="leave --add out to write a new one")
     if not add and out.exists() and (not out.is_dir() or any(out.iterdir())):
         hint = ", or add to it with --add" if (out / "runs.csv").is_file() else ""
         raise OutputError(
-            "exists already and is not empty", where=str(out), mend=f"choose another name or remove it{hint}"
+            "exists already and is not empty", where=str(out), remedy=f"choose another name or remove it{hint}"
         )
     require_writable(out)
 
@@ -113,7 +113,7 @@ def _write_tests(files: list[Path], known: Profile, target: Path) -> None:
     for refusal in refusals:
         typer.echo(f"not in the table: {refusal.error}", err=True)
     if not records:
-        raise InputError("no test can be read", mend="correct the files listed above, or give a profile")
+        raise InputError("no test can be read", remedy="correct the files listed above, or give a profile")
     if str(target) == "-":
         print(tests_text(records), end="")
         return
@@ -186,7 +186,7 @@ def _joined(old: Dataset, new: Dataset) -> Dataset:
     if again:
         raise OutputError(
             f"{len(again)} of the tests are there already: {', '.join(again[:5])}{' ...' if again[5:] else ''}",
-            where=f"dataset {old.name}", mend="give the new files only",
+            where=f"dataset {old.name}", remedy="give the new files only",
         )  # fmt: skip
     taken = {run.id for run in old}
     runs = list(old.runs)
@@ -261,7 +261,7 @@ def _print(result: ImportResult, out: Path | None, total: int, *, dry: bool = Fa
             f" and {len(result.left_out) - 5} more" if result.left_out[5:] else ""
         )
         print(f"left out, no tables of tests: {shown}")
-    if any("profile" in refusal.error.mend for refusal in result.refusals):
+    if any("profile" in refusal.error.remedy for refusal in result.refusals):
         print(
             "a profile answers once for all files: mrdamper import FILE --write-profile rig.toml, "
             "correct rig.toml, import with --profile rig.toml"
@@ -302,7 +302,7 @@ def _refused_lines(result: ImportResult) -> list[str]:
     alike: dict[tuple[str, str, str], list[Refusal]] = {}
     for refusal in result.refusals:
         error = refusal.error
-        alike.setdefault((error.code, error.found, error.mend), []).append(refusal)
+        alike.setdefault((error.code, error.found, error.remedy), []).append(refusal)
     lines = []
     for refusals in alike.values():
         error = refusals[0].error
@@ -311,8 +311,8 @@ def _refused_lines(result: ImportResult) -> list[str]:
             continue
         names = [Path(refusal.file).name for refusal in refusals]
         shown = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if names[3:] else "")
-        mend = f"; {error.mend}" if error.mend else ""
-        lines.append(f"refused {len(names)} times ({shown}): {error.found}{mend} [{error.code}]")
+        remedy = f"; {error.remedy}" if error.remedy else ""
+        lines.append(f"refused {len(names)} times ({shown}): {error.found}{remedy} [{error.code}]")
     return lines
 
 

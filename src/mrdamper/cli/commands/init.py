@@ -30,7 +30,7 @@ def register(app: typer.Typer) -> None:
             print(text, end="")
             return
         if out.exists():
-            raise OutputError("this file exists", where=str(out), mend="choose another name, or delete it first")
+            raise OutputError("this file exists", where=str(out), remedy="choose another name, or delete it first")
         with write_file(out) as target:
             target.write_text(text, encoding="utf-8")
         typer.echo(f"template: {out}")

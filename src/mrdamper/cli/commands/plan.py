@@ -43,9 +43,9 @@ def register(app: typer.Typer) -> None:
         require_writable(out)
         damper = load_model(model) if model else None
         if limits is None and damper is None:
-            raise InputError("neither a model nor limits is given", mend="give --limits limits.toml", code="E_LIMITS")
+            raise InputError("neither a model nor limits is given", remedy="give --limits limits.toml", code="E_LIMITS")
         if about is not None and damper is None:
-            raise InputError("--about without a model", mend="give a model.json")
+            raise InputError("--about without a model", remedy="give a model.json")
         allowed = Limits.read(limits) if limits else Limits.of(damper)  # type: ignore[arg-type]
         names = []
         with progress_soon("planning") as tell, write_result(out) as folder:
@@ -88,4 +88,4 @@ def _doubt(about: str | None):
         current, frequency, amplitude = (float(part) for part in about.split(","))
         return Condition(current, frequency, 1e-3 * amplitude)
     except ValueError:
-        raise ConditionError(f"--about {about}", mend="give A,Hz,mm, as 0.5,2,10") from None
+        raise ConditionError(f"--about {about}", remedy="give A,Hz,mm, as 0.5,2,10") from None

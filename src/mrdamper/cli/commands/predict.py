@@ -66,7 +66,7 @@ def register(app: typer.Typer) -> None:
         for name, value in (("--current", current), ("--frequency", frequency), ("--amplitude", amplitude)):
             if value is not None and not 0 <= value < math.inf:
                 raise ConditionError(
-                    f"{name} {value:g}", mend="give zero or more; the force depends on the magnitude only"
+                    f"{name} {value:g}", remedy="give zero or more; the force depends on the magnitude only"
                 )
         student(level, 1.0)  # refuses a level that is none
         require_writable(out)
@@ -77,12 +77,12 @@ def register(app: typer.Typer) -> None:
             damper = replace(damper, coil=Coil(1e-3 * coil_lag, 1e-3 * coil_lag, driver))  # type: ignore[type-var]
         if motion is not None:
             if frequency is not None or amplitude is not None:
-                raise InputError("--motion together with --frequency or --amplitude", mend="give one of them")
+                raise InputError("--motion together with --frequency or --amplitude", remedy="give one of them")
             prediction = damper.predict_run(load_motion(motion, current))
         else:
             if current is None or frequency is None or amplitude is None:
                 raise InputError(
-                    "no condition", mend="give --current A --frequency Hz --amplitude mm, or --motion FILE"
+                    "no condition", remedy="give --current A --frequency Hz --amplitude mm, or --motion FILE"
                 )
             prediction = damper.predict(Condition(current, frequency, 1e-3 * amplitude))
         for flag in prediction.extrapolation:

@@ -59,15 +59,17 @@ def register(app: typer.Typer) -> None:
 
         require_writable(out)
         if gas is not None and data is None:
-            raise InputError("--gas without --data: the virtual rig has its own gas spring", mend="give --data DATASET")
+            raise InputError(
+                "--gas without --data: the virtual rig has its own gas spring", remedy="give --data DATASET"
+            )
         options = _options(preset, box, mass_law, friction, setting)
         dataset = None if data is None else load_dataset(data)
         if dataset is None and rig is not None:
-            raise InputError("--rig without --data", mend="give --data DATASET, or leave --rig out")
+            raise InputError("--rig without --data", remedy="give --data DATASET, or leave --rig out")
         if dataset is not None:
             if rig is None and len(dataset.rigs) > 1:
                 names = " or ".join(dataset.rigs)
-                raise InputError(f"the dataset holds {len(dataset.rigs)} rigs", mend=f"choose --rig {names}")
+                raise InputError(f"the dataset holds {len(dataset.rigs)} rigs", remedy=f"choose --rig {names}")
             dataset = dataset.rig(rig or next(iter(dataset.rigs)))
         with progress_on_stderr() as progress, several(jobs or os.cpu_count() or 1) as processes:
             study = run_reproduction(
@@ -115,7 +117,7 @@ def _options(preset: list[str], box: list[str], mass_law: str, friction: str, se
                 given[name if option == "--preset" else f"{name}_box"] = _one(numbers, option)
             except ValueError as error:
                 form = "NAME=NUMBER" if option == "--preset" else "NAME=LOW:HIGH"
-                raise InputError(f"{option} {name}={text}", mend=f"write {option} {form}") from error
+                raise InputError(f"{option} {name}={text}", remedy=f"write {option} {form}") from error
     return PaperOptions(**(given | values_of_fields(PaperOptions, parse_pairs(setting, "--set"))))
 
 

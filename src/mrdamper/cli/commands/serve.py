@@ -25,7 +25,7 @@ def register(app: typer.Typer) -> None:
 
         missing = [name for name in _NEEDS if importlib.util.find_spec(name) is None]
         if missing:
-            raise MissingExtraError(f"the app needs {', '.join(missing)}", mend="pip install 'mrdamper[web]'")
+            raise MissingExtraError(f"the app needs {', '.join(missing)}", remedy="pip install 'mrdamper[web]'")
         from mrdamper.web.server import serve as run
 
         ended_by = run(port, browser)

@@ -73,7 +73,7 @@ def register(app: typer.Typer) -> None:
         if out is not None:
             require_writable(out)
         elif compare:
-            raise InputError("--compare without --out", mend="give a folder for the report")
+            raise InputError("--compare without --out", remedy="give a folder for the report")
         found = load_system(system)
         shaken_by = load_input(*parse_named(source, "--input"), time_scale=time_scale)
         dampers: dict[str, Damper] = {} if without else dict(found.dampers)
@@ -84,7 +84,7 @@ def register(app: typer.Typer) -> None:
             raise InputError(
                 f"no model for the damper {', '.join(empty)}",
                 where=system,
-                mend="give --damper model.json, or --without-damper",
+                remedy="give --damper model.json, or --without-damper",
                 code="E_NO_DAMPER",
             )
         highest = _amperes(current, volts, dampers)
@@ -93,13 +93,13 @@ def register(app: typer.Typer) -> None:
             controller = with_values(controller_type("passive"), {"current_A": highest})
         others = [_controller(text) for text in _all_of(compare or [])]
         if others and not dampers:
-            raise InputError("controllers without a damper", mend="omit --without-damper or --compare")
+            raise InputError("controllers without a damper", remedy="omit --without-damper or --compare")
         if law_out is not None or law_fmu is not None:
             _export_law(SystemLoop(found.system, shaken_by, dampers, controller, highest), law_out, law_fmu)
         drawn = None
         if draws is not None:
             if not dampers:
-                raise InputError("draws without a damper", mend="omit --without-damper or --draws")
+                raise InputError("draws without a damper", remedy="omit --without-damper or --draws")
             drawn = draw(dampers, draws, seed)
         bands, paths = None, []
         with progress_soon(f"{found.system.title}, time step halved until peaks converge") as tell:
@@ -131,7 +131,7 @@ def _export_law(loop: SystemLoop, folder: Path | None, fmu: Path | None) -> None
 
     law, (name, title) = loop.control.program, (type(loop.controller).name, type(loop.controller).title)
     if law is None:
-        raise InputError(f"{name} has no law to export", mend="give --control a law")
+        raise InputError(f"{name} has no law to export", remedy="give --control a law")
     paths, notes = [] if folder is None else write_program(law, name, title, folder), ()
     if fmu is not None:
         made, notes = write_program_fmu(law, name, title, loop.control.units, fmu, loop.period, loop.control.start)
@@ -162,18 +162,18 @@ def _amperes(current: float | None, volts: float | None, dampers: dict[str, Damp
     from mrdamper.errors import InputError
 
     if current is not None and volts is not None:
-        raise InputError("--current beside --volts", mend="give one")
+        raise InputError("--current beside --volts", remedy="give one")
     if volts is None or not dampers:
         if current is not None and not 0 <= current < math.inf:
-            raise InputError(f"--current {current:g}", mend="give zero or more")
+            raise InputError(f"--current {current:g}", remedy="give zero or more")
         return current
     if not 0 <= volts < math.inf:
-        raise InputError(f"--volts {volts:g}", mend="give zero or more")
+        raise InputError(f"--volts {volts:g}", remedy="give zero or more")
     gains = {d.coil.driver if d.coil else None for d in dampers.values()}
     driver = gains.pop()
     if gains or driver is None:
         raise InputError(
-            "volts for a damper whose driver is not known", mend="give --current, or a model with a coil driver"
+            "volts for a damper whose driver is not known", remedy="give --current, or a model with a coil driver"
         )
     return min(driver.amperes_per_volt * volts, driver.limit_A)
 

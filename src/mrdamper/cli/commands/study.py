@@ -66,7 +66,7 @@ def register(app: typer.Typer) -> None:
             chosen = study_method(str(model), parse_pairs(setting, "--set"), parse_gas(gas))
         elif gas or setting:
             raise InputError(
-                "--gas and --set are options of a published method", mend="add --model paper, or omit them"
+                "--gas and --set are options of a published method", remedy="add --model paper, or omit them"
             )
         head, bands = load_about(about) if about else None, load_limits(limits) if limits else ()
         also = [kind for kind, wanted in (("pdf", pdf or about is not None), ("png", png)) if wanted]
@@ -76,7 +76,7 @@ def register(app: typer.Typer) -> None:
         if lag and not any(run.current_changes for run in dataset.split("train")):
             raise IdentificationError(
                 "the current is constant in every identification run, so the coil lag cannot be identified",
-                mend="add a run in which the current is switched, or omit --lag",
+                remedy="add a run in which the current is switched, or omit --lag",
                 code="E_LAG",
             )
         workers = min(os.cpu_count() or 1, len(dataset.rigs))

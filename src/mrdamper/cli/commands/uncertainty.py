@@ -39,14 +39,14 @@ def register(app: typer.Typer) -> None:
 
         student(level, 1.0)  # refuses a level that is none
         if steps < 10:
-            raise InputError(f"--steps {steps}", mend="give at least 10, usually some thousands")
+            raise InputError(f"--steps {steps}", remedy="give at least 10, usually some thousands")
         require_writable(out)
         damper = load_model(model)
         runs = []
         if damper.certainty is None or profile or samples:
             dataset = load_dataset(data)
             if damper.rig not in dataset.rigs:
-                raise InputError(f"the dataset has no rig {damper.rig!r}", mend=f"rigs: {', '.join(dataset.rigs)}")
+                raise InputError(f"the dataset has no rig {damper.rig!r}", remedy=f"rigs: {', '.join(dataset.rigs)}")
             runs = _used(dataset.rig(damper.rig))
         if damper.certainty is None:
             damper = certain(damper, runs)
@@ -93,5 +93,5 @@ def _used(dataset) -> list:
 
     runs = [run for run in usable_sines(dataset)[0] if run.split == "train"]
     if not runs:
-        raise InputError("no identification run with a steady sine", mend="check the split column of runs.csv")
+        raise InputError("no identification run with a steady sine", remedy="check the split column of runs.csv")
     return runs

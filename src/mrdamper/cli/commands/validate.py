@@ -57,7 +57,7 @@ def register(app: typer.Typer) -> None:
             typer.echo(f"the model is of rig {damper.rig!r}; scoring the dataset's one rig {wanted!r}", err=True)
         runs = [run for run in dataset.rig(wanted) if split in (None, run.split)]
         if not runs:
-            raise InputError(f"no {split} runs", where=f"rig {wanted}", mend="leave out --split")
+            raise InputError(f"no {split} runs", where=f"rig {wanted}", remedy="leave out --split")
         whole = dataset.rig(wanted)
         known = (
             sessions_known(damper, [whole[n] for n in check_run], own_sessions) if check_run or own_sessions else None
@@ -66,7 +66,7 @@ def register(app: typer.Typer) -> None:
         for name, why in validation.refused.items():
             typer.echo(f"not scored: {name}: {why}", err=True)
         if not validation.runs:
-            raise InputError("no run could be scored", where=f"rig {wanted}", mend="see the lines above")
+            raise InputError("no run could be scored", where=f"rig {wanted}", remedy="see the lines above")
         by_id = {run.id: run for run in runs}
         peaks = {
             run.run_id: peak_band(

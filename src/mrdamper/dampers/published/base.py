@@ -114,11 +114,11 @@ class ConditionedDamper(Damper):
             raise IdentificationError(
                 f"{len(identifications)} identifications",
                 where=cls.heading,
-                mend="give runs at three conditions or more",
+                remedy="give runs at three conditions or more",
             )
         if {i.model.name for i in identifications} != {cls.basis}:
             raise IdentificationError(
-                "identifications of another model", where=cls.heading, mend=f"identify with model {cls.basis}"
+                "identifications of another model", where=cls.heading, remedy=f"identify with model {cls.basis}"
             )
         conditions = [i.condition for i in identifications]
         reference = _middle(conditions)
@@ -172,7 +172,9 @@ class ConditionedDamper(Damper):
             for condition in envelope.corners:
                 made.force_along(sine(condition, 1, 8), condition)
         except (KeyError, TypeError, ValueError, IndexError, ArithmeticError) as error:
-            raise ParameterError(f"coefficients do not fit the model: {error}", mend="write the model again") from error
+            raise ParameterError(
+                f"coefficients do not fit the model: {error}", remedy="write the model again"
+            ) from error
         return made  # type: ignore[return-value]
 
 

@@ -76,11 +76,11 @@ def _number(kind: type, key: str, text: str) -> float:
     try:
         return kind(text)
     except ValueError as error:
-        raise InputError(f"{key} = {text}", mend=f"give a number ({kind.__name__})") from error
+        raise InputError(f"{key} = {text}", remedy=f"give a number ({kind.__name__})") from error
 
 
 def _range(key: str, text: str) -> tuple[float, float]:
     low, colon, high = text.partition(":")
     if not colon:
-        raise InputError(f"{key} = {text}", mend=f"write {key}=LOW:HIGH")
+        raise InputError(f"{key} = {text}", remedy=f"write {key}=LOW:HIGH")
     return _number(float, key, low), _number(float, key, high)

@@ -52,14 +52,14 @@ class Balance(Method):
         if self.harmonics < _MIN_HARMONICS:
             raise IdentificationError(
                 f"{self.harmonics} harmonics cannot determine viscosity, stiffness and two numbers of a loop",
-                mend=f"use {_MIN_HARMONICS} or more",
+                remedy=f"use {_MIN_HARMONICS} or more",
             )
 
     def solve(self, problem: Problem) -> Solution:
         """Determine the free parameters of a problem."""
         if problem.with_delay:
             raise IdentificationError(
-                "method balance determines no delay", mend="leave out the delay, or use method projection"
+                "method balance determines no delay", remedy="leave out the delay, or use method projection"
             )
         record = SineRecord.of(problem.run)
         balanced = _Balanced(problem, record, HarmonicProjection(record.theta, self.harmonics))
@@ -141,6 +141,7 @@ def steady_state(model: Model, record: SineRecord) -> Floats:
     shape = model.shape
     if shape is None:
         raise IdentificationError(
-            f"no closed loop of the {model.title} model is known", mend="use method projection, which follows any model"
+            f"no closed loop of the {model.title} model is known",
+            remedy="use method projection, which follows any model",
         )
     return float(shape.yield_displacement) * steady_loop(shape, record.condition.amplitude_m, record.theta)

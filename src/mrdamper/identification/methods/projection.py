@@ -152,7 +152,7 @@ def _best_of_grid(
         costs = np.array([float(np.sum(_project(problem, _point(axes, u), thin).residual ** 2)) for u in grid])
     if not np.isfinite(costs).any():
         raise IdentificationError(
-            "no start point gives a finite force", where=f"run {problem.run.id}", mend="check the units of the run"
+            "no start point gives a finite force", where=f"run {problem.run.id}", remedy="check the units of the run"
         )
     return [grid[i] for i in np.argsort(costs)[:keep]], len(grid)
 

@@ -114,7 +114,7 @@ def stroke(shape: Shape, zeta0: ArrayLike, distance: ArrayLike) -> Floats:
     _check_start(shape, zeta0)
     start, travelled = np.broadcast_arrays(np.asarray(zeta0, dtype=float), np.asarray(distance, dtype=float))
     if np.any(travelled < 0):
-        raise ExcitationError("a stroke has negative length", mend="give the distance and state zeta0 · sgn v")
+        raise ExcitationError("a stroke has negative length", remedy="give the distance and state zeta0 · sgn v")
     phi = float(shape.kappa) * travelled.ravel()
     states = _states(master_curve(shape.n), float(shape.rho), start.ravel(), slice(None), phi)
     return states.reshape(start.shape)[()]
@@ -180,13 +180,14 @@ def _advance(curve: MasterCurve, rho: Any, w: Any, phi: Any, xp: ModuleType = ma
 def _check_start(shape: Shape, zeta0: ArrayLike) -> None:
     size = float(np.max(np.abs(zeta0), initial=0.0))
     if not size <= CEILING:
-        raise ParameterError(f"the state starts at {size:g} z_max", mend=f"start within ±{CEILING:g} z_max")
+        raise ParameterError(f"the state starts at {size:g} z_max", remedy=f"start within ±{CEILING:g} z_max")
     pull = np.asarray(shape.rho) * max(size, 1.0) ** shape.n
     if np.max(pull) > 1 + 1e-12:
         raise ParameterError(
-            f"from {size:g} z_max the state runs away for rho = {np.max(shape.rho):g}", mend="start within ±z_max"
+            f"from {size:g} z_max the state runs away for rho = {np.max(shape.rho):g}", remedy="start within ±z_max"
         )
     if np.min(pull) < -STEEPEST:
         raise ParameterError(
-            f"the release from {size:g} z_max is too steep for rho = {np.min(shape.rho):g}", mend="start within ±z_max"
+            f"the release from {size:g} z_max is too steep for rho = {np.min(shape.rho):g}",
+            remedy="start within ±z_max",
         )

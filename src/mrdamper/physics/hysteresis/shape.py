@@ -42,13 +42,13 @@ class Shape:
 
     def __post_init__(self) -> None:
         if not np.all((np.asarray(self.kappa) > 0) & np.isfinite(self.kappa)):
-            raise ParameterError(f"kappa is {self.kappa}", mend="A/z_max must be positive and finite")
+            raise ParameterError(f"kappa is {self.kappa}", remedy="A/z_max must be positive and finite")
         if not np.all((np.asarray(self.rho) >= -STEEPEST) & (np.asarray(self.rho) <= 1)):
             raise ParameterError(
-                f"(gamma − beta)/(gamma + beta) is {self.rho}", mend=f"it lies between {-STEEPEST:g} and 1"
+                f"(gamma − beta)/(gamma + beta) is {self.rho}", remedy=f"it lies between {-STEEPEST:g} and 1"
             )
         if not 1 <= self.n <= HIGHEST_N:
-            raise ParameterError(f"n is {self.n}", mend=f"n lies between 1 and {HIGHEST_N:g}")
+            raise ParameterError(f"n is {self.n}", remedy=f"n lies between 1 and {HIGHEST_N:g}")
 
     @classmethod
     def from_bouc_wen(cls, beta: float | Floats, gamma: float | Floats, n: float = 2.0, A: float = 1.0) -> Self:
@@ -69,7 +69,7 @@ class Shape:
         if not (np.all(dissipates(beta, gamma)) and A > 0):
             raise ParameterError(
                 f"A = {A}, beta = {beta}, gamma = {gamma} is no damper",
-                mend="A > 0, beta >= 0 and beta + gamma > 0 are needed (beta belongs to |v|)",
+                remedy="A > 0, beta >= 0 and beta + gamma > 0 are needed (beta belongs to |v|)",
             )
         return cls(A / z_max(beta, gamma, n, A), (gamma - beta) / (gamma + beta), n)
 

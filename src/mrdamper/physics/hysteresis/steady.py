@@ -152,7 +152,7 @@ class _SteadyLoop:
         Newton's steps from the left never overshoot, and no bracket is needed.
         """
         if not (amplitude > 0 and math.isfinite(amplitude)):
-            raise ExcitationError(f"the amplitude is {amplitude:g} m", mend="give a positive amplitude")
+            raise ExcitationError(f"the amplitude is {amplitude:g} m", remedy="give a positive amplitude")
         curve, reach = master_curve(n), kappa * amplitude
         r = reach  # the first step from r = 0
         for _ in range(100):

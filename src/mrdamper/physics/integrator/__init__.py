@@ -75,7 +75,7 @@ def integrate(
     """
     time, x, v, current = (np.asarray(channel, dtype=float) for channel in motion)
     if not np.all(np.diff(time) > 0):
-        raise ExcitationError("time does not increase", mend="sort the samples and drop the repeated ones")
+        raise ExcitationError("time does not increase", remedy="sort the samples and drop the repeated ones")
     given = (*map(float, parameters), *map(float, scale), float(tolerance))
     record, derived = _record(rate, len(start), given)
     steps = np.concatenate([[1.0], np.diff(time)])
@@ -92,7 +92,7 @@ def integrate(
         why = "runs away" if lost.size else f"needs more than {_MAX_STEPS_PER_SAMPLE:_} steps".replace("_", " ")
         raise ParameterError(
             f"the model's state {why} between samples {at - 1} and {at} ({time[at]:.4g} s)",
-            mend="its parameters are too stiff or unstable; bring them nearer to the data's scales",
+            remedy="its parameters are too stiff or unstable; bring them nearer to the data's scales",
         )
     return out
 
@@ -106,7 +106,7 @@ def _record(rate: Rate, states: int, given: tuple[float, ...]) -> tuple[RecordPr
     programs.append(RecordProgram(_traced(rate, states, given)))
     derived = programs[-1].prepare(given)
     if derived is None:
-        raise ParameterError(f"parameters {given}", mend="give finite numbers")
+        raise ParameterError(f"parameters {given}", remedy="give finite numbers")
     return programs[-1], derived
 
 

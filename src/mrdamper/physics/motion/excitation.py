@@ -52,7 +52,7 @@ class Excitation:
         for name in ("displacement", "velocity", "acceleration", "current"):
             array = np.asarray(getattr(self, name), dtype=float)
             if array.shape not in ((), (1,), (size,)):
-                raise ExcitationError(f"{name} has {array.size} samples, time has {size}", mend="give one for each")
+                raise ExcitationError(f"{name} has {array.size} samples, time has {size}", remedy="give one for each")
             object.__setattr__(self, name, array if array.shape == (size,) else np.broadcast_to(array, (size,)))
 
     def __len__(self) -> int:

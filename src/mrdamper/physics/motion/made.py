@@ -100,9 +100,13 @@ def sweep(
     try:
         envelope = np.asarray(amplitude(frequency) if callable(amplitude) else amplitude, dtype=float)
     except TypeError as error:
-        raise ExcitationError(f"amplitude: {error}", mend="give a number, or a function of the frequencies") from error
+        raise ExcitationError(
+            f"amplitude: {error}", remedy="give a number, or a function of the frequencies"
+        ) from error
     if envelope.shape not in ((), time.shape):
-        raise ExcitationError(f"amplitude has shape {envelope.shape}, time {time.shape}", mend="give one value or all")
+        raise ExcitationError(
+            f"amplitude has shape {envelope.shape}, time {time.shape}", remedy="give one value or all"
+        )
     return _derived(time, envelope * np.sin(phase), current)
 
 
@@ -120,7 +124,7 @@ def random_motion(
     frequency = np.fft.rfftfreq(size, 1 / sample_rate)
     inside = (frequency >= band_Hz[0]) & (frequency <= band_Hz[1])
     if not inside.any():
-        raise ExcitationError(f"no frequency line lies in {band_Hz} Hz", mend="lengthen the record or widen the band")
+        raise ExcitationError(f"no frequency line lies in {band_Hz} Hz", remedy="lengthen the record or widen the band")
     spectrum = inside * (rng.standard_normal(frequency.size) + 1j * rng.standard_normal(frequency.size))
     x = np.fft.irfft(spectrum, size)
     return _derived(np.arange(size) / sample_rate, x * rms / np.std(x), current)
@@ -133,10 +137,10 @@ def _derived(time: Floats, x: Floats, current: float) -> Excitation:
 
 def _require_samples(count: float) -> None:
     if not 2 <= count <= _MAX_SAMPLES:
-        raise ExcitationError(f"a motion of {count:.3g} samples", mend=f"give between 2 and {_MAX_SAMPLES:.0e}")
+        raise ExcitationError(f"a motion of {count:.3g} samples", remedy=f"give between 2 and {_MAX_SAMPLES:.0e}")
 
 
 def _require_positive(**values: float) -> None:
     for name, value in values.items():
         if not (np.isfinite(value) and value > 0):
-            raise ExcitationError(f"{name} is {value}", mend="give a positive number")
+            raise ExcitationError(f"{name} is {value}", remedy="give a positive number")

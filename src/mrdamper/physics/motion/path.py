@@ -144,16 +144,16 @@ def lately_along(function: Callable[..., Floats]) -> Callable[..., Floats]:
 def _checked_motion(displacement: ArrayLike, time: ArrayLike | None) -> tuple[Floats, Floats | None]:
     x = np.asarray(displacement, dtype=float)
     if x.ndim != 1 or x.size == 0:
-        raise ExcitationError(f"displacement has shape {x.shape}", mend="give one channel, samples in a row")
+        raise ExcitationError(f"displacement has shape {x.shape}", remedy="give one channel, samples in a row")
     if not np.isfinite(x).all():
-        raise ExcitationError("displacement holds NaN or infinity", mend="cut or repair the record")
+        raise ExcitationError("displacement holds NaN or infinity", remedy="cut or repair the record")
     if time is None:
         return x, None
     t = np.asarray(time, dtype=float)
     if t.shape != x.shape:
-        raise ExcitationError(f"displacement has shape {x.shape}, time {t.shape}", mend="trim or resample the run")
+        raise ExcitationError(f"displacement has shape {x.shape}, time {t.shape}", remedy="trim or resample the run")
     if not np.all(np.diff(t) > 0):
-        raise ExcitationError("time does not increase", mend="sort the samples and drop the repeated ones")
+        raise ExcitationError("time does not increase", remedy="sort the samples and drop the repeated ones")
     return x, t
 
 

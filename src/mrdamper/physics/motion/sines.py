@@ -69,11 +69,11 @@ def analyse_motion(run: Run) -> MotionAnalysis:
     run = run.steady()
     where = f"run {run.id}"
     if np.ptp(run.displacement) < _MIN_DISPLACEMENT_M:
-        raise ExcitationError("the displacement does not move", where=where, mend="check the channel")
+        raise ExcitationError("the displacement does not move", where=where, remedy="check the channel")
     try:
         frequency = fundamental_frequency(run.time, run.displacement)
     except np.linalg.LinAlgError as error:
-        raise ExcitationError("too few samples for a sine", where=where, mend="record a full cycle") from error
+        raise ExcitationError("too few samples for a sine", where=where, remedy="record a full cycle") from error
     orders = (
         _MEASURED_HARMONICS if np.ptp(run.time) * frequency > 2 else 3
     )  # harmonics of a short record overlap its drift
@@ -83,7 +83,7 @@ def analyse_motion(run: Run) -> MotionAnalysis:
         raise ExcitationError(
             f"the steady window holds {cycles:.2f} cycles",
             where=where,
-            mend="record at least one full cycle",
+            remedy="record at least one full cycle",
         )
     power = series.sine**2 + series.cosine**2
     residual = float(np.std(run.displacement - series(run.time)))

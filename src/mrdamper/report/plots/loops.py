@@ -127,7 +127,7 @@ def _drawn(axes: Axes | None, x: Floats, force: Floats, name: str, line: dict[st
 
             axes = pyplot.subplots()[1]
         elif not hasattr(axes, "plot"):
-            raise InputError(f"axes is {shown(axes)}", mend="give axes of matplotlib, or none", code="E_ARGUMENT")
+            raise InputError(f"axes is {shown(axes)}", remedy="give axes of matplotlib, or none", code="E_ARGUMENT")
         axes.plot(x, KN * force, **line)
         label(axes, name, "Force (kN)")
     return axes

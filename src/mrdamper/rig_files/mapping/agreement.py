@@ -55,7 +55,7 @@ def _refusal(records: Sequence[Record], points: Sequence[_Point | None], i: int,
         f"at {one[2]:.3g} A (from {whence}), {one[0]:.3g} Hz and {1e3 * one[1]:.3g} mm its force is {one[3]:.4g} N "
         f"from peak to peak, that of {records[j].id} at the same condition {other[3]:.4g} N",
         where=records[i].provenance.get("file", records[i].id),
-        mend="one of them has another current or another unit of force: state the current of each in tests.csv "
+        remedy="one of them has another current or another unit of force: state the current of each in tests.csv "
         "(where a name or heading states a wrong one, correct that), or leave one out",
         code="E_CONDITIONS",
     )

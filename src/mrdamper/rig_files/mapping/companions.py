@@ -179,7 +179,7 @@ def contradictions_with(
         if not change and contradicts(held, currents[i]):
             refused[i] = ColumnError(
                 printable(f"the test gives {held:g} A, {path.name} {currents[i]:g} A"), where=printable(file.name),
-                mend="correct the one that is wrong, or take the table out of the folder",
+                remedy="correct the one that is wrong, or take the table out of the folder",
                 code="E_CURRENT_CONTRADICTS",
             )  # fmt: skip
     return refused

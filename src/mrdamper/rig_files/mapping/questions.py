@@ -56,7 +56,7 @@ def question_of(error: InputError, columns: Sequence[str] = ()) -> Question | No
     columns : sequence of str
         Names of the columns of the refused file, in order; empty ones have no name.
     """
-    match = _ROLE.search(error.mend or "")
+    match = _ROLE.search(error.remedy or "")
     role = match[1] if match else ""
     if role not in DIMENSION:
         return None

@@ -45,15 +45,15 @@ def dissipates(view: View) -> None:
     if share < GIVING:
         if _exchanged(view):
             what = "displacement and force look exchanged"
-            mend = "name the columns the other way round: [channels.force] column = ... in a profile"
+            remedy = "name the columns the other way round: [channels.force] column = ... in a profile"
         else:
             what = "force and displacement count in opposite directions"
-            mend = "say [channels.force] sign = -1 in a profile"
+            remedy = "say [channels.force] sign = -1 in a profile"
         raise view.refused(
             "E_DISSIPATION_SIGN",
             f"the loop gives energy instead of taking it ({-100 * share:.0f} % of the force pushes along with the "
             f"motion): {what}",
-            mend,
+            remedy,
         )
 
 

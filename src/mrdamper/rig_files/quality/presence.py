@@ -32,8 +32,8 @@ def finite(view: View) -> Iterator[Finding]:
             count = int(np.count_nonzero(infinite))
             text = f"{name} is infinite in {count} sample{'s' * (count > 1)}, first {view.place(at)}"
             if name in USED:
-                mend = "export the channel again with a wider number format"
-                raise view.refused("E_NONFINITE", text, mend)
+                remedy = "export the channel again with a wider number format"
+                raise view.refused("E_NONFINITE", text, remedy)
             yield Finding("W_MISSING", f"{text}; the channel is not used")
 
 

@@ -43,9 +43,9 @@ class View:
         """Name of the record in messages."""
         return self.record.provenance.get("file", "") or f"run {self.record.id}"
 
-    def refused(self, code: str, found: str, mend: str) -> QualityError:
+    def refused(self, code: str, found: str, remedy: str) -> QualityError:
         """The refusal of the record."""
-        return QualityError(found, where=self.where, mend=mend, code=code)
+        return QualityError(found, where=self.where, remedy=remedy, code=code)
 
     def place(self, sample: int) -> str:
         """Place of a sample in its file: its line, or its number."""

@@ -83,13 +83,13 @@ def reader_of(source: Source) -> Reader:
     if found is None or (named is not None and source.suffix not in found.suffixes):
         text = found is None and foreign is None and b"\0" not in head
         is_now = found.title if found is not None else foreign or ("text" if text else "something else")
-        mend = f"rename it to {found.suffixes[0]}" if found else "rename it to .csv" if text else "export it as CSV"
+        remedy = f"rename it to {found.suffixes[0]}" if found else "rename it to .csv" if text else "export it as CSV"
         if foreign in _PICTURES:
-            mend = "give the numbers it was drawn from"
+            remedy = "give the numbers it was drawn from"
         raise source.refuse(
             "E_FORMAT",
             f"the name says {named.title if named else source.suffix or 'nothing'}, the content is {is_now}",
-            mend,
+            remedy,
         )
     return found()
 

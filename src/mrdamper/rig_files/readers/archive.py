@@ -39,10 +39,10 @@ def opened(path: Path, *, folder: bool = False) -> Iterator[Source]:
             yield _gunzip(source) if head.startswith(_GZIP) else source
             return
         if packed and source.suffix not in (".gz", ".zip", ".gzip", ""):
-            mend = "rename it to .zip or .gz"
+            remedy = "rename it to .zip or .gz"
             if source.suffix == ".fmu":
-                mend = "an FMU is a model: mrdamper check reads it"
-            raise source.refuse("E_FORMAT", f"the name says {source.suffix}, the content is a packed file", mend)
+                remedy = "an FMU is a model: mrdamper check reads it"
+            raise source.refuse("E_FORMAT", f"the name says {source.suffix}, the content is a packed file", remedy)
         if packed:
             source = _unzip(source) if head.startswith(b"PK") else _gunzip(source)
             _refuse_nested(source)
@@ -58,7 +58,7 @@ def as_it_is(path: Path) -> Iterator[Source]:
     except (OSError, ValueError) as error:
         found, size, file = getattr(error, "strerror", None) or str(error), 0, None
     if file is None:
-        raise RigFileError("E_FILE", found, file=str(path), mend="give the path of a rig's file")
+        raise RigFileError("E_FILE", found, file=str(path), remedy="give the path of a rig's file")
     with contextlib.ExitStack() as stack:
         stack.enter_context(file)
         yield Source(path, path.name, path.suffix.lower(), file, size, stack)

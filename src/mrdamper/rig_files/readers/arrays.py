@@ -100,7 +100,7 @@ def as_floats(source: Source, array: np.ndarray, name: str, column: int) -> Floa
     """
     array = np.asarray(array)
     kind = array.dtype.kind
-    place = {"column": column + 1, "mend": "export plain numbers"}
+    place = {"column": column + 1, "remedy": "export plain numbers"}
     if kind == "O":
         raise source.refuse("E_UNSAFE", f"column {name!r} holds objects or links, not numbers", **place)
     if kind not in "iufMm":
@@ -175,7 +175,7 @@ def load(library: str, title: str) -> ModuleType:
             return importlib.import_module(library)
     except ImportError as error:
         raise MissingExtraError(
-            f"reading {title} needs {error.name or library}", mend='install it: pip install "mrdamper[rig]"'
+            f"reading {title} needs {error.name or library}", remedy='install it: pip install "mrdamper[rig]"'
         ) from error
 
 

@@ -58,12 +58,12 @@ class RigFileError(InputError):
         file: str = "",
         line: int | None = None,
         column: int | None = None,
-        mend: str = "",
+        remedy: str = "",
     ):
         file, found = printable(file), printable(found)
         self.file, self.line, self.column = file, line, column
         parts = [file, f"line {line}" if line is not None else "", f"column {column}" if column is not None else ""]
-        super().__init__(found, where=", ".join(part for part in parts if part), mend=mend, code=code)
+        super().__init__(found, where=", ".join(part for part in parts if part), remedy=remedy, code=code)
 
 
 class NoTableError(RigFileError):
@@ -89,10 +89,10 @@ class Source:
         return start
 
     def refuse(
-        self, code: str, found: str, mend: str = "", *, line: int | None = None, column: int | None = None
+        self, code: str, found: str, remedy: str = "", *, line: int | None = None, column: int | None = None
     ) -> RigFileError:
         """A refusal that names this file."""
-        return RigFileError(code, found, file=self.name, line=line, column=column, mend=mend)
+        return RigFileError(code, found, file=self.name, line=line, column=column, remedy=remedy)
 
 
 @dataclass(frozen=True, eq=False)

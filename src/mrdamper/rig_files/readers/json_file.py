@@ -39,12 +39,12 @@ class Json(Reader):
         source.file.seek(0)
         tree = _tree(_parsed(source, source.file.read()))
         if isinstance(tree, Mapping) and _SAVED_MODEL in map(str, tree.values()):
-            mend = "give it to mrdamper predict, validate or export; tests are what import reads"
-            raise NoTableError("E_FORMAT", "a saved model", file=source.name, mend=mend)
+            remedy = "give it to mrdamper predict, validate or export; tests are what import reads"
+            raise NoTableError("E_FORMAT", "a saved model", file=source.name, remedy=remedy)
         tables = nested_tables(source, tree if isinstance(tree, Mapping) else {"": tree}, self.title)
         if not any(len(table.names) > 1 for table in tables):
-            mend = "export it as CSV, or the samples of every channel as a list"
-            raise NoTableError("E_FORMAT", "JSON without lists of numbers", file=source.name, mend=mend)
+            remedy = "export it as CSV, or the samples of every channel as a list"
+            raise NoTableError("E_FORMAT", "JSON without lists of numbers", file=source.name, remedy=remedy)
         return tables
 
 

@@ -51,7 +51,7 @@ class Form:
         """Raise what was kept."""
         errors = [self.wrong[place] for place in sorted(self.wrong, key=lambda place: (place[0] or 0, place[1] or 0))]
         if self.more:
-            errors.append(self.stream.source.refuse(errors[-1].code, f"{self.more} more like these", errors[-1].mend))
+            errors.append(self.stream.source.refuse(errors[-1].code, f"{self.more} more like these", errors[-1].remedy))
         CombinedError.raise_from(errors)
 
 

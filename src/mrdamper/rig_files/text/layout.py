@@ -345,7 +345,7 @@ def _first_row(content: Sequence[tuple[int, str]], above: int, separator: str, s
     if not rows or (len(rows) == 1 and len(content) > 1 and named and not _is_row(sample[-1])):
         what = "names of columns, but no row of numbers below them" if named else "no row of numbers"
         kind = RigFileError if named else NoTableError
-        raise kind("E_NO_DATA", what, file=source.name, mend="export the file again, with its data")
+        raise kind("E_NO_DATA", what, file=source.name, remedy="export the file again, with its data")
     width = Counter(len(cells) for cells in rows).most_common(1)[0][0]
     first, cells = _first_of(content, width, separator)
     trailing = width > 1 and separator != SPACES and not cells[-1] and not any(r[-1] for r in rows if len(r) == width)

@@ -147,7 +147,7 @@ def choose_function(
         elif best is None or _replaces(fit, best, dissipating, conditions):
             best = fit
     if best is None:
-        raise refusal or IdentificationError("no form to choose from", mend="name at least one")
+        raise refusal or IdentificationError("no form to choose from", remedy="name at least one")
     return replace(best, refused=refused)
 
 
@@ -176,7 +176,7 @@ def require_determined(form: str, conditions: Sequence[Condition]) -> None:
     chosen = form_named(form)
     I, f, A = features(conditions)
     if chosen.rate_bounds:
-        raise IdentificationError(f"{form} has rates to search", mend="choose a form without")
+        raise IdentificationError(f"{form} has rates to search", remedy="choose a form without")
     if len(conditions) < len(chosen.terms) or _fixed_columns(chosen, tuple(conditions)) is None:
         raise _undetermined(chosen, f"{len(conditions)} conditions do not tell its terms apart", I, f, A)
 
@@ -286,5 +286,5 @@ def _undetermined(form: Form, reason: str, I: Floats, f: Floats, A: Floats) -> I
     return IdentificationError(
         f"{form.name} has {len(form.terms) + len(form.rate_bounds)} coefficients and {reason}: "
         f"{levels[0]} currents, {levels[1]} frequencies, {levels[2]} amplitudes",
-        mend="test more conditions or choose a shorter form",
+        remedy="test more conditions or choose a shorter form",
     )

@@ -190,7 +190,7 @@ class ParameterFunction:
         if len(self.coefficients) != len(form.terms) or len(self.rates) != len(form.rate_bounds):
             raise IdentificationError(
                 f"form {self.form} with {len(self.coefficients)} coefficients and {len(self.rates)} rates",
-                mend=f"it takes {len(form.terms)} and {len(form.rate_bounds)}",
+                remedy=f"it takes {len(form.terms)} and {len(form.rate_bounds)}",
             )
 
     def __call__(self, current: Any, frequency: Any, amplitude: Any) -> Any:

@@ -118,5 +118,5 @@ def _disagreement(train: Sequence[Track], found: dict[str, Contradiction]) -> Co
         f"{len(found)} of {len(train)} runs contradict the other {len(rest)} ({', '.join(causes)}): "
         f"{', '.join(sorted(found))} against {', '.join(rest)}; the first, {first.run_id}, {first.explanation}",
         where=f"rig {train[0].run.rig}" if train[0].run.rig else "the dataset",
-        mend="tests of two dampers need a column specimen in tests.csv; --keep RUN keeps a run as it is",
+        remedy="tests of two dampers need a column specimen in tests.csv; --keep RUN keeps a run as it is",
     )

@@ -72,11 +72,11 @@ def load_input(name: str | Path, values: Mapping[str, float] | None = None, time
     synthetic = made_inputs()
     if str(name) in synthetic:
         if time_scale != 1.0:
-            raise RecordError("a time scale for a made input", where=str(name), mend="set its own parameters instead")
+            raise RecordError("a time scale for a made input", where=str(name), remedy="set its own parameters instead")
         kind, preset = synthetic[str(name)]
         return with_values(kind, {**preset, **(values or {})})
     if values:
-        raise RecordError(f"{', '.join(values)} for a record", where=str(name), mend="leave them out")
+        raise RecordError(f"{', '.join(values)} for a record", where=str(name), remedy="leave them out")
     records = bundled_records()
     if str(name) not in records and Path(name).suffix != ".csv" and not Path(name).exists():
         raise UnknownNameError.of("input", str(name), [*synthetic, *records])

@@ -65,16 +65,16 @@ def load_record(path: str | Path, time_scale: float = 1.0) -> RecordedInput:
     table = table.rename({column: column.strip().lstrip("\ufeff") for column in table.columns})
     present = [name for name in _COLUMNS if name in table.columns]
     if len(present) > 1:
-        raise ColumnError(f"both {' and '.join(present)}", where=str(path), mend="keep one")
+        raise ColumnError(f"both {' and '.join(present)}", where=str(path), remedy="keep one")
     if "time_s" not in table.columns or not present:
         missing = f"no column {'time_s' if present else ' or '.join(_COLUMNS)} (found {', '.join(table.columns)})"
         likely = any(c.lower().startswith(("time", "t_", "acc", "a_", "height")) for c in table.columns)
-        mend = "say the unit in the name: time_s, and acceleration_m_s2 or acceleration_g"
-        raise (UnitError if likely else ColumnError)(missing, where=str(path), mend=mend)
+        remedy = "say the unit in the name: time_s, and acceleration_m_s2 or acceleration_g"
+        raise (UnitError if likely else ColumnError)(missing, where=str(path), remedy=remedy)
     columns = {}
     for name in ("time_s", present[0]):
         if not table[name].dtype.is_numeric() or table[name].null_count():
-            raise ColumnError(f"column {name} holds text or empty cells", where=str(path), mend="write plain numbers")
+            raise ColumnError(f"column {name} holds text or empty cells", where=str(path), remedy="write plain numbers")
         columns[name] = table[name].to_numpy().astype(np.float64)
     return record(columns["time_s"], columns[present[0]], present[0], time_scale, where=str(path))
 
@@ -84,13 +84,13 @@ def record(
 ) -> RecordedInput:
     """Make a record from its samples; `quantity` is a column name of `load_record`, which raises the same."""
     if quantity not in _COLUMNS:
-        raise UnitError(f"quantity {quantity!r}", where=where, mend=f"one of {', '.join(_COLUMNS)}")
+        raise UnitError(f"quantity {quantity!r}", where=where, remedy=f"one of {', '.join(_COLUMNS)}")
     if time.size < 3:
-        raise RecordError(f"{time.size} samples", where=where, mend="give at least three")
+        raise RecordError(f"{time.size} samples", where=where, remedy="give at least three")
     if not (np.isfinite(time).all() and np.isfinite(values).all()):
-        raise RecordError("not every number is finite", where=where, mend="remove or fill those rows")
+        raise RecordError("not every number is finite", where=where, remedy="remove or fill those rows")
     if not (np.isfinite(time_scale) and time_scale > 0):
-        raise RecordError(f"time scale {time_scale:g}", where=where, mend="give a positive number")
+        raise RecordError(f"time scale {time_scale:g}", where=where, remedy="give a positive number")
     steps = np.diff(time)
     step = float(np.median(steps))
     worst = int(np.argmax(np.abs(steps - step)))
@@ -98,7 +98,7 @@ def record(
         raise RecordError(
             f"step of {steps[worst]:.6g} s after {time[worst]:.6g} s where others are {step:.6g} s",
             where=where,
-            mend="give samples at equal steps, in order of time",
+            remedy="give samples at equal steps, in order of time",
             code="E_RECORD_STEP",
         )
     scaled = values * _COLUMNS[quantity]
@@ -106,7 +106,7 @@ def record(
         raise UnitError(
             f"a peak of {np.abs(values).max():.4g} in {quantity} is {np.abs(scaled).max():.4g} m/s²",
             where=where,
-            mend="no ground moves like that: is it in cm/s² (gal), or m/s² under the name of g?",
+            remedy="no ground moves like that: is it in cm/s² (gal), or m/s² under the name of g?",
         )
     clock = np.arange(time.size) * ((time[-1] - time[0]) / (time.size - 1) / time_scale)
     return RecordedInput(clock, scaled, "road" if quantity == "height_m" else "ground")

@@ -68,7 +68,9 @@ async def take_file(
                 if size > FILE_LIMIT:
                     raise _too_large(name)
                 if drop.size + size > DROP_LIMIT:
-                    raise DropError("the files together exceed 1 GB", mend="drop fewer at once, or use mrdamper import")
+                    raise DropError(
+                        "the files together exceed 1 GB", remedy="drop fewer at once, or use mrdamper import"
+                    )
                 file.write(piece)
     except BaseException:  # also a connection that breaks off: half a file is none
         path.unlink(missing_ok=True)
@@ -153,7 +155,7 @@ def _motion(group: list[Any], currents: list[float]) -> dict[str, Any]:
 
 def _drop(session: Session, key: str) -> Drop:
     if key not in session.drops:
-        raise UnknownNameError("that drop is over", mend="drop the files again")
+        raise UnknownNameError("that drop is over", remedy="drop the files again")
     return session.drops[key]
 
 
@@ -161,6 +163,6 @@ def _too_large(name: str) -> DropError:
     return DropError(
         f"the file is over {FILE_LIMIT // 1_000_000} MB",
         where=name,
-        mend="read it with mrdamper import, which has no such limit, and drop the dataset folder",
+        remedy="read it with mrdamper import, which has no such limit, and drop the dataset folder",
         code="E_DROP_SIZE",
     )

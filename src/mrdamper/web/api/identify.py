@@ -115,7 +115,7 @@ def residual(number: int, session: Current) -> Response:
     found, scored = session.results["identified"]
     ids = [i.run_id for i in found] or [run.run_id for run in scored.train.runs]
     if not 0 <= number < len(ids):
-        raise InputError("no such run", mend="choose one from the table", code="E_NAME")
+        raise InputError("no such run", remedy="choose one from the table", code="E_NAME")
     row = next(row for row in table.rows if row.run.id == ids[number])
     if found:
         modelled = modelled_cycle(found[number].model, row.run, found[number].delay)

@@ -50,7 +50,7 @@ def file(number: int, session: Current) -> FileResponse:
     """One of these files, always as a download: a report is a page and must not run as ours."""
     written = _written(session)
     if not 0 <= number < len(written):
-        raise InputError("no such file", mend="load the page again", code="E_NAME")
+        raise InputError("no such file", remedy="load the page again", code="E_NAME")
     path = written[number]
     return FileResponse(path, filename=path.name, media_type="application/octet-stream")
 
@@ -60,7 +60,7 @@ def everything(session: Current) -> Response:
     """All of them in one archive."""
     written = _written(session)
     if not written:
-        raise InputError("no study yet", mend="run one on the Identify page", code="E_NO_RESULT")
+        raise InputError("no study yet", remedy="run one on the Identify page", code="E_NO_RESULT")
     return archive(written, "mrdamper-study")
 
 
@@ -106,7 +106,7 @@ def exported(key: str, session: Current) -> Response:
     """Return an exported file, or an archive of several."""
     paths: list[Path] | None = session.results.get(f"exported.{key}")
     if not paths:
-        raise InputError("no such export", mend="export again", code="E_NAME")
+        raise InputError("no such export", remedy="export again", code="E_NAME")
     if len(paths) == 1:
         return FileResponse(paths[0], filename=paths[0].name, media_type="application/octet-stream")
     return zipped({path.name: path.read_bytes() for path in paths}, f"{paths[0].parent.name}.zip")
@@ -131,7 +131,7 @@ def open_bench(key: str, session: Current) -> dict[str, Any]:
     """Bring back what such a file holds."""
     drop = session.drops.get(key)
     if drop is None or len(drop.names) != 1:
-        raise InputError("no saved project was dropped", mend="drop it again, alone", code="E_DROP")
+        raise InputError("no saved project was dropped", remedy="drop it again, alone", code="E_DROP")
     kept: Kept = open_kept(next(iter(drop.names)), drop.folder)
     if kept.intake is not None:
         session.put(kept.intake)

@@ -126,14 +126,14 @@ def _channel(profile: Profile, name: str, chosen: ChosenColumn) -> Channel:
 def _drop(session: Session) -> Drop:
     drop = next(iter(session.drops.values()), None)
     if drop is None:
-        raise UnknownNameError("no files were dropped", mend="drop the files of a rig")
+        raise UnknownNameError("no files were dropped", remedy="drop the files of a rig")
     return drop
 
 
 def _file(drop: Drop, number: int) -> Path:
     paths = list(drop.names)
     if number >= len(paths):
-        raise UnknownNameError("no such file was dropped", mend="choose one from the list")
+        raise UnknownNameError("no such file was dropped", remedy="choose one from the list")
     return paths[number]
 
 

@@ -110,7 +110,7 @@ async function send(path, options) {
 }
 
 function lost() {
-  return new BenchError({ text: "the bench does not answer", found: "the bench does not answer", mend: "start mrdamper serve again and load the page", code: "E_OFFLINE" }, 0);
+  return new BenchError({ text: "the bench does not answer", found: "the bench does not answer", remedy: "start mrdamper serve again and load the page", code: "E_OFFLINE" }, 0);
 }
 
 async function answer(response) {

@@ -58,13 +58,13 @@ export function table(columns, rows, { pick, chosen, caption } = {}) {
   );
 }
 
-/** What went wrong, where, and how to mend it. */
+/** What went wrong, where, and how to correct it. */
 export function problem(error) {
   const said = error.said ?? { text: String(error.message ?? error) };
   return h(
     "div", { class: "message bad", role: "alert" },
     h("div", {}, said.where ? [h("b", {}, said.where), ": "] : null, said.where ? said.found : capital(said.found ?? said.text)),
-    said.mend ? h("div", {}, capital(said.mend), ".") : null,
+    said.remedy ? h("div", {}, capital(said.remedy), ".") : null,
     said.code ? h("code", {}, said.code) : null,
   );
 }

@@ -146,6 +146,6 @@ export class DropZone {
 
 function tooLargeError(name, limit) {
   const error = new Error("too large");
-  error.said = { where: name, found: `the file is over ${bytes(limit)}`, mend: "read it with mrdamper import, which has no such limit, and drop the dataset folder", code: "E_DROP_SIZE" };
+  error.said = { where: name, found: `the file is over ${bytes(limit)}`, remedy: "read it with mrdamper import, which has no such limit, and drop the dataset folder", code: "E_DROP_SIZE" };
   return error;
 }
