@@ -87,12 +87,12 @@ def test_a_check_run_corrects_its_day_only_and_the_scores_say_so():
     hot = [recorded(f"hot {i}", f"2024-06-01T1{i}:00:00", gain=0.9, amplitude=0.01 + 0.002 * i) for i in range(3)]
     other = recorded("other", "2024-06-02T10:00:00", gain=0.9)
     plain = validate(damper, [*hot, other])
-    scores = validate(damper, [*hot[1:], other], known=sessions_known(damper, hot[:1]))
+    scores = validate(damper, [*hot[1:], other], sessions=sessions_known(damper, hot[:1]))
     assert [run.session for run in plain.runs] == ["unknown"] * 4
     assert [run.session for run in scores.runs] == ["known", "known", "unknown"]
     assert all(run.scores.nrmse_pp < 0.2 * plain.median() for run in scores.runs[:2])
     assert scores.runs[2].scores == plain.runs[3].scores
-    itself = validate(damper, hot[:1], known=sessions_known(damper, hot[:1]))
+    itself = validate(damper, hot[:1], sessions=sessions_known(damper, hot[:1]))
     assert itself.runs[0].session == "unknown"  # a run does not correct itself
     with pytest.raises(InputError, match="could not tell") as caught:
         sessions_known(DAMPER, hot[:1])

@@ -295,7 +295,7 @@ def test_steps_tell_how_far_they_are_and_take_pure_sines_where_they_must(monkeyp
     runs = [TRAIN[2], noise_record(15.0), TRAIN[3]]
     steps = [(Recipe(name, Basis("bingham"), make, pure=pure), runs) for name, pure in (("all", False), ("pure", True))]
     scored, refused = fit_and_score_all(
-        steps, HELD, lambda what, share: told.append((what, share)), leave_out=False, found=found
+        steps, HELD, lambda what, share: told.append((what, share)), leave_out=False, cache=found
     )
     assert refused == {}
     names = [run.id for run in runs]

@@ -71,74 +71,74 @@ def band(
         E_LEVEL if the level is not between 0 and 1.
     """
     student(level, 1.0)
-    known: Certainty | None = damper.certainty
-    if known is None or not (known.of_sessions or known.run_dof > 0):
+    uncertainty: Certainty | None = damper.certainty
+    if uncertainty is None or not (uncertainty.of_sessions or uncertainty.run_dof > 0):
         return None
     seen_at = slice(None) if shown is None else shown
     force, motion = prediction.force[seen_at], prediction.motion.part(seen_at)
-    slopes = force_slopes(damper, prediction, known.names)[seen_at]
+    slopes = force_slopes(damper, prediction, uncertainty.names)[seen_at]
     distance = prediction.distance(damper.envelope)
     half = peak_force(force)
-    parameter = np.einsum("np,pq,nq->n", slopes, known.covariance, slopes)
-    session = (known.gain * force) ** 2 + known.offset**2
+    parameter = np.einsum("np,pq,nq->n", slopes, uncertainty.covariance, slopes)
+    session = (uncertainty.gain * force) ** 2 + uncertainty.offset**2
     model = (
-        (known.run_gain * force) ** 2
-        + known.run_offset**2
-        + (known.force**2 + known.growth.variance("force", distance)) * half**2
+        (uncertainty.run_gain * force) ** 2
+        + uncertainty.run_offset**2
+        + (uncertainty.force**2 + uncertainty.growth.variance("force", distance)) * half**2
     )
     top, bottom = int(np.argmax(force)), int(np.argmin(force))
     swing = (slopes[top] - slopes[bottom]) / 2
-    own = float(swing @ known.covariance @ swing)
-    dofs = _degrees_of_freedom(known)
+    own = float(swing @ uncertainty.covariance @ swing)
+    dofs = _degrees_of_freedom(uncertainty)
 
     def reach(quantity: Quantity, parts: Sequence[float]) -> float:
         whole = sum(parts)
         if whole <= 0:
             return 0.0
         dof = whole**2 / sum(part**2 / d for part, d in zip(parts, dofs, strict=True))
-        factor = known.calibration.factor(quantity, level) if known.calibration else 1.0
+        factor = uncertainty.calibration.factor(quantity, level) if uncertainty.calibration else 1.0
         return factor * student(level, dof) * float(np.sqrt(whole))
 
     t = reach("force", [float(np.mean(v)) for v in (parameter, session, model)])
     mean = float(np.mean(parameter + session + model))
     width = (t / np.sqrt(mean) if mean > 0 else 0.0) * np.sqrt(parameter + session + model)
-    of_run = (known.run_gain**2 + known.peak**2 + known.growth.variance("peak", distance)) * half**2
-    unseen = reach("peak", [own, (known.gain * half) ** 2, of_run])
-    seen = reach("peak", [own, 0.0, of_run])
+    of_run = (uncertainty.run_gain**2 + uncertainty.peak**2 + uncertainty.growth.variance("peak", distance)) * half**2
+    unseen = reach("peak", [own, (uncertainty.gain * half) ** 2, of_run])
+    sensed = reach("peak", [own, 0.0, of_run])
     power = dissipated_power(force, motion.velocity, motion.time) or 1.0
     turned = np.array([dissipated_power(column, motion.velocity, motion.time) for column in slopes.T]) / power
-    lost = known.run_gain**2 + known.energy**2 + known.growth.variance("energy", distance)
-    loss = reach("energy", [float(turned @ known.covariance @ turned), known.gain**2, lost])
+    lost = uncertainty.run_gain**2 + uncertainty.energy**2 + uncertainty.growth.variance("energy", distance)
+    loss = reach("energy", [float(turned @ uncertainty.covariance @ turned), uncertainty.gain**2, lost])
     return Band(
         force - width, force + width, np.sqrt(parameter), np.sqrt(session), np.sqrt(model),
-        (max(half - unseen, 0.0), half + unseen), (-loss, loss), (max(half - seen, 0.0), half + seen),
+        (max(half - unseen, 0.0), half + unseen), (-loss, loss), (max(half - sensed, 0.0), half + sensed),
     )  # fmt: skip
 
 
-def _degrees_of_freedom(known: Certainty) -> tuple[float, float, float]:
+def _degrees_of_freedom(uncertainty: Certainty) -> tuple[float, float, float]:
     """Behind the variances of parameters, sessions and the rest; calibration counts the runs of the last by itself."""
-    worst = float(np.min(known.dof)) if known.names else 1.0
-    runs = np.inf if known.calibration else max(known.run_dof, 1.0)
-    return worst, max(known.session_dof, 1.0), float(runs)
+    worst = float(np.min(uncertainty.dof)) if uncertainty.names else 1.0
+    runs = np.inf if uncertainty.calibration else max(uncertainty.run_dof, 1.0)
+    return worst, max(uncertainty.session_dof, 1.0), float(runs)
 
 
 def scope(damper: Damper, level: float) -> str:
     """Sessions a band holds for, and how far it is calibrated, as a phrase."""
-    known: Certainty | None = damper.certainty
-    if known is None:
+    uncertainty: Certainty | None = damper.certainty
+    if uncertainty is None:
         return ""
     text = (
         "in a future test session"
-        if known.of_sessions
+        if uncertainty.of_sessions
         else f"for sessions like the tested ones (fewer than {SESSIONS_NEEDED} known)"
     )
-    found = known.calibration
-    if found is None:
+    calibration = uncertainty.calibration
+    if calibration is None:
         return f"{text}, not calibrated: no cross-validated runs"
-    if level > found.reachable:
+    if level > calibration.reachable:
         text += (
-            f", calibrated to {100 * found.reachable:.0f} % at most by {found.units} independent {found.unit}s and "
-            "beyond by a normal distribution"
+            f", calibrated to {100 * calibration.reachable:.0f} % at most by {calibration.units} independent "
+            f"{calibration.unit}s and beyond by a normal distribution"
         )
     return text
 
@@ -193,8 +193,8 @@ def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
     InputError
         E_LEVEL if the level is not between 0 and 1.
     """
-    known, tested = damper.certainty, damper.envelope
-    if known is None or not tested.tested:
+    uncertainty, tested = damper.certainty, damper.envelope
+    if uncertainty is None or not tested.tested:
         return None
     at = tested.middle
     if not 0 < at.peak_velocity <= tested.peak_velocity_m_s[1]:
@@ -203,18 +203,20 @@ def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
     own, quantile = [], []
     for current in currents:
         prediction = damper.predict(replace(at, current_A=current))
-        found = band(damper, prediction, level)
-        if found is None:
+        interval = band(damper, prediction, level)
+        if interval is None:
             return None
-        parts = np.sqrt(found.parameter**2 + found.session**2 + found.model**2)
-        own.append(np.mean(found.parameter**2) / peak_force(prediction.force) ** 2)
-        quantile.append(np.mean(found.high - prediction.force) / (np.mean(parts) or 1.0))
+        parts = np.sqrt(interval.parameter**2 + interval.session**2 + interval.model**2)
+        own.append(np.mean(interval.parameter**2) / peak_force(prediction.force) ** 2)
+        quantile.append(np.mean(interval.high - prediction.force) / (np.mean(parts) or 1.0))
     t = float(np.mean(quantile))
-    grown = [known.growth.variance("force", tested.distance(c, np.array([c.current_A]))) for c in tested.farthest]
+    grown = [uncertainty.growth.variance("force", tested.distance(c, np.array([c.current_A]))) for c in tested.farthest]
     at_tests, untested = (
-        t * float(np.sqrt(known.force**2 + np.mean(own) + more)) for more in (0.0, max(grown, default=0.0))
+        t * float(np.sqrt(uncertainty.force**2 + np.mean(own) + more)) for more in (0.0, max(grown, default=0.0))
     )
-    return PortableBand(level, t * known.total_gain, t * known.total_offset, at_tests, untested, scope(damper, level))
+    return PortableBand(
+        level, t * uncertainty.total_gain, t * uncertainty.total_offset, at_tests, untested, scope(damper, level)
+    )
 
 
 def session_band(

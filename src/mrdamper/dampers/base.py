@@ -131,12 +131,12 @@ class Envelope:
         if not self.conditions or condition.frequency_Hz <= 0 or condition.amplitude_m <= 0:
             return Distance()
         tested = [Condition(*point) for point in self.conditions]
-        found = distance_from(tested, condition, current, any_current=self.any_motion)
+        nearest = distance_from(tested, condition, current, any_current=self.any_motion)
         if not self.any_motion:
-            return found
+            return nearest
         larger = max(0.0, np.log(condition.amplitude_m / self.amplitude_m[1]))
         faster = max(0.0, np.log(condition.peak_velocity / self.peak_velocity_m_s[1]))
-        return replace(found, motion=min(found.motion, float(np.hypot(larger, faster))))
+        return replace(nearest, motion=min(nearest.motion, float(np.hypot(larger, faster))))
 
     def _combined(self, condition: Condition) -> bool:
         """Whether a condition lies in the convex hull of the tested ones, in I, log f and log A (and log f·A)."""
@@ -448,16 +448,16 @@ class Damper(Displayable):
         of one current. Otherwise they follow the sine that the motion has resembled so far: an
         approximation, flagged as such, and the force that a stream of the damper gives.
         """
-        found = equivalent_sine(run)
-        motion = measured_motion(run).about(found.centre)
-        if found.is_sine and not run.current_changes:
-            flags = self.envelope.flags(found.condition)
+        sine = equivalent_sine(run)
+        motion = measured_motion(run).about(sine.centre)
+        if sine.is_sine and not run.current_changes:
+            flags = self.envelope.flags(sine.condition)
         else:
             flags = (*self.envelope.motion_flags(motion), *(() if self.envelope.any_motion else (NOT_A_SINE,)))
         if self.knee is not None and samples_in_knee(motion, self.knee) < _SAMPLES_IN_KNEE:
             flags = (*flags, COARSE)
-        made = Prediction(motion, np.zeros(len(motion)), found.condition, flags)
-        return replace(made, force=self.force_for(made))
+        prediction = Prediction(motion, np.zeros(len(motion)), sine.condition, flags)
+        return replace(prediction, force=self.force_for(prediction))
 
     def force_for(self, prediction: Prediction) -> Floats:
         """The force of this damper for what another one's prediction was made for."""

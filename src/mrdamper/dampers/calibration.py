@@ -208,15 +208,15 @@ class Growth:
         size = np.sqrt(np.mean(table**2, axis=0))
         size[size == 0] = 1.0
         excess = np.array([_squared_errors(run) - _expected(run, at_tests) for run in away])
-        found = [np.sqrt(nnls(table / size, np.maximum(column, 0.0))[0] / size) for column in excess.T]
-        return cls(*(tuple(np.minimum(value, _MAX_GROWTH).tolist()) for value in found))
+        slopes = [np.sqrt(nnls(table / size, np.maximum(column, 0.0))[0] / size) for column in excess.T]
+        return cls(*(tuple(np.minimum(value, _MAX_GROWTH).tolist()) for value in slopes))
 
 
 def _squared_errors(run: PredictedRun) -> Floats:
     """(3,) squared relative errors of the force, the peak and the energy; what is not finite counts as one."""
     force = float(np.mean((run.measured - run.predicted) ** 2)) / run.half**2
-    found = np.square([np.sqrt(force), run.peak - 1, run.energy - 1])
-    return np.where(np.isfinite(found), found, 1.0)
+    errors = np.square([np.sqrt(force), run.peak - 1, run.energy - 1])
+    return np.where(np.isfinite(errors), errors, 1.0)
 
 
 def _expected(run: PredictedRun, at_tests: ModelError) -> Floats:
@@ -262,7 +262,7 @@ class Calibration:
         return min(REPORTED_LEVEL, self.reachable)
 
     @property
-    def found(self) -> str:
+    def summary(self) -> str:
         """Coverage as a sentence without its full stop."""
         force, peak, energy = (f"{100 * share:.0f} %" for share in self.coverage)
         few = ""
@@ -294,8 +294,8 @@ class Calibration:
         factors = {q: _factors(units, q) for q in QUANTITIES}
         whole = cls("session" if by_session else "run", len(units), **factors, coverage=(0.0, 0.0, 0.0))
         others = [[other for other in units if other is not unit] for unit in units]
-        found = tuple(_covered(units, others, q, whole.level) for q in QUANTITIES)
-        return cls(whole.unit, whole.units, whole.force, whole.peak, whole.energy, found)  # type: ignore[arg-type]
+        coverage = tuple(_covered(units, others, q, whole.level) for q in QUANTITIES)
+        return cls(whole.unit, whole.units, whole.force, whole.peak, whole.energy, coverage)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, eq=False)

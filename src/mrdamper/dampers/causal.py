@@ -129,8 +129,8 @@ def causal_force(damper: Damper, motion: Excitation) -> Floats:
     derived = record.prepare(given) or ()
     steps = np.diff(motion.time, prepend=2 * motion.time[0] - motion.time[1])
     channels = (motion.displacement, motion.velocity, motion.acceleration, motion.current, steps)
-    found = record.along(given, derived, record.starts, channels)
-    force, failed = found.outputs[0], found.failed
+    outputs = record.along(given, derived, record.starts, channels)
+    force, failed = outputs.outputs[0], outputs.failed
     if failed >= 0 or not np.isfinite(force).all():
         at = failed if failed >= 0 else int(np.flatnonzero(~np.isfinite(force))[0])
         raise ExcitationError(

@@ -145,38 +145,40 @@ class Certainty:
 
 def unsure(damper: Damper) -> list[str]:
     """Sentences on parameters that are not identifiable or badly determined, and on sessions."""
-    known: Certainty | None = damper.certainty
-    if known is None:
+    uncertainty: Certainty | None = damper.certainty
+    if uncertainty is None:
         return ["The uncertainty of the parameters is not known: the model was saved without it."]
     numbers = damper.fitted_parameters
-    said = [f"{name} ended at {_limit(numbers[name])}; its interval is one-sided." for name in known.one_sided]
-    said += [f"{text}." for text in known.words]
-    told = " ".join(known.words)
-    if silent := [name for name in known.unknown if name not in told]:
-        said.append(f"{', '.join(silent)} {NOT_IDENTIFIABLE}.")
-    if not known.of_sessions:
-        said.append(
+    sentences = [
+        f"{name} ended at {_limit(numbers[name])}; its interval is one-sided." for name in uncertainty.one_sided
+    ]
+    sentences += [f"{text}." for text in uncertainty.words]
+    mentioned = " ".join(uncertainty.words)
+    if silent := [name for name in uncertainty.unknown if name not in mentioned]:
+        sentences.append(f"{', '.join(silent)} {NOT_IDENTIFIABLE}.")
+    if not uncertainty.of_sessions:
+        sentences.append(
             "Fewer than three known sessions: the scatter between sessions is not estimated, and intervals hold for "
             "sessions like the tested ones."
         )
-    elif known.session_dof < 2:
-        said.append("The scatter between sessions rests on fewer than two degrees of freedom.")
+    elif uncertainty.session_dof < 2:
+        sentences.append("The scatter between sessions rests on fewer than two degrees of freedom.")
     apart, wide, weak = [], [], []
-    for i, name in enumerate(known.names):
-        ends = known.ends(damper, name)
+    for i, name in enumerate(uncertainty.names):
+        ends = uncertainty.ends(damper, name)
         if ends is None:
             continue
         apart.append(i)
-        error = float(np.sqrt(known.covariance[i, i]))
-        if known.logs[i] and error > _BADLY:
+        error = float(np.sqrt(uncertainty.covariance[i, i]))
+        if uncertainty.logs[i] and error > _BADLY:
             wide.append((name, f"{ends[1] / ends[0]:.2g}"))
-        elif not known.logs[i] and error > _BADLY * abs(numbers[name].value):
+        elif not uncertainty.logs[i] and error > _BADLY * abs(numbers[name].value):
             about = written(numbers[name].value, ends, numbers[name].unit)
             weak.append((name, about))
-    said += _grouped(weak, "{} is not significant ({})", "Not significant")
-    said += _grouped(wide, "95 % interval of {} spans a factor of {}", "95 % intervals span a factor of")
-    names, block = [known.names[i] for i in apart], known.covariance[np.ix_(apart, apart)]
-    return [*said, *(f"{text}." for text in weaknesses(names, block))]
+    sentences += _grouped(weak, "{} is not significant ({})", "Not significant")
+    sentences += _grouped(wide, "95 % interval of {} spans a factor of {}", "95 % intervals span a factor of")
+    names, block = [uncertainty.names[i] for i in apart], uncertainty.covariance[np.ix_(apart, apart)]
+    return [*sentences, *(f"{text}." for text in weaknesses(names, block))]
 
 
 def _grouped(entries: list[tuple[str, str]], single: str, several: str) -> list[str]:
@@ -201,19 +203,19 @@ def table(damper: Damper, level: float = 0.95) -> list[dict[str, Any]]:
     Keys: name, value, unit, low, high (NaN where there are none), effective_samples (NaN where not
     known), state, written (as on a screen).
     """
-    known: Certainty | None = damper.certainty
+    uncertainty: Certainty | None = damper.certainty
     rows = []
     for name, own in damper.fitted_parameters.items():
-        ends = known.ends(damper, name, level) if known else None
-        if known is None:
+        ends = uncertainty.ends(damper, name, level) if uncertainty else None
+        if uncertainty is None:
             state = "no covariance"
-        elif name in known.one_sided:
+        elif name in uncertainty.one_sided:
             state = f"one-sided: at {_limit(own)}"
         else:
             state = "determined" if ends else NOT_IDENTIFIABLE
         low, high = ends or (math.nan, math.nan)
         row = {"name": name, "value": own.value, "unit": own.unit, "low": low, "high": high}
-        row["effective_samples"] = known.effective.get(name, math.nan) if known and ends else math.nan
+        row["effective_samples"] = uncertainty.effective.get(name, math.nan) if uncertainty and ends else math.nan
         text = written(own.value, ends, own.unit) + ("" if ends else f" ({state})")
         if state == NOT_IDENTIFIABLE:
             text = state  # the estimate is one of many that fit as well

@@ -137,33 +137,33 @@ def identify_jointly(
     progress("which terms the tests show", 0.8)
     evidence = Evidence.of(problem, fit)
     chosen, more = evidence.choose([t for t in TERMS if not problem.fixed.keys() & set(t.names)])
-    final, found = problem, fit
+    final, best = problem, fit
     off = {name: 0.0 for term in TERMS for name in term.names if name in problem.free and name not in chosen}
     coil, gone = _absent(problem, fit)
     off |= dict.fromkeys(gone, 0.0)
     if off or coil != problem.given_coil:
         final = JointProblem(runs, MODEL, {**problem.fixed, **off}, free=problem.free, coil=coil, parts=problem.parts)
-        found = final.fit(start=evidence.start(final), rounds=1, settled=_ROUGHLY / 10)
-    coil, gone = _absent(final, found)
+        best = final.fit(start=evidence.start(final), rounds=1, settled=_ROUGHLY / 10)
+    coil, gone = _absent(final, best)
     if gone or coil != final.given_coil:
         fixed = {**final.fixed, **dict.fromkeys(gone, 0.0)}
         final = JointProblem(runs, MODEL, fixed, free=final.free, coil=coil, parts=final.parts)
-        found = final.fit(start=final.from_point(found), rounds=1, settled=_ROUGHLY / 10)
-    left_out, before = (Evidence.of(p, f).everything() for p, f in ((final, found), (problem, fit)))
+        best = final.fit(start=final.from_point(best), rounds=1, settled=_ROUGHLY / 10)
+    left_out, before = (Evidence.of(p, f).everything() for p, f in ((final, best), (problem, fit)))
     if not smaller_wins(
         left_out, before
     ):  # what one step promised, the search did not keep: terms earn their place here too
-        final, found = problem, fit
-    found = final.fit(start=found.point, rounds=1, settled=_ROUGHLY / 10, to_the_last_digit=True)
+        final, best = problem, fit
+    best = final.fit(start=best.point, rounds=1, settled=_ROUGHLY / 10, to_the_last_digit=True)
     progress("one model for all runs", 1.0)
-    left_out = Evidence.of(final, found).everything()
-    left_out = _means({**left_out, **current, **Evidence.of(final, found, _by_session).everything()})
+    left_out = Evidence.of(final, best).everything()
+    left_out = _means({**left_out, **current, **Evidence.of(final, best, _by_session).everything()})
     tried = (*tried, *more)
     kept = "; ".join(t.term for t in tried if t.kept)
-    about = {**found.damper.provenance, "terms": kept or "none beyond the plain form"}
+    about = {**best.damper.provenance, "terms": kept or "none beyond the plain form"}
     about |= {f"left out, {what}": f"{100 * error:.2f} %" for what, error in left_out.items()}
-    found = replace(found, damper=replace(found.damper, provenance=about), second=second)
-    return JointChoice(final, found, tried, left_out)
+    best = replace(best, damper=replace(best.damper, provenance=about), second=second)
+    return JointChoice(final, best, tried, left_out)
 
 
 def _lost_motion(problem: JointProblem, fit: JointFit) -> tuple[JointProblem, JointFit, tuple[Tried, ...]]:
@@ -171,13 +171,13 @@ def _lost_motion(problem: JointProblem, fit: JointFit) -> tuple[JointProblem, Jo
     without = problem.with_free(problem.free, {"e": _NO_PLAY})
     starts = (without.from_point(fit), without.start)  # the play found need not be the way of a seat without play
     fits = [without.fit(start=start, rounds=1, most_steps=10, settled=_ROUGHLY) for start in starts]
-    found = min(fits, key=lambda each: float(np.sum(each.nrmse_pp)))
-    now, scores = (Evidence.of(p, f).everything() for p, f in ((problem, fit), (without, found)))
+    refitted = min(fits, key=lambda each: float(np.sum(each.nrmse_pp)))
+    now, scores = (Evidence.of(p, f).everything() for p, f in ((problem, fit), (without, refitted)))
     kept = not smaller_wins(scores, now)
-    said = _tried("lost motion after a reversal", kept, now, scores)
+    trial = _tried("lost motion after a reversal", kept, now, scores)
     if kept:
-        return problem, fit, (said,)
-    return without, replace(found, second=Valley.beside(found, [fit])), (said,)
+        return problem, fit, (trial,)
+    return without, replace(refitted, second=Valley.beside(refitted, [fit])), (trial,)
 
 
 def _absent(problem: JointProblem, fit: JointFit) -> tuple[Coil | Literal["determined"] | None, tuple[str, ...]]:
@@ -220,19 +220,19 @@ def _level_law(
     for term in (None, *forms):
         form = term.names if term else ()
         problem = longest.with_free([n for n in longest.free if n not in _LAW or n in form])
-        found = fit
+        trial = fit
         if set(problem.free) != set(longest.free):
-            found = problem.fit(start=problem.from_point(fit), rounds=1, most_steps=10, settled=_ROUGHLY)
-        scores: Errors = Evidence.of(problem, found).everything()
+            trial = problem.fit(start=problem.from_point(fit), rounds=1, most_steps=10, settled=_ROUGHLY)
+        scores: Errors = Evidence.of(problem, trial).everything()
         if levels:
             scores = {**scores, "current": _left_out_current(problem, starts, levels)}
         if term is None or best is None:
-            best = form, found, scores
+            best = form, trial, scores
             continue
         kept = not smaller_wins(best[2], scores)
         tried.append(_tried(term.title, kept, scores, best[2]))
         if kept:
-            best = form, found, scores
+            best = form, trial, scores
     assert best is not None
     current = {what: error for what, error in best[2].items() if what == "current"}
     return best[0], best[1], tuple(tried), current
@@ -294,8 +294,8 @@ class Evidence:
     @classmethod
     def of(cls, problem: JointProblem, fit: JointFit, by: Grouping | None = None) -> Evidence:
         """Linearise a problem where a fit of it ended; by default conditions are left out."""
-        known = problem.linearised(fit)
-        table, owner = known.table, known.table.owner
+        linearised = problem.linearised(fit)
+        table, owner = linearised.table, linearised.table.owner
         names = [*(a.name for a in problem.axes), *(i.name for i in problem.linear)]
         values = np.array([*fit.point, *(getattr(fit.damper.model, i.name) for i in problem.linear)])
         neutral = values.copy()
@@ -308,7 +308,7 @@ class Evidence:
             runs = float(np.sum(table.share[group]))  # one for each whole run
             return float(np.sqrt(np.sum((weighted[group] / table.weights[owner[group]]) ** 2) / runs))
 
-        return cls(names, values, neutral, known.residual, known.jacobian, rows, error)
+        return cls(names, values, neutral, linearised.residual, linearised.jacobian, rows, error)
 
     def everything(self) -> dict[str, Floats]:
         """Left-out errors with all parameters."""
@@ -319,7 +319,7 @@ class Evidence:
         on = np.array([n in active or n.startswith("coil.") for n in self.names])
         shift = np.where(on, 0.0, self.neutral - self.values)
         base = self.residual + self.jacobian @ shift
-        found = {}
+        errors_by_fold = {}
         normal, right = self.jacobian[:, on].T @ self.jacobian[:, on], self.jacobian[:, on].T @ base
         for what, groups in self.groups.items():
             errors = []
@@ -327,8 +327,8 @@ class Evidence:
                 J = self.jacobian[np.ix_(group, on)]
                 step = _damped(normal - J.T @ J, -(right - J.T @ base[group]))
                 errors.append(self.error_of(base[group] + J @ step, group))
-            found[what] = np.array(errors)
-        return found
+            errors_by_fold[what] = np.array(errors)
+        return errors_by_fold
 
     def error_of(self, weighted: Floats, group: np.ndarray) -> float:
         """Unweighted error of some rows."""
@@ -357,11 +357,11 @@ class Evidence:
         J, base = self.jacobian[:, on], self.residual + self.jacobian @ shift
         moved = self.values + shift
         moved[on] += solve_linear(J, -base, rank_limit=1e-10)
-        known = dict(zip(self.names, moved.tolist(), strict=True))
+        values = dict(zip(self.names, moved.tolist(), strict=True))
         lower = np.array([a.coordinate(a.lower) for a in problem.axes])
         upper = np.array([a.coordinate(a.upper) for a in problem.axes])
         return np.clip(
-            [known[a.name] for a in problem.axes], lower + 0.02 * (upper - lower), upper - 0.02 * (upper - lower)
+            [values[a.name] for a in problem.axes], lower + 0.02 * (upper - lower), upper - 0.02 * (upper - lower)
         )
 
 
@@ -382,7 +382,7 @@ def _means(errors: Errors) -> dict[str, float]:
 
 def _by_condition(problem: JointProblem, owner: np.ndarray) -> dict[str, list[np.ndarray]]:
     """Rows left out together: of a condition, or a stretch of another record."""
-    found = {}
+    rows_by_key = {}
     sines = [i for i, part in enumerate(problem.parts) if part.is_sine and not part.changes]
     conditions = [problem.parts[i].condition for i in sines]
     groups = [np.flatnonzero(np.isin(owner, [sines[k] for k in group])) for group in same_condition(conditions)]
@@ -392,8 +392,8 @@ def _by_condition(problem: JointProblem, owner: np.ndarray) -> dict[str, list[np
             cycles = (part.motion.time[-1] - part.motion.time[0]) * part.condition.frequency_Hz
             groups += np.array_split(rows, max(4, int(cycles / _BLOCK)))
     if len(groups) > 2:
-        found["condition"] = groups
-    return found
+        rows_by_key["condition"] = groups
+    return rows_by_key
 
 
 def _by_session(problem: JointProblem, owner: np.ndarray) -> dict[str, list[np.ndarray]]:
@@ -402,8 +402,8 @@ def _by_session(problem: JointProblem, owner: np.ndarray) -> dict[str, list[np.n
         sessions = [session_of(run) for run in problem.runs]
     except InputError:
         return {}  # a clock that is no date: what sessions share is refused where it is asked for
-    known = [session for session in sessions if session is not None]
-    found = dict.fromkeys(known)
-    if not SESSIONS_NEEDED <= len(found) < len(known):
+    sessions_of_runs = [session for session in sessions if session is not None]
+    rows = dict.fromkeys(sessions_of_runs)
+    if not SESSIONS_NEEDED <= len(rows) < len(sessions_of_runs):
         return {}
-    return {"session": [np.flatnonzero(np.isin(owner, [i for i, s in enumerate(sessions) if s == n])) for n in found]}
+    return {"session": [np.flatnonzero(np.isin(owner, [i for i, s in enumerate(sessions) if s == n])) for n in rows]}

@@ -82,17 +82,17 @@ def certain(
     )
     free = [name for name in numbers if name not in at_bound]
     slopes = [force_slopes(damper, p.prediction, free)[p.picked] for p in parts]
-    known, unseen, alike, inverse = _determined(slopes, parts, len(free))
+    kept, unseen, alike, inverse = _determined(slopes, parts, len(free))
     conditions = [part.prediction.condition for part in parts]
     infinite = np.diag([np.inf if i in unseen else 1.0 for i in range(len(free))])
     words = weaknesses(free, infinite, alike, conditions)
     unknown = {free[i] for i in (*unseen, *(i for group in alike for i in group))}
-    names = [free[i] for i in known]
+    names = [free[i] for i in kept]
     # A parameter at its bound of zero has no size that its interval could be compared with.
     sized = {name for name in names if bounded or numbers[name].value}
-    spread, wide = _identifiable(names, sized, numbers, parts, [s[:, known] for s in slopes], inverse)
+    spread, wide = _identifiable(names, sized, numbers, parts, [s[:, kept] for s in slopes], inverse)
     effects = spread.effects
-    made = Certainty(
+    uncertainty = Certainty(
         spread.names, tuple(numbers[n].log for n in spread.names), spread.covariance, spread.dof, at_bound,
         tuple(name for name in free if name in unknown | wide),
         effects.gain, effects.offset, effects.session_dof, effects.run_gain, effects.run_offset, effects.run_dof,
@@ -100,7 +100,7 @@ def certain(
         taught=dict(zip([p.run.id for p in parts], _shares(spread.information), strict=True)),
         effective=dict(zip(spread.names, spread.effective.tolist(), strict=True)),
     )  # fmt: skip
-    certainty = _with_model_error(made, parts, spread.slopes, cross_validated, away, other_sessions)
+    certainty = _with_model_error(uncertainty, parts, spread.slopes, cross_validated, away, other_sessions)
     return replace(damper, certainty=certainty)  # type: ignore[type-var]
 
 
@@ -136,11 +136,11 @@ class _Spread:
             + (1 - share) ** 2 * doubt / 2,
             1e-9,
         )
-        told = np.array([np.sum((s @ inverse * p.weight) ** 2, axis=0) for s, p in zip(slopes, parts, strict=True)])
+        squares = np.array([np.sum((s @ inverse * p.weight) ** 2, axis=0) for s, p in zip(slopes, parts, strict=True)])
         return cls(
             tuple(names), slopes, covariance, np.maximum(dof, 1.0),
             np.minimum(left * np.diag(inverse) / variance, samples), effects,
-            told / np.maximum(told.sum(axis=0), np.finfo(float).tiny),
+            squares / np.maximum(squares.sum(axis=0), np.finfo(float).tiny),
         )  # fmt: skip
 
 
@@ -159,15 +159,15 @@ def _identifiable(
     """
     wide: set[str] = set()
     while True:
-        found = _Spread.of(names, parts, slopes, inverse)
-        errors = np.sqrt(np.diag(found.covariance))
+        spread = _Spread.of(names, parts, slopes, inverse)
+        errors = np.sqrt(np.diag(spread.covariance))
         ends = [
             interval_about(own[n].value, float(e), float(d), _LEVEL, own[n].log)
-            for n, e, d in zip(names, errors, found.dof, strict=True)
+            for n, e, d in zip(names, errors, spread.dof, strict=True)
         ]
         lost = [i for i, each in enumerate(ends) if each is None and names[i] in sized]
         if not lost:
-            return found, wide
+            return spread, wide
         wide |= {names[i] for i in lost}
         worst = max(lost, key=lambda i: relative_width(own[names[i]].value, float(errors[i]), own[names[i]].log))
         keep = [i for i in range(len(names)) if i != worst]
@@ -219,9 +219,9 @@ def _within(parts: Sequence[RunResiduals], slopes: Sequence[Floats], inverse: Fl
         time = part.prediction.motion.time[part.picked]
         own = inverse * part.weight**2  # what this run takes part in
         score, dof, _ = score_covariance(slope, rest, time, part.frequency, own)
-        made = inverse @ score @ inverse * part.weight**4
-        total += made
-        doubt += np.diag(made) ** 2 * 2 / dof
+        covariance = inverse @ score @ inverse * part.weight**4
+        total += covariance
+        doubt += np.diag(covariance) ** 2 * 2 / dof
     return total, doubt / np.maximum(np.diag(total), np.finfo(float).tiny) ** 2
 
 
@@ -235,7 +235,7 @@ def _inside(part: RunResiduals) -> PredictedRun:
 
 
 def _with_model_error(
-    made: Certainty,
+    uncertainty: Certainty,
     parts: Sequence[RunResiduals],
     slopes: Sequence[Floats],
     cross_validated: Sequence[PredictedRun],
@@ -244,23 +244,23 @@ def _with_model_error(
 ) -> Certainty:
     """Error of the form: what is left after each run's own gain and offset; and the calibration on it."""
     own = {  # mean variance of the force by the parameters, over the square of half the peak-to-peak force
-        part.run.id: float(np.mean(np.einsum("np,pq,nq->n", slope, made.covariance, slope)))
+        part.run.id: float(np.mean(np.einsum("np,pq,nq->n", slope, uncertainty.covariance, slope)))
         / max(float(np.ptp(part.predicted)) / 2, 1e-300) ** 2
         for part, slope in zip(parts, slopes, strict=True)
     }
     shown = cross_validated or [_inside(part) for part in parts]
     error = model_error(shown)
-    made = replace(made, force=error.force, peak=error.peak, energy=error.energy)
+    uncertainty = replace(uncertainty, force=error.force, peak=error.peak, energy=error.energy)
     if not cross_validated:
-        return made
-    if other_sessions and made.of_sessions:
+        return uncertainty
+    if other_sessions and uncertainty.of_sessions:
         gain, offset = scatter_between_sessions(other_sessions)
-        made = replace(made, gain=max(made.gain, gain), offset=max(made.offset, offset))
-    made = replace(
-        made,
+        uncertainty = replace(uncertainty, gain=max(uncertainty.gain, gain), offset=max(uncertainty.offset, offset))
+    uncertainty = replace(
+        uncertainty,
         left_out=len(cross_validated),
-        run_gain=float(np.sqrt(max(error.gain**2 - made.gain**2, 0.0))),
-        run_offset=float(np.sqrt(max(error.offset**2 - made.offset**2, 0.0))),
+        run_gain=float(np.sqrt(max(error.gain**2 - uncertainty.gain**2, 0.0))),
+        run_offset=float(np.sqrt(max(error.offset**2 - uncertainty.offset**2, 0.0))),
         run_dof=max(len(cross_validated) - 1.0, 1.0),
         growth=Growth.of([*cross_validated, *away], error),
     )
@@ -270,8 +270,8 @@ def _with_model_error(
         share = own.get(run.run_id, usual)
         # A fold that saw other runs of the session has taken part of its gain up: the scatter that is left counts.
         gain = error.gain**2
-        grown = {quantity: share + made.growth.variance(quantity, run.distance) for quantity in QUANTITIES}
-        force = gain * run.predicted**2 + error.offset**2 + (grown["force"] + made.force**2) * run.half**2
-        peak, energy = (np.sqrt(grown[q] + gain + getattr(made, q) ** 2) for q in ("peak", "energy"))
+        grown = {quantity: share + uncertainty.growth.variance(quantity, run.distance) for quantity in QUANTITIES}
+        force = gain * run.predicted**2 + error.offset**2 + (grown["force"] + uncertainty.force**2) * run.half**2
+        peak, energy = (np.sqrt(grown[q] + gain + getattr(uncertainty, q) ** 2) for q in ("peak", "energy"))
         scores.append(Scored.of(run, np.sqrt(force), float(peak), float(energy)))
-    return replace(made, calibration=Calibration.of(cross_validated, scores))
+    return replace(uncertainty, calibration=Calibration.of(cross_validated, scores))

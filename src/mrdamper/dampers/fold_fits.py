@@ -44,8 +44,8 @@ class FoldFits:
         block = next((block for block in self.blocks if left <= block), left)
         if block not in self._starts:
             self._starts[block] = self._search(block)
-        known = {float(np.mean(start.nrmse_pp[list(rows)])): start for start in self._starts[block]}
-        able = [start for error, start in known.items() if error <= _NEAR * min(known)]
+        ends = {float(np.mean(start.nrmse_pp[list(rows)])): start for start in self._starts[block]}
+        able = [start for error, start in ends.items() if error <= _NEAR * min(ends)]
         return min((self.problem.refit(start, rows, _SETTLED) for start in able), key=lambda fit: fit.error)
 
     def _search(self, block: frozenset[int]) -> list[JointFit]:

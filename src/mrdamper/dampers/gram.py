@@ -306,10 +306,10 @@ def fit_jointly(
         centre = newton_refine(last.gradient, centre, *box)
     solution = last.solution(centre)
     function = ParameterFunction(start.form, tuple((centre / search.scale).tolist()), start.rates, log=True)
-    made = _finish(design, solution, {data.shape: function})
+    fit = _finish(design, solution, {data.shape: function})
     reached, ends = search.shape_values(centre), data.ladder[[0, -1]]
     outside = np.any((reached <= ends[0] * _RUNG**0.01) | (reached >= ends[1] / _RUNG**0.01))
-    return replace(made, at_bounds=(data.shape,)) if outside else made
+    return replace(fit, at_bounds=(data.shape,)) if outside else fit
 
 
 @on_one_blas_thread

@@ -270,9 +270,9 @@ class JointProblem:
     def from_point(self, fit: JointFit) -> Floats:
         """(D,) the end of another problem's fit on these axes; what it did not have begins at its own start."""
         lags = fit.damper.coil
-        known = {RISE: lags.rise_s, FALL: lags.fall_s} if lags else {}
-        known |= {name: getattr(fit.damper.model, name) for name in fit.searched if name not in known}
-        values = [known.get(a.name, a.grid[0]) for a in self.axes]
+        axis_values = {RISE: lags.rise_s, FALL: lags.fall_s} if lags else {}
+        axis_values |= {name: getattr(fit.damper.model, name) for name in fit.searched if name not in axis_values}
+        values = [axis_values.get(a.name, a.grid[0]) for a in self.axes]
         return np.array([a.coordinate(min(max(v, a.lower), a.upper)) for a, v in zip(self.axes, values, strict=True)])
 
     def errors(self, fit: JointFit, rows: Sequence[int]) -> Floats:
@@ -382,11 +382,11 @@ class JointProblem:
         evaluations, ending, curved = 0, StopReason.SOLVED, settled < _SETTLED
         for left in reversed(range(rounds)):
             if self.axes:
-                found = least_squares(
+                solution = least_squares(
                     table.solved_residual, point, *self.box(), most_steps, settled, slopes=table.slopes, curved=curved
                 )
-                point, ending = found.point, found.ending
-                evaluations += found.evaluations
+                point, ending = solution.point, solution.ending
+                evaluations += solution.evaluations
                 if to_the_last_digit and not left:
                     point = newton_refine(table.gradient, point, *self.box())
             table.weigh(table.solve(point).nrmse_pp)
@@ -419,9 +419,9 @@ class JointProblem:
             Relative gain of a step at which the search ends.
         """
         begin, rows = time.perf_counter(), sorted(rows)
-        known = self.linearised(fit)
-        table = known.table.only(rows)
-        errors, point = known.extrapolate_refit(rows, self.box())
+        linearised = self.linearised(fit)
+        table = linearised.table.only(rows)
+        errors, point = linearised.extrapolate_refit(rows, self.box())
         table.weigh(errors)
         costs = [float(np.sum(table.solve(u).residual ** 2)) for u in (fit.point, point)]
         if costs[1] > costs[0]:  # far from where the derivatives hold
@@ -431,13 +431,13 @@ class JointProblem:
 
     def linearised(self, fit: JointFit) -> Linearised:
         """All runs linearised at a fit, weighted by the errors it left; remembered for the last fits."""
-        known = next((made for one, made in self._linearisations if one is fit), None)
-        if known is None:
+        linearisation = next((each for one, each in self._linearisations if one is fit), None)
+        if linearisation is None:
             table = Table(self, self.parts)
             table.weigh(fit.nrmse_pp)
-            known = Linearised(table, fit.point, *table.linearise(fit.point, fit.damper.model))
-            self._linearisations = [*self._linearisations[1 - _REMEMBERED :], (fit, known)]
-        return known
+            linearisation = Linearised(table, fit.point, *table.linearise(fit.point, fit.damper.model))
+            self._linearisations = [*self._linearisations[1 - _REMEMBERED :], (fit, linearisation)]
+        return linearisation
 
     _linearisations: Sequence[tuple[JointFit, Linearised]] = ()
 
@@ -462,7 +462,7 @@ class JointProblem:
     def _at_bounds(self, point: Floats) -> list[str]:
         """Parameters whose search axis ended at a limit, under their own names."""
         own = {info.name for info in self.model_type.parameters()}
-        found = []
+        names = []
         middle = np.mean(self.box(), axis=0)
         for i, axis in enumerate(self.axes):
             if not axis.at_bound(float(point[i])):
@@ -470,8 +470,8 @@ class JointProblem:
             inward = np.where(np.arange(point.size) == i, middle, point)
             here, there = self.without_linear(point).values(), self.without_linear(inward).values()
             stands_for = [n for n in here if here[n] != there[n]]
-            found += [axis.name] if axis.name in own or not stands_for else stands_for
-        return found
+            names += [axis.name] if axis.name in own or not stands_for else stands_for
+        return names
 
     def box(self) -> tuple[Floats, Floats]:
         """Lower and upper ends of the search axes."""
@@ -489,12 +489,12 @@ class JointProblem:
 
 def _envelope(parts: Sequence[Part]) -> Envelope:
     """Ranges of the sines at one current, and every sample of the others."""
-    found = Envelope.of([part.condition for part in parts])
+    envelope = Envelope.of([part.condition for part in parts])
     others = [part for part in parts if part.changes or not part.is_sine]
     extent = np.array([[part.lowest, part.highest] for part in others])
     for part in others:
-        found = found.with_motion(part.motion.current, extent, part.motion.velocity)
-    return found
+        envelope = envelope.with_motion(part.motion.current, extent, part.motion.velocity)
+    return envelope
 
 
 def _scale(parts: Sequence[Part]) -> Scale:

@@ -71,16 +71,16 @@ class Likelihood:
             E_CERTAINTY if the runs determine none of its numbers.
         """
         whole = certain(damper, runs, bounded=False)
-        known: Certainty | None = whole.certainty
-        if known is None or not known.names:
+        uncertainty: Certainty | None = whole.certainty
+        if uncertainty is None or not uncertainty.names:
             raise InputError(
                 "these runs determine no number of the damper", remedy="give its train runs", code="E_CERTAINTY"
             )
-        names, numbers = known.names, damper.fitted_parameters
+        names, numbers = uncertainty.names, damper.fitted_parameters
         parts = tuple(RunResiduals.of(damper, run) for run in runs)
         slopes = [force_slopes(damper, p.prediction, names)[p.picked] for p in parts]
         normal = normal_matrix(slopes, parts)
-        root = np.linalg.cholesky(positive(normal @ known.covariance @ normal))
+        root = np.linalg.cholesky(positive(normal @ uncertainty.covariance @ normal))
         rows = np.concatenate([s * p.weight**2 for s, p in zip(slopes, parts, strict=True)])
         instruments: Floats = np.asarray(np.linalg.solve(root, rows.T), dtype=float)
         measured = np.concatenate([p.predicted - p.residual for p in parts])
@@ -93,7 +93,7 @@ class Likelihood:
         )
         bounds = np.array([_coordinates(numbers[n].bounds, log) for n, log in zip(names, logs, strict=True)])
         return cls(
-            damper, names, start, known.covariance, logs, bounds, parts, instruments, measured,
+            damper, names, start, uncertainty.covariance, logs, bounds, parts, instruments, measured,
             np.asarray(np.linalg.solve(root, score), dtype=float),
             np.asarray(np.linalg.solve(root, normal), dtype=float),
         )  # fmt: skip
@@ -117,8 +117,8 @@ class Likelihood:
         model = damper.one_model
         if model is None or self._strung is None:
             return np.concatenate([damper.force_for(p.prediction)[p.picked] for p in self.parts])
-        whole, picked, seen = self._strung
-        return model.force(seen, model.state(whole)[picked])
+        whole, picked, motion = self._strung
+        return model.force(motion, model.state(whole)[picked])
 
     @cached_property
     def _strung(self) -> tuple[Excitation, NDArray[np.intp], Excitation] | None:
@@ -189,8 +189,8 @@ def profile(likelihood: Likelihood, name: str) -> Profile:
     """
     own = likelihood.damper.fitted_parameters.get(name)
     if own is None:
-        known = ", ".join(likelihood.damper.fitted_parameters)
-        raise InputError(f"no number {name}", remedy=f"known: {known}", code="E_CERTAINTY")
+        names = ", ".join(likelihood.damper.fitted_parameters)
+        raise InputError(f"no number {name}", remedy=f"known: {names}", code="E_CERTAINTY")
     if name not in likelihood.names or name in (likelihood.damper.certainty or _NONE).unknown:
         flat = np.array([own.value])
         return Profile(name, own.unit, flat, np.zeros(1), own.value, (-np.inf, np.inf), "flat")

@@ -94,8 +94,8 @@ class ModifiedModel(Damper):
 
     @property
     def equation(self) -> str:
-        known = self.parameters.model_type.coordinates
-        relations = [known[name][1] for name in self.functions if name in known]
+        coordinates = self.parameters.model_type.coordinates
+        relations = [coordinates[name][1] for name in self.functions if name in coordinates]
         return r",\quad ".join([self.parameters.model_type.equation, *relations])
 
     @property
@@ -157,12 +157,12 @@ class ModifiedModel(Damper):
     ) -> Self:
         functions = {n: ParameterFunction(f.form, f.coefficients, f.rates, f.log) for n, f in saved.functions.items()}
         motions = MotionHull(saved.tested_motions) if saved.tested_motions else None
-        made = cls(rig, ParameterMap(model_type(saved.model), functions, motions), envelope, provenance, coil)
+        damper = cls(rig, ParameterMap(model_type(saved.model), functions, motions), envelope, provenance, coil)
         try:
-            made.model_at(envelope.middle)
+            damper.model_at(envelope.middle)
         except (TypeError, KeyError) as error:
             raise ParameterError(f"functions do not fit the model: {error}", remedy="write the model again") from error
-        return made
+        return damper
 
 
 @dataclass(frozen=True, eq=False)
@@ -308,7 +308,7 @@ def _candidates(data: Condensed, any_motion: bool) -> dict[str, list[str | Law]]
     """Forms of every coordinate, shortest first; rates of laws over the current are tried on a grid."""
     highest = max(abs(c.current_A) for c in data.conditions) or 1.0
     decaying: list[str | Law] = [("decaying-current", (rate / highest,)) for rate in _RATES]
-    found: dict[str, list[str | Law]] = {}
+    candidates: dict[str, list[str | Law]] = {}
     for name, forms in data.model_type.map_forms().items():
         laws: list[str | Law] = [
             form
@@ -317,9 +317,9 @@ def _candidates(data: Condensed, any_motion: bool) -> dict[str, list[str | Law]]
         ]
         if name in _dissipating(data.model_type) and len(laws) > 1 and highest:
             laws += decaying
-        found[name] = laws
+        candidates[name] = laws
     inertia: list[str | Law] = [ABSENT, "constant"]
-    return found | {name: list(inertia) for name in data.linear if name not in found}
+    return candidates | {name: list(inertia) for name in data.linear if name not in candidates}
 
 
 def _tells_inertia(model_type: type[Model], conditions: Sequence[Condition]) -> bool:
@@ -331,20 +331,20 @@ def _tells_inertia(model_type: type[Model], conditions: Sequence[Condition]) -> 
 
 def _dissipating(model_type: type[Model]) -> dict[str, str]:
     """Units of the linear coordinates that must not be negative."""
-    found = {i.name: i.unit for i in model_type.parameters() if i.linear and i.bounds[0] == 0}
-    return found | ({"yield_force": "N"} if "yield_force" in model_type.map_forms() else {})
+    units = {i.name: i.unit for i in model_type.parameters() if i.linear and i.bounds[0] == 0}
+    return units | ({"yield_force": "N"} if "yield_force" in model_type.map_forms() else {})
 
 
 def _clipped(parameters: ParameterMap, conditions: Sequence[Condition]) -> tuple[str, ...]:
     """Parameters whose function leaves their bounds at a test."""
     bounds = {info.name: info.bounds for info in parameters.model_type.parameters()}
-    found = []
+    names = []
     for name, function in parameters.functions.items():
         low, high = bounds.get(name, (0.0 if name == "yield_force" else -np.inf, np.inf))
         values = function(*features(conditions))
         if np.any(values < low) or np.any(values > high):
-            found.append(name)
-    return tuple(found)
+            names.append(name)
+    return tuple(names)
 
 
 def _about_forms(functions: Mapping[str, ParameterFunction]) -> dict[str, str]:

@@ -27,17 +27,17 @@ class Piece:
     @classmethod
     def of(cls, run: Run) -> Piece:
         """Cut it from a run."""
-        found = equivalent_sine(run)
+        sine = equivalent_sine(run)
         last = int(np.flatnonzero(run.in_window)[-1])
-        period = 1 / found.condition.frequency_Hz
+        period = 1 / sine.condition.frequency_Hz
         begin = int(np.searchsorted(run.time, run.time[last] - period))
         lead = int(np.searchsorted(run.time, run.time[last] - 1.75 * period))
         step = max(1, (last - begin) // _SAMPLES)
-        motion = measured_motion(run).about(found.centre).part(slice(lead, last + 1, step))
+        motion = measured_motion(run).about(sine.centre).part(slice(lead, last + 1, step))
         force = run.force[lead : last + 1 : step]
         scored = slice((begin - lead) // step, None)
         scale = float(np.ptp(force[scored])) * np.sqrt(force[scored].size)
-        return cls(found.condition, motion, scored, force[scored], scale)
+        return cls(sine.condition, motion, scored, force[scored], scale)
 
     def residual(self, model: Model) -> Floats:
         """Predicted minus measured force over the force scale; its squares sum to nrmse_pp²."""

@@ -144,8 +144,8 @@ class GainsAndOffsets:
             table = np.zeros((len(groups), len(self.runs)))
             for k, members in enumerate(groups):
                 table[k, members] = 1.0
-        made = [_Component(which, table) for which in (0, 1)]
-        return made if groups and self._retained(made[0]) >= _MIN_RETAINED else []
+        components = [_Component(which, table) for which in (0, 1)]
+        return components if groups and self._retained(components[0]) >= _MIN_RETAINED else []
 
     def _read_by(self, statistic: _Component, component: _Component) -> Floats:
         """(J, K) effects of the groups of a component on a statistic: sums of groups over the root of their size."""

@@ -127,13 +127,13 @@ class Spread:
         near = np.where(np.isfinite(apart), np.exp(-np.nan_to_num(apart) / self.hours), 0.0)
         return same * (self.session**2 + self.hour**2 * near)
 
-    def given(self, at: When, seen: Sequence[When], values: Floats) -> tuple[float, float]:
+    def given(self, at: When, others: Sequence[When], values: Floats) -> tuple[float, float]:
         """Mean and standard deviation of a run's value about zero, those of others being known."""
-        if not len(seen) or self.total == 0:
+        if not len(others) or self.total == 0:
             return 0.0, self.total
         own = max(self.run, _LEAST * self.total) ** 2
-        k = self.covariance([at], seen)[0]
-        K = self.covariance(seen, seen) + own * np.eye(len(seen))
+        k = self.covariance([at], others)[0]
+        K = self.covariance(others, others) + own * np.eye(len(others))
         solved = np.linalg.solve(K, np.column_stack([values, k]))
         left = self.total**2 - float(k @ solved[:, 1])
         return float(k @ solved[:, 0]), float(np.sqrt(max(left, own)))
@@ -249,9 +249,9 @@ class Sessions:
         names = [w.session for w in when if w.session is not None]
         count = len(set(names))
         if count < SESSIONS_NEEDED or count == len(names):
-            found = "every session holds one run" if count >= SESSIONS_NEEDED else f"{count} known sessions"
+            reason = "every session holds one run" if count >= SESSIONS_NEEDED else f"{count} known sessions"
             raise InputError(
-                f"{found}: the scatter between sessions cannot be estimated", remedy=_NEEDED, code="E_SESSION"
+                f"{reason}: the scatter between sessions cannot be estimated", remedy=_NEEDED, code="E_SESSION"
             )
         gain = Spread.likeliest(when, np.array([r.gain - 1 for r in left_out]))
         offset = Spread.likeliest(when, np.array([r.offset for r in left_out]))
@@ -285,13 +285,13 @@ class Sessions:
             Check runs of a day, say.
         own : bool
         """
-        found = [(run.id, When.of(run), reading_of(damper, run)) for run in runs]
-        names = {name for name, _, _ in found}
+        entries = [(run.id, When.of(run), reading_of(damper, run)) for run in runs]
+        names = {name for name, _, _ in entries}
         if own:
             rows = [i for i, name in enumerate(self.run_ids) if name not in names]
             still = [Reading(self.gains[i], self.offsets[i], 0.0, 0.0, 0.0, 1.0) for i in rows]
-            found += [(self.run_ids[i], self.when[i], r) for i, r in zip(rows, still, strict=True)]
-        ids, when, readings = zip(*found, strict=True) if found else ((), (), ())
+            entries += [(self.run_ids[i], self.when[i], r) for i, r in zip(rows, still, strict=True)]
+        ids, when, readings = zip(*entries, strict=True) if entries else ((), (), ())
         gains, offsets = tuple(r.gain for r in readings), tuple(r.offset for r in readings)
         return replace(self, run_ids=ids, when=when, gains=gains, offsets=offsets)
 
@@ -304,15 +304,15 @@ def sessions_known(damper: Damper, runs: Iterable[Run] = (), own: bool = False) 
     InputError
         E_SESSION if the damper's tests could not tell what a session shares.
     """
-    known = damper.certainty.sessions if damper.certainty else None
-    if known is None:
+    sessions = damper.certainty.sessions if damper.certainty else None
+    if sessions is None:
         raise InputError(
             "its tests could not tell what runs of a session share",
             where=damper.title,
             remedy=_NEEDED,
             code="E_SESSION",
         )
-    return known.seen(damper, runs, own)
+    return sessions.seen(damper, runs, own)
 
 
 def reading_of(damper: Damper, run: Run) -> Reading:
@@ -332,8 +332,8 @@ def known_errors(runs: Sequence[Run], left_out: Sequence[Reading]) -> Floats:
     sessions = Sessions.of(runs, left_out, left_out)
     errors = []
     for run, reading in zip(runs, left_out, strict=True):
-        found = sessions.expected(When.of(run), without=run.id)
-        errors.append(reading.error(found.gain, found.offset) if found else reading.error(1.0, 0.0))
+        correction = sessions.expected(When.of(run), without=run.id)
+        errors.append(reading.error(correction.gain, correction.offset) if correction else reading.error(1.0, 0.0))
     return np.array(errors)
 
 

@@ -65,18 +65,18 @@ class Part:
 
     @classmethod
     def of(cls, run: Run) -> Part:
-        found = equivalent_sine(run)
-        motion = measured_motion(run).about(found.centre)
+        sine = equivalent_sine(run)
+        motion = measured_motion(run).about(sine.centre)
         window = np.flatnonzero(run.in_window)
         first, last = int(window[0]), int(window[-1])
         scale = float(np.ptp(run.force[first : last + 1]))
         if scale == 0:
             raise RunError("the force does not change", where=f"run {run.id}", remedy="leave the run out")
-        period, time = 1 / found.condition.frequency_Hz, run.time
+        period, time = 1 / sine.condition.frequency_Hz, run.time
         information = 1.0
-        followed = _carrying(motion, found.condition)
+        followed = _carrying(motion, sine.condition)
         steady = first
-        if found.is_sine:
+        if sine.is_sine:
             steady = max(first, int(np.searchsorted(time, time[last] - _CYCLES * period)))
             followed &= (time <= time[first] + period) | (time >= time[steady] - _WARM_UP * period)
         else:
@@ -84,7 +84,7 @@ class Part:
         at = np.flatnonzero(followed)
         x = motion.displacement
         moved = np.maximum.accumulate(x) - np.minimum.accumulate(x)  # not the travel: that grows at rest, by noise
-        unknown = min(int(np.searchsorted(moved, found.condition.amplitude_m)), max(first, len(motion) // 4))
+        unknown = min(int(np.searchsorted(moved, sine.condition.amplitude_m)), max(first, len(motion) // 4))
         rows = at[(at >= unknown) & (at < len(motion) - 1)]  # the last sample turns towards the next run
         before, inside, after = rows[rows < first], rows[(rows >= steady) & (rows <= last)], rows[rows > last]
         inside = inside[:: max(1, int(inside.size / (_ROWS * information)))]
@@ -101,11 +101,11 @@ class Part:
             np.searchsorted(at, picked),
             run.force[picked],
             share,
-            found.condition,
+            sine.condition,
             scale,
             information,
             run.current_changes,
-            found.is_sine,
+            sine.is_sine,
             float(np.min(run.displacement)),
             float(np.max(run.displacement)),
             (int(np.searchsorted(at, inside[0])), int(np.searchsorted(at, inside[-1]))),
@@ -258,8 +258,8 @@ class Table:
         """
         if self._laid is None or not np.array_equal(self._laid[0], point):
             bare = self.problem.without_linear(point)
-            seen, state = self._followed(bare, point)
-            self._laid = point, bare, *linear_table(bare, self.problem.linear, seen, state)
+            motion, state = self._followed(bare, point)
+            self._laid = point, bare, *linear_table(bare, self.problem.linear, motion, state)
         return self._laid[1:]
 
     def solve(self, point: Floats) -> Solved:
@@ -360,11 +360,11 @@ class Linearised:
             weighted = rows * weights[owner][:, None]
             left = beside(weighted[:, : own.stop], weighted[:, own.stop :])
             start, slopes = left[:, 0], left[:, own]
-            found = least_squares(
+            solution = least_squares(
                 lambda u, r=start, J=slopes: r + J @ (u - self.point), point, *box, slopes=lambda _, J=slopes: J
             )
-            point = found.point
-            errors = np.sqrt(np.bincount(owner, found.residual**2)) / weights
+            point = solution.point
+            errors = np.sqrt(np.bincount(owner, solution.residual**2)) / weights
             weights = self.table.information[list(runs)] * robust_weights(errors, _BEST)
         return errors, point
 

@@ -279,7 +279,7 @@ def _fit_one(
     held_out: Sequence[Run], task: tuple[Recipe, Sequence[Run], IdentificationCache], progress: Progress
 ) -> tuple[list[Scored], dict[str, str]]:
     recipe, runs, cache = task
-    return fit_and_score_all([(recipe, runs)], held_out, progress, leave_out=False, found=cache)
+    return fit_and_score_all([(recipe, runs)], held_out, progress, leave_out=False, cache=cache)
 
 
 def _genetic_ends(searches: Mapping[str, Basis], optimum: Basis | None, cache: _Identified) -> tuple[GeneticEnd, ...]:

@@ -355,7 +355,7 @@ def _scatter(rig: RigStudy) -> str:
     return omitted + (
         f"Scatter between runs: gain {100 * drift.gain:.1f} %, offset {drift.offset:.0f} N (standard deviations of "
         f"measured over predicted force). All errors are those of a future test session; {known}"
-        + (f" {rig.calibration.found}." if rig.calibration else "")
+        + (f" {rig.calibration.summary}." if rig.calibration else "")
     )
 
 

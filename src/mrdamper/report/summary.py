@@ -105,7 +105,7 @@ def _rig_lines(rig: RigStudy, shown: int, *, verbose: bool) -> tuple[list[str], 
             f"{intervals.inside} of {intervals.runs} validation runs inside"
         )
     if rig.calibration is not None:
-        lines.append(f"  {rig.calibration.found}")
+        lines.append(f"  {rig.calibration.summary}")
     others = rig.candidates[1:]
     for other in others if verbose else others[:1]:
         lines.append(

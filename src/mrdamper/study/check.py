@@ -114,9 +114,9 @@ def check(dataset: Dataset) -> DatasetCheck:
         for run in rig:
             findings += _of_run(run)
         accepted, refused = believed(rig)
-        known = {one.run_id for one in findings if one.severity == "refused"}
+        refused_ids = {one.run_id for one in findings if one.severity == "refused"}
         for run_id, why in refused.items():
-            if run_id not in known:
+            if run_id not in refused_ids:
                 findings.append(DatasetFinding(run_id, name, why.rsplit("[", 1)[-1].rstrip("]"), "set aside", why))
         findings += _of_rig(name, accepted)
     return DatasetCheck(dataset, tuple(findings))
@@ -124,10 +124,10 @@ def check(dataset: Dataset) -> DatasetCheck:
 
 def _of_run(run: Run) -> list[DatasetFinding]:
     refusal, noted = judged(run)
-    found = [DatasetFinding(run.id, run.rig, finding.code, "noted", str(finding)) for finding in noted]
+    findings = [DatasetFinding(run.id, run.rig, finding.code, "noted", str(finding)) for finding in noted]
     if isinstance(refusal, InputError):
-        found.append(DatasetFinding(run.id, run.rig, refusal.code, "refused", str(refusal)))
-    return found
+        findings.append(DatasetFinding(run.id, run.rig, refusal.code, "refused", str(refusal)))
+    return findings
 
 
 def _of_rig(rig: str, runs: Sequence[Run]) -> list[DatasetFinding]:
@@ -150,8 +150,8 @@ def _of_accepted_runs(
         refusal, noted = judged(run)
         if refusal is not None:
             raise refusal
-        found = identify_run(with_findings(run), *args, **kwargs)
-        return replace(found, notes=(*found.notes, *map(str, noted)))
+        result = identify_run(with_findings(run), *args, **kwargs)
+        return replace(result, notes=(*result.notes, *map(str, noted)))
 
     return identify_accepted
 

@@ -95,22 +95,22 @@ def compare(
     begin = time.perf_counter()
     chosen = recipes(names, genetic)
     workers = jobs or os.cpu_count() or 1
-    seen = [_seen(dataset.rig(name)) for name in dataset.rigs]
-    completed = [_completed(chosen, rig) for rig in seen]
+    rigs = [_seen(dataset.rig(name)) for name in dataset.rigs]
+    completed = [_completed(chosen, rig) for rig in rigs]
     tasks, steps = [], []
-    for rig, (recipes_of_rig, _) in zip(seen, completed, strict=True):
+    for rig, (recipes_of_rig, _) in zip(rigs, completed, strict=True):
         bases = dict.fromkeys(recipe.basis for recipe in recipes_of_rig if recipe.basis)
         tasks += [(basis, run) for basis in bases for run in rig.sines]
         steps += [(recipe, rig.train if recipe.basis else rig.everything) for recipe in recipes_of_rig]
     with crew(dataset, workers) as processes:
-        found = processes.identify(tasks, lambda what, share: progress(what, 0.5 * share))
+        cache = processes.identify(tasks, lambda what, share: progress(what, 0.5 * share))
         followed = processes.follow(
             [step for step in steps if step[1]],
-            {rig.dataset.rigs[0]: rig.held_out for rig in seen},
-            found,
+            {rig.dataset.rigs[0]: rig.held_out for rig in rigs},
+            cache,
             lambda what, share: progress(what, 0.5 + 0.5 * share),
         )
-    compared = tuple(_ranked(rig, *one, followed, found) for rig, one in zip(seen, completed, strict=True))
+    compared = tuple(_ranked(rig, *one, followed, cache) for rig, one in zip(rigs, completed, strict=True))
     progress("compared", 1.0)
     return Comparison(dataset, compared, time.perf_counter() - begin, workers)
 
@@ -132,9 +132,9 @@ def _seen(rig: Dataset) -> _Seen:
     sines, not_identified = usable_sines(rig)
     not_identified |= {one.run_id: str(one) for one in contradictions}
     trusted = believed(rig)[0]
-    train, known = [run for run in sines if run.split == "train"], {run.id for run in sines}
+    train, all_ids = [run for run in sines if run.split == "train"], {run.id for run in sines}
     # Any other motion, or a current that changes: the joint model takes them too.
-    others = usable(run for run in trusted if run.split == "train" and run.id not in known)[0]
+    others = usable(run for run in trusted if run.split == "train" and run.id not in all_ids)[0]
     if len(train) < 3 and not others:
         raise IdentificationError(
             "fewer than three identification runs with a steady sine",
@@ -162,14 +162,14 @@ def _ranked(
     chosen: Sequence[Recipe],
     impossible: Mapping[str, str],
     followed: Mapping[tuple[str, str], Scored | str],
-    found: IdentificationCache,
+    cache: IdentificationCache,
 ) -> RigComparison:
     name = rig.dataset.rigs[0]
-    made = dict(impossible) | {
+    results = dict(impossible) | {
         recipe.name: followed.get((name, recipe.name), "no identification runs with a steady sine") for recipe in chosen
     }
-    refused = {recipe: why for recipe, why in made.items() if isinstance(why, str)}
-    entries = [judged_on_all(one, rig.everything) for one in made.values() if isinstance(one, Scored)]
+    refused = {recipe: why for recipe, why in results.items() if isinstance(why, str)}
+    entries = [judged_on_all(one, rig.everything) for one in results.values() if isinstance(one, Scored)]
     if not entries:
         recipe, reason = next(iter(refused.items()))
         raise IdentificationError(
@@ -177,14 +177,14 @@ def _ranked(
             where=f"rig {name or rig.dataset.name}",
             remedy="choose other models with --models, or leave this rig out of the dataset",
         )
-    entries = [replace(entry, per_run=_per_run(entry.recipe.basis, rig.sines, found)) for entry in entries]
+    entries = [replace(entry, per_run=_per_run(entry.recipe.basis, rig.sines, cache)) for entry in entries]
     entries.sort(key=lambda entry: entry.cross_validated.median())
     steady = frozenset(run.id for run in rig.sines)
     return RigComparison(name, rig.dataset, steady, tuple(entries), refused, rig.not_identified)
 
 
-def _per_run(basis: Basis | None, sines: Sequence[Run], found: IdentificationCache) -> float:
+def _per_run(basis: Basis | None, sines: Sequence[Run], cache: IdentificationCache) -> float:
     """Median error of all sines, the held-out ones too, each identified for itself."""
-    every = [found[basis, run.id][0] for run in sines] if basis else []
+    every = [cache[basis, run.id][0] for run in sines] if basis else []
     errors = [one.scores.nrmse_pp for one in every if isinstance(one, Identification)]
     return float(np.median(errors)) if errors else float("nan")

@@ -54,19 +54,19 @@ def folds_by_kind(pieces: Sequence[Run]) -> dict[str, list[list[int]]]:
     motions = [equivalent_sine(piece) for piece in pieces]
     sines = [i for i, motion in enumerate(motions) if motion.is_sine and not pieces[i].current_changes]
     conditions = [motions[i].condition for i in sines]
-    found: dict[str, list[list[int]]] = {}
+    folds: dict[str, list[list[int]]] = {}
     levels = np.array(current_levels([abs(c.current_A) for c in conditions]))
     by_level = [[sines[k] for k in np.flatnonzero(levels == level)] for level in np.unique(levels)]
     if len(by_level) > 2:
-        found["inner current"], found["edge current"] = by_level[1:-1], [by_level[0], by_level[-1]]
+        folds["inner current"], folds["edge current"] = by_level[1:-1], [by_level[0], by_level[-1]]
     if fastest := _fastest([motions[i].condition for i in sines]):
-        found["fastest motions"] = [[sines[k] for k in fastest]]
+        folds["fastest motions"] = [[sines[k] for k in fastest]]
     if sessions := _sessions(pieces):
-        found["session"] = sessions
+        folds["session"] = sessions
     others = [i for i in range(len(pieces)) if i not in set(sines)]
     if others and len(sines) > 2:
-        found["other records"] = [others]
-    return found
+        folds["other records"] = [others]
+    return folds
 
 
 def all_folds(pieces: Sequence[Run]) -> list[list[int]]:
@@ -113,7 +113,7 @@ def cross_validate_by_kind(
 
     Runs of a fold without which no damper can be made are among the refused.
     """
-    found = {}
+    scores = {}
     for kind, groups in folds_by_kind(pieces).items():
         scored: list[RunScore] = []
         refused: dict[str, str] = {}
@@ -123,8 +123,8 @@ def cross_validate_by_kind(
                 scored += [score_run(damper, pieces[i]) for i in group]
             except InputError as error:
                 refused |= {pieces[i].notes.get(_RECORD, pieces[i].id): str(error) for i in group}
-        found[kind] = replace(_whole_again(Validation(title, tuple(scored)), pieces), refused=refused)
-    return found
+        scores[kind] = replace(_whole_again(Validation(title, tuple(scored)), pieces), refused=refused)
+    return scores
 
 
 def stretches(run: Run) -> list[Run]:
@@ -167,6 +167,6 @@ def _joined(name: str, scores: Sequence[RunScore]) -> RunScore:
     flags = tuple(dict.fromkeys(flag for score in scores for flag in score.extrapolation))
     rests = [score.rest for score in scores if score.rest is not None]
     rest = float(np.sqrt(np.mean(np.square(rests)))) if rests else None
-    seen = [score.predicted for score in scores if score.predicted is not None]
-    beside = PredictedRun.joined(name, seen) if seen else None
+    predictions = [score.predicted for score in scores if score.predicted is not None]
+    beside = PredictedRun.joined(name, predictions) if predictions else None
     return replace(scores[0], run_id=name, scores=whole, extrapolation=flags, rest=rest, reading=None, predicted=beside)

@@ -45,7 +45,7 @@ def first_matrix(limits: Limits, hours: float) -> list[Proposal]:
         condition = Condition(current, min(frequency, top), amplitude * 1e-3)
         return Proposal(session, condition, limits.minutes(condition), reason)
 
-    made, left = [], hours * 60 - limits.opening
+    tests, left = [], hours * 60 - limits.opening
     again = proposed(repeat, _SESSIONS) if limits.sessions >= _SESSIONS else None
     reserved = limits.opening + again.minutes if again else 0.0
     first = proposed(wanted[1], 1)
@@ -54,6 +54,6 @@ def first_matrix(limits: Limits, hours: float) -> list[Proposal]:
     left -= reserved
     for item in filter(None, (proposed(row, 1) for row in wanted)):
         if item.minutes <= left:
-            made.append(item)
+            tests.append(item)
             left -= item.minutes
-    return [*made, again] if again else made
+    return [*tests, again] if again else tests

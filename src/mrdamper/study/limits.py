@@ -73,8 +73,8 @@ class Limits:
                 raise bad_limits(f"{name} = {getattr(self, name):g}", "give a number above zero")
         samples = self.cycles / self.frequency_Hz[0] * self.sample_rate_Hz
         if samples > _MOST_SAMPLES:
-            found = f"a record of {self.cycles:g} cycles at {self.frequency_Hz[0]:g} Hz has {samples:.3g} samples"
-            raise bad_limits(found, f"lower sample_rate_Hz or cycles to at most {_MOST_SAMPLES:,} samples")
+            text = f"a record of {self.cycles:g} cycles at {self.frequency_Hz[0]:g} Hz has {samples:.3g} samples"
+            raise bad_limits(text, f"lower sample_rate_Hz or cycles to at most {_MOST_SAMPLES:,} samples")
         if self.sessions != int(self.sessions):
             raise bad_limits(f"sessions = {self.sessions:g}", "give a whole number")
         if min(self.minutes_between, self.session_minutes, self.force_N) < 0:
@@ -107,8 +107,8 @@ class Limits:
         try:
             given = read_toml_file(path)
         except (OSError, tomllib.TOMLDecodeError) as error:
-            found = str(error).splitlines()[0]
-            raise LimitsError(found, where=str(path), remedy="give a TOML file of limits") from error
+            reason = str(error).splitlines()[0]
+            raise LimitsError(reason, where=str(path), remedy="give a TOML file of limits") from error
         require_known_keys(given, LimitsError, str(path))
         given = {name: value for name, value in given.items() if name in RIG_LIMITS}
         for name, value in given.items():
@@ -152,17 +152,17 @@ class Limits:
         frequency, amplitude = (
             np.unique(np.geomspace(*ends, _LEVELS)) for ends in (self.frequency_Hz, self.amplitude_mm)
         )
-        made = [
+        conditions = [
             Condition(float(i), float(f), 1e-3 * float(a))
             for i, f, a in itertools.product(current, frequency, amplitude)
         ]
-        allowed = [c for c in made if c.peak_velocity <= self.velocity_m_s * (1 + 1e-9)]
+        allowed = [c for c in conditions if c.peak_velocity <= self.velocity_m_s * (1 + 1e-9)]
         least = self.opening + min(self.minutes(c) for c in allowed)
         if not (math.isfinite(hours) and hours * 60 >= least):
             raise bad_limits(f"{hours:g} hours", f"a session set up with its shortest record takes {least:.1f} minutes")
         return allowed
 
 
-def bad_limits(found: str, remedy: str) -> LimitsError:
+def bad_limits(problem: str, remedy: str) -> LimitsError:
     """Return the error for limits that cannot be used."""
-    return LimitsError(found, where="limits", remedy=remedy)
+    return LimitsError(problem, where="limits", remedy=remedy)

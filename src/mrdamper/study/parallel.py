@@ -121,7 +121,7 @@ class Crew:
         self,
         steps: Sequence[tuple[Recipe, Sequence[Run]]],
         held_out: Mapping[str, Sequence[Run]],
-        found: IdentificationCache,
+        cache: IdentificationCache,
         progress: Progress,
     ) -> dict[tuple[str, str], Scored | str]:
         """Recipes followed from identifications there are already, or why not, by rig and name of the recipe.
@@ -131,13 +131,13 @@ class Crew:
         steps : sequence of (Recipe, train runs)
             The runs of one step are of one rig.
         held_out : mapping of rig to runs
-        found : mapping
+        cache : mapping
             Identifications, by basis and run id.
         progress : callable
         """
         tasks: dict[tuple[str, str], tuple[Any, ...]] = {}
         for recipe, runs in sorted(steps, key=lambda step: step[0].basis is not None and not step[0].basis.costly):
-            own = {(recipe.basis, run.id): found[recipe.basis, run.id] for run in runs if recipe.basis}
+            own = {(recipe.basis, run.id): cache[recipe.basis, run.id] for run in runs if recipe.basis}
             ids, held = [run.id for run in runs], [run.id for run in held_out[runs[0].rig]]
             tasks[runs[0].rig, recipe.name] = (recipe, ids, held, own)
         return self._each(_follow_one, tasks, "followed", progress)
@@ -173,8 +173,8 @@ def identify_quickly(basis: Basis, run: Run) -> tuple[Identification | str, floa
     """One of many identifications, or why there is none, and its seconds: what is costly sees a few cycles."""
     begin = time.perf_counter()
     try:
-        method, seen = quickened(basis, run)
-        return conclude(basis.problem(run), method, method.solve(seen)), time.perf_counter() - begin
+        method, shortened_run = quickened(basis, run)
+        return conclude(basis.problem(run), method, method.solve(shortened_run)), time.perf_counter() - begin
     except InputError as error:
         return str(error), time.perf_counter() - begin
 
@@ -188,10 +188,10 @@ def quickened(basis: Basis, run: Run) -> tuple[Method, Problem]:
 
 
 def _follow_one(
-    recipe: Recipe, runs: Sequence[str], held_out: Sequence[str], found: IdentificationCache
+    recipe: Recipe, runs: Sequence[str], held_out: Sequence[str], cache: IdentificationCache
 ) -> Scored | str:
     train = [_RUNS[run_id] for run_id in runs]
-    scored, refused = fit_and_score_all([(recipe, train)], [_RUNS[run_id] for run_id in held_out], found=found)
+    scored, refused = fit_and_score_all([(recipe, train)], [_RUNS[run_id] for run_id in held_out], cache=cache)
     return scored[0] if scored else refused[recipe.name]
 
 

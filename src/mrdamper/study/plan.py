@@ -126,24 +126,24 @@ class Reckoning:
         progress: Progress = lambda what, share: None,
     ) -> Reckoning:
         """Of a damper with its covariance; raises as `plan_tests`."""
-        known: Certainty | None = damper.certainty
-        if known is None or not known.names:
+        uncertainty: Certainty | None = damper.certainty
+        if uncertainty is None or not uncertainty.names:
             remedy = "study the tests again, or plan without a model"
             raise InputError("the model does not know how sure it is", remedy=remedy, code="E_CERTAINTY")
         # What no run could tell is planned for too: anything within a factor, or what moves the force by all of it.
-        unknown = [n for n in damper.fitted_parameters if n not in known.names and n not in known.one_sided]
-        names = (*known.names, *unknown)
-        told = []
+        unknown = [n for n in damper.fitted_parameters if n not in uncertainty.names and n not in uncertainty.one_sided]
+        names = (*uncertainty.names, *unknown)
+        slopes_of_draws = []
         for number, condition in enumerate(conditions):
             progress(f"what test {number + 1} of {len(conditions)} would tell", 0.9 * number / len(conditions))
-            told.append(_slopes(damper, known, names, condition))
-        seen = np.array(told)  # (C, D, K, P + 2)
-        doubt = seen if not isinstance(about, Condition) else np.array([_slopes(damper, known, names, about)])
+            slopes_of_draws.append(_slopes(damper, uncertainty, names, condition))
+        stacked = np.array(slopes_of_draws)  # (C, D, K, P + 2)
+        doubt = stacked if not isinstance(about, Condition) else np.array([_slopes(damper, uncertainty, names, about)])
         by_number = doubt[..., : len(names)]
         goal = np.einsum("cdkp,cdkq->pq", by_number, by_number) / np.prod(doubt.shape[:3])
         logs = [damper.fitted_parameters[name].log for name in names]
         covariance = np.diag(np.where(logs, _FACTOR**2, 1 / np.maximum(np.diag(goal), 1e-12)))
-        covariance[: len(known.names), : len(known.names)] = known.covariance
+        covariance[: len(uncertainty.names), : len(uncertainty.names)] = uncertainty.covariance
         covariance += 1e-12 * np.diag(np.diag(covariance))
         if isinstance(about, str):
             if about not in names:
@@ -151,11 +151,13 @@ class Reckoning:
             own = damper.fitted_parameters[about]
             goal = np.zeros_like(goal)
             goal[names.index(about), names.index(about)] = 1 if own.log else 1 / (own.value or 1.0) ** 2
-        grams = np.einsum("cdkp,cdkq->cdpq", seen, seen) / max(known.force, _FLOOR) ** 2
-        half = 1 / float(np.mean(seen[..., -1]))
-        session = np.array([max(known.total_gain, _NO_GAIN), max(known.total_offset, _NO_OFFSET * half)]) ** -2.0
+        grams = np.einsum("cdkp,cdkq->cdpq", stacked, stacked) / max(uncertainty.force, _FLOOR) ** 2
+        half = 1 / float(np.mean(stacked[..., -1]))
+        session = (
+            np.array([max(uncertainty.total_gain, _NO_GAIN), max(uncertainty.total_offset, _NO_OFFSET * half)]) ** -2.0
+        )
         mean = np.mean(doubt[..., len(names) :] ** 2, axis=(0, 1, 2))
-        beside = float(mean @ [known.total_gain**2, known.total_offset**2]) + known.force**2
+        beside = float(mean @ [uncertainty.total_gain**2, uncertainty.total_offset**2]) + uncertainty.force**2
         words = about if isinstance(about, str) else f"at {about}" if about else "over the envelope"
         return cls(limits, conditions, names, np.linalg.inv(covariance), goal, grams, session, words, beside)
 
@@ -193,7 +195,7 @@ class Reckoning:
         """Records one by one, each the one that lowers the variance most for its rig time, sessions in turn."""
         played: Sessions = [[] for _ in range(sessions)]
         sums = np.zeros((sessions, *self.grams.shape[1:]))
-        told = np.zeros((sessions, *self.prior.shape))
+        information = np.zeros((sessions, *self.prior.shape))
         left = 60 * hours - sessions * self.limits.opening
         while True:
             at = min(range(sessions), key=lambda s: self.minutes[played[s]].sum())
@@ -202,13 +204,13 @@ class Reckoning:
             options = np.flatnonzero(self.minutes <= free * (1 + 1e-12))
             if not options.size:
                 return played
-            total = self.prior + told.sum(axis=0)
+            total = self.prior + information.sum(axis=0)
             then = self.information(sums[at] + self.grams[options])
-            gains = (self.variance(total) - self.variance(total - told[at] + then)) / self.minutes[options]
+            gains = (self.variance(total) - self.variance(total - information[at] + then)) / self.minutes[options]
             best = int(np.argmax(gains))
             played[at].append(int(options[best]))
             sums[at] += self.grams[options[best]]
-            told[at], left = then[best], left - self.minutes[options[best]]
+            information[at], left = then[best], left - self.minutes[options[best]]
 
     def _exchanged(self, played: Sessions) -> Sessions:
         """Each record in turn for the one that tells most in its place and takes no longer, all others being played."""
@@ -222,7 +224,7 @@ class Reckoning:
 
     def proposals(self, played: Sessions) -> list[Proposal]:
         """Records with the doubt before and after each, session by session."""
-        made: list[Proposal] = []
+        proposals: list[Proposal] = []
         before, so_far = self.spread([]), [[] for _ in played]
         today = np.sqrt(np.diag(np.linalg.inv(self.prior)))
         for session, rows in enumerate(played):
@@ -232,9 +234,11 @@ class Reckoning:
                 then = np.sqrt(np.diag(np.linalg.inv(precision))) / today
                 best, after = int(np.argmin(then)), math.sqrt(self.variance(precision))
                 reason = f"{self.names[best]} is then known to {100 * then[best]:.0f} % of today's error"
-                made.append(Proposal(session + 1, self.conditions[i], float(self.minutes[i]), reason, before, after))
+                proposals.append(
+                    Proposal(session + 1, self.conditions[i], float(self.minutes[i]), reason, before, after)
+                )
                 before = after
-        return made
+        return proposals
 
     def said(self, proposals: Sequence[Proposal]) -> str:
         """The doubt before and after, in words."""
@@ -252,27 +256,27 @@ class Reckoning:
         )
 
 
-def _slopes(damper: Damper, known: Certainty, names: Sequence[str], condition: Condition) -> Floats:
+def _slopes(damper: Damper, uncertainty: Certainty, names: Sequence[str], condition: Condition) -> Floats:
     """(D, K, P + 2) derivatives over half the peak-to-peak force: by the numbers, by a gain, by an offset [N]."""
     rng = np.random.default_rng(_SEED)
-    root = np.linalg.cholesky(known.covariance + 1e-12 * np.diag(np.diag(known.covariance)))
+    root = np.linalg.cholesky(uncertainty.covariance + 1e-12 * np.diag(np.diag(uncertainty.covariance)))
     motion, last = sine(condition, 2, 4 * _SAMPLES), slice(-4 * _SAMPLES, None, 4)
-    made = []
+    slopes = []
     for draw in range(_DRAWS + 1):
-        shift = 0.5 * root @ rng.standard_normal(len(known.names)) * (draw > 0)
-        own = [damper.fitted_parameters[name] for name in known.names]
+        shift = 0.5 * root @ rng.standard_normal(len(uncertainty.names)) * (draw > 0)
+        own = [damper.fitted_parameters[name] for name in uncertainty.names]
         moved = [n.value * math.exp(s) if n.log else n.value + s for n, s in zip(own, shift, strict=True)]
-        values = {name: float(np.clip(v, *n.bounds)) for name, v, n in zip(known.names, moved, own, strict=True)}
+        values = {name: float(np.clip(v, *n.bounds)) for name, v, n in zip(uncertainty.names, moved, own, strict=True)}
         drawn = damper.with_parameters(values)
         base = Prediction(motion, drawn.force_along(motion, condition), condition, ())
         force = base.force[last]
         half = float(np.ptp(force) / 2) or 1.0
-        made.append(np.column_stack([force_slopes(drawn, base, names)[last], force, np.ones(force.size)]) / half)
-    return np.array(made)
+        slopes.append(np.column_stack([force_slopes(drawn, base, names)[last], force, np.ones(force.size)]) / half)
+    return np.array(slopes)
 
 
 def taught_least(damper: Damper, least: int = 3) -> list[tuple[str, float]]:
     """The runs a damper was identified from that say least about its numbers, each with its share of what is known."""
-    known = damper.certainty
-    shares = sorted(known.taught.items(), key=lambda item: item[1]) if known else []
+    uncertainty = damper.certainty
+    shares = sorted(uncertainty.taught.items(), key=lambda item: item[1]) if uncertainty else []
     return shares[:least] if len(shares) > least else []

@@ -234,13 +234,13 @@ def fit_and_score(
     """
     begin = time.perf_counter()
     pieces = [piece for run in train for piece in stretches(run)] if recipe.basis is None else list(train)
-    made = recipe.make(pieces, identifications)
+    result = recipe.make(pieces, identifications)
     seconds = spent + time.perf_counter() - begin
-    title, left_out = made.damper.title, None
+    title, left_out = result.damper.title, None
     without: list[Damper] = []
 
     def refit(rows: Sequence[int]) -> Damper:
-        without.append(made.refit(rows))
+        without.append(result.refit(rows))
         return without[-1]
 
     if leave_out:
@@ -248,15 +248,15 @@ def fit_and_score(
     errors = [i.scores.nrmse_pp for i in identifications]
     return Scored(
         recipe=recipe,
-        damper=made.damper,
-        fit=made.fit,
+        damper=result.damper,
+        fit=result.fit,
         identifications=tuple(identifications),
         per_run=float(np.median(errors)) if errors else float("nan"),
-        train=validate(made.damper, train),
+        train=validate(result.damper, train),
         cross_validated=left_out or Validation(title, ()),
-        validation=validate(made.damper, held_out),
+        validation=validate(result.damper, held_out),
         seconds=seconds,
-        by_kind=cross_validate_by_kind(pieces, made.refit, title) if kinds else {},
+        by_kind=cross_validate_by_kind(pieces, result.refit, title) if kinds else {},
         spread=_spread(without),
     )
 
@@ -274,7 +274,7 @@ def fit_and_score_all(
     *,
     leave_out: bool = True,
     kinds: bool = False,
-    found: IdentificationCache | None = None,
+    cache: IdentificationCache | None = None,
 ) -> tuple[list[Scored], dict[str, str]]:
     """Follow several recipes on one rig; what more than one of them starts from is identified once.
 
@@ -285,7 +285,7 @@ def fit_and_score_all(
     progress : callable
     leave_out, kinds : bool
         As `fit_and_score` takes them.
-    found : mapping, optional
+    cache : mapping, optional
         Identifications there are already, by basis and run id; added to.
 
     Returns
@@ -294,7 +294,7 @@ def fit_and_score_all(
     refused : mapping of recipe name to reason
         Recipes whose damper cannot be determined from these runs.
     """
-    found = {} if found is None else found
+    cache = {} if cache is None else cache
     scored, refused = [], {}
     for number, (recipe, runs) in enumerate(steps):
 
@@ -302,8 +302,10 @@ def fit_and_score_all(
             progress(f"{recipe.name}, {what}", (number + share) / len(steps))
 
         try:
-            seen = [run for run in runs if analyse_motion(run).is_sine] if recipe.pure else runs
-            identifications, spent = identified(recipe.basis, seen, found, lambda what, share: tell(what, 0.5 * share))
+            followed = [run for run in runs if analyse_motion(run).is_sine] if recipe.pure else runs
+            identifications, spent = identified(
+                recipe.basis, followed, cache, lambda what, share: tell(what, 0.5 * share)
+            )
             tell("over all conditions", 0.5)
             scored.append(
                 fit_and_score(recipe, runs, identifications, held_out, spent=spent, leave_out=leave_out, kinds=kinds)
@@ -314,7 +316,7 @@ def fit_and_score_all(
 
 
 def identified(
-    basis: Basis | None, runs: Sequence[Run], found: IdentificationCache, progress: Progress = lambda what, share: None
+    basis: Basis | None, runs: Sequence[Run], cache: IdentificationCache, progress: Progress = lambda what, share: None
 ) -> tuple[list[Identification], float]:
     """Identifications of runs, made where they are not found yet, and the seconds they took.
 
@@ -325,18 +327,18 @@ def identified(
     """
     if basis is None:
         return [], 0.0
-    made, spent = [], 0.0
+    identifications, spent = [], 0.0
     for number, run in enumerate(runs):
-        if (basis, run.id) not in found:
+        if (basis, run.id) not in cache:
             progress(f"run {run.id}", number / len(runs))
             begin = time.perf_counter()
-            found[basis, run.id] = basis.identify(run), time.perf_counter() - begin
-        one, seconds = found[basis, run.id]
+            cache[basis, run.id] = basis.identify(run), time.perf_counter() - begin
+        one, seconds = cache[basis, run.id]
         if isinstance(one, str):
             raise IdentificationError(f"run {run.id}: {one}")
-        made.append(one)
+        identifications.append(one)
         spent += seconds
-    return made, spent
+    return identifications, spent
 
 
 def fit_per_run(runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
@@ -490,11 +492,11 @@ def study_methods() -> Mapping[str, type[StudyMethod]]:
 
 def catalogue() -> Mapping[str, Recipe]:
     """Every recipe that can be compared, by name; models and dampers dropped in are found."""
-    found = [modified(name) for name in all_models() if name != JOINTLY]
-    found += [jointly(name) for name in _closed_shapes()]
-    found += [recipe for method in study_methods().values() for recipe in method.compared()]
-    found += [play_and_bypass(), *(conditioned(cls) for cls in all_published().values())]
-    return {recipe.name: recipe for recipe in found}
+    all_recipes = [modified(name) for name in all_models() if name != JOINTLY]
+    all_recipes += [jointly(name) for name in _closed_shapes()]
+    all_recipes += [recipe for method in study_methods().values() for recipe in method.compared()]
+    all_recipes += [play_and_bypass(), *(conditioned(cls) for cls in all_published().values())]
+    return {recipe.name: recipe for recipe in all_recipes}
 
 
 def recipes(names: Sequence[str] = (), genetic: bool = False) -> list[Recipe]:
@@ -511,11 +513,11 @@ def recipes(names: Sequence[str] = (), genetic: bool = False) -> list[Recipe]:
     UnknownNameError
         With the near matches.
     """
-    known = catalogue()
+    by_name = catalogue()
     for name in names:
-        if name not in known:
-            raise UnknownNameError.of("model", name, known)
-    return [known[name] for name in (names or known) if names or genetic or not known[name].on_request]
+        if name not in by_name:
+            raise UnknownNameError.of("model", name, by_name)
+    return [by_name[name] for name in (names or by_name) if names or genetic or not by_name[name].on_request]
 
 
 def _closed_shapes() -> list[str]:

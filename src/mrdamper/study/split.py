@@ -65,43 +65,43 @@ def hold_out(
         raise SplitError(
             f"{len(before)} runs are held out already", where=where, remedy="give --replace to choose anew"
         )
-    known = {run.id: _condition(run) for run in dataset}
+    condition_of = {run.id: _condition(run) for run in dataset}
     held: set[str] = set()
     reasons = []
     for name in runs:
-        if name not in known:
-            raise UnknownNameError.of("run", name, known)
+        if name not in condition_of:
+            raise UnknownNameError.of("run", name, condition_of)
         held.add(name)
     if runs:
         reasons.append("by hand")
     for amperes in currents:
-        found = [run.id for run in dataset if abs(run.mean_current - amperes) <= _NEAR_A + _NEAR * abs(amperes)]
-        if not found:
+        ids = [run.id for run in dataset if abs(run.mean_current - amperes) <= _NEAR_A + _NEAR * abs(amperes)]
+        if not ids:
             levels = sorted({round(run.mean_current, 2) for run in dataset})
             raise SplitError(
                 f"no run at {amperes:g} A", where=where, remedy=f"currents: {', '.join(map(str, levels))} A"
             )
-        held.update(found)
+        held.update(ids)
         reasons.append(f"all at {amperes:g} A")
     for text in conditions:
         wanted = _stated(text)
-        found = [name for name, c in known.items() if c is not None and len(same_condition([wanted, c])) == 1]
-        if not found:
+        ids = [name for name, c in condition_of.items() if c is not None and len(same_condition([wanted, c])) == 1]
+        if not ids:
             raise SplitError(f"no run at {wanted}", where=where, remedy="mrdamper check shows the conditions")
-        held.update(found)
+        held.update(ids)
         reasons.append(f"all at {wanted}")
     if every is not None:
         held.update(run.id for run in dataset.runs[every - 1 :: every])
         reasons.append(f"one run in {every}")
     if not reasons and not none:
-        held, reason = _stratified(known, where)
+        held, reason = _stratified(condition_of, where)
         reasons.append(reason)
-    left = [c for name, c in known.items() if name not in held and c is not None]
+    left = [c for name, c in condition_of.items() if name not in held and c is not None]
     if held and len(same_condition(left)) < _FEWEST:
         raise SplitError(
             f"{len(same_condition(left))} conditions left to identify from", where=where, remedy="hold fewer runs out"
         )
-    shown = {name: "no sine" if c is None else str(c) for name, c in known.items()}
+    shown = {name: "no sine" if c is None else str(c) for name, c in condition_of.items()}
     return Chosen(frozenset(held), ", ".join(reasons) or "nothing", shown)
 
 
@@ -120,10 +120,10 @@ def _stated(text: str) -> Condition:
     return Condition(current, frequency, amplitude / 1e3)
 
 
-def _stratified(known: dict[str, Condition | None], where: str) -> tuple[set[str], str]:
+def _stratified(condition_of: dict[str, Condition | None], where: str) -> tuple[set[str], str]:
     """A fifth of the conditions, spread over currents and motions, all of which stay in the identification."""
-    names = [name for name, c in known.items() if c is not None]
-    conditions = [c for c in known.values() if c is not None]
+    names = [name for name, c in condition_of.items() if c is not None]
+    conditions = [c for c in condition_of.values() if c is not None]
     groups = same_condition(conditions)
     at_rest = [Condition(0.0, c.frequency_Hz, c.amplitude_m) for c in conditions]
     current_of = _levels([Condition(c.current_A, 1.0, 1.0) for c in conditions])

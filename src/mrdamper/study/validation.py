@@ -110,9 +110,9 @@ class Validation(Displayable):
         return max(self._magnitudes(name), default=float("nan"))
 
     def _magnitudes(self, name: str) -> list[float]:
-        known = [one.name for one in fields(Scores)]
-        if name not in known:
-            raise UnknownNameError.of("score", name, known)
+        names = [one.name for one in fields(Scores)]
+        if name not in names:
+            raise UnknownNameError.of("score", name, names)
         return [abs(float(getattr(run.scores, name))) for run in self.runs]
 
     @checked()
@@ -123,7 +123,7 @@ class Validation(Displayable):
 
 @checked("damper")
 def validate(
-    damper: Damper, runs: Iterable[Run], title: str | None = None, *, known: Sessions | None = None
+    damper: Damper, runs: Iterable[Run], title: str | None = None, *, sessions: Sessions | None = None
 ) -> Validation:
     """Predict runs from their measured motion and score them inside their steady windows.
 
@@ -136,7 +136,7 @@ def validate(
     runs : iterable of Run
     title : str, optional
         Default: the damper's.
-    known : Sessions, optional
+    sessions : Sessions, optional
         What is known of the runs' sessions (`sessions_known`); by default nothing is, and nothing is corrected.
 
     Raises
@@ -160,13 +160,13 @@ def validate(
     for run in runs:
         require(run, Run, "a run")
         try:
-            scored.append(score_run(damper, run, known))
+            scored.append(score_run(damper, run, sessions))
         except InputError as error:
             refused[run.id] = str(error)
     return Validation(title or damper.title, tuple(scored), refused)
 
 
-def score_run(damper: Damper, run: Run, known: Sessions | None = None) -> RunScore:
+def score_run(damper: Damper, run: Run, sessions: Sessions | None = None) -> RunScore:
     """Predict and score one run, corrected where its session is known.
 
     Raises
@@ -176,14 +176,14 @@ def score_run(damper: Damper, run: Run, known: Sessions | None = None) -> RunSco
     """
     swing = float(np.ptp(run.force[run.in_window]))
     if not _LEAST_SWING < swing < 1 / _LEAST_SWING:
-        found = f"the force changes by {swing:.3g} N" if swing else "the force does not change"
-        raise RunError(found, where=f"run {run.id}", remedy="check the channel")
+        text = f"the force changes by {swing:.3g} N" if swing else "the force does not change"
+        raise RunError(text, where=f"run {run.id}", remedy="check the channel")
     prediction = damper.predict_run(run)
     inside = run.in_window
     reading = Reading.of(run.force[inside], prediction.force[inside])
     away = prediction.distance(damper.envelope)
     beside = PredictedRun.of(run, prediction.force, prediction.motion.velocity, away)
-    expected = known.expected(When.of(run), without=run.id) if known else None
+    expected = sessions.expected(When.of(run), without=run.id) if sessions else None
     if expected is not None:
         prediction = expected.corrected(prediction)
     return RunScore(
@@ -214,19 +214,19 @@ def peak_band(damper: Damper, run: Run, level: float = 0.9, expected: Expected |
     """
     prediction, inside = damper.predict_run(run), run.in_window
     if expected is None:
-        known = band(damper, prediction, level, inside)
+        interval = band(damper, prediction, level, inside)
     else:
-        known = session_band(expected, damper, prediction, level, inside)
+        interval = session_band(expected, damper, prediction, level, inside)
     prediction = expected.corrected(prediction) if expected else prediction
     velocity, time = prediction.motion.velocity[inside], run.time[inside]
     cycles = max(prediction.condition.frequency_Hz, 1e-9)
     energy = dissipated_power(run.force[inside], velocity, time) / cycles
     row = {"peak_force_measured_N": peak_force(run.force[inside]), "energy_measured_J": energy}
-    if known is None:
+    if interval is None:
         return row
     predicted = dissipated_power(prediction.force[inside], velocity, time) / cycles
-    low, high = (predicted * (1 + share) for share in known.energy)
-    row |= {"peak_force_low_N": known.peak[0], "peak_force_high_N": known.peak[1]}
+    low, high = (predicted * (1 + share) for share in interval.energy)
+    row |= {"peak_force_low_N": interval.peak[0], "peak_force_high_N": interval.peak[1]}
     return {**row, "energy_low_J": low, "energy_high_J": high}
 
 

@@ -143,10 +143,14 @@ class RigStudy(Displayable):
     @property
     def interval_coverage(self) -> dict[str, float] | None:
         """Shares of cross-validated samples, peaks and energies inside their intervals, and the level of these."""
-        found = self.calibration
-        if found is None:
+        calibration = self.calibration
+        if calibration is None:
             return None
-        return {"level": found.level, "units": found.units, **dict(zip(QUANTITIES, found.coverage, strict=True))}
+        return {
+            "level": calibration.level,
+            "units": calibration.units,
+            **dict(zip(QUANTITIES, calibration.coverage, strict=True)),
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -358,10 +362,10 @@ def study_rig(
     chosen = replace(
         chosen, damper=certain(chosen.damper, taken, beside, held, away=away, other_sessions=other_sessions)
     )
-    candidates[0], known = _with_sessions(chosen, dataset)
+    candidates[0], sessions_note = _with_sessions(chosen, dataset)
     return RigStudy(
-        rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), refused, impossible, model is not None, known,
-        contradictions,
+        rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), refused, impossible, model is not None,
+        sessions_note, contradictions,
     )  # fmt: skip
 
 
@@ -370,22 +374,22 @@ def _with_sessions(chosen: Scored, dataset: Dataset) -> tuple[Scored, float | st
     damper, own = chosen.damper, {score.run_id: score.reading for score in chosen.train.runs}
     left_out = [score for score in chosen.cross_validated.runs if own.get(score.run_id) is not None]
     runs = [dataset[score.run_id] for score in left_out]
-    seen = [score.reading for score in left_out if score.reading is not None]
+    readings = [score.reading for score in left_out if score.reading is not None]
     try:
-        sessions = Sessions.of(runs, seen, [own[score.run_id] for score in left_out])  # type: ignore[misc]
-        error = float(np.median(known_errors(runs, seen)))
+        sessions = Sessions.of(runs, readings, [own[score.run_id] for score in left_out])  # type: ignore[misc]
+        error = float(np.median(known_errors(runs, readings)))
     except InputError as reason:
         return chosen, str(reason)
     if damper.certainty is None:
         return chosen, error
-    known = replace(damper.certainty, sessions=sessions)
-    return replace(chosen, damper=replace(damper, certainty=known)), error  # type: ignore[type-var]
+    uncertainty = replace(damper.certainty, sessions=sessions)
+    return replace(chosen, damper=replace(damper, certainty=uncertainty)), error  # type: ignore[type-var]
 
 
 def judged_on_all(candidate: Scored, everything: Sequence[Run]) -> Scored:
     """The same with the train runs that its recipe could not take among the left-out ones: it never saw them."""
-    known = {score.run_id for score in (*candidate.train.runs, *candidate.cross_validated.runs)}
-    others = validate(candidate.damper, [run for run in everything if run.id not in known])
+    scored = {score.run_id for score in (*candidate.train.runs, *candidate.cross_validated.runs)}
+    others = validate(candidate.damper, [run for run in everything if run.id not in scored])
     if not others.runs:
         return candidate
     left_out = candidate.cross_validated
@@ -400,7 +404,7 @@ def errors_by_kind(candidates: Sequence[Scored]) -> list[dict[str, Floats]]:
     A run that a candidate cannot take was left out of it in every way; one that no damper could be made without
     counts as infinitely wrong.
     """
-    found: list[dict[str, Floats]] = [{} for _ in candidates]
+    by_candidate: list[dict[str, Floats]] = [{} for _ in candidates]
     for kind in dict.fromkeys(name for c in candidates for name in (CONDITION, *c.by_kind)):
         errors = []
         for candidate in candidates:
@@ -410,10 +414,10 @@ def errors_by_kind(candidates: Sequence[Scored]) -> list[dict[str, Floats]]:
             errors.append({**own, **left_out, **dict.fromkeys(refused, np.inf)})
         left_out = set().union(*({run.run_id for run in _runs(c, kind)} for c in candidates))
         common = sorted(left_out.intersection(*errors))
-        for errors_of, row in zip(found, errors, strict=True):
+        for errors_of, row in zip(by_candidate, errors, strict=True):
             if common:
                 errors_of[kind] = np.array([row[name] for name in common])
-    return found
+    return by_candidate
 
 
 def _runs(candidate: Scored, kind: str) -> Sequence[RunScore]:
@@ -425,7 +429,7 @@ def _runs(candidate: Scored, kind: str) -> Sequence[RunScore]:
 
 def usable(runs: Iterable[Run], clipped: bool = False) -> tuple[list[Run], dict[str, str]]:
     """The runs of any motion and any current that a joint model takes, and why the others are not used."""
-    found, refused = [], {}
+    runs_used, refused = [], {}
     for run in runs:
         try:
             refuse_clipped(with_findings(run), clipped)
@@ -434,10 +438,10 @@ def usable(runs: Iterable[Run], clipped: bool = False) -> tuple[list[Run], dict[
                     "the force does not change", where=f"run {run.id}", remedy="check the channel"
                 )
             equivalent_sine(run)  # refuses a run that does not move
-            found.append(run)
+            runs_used.append(run)
         except InputError as error:
             refused[run.id] = str(error)
-    return found, refused
+    return runs_used, refused
 
 
 def agreeing(dataset: Dataset, keep: Collection[str] = ()) -> tuple[Dataset, tuple[Contradiction, ...]]:
@@ -483,7 +487,7 @@ def _are_one_test(run: Run, other: Run) -> bool:
 
 def _of_another_size(runs: Sequence[Run]) -> dict[str, str]:
     """Runs whose force, stroke or current is so far from all others' that its unit must be another."""
-    found: dict[str, str] = {}
+    reasons: dict[str, str] = {}
     for what, unit, most, size_of in _SIZES:
         sizes = {run.id: size_of(run) for run in runs}
         counted = [size for size in sizes.values() if size > 0]
@@ -495,11 +499,11 @@ def _of_another_size(runs: Sequence[Run]) -> dict[str, str]:
             like = f", as if in {thousandth}" if size < usual / most and thousandth else ""
             like = ", as if in mA" if what == "current" and size > 50 * usual else like
             if size > most * usual or (what != "current" and size < usual / most):
-                found[name] = (
+                reasons[name] = (
                     f"run {name}: {what} of {size:.3g} {unit}, {usual:.3g} {unit} in the other runs{like}; "
                     "state its unit when it is imported, or take it out of the dataset [E_OTHER_SIZE]"
                 )
-    return found
+    return reasons
 
 
 def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], dict[str, str]]:
@@ -510,18 +514,18 @@ def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], di
         try:
             refuse_clipped(with_findings(run), clipped)
             run.current_A  # noqa: B018
-            found = equivalent_sine(run)
+            sine = equivalent_sine(run)
             rate = (run.time.size - 1) / float(run.time[-1] - run.time[0])
-            if found.is_sine and rate < _SAMPLES_A_CYCLE * found.condition.frequency_Hz:
+            if sine.is_sine and rate < _SAMPLES_A_CYCLE * sine.condition.frequency_Hz:
                 raise IdentificationError(
-                    f"{rate / found.condition.frequency_Hz:.1f} samples per cycle",
+                    f"{rate / sine.condition.frequency_Hz:.1f} samples per cycle",
                     where=f"run {run.id}",
                     remedy=f"record at least {_SAMPLES_A_CYCLE}",
                 )
         except InputError as error:
             refused[run.id] = str(error)
             continue
-        if found.is_sine and analyse_motion(run).distortion < _DISTORTED:
+        if sine.is_sine and analyse_motion(run).distortion < _DISTORTED:
             sines.append(run)
         else:
             refused[run.id] = "the motion is not a sine, which individual fits require"

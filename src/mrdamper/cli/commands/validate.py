@@ -62,7 +62,7 @@ def register(app: typer.Typer) -> None:
         known = (
             sessions_known(damper, [whole[n] for n in check_run], own_sessions) if check_run or own_sessions else None
         )
-        validation = score(damper, watched([run for run in runs if run.id not in check_run], "run"), known=known)
+        validation = score(damper, watched([run for run in runs if run.id not in check_run], "run"), sessions=known)
         for name, why in validation.refused.items():
             typer.echo(f"not scored: {name}: {why}", err=True)
         if not validation.runs:

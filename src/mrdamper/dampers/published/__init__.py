@@ -30,8 +30,8 @@ def all_conditioned() -> Mapping[str, type[ConditionedDamper]]:
 
 def all_published() -> Mapping[str, Published]:
     """What is fitted beside the models: the condition-dependent dampers, and a regression without physics."""
-    known = {**all_conditioned(), KernelDamper.name: KernelDamper}
-    return {name: known[name] for name in sorted(known)}
+    types = {**all_conditioned(), KernelDamper.name: KernelDamper}
+    return {name: types[name] for name in sorted(types)}
 
 
 def conditioned_type(name: str) -> type[ConditionedDamper]:

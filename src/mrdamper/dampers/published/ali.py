@@ -92,8 +92,8 @@ def _power_law(name: str, conditions: Sequence[Condition], values: Floats, refer
     frequency = np.log([c.frequency_Hz / reference.frequency_Hz for c in conditions])
     levels = [np.isclose(currents, level, atol=2e-3) for level in np.unique(np.round(currents, 3))]
     logs = np.log(np.maximum(values, 1e-3))
-    found = np.linalg.lstsq(np.column_stack([amplitude, frequency, *levels]), logs, rcond=1e-6)[0]
-    p, q = (float(power) for power in np.clip(found[:2], -2, 2))
+    solution = np.linalg.lstsq(np.column_stack([amplitude, frequency, *levels]), logs, rcond=1e-6)[0]
+    p, q = (float(power) for power in np.clip(solution[:2], -2, 2))
     rest = values / np.exp(p * amplitude + q * frequency)
     floor = 0.2 * float(np.min(rest))  # the quadratic may dip below zero between currents
     return {**fit_quadratic(name, currents, rest), f"{name}_p": p, f"{name}_q": q, f"{name}_floor": max(floor, 1e-3)}

@@ -142,8 +142,8 @@ class ConditionedDamper(Damper):
             return np.concatenate([piece.residual(damper.model_at(piece.condition)) for piece in pieces])
 
         centre = begin / size
-        found = least_squares(residual, centre, centre - _REACH, centre + _REACH, most_steps=_STEPS)
-        return replace(self, coefficients=dict(zip(names, (found.point * size).tolist(), strict=True)))
+        solution = least_squares(residual, centre, centre - _REACH, centre + _REACH, most_steps=_STEPS)
+        return replace(self, coefficients=dict(zip(names, (solution.point * size).tolist(), strict=True)))
 
     @property
     def fitted_parameters(self) -> Mapping[str, FittedParameter]:
@@ -163,19 +163,19 @@ class ConditionedDamper(Damper):
     ) -> Self:
         from mrdamper.dampers.published import conditioned_type  # imports every file, this one among them
 
-        known = conditioned_type(saved.model)
+        kind = conditioned_type(saved.model)
         reference = Condition(*saved.reference)
         tables = {name: np.array(table) for name, table in saved.tables.items()}
         try:
-            made = known(rig, saved.coefficients, reference, envelope, provenance, coil=coil, **tables)  # type: ignore[arg-type]
-            made.force_along(sine(reference, 1, 8), reference)
+            damper = kind(rig, saved.coefficients, reference, envelope, provenance, coil=coil, **tables)  # type: ignore[arg-type]
+            damper.force_along(sine(reference, 1, 8), reference)
             for condition in envelope.corners:
-                made.force_along(sine(condition, 1, 8), condition)
+                damper.force_along(sine(condition, 1, 8), condition)
         except (KeyError, TypeError, ValueError, IndexError, ArithmeticError) as error:
             raise ParameterError(
                 f"coefficients do not fit the model: {error}", remedy="write the model again"
             ) from error
-        return made  # type: ignore[return-value]
+        return damper  # type: ignore[return-value]
 
 
 def quadratic(current: float, coefficients: Mapping[str, float], name: str) -> float:
@@ -187,8 +187,8 @@ def fit_quadratic(name: str, currents: Floats, values: Floats) -> dict[str, floa
     """Coefficients of `quadratic` by least squares; as many as the distinct currents allow, the rest zero."""
     terms = min(3, len(np.unique(np.round(currents, 3))))
     table = np.vander(currents, terms, increasing=True)
-    found = np.linalg.lstsq(table, values, rcond=None)[0]
-    return {f"{name}{i}": float(found[i]) if i < terms else 0.0 for i in range(3)}
+    solution = np.linalg.lstsq(table, values, rcond=None)[0]
+    return {f"{name}{i}": float(solution[i]) if i < terms else 0.0 for i in range(3)}
 
 
 def _middle(conditions: Sequence[Condition]) -> Condition:

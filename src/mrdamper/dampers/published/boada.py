@@ -69,10 +69,10 @@ class BoadaType(ConditionedDamper):
     def model_at(self, condition: Condition) -> Guo:
         scaled = zip(_raw(condition), self._part("centre", _INPUTS), self._part("spread", _INPUTS), strict=True)
         weights = self._part("weight", _weight_count(len(_OUTPUTS)))
-        found = _network(weights, [(value - centre) / spread for value, centre, spread in scaled], len(_OUTPUTS))
+        outputs = _network(weights, [(value - centre) / spread for value, centre, spread in scaled], len(_OUTPUTS))
         bounds = {info.name: info.bounds for info in Guo.parameters()}
         values = {}
-        for i, (name, output) in enumerate(zip(_OUTPUTS, found, strict=True)):
+        for i, (name, output) in enumerate(zip(_OUTPUTS, outputs, strict=True)):
             middle, width = self.coefficients[f"middle{i}"], self.coefficients[f"width{i}"]
             values[name] = np.clip(_backward(name, middle + width * np.clip(output, -4, 4)), *bounds[name])
         return Guo(**values)
@@ -122,8 +122,8 @@ def _train(inputs: Floats, targets: Floats) -> Floats:
 
     def residuals(networks: Floats) -> Floats:
         """(S, R) of (S, W) weights."""
-        found = _network(networks.T[..., None], list(inputs.T), targets.shape[1])
-        error = np.stack(found, axis=-1) - targets
+        outputs = _network(networks.T[..., None], list(inputs.T), targets.shape[1])
+        error = np.stack(outputs, axis=-1) - targets
         return np.concatenate([error.reshape(len(networks), -1), _DECAY * networks], axis=1)
 
     def slopes(weights: Floats) -> Floats:

@@ -115,8 +115,8 @@ def _powers(
             *[np.isclose(currents, level, atol=2e-3) for level in levels],
         ]
     )
-    found = np.linalg.lstsq(table, np.log(np.maximum(force, 1.0)), rcond=1e-6)[0]
-    return float(found[0]), float(found[1])
+    solution = np.linalg.lstsq(table, np.log(np.maximum(force, 1.0)), rcond=1e-6)[0]
+    return float(solution[0]), float(solution[1])
 
 
 def _line(currents: Floats, values: Floats) -> Floats:
@@ -129,8 +129,13 @@ def _rising(name: str, currents: Floats, values: Floats, knee: float) -> dict[st
     lift = np.where(currents > knee, 1 - np.exp(-_RISE * (currents - knee)), 0.0)
     below = np.clip(1 - currents / knee, 0.0, None)
     table = np.column_stack([1 - below, lift, below])
-    found = np.linalg.lstsq(table, values, rcond=1e-8)[0]
-    return {f"{name}1": float(found[0]), f"{name}2": float(found[1]), f"{name}3": _RISE, f"{name}4": float(found[2])}
+    solution = np.linalg.lstsq(table, values, rcond=1e-8)[0]
+    return {
+        f"{name}1": float(solution[0]),
+        f"{name}2": float(solution[1]),
+        f"{name}3": _RISE,
+        f"{name}4": float(solution[2]),
+    }
 
 
 def _law(given: Mapping[str, float], name: str, current: float, knee: float) -> float:

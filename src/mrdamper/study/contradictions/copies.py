@@ -45,16 +45,16 @@ class Copy:
 
 def find_copies(runs: Sequence[Run]) -> list[Copy]:
     """Find the runs whose force is another's; of an identification and a validation run, the validation run."""
-    known = {run.id: _ranges(run) for run in runs}
-    found: dict[str, Copy] = {}
+    ranges = {run.id: _ranges(run) for run in runs}
+    copies: dict[str, Copy] = {}
     for first, second in combinations(runs, 2):
-        if first.id in found or second.id in found or not _alike(known[first.id], known[second.id]):
+        if first.id in copies or second.id in copies or not _alike(ranges[first.id], ranges[second.id]):
             continue
         correlation = _shared_noise(first, second)
         if correlation is not None:
             original, copy = (second, first) if first.split == "validate" != second.split else (first, second)
-            found[copy.id] = Copy(copy.id, original.id, correlation)
-    return list(found.values())
+            copies[copy.id] = Copy(copy.id, original.id, correlation)
+    return list(copies.values())
 
 
 def _ranges(run: Run) -> tuple[float, float]:

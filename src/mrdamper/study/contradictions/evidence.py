@@ -150,10 +150,10 @@ class Posterior:
         """Mean and covariance of the coefficients at a run's current, without that run."""
         mean, covariance = self.at(run.over)
         left = np.eye(mean.size) - covariance @ run.gram
-        found: Floats = np.asarray(
+        moments: Floats = np.asarray(
             np.linalg.solve(left, np.column_stack([mean - covariance @ run.moment, covariance])), dtype=float
         )
-        return found[:, 0], found[:, 1:]
+        return moments[:, 0], moments[:, 1:]
 
     def log_probability_by_others(self, run: Moments) -> float:
         """Logarithm of the probability density of a run's force, by the other runs alone."""
@@ -281,13 +281,13 @@ def stop_operators(displacements: Sequence[Floats], yields: Floats) -> list[Floa
     for i, x in enumerate(displacements):
         steps[: x.size, i, 0] = np.diff(x, prepend=x[:1])
     state = np.zeros((len(displacements), yields.size))
-    found = np.empty((longest, *state.shape))
-    for step, row in zip(steps, found, strict=True):
+    outputs = np.empty((longest, *state.shape))
+    for step, row in zip(steps, outputs, strict=True):
         np.add(state, step, out=state)
         np.minimum(state, yields, out=state)
         np.maximum(state, -yields, out=row)
         state[:] = row
-    return [found[: x.size, i] for i, x in enumerate(displacements)]
+    return [outputs[: x.size, i] for i, x in enumerate(displacements)]
 
 
 def _nodes(tracks: Sequence[Track]) -> Floats:

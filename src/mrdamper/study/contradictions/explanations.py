@@ -120,13 +120,13 @@ class Candidate:
             What the other runs determine.
         """
         least = others.log_probability(others.weigh(self.own))
-        found = []
+        candidates = []
         for trial, products in self._trials(others):
             if self._is_large(trial, products, others):
                 odds = trial.odds + (_EDGE if trial.cause in ("force", "current") and self._is_edge else 0.0)
                 gain = others.log_probability(others.weigh(products)) - odds - least
-                found.append(Explanation(replace(trial, odds=odds), gain, products))
-        return sorted(found, key=lambda e: -e.gain)
+                candidates.append(Explanation(replace(trial, odds=odds), gain, products))
+        return sorted(candidates, key=lambda e: -e.gain)
 
     def alone(self, others: Posterior) -> Explanation:
         """The last resort: the run is of another damper."""
@@ -242,8 +242,8 @@ class Candidate:
         expected, one = others.at(products.over)[0], products.constant
         table = np.column_stack([expected, one])
         best = np.linalg.lstsq(table.T @ products.gram @ table, table.T @ products.moment, rcond=1e-10)[0]
-        found = table @ np.clip(best, [1 / _MOST_SESSION, -np.inf], [_MOST_SESSION, np.inf])
-        power = products.power - 2 * float(found @ products.moment) + float(found @ products.gram @ found)
+        force = table @ np.clip(best, [1 / _MOST_SESSION, -np.inf], [_MOST_SESSION, np.inf])
+        power = products.power - 2 * float(force @ products.moment) + float(force @ products.gram @ force)
         return float(np.sqrt(max(power, 0.0) / products.rows)) / products.size
 
     def _is_nearer(self, factor: float) -> bool:

@@ -69,16 +69,16 @@ def describe(run: Run, explanation: Explanation, others: int) -> Contradiction:
         "force": _force, "offset": _offset, "current": _current, "displacement": _displacement, "time": _time,
         "sign": _sign, "damper": _damper, "shifted": _shifted,
     }[explanation.cause]  # fmt: skip
-    found, remedy = text(run, explanation.trial)
-    against = f"contradicts the other {others} runs: {found} (log odds {explanation.gain:.0f})"
+    contradiction, remedy = text(run, explanation.trial)
+    against = f"contradicts the other {others} runs: {contradiction} (log odds {explanation.gain:.0f})"
     return Contradiction(run.id, explanation.cause, explanation.trial.value, explanation.gain, against, remedy)
 
 
 def describe_copy(copy: Copy, validation: bool) -> Contradiction:
     """Say in words that a run is a copy."""
-    found = f"a copy of run {copy.original}: their forces share the noise (correlation {copy.correlation:.2f})"
+    text = f"a copy of run {copy.original}: their forces share the noise (correlation {copy.correlation:.2f})"
     remedy = "a test counts once" + (", and validation needs tests of its own" if validation else "")
-    return Contradiction(copy.run_id, "copy", copy.correlation, float("inf"), found, f"{remedy}: delete the file")
+    return Contradiction(copy.run_id, "copy", copy.correlation, float("inf"), text, f"{remedy}: delete the file")
 
 
 def _force(run: Run, e: Trial) -> tuple[str, str]:

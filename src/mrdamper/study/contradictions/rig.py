@@ -50,33 +50,37 @@ def find_contradictions(runs: Sequence[Run], keep: Collection[str] = ()) -> list
         If more than a third of the identification runs contradict the others.
     """
     copies = [describe_copy(copy, _split(runs, copy.run_id) == "validate") for copy in find_copies(runs)]
-    found = {one.run_id: one for one in copies if one.run_id not in keep}
-    tracks = [t for t in tracks_of([run for run in runs if run.id not in found])]
+    contradictions = {one.run_id: one for one in copies if one.run_id not in keep}
+    tracks = [t for t in tracks_of([run for run in runs if run.id not in contradictions])]
     tracks, milliamperes = _in_amperes(tracks, keep)
-    found |= milliamperes
+    contradictions |= milliamperes
     train = [track for track in tracks if track.run.split == "train"]
     if len(train) >= FEWEST_RUNS:
-        found |= _among(train, keep)
-        trusted = [track for track in train if track.run.id not in found]
-        validation = [t for t in tracks if t.run.split != "train" and t.run.id not in keep and t.run.id not in found]
-        found |= _of_validation(validation, trusted)
-    return [found[run.id] for run in runs if run.id in found]
+        contradictions |= _among(train, keep)
+        trusted = [track for track in train if track.run.id not in contradictions]
+        validation = [
+            t for t in tracks if t.run.split != "train" and t.run.id not in keep and t.run.id not in contradictions
+        ]
+        contradictions |= _of_validation(validation, trusted)
+    return [contradictions[run.id] for run in runs if run.id in contradictions]
 
 
 def _among(train: Sequence[Track], keep: Collection[str]) -> dict[str, Contradiction]:
     search = Search(train)
     search.run(int(_MOST_SHARE * len(train)))
-    found = {train[i].run.id: describe(train[i].run, e, len(train) - 1) for i, e in sorted(search.found.items())}
-    found = {name: one for name, one in found.items() if name not in keep}
-    incoherent = len(found) > _MANY * len(train) and search.evidence.spread.misfit >= _INCOHERENT
-    if len(found) > _MOST_SHARE * len(train) or incoherent or _opposed(list(found.values())):
-        raise _disagreement(train, found)
-    return found
+    contradictions = {
+        train[i].run.id: describe(train[i].run, e, len(train) - 1) for i, e in sorted(search.found.items())
+    }
+    contradictions = {name: one for name, one in contradictions.items() if name not in keep}
+    incoherent = len(contradictions) > _MANY * len(train) and search.evidence.spread.misfit >= _INCOHERENT
+    if len(contradictions) > _MOST_SHARE * len(train) or incoherent or _opposed(list(contradictions.values())):
+        raise _disagreement(train, contradictions)
+    return contradictions
 
 
-def _opposed(found: Sequence[Contradiction]) -> bool:
+def _opposed(contradictions: Sequence[Contradiction]) -> bool:
     """Tell whether some runs need a factor and others its inverse: nobody knows which of them are right."""
-    factors = [one.value for one in found if one.cause == "force"]
+    factors = [one.value for one in contradictions if one.cause == "force"]
     return any(abs(np.log(a * b)) < _INVERSE for a, b in combinations(factors, 2))
 
 
@@ -92,7 +96,7 @@ def _in_amperes(tracks: Sequence[Track], keep: Collection[str]) -> tuple[list[Tr
     """The runs, those in amperes whose current is a thousand times the others', which are in milliamperes."""
     sizes = [float(np.median(track.current)) for track in tracks]
     usual = float(np.median([size for size in sizes if size > 0] or [0.0]))
-    kept, found = [], {}
+    kept, contradictions = [], {}
     for track, size in zip(tracks, sizes, strict=True):
         run = track.run
         if usual <= 0 or size < _MILLIAMPERES * usual or run.id in keep:
@@ -101,22 +105,23 @@ def _in_amperes(tracks: Sequence[Track], keep: Collection[str]) -> tuple[list[Tr
         text = f"its current of {size:.4g} A is {size / usual:.3g} times that of the others: it looks like milliamperes"
         remedy = f"in tests.csv, set current_A of {run.notes.get('file', '') or run.id} to {size / 1e3:.3g}"
         kept.append(replace(track, current=track.current / 1e3))
-        found[run.id] = Contradiction(run.id, "current", size / 1e3, float("inf"), text, remedy)
-    return kept, found
+        contradictions[run.id] = Contradiction(run.id, "current", size / 1e3, float("inf"), text, remedy)
+    return kept, contradictions
 
 
 def _split(runs: Sequence[Run], name: str) -> str:
     return next(run.split for run in runs if run.id == name)
 
 
-def _disagreement(train: Sequence[Track], found: dict[str, Contradiction]) -> ContradictionError:
+def _disagreement(train: Sequence[Track], contradictions: dict[str, Contradiction]) -> ContradictionError:
     """The refusal, with both groups of runs."""
-    rest = [track.run.id for track in train if track.run.id not in found]
-    causes = sorted({one.code for one in found.values()})
-    first = next(iter(found.values()))
+    rest = [track.run.id for track in train if track.run.id not in contradictions]
+    causes = sorted({one.code for one in contradictions.values()})
+    first = next(iter(contradictions.values()))
     return ContradictionError(
-        f"{len(found)} of {len(train)} runs contradict the other {len(rest)} ({', '.join(causes)}): "
-        f"{', '.join(sorted(found))} against {', '.join(rest)}; the first, {first.run_id}, {first.explanation}",
+        f"{len(contradictions)} of {len(train)} runs contradict the other {len(rest)} ({', '.join(causes)}): "
+        f"{', '.join(sorted(contradictions))} against {', '.join(rest)}; "
+        f"the first, {first.run_id}, {first.explanation}",
         where=f"rig {train[0].run.rig}" if train[0].run.rig else "the dataset",
         remedy="tests of two dampers need a column specimen in tests.csv; --keep RUN keeps a run as it is",
     )

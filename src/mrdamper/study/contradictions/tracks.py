@@ -80,13 +80,13 @@ class Track:
 
 def tracks_of(runs: Sequence[Run]) -> list[Track]:
     """Make the short versions of the runs that move; others are left out."""
-    found = []
+    tracks = []
     for run in runs:
         try:
-            found.append(_track(run))
+            tracks.append(_track(run))
         except InputError:
             continue
-    return found
+    return tracks
 
 
 def _track(run: Run) -> Track:
