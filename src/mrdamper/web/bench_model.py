@@ -11,7 +11,7 @@ from mrdamper.dampers.base import Damper, Prediction
 from mrdamper.data import Condition
 from mrdamper.data.parameters import ParameterInfo
 from mrdamper.errors import ParameterError
-from mrdamper.physics.simulation import ForceLaw, steady_loop
+from mrdamper.physics.simulation import ForceLaw, Response, steady_loop
 
 _DECADES = 10.0  # a slider without bounds reaches this factor up and down, or twice the value
 
@@ -31,12 +31,15 @@ def held_model(damper: Damper, condition: Condition, held: Mapping[str, float]) 
     return replace(model, **held)  # type: ignore[type-var]
 
 
-def predict_held(damper: Damper, condition: Condition, held: Mapping[str, float]) -> Prediction:
+def loop_held(damper: Damper, condition: Condition, held: Mapping[str, float]) -> Response:
     """Steady loop at a condition; raises as `held_model`."""
-    if not held:
-        return damper.predict(condition)
-    response = steady_loop(held_model(damper, condition, held), condition)
-    return Prediction(response.excitation, response.force, condition, damper.envelope.flags(condition))
+    return steady_loop(held_model(damper, condition, held), condition) if held else damper.loop(condition)
+
+
+def predict_held(damper: Damper, condition: Condition, held: Mapping[str, float]) -> Prediction:
+    """Steady loop at a condition with its flags; raises as `held_model`."""
+    loop = loop_held(damper, condition, held)
+    return Prediction(loop.excitation, loop.force, condition, damper.envelope.flags(condition), steady=True)
 
 
 def as_damper(damper: Damper, held: Mapping[str, float]) -> Damper:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from threading import Lock
 from time import thread_time
 from typing import Any
@@ -13,10 +14,11 @@ from pydantic import BaseModel, Field
 
 from mrdamper.dampers.bands import band, no_band, scope
 from mrdamper.dampers.base import Damper
-from mrdamper.data import Condition
+from mrdamper.data import Condition, Floats
+from mrdamper.physics.motion import Excitation
 from mrdamper.statistics.metrics import dissipated_power, peak_force
 from mrdamper.web.answers import frame, number
-from mrdamper.web.bench_model import held_model, predict_held, sliders
+from mrdamper.web.bench_model import held_model, loop_held, predict_held, sliders
 from mrdamper.web.curves import on_screen, predicted_cycle
 from mrdamper.web.rig_table import RigTable, condition_on_screen
 from mrdamper.web.sessions import Bench, Current, Session
@@ -97,7 +99,8 @@ def _predicted(found: Damper, ask: Ask, session: Session) -> Response:
         paces.append(1e3 * (thread_time() - began))
         cycle = predicted_cycle(prediction)
         arrays |= {f"{name}.{axis}": values for axis, values in cycle.items()}
-        loops.append({"name": name, "current_A": condition.current_A, **_figures(prediction)})
+        figures = _figures(prediction.motion, prediction.force, ask.frequency_Hz)
+        loops.append({"name": name, "current_A": condition.current_A, **figures})
         if name == "now" and ask.band and not ask.held and (around := band(found, prediction, _LEVEL)):
             for end, force in (("low", around.low), ("high", around.high)):
                 arrays |= {f"{end}.{axis}": v for axis, v in on_screen(prediction.motion, force).items()}
@@ -110,7 +113,8 @@ def _predicted(found: Damper, ask: Ask, session: Session) -> Response:
         elif name == "now" and ask.band:
             loops[-1]["no_band"] = _OF_HAND if ask.held else no_band(found)
     if ask.currents:
-        arrays |= _over_current(found, ask)
+        held = tuple(sorted(ask.held.items()))
+        arrays |= _over_current(found, held, ask.frequency_Hz, ask.amplitude_m, ask.currents)
     model = held_model(found, ask.condition, ask.held)
     head = {
         "loops": loops,
@@ -141,19 +145,22 @@ def _tested_currents(found: Damper, table: RigTable | None) -> list[float]:
     return sorted({levels[i] for i in picked})
 
 
-def _over_current(found: Damper, ask: Ask) -> dict[str, Any]:
-    even = np.linspace(0.0, _BEYOND * (found.envelope.current_A[1] or 1.0), max(ask.currents - 2, 2))
+@lru_cache(maxsize=64)  # the same while the current is moved, and in every session with the same damper
+def _over_current(
+    found: Damper, held: tuple[tuple[str, float], ...], frequency_Hz: float, amplitude_m: float, points: int
+) -> dict[str, Any]:
+    even = np.linspace(0.0, _BEYOND * (found.envelope.current_A[1] or 1.0), max(points - 2, 2))
     currents = np.union1d(even, found.envelope.current_A)  # the line changes its dash where the tests end
-    conditions = [Condition(float(I), ask.frequency_Hz, ask.amplitude_m) for I in currents]
-    figures = [_figures(predict_held(found, condition, ask.held)) for condition in conditions]
+    conditions = [Condition(float(I), frequency_Hz, amplitude_m) for I in currents]
+    loops = [loop_held(found, condition, dict(held)) for condition in conditions]
+    figures = [_figures(loop.excitation, loop.force, frequency_Hz) for loop in loops]
     curves = {f"over.{end}": np.array([f[name] for f in figures]) for end, name in _OVER.items()}
     return {"over.current": currents, **curves}
 
 
-def _figures(prediction: Any) -> dict[str, float]:
-    motion = prediction.motion
-    power = dissipated_power(prediction.force, motion.velocity, motion.time)
-    return {"peak_N": peak_force(prediction.force), "energy_J": power / prediction.condition.frequency_Hz}
+def _figures(motion: Excitation, force: Floats, frequency_Hz: float) -> dict[str, float]:
+    power = dissipated_power(force, motion.velocity, motion.time)
+    return {"peak_N": peak_force(force), "energy_J": power / frequency_Hz}
 
 
 def _measured(row: Any) -> dict[str, Any]:
