@@ -18,7 +18,7 @@ from mrdamper.data.encoding import c_comment
 from mrdamper.export.base import Exporter, Written, identifier, write_export
 from mrdamper.export.templates import render
 from mrdamper.models import Model
-from mrdamper.tracing import Program
+from mrdamper.tracing import Expression, Program
 from mrdamper.tracing.c_writer import CWriter
 from mrdamper.tracing.tape import LookupTable
 
@@ -45,20 +45,27 @@ def c_sources(stepping: Stream, name: str, rig: str) -> dict[str, str]:
     return {f"{name}.h": render("model.h.j2", **facts), f"{name}.c": render("model.c.j2", **facts)}
 
 
+class _ConstantsWriter(CWriter):
+    """Writer of a program whose parameters keep their values."""
+
+    def name(self, expression: Expression) -> str:
+        return self.number(expression.value) if expression.op == "parameter" else super().name(expression)
+
+
 def program_sources(traced: Program, name: str, title: str) -> dict[str, str]:
     """Header and source of any program of one sample, by file name: a control law, an inverse.
 
     Parameters
     ----------
     traced : Program
-        With dt among its inputs and no parameters.
+        With dt among its inputs; its parameters are written as constants.
     name : str
         Prefix of files and symbols.
     title : str
         For the comment at the top.
     """
     word = identifier(name)
-    writer = CWriter(traced)
+    writer = _ConstantsWriter(traced)
     setup = writer.setup()
     derived = [("int" if e.logical else f"{word}_real", writer.name(e).removeprefix("d->")) for e in traced.derived]
     arguments = [(f"const {word}_derived *d", "d")] if derived else []

@@ -40,7 +40,7 @@ def write_program_fmu(
     Parameters
     ----------
     traced : Program
-        With dt as its last input and no parameters.
+        With dt as its last input; its parameters are written as constants.
     name, title : str
         Of files and symbols; for people.
     units : mapping of str to str
@@ -130,11 +130,12 @@ def _reference(traced: Program, facts: dict[str, Any]) -> tuple[Floats, dict[str
         for i, v in enumerate(v for v in facts["variables"] if v.causality == "input")
     }
     prepare, advance = python_functions(traced)
-    _, derived = prepare(())
+    parameters = tuple(float(e.value) for e in traced.tape.parameters.values())
+    _, derived = prepare(parameters)
     memory = tuple(traced.tape.starts.values())
     rows = [tuple(float(value) for _, value in facts["held"])]
     for sample in list(zip(*(column.tolist() for column in given.values()), strict=True))[:-1]:
-        _, outputs, memory = advance((), derived, memory, (*sample, step))
+        _, outputs, memory = advance(parameters, derived, memory, (*sample, step))
         rows.append(outputs)
     columns = (np.array(column) for column in zip(*rows, strict=True))
     return time, given, dict(zip(traced.outputs, columns, strict=True))

@@ -211,7 +211,7 @@ class SystemLoop:
         return Simulation(
             system, time, x, v, absolute, self.links, force, x @ self.B.T + road @ self.D.T,
             v @ self.B.T + road_rate @ self.D.T, current, flags.astype(np.int64), road, road_rate,
-            self._energy(dt, x, v, force, load, road), self.controller, self.control.limits,
+            load, self.controller, self.control.limits,
         )  # fmt: skip
 
     def _previewed(
@@ -295,27 +295,6 @@ class SystemLoop:
             compiled = compiled_loop(self.stages, law) if machine else None
             self._walks[machine] = compiled or interpreted_loop(self.stages, law)
         return self._walks[machine]
-
-    def _energy(self, dt: float, x: Floats, v: Floats, force: Floats, load: Floats, road: Floats) -> dict[str, Floats]:
-        """Energies since the start [J], by the trapezoidal rule the loop itself steps with."""
-
-        def running(power: Floats) -> Floats:
-            return np.concatenate([[0.0], np.cumsum(power)])
-
-        def mean(series: Floats) -> Floats:
-            return 0.5 * (series[1:] + series[:-1])
-
-        system, moved = self.system, np.diff(x, axis=0)
-        ways, middle = np.diff(road, axis=0) @ self.D.T, mean(v)
-        work = mean(force) * (moved @ self.B.T + ways)
-        entered = np.einsum("ij,ij->i", mean(load), moved) + (mean(force) * ways).sum(axis=1)
-        stored = 0.5 * (np.einsum("ij,ij->i", v @ system.M, v) + np.einsum("ij,ij->i", x @ system.K, x))
-        energies = {
-            "input": running(entered),
-            "stored": stored,
-            "structure": running(dt * np.einsum("ij,ij->i", middle @ system.C, middle)),
-        }
-        return energies | {link.name: running(work[:, i]) for i, link in enumerate(self.links)}
 
 
 def _fit(system: System, source: Input, dampers: Mapping[str, Damper]) -> None:

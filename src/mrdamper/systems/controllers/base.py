@@ -66,7 +66,8 @@ class Sensors:
 
     def on_off(self, on: Any) -> Any:
         """Return the highest current where a condition holds, the lowest elsewhere."""
-        return self.tape.select(on, self.high, self.low)
+        high = self.tape.parameter(identifier(f"{self.link.name}.highest_current"), self.high)  # one program for all
+        return self.tape.select(on, high, self.low)
 
     def current_for(self, force: Any) -> Any:
         """Calculate the current for a wanted force [N], positive against extension: see `invert`."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from threading import Lock
 from typing import Any
 
@@ -67,21 +68,23 @@ def ride(ask: Ask, session: Current) -> Response:
     """Histories of a system with a damper under a law, and with that damper left without current."""
     if ask.system not in bundled_systems():  # a name, never a path of this machine
         raise UnknownNameError.of("system", ask.system, bundled_systems())
-    damper, system = session.damper(ask.damper).damper, load_system(ask.system).system
-    capacity, scale = _capacity(damper), 1.0
-    if ask.scaled and _kind(system) == "road":
-        scale = float(f"{capacity * len(system.dampers) / (_FORCE_SHARE * _GRAVITY * system.M[0, 0]):.2g}")
-        system = _scaled(system, scale)
-    source = _source(ask.source, system)
+    with _TURN:  # whoever asks the same meanwhile gets the same
+        return frame(
+            *_ridden(session.damper(ask.damper).damper, ask.system, ask.source, ask.control, ask.current_A, ask.scaled)
+        )
+
+
+@lru_cache(maxsize=48)
+def _ridden(
+    damper: Damper, name: str, source_name: str, control: str, current_A: float, scaled: bool
+) -> tuple[dict[str, Any], dict[str, Floats]]:
+    """Head and histories of a ride; shared by all sessions with the same damper."""
+    system, source, capacity, scale = _setting(damper, name, source_name, scaled)
+    kind = controller_type(control)
+    law = with_values(kind, {"current_A": current_A}) if kind is Passive else kind()
     dampers = dict.fromkeys((link.name for link in system.dampers), damper)
-    kind = controller_type(ask.control)
-    law = with_values(kind, {"current_A": ask.current_A}) if kind is Passive else kind()
-    with _TURN:
-        done = simulate_system(system, source, dampers, law, highest=None if kind is Passive else ask.current_A)
-        idle = SystemLoop(system, source, dampers, Passive()).run(done.step)
-    every = slice(None, None, -(-done.time.size // _SAMPLES))
-    unmoved = {f"idle.{name}": idle.a[:, i] for i, name in enumerate(system.coordinates)}
-    arrays = {name: values[every] for name, values in (_histories(done, source) | unmoved).items()}
+    done = simulate_system(system, source, dampers, law, highest=None if kind is Passive else current_A)
+    idle, idle_cost = _idle(damper, name, source_name, scaled, done.step)
     head = {
         "kind": _kind(system),
         "scale": scale,
@@ -92,14 +95,38 @@ def ride(ask: Ask, session: Current) -> Response:
         "dampers": [link.name for link in done.dampers],
         "calm": system.coordinates[-1 if system.ground is not None else 0],
         "peaks": {name: values.tolist() for name, values in done.peaks.items()},
-        "gain": number(1 - (cost(done) / cost(idle)) ** 0.5 if cost(idle) > 0 else None),
+        "gain": number(1 - (cost(done) / idle_cost) ** 0.5 if idle_cost > 0 else None),
         "outside": done.outside,
         "settled": done.settled,
         "step_s": done.step,
         "halving": number(done.halving),
         "energy_gap": number(done.energy_gap),
     }
-    return frame(head, arrays)
+    return head, _thinned(_histories(done, source)) | idle
+
+
+@lru_cache(maxsize=16)
+def _setting(damper: Damper, name: str, source: str, scaled: bool) -> tuple[System, Input, float, float]:
+    """System, its input, the force of the damper [N] and the scale of a vehicle."""
+    system, capacity, scale = load_system(name).system, _capacity(damper), 1.0
+    if scaled and _kind(system) == "road":
+        scale = float(f"{capacity * len(system.dampers) / (_FORCE_SHARE * _GRAVITY * system.M[0, 0]):.2g}")
+        system = _scaled(system, scale)
+    return system, _source(source, system), capacity, scale
+
+
+@lru_cache(maxsize=16)
+def _idle(damper: Damper, name: str, source_name: str, scaled: bool, step: float) -> tuple[dict[str, Floats], float]:
+    """Accelerations of the system with that damper left without current, and its cost."""
+    system, source, *_ = _setting(damper, name, source_name, scaled)
+    dampers = dict.fromkeys((link.name for link in system.dampers), damper)
+    idle = SystemLoop(system, source, dampers, Passive()).run(step)
+    return _thinned({f"idle.{at}": idle.a[:, i] for i, at in enumerate(system.coordinates)}), cost(idle)
+
+
+def _thinned(histories: dict[str, Floats]) -> dict[str, Floats]:
+    """As many samples as the page shows."""
+    return {name: values[:: -(-values.size // _SAMPLES)].astype("<f4") for name, values in histories.items()}
 
 
 def _road_title(name: str) -> str:
