@@ -64,7 +64,7 @@ EXPLAINED = (
     Explained("dampers.joint", "evaluations, ending", "0 → 1", "where nothing is searched nothing is counted"),
     Explained("dampers.joint", "curved = settled", "", _BUDGET),
     Explained("dampers.joint", "found = least_squares(", "slopes and curved exchanged", _BUDGET),
-    Explained("dampers.joint", "_FEW_STEPS", "0.001 → 0.01", _BUDGET),
+    Explained("dampers.joint", "_TRIAL_STEPS", "0.001 → 0.01", _BUDGET),
     Explained("dampers.joint", "table.weights / known", "", "known slopes lead; the last round has its own"),
     Explained("dampers.joint", "len(axis.grid) > 1", "1 → 2", "no axis has two starts before the one of lengths"),
     Explained("dampers.joint", "(RISE, FALL)", "items", _ORDER),

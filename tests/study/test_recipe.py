@@ -313,7 +313,9 @@ def test_stretches_are_scored_as_the_record_they_were_cut_from():
     def score(name, k, flags):
         return RunScore(name, "rig", Condition(0, 1, 1), Scores(*(k * np.arange(1.0, 7.0))), None, flags)
 
-    pieces = [replace(TRAIN[0], id=f"long {n}", notes={cross_validation._RECORD: "long"}) for n in (1, 2)] + [TRAIN[1]]
+    pieces = [replace(TRAIN[0], id=f"long {n}", notes={cross_validation._STRETCH_NOTE: "long"}) for n in (1, 2)] + [
+        TRAIN[1]
+    ]
     scores = (
         score("long 1", 3.0, ("current",)),
         score("long 2", 4.0, ("current", "amplitude")),

@@ -30,10 +30,10 @@ from mrdamper.statistics.functions.motion_hull import MotionHull
 NOT_A_SINE = "not a sine"
 COARSE = "sampling"
 COMBINATION = "combination"  # every quantity was tested, these together were not
-_TOGETHER = 10.0  # weight of the sum of shares, which is one, against distances in the hull
+_SUM_WEIGHT = 10.0  # weight of the sum of shares, which is one, against distances in the hull
 _SAME_CURRENT = 1e-3  # A; a current that varies less is one current
-_LEAST = 1e-12  # frequency [Hz] and amplitude [m] that stand for zero in a logarithm
-_SAMPLES_IN_KNEE = 2  # below, the knee falls between samples
+_LOGARITHM_FLOOR = 1e-12  # frequency [Hz] and amplitude [m] that stand for zero in a logarithm
+_MIN_YIELD_SAMPLES = 2  # below, the knee falls between samples
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,8 @@ class Envelope:
         currents = [*levels, *((one + other) / 2 for one, other in pairwise(levels))]
         fastest = self.peak_velocity_m_s[1]
         motions = [
-            (f, min(A, fastest / (2 * np.pi * max(f, _LEAST)))) for f, A in product(self.frequency_Hz, self.amplitude_m)
+            (f, min(A, fastest / (2 * np.pi * max(f, _LOGARITHM_FLOOR))))
+            for f, A in product(self.frequency_Hz, self.amplitude_m)
         ]
         return [Condition(current, *motion) for current in currents for motion in motions]
 
@@ -147,8 +148,8 @@ class Envelope:
         scale = max(self.current_A[1], _SAME_CURRENT)
         corners = np.array([_features(point, scale) for point in self.conditions])
         asked = _features(_point(condition), scale)
-        centred = np.column_stack([corners - asked, np.full(len(corners), _TOGETHER)])
-        return bool(nnls(centred.T, np.array([0.0, 0.0, 0.0, _TOGETHER]))[1] < SLACK)
+        centred = np.column_stack([corners - asked, np.full(len(corners), _SUM_WEIGHT)])
+        return bool(nnls(centred.T, np.array([0.0, 0.0, 0.0, _SUM_WEIGHT]))[1] < SLACK)
 
     def motion_flags(self, motion: Excitation) -> tuple[str, ...]:
         """Which quantities of a motion that is no sine lie outside."""
@@ -239,7 +240,9 @@ def _point(condition: Condition) -> tuple[float, float, float]:
 
 
 def _features(point: tuple[float, float, float], current_scale: float) -> Floats:
-    return np.array([point[0] / current_scale, np.log(max(point[1], _LEAST)), np.log(max(point[2], _LEAST))])
+    return np.array(
+        [point[0] / current_scale, np.log(max(point[1], _LOGARITHM_FLOOR)), np.log(max(point[2], _LOGARITHM_FLOOR))]
+    )
 
 
 _ANY = (-np.inf, np.inf)
@@ -454,7 +457,7 @@ class Damper(Displayable):
             flags = self.envelope.flags(sine.condition)
         else:
             flags = (*self.envelope.motion_flags(motion), *(() if self.envelope.any_motion else (NOT_A_SINE,)))
-        if self.knee is not None and samples_in_knee(motion, self.knee) < _SAMPLES_IN_KNEE:
+        if self.knee is not None and samples_in_knee(motion, self.knee) < _MIN_YIELD_SAMPLES:
             flags = (*flags, COARSE)
         prediction = Prediction(motion, np.zeros(len(motion)), sine.condition, flags)
         return replace(prediction, force=self.force_for(prediction))

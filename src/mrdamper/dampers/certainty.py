@@ -24,7 +24,7 @@ from mrdamper.identification.intervals import NOT_IDENTIFIABLE, interval_about, 
 if TYPE_CHECKING:
     from mrdamper.dampers.protocols import DamperLike as Damper
 _MAX_LISTED = 6  # number of parameters named in one sentence
-_BADLY = 0.5  # standard error over the estimate from which a parameter is not significant
+_MAX_RELATIVE_ERROR = 0.5  # standard error over the estimate from which a parameter is not significant
 
 
 @dataclass(frozen=True)
@@ -170,9 +170,9 @@ def unsure(damper: Damper) -> list[str]:
             continue
         apart.append(i)
         error = float(np.sqrt(uncertainty.covariance[i, i]))
-        if uncertainty.logs[i] and error > _BADLY:
+        if uncertainty.logs[i] and error > _MAX_RELATIVE_ERROR:
             wide.append((name, f"{ends[1] / ends[0]:.2g}"))
-        elif not uncertainty.logs[i] and error > _BADLY * abs(numbers[name].value):
+        elif not uncertainty.logs[i] and error > _MAX_RELATIVE_ERROR * abs(numbers[name].value):
             about = written(numbers[name].value, ends, numbers[name].unit)
             weak.append((name, about))
     sentences += _grouped(weak, "{} is not significant ({})", "Not significant")

@@ -21,10 +21,10 @@ from mrdamper.errors import InputError
 from mrdamper.statistics.functions.selection import Errors, smaller_wins
 from mrdamper.statistics.linear import on_one_blas_thread, solve_linear
 
-_ROUGHLY = 1e-4  # relative gain of a step that is enough to tell forms apart
-_NO_PLAY = 1e-2  # seat longer than any play: none is left [m]
-_BLOCK = 12.0  # cycles of a record that is no sine that are left out together
-_LEVEL = 5e-3  # currents closer than this share of the largest are one level
+_COARSE_TOLERANCE = 1e-4  # relative gain of a step that is enough to tell forms apart
+_NO_PLAY_LENGTH_M = 1e-2  # seat longer than any play: none is left [m]
+_BLOCK_CYCLES = 12.0  # cycles of a record that is no sine that are left out together
+_LEVEL_TOLERANCE = 5e-3  # currents closer than this share of the largest are one level
 MODEL = "play-bypass"
 SEARCHED = ("leak", "cq", "qb")  # presets free from the first fit on: without them others make up for what they do
 
@@ -52,7 +52,7 @@ LEVEL_LAWS = (
     Term("yield force saturates with current", ("si",), (0.0,)),
     Term("yield force rises and saturates over currents of its own", ("Ic", "si"), (0.0, 0.0)),
 )
-_LAW = ("Ic", "si")
+_LEVEL_LAW_PARAMETERS = ("Ic", "si")
 TERMS = (
     Term("viscosity differs by direction", ("cq",), (0.0,)),
     Term("bypass differs by direction", ("qb",), (0.0,)),
@@ -124,8 +124,8 @@ def identify_jointly(
     laws = () if fixed else _level_laws(problem)
     progress("one model, steady ends first", 0.0)
     ends = [part.steady_end() for part in problem.parts]
-    short = JointProblem(runs, MODEL, fixed, free=(*SEARCHED, *(_LAW if laws else ())), parts=ends)
-    fit = short.search(rounds=2, most_steps=15, settled=_ROUGHLY)
+    short = JointProblem(runs, MODEL, fixed, free=(*SEARCHED, *(_LEVEL_LAW_PARAMETERS if laws else ())), parts=ends)
+    fit = short.search(rounds=2, most_steps=15, settled=_COARSE_TOLERANCE)
     short, fit, tried = _lost_motion(short, fit)
     second = fit.second
     progress("how the force rises with current", 0.3)
@@ -133,7 +133,7 @@ def identify_jointly(
     tried = (*tried, *more)
     progress("whole records", 0.5)
     problem = problem.with_free((*SEARCHED, *law), short.fixed)
-    fit = problem.fit(start=problem.from_point(fit), rounds=2, most_steps=8, settled=_ROUGHLY / 10)
+    fit = problem.fit(start=problem.from_point(fit), rounds=2, most_steps=8, settled=_COARSE_TOLERANCE / 10)
     progress("which terms the tests show", 0.8)
     evidence = Evidence.of(problem, fit)
     chosen, more = evidence.choose([t for t in TERMS if not problem.fixed.keys() & set(t.names)])
@@ -143,18 +143,18 @@ def identify_jointly(
     off |= dict.fromkeys(gone, 0.0)
     if off or coil != problem.given_coil:
         final = JointProblem(runs, MODEL, {**problem.fixed, **off}, free=problem.free, coil=coil, parts=problem.parts)
-        best = final.fit(start=evidence.start(final), rounds=1, settled=_ROUGHLY / 10)
+        best = final.fit(start=evidence.start(final), rounds=1, settled=_COARSE_TOLERANCE / 10)
     coil, gone = _absent(final, best)
     if gone or coil != final.given_coil:
         fixed = {**final.fixed, **dict.fromkeys(gone, 0.0)}
         final = JointProblem(runs, MODEL, fixed, free=final.free, coil=coil, parts=final.parts)
-        best = final.fit(start=final.from_point(best), rounds=1, settled=_ROUGHLY / 10)
+        best = final.fit(start=final.from_point(best), rounds=1, settled=_COARSE_TOLERANCE / 10)
     left_out, before = (Evidence.of(p, f).everything() for p, f in ((final, best), (problem, fit)))
     if not smaller_wins(
         left_out, before
     ):  # what one step promised, the search did not keep: terms earn their place here too
         final, best = problem, fit
-    best = final.fit(start=best.point, rounds=1, settled=_ROUGHLY / 10, to_the_last_digit=True)
+    best = final.fit(start=best.point, rounds=1, settled=_COARSE_TOLERANCE / 10, to_the_last_digit=True)
     progress("one model for all runs", 1.0)
     left_out = Evidence.of(final, best).everything()
     left_out = _means({**left_out, **current, **Evidence.of(final, best, _by_session).everything()})
@@ -168,9 +168,9 @@ def identify_jointly(
 
 def _lost_motion(problem: JointProblem, fit: JointFit) -> tuple[JointProblem, JointFit, tuple[Tried, ...]]:
     """Whether the damper loses motion after a reversal: the model without it, where that predicts as well."""
-    without = problem.with_free(problem.free, {"e": _NO_PLAY})
+    without = problem.with_free(problem.free, {"e": _NO_PLAY_LENGTH_M})
     starts = (without.from_point(fit), without.start)  # the play found need not be the way of a seat without play
-    fits = [without.fit(start=start, rounds=1, most_steps=10, settled=_ROUGHLY) for start in starts]
+    fits = [without.fit(start=start, rounds=1, most_steps=10, settled=_COARSE_TOLERANCE) for start in starts]
     refitted = min(fits, key=lambda each: float(np.sum(each.nrmse_pp)))
     now, scores = (Evidence.of(p, f).everything() for p, f in ((problem, fit), (without, refitted)))
     kept = not smaller_wins(scores, now)
@@ -219,10 +219,10 @@ def _level_law(
     best: tuple[tuple[str, ...], JointFit, Errors] | None = None
     for term in (None, *forms):
         form = term.names if term else ()
-        problem = longest.with_free([n for n in longest.free if n not in _LAW or n in form])
+        problem = longest.with_free([n for n in longest.free if n not in _LEVEL_LAW_PARAMETERS or n in form])
         trial = fit
         if set(problem.free) != set(longest.free):
-            trial = problem.fit(start=problem.from_point(fit), rounds=1, most_steps=10, settled=_ROUGHLY)
+            trial = problem.fit(start=problem.from_point(fit), rounds=1, most_steps=10, settled=_COARSE_TOLERANCE)
         scores: Errors = Evidence.of(problem, trial).everything()
         if levels:
             scores = {**scores, "current": _left_out_current(problem, starts, levels)}
@@ -243,7 +243,7 @@ def _left_out_current(problem: JointProblem, starts: Sequence[JointFit], levels:
     errors: list[Floats] = []
     for level, start in zip(levels, starts, strict=True):
         rest = [i for i in range(len(problem.parts)) if i not in level]
-        without = problem.fit(rest, problem.from_point(start), rounds=1, most_steps=8, settled=_ROUGHLY)
+        without = problem.fit(rest, problem.from_point(start), rounds=1, most_steps=8, settled=_COARSE_TOLERANCE)
         errors.append(problem.errors(without, level))
     return np.concatenate(errors)
 
@@ -255,7 +255,7 @@ def levels_of(problem: JointProblem) -> list[list[int]]:
     levels: list[list[int]] = []
     for i in sorted(constant, key=lambda i: problem.parts[i].condition.current_A):
         now = problem.parts[i].condition.current_A
-        if levels and now - problem.parts[levels[-1][0]].condition.current_A <= max(_LEVEL * highest, 1e-3):
+        if levels and now - problem.parts[levels[-1][0]].condition.current_A <= max(_LEVEL_TOLERANCE * highest, 1e-3):
             levels[-1].append(i)
         else:
             levels.append([i])
@@ -266,7 +266,7 @@ def _undetermined(runs: Sequence[Run]) -> dict[str, float]:
     """Parameters that the currents of the tests cannot tell from others: of one level, the rises with current."""
     lowest = min(float(np.min(np.abs(run.coil_current))) for run in runs)
     highest = max(float(np.max(np.abs(run.coil_current))) for run in runs)
-    one_level = highest - lowest <= _LEVEL * highest
+    one_level = highest - lowest <= _LEVEL_TOLERANCE * highest
     return {"fy1": 0.0, "c1": 0.0, "h1": 0.0} if one_level else {}
 
 
@@ -390,7 +390,7 @@ def _by_condition(problem: JointProblem, owner: np.ndarray) -> dict[str, list[np
         if i not in sines:
             rows = np.flatnonzero(owner == i)
             cycles = (part.motion.time[-1] - part.motion.time[0]) * part.condition.frequency_Hz
-            groups += np.array_split(rows, max(4, int(cycles / _BLOCK)))
+            groups += np.array_split(rows, max(4, int(cycles / _BLOCK_CYCLES)))
     if len(groups) > 2:
         rows_by_key["condition"] = groups
     return rows_by_key

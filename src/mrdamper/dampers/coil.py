@@ -17,7 +17,7 @@ from mrdamper.data import Floats
 from mrdamper.errors import ParameterError
 from mrdamper.tracing import Tape, choose
 
-_LONGEST = 10.0  # s; a field that needs longer is no coil's
+_MAX_LAG_S = 10.0  # s; a field that needs longer is no coil's
 
 
 @dataclass(frozen=True)
@@ -94,8 +94,8 @@ class Coil:
 
     def __post_init__(self) -> None:
         for name, value in (("rise_s", self.rise_s), ("fall_s", self.fall_s)):
-            if not 0 <= value <= _LONGEST:
-                raise ParameterError(f"{name} = {value:g} s", where="coil", remedy=f"give 0 to {_LONGEST:g} s")
+            if not 0 <= value <= _MAX_LAG_S:
+                raise ParameterError(f"{name} = {value:g} s", where="coil", remedy=f"give 0 to {_MAX_LAG_S:g} s")
 
     def along(self, time: Floats, current: Floats) -> Floats:
         """(N,) current [A] whose steady field is there at (N,) times [s]; see `field_current`."""

@@ -26,7 +26,7 @@ from mrdamper.identification.covariance import alike_groups, score_covariance
 from mrdamper.identification.intervals import interval_about, relative_width, weaknesses
 from mrdamper.statistics.metrics import dissipated_power, peak_force
 
-_ONE_RUN = 0.6  # share of the information on a parameter from which one run mainly determines it
+_MAX_RUN_SHARE = 0.6  # share of the information on a parameter from which one run mainly determines it
 _MIN_EIGENVALUE = 1e-10  # of the largest of the scaled normal matrix, below which a direction is not determined
 _LEVEL = 0.95  # of the intervals by which a parameter is identifiable or not
 
@@ -206,7 +206,7 @@ def _rest_on_one_run(names: Sequence[str], parts: Sequence[RunResiduals], inform
     return [
         f"{name} is determined mainly by run {parts[r].run.id} ({100 * information[r, i]:.0f} % of its information)"
         for i, (name, r) in enumerate(zip(names, best, strict=True))
-        if information[r, i] > _ONE_RUN
+        if information[r, i] > _MAX_RUN_SHARE
     ]
 
 

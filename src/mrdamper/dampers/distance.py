@@ -15,8 +15,8 @@ import numpy as np
 from mrdamper.data import Condition, Floats, current_levels
 from mrdamper.statistics.functions.motion_hull import MotionHull
 
-_SLACK = 0.02  # of the largest current: sessions repeat a level to some per cent
-_MOST = 400  # samples of a current that are looked at
+_CURRENT_TOLERANCE = 0.02  # of the largest current: sessions repeat a level to some per cent
+_MAX_SAMPLES = 400  # samples of a current that are looked at
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def distance_from(
         The current changed in tests, so that none between the levels is far from them.
     """
     levels = np.unique(current_levels([abs(c.current_A) for c in tested]))
-    between, beyond = _current_distances(np.abs(current[:: max(1, current.size // _MOST)]), levels)
+    between, beyond = _current_distances(np.abs(current[:: max(1, current.size // _MAX_SAMPLES)]), levels)
     frequency, amplitude = MotionHull.of(tested).nearest(at.frequency_Hz, at.amplitude_m)
     motion = np.hypot(np.log(at.frequency_Hz / frequency), np.log(at.amplitude_m / amplitude))
     gaps = 0.0 if any_current else float(np.sqrt(np.mean(between**2)))
@@ -77,5 +77,5 @@ def _current_distances(current: Floats, levels: Floats) -> tuple[Floats, Floats]
     after = np.clip(np.searchsorted(levels, current), 1, max(levels.size - 1, 1))
     lower, upper = levels[after - 1], levels[np.minimum(after, levels.size - 1)]
     between = np.maximum(current - lower, 0) * np.maximum(upper - current, 0) / largest**2
-    beyond = np.maximum(np.maximum(levels[0] - current, current - levels[-1]) / largest - _SLACK, 0)
+    beyond = np.maximum(np.maximum(levels[0] - current, current - levels[-1]) / largest - _CURRENT_TOLERANCE, 0)
     return between, beyond

@@ -9,11 +9,15 @@ import numpy as np
 
 from mrdamper.dampers.joint import JointFit, JointProblem, Valley
 
-_MOST_LEFT_OUT = 0.5  # share of the runs that a search may be without
-_STARTS = 3  # of the model, from which a search goes
-_ROUNDS, _STEPS, _ROUGHLY = 1, 10, 1e-4  # of a search on steady ends, and relative gain of a step at which it ends
-_NEAR = 1.05  # times the smallest error on the remaining runs, up to which a start is followed
-_SETTLED = 1e-4  # relative gain of a step at which a fit without a fold ends
+_MAX_OMITTED_SHARE = 0.5  # share of the runs that a search may be without
+_START_COUNT = 3  # of the model, from which a search goes
+_SEARCH_ROUNDS, _SEARCH_STEPS, _SEARCH_TOLERANCE = (
+    1,
+    10,
+    1e-4,
+)  # of a search on steady ends, and relative gain of a step at which it ends
+_MAX_ERROR_RATIO = 1.05  # times the smallest error on the remaining runs, up to which a start is followed
+_FIT_TOLERANCE = 1e-4  # relative gain of a step at which a fit without a fold ends
 
 
 class FoldFits:
@@ -45,8 +49,8 @@ class FoldFits:
         if block not in self._starts:
             self._starts[block] = self._search(block)
         ends = {float(np.mean(start.nrmse_pp[list(rows)])): start for start in self._starts[block]}
-        able = [start for error, start in ends.items() if error <= _NEAR * min(ends)]
-        return min((self.problem.refit(start, rows, _SETTLED) for start in able), key=lambda fit: fit.error)
+        able = [start for error, start in ends.items() if error <= _MAX_ERROR_RATIO * min(ends)]
+        return min((self.problem.refit(start, rows, _FIT_TOLERANCE) for start in able), key=lambda fit: fit.error)
 
     def _search(self, block: frozenset[int]) -> list[JointFit]:
         """Ends of the search without a block: the best, and the best of other knees that come near it."""
@@ -61,12 +65,12 @@ class FoldFits:
             parts=[whole.parts[i].steady_end() for i in rows],
         )
         ends = [
-            short.fit(start=start, rounds=_ROUNDS, most_steps=_STEPS, settled=_ROUGHLY)
-            for start in short.promising[:_STARTS]
+            short.fit(start=start, rounds=_SEARCH_ROUNDS, most_steps=_SEARCH_STEPS, settled=_SEARCH_TOLERANCE)
+            for start in short.promising[:_START_COUNT]
         ]
         ends.sort(key=lambda end: end.error)
         kept = [ends[0], *(end for end in ends[1:] if Valley.beside(ends[0], [end]))]
-        return [self._in_whole(end) for end in kept[:_STARTS]]
+        return [self._in_whole(end) for end in kept[:_START_COUNT]]
 
     def _in_whole(self, end: JointFit) -> JointFit:
         """The end of a search as a start for fits of this problem."""
@@ -81,7 +85,7 @@ def _blocks(folds: Iterable[Sequence[int]], count: int) -> tuple[frozenset[int],
     """Few sets that contain every fold and at most half of the runs, unless a fold is larger by itself."""
     blocks: list[frozenset[int]] = []
     for fold in sorted((frozenset(fold) for fold in folds), key=len, reverse=True):
-        able = [i for i, block in enumerate(blocks) if len(block | fold) <= _MOST_LEFT_OUT * count or fold <= block]
+        able = [i for i, block in enumerate(blocks) if len(block | fold) <= _MAX_OMITTED_SHARE * count or fold <= block]
         if not able:
             blocks.append(fold)
             continue

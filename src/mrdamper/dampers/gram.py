@@ -29,14 +29,16 @@ from mrdamper.statistics.functions.selection import broken_law, fold_groups, ris
 from mrdamper.statistics.levenberg_marquardt import least_squares, newton_refine
 from mrdamper.statistics.linear import on_one_blas_thread, project_out_columns, robust_weights, solve_linear
 
-_RUNG = 1500 ** (1 / 40)  # from one yield displacement to the next; between them Gram matrices are interpolated
-_LATTICE = 2e-6  # m, one of the rungs, whatever the data
-_SHORTEST = 5e-4  # yield displacement looked for, in the smallest amplitude; the longest is the largest amplitude
-_AT_ONCE = 2**17  # states held at a time
-_SETTLED = 1e-6  # relative gain of a step at which a search ends
-_SAME_WEIGHTS = 1e-3  # change of the robust weights below which another round changes nothing
-_REACH = 6.0  # of a search, in units of a function's terms
-_BEST = 1e-4  # nrmse_pp below which a run gains no more weight
+_GRID_RATIO = 1500 ** (1 / 40)  # from one yield displacement to the next; between them Gram matrices are interpolated
+_GRID_ORIGIN_M = 2e-6  # m, one of the rungs, whatever the data
+_MIN_LENGTH_RATIO = (
+    5e-4  # yield displacement looked for, in the smallest amplitude; the longest is the largest amplitude
+)
+_MAX_STATES = 2**17  # states held at a time
+_SEARCH_TOLERANCE = 1e-6  # relative gain of a step at which a search ends
+_WEIGHT_TOLERANCE = 1e-3  # change of the robust weights below which another round changes nothing
+_SEARCH_RANGE = 6.0  # of a search, in units of a function's terms
+_MIN_ERROR_PP = 1e-4  # nrmse_pp below which a run gains no more weight
 _PASSES = 2  # over all coordinates in the choice of forms
 _RIDGE = 1e-7  # interpolated Gram matrices of nearly parallel columns may lose positivity by less
 
@@ -165,8 +167,10 @@ def _bend(gram: Floats) -> Floats:
 
 def _ladder(amplitudes: Sequence[float]) -> Floats:
     """Rungs [m] from far inside the smallest amplitude to the largest."""
-    low, high = (np.log(v / _LATTICE) / np.log(_RUNG) for v in (_SHORTEST * min(amplitudes), max(amplitudes)))
-    return _LATTICE * _RUNG ** np.arange(np.floor(low), np.ceil(high) + 1)
+    low, high = (
+        np.log(v / _GRID_ORIGIN_M) / np.log(_GRID_RATIO) for v in (_MIN_LENGTH_RATIO * min(amplitudes), max(amplitudes))
+    )
+    return _GRID_ORIGIN_M * _GRID_RATIO ** np.arange(np.floor(low), np.ceil(high) + 1)
 
 
 def _gram(problem: Problem, linear: tuple[str, ...], shape: str, ladder: Floats) -> Floats:
@@ -196,7 +200,7 @@ def _columns(problem: Problem, linear: tuple[str, ...], shape: Mapping[str, floa
 def _gram_of_shapes(problem: Problem, table: Floats, moving: int, shape: Shape, ladder: Floats) -> Floats:
     """The same matrices, all shapes followed at once; only the rows of the moving column differ."""
     grams = np.stack([table.T @ table] * ladder.size)
-    few = max(1, _AT_ONCE // len(problem.motion))
+    few = max(1, _MAX_STATES // len(problem.motion))
     for begin in range(0, ladder.size, few):
         part = slice(begin, begin + few)
         zeta = follow_alike(shape.n, float(shape.rho), 1 / ladder[part], problem.motion.path)[:, problem.scored]
@@ -291,14 +295,14 @@ def fit_jointly(
         return _finish(design, _reweighted(design, data.gram[:, 0], reweightings), {})
     search = _ShapeSearch(design, start, np.ones(data.scale.size))
     centre = np.array(start.coefficients) * search.scale
-    box = centre - _REACH, centre + _REACH
+    box = centre - _SEARCH_RANGE, centre + _SEARCH_RANGE
     last = search
     for _ in range(reweightings):
         centre = least_squares(
-            search.residual, centre, *box, most_steps, _SETTLED, slopes=search.slopes, curved=True
+            search.residual, centre, *box, most_steps, _SEARCH_TOLERANCE, slopes=search.slopes, curved=True
         ).point
-        weights = robust_weights(search.solution(centre).nrmse_pp, _BEST)
-        settled = np.max(np.abs(weights / search.weights - 1)) < _SAME_WEIGHTS
+        weights = robust_weights(search.solution(centre).nrmse_pp, _MIN_ERROR_PP)
+        settled = np.max(np.abs(weights / search.weights - 1)) < _WEIGHT_TOLERANCE
         last, search = search, search.weighted(weights)
         if settled:
             break
@@ -308,7 +312,7 @@ def fit_jointly(
     function = ParameterFunction(start.form, tuple((centre / search.scale).tolist()), start.rates, log=True)
     fit = _finish(design, solution, {data.shape: function})
     reached, ends = search.shape_values(centre), data.ladder[[0, -1]]
-    outside = np.any((reached <= ends[0] * _RUNG**0.01) | (reached >= ends[1] / _RUNG**0.01))
+    outside = np.any((reached <= ends[0] * _GRID_RATIO**0.01) | (reached >= ends[1] / _GRID_RATIO**0.01))
     return replace(fit, at_bounds=(data.shape,)) if outside else fit
 
 
@@ -327,7 +331,7 @@ def leave_out_errors(
         else np.full(data.scale.size, data.ladder[0])
     )
     table, _ = design.table(data.at(shapes)[0])
-    weights = robust_weights(fit.nrmse_pp, _BEST)
+    weights = robust_weights(fit.nrmse_pp, _MIN_ERROR_PP)
     errors = np.zeros(data.scale.size)
     for group in groups:
         kept = weights.copy()
@@ -449,7 +453,7 @@ def _reweighted(design: _Design, gram: Floats, reweightings: int) -> _Solution:
     table, _ = design.table(gram)
     solution = _solve(table, np.ones(gram.shape[0]))
     for _ in range(reweightings):
-        solution = _solve(table, robust_weights(solution.nrmse_pp, _BEST))
+        solution = _solve(table, robust_weights(solution.nrmse_pp, _MIN_ERROR_PP))
     return solution
 
 

@@ -30,15 +30,18 @@ from mrdamper.statistics.levenberg_marquardt import Minimum, least_squares, newt
 from mrdamper.statistics.linear import on_one_blas_thread
 
 RISE, FALL = "coil.rise_s", "coil.fall_s"  # names of the coil's lags on the search axes
-_SETTLED = 1e-6  # relative gain of a step at which the search ends
-_LAGS, _LAG = (1e-4, 0.2), 8e-3  # of a coil's field [s]
-_FEW, _FEW_STEPS = 6, 5  # runs on which starts are tried, and steps from each
-_AGAIN, _AGAIN_STEPS = 5e-4, 15  # relative gain of a step at which a fit without some runs ends, and its steps
-_CLEARLY = 0.85  # share of the first start's cost that another one must come below
-_BETTER = 0.995  # share of the first end's error that another one must come below
-_REMEMBERED = 8  # linearisations
-_OTHER_KNEE = 0.1  # relative difference from which knees are two
-_NEARLY = 1.25  # times the error: a valley that describes the tests nearly as well
+_SEARCH_TOLERANCE = 1e-6  # relative gain of a step at which the search ends
+_LAG_BOUNDS_S, _START_LAG_S = (1e-4, 0.2), 8e-3  # of a coil's field [s]
+_TRIAL_RUNS, _TRIAL_STEPS = 6, 5  # runs on which starts are tried, and steps from each
+_REFIT_TOLERANCE, _REFIT_STEPS = (
+    5e-4,
+    15,
+)  # relative gain of a step at which a fit without some runs ends, and its steps
+_MAX_COST_RATIO = 0.85  # share of the first start's cost that another one must come below
+_MAX_ERROR_RATIO = 0.995  # share of the first end's error that another one must come below
+_CACHED_LINEARISATIONS = 8  # linearisations
+_MIN_YIELD_DIFFERENCE = 0.1  # relative difference from which knees are two
+_MAX_RUNNER_UP_RATIO = 1.25  # times the error: a valley that describes the tests nearly as well
 
 
 @dataclass(frozen=True)
@@ -204,9 +207,11 @@ class Valley:
     def beside(cls, chosen: JointFit, ends: Iterable[JointFit]) -> Valley | None:
         """The best of some ends of a search that differ from the chosen one, if any."""
         own = chosen.damper.knee
-        others = [(e.error, k) for e in ends if (k := e.damper.knee) and own and abs(k - own) > _OTHER_KNEE * own]
+        others = [
+            (e.error, k) for e in ends if (k := e.damper.knee) and own and abs(k - own) > _MIN_YIELD_DIFFERENCE * own
+        ]
         error, knee = min(others, default=(np.inf, 0.0))
-        return cls(knee, error, own, chosen.error) if own and error < _NEARLY * chosen.error else None
+        return cls(knee, error, own, chosen.error) if own and error < _MAX_RUNNER_UP_RATIO * chosen.error else None
 
 
 class JointProblem:
@@ -260,7 +265,7 @@ class JointProblem:
         self.given_coil: Coil | Literal["determined"] | None = coil
         self.coil = None if coil == "determined" else coil
         if coil == "determined" and any(part.changes for part in self.parts):
-            self.axes += tuple(SearchAxis(name, *_LAGS, (_LAG,), log=True) for name in (RISE, FALL))
+            self.axes += tuple(SearchAxis(name, *_LAG_BOUNDS_S, (_START_LAG_S,), log=True) for name in (RISE, FALL))
 
     def with_free(self, free: Sequence[str], fixed: Mapping[str, float] | None = None) -> JointProblem:
         """The same runs with other presets free, or more parameters held."""
@@ -301,22 +306,22 @@ class JointProblem:
         kinds = [np.flatnonzero(lengths == d) for d in dict.fromkeys(lengths.tolist())]
         ends = [self._downhill(grid[min(kind, key=costs.__getitem__)]) for kind in kinds]
         first = ends[0]
-        ends.sort(key=lambda end: _CLEARLY * end.cost if end is first else end.cost)
+        ends.sort(key=lambda end: _MAX_COST_RATIO * end.cost if end is first else end.cost)
         return [end.point for end in ends]
 
     @cached_property
     def _few(self) -> Table:
         """A few runs on which starts are tried."""
-        few = self.parts[:: max(1, len(self.parts) // _FEW)]
+        few = self.parts[:: max(1, len(self.parts) // _TRIAL_RUNS)]
         return Table(self, [part.steady_end() for part in few])
 
     def _downhill(self, start: Floats) -> Minimum:
         """Some steps from a start, on few runs."""
         table = self._few
-        return least_squares(table.solved_residual, start, *self.box(), _FEW_STEPS, 1e-3, slopes=table.slopes)
+        return least_squares(table.solved_residual, start, *self.box(), _TRIAL_STEPS, 1e-3, slopes=table.slopes)
 
     def search(
-        self, start: Floats | None = None, rounds: int = 3, most_steps: int = 25, settled: float = _SETTLED
+        self, start: Floats | None = None, rounds: int = 3, most_steps: int = 25, settled: float = _SEARCH_TOLERANCE
     ) -> JointFit:
         """Identify from the two most promising of the model's starts, and from another if one is given.
 
@@ -334,7 +339,7 @@ class JointProblem:
         """
         starts = [*self.promising[:2], *([] if start is None else [self._downhill(start).point])]
         ends = [self.fit(start=u, rounds=rounds, most_steps=most_steps, settled=settled) for u in starts]
-        best = min(ends, key=lambda end: _BETTER * end.error if end is ends[0] else end.error)
+        best = min(ends, key=lambda end: _MAX_ERROR_RATIO * end.error if end is ends[0] else end.error)
         return replace(best, second=Valley.beside(best, ends))
 
     @on_one_blas_thread
@@ -344,7 +349,7 @@ class JointProblem:
         start: Floats | None = None,
         rounds: int = 3,
         most_steps: int = 25,
-        settled: float = _SETTLED,
+        settled: float = _SEARCH_TOLERANCE,
         *,
         to_the_last_digit: bool = False,
     ) -> JointFit:
@@ -379,7 +384,7 @@ class JointProblem:
         to_the_last_digit: bool = False,
     ) -> JointFit:
         """Search in rounds, with weights by the errors the last one left."""
-        evaluations, ending, curved = 0, StopReason.SOLVED, settled < _SETTLED
+        evaluations, ending, curved = 0, StopReason.SOLVED, settled < _SEARCH_TOLERANCE
         for left in reversed(range(rounds)):
             if self.axes:
                 solution = least_squares(
@@ -403,7 +408,7 @@ class JointProblem:
         )
 
     @on_one_blas_thread
-    def refit(self, fit: JointFit, rows: Sequence[int], settled: float = _AGAIN) -> JointFit:
+    def refit(self, fit: JointFit, rows: Sequence[int], settled: float = _REFIT_TOLERANCE) -> JointFit:
         """Fit some of the runs, from the fit to all: what leaving out the others asks for.
 
         First to where the derivatives known from the fit to all lead, which costs no force; then with
@@ -427,7 +432,7 @@ class JointProblem:
         if costs[1] > costs[0]:  # far from where the derivatives hold
             point = fit.point
         table.weigh(table.solve(point).nrmse_pp)
-        return self._search(table, [self.parts[i] for i in rows], point, 1, _AGAIN_STEPS, settled, begin)
+        return self._search(table, [self.parts[i] for i in rows], point, 1, _REFIT_STEPS, settled, begin)
 
     def linearised(self, fit: JointFit) -> Linearised:
         """All runs linearised at a fit, weighted by the errors it left; remembered for the last fits."""
@@ -436,7 +441,7 @@ class JointProblem:
             table = Table(self, self.parts)
             table.weigh(fit.nrmse_pp)
             linearisation = Linearised(table, fit.point, *table.linearise(fit.point, fit.damper.model))
-            self._linearisations = [*self._linearisations[1 - _REMEMBERED :], (fit, linearisation)]
+            self._linearisations = [*self._linearisations[1 - _CACHED_LINEARISATIONS :], (fit, linearisation)]
         return linearisation
 
     _linearisations: Sequence[tuple[JointFit, Linearised]] = ()

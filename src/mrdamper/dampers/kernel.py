@@ -18,10 +18,10 @@ from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.identification import Identification
 from mrdamper.physics.motion import Excitation
 
-_CENTRES = 200
+_MAX_CENTRES = 200
 _WIDTH = 1.2  # of a kernel, in standard deviations of the inputs
 _RIDGE = 1e-3
-_SLOW = 5e-3  # m/s; below it velocity counts straight, above it by its logarithm
+_LINEAR_VELOCITY_M_S = 5e-3  # m/s; below it velocity counts straight, above it by its logarithm
 _SEED = 20240813
 _INPUTS = 4
 
@@ -131,7 +131,7 @@ class KernelDamper(Damper):
         trust /= trust.mean()
         mean = float(np.average(force, weights=trust**2))
         size = float(np.std(force))
-        pick = np.random.default_rng(_SEED).choice(len(inputs), min(_CENTRES, len(inputs)), replace=False)
+        pick = np.random.default_rng(_SEED).choice(len(inputs), min(_MAX_CENTRES, len(inputs)), replace=False)
         centres = inputs[np.sort(pick)]
         table = _kernel(inputs, centres) * trust[:, None]
         normal = table.T @ table / len(inputs) + _RIDGE * _kernel(centres, centres) / len(centres)
@@ -160,7 +160,7 @@ class KernelDamper(Damper):
 
 def _inputs(motion: Excitation) -> Floats:
     """Displacement, bent velocity, acceleration, current, one row a sample."""
-    bent = np.arcsinh(motion.velocity / _SLOW)
+    bent = np.arcsinh(motion.velocity / _LINEAR_VELOCITY_M_S)
     return np.column_stack([motion.displacement, bent, motion.acceleration, motion.current])
 
 

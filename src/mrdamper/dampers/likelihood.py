@@ -26,10 +26,10 @@ from mrdamper.data import Floats, Run
 from mrdamper.errors import InputError
 from mrdamper.physics.motion import Excitation
 
-CROSSED = 3.84  # fall of twice the logarithm at which a 95 % interval ends: chi squared of one
-_FORGETS = 20  # samples before those that count: a run has turned by then
-_POINTS, _REACH = 12, 4.0  # of a profile to either side, and how many standard errors it goes
-_TRIES, _SETTLED = 12, 1e-3  # steps of the other numbers at one point; gain at which they rest
+CHI_SQUARED_95 = 3.84  # fall of twice the logarithm at which a 95 % interval ends: chi squared of one
+_MEMORY_SAMPLES = 20  # samples before those that count: a run has turned by then
+_PROFILE_POINTS, _PROFILE_RANGE = 12, 4.0  # of a profile to either side, and how many standard errors it goes
+_MAX_STEPS, _TOLERANCE = 12, 1e-3  # steps of the other numbers at one point; gain at which they rest
 
 Kind = Literal["bounded", "one-sided", "flat"]
 
@@ -123,7 +123,7 @@ class Likelihood:
     @cached_property
     def _strung(self) -> tuple[Excitation, NDArray[np.intp], Excitation] | None:
         """All runs in one motion, followed faster than many short ones; None where one does not forget the other."""
-        if self.damper.one_model is None or min(int(p.picked[0]) for p in self.parts) < _FORGETS:
+        if self.damper.one_model is None or min(int(p.picked[0]) for p in self.parts) < _MEMORY_SAMPLES:
             return None
         motions = [self.damper.with_field_current(p.prediction.motion) for p in self.parts]
         begins = np.cumsum([0, *(len(m) for m in motions)])[:-1]
@@ -191,7 +191,7 @@ def profile(likelihood: Likelihood, name: str) -> Profile:
     if own is None:
         names = ", ".join(likelihood.damper.fitted_parameters)
         raise InputError(f"no number {name}", remedy=f"known: {names}", code="E_CERTAINTY")
-    if name not in likelihood.names or name in (likelihood.damper.certainty or _NONE).unknown:
+    if name not in likelihood.names or name in (likelihood.damper.certainty or _NO_PARAMETERS).unknown:
         flat = np.array([own.value])
         return Profile(name, own.unit, flat, np.zeros(1), own.value, (-np.inf, np.inf), "flat")
     i = likelihood.names.index(name)
@@ -199,15 +199,15 @@ def profile(likelihood: Likelihood, name: str) -> Profile:
     points, falls = [likelihood.start], [likelihood(likelihood.start)]
     for side in (-1.0, 1.0):
         at = likelihood.start
-        for step in range(1, _POINTS + 1):
-            u = likelihood.start[i] + side * error * _REACH * step / _POINTS
+        for step in range(1, _PROFILE_POINTS + 1):
+            u = likelihood.start[i] + side * error * _PROFILE_RANGE * step / _PROFILE_POINTS
             u = float(np.clip(u, *likelihood.bounds[i]))
             if not np.isfinite(u) or u == at[i]:
                 break
             at, fall = _others(likelihood, i, u, at)
             points.append(at)
             falls.append(fall)
-            if fall > 3 * CROSSED:
+            if fall > 3 * CHI_SQUARED_95:
                 break
     order = np.argsort([p[i] for p in points])
     us, fall = np.array([points[k][i] for k in order]), np.array([falls[k] for k in order])
@@ -224,7 +224,7 @@ def profile(likelihood: Likelihood, name: str) -> Profile:
     return Profile(name, own.unit, values, fall, own.value, (ends[0], ends[1]), kind)
 
 
-_NONE = Certainty((), (), np.zeros((0, 0)), np.zeros(0))
+_NO_PARAMETERS = Certainty((), (), np.zeros((0, 0)), np.zeros(0))
 
 
 def _others(likelihood: Likelihood, held: int, value: float, start: Floats) -> tuple[Floats, float]:
@@ -238,7 +238,7 @@ def _others(likelihood: Likelihood, held: int, value: float, start: Floats) -> t
     at[held] = value
     at = np.clip(at, likelihood.bounds[:, 0], likelihood.bounds[:, 1])
     e = likelihood.score(at)
-    for _ in range(_TRIES):
+    for _ in range(_MAX_STEPS):
         step, share, better = solve @ e, 1.0, None
         while share > 0.05:
             there = at.copy()
@@ -253,18 +253,18 @@ def _others(likelihood: Likelihood, held: int, value: float, start: Floats) -> t
             break
         gain = float(e @ e - better[1] @ better[1])
         at, e = better
-        if gain < _SETTLED:
+        if gain < _TOLERANCE:
             break
     return at, float(e @ e)
 
 
 def _crossing(values: Floats, fall: Floats) -> float:
-    """Where a fall first reaches `CROSSED` along a side; infinite if it does not."""
-    over = np.flatnonzero(fall >= CROSSED)
+    """Where a fall first reaches `CHI_SQUARED_95` along a side; infinite if it does not."""
+    over = np.flatnonzero(fall >= CHI_SQUARED_95)
     if not over.size or over[0] == 0:
         return float(np.sign(values[-1] - values[0]) or 1.0) * np.inf if not over.size else float(values[0])
     k = int(over[0])
     # The fall is a parabola nearly: straight in its root.
     root = np.sqrt(np.maximum(fall, 0))
-    share = (np.sqrt(CROSSED) - root[k - 1]) / (root[k] - root[k - 1])
+    share = (np.sqrt(CHI_SQUARED_95) - root[k - 1]) / (root[k] - root[k - 1])
     return float(values[k - 1] + share * (values[k] - values[k - 1]))

@@ -27,7 +27,7 @@ from mrdamper.statistics.functions.forms import FORMS, ParameterFunction, featur
 from mrdamper.statistics.functions.motion_hull import MotionHull
 
 _RATES = (0.4, 0.8, 1.5, 2.5, 4.0)  # of decaying laws, times the largest current [-]
-_APART = 1.2  # highest over lowest frequency from which a mass is told from a stiffness [-]
+_MIN_FREQUENCY_RATIO = 1.2  # highest over lowest frequency from which a mass is told from a stiffness [-]
 
 
 @dataclass(frozen=True)
@@ -326,7 +326,7 @@ def _tells_inertia(model_type: type[Model], conditions: Sequence[Condition]) -> 
     """Whether a mass can be told from a stiffness: the model has one, and the frequencies of the tests differ."""
     frequencies = [c.frequency_Hz for c in conditions]
     has_mass = any(info.name == "m" and info.linear for info in model_type.parameters())
-    return has_mass and max(frequencies) > _APART * min(frequencies)
+    return has_mass and max(frequencies) > _MIN_FREQUENCY_RATIO * min(frequencies)
 
 
 def _dissipating(model_type: type[Model]) -> dict[str, str]:

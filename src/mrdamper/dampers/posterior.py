@@ -11,9 +11,9 @@ from mrdamper.dampers.likelihood import Likelihood, positive
 from mrdamper.data import Floats
 from mrdamper.errors import InputError, MissingExtraError
 
-_TAILS = 5.0  # degrees of freedom of the proposals
-_THROWN = 0.2  # of a chain: where it begins
-_TIMES, _RHAT = 50, 1.01  # autocorrelation times a chain must hold, and split-R̂ it may have
+_PROPOSAL_DOF = 5.0  # degrees of freedom of the proposals
+_BURN_IN_SHARE = 0.2  # of a chain: where it begins
+_MIN_AUTOCORRELATION_TIMES, _MAX_RHAT = 50, 1.01  # autocorrelation times a chain must hold, and split-R̂ it may have
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,12 +74,14 @@ def posterior(likelihood: Likelihood, steps: int = 2000, walkers: int = 0, seed:
     def wide(points: Floats) -> Floats:
         """Logarithm of the density the proposals come from: Student's t of five degrees."""
         return (
-            -0.5 * (_TAILS + size) * np.log1p(np.sum(((points - likelihood.start) @ inverse.T) ** 2, axis=1) / _TAILS)
+            -0.5
+            * (_PROPOSAL_DOF + size)
+            * np.log1p(np.sum(((points - likelihood.start) @ inverse.T) ** 2, axis=1) / _PROPOSAL_DOF)
         )
 
     def propose(points: Floats, random) -> tuple[Floats, Floats]:
         shape = points.shape
-        scale = np.sqrt(_TAILS / random.chisquare(_TAILS, shape[0]))
+        scale = np.sqrt(_PROPOSAL_DOF / random.chisquare(_PROPOSAL_DOF, shape[0]))
         new = likelihood.start + (random.standard_normal(shape) * scale[:, None]) @ root.T
         return new, wide(points) - wide(new)
 
@@ -89,10 +91,12 @@ def posterior(likelihood: Likelihood, steps: int = 2000, walkers: int = 0, seed:
     sampler = emcee.EnsembleSampler(count, size, lambda u: -0.5 * likelihood(u), moves=moves)
     sampler.random_state = np.random.RandomState(seed).get_state()
     sampler.run_mcmc(begin, steps, skip_initial_state_check=True)
-    kept: Floats = np.asarray(sampler.get_chain(discard=int(_THROWN * steps)), dtype=float)  # (steps, walkers, P)
+    kept: Floats = np.asarray(
+        sampler.get_chain(discard=int(_BURN_IN_SHARE * steps)), dtype=float
+    )  # (steps, walkers, P)
     time = float(np.max(emcee.autocorr.integrated_time(kept, tol=0)))
     rhat = split_rhat(kept)
-    if not (len(kept) > _TIMES * time and rhat <= _RHAT):
+    if not (len(kept) > _MIN_AUTOCORRELATION_TIMES * time and rhat <= _MAX_RHAT):
         raise InputError(
             f"not converged: {len(kept)} steps of {time:.0f} autocorrelation times each, split-R̂ {rhat:.3f}",
             remedy=f"take {int(70 * time * 1.25)} steps or more; more than 50 times and 1.01 at most are asked for",

@@ -20,7 +20,7 @@ from mrdamper.data import SESSIONS_NEEDED, Floats
 _MIN_RETAINED = 0.05  # share of a variance that the fit must have left in the residuals for it to be estimated
 _MAX_CONDITION = 100.0  # condition number of the moment equations; beyond, runs and sessions are not separated
 _DRAWS, _ROUNDS, _SEED = 600, 4, 20240813  # draws of gains and offsets; rounds of weights, as in the joint fit
-_LEAST_ERROR = 1e-3  # nrmse_pp below which a run gains no more weight, as in the joint fit
+_MIN_ERROR_PP = 1e-3  # nrmse_pp below which a run gains no more weight, as in the joint fit
 
 
 @dataclass(frozen=True)
@@ -216,5 +216,5 @@ class GainsAndOffsets:
             moved = np.linalg.solve(normal / unit[:, :, None] / unit[:, None, :], right[:, :, None])[:, :, 0] / unit
             left = np.concatenate([np.broadcast_to(moved[:, None, :], (len(shift), count, size)), -shift], axis=2)
             squares = np.einsum("drp,rpq,drq->dr", left, grams, left, optimize=True) + rest
-            weight = 1 / np.maximum(np.sqrt(np.maximum(squares, 0)) / scale, _LEAST_ERROR)
+            weight = 1 / np.maximum(np.sqrt(np.maximum(squares, 0)) / scale, _MIN_ERROR_PP)
         return moved.T @ moved / len(shift)

@@ -10,10 +10,10 @@ import numpy as np
 from mrdamper.dampers.base import Damper, Prediction
 from mrdamper.data import Floats, Run, session_of
 
-_ROWS = 400  # samples of a run that enter
+_MAX_SAMPLES = 400  # samples of a run that enter
 _CYCLES = 4  # of a sine that enter, as in the joint fit
 _WARM_UP = 1.5  # cycles before them in which the model forgets its start
-_LEAST_ERROR = 1e-3  # nrmse_pp below which a run gains no more weight, as in the joint fit
+_MIN_ERROR_PP = 1e-3  # nrmse_pp below which a run gains no more weight, as in the joint fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,12 +59,12 @@ class RunResiduals:
             begin = int(np.searchsorted(run.time, run.time[first] - _WARM_UP * period))
             short = replace(prediction, motion=prediction.motion.part(slice(begin, last + 1)))
             prediction = replace(short, force=damper.force_for(short))
-        measured = run.force[first : last + 1 : max(1, (last + 1 - first) // _ROWS)]
-        picked = np.arange(first, last + 1, max(1, (last + 1 - first) // _ROWS)) - begin
+        measured = run.force[first : last + 1 : max(1, (last + 1 - first) // _MAX_SAMPLES)]
+        picked = np.arange(first, last + 1, max(1, (last + 1 - first) // _MAX_SAMPLES)) - begin
         residual = prediction.force[picked] - measured
         scale = float(np.ptp(run.force[first : last + 1])) or 1.0
         error = float(np.sqrt(np.mean(residual**2))) / scale
-        weight = 1 / (scale * np.sqrt(picked.size) * np.sqrt(max(error, _LEAST_ERROR)))
+        weight = 1 / (scale * np.sqrt(picked.size) * np.sqrt(max(error, _MIN_ERROR_PP)))
         frequency = prediction.condition.frequency_Hz if prediction.is_sine else None
         return cls(run, session_of(run), prediction, picked, residual, scale, weight, frequency)
 

@@ -25,9 +25,11 @@ if TYPE_CHECKING:
 STRICT = {"extra": "forbid", "allow_inf_nan": False}  # of what is read from a saved model
 P = TypeVar("P")  # a prediction
 UNKNOWN, KNOWN = "unknown", "known"  # session of a score: predicted as it is, or corrected by other runs of the day
-_HOURS = (0.5, 1.0, 2.0, 4.0, 8.0)  # over which what an hour shares is forgotten
-_LEAST = 0.2  # of the spread: each run has at least so much of its own, for the model misses every condition anew
-_NEEDED = "record a condition twice a day, on three days or more; state recorded_at or session in runs.csv"
+_CORRELATION_HOURS = (0.5, 1.0, 2.0, 4.0, 8.0)  # over which what an hour shares is forgotten
+_MIN_RUN_SHARE = (
+    0.2  # of the spread: each run has at least so much of its own, for the model misses every condition anew
+)
+_REMEDY = "record a condition twice a day, on three days or more; state recorded_at or session in runs.csv"
 
 
 @dataclass(frozen=True)
@@ -131,7 +133,7 @@ class Spread:
         """Mean and standard deviation of a run's value about zero, those of others being known."""
         if not len(others) or self.total == 0:
             return 0.0, self.total
-        own = max(self.run, _LEAST * self.total) ** 2
+        own = max(self.run, _MIN_RUN_SHARE * self.total) ** 2
         k = self.covariance([at], others)[0]
         K = self.covariance(others, others) + own * np.eye(len(others))
         solved = np.linalg.solve(K, np.column_stack([values, k]))
@@ -152,8 +154,8 @@ class Spread:
             good = (sign > 0) & (scale > 0)
             return np.where(good, log + size * np.log(np.where(good, scale, 1.0)), np.inf), np.where(good, scale, 0.0)
 
-        best = (np.inf, cls(0.0, 0.0, float(np.sqrt(np.mean(values**2))), _HOURS[0]))
-        for hours in _HOURS:
+        best = (np.inf, cls(0.0, 0.0, float(np.sqrt(np.mean(values**2))), _CORRELATION_HOURS[0]))
+        for hours in _CORRELATION_HOURS:
             near = cls(0.0, 1.0, 0.0, hours).covariance(when, when)
             np.fill_diagonal(near, 1.0)
             for start in ((1.0, 1.0), (1.0, 0.01), (0.01, 1.0), (0.01, 0.01)):
@@ -251,7 +253,7 @@ class Sessions:
         if count < SESSIONS_NEEDED or count == len(names):
             reason = "every session holds one run" if count >= SESSIONS_NEEDED else f"{count} known sessions"
             raise InputError(
-                f"{reason}: the scatter between sessions cannot be estimated", remedy=_NEEDED, code="E_SESSION"
+                f"{reason}: the scatter between sessions cannot be estimated", remedy=_REMEDY, code="E_SESSION"
             )
         gain = Spread.likeliest(when, np.array([r.gain - 1 for r in left_out]))
         offset = Spread.likeliest(when, np.array([r.offset for r in left_out]))
@@ -309,7 +311,7 @@ def sessions_known(damper: Damper, runs: Iterable[Run] = (), own: bool = False) 
         raise InputError(
             "its tests could not tell what runs of a session share",
             where=damper.title,
-            remedy=_NEEDED,
+            remedy=_REMEDY,
             code="E_SESSION",
         )
     return sessions.seen(damper, runs, own)

@@ -11,7 +11,7 @@ from mrdamper.dampers.base import Damper, Prediction
 from mrdamper.data import Floats
 from mrdamper.identification.columns import linear_table
 
-_STEP = 1e-4  # of a number
+_RELATIVE_STEP = 1e-4  # of a number
 
 
 def force_slopes(damper: Damper, prediction: Prediction, names: Sequence[str]) -> Floats:
@@ -55,7 +55,7 @@ def _linear(damper: Damper, prediction: Prediction, names: Sequence[str]) -> dic
 
 def _moved(damper: Damper, prediction: Prediction, name: str) -> Floats:
     own = damper.fitted_parameters[name]
-    step = _STEP if own.log else _STEP * (abs(own.value) or 1.0)
+    step = _RELATIVE_STEP if own.log else _RELATIVE_STEP * (abs(own.value) or 1.0)
     there = own.value * np.exp(step) if own.log else own.value + step
     if there > own.bounds[1]:
         step, there = -step, own.value * np.exp(-step) if own.log else own.value - step

@@ -28,18 +28,22 @@ if TYPE_CHECKING:
     from mrdamper.dampers.protocols import SearchSpace
 
 _ROWS = 400  # samples of a steady run that enter the least squares, about
-_TURNING, _RUNNING, _RESTING = 400, 60, 15  # samples of a cycle that are followed: where it turns, runs on, rests
-_SLOW = 0.4  # of the peak velocity, below which a motion turns
-_AT_REST = 0.05  # cycles of rest around a sample at which nothing turns any more
-_CURRENT_MOVES = 1e-3  # of the largest current; where it changes by more, every sample is followed
-_TRANSIENT = 0.1  # weight of what lies outside a steady window, ramps and rests, against what lies inside
+_SAMPLES_TURNING, _SAMPLES_RUNNING, _SAMPLES_RESTING = (
+    400,
+    60,
+    15,
+)  # samples of a cycle that are followed: where it turns, runs on, rests
+_TURNING_VELOCITY_RATIO = 0.4  # of the peak velocity, below which a motion turns
+_REST_CYCLES = 0.05  # cycles of rest around a sample at which nothing turns any more
+_CURRENT_TOLERANCE = 1e-3  # of the largest current; where it changes by more, every sample is followed
+_TRANSIENT_WEIGHT = 0.1  # weight of what lies outside a steady window, ramps and rests, against what lies inside
 _CYCLES = 4  # of a sine that enter: more repeat the same
 _WARM_UP = 1.5  # cycles before the scored samples in which the model forgets its start
-_BEST = 1e-3  # nrmse_pp below which a run gains no more weight
-_STILL = 0.01  # share of the peak velocity below which a damper rests
-_FORESEEN = 3  # rounds of weights on derivatives that are known
-_ACROSS = 1e-3  # of the box, over which the last slopes are taken
-_NEARLY = 1e-11  # keeps columns apart that are nearly alike
+_MIN_ERROR_PP = 1e-3  # nrmse_pp below which a run gains no more weight
+_REST_VELOCITY_RATIO = 0.01  # share of the peak velocity below which a damper rests
+_REFIT_ROUNDS = 3  # rounds of weights on derivatives that are known
+_DIFFERENCE_RATIO = 1e-3  # of the box, over which the last slopes are taken
+_RIDGE = 1e-11  # keeps columns apart that are nearly alike
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +95,7 @@ class Part:
         every = max(1, (before.size + after.size) // _ROWS)
         before, after = before[::every], after[::every]
         picked = np.concatenate([before, inside, after])
-        transient = _TRANSIENT if before.size + after.size else 0.0
+        transient = _TRANSIENT_WEIGHT if before.size + after.size else 0.0
         lasting = [_lasting(time[part]) for part in (before, inside, after)]
         outside = float(lasting[0].sum() + lasting[2].sum())
         sizes = (transient / max(outside, 1e-300), 1 / lasting[1].sum(), transient / max(outside, 1e-300))
@@ -135,16 +139,20 @@ def _carrying(motion: Excitation, condition: Condition) -> NDArray[np.bool_]:
     """
     size, duration = len(motion), float(motion.time[-1] - motion.time[0])
     cycle = (size - 1) / (duration * condition.frequency_Hz)  # samples
-    dense = max(1, int(cycle / _TURNING))
-    sparse = dense * max(1, round(cycle / _RUNNING / dense))
+    dense = max(1, int(cycle / _SAMPLES_TURNING))
+    sparse = dense * max(1, round(cycle / _SAMPLES_RUNNING / dense))
     speed = np.abs(motion.velocity) / condition.peak_velocity
-    reach = max(1, int(_AT_REST * cycle))
-    moving = np.cumsum(np.concatenate([np.zeros(reach + 1), speed > _STILL, np.zeros(reach)]))
+    reach = max(1, int(_REST_CYCLES * cycle))
+    moving = np.cumsum(np.concatenate([np.zeros(reach + 1), speed > _REST_VELOCITY_RATIO, np.zeros(reach)]))
     resting = moving[2 * reach + 1 :] == moving[: -2 * reach - 1]
     place = np.arange(size)
-    every = np.where(resting, sparse * round(_RUNNING / _RESTING), np.where(speed < _SLOW, dense, sparse))
+    every = np.where(
+        resting,
+        sparse * round(_SAMPLES_RUNNING / _SAMPLES_RESTING),
+        np.where(speed < _TURNING_VELOCITY_RATIO, dense, sparse),
+    )
     kept = place % every == 0
-    current = np.abs(np.diff(motion.current)) > _CURRENT_MOVES * float(np.max(np.abs(motion.current)))
+    current = np.abs(np.diff(motion.current)) > _CURRENT_TOLERANCE * float(np.max(np.abs(motion.current)))
     kept[:-1] |= current
     kept[1:] |= current
     return kept
@@ -236,7 +244,7 @@ class Table:
 
     def weigh(self, errors: Floats) -> None:
         """Robust weights: the sum of the errors counts, not of their squares; long records by their information."""
-        self.weights = self.information * robust_weights(errors, _BEST)
+        self.weights = self.information * robust_weights(errors, _MIN_ERROR_PP)
         self._solved = None
 
     @property
@@ -298,7 +306,7 @@ class Table:
         """
         solved, weights = self.solve(point), self.weights[self.owner]
         lower, upper = self.problem.box()
-        reach = np.minimum(_ACROSS * (upper - lower), np.minimum(point - lower, upper - point))
+        reach = np.minimum(_DIFFERENCE_RATIO * (upper - lower), np.minimum(point - lower, upper - point))
         slope = np.zeros(point.size)
         for i in np.flatnonzero(reach):
             step = np.where(np.arange(point.size) == i, reach, 0.0)
@@ -356,7 +364,7 @@ class Linearised:
         owner = np.repeat(np.arange(len(runs)), [len(triangle) for triangle in triangles])
         rows, weights = np.concatenate(triangles), self.table.weights[list(runs)]
         errors = np.zeros(0)
-        for _ in range(_FORESEEN):
+        for _ in range(_REFIT_ROUNDS):
             weighted = rows * weights[owner][:, None]
             left = beside(weighted[:, : own.stop], weighted[:, own.stop :])
             start, slopes = left[:, 0], left[:, own]
@@ -365,7 +373,7 @@ class Linearised:
             )
             point = solution.point
             errors = np.sqrt(np.bincount(owner, solution.residual**2)) / weights
-            weights = self.table.information[list(runs)] * robust_weights(errors, _BEST)
+            weights = self.table.information[list(runs)] * robust_weights(errors, _MIN_ERROR_PP)
         return errors, point
 
 
@@ -374,7 +382,7 @@ def beside(slopes: Floats, columns: Floats) -> Floats:
     gram = columns.T @ columns
     scale = np.sqrt(np.diag(gram))
     scale = np.where(scale > 0, scale, 1.0)
-    normal = gram / scale / scale[:, None] + _NEARLY * np.eye(scale.size)
+    normal = gram / scale / scale[:, None] + _RIDGE * np.eye(scale.size)
     taken = columns @ (np.linalg.solve(normal, columns.T @ slopes / scale[:, None]) / scale[:, None])
     return np.subtract(slopes, taken, out=taken)
 

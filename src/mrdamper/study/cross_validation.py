@@ -15,10 +15,13 @@ from mrdamper.errors import InputError
 from mrdamper.physics.motion import equivalent_sine
 from mrdamper.study.validation import RunScore, Validation, leave_out, score_run
 
-_MOTIONS = 0.05  # frequencies and amplitudes this close are one motion
-_FAST = 0.8  # of the largest peak velocity, from which a motion is among the fastest
-_STRETCH, _STRETCHES = 12, 8  # cycles of a long record that are left out together, at least; stretches at most
-_RECORD = "stretch of"  # note of a stretch: the record it was cut from
+_MOTION_TOLERANCE = 0.05  # frequencies and amplitudes this close are one motion
+_FAST_VELOCITY_RATIO = 0.8  # of the largest peak velocity, from which a motion is among the fastest
+_MIN_STRETCH_CYCLES, _MAX_STRETCHES = (
+    12,
+    8,
+)  # cycles of a long record that are left out together, at least; stretches at most
+_STRETCH_NOTE = "stretch of"  # note of a stretch: the record it was cut from
 
 
 def cross_validate(pieces: Sequence[Run], refit: Callable[[Sequence[int]], Damper], title: str) -> Validation:
@@ -85,12 +88,12 @@ def condition_folds(pieces: Sequence[Run]) -> list[list[int]]:
 
 def _fastest(conditions: Sequence[Condition]) -> list[int]:
     """The sines of the largest peak velocities, those of one motion at least; empty where they leave fewer than two."""
-    groups = same_motion(conditions, _MOTIONS) if conditions else []
+    groups = same_motion(conditions, _MOTION_TOLERANCE) if conditions else []
     groups.sort(key=lambda group: -max(conditions[k].peak_velocity for k in group))
     if len(groups) < 3:
         return []
     speeds = [max(conditions[k].peak_velocity for k in group) for group in groups]
-    count = int(np.clip(np.sum(np.array(speeds) >= _FAST * speeds[0]), 1, len(groups) - 2))
+    count = int(np.clip(np.sum(np.array(speeds) >= _FAST_VELOCITY_RATIO * speeds[0]), 1, len(groups) - 2))
     return [k for group in groups[:count] for k in group]
 
 
@@ -122,7 +125,7 @@ def cross_validate_by_kind(
                 damper = refit([i for i in range(len(pieces)) if i not in set(group)])
                 scored += [score_run(damper, pieces[i]) for i in group]
             except InputError as error:
-                refused |= {pieces[i].notes.get(_RECORD, pieces[i].id): str(error) for i in group}
+                refused |= {pieces[i].notes.get(_STRETCH_NOTE, pieces[i].id): str(error) for i in group}
         scores[kind] = replace(_whole_again(Validation(title, tuple(scored)), pieces), refused=refused)
     return scores
 
@@ -132,7 +135,7 @@ def stretches(run: Run) -> list[Run]:
     motion = equivalent_sine(run)
     period = 1 / motion.condition.frequency_Hz
     begin, end = run.window or (float(run.time[0]), float(run.time[-1]))
-    count = min(_STRETCHES, int((end - begin) / period / _STRETCH))
+    count = min(_MAX_STRETCHES, int((end - begin) / period / _MIN_STRETCH_CYCLES))
     if (motion.is_sine and not run.current_changes) or count < 2:
         return [run]
     cuts = np.searchsorted(run.time, np.linspace(begin, end, count + 1))
@@ -140,14 +143,14 @@ def stretches(run: Run) -> list[Run]:
     for number, (first, last) in enumerate(pairwise(cuts.tolist()), 1):
         lead = max(0, int(np.searchsorted(run.time, run.time[first] - 1.5 * period)))
         window = (float(run.time[first]), float(run.time[min(last, run.time.size) - 1]))
-        notes = {**run.notes, _RECORD: run.id}
+        notes = {**run.notes, _STRETCH_NOTE: run.id}
         parts.append(replace(run.part(lead, last), id=f"{run.id} {number}/{count}", window=window, notes=notes))
     return parts
 
 
 def _whole_again(validation: Validation, pieces: Sequence[Run]) -> Validation:
     """One score a record where its stretches were scored one by one."""
-    record = {piece.id: piece.notes.get(_RECORD, piece.id) for piece in pieces}
+    record = {piece.id: piece.notes.get(_STRETCH_NOTE, piece.id) for piece in pieces}
     scored: dict[str, list[RunScore]] = {}
     for score in validation.runs:
         scored.setdefault(record[score.run_id], []).append(score)

@@ -16,7 +16,7 @@ from mrdamper.data import Condition
 from mrdamper.rig_files.limits_file import RIG_LIMITS, LimitsError, require_known_keys
 from mrdamper.rig_files.strict_toml import read_toml_file
 
-_MOST_SAMPLES = 500_000  # of a planned record
+_MAX_SAMPLES = 500_000  # of a planned record
 _RANGES = ("current_A", "frequency_Hz", "amplitude_mm")
 _LEVELS = 4  # of each of them on the grid of candidates
 
@@ -72,9 +72,9 @@ class Limits:
             if not getattr(self, name) > 0:
                 raise bad_limits(f"{name} = {getattr(self, name):g}", "give a number above zero")
         samples = self.cycles / self.frequency_Hz[0] * self.sample_rate_Hz
-        if samples > _MOST_SAMPLES:
+        if samples > _MAX_SAMPLES:
             text = f"a record of {self.cycles:g} cycles at {self.frequency_Hz[0]:g} Hz has {samples:.3g} samples"
-            raise bad_limits(text, f"lower sample_rate_Hz or cycles to at most {_MOST_SAMPLES:,} samples")
+            raise bad_limits(text, f"lower sample_rate_Hz or cycles to at most {_MAX_SAMPLES:,} samples")
         if self.sessions != int(self.sessions):
             raise bad_limits(f"sessions = {self.sessions:g}", "give a whole number")
         if min(self.minutes_between, self.session_minutes, self.force_N) < 0:
@@ -128,7 +128,7 @@ class Limits:
         """The ranges a damper was tested over."""
         e = damper.envelope
         amplitudes = 1e3 * e.amplitude_m[0], 1e3 * e.amplitude_m[1]
-        rate = min(cls.sample_rate_Hz, 0.5 * _MOST_SAMPLES * e.frequency_Hz[0] / cls.cycles)
+        rate = min(cls.sample_rate_Hz, 0.5 * _MAX_SAMPLES * e.frequency_Hz[0] / cls.cycles)
         return cls(e.current_A, e.frequency_Hz, amplitudes, velocity_m_s=e.peak_velocity_m_s[1], sample_rate_Hz=rate)
 
     @property

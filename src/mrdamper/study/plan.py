@@ -29,9 +29,12 @@ from mrdamper.study.recipe import Progress
 
 _SAMPLES = 24  # of a cycle that count; model error leaves fewer independent ones than a rig records
 _DRAWS = 2  # of the parameters, beside the estimate
-_FLOOR = 0.01  # of half the peak-to-peak force: what no record is better than
-_NO_GAIN, _NO_OFFSET = 1e-4, 1e-3  # least spread of sessions: a share, and of half the peak-to-peak force
-_FACTOR = 1.0  # standard deviation of the logarithm of a number that no run could tell
+_MIN_ERROR_RATIO = 0.01  # of half the peak-to-peak force: what no record is better than
+_MIN_SESSION_GAIN, _MIN_SESSION_OFFSET = (
+    1e-4,
+    1e-3,
+)  # least spread of sessions: a share, and of half the peak-to-peak force
+_PRIOR_LOG_DEVIATION = 1.0  # standard deviation of the logarithm of a number that no run could tell
 _LEVEL = 0.9  # of bands
 _SEED = 20240813
 
@@ -142,7 +145,7 @@ class Reckoning:
         by_number = doubt[..., : len(names)]
         goal = np.einsum("cdkp,cdkq->pq", by_number, by_number) / np.prod(doubt.shape[:3])
         logs = [damper.fitted_parameters[name].log for name in names]
-        covariance = np.diag(np.where(logs, _FACTOR**2, 1 / np.maximum(np.diag(goal), 1e-12)))
+        covariance = np.diag(np.where(logs, _PRIOR_LOG_DEVIATION**2, 1 / np.maximum(np.diag(goal), 1e-12)))
         covariance[: len(uncertainty.names), : len(uncertainty.names)] = uncertainty.covariance
         covariance += 1e-12 * np.diag(np.diag(covariance))
         if isinstance(about, str):
@@ -151,10 +154,16 @@ class Reckoning:
             own = damper.fitted_parameters[about]
             goal = np.zeros_like(goal)
             goal[names.index(about), names.index(about)] = 1 if own.log else 1 / (own.value or 1.0) ** 2
-        grams = np.einsum("cdkp,cdkq->cdpq", stacked, stacked) / max(uncertainty.force, _FLOOR) ** 2
+        grams = np.einsum("cdkp,cdkq->cdpq", stacked, stacked) / max(uncertainty.force, _MIN_ERROR_RATIO) ** 2
         half = 1 / float(np.mean(stacked[..., -1]))
         session = (
-            np.array([max(uncertainty.total_gain, _NO_GAIN), max(uncertainty.total_offset, _NO_OFFSET * half)]) ** -2.0
+            np.array(
+                [
+                    max(uncertainty.total_gain, _MIN_SESSION_GAIN),
+                    max(uncertainty.total_offset, _MIN_SESSION_OFFSET * half),
+                ]
+            )
+            ** -2.0
         )
         mean = np.mean(doubt[..., len(names) :] ** 2, axis=(0, 1, 2))
         beside = float(mean @ [uncertainty.total_gain**2, uncertainty.total_offset**2]) + uncertainty.force**2

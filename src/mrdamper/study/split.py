@@ -11,8 +11,8 @@ from mrdamper.errors import InputError, UnknownNameError
 from mrdamper.physics.motion import equivalent_sine
 
 SHARE = 0.2  # of the conditions, by default
-_FEWEST = 2  # conditions to identify from
-_NEAR_A, _NEAR = 0.02, 0.05  # of a current named: [A], and of it
+_MIN_CONDITIONS = 2  # conditions to identify from
+_CURRENT_TOLERANCE_A, _CURRENT_TOLERANCE = 0.02, 0.05  # of a current named: [A], and of it
 
 
 class SplitError(InputError):
@@ -75,7 +75,11 @@ def hold_out(
     if runs:
         reasons.append("by hand")
     for amperes in currents:
-        ids = [run.id for run in dataset if abs(run.mean_current - amperes) <= _NEAR_A + _NEAR * abs(amperes)]
+        ids = [
+            run.id
+            for run in dataset
+            if abs(run.mean_current - amperes) <= _CURRENT_TOLERANCE_A + _CURRENT_TOLERANCE * abs(amperes)
+        ]
         if not ids:
             levels = sorted({round(run.mean_current, 2) for run in dataset})
             raise SplitError(
@@ -97,7 +101,7 @@ def hold_out(
         held, reason = _stratified(condition_of, where)
         reasons.append(reason)
     left = [c for name, c in condition_of.items() if name not in held and c is not None]
-    if held and len(same_condition(left)) < _FEWEST:
+    if held and len(same_condition(left)) < _MIN_CONDITIONS:
         raise SplitError(
             f"{len(same_condition(left))} conditions left to identify from", where=where, remedy="hold fewer runs out"
         )

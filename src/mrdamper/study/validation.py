@@ -16,7 +16,7 @@ from mrdamper.data import Condition, Displayable, Run
 from mrdamper.errors import InputError, RunError, UnknownNameError, checked, require
 from mrdamper.statistics.metrics import Scores, dissipated_power, peak_force, score
 
-_LEAST_SWING = 1e-100  # of a force, and its inverse the most [N]: their squares are numbers
+_MIN_SWING_N = 1e-100  # of a force, and its inverse the most [N]: their squares are numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +175,7 @@ def score_run(damper: Damper, run: Run, sessions: Sessions | None = None) -> Run
         If the run does not move, or its force does not change, or not as a force does.
     """
     swing = float(np.ptp(run.force[run.in_window]))
-    if not _LEAST_SWING < swing < 1 / _LEAST_SWING:
+    if not _MIN_SWING_N < swing < 1 / _MIN_SWING_N:
         text = f"the force changes by {swing:.3g} N" if swing else "the force does not change"
         raise RunError(text, where=f"run {run.id}", remedy="check the channel")
     prediction = damper.predict_run(run)

@@ -48,10 +48,10 @@ from mrdamper.study.recipe import (
 )
 from mrdamper.study.validation import RunScore, Validation, validate
 
-_SAMPLES_A_CYCLE = 8  # below, neither the velocity nor a loop can be told
-_DISTORTED = 0.35  # harmonics over the fundamental: a triangle has 0.12, a square wave 0.48
-_SAME = 1e-4  # of the range: two tests never agree so well, a file written twice does
-_FEWEST = 4  # runs that say what is usual
+_MIN_SAMPLES_PER_CYCLE = 8  # below, neither the velocity nor a loop can be told
+_MAX_DISTORTION = 0.35  # harmonics over the fundamental: a triangle has 0.12, a square wave 0.48
+_DUPLICATE_TOLERANCE = 1e-4  # of the range: two tests never agree so well, a file written twice does
+_MIN_RUNS = 4  # runs that say what is usual
 _SIZES = (
     ("peak-to-peak force", "N", 100, lambda run: float(np.ptp(run.force))),
     ("stroke", "m", 300, lambda run: float(np.ptp(run.displacement))),
@@ -479,7 +479,7 @@ def _are_one_test(run: Run, other: Run) -> bool:
     size = min(run.time.size, other.time.size)
     for channel in ("displacement", "force"):
         one, two = getattr(run, channel)[:size], getattr(other, channel)[:size]
-        near = _SAME * float(np.ptp(one))
+        near = _DUPLICATE_TOLERANCE * float(np.ptp(one))
         if np.abs(one[::97] - two[::97]).max() > near or np.abs(one - two).max() > near:
             return False
     return True
@@ -491,7 +491,7 @@ def _of_another_size(runs: Sequence[Run]) -> dict[str, str]:
     for what, unit, most, size_of in _SIZES:
         sizes = {run.id: size_of(run) for run in runs}
         counted = [size for size in sizes.values() if size > 0]
-        if len(counted) < _FEWEST:
+        if len(counted) < _MIN_RUNS:
             continue
         usual = float(np.median(counted))
         for name, size in sizes.items():
@@ -516,16 +516,16 @@ def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], di
             run.current_A  # noqa: B018
             sine = equivalent_sine(run)
             rate = (run.time.size - 1) / float(run.time[-1] - run.time[0])
-            if sine.is_sine and rate < _SAMPLES_A_CYCLE * sine.condition.frequency_Hz:
+            if sine.is_sine and rate < _MIN_SAMPLES_PER_CYCLE * sine.condition.frequency_Hz:
                 raise IdentificationError(
                     f"{rate / sine.condition.frequency_Hz:.1f} samples per cycle",
                     where=f"run {run.id}",
-                    remedy=f"record at least {_SAMPLES_A_CYCLE}",
+                    remedy=f"record at least {_MIN_SAMPLES_PER_CYCLE}",
                 )
         except InputError as error:
             refused[run.id] = str(error)
             continue
-        if sine.is_sine and analyse_motion(run).distortion < _DISTORTED:
+        if sine.is_sine and analyse_motion(run).distortion < _MAX_DISTORTION:
             sines.append(run)
         else:
             refused[run.id] = "the motion is not a sine, which individual fits require"

@@ -20,8 +20,8 @@ from mrdamper.models import Model
 from mrdamper.physics.motion import sine
 from mrdamper.statistics.levenberg_marquardt import least_squares
 
-_STEPS = 8
-_REACH = 0.8  # a coefficient may move by this share of its start, or of one
+_MAX_STEPS = 8
+_COEFFICIENT_RANGE = 0.8  # a coefficient may move by this share of its start, or of one
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,9 @@ class ConditionedDamper(Damper):
             return np.concatenate([piece.residual(damper.model_at(piece.condition)) for piece in pieces])
 
         centre = begin / size
-        solution = least_squares(residual, centre, centre - _REACH, centre + _REACH, most_steps=_STEPS)
+        solution = least_squares(
+            residual, centre, centre - _COEFFICIENT_RANGE, centre + _COEFFICIENT_RANGE, most_steps=_MAX_STEPS
+        )
         return replace(self, coefficients=dict(zip(names, (solution.point * size).tolist(), strict=True)))
 
     @property

@@ -19,8 +19,8 @@ _SEED = 20240813
 _OUTPUTS = ("fy", "kappa", "v0", "c", "k", "f0")
 _LOGARITHMIC = ("fy", "kappa", "v0")
 _INPUTS = 3
-_LARGEST = 20.0  # weight
-_NUDGE = 1e-6 * (2 * _LARGEST)  # of a weight, for derivatives by differences
+_MAX_WEIGHT = 20.0  # weight
+_WEIGHT_STEP = 1e-6 * (2 * _MAX_WEIGHT)  # of a weight, for derivatives by differences
 
 
 class BoadaType(ConditionedDamper):
@@ -128,8 +128,8 @@ def _train(inputs: Floats, targets: Floats) -> Floats:
 
     def slopes(weights: Floats) -> Floats:
         """Forward differences by all weights at once."""
-        moved = weights + _NUDGE * np.eye(count)
-        return np.ascontiguousarray(((residuals(moved) - residuals(weights[None])) / _NUDGE).T)
+        moved = weights + _WEIGHT_STEP * np.eye(count)
+        return np.ascontiguousarray(((residuals(moved) - residuals(weights[None])) / _WEIGHT_STEP).T)
 
-    box = np.full(count, _LARGEST)
+    box = np.full(count, _MAX_WEIGHT)
     return least_squares(lambda w: residuals(w[None])[0], begin, -box, box, most_steps=60, slopes=slopes).point

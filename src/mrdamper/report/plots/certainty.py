@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from mrdamper.dampers.likelihood import CROSSED, Profile
+from mrdamper.dampers.likelihood import CHI_SQUARED_95, Profile
 from mrdamper.dampers.posterior import Samples
 from mrdamper.report.plots.style import PALETTE, WIDTH, house_style, label, new_figure
 
@@ -22,9 +22,9 @@ def profile_curves(profiles: Sequence[Profile]) -> Figure:
         figure, panels = new_figure(rows, columns, 0.9 + 2.1 * rows)
         for axes, found in zip(panels, profiles, strict=False):
             axes.plot(found.values, found.fall, marker=".", color=PALETTE[1])
-            axes.axhline(CROSSED, color=PALETTE[2], lw=0.8)
+            axes.axhline(CHI_SQUARED_95, color=PALETTE[2], lw=0.8)
             axes.axvline(found.estimate, color=PALETTE[0], lw=0.6, ls=":")
-            axes.set_ylim(0, 3 * CROSSED)
+            axes.set_ylim(0, 3 * CHI_SQUARED_95)
             label(axes, f"{found.name} ({found.unit or '–'})", "−2 Δ ln L (–)", found.kind)
         for axes in panels[len(profiles) :]:
             axes.set_visible(False)

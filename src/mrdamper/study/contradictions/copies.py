@@ -14,17 +14,19 @@ import numpy as np
 
 from mrdamper.data import Floats, Run
 
-_MOST_SAMPLES = 2**15  # samples of a run that are compared
+_MAX_SAMPLES = 2**15  # samples of a run that are compared
 _SAME_STROKE = 0.05  # relative difference of the strokes of two records of one test
-_LOOKED_AT = 4000  # samples from which ranges are taken
+_RANGE_SAMPLES = 4000  # samples from which ranges are taken
 _SAME_RANGE = 0.15  # relative difference of their peak-to-peak forces
-_LEAST_OVERLAP = 150  # samples two records have to share
-_LEAST_CORRELATION = 0.35  # of the noise of two copies
-_ABOVE_OWN = 0.25  # by which it exceeds the largest correlation of a run's noise with itself at another time
+_MIN_OVERLAP = 150  # samples two records have to share
+_MIN_CORRELATION = 0.35  # of the noise of two copies
+_MIN_EXCESS_CORRELATION = (
+    0.25  # by which it exceeds the largest correlation of a run's noise with itself at another time
+)
 _SIGNIFICANCE = 9.0  # standard deviations of a correlation by chance
-_MOST_RATIO = 10  # ratio of two sample rates
+_MAX_RATE_RATIO = 10  # ratio of two sample rates
 _PHASES = 8  # parts of a sample by which a run is moved before it is compared at another sample rate
-_EVEN = 0.01  # relative deviation of that ratio from a whole number
+_RATIO_TOLERANCE = 0.01  # relative deviation of that ratio from a whole number
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ def find_copies(runs: Sequence[Run]) -> list[Copy]:
 
 def _ranges(run: Run) -> tuple[float, float]:
     """Range of displacement [m] and force [N], without the outermost samples."""
-    every = slice(None, None, max(1, run.force.size // _LOOKED_AT))
+    every = slice(None, None, max(1, run.force.size // _RANGE_SAMPLES))
     x, force = (np.percentile(values[every], (1, 99)) for values in (run.displacement, run.force))
     return float(np.ptp(x)), float(np.ptp(force))
 
@@ -75,11 +77,11 @@ def _shared_noise(first: Run, second: Run) -> float | None:
     fine, coarse = (first, second) if steps[0] <= steps[1] else (second, first)
     ratio = max(steps) / min(steps)
     every = round(ratio)
-    if every > _MOST_RATIO:
+    if every > _MAX_RATE_RATIO:
         return None
     other = _noise(coarse.force)
     best: float | None = None
-    is_even = abs(ratio / every - 1) <= _EVEN
+    is_even = abs(ratio / every - 1) <= _RATIO_TOLERANCE
     for phase in range(every if is_even else _PHASES):
         if is_even:
             force = fine.force[phase::every]
@@ -93,7 +95,7 @@ def _shared_noise(first: Run, second: Run) -> float | None:
 
 
 def _correlation(a: Floats, b: Floats) -> float | None:
-    if min(a.size, b.size) < _LEAST_OVERLAP:
+    if min(a.size, b.size) < _MIN_OVERLAP:
         return None
     size = 2 ** int(np.ceil(np.log2(a.size + b.size)))
     spectra = [np.fft.rfft(x, size) for x in (a, b)]
@@ -105,13 +107,13 @@ def _correlation(a: Floats, b: Floats) -> float | None:
 
     overlap = over_shifts(there[0], there[1])
     energy = np.sqrt(np.maximum(over_shifts(power[0], there[1]) * over_shifts(there[0], power[1]), 0.0))
-    usable = (overlap > max(_LEAST_OVERLAP, 0.3 * min(a.size, b.size))) & (energy > 0)
+    usable = (overlap > max(_MIN_OVERLAP, 0.3 * min(a.size, b.size))) & (energy > 0)
     if not usable.any():
         return None
     values = np.where(usable, over_shifts(*spectra) / np.where(usable, energy, 1.0), 0.0)
     peak = int(np.argmax(values))
     own = max(_largest_own(x) for x in (a, b))
-    least = max(_LEAST_CORRELATION, own + _ABOVE_OWN, _SIGNIFICANCE / float(np.sqrt(overlap[peak])))
+    least = max(_MIN_CORRELATION, own + _MIN_EXCESS_CORRELATION, _SIGNIFICANCE / float(np.sqrt(overlap[peak])))
     return float(values[peak]) if values[peak] > least else None
 
 
@@ -127,8 +129,8 @@ def _largest_own(noise: Floats) -> float:
 
 def _noise(force: Floats) -> Floats:
     """The highest frequencies of a force, without what stands out of them."""
-    part = force[:_MOST_SAMPLES]
-    if part.size < _LEAST_OVERLAP:
+    part = force[:_MAX_SAMPLES]
+    if part.size < _MIN_OVERLAP:
         return np.zeros(0)
     rest = part[2:-2] - (4 * (part[1:-3] + part[3:-1]) - (part[:-4] + part[4:])) / 6
     limit = 4 * float(np.median(np.abs(rest))) / 0.6745

@@ -24,13 +24,17 @@ _YIELDS = (0.015, 0.06, 0.2, 0.6)  # yield displacements of the stop operators, 
 _VELOCITIES = (0.03, 0.1, 0.3)  # velocities at which friction saturates, relative to the median peak velocity
 _LEADS = (0.1, 0.4)  # displacements that count as velocity in friction, relative to the median amplitude
 _ELEMENTS = 7 + len(_VELOCITIES) + len(_LEADS) + len(_YIELDS)
-_MOST_ELEMENT = 20.0  # size of an element relative to its usual one
-_MOST_NODES = 7  # currents at which coefficients are estimated
-_COMMON, _SLOPE, _BEND = 1.5, 1.5, 0.8  # standard deviations of a coefficient, relative to the median force
-_LENGTH = 0.5  # correlation length of a coefficient over the current, relative to the highest current
+_MAX_ELEMENT = 20.0  # size of an element relative to its usual one
+_MAX_NODES = 7  # currents at which coefficients are estimated
+_COMMON_DEVIATION, _SLOPE_DEVIATION, _BEND_DEVIATION = (
+    1.5,
+    1.5,
+    0.8,
+)  # standard deviations of a coefficient, relative to the median force
+_CORRELATION_LENGTH = 0.5  # correlation length of a coefficient over the current, relative to the highest current
 _MISFIT = 0.05  # standard deviation of the model error, relative to the run's force
-_FLOOR = 0.03  # the same, relative to the median force
-_SAMPLES = 12.0  # independent samples of a run's model error
+_MIN_MISFIT = 0.03  # the same, relative to the median force
+_INDEPENDENT_SAMPLES = 12.0  # independent samples of a run's model error
 
 
 @dataclass(frozen=True)
@@ -209,15 +213,17 @@ class Evidence:
     def weigh(self, run: Products, expected: Floats) -> Moments:
         """Weighted products of a run; its gain multiplies the force of the coefficients expected of it."""
         spread, size = self.spread, run.size
-        level = (_MISFIT * size) ** 2 + _FLOOR**2 * min(1.0, size)
-        weight = _SAMPLES / (run.rows * spread.misfit**2 * level)
+        level = (_MISFIT * size) ** 2 + _MIN_MISFIT**2 * min(1.0, size)
+        weight = _INDEPENDENT_SAMPLES / (run.rows * spread.misfit**2 * level)
         one = run.constant
         mean = float(one @ run.gram @ expected) / run.rows
         shared = np.column_stack([spread.gain * (expected - mean * one), spread.offset * np.sqrt(max(size, 0.1)) * one])
         along = weight * run.gram @ shared
         inner = np.linalg.inv(np.eye(2) + shared.T @ along)
         with_force = weight * shared.T @ run.moment
-        normalisation = _SAMPLES * np.log(spread.misfit**2 * level / size**2) - float(np.linalg.slogdet(inner)[1])
+        normalisation = _INDEPENDENT_SAMPLES * np.log(spread.misfit**2 * level / size**2) - float(
+            np.linalg.slogdet(inner)[1]
+        )
         return Moments(
             weight * run.gram - along @ inner @ along.T,
             weight * run.moment - along @ inner @ with_force,
@@ -238,7 +244,7 @@ class Evidence:
         led = [np.tanh((v + lead * x) / _VELOCITIES[1]) for lead in _LEADS]
         linear = [np.ones(rows.size), x, x * x, v, track.acceleration[rows] / self._acceleration]
         uneven = [np.abs(v), np.abs(friction[1])]
-        table = np.clip(np.column_stack([*linear, *friction, *led, *uneven, stops]), -_MOST_ELEMENT, _MOST_ELEMENT)
+        table = np.clip(np.column_stack([*linear, *friction, *led, *uneven, stops]), -_MAX_ELEMENT, _MAX_ELEMENT)
         over = self.shares(track.current[rows] if track.current_changes else track.current[:1])
         if track.current_changes:
             table = (over[:, :, None] * table[:, None, :]).reshape(rows.size, -1)
@@ -298,14 +304,14 @@ def _nodes(tracks: Sequence[Track]) -> Floats:
         if track.current_changes:
             levels |= set(np.percentile(track.current, (0, 50, 100)).tolist())
     values = np.array(sorted(levels))
-    if values.size > _MOST_NODES:
-        values = np.unique(np.quantile(values, np.linspace(0, 1, _MOST_NODES)))
+    if values.size > _MAX_NODES:
+        values = np.unique(np.quantile(values, np.linspace(0, 1, _MAX_NODES)))
     return values
 
 
 def _root_covariance(nodes: Floats) -> Floats:
     """(K, K) root of the covariance of a coefficient at the nodes."""
     share = nodes / (nodes.max() or 1.0)
-    near = np.exp(-0.5 * ((share[:, None] - share) / _LENGTH) ** 2)
-    covariance = _COMMON**2 + _SLOPE**2 * share[:, None] * share + _BEND**2 * near
+    near = np.exp(-0.5 * ((share[:, None] - share) / _CORRELATION_LENGTH) ** 2)
+    covariance = _COMMON_DEVIATION**2 + _SLOPE_DEVIATION**2 * share[:, None] * share + _BEND_DEVIATION**2 * near
     return np.asarray(np.linalg.cholesky(covariance + 1e-6 * np.eye(nodes.size)), dtype=float)

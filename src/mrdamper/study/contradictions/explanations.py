@@ -18,25 +18,25 @@ Cause = Literal["force", "offset", "current", "displacement", "time", "sign", "d
 FORCE_UNITS = {"lbf": 4.4482216, "kgf": 9.80665, "kN": 1e3, "daN": 10.0, "kip": 4448.2216}  # in newtons
 LENGTH_UNITS = {"inch": 25.4, "cm": 10.0, "m": 1e3, "µm": 1e-3}  # in millimetres
 TIME_UNITS = {"ms": 1e-3, "min": 60.0}  # in seconds
-_NAMED = 0.08  # difference of the logarithms up to which a factor is that of a unit
+_UNIT_TOLERANCE = 0.08  # difference of the logarithms up to which a factor is that of a unit
 _FACTORS = (0.2, 0.25, 0.35, 0.5, 0.7, 1.4, 2.0, 2.8, 4.0, 5.0)  # of displacement or time, beside units
-_MOST_FACTOR = 2e3  # factor of displacement or time between two tested motions
+_MAX_FACTOR = 2e3  # factor of displacement or time between two tested motions
 _SAME_FACTOR = 0.03  # difference of the logarithms of factors that are one
-_CURRENTS = 31  # currents that are tried
+_TRIED_CURRENTS = 31  # currents that are tried
 
 # Logarithms of prior odds against an explanation: one that names a unit, a tested level or a tested motion is simpler.
-_UNIT, _LEVEL, _FREE, _SIGN, _ODD, _ALONE = 4.0, 4.0, 7.0, 4.0, 12.0, 10.0
-_TESTED_MOTION = 5.0  # what a motion of other runs lowers them by, and losing such a motion raises them by
-_EDGE = 14.0  # what the only run at the lowest or highest current raises those of a factor or another current by
+_UNIT_ODDS, _LEVEL_ODDS, _FREE_ODDS, _SIGN_ODDS, _ODD_MOTION_ODDS, _ALONE_ODDS = 4.0, 4.0, 7.0, 4.0, 12.0, 10.0
+_TESTED_MOTION_ODDS = 5.0  # what a motion of other runs lowers them by, and losing such a motion raises them by
+_EDGE_ODDS = 14.0  # what the only run at the lowest or highest current raises those of a factor or another current by
 _USUAL_STEP = 3.0  # the same of the time between two samples
 _SAME_STEP = 0.01  # relative difference of times between samples that are one
 
 # Sizes below which an explanation is no contradiction but what sessions and tests differ by.
-LEAST_FACTOR = 1.25  # of a force or a displacement
-LEAST_OFFSET = 0.2  # of the median half range of the force
-LEAST_CURRENT_EFFECT = 0.12  # RMS change of the force over the run's half range
-LEAST_UNEXPLAINED = 0.1  # RMS error of the force over the run's half range, at the best gain of a session
-_MOST_SESSION = 1.12  # gain of a session against the others
+MIN_FACTOR = 1.25  # of a force or a displacement
+MIN_OFFSET = 0.2  # of the median half range of the force
+MIN_CURRENT_EFFECT = 0.12  # RMS change of the force over the run's half range
+MIN_UNEXPLAINED = 0.1  # RMS error of the force over the run's half range, at the best gain of a session
+_MAX_SESSION_GAIN = 1.12  # gain of a session against the others
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Trial:
         if self.cause != other.cause:
             return False
         if self.cause in ("force", "displacement", "time"):
-            return abs(np.log(self.value / other.value)) < _NAMED
+            return abs(np.log(self.value / other.value)) < _UNIT_TOLERANCE
         return abs(self.value - other.value) <= 0.1 * max(abs(self.value), abs(other.value))
 
 
@@ -123,7 +123,7 @@ class Candidate:
         candidates = []
         for trial, products in self._trials(others):
             if self._is_large(trial, products, others):
-                odds = trial.odds + (_EDGE if trial.cause in ("force", "current") and self._is_edge else 0.0)
+                odds = trial.odds + (_EDGE_ODDS if trial.cause in ("force", "current") and self._is_edge else 0.0)
                 gain = others.log_probability(others.weigh(products)) - odds - least
                 candidates.append(Explanation(replace(trial, odds=odds), gain, products))
         return sorted(candidates, key=lambda e: -e.gain)
@@ -132,10 +132,10 @@ class Candidate:
         """The last resort: the run is of another damper."""
         prior = self.evidence.prior
         own = others.weigh(self.own)
-        gain = prior.log_probability(own) - _ALONE - others.log_probability(own)
-        if self._unexplained(self.own, others) < LEAST_UNEXPLAINED:
+        gain = prior.log_probability(own) - _ALONE_ODDS - others.log_probability(own)
+        if self._unexplained(self.own, others) < MIN_UNEXPLAINED:
             gain = -np.inf
-        return Explanation(Trial("damper", 1.0, "", _ALONE), gain, self.own)
+        return Explanation(Trial("damper", 1.0, "", _ALONE_ODDS), gain, self.own)
 
     def changed(self, trial: Trial) -> Products:
         """Products of the run as corrected by a trial of force, offset or current."""
@@ -166,36 +166,41 @@ class Candidate:
         expected, one = others.at(self.own.over)[0], self.own.constant
         mean = float(one @ self.own.gram @ expected) / self.own.rows
         measured = float(one @ self.own.moment) / self.own.rows
-        yield Trial("offset", self.evidence.force * (mean - measured), "", _FREE)
+        yield Trial("offset", self.evidence.force * (mean - measured), "", _FREE_ODDS)
         swing = expected - mean * one
         along = float(swing @ self.own.moment) - measured * float(swing @ self.own.gram @ one)
         if along > 0:
             best = float(swing @ self.own.gram @ swing) / along
-            yield Trial("force", best, "", _FREE)
+            yield Trial("force", best, "", _FREE_ODDS)
             for unit, factor in _both_ways(FORCE_UNITS):
-                if abs(np.log(best / factor)) < 3 * _NAMED:
-                    yield Trial("force", factor, unit, _UNIT)
+                if abs(np.log(best / factor)) < 3 * _UNIT_TOLERANCE:
+                    yield Trial("force", factor, unit, _UNIT_ODDS)
 
     def _of_the_current(self) -> Iterator[Trial]:
         """Another constant current."""
         if self.track.current_changes:
             return
         levels = self.evidence.nodes.tolist()
-        yield from (Trial("current", level, "", _LEVEL) for level in levels)
-        yield from (Trial("current", i, "", _FREE) for i in np.linspace(0, levels[-1], _CURRENTS)[1:-1].tolist())
+        yield from (Trial("current", level, "", _LEVEL_ODDS) for level in levels)
+        yield from (
+            Trial("current", i, "", _FREE_ODDS) for i in np.linspace(0, levels[-1], _TRIED_CURRENTS)[1:-1].tolist()
+        )
 
     def _of_the_motion(self) -> Iterator[Trial]:
         """A factor of displacement or time; both channels inverted."""
-        yield Trial("sign", -1.0, "", _SIGN)
+        yield Trial("sign", -1.0, "", _SIGN_ODDS)
         kinds: tuple[tuple[Cause, dict[str, float]], ...] = (("displacement", LENGTH_UNITS), ("time", TIME_UNITS))
         for cause, units in kinds:
             named = [(unit, factor) for unit, factor in _both_ways(units) if cause == "time" or self._is_nearer(factor)]
-            factors = [*((f, u, _UNIT) for u, f in named), *((f, "", _ODD) for f in (*_FACTORS, *self._ratios(cause)))]
+            factors = [
+                *((f, u, _UNIT_ODDS) for u, f in named),
+                *((f, "", _ODD_MOTION_ODDS) for f in (*_FACTORS, *self._ratios(cause))),
+            ]
             for k, (factor, unit, odds) in enumerate(factors):
                 if any(abs(np.log(factor / f)) < _SAME_FACTOR for f, *_ in factors[:k]):
                     continue
                 trial = Trial(cause, factor, unit, odds)
-                odds -= _TESTED_MOTION * self._tested(trial)
+                odds -= _TESTED_MOTION_ODDS * self._tested(trial)
                 yield replace(trial, odds=odds - _USUAL_STEP * (cause == "time") * self._is_usual(factor))
 
     def _ratios(self, cause: Cause) -> list[float]:
@@ -205,7 +210,7 @@ class Candidate:
             return []
         ratios = [getattr(t, name) / getattr(own, name) for t in self._others if t.frequency]
         ratios = [1 / r if cause == "time" else r for r in ratios]
-        return [r for r in ratios if LEAST_FACTOR < max(r, 1 / r) < _MOST_FACTOR]
+        return [r for r in ratios if MIN_FACTOR < max(r, 1 / r) < _MAX_FACTOR]
 
     def _tested(self, trial: Trial) -> int:
         """1 if the change brings the motion to one that more of the other runs have, −1 if to one that fewer have."""
@@ -229,12 +234,12 @@ class Candidate:
     def _is_large(self, trial: Trial, products: Products, others: Posterior) -> bool:
         value, size = trial.value, self.own.size
         if trial.cause in ("force", "displacement", "time"):
-            return abs(np.log(value)) > np.log(LEAST_FACTOR)
+            return abs(np.log(value)) > np.log(MIN_FACTOR)
         if trial.cause == "offset":
-            return abs(value) > LEAST_OFFSET * self.evidence.force * max(size, 0.3)
+            return abs(value) > MIN_OFFSET * self.evidence.force * max(size, 0.3)
         if trial.cause == "current":
             change = others.at(products.over)[0] - others.at(self.own.over)[0]
-            return _rms(products, change) > LEAST_CURRENT_EFFECT * size
+            return _rms(products, change) > MIN_CURRENT_EFFECT * size
         return True
 
     def _unexplained(self, products: Products, others: Posterior) -> float:
@@ -242,7 +247,7 @@ class Candidate:
         expected, one = others.at(products.over)[0], products.constant
         table = np.column_stack([expected, one])
         best = np.linalg.lstsq(table.T @ products.gram @ table, table.T @ products.moment, rcond=1e-10)[0]
-        force = table @ np.clip(best, [1 / _MOST_SESSION, -np.inf], [_MOST_SESSION, np.inf])
+        force = table @ np.clip(best, [1 / _MAX_SESSION_GAIN, -np.inf], [_MAX_SESSION_GAIN, np.inf])
         power = products.power - 2 * float(force @ products.moment) + float(force @ products.gram @ force)
         return float(np.sqrt(max(power, 0.0) / products.rows)) / products.size
 

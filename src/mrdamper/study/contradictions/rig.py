@@ -16,12 +16,12 @@ from mrdamper.study.contradictions.findings import Contradiction, describe, desc
 from mrdamper.study.contradictions.search import Search
 from mrdamper.study.contradictions.tracks import Track, tracks_of
 
-FEWEST_RUNS = 4  # identification runs from which one can contradict the others
-_MOST_SHARE = 0.34  # share of the runs that may contradict the others; beyond, nobody knows which are right
-_MANY = 0.2  # share of the runs from which they are refused if the others do not agree either
-_INCOHERENT = 4.0  # factor of the usual model error at which runs do not agree
-_INVERSE = 0.1  # logarithm of the product of two factors up to which one is the inverse of the other
-_MILLIAMPERES = 50.0  # ratio of a current to the usual one from which it is in milliamperes
+MIN_RUNS = 4  # identification runs from which one can contradict the others
+_MAX_SHARE = 0.34  # share of the runs that may contradict the others; beyond, nobody knows which are right
+_REFUSED_SHARE = 0.2  # share of the runs from which they are refused if the others do not agree either
+_MAX_MISFIT_FACTOR = 4.0  # factor of the usual model error at which runs do not agree
+_INVERSE_TOLERANCE = 0.1  # logarithm of the product of two factors up to which one is the inverse of the other
+_MILLIAMPERE_RATIO = 50.0  # ratio of a current to the usual one from which it is in milliamperes
 
 
 class ContradictionError(InputError):
@@ -55,7 +55,7 @@ def find_contradictions(runs: Sequence[Run], keep: Collection[str] = ()) -> list
     tracks, milliamperes = _in_amperes(tracks, keep)
     contradictions |= milliamperes
     train = [track for track in tracks if track.run.split == "train"]
-    if len(train) >= FEWEST_RUNS:
+    if len(train) >= MIN_RUNS:
         contradictions |= _among(train, keep)
         trusted = [track for track in train if track.run.id not in contradictions]
         validation = [
@@ -67,13 +67,15 @@ def find_contradictions(runs: Sequence[Run], keep: Collection[str] = ()) -> list
 
 def _among(train: Sequence[Track], keep: Collection[str]) -> dict[str, Contradiction]:
     search = Search(train)
-    search.run(int(_MOST_SHARE * len(train)))
+    search.run(int(_MAX_SHARE * len(train)))
     contradictions = {
         train[i].run.id: describe(train[i].run, e, len(train) - 1) for i, e in sorted(search.found.items())
     }
     contradictions = {name: one for name, one in contradictions.items() if name not in keep}
-    incoherent = len(contradictions) > _MANY * len(train) and search.evidence.spread.misfit >= _INCOHERENT
-    if len(contradictions) > _MOST_SHARE * len(train) or incoherent or _opposed(list(contradictions.values())):
+    incoherent = (
+        len(contradictions) > _REFUSED_SHARE * len(train) and search.evidence.spread.misfit >= _MAX_MISFIT_FACTOR
+    )
+    if len(contradictions) > _MAX_SHARE * len(train) or incoherent or _opposed(list(contradictions.values())):
         raise _disagreement(train, contradictions)
     return contradictions
 
@@ -81,11 +83,11 @@ def _among(train: Sequence[Track], keep: Collection[str]) -> dict[str, Contradic
 def _opposed(contradictions: Sequence[Contradiction]) -> bool:
     """Tell whether some runs need a factor and others its inverse: nobody knows which of them are right."""
     factors = [one.value for one in contradictions if one.cause == "force"]
-    return any(abs(np.log(a * b)) < _INVERSE for a, b in combinations(factors, 2))
+    return any(abs(np.log(a * b)) < _INVERSE_TOLERANCE for a, b in combinations(factors, 2))
 
 
 def _of_validation(validation: Sequence[Track], trusted: Sequence[Track]) -> dict[str, Contradiction]:
-    if not validation or len(trusted) < FEWEST_RUNS:
+    if not validation or len(trusted) < MIN_RUNS:
         return {}
     search = Search(trusted)
     explained = [(track.run, search.explain(track)) for track in validation]
@@ -99,7 +101,7 @@ def _in_amperes(tracks: Sequence[Track], keep: Collection[str]) -> tuple[list[Tr
     kept, contradictions = [], {}
     for track, size in zip(tracks, sizes, strict=True):
         run = track.run
-        if usual <= 0 or size < _MILLIAMPERES * usual or run.id in keep:
+        if usual <= 0 or size < _MILLIAMPERE_RATIO * usual or run.id in keep:
             kept.append(track)
             continue
         text = f"its current of {size:.4g} A is {size / usual:.3g} times that of the others: it looks like milliamperes"

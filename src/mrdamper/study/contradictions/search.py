@@ -18,26 +18,26 @@ _ODDS, _FEW_ODDS = 12.0, 36.0  # logarithm of the odds from which an explanation
 _ALONE_ODDS = 10.0  # more of them for a run that nothing explains
 _MISFITS = (4.0, 2.0, 1.4, 1.0, 0.7, 0.5, 0.35)  # factors of the usual model error that are tried
 _DRIFTS = ((0.06, 0.04), (0.04, 0.04), (0.06, 0.01), (0.04, 0.01))  # gains and offsets that are tried
-_ALIKE = 3  # explanations of a run that others may have in common with it
-_LOOKED_AT = 12  # runs whose explanations are tried in a round, at least
-_STAYS = 3.0  # logarithm of the odds from which an accepted explanation stays
+_SHARED_EXPLANATIONS = 3  # explanations of a run that others may have in common with it
+_RUNS_PER_ROUND = 12  # runs whose explanations are tried in a round, at least
+_KEEP_ODDS = 3.0  # logarithm of the odds from which an accepted explanation stays
 _SHIFT_ODDS = 12.0  # logarithm of the prior odds against shifted rows
 _EXCHANGE_ODDS = 6.0  # the same against two exchanged rows
 _SPARSE_ODDS = 20.0  # the same where the tests are no matrix of currents and motions
-_REGULAR = 6.0  # what an empty cell of the matrix of tests that is filled lowers them by
-_NEARLY = 0.5  # repeated and missing tests of a matrix that is nearly complete, over its tests
-_LEAST_SHIFT_ODDS = 0.0  # prior odds of shifted rows at least
+_EMPTY_CELL_ODDS = 6.0  # what an empty cell of the matrix of tests that is filled lowers them by
+_MAX_IRREGULARITY = 0.5  # repeated and missing tests of a matrix that is nearly complete, over its tests
+_MIN_SHIFT_ODDS = 0.0  # prior odds of shifted rows at least
 _MEMBER_ODDS = 4.0  # the same against a further run with the same cause
-_FEWEST_SHIFTED = 2  # runs whose current a shift has to change
+_MIN_SHIFTED_RUNS = 2  # runs whose current a shift has to change
 _SAME_CURRENT = 0.01  # difference of two currents that are one [A]
-_EQUAL = 6.0  # odds up to which a run nothing explains better takes the best explanation
-_BEST = 6  # explanations of a run that are compared with those of other runs
-_SEEDS = 5  # runs from which a second group of runs is grown
-_SHARPER = 2.5  # factor by which the model error of a group of its own is smaller than that of all runs
-_LEAST_MISFIT = 0.5  # factor of the usual model error for groups at least
-_SMALLER = (1.0, 0.7, 0.45, 0.3)  # factors of the model error that explained runs leave
-_REFINED = 4  # single explanations whose model error is adapted
-_JUMP = 0.3  # difference of the logarithms of the gains of two groups of runs at one current
+_TIE_ODDS = 6.0  # odds up to which a run nothing explains better takes the best explanation
+_COMPARED_EXPLANATIONS = 6  # explanations of a run that are compared with those of other runs
+_GROUP_SEEDS = 5  # runs from which a second group of runs is grown
+_GROUP_ERROR_RATIO = 2.5  # factor by which the model error of a group of its own is smaller than that of all runs
+_MIN_MISFIT = 0.5  # factor of the usual model error for groups at least
+_ERROR_FACTORS = (1.0, 0.7, 0.45, 0.3)  # factors of the model error that explained runs leave
+_REFINED_EXPLANATIONS = 4  # single explanations whose model error is adapted
+_GROUP_GAIN_DIFFERENCE = 0.3  # difference of the logarithms of the gains of two groups of runs at one current
 _ROUNDS = 4  # assignments of runs to two groups
 
 
@@ -49,9 +49,9 @@ class Proposal:
     gain: float
 
 
-_FALLING, _LEAST_FALL, _MOST_FALLING = 60.0, 0.05, 8.0  # odds against a falling force: per share, from, at most
+_FALLING_ODDS, _MIN_FALL, _MAX_FALLING_ODDS = 60.0, 0.05, 8.0  # odds against a falling force: per share, from, at most
 _AT_NODE = 0.9  # share of a node from which a run is at its current
-_NOTHING = Proposal({}, -np.inf)
+_NO_PROPOSAL = Proposal({}, -np.inf)
 
 
 class Search:
@@ -74,7 +74,7 @@ class Search:
     def run(self, most: int) -> None:
         """Explain runs until the others agree, or more than `most` are explained."""
         while len(self.found) <= most:
-            best = max(self._proposals(), key=lambda proposal: proposal.gain, default=_NOTHING)
+            best = max(self._proposals(), key=lambda proposal: proposal.gain, default=_NO_PROPOSAL)
             if not best.explanations or best.gain < self._threshold(best.explanations.values()):
                 break
             self._accept(best.explanations)
@@ -140,13 +140,13 @@ class Search:
         order = sorted(left, key=lambda k: -odds[k])
         self._own = self.evidence.log_evidence([self._members[k] for k in self._agreeing()])
         self._options: dict[int, list[Explanation]] = {}
-        singles = [self._of_one(i) for i in order[: max(_LOOKED_AT, len(order) // 4)]]
-        yield from map(self._refined, sorted(singles, key=lambda proposal: -proposal.gain)[:_REFINED])
+        singles = [self._of_one(i) for i in order[: max(_RUNS_PER_ROUND, len(order) // 4)]]
+        yield from map(self._refined, sorted(singles, key=lambda proposal: -proposal.gain)[:_REFINED_EXPLANATIONS])
         groups = dict.fromkeys([*self._groups(order, posterior), *self._alike(order)])
         ranked = sorted(map(self._of_group, groups), key=lambda proposal: -proposal.gain)
-        yield from (self._smaller(proposal) for proposal in ranked[:_REFINED])
+        yield from (self._smaller(proposal) for proposal in ranked[:_REFINED_EXPLANATIONS])
         if not self.found:
-            best = max(self._of_rows(order[:_LOOKED_AT]), key=lambda proposal: proposal.gain, default=_NOTHING)
+            best = max(self._of_rows(order[:_RUNS_PER_ROUND]), key=lambda proposal: proposal.gain, default=_NO_PROPOSAL)
             if best.explanations:
                 yield self._refined_rows(best, posterior)
 
@@ -156,7 +156,7 @@ class Search:
         alone = self._candidates[i].alone(others)
         self._options[i] = self._candidates[i].explanations(others)
         named = next(iter(self._options[i]), None)
-        best = named if named is not None and alone.gain - named.gain < _EQUAL else alone
+        best = named if named is not None and alone.gain - named.gain < _TIE_ODDS else alone
         return Proposal({i: best}, best.gain)
 
     def _refined(self, proposal: Proposal) -> Proposal:
@@ -177,7 +177,7 @@ class Search:
     ) -> float:
         """Logarithm of the evidence of runs, and of others apart, at the model error most probable for them."""
         spread, best = self.evidence.spread, -np.inf
-        for factor in _SMALLER:
+        for factor in _ERROR_FACTORS:
             self.evidence.spread = replace(spread, misfit=max(factor * spread.misfit, _MISFITS[-1]))
             members = [expected.weigh(p) for p in products]
             total = self.evidence.log_evidence(members) - self._falling(members)
@@ -199,7 +199,7 @@ class Search:
             [np.sqrt(mean @ self._usual_gram @ mean) for mean in (posterior.at(node)[0] for node in nodes)]
         )
         fall = float(np.max(1 - sizes / np.maximum.accumulate(sizes)))
-        return min(_FALLING * max(fall - _LEAST_FALL, 0.0), _MOST_FALLING)
+        return min(_FALLING_ODDS * max(fall - _MIN_FALL, 0.0), _MAX_FALLING_ODDS)
 
     @cached_property
     def _usual_gram(self) -> Floats:
@@ -219,20 +219,20 @@ class Search:
             for size in range(2, len(at)):
                 sets += [at[:size], at[-size:]]
             jumps = np.diff([np.log(max(gains[k], 1e-3)) for k in at])
-            if jumps.size and jumps.max() > _JUMP:
+            if jumps.size and jumps.max() > _GROUP_GAIN_DIFFERENCE:
                 low += at[: int(np.argmax(jumps)) + 1]
                 high += at[int(np.argmax(jumps)) + 1 :]
         sets += [low, high]
         ranked = sorted(order, key=gains.__getitem__)
-        for seeds in (*([k] for k in order[:_SEEDS]), ranked[: len(ranked) // 3], ranked[-(len(ranked) // 3) :]):
+        for seeds in (*([k] for k in order[:_GROUP_SEEDS]), ranked[: len(ranked) // 3], ranked[-(len(ranked) // 3) :]):
             sets.append(self._grown(seeds, posterior))
         return list(dict.fromkeys(tuple(sorted(s)) for s in sets if 2 <= len(s) <= len(self.tracks) // 2))
 
     def _alike(self, order: Sequence[int]) -> list[tuple[int, ...]]:
         """Sets of runs that one explanation makes more probable each."""
         sets = []
-        for i in order[:_SEEDS]:
-            for explanation in self._options.get(i, [])[:_ALIKE]:
+        for i in order[:_GROUP_SEEDS]:
+            for explanation in self._options.get(i, [])[:_SHARED_EXPLANATIONS]:
                 trial = explanation.trial
                 sets.append(
                     [k for k, of in self._options.items() if any(e.gain > 0 and e.trial.is_like(trial) for e in of)]
@@ -250,7 +250,7 @@ class Search:
         """The group of runs about some that follow a damper of their own rather than that of the others."""
         every = [k for k in self._agreeing() if k not in self.found]
         spread = self.evidence.spread
-        self.evidence.spread = replace(spread, misfit=max(spread.misfit / _SHARPER, _LEAST_MISFIT))
+        self.evidence.spread = replace(spread, misfit=max(spread.misfit / _GROUP_ERROR_RATIO, _MIN_MISFIT))
         members = {k: posterior.weigh(self._products[k]) for k in self._agreeing()}
         group = set(seeds)
         for _ in range(_ROUNDS):
@@ -278,8 +278,8 @@ class Search:
         kept, own = [self._products[k] for k in rest], [self._products[k] for k in group]
         base = self._base + _MEMBER_ODDS * (len(group) - 1)
         options = [self._candidates[k].explanations(others) for k in group]
-        best, joint = _NOTHING, -np.inf
-        for explanation in options[0][:_BEST]:
+        best, joint = _NO_PROPOSAL, -np.inf
+        for explanation in options[0][:_COMPARED_EXPLANATIONS]:
             if explanation.cause == "current" and not self._may_share(group, explanation.trial.value):
                 continue
             alike = [next((e for e in of if e.trial.is_like(explanation.trial)), None) for of in options]
@@ -297,7 +297,7 @@ class Search:
         alone = [self._candidates[k].alone(others) for k in group]
         if sum(np.isfinite(e.gain) for e in alone) > len(group) / 2:
             gain = self._adapted(kept, others, [own]) - base - alone[0].trial.odds
-            if gain > best.gain + _EQUAL:
+            if gain > best.gain + _TIE_ODDS:
                 best = Proposal({k: replace(e, gain=gain) for k, e in zip(group, alone, strict=True)}, gain)
         return best
 
@@ -328,16 +328,16 @@ class Search:
         empty = self._irregular(written)
         for i, j in combinations(rows, 2):
             if (order[i] in suspects or order[j] in suspects) and abs(written[i] - written[j]) > _SAME_CURRENT:
-                odds = _EXCHANGE_ODDS if empty <= _NEARLY * len(rows) else _SPARSE_ODDS
+                odds = _EXCHANGE_ODDS if empty <= _MAX_IRREGULARITY * len(rows) else _SPARSE_ODDS
                 yield self._of_currents({order[i]: written[j], order[j]: written[i]}, "current", odds)
         for step in (-1, 1):
             for first in range(last):
                 moved = [written[k if k < first else min(max(k + step, first), last)] for k in rows]
                 changed = {order[k]: moved[k] for k in rows if abs(moved[k] - written[k]) > _SAME_CURRENT}
-                if len(changed) >= _FEWEST_SHIFTED:
+                if len(changed) >= _MIN_SHIFTED_RUNS:
                     filled = empty - self._irregular(moved) if set(moved) == set(written) else 0
-                    odds = _SHIFT_ODDS - _REGULAR * filled * (empty <= _NEARLY * len(rows))
-                    yield self._of_currents(changed, "shifted", max(odds, _LEAST_SHIFT_ODDS))
+                    odds = _SHIFT_ODDS - _EMPTY_CELL_ODDS * filled * (empty <= _MAX_IRREGULARITY * len(rows))
+                    yield self._of_currents(changed, "shifted", max(odds, _MIN_SHIFT_ODDS))
 
     def _of_currents(self, currents: dict[int, float], cause: Cause, odds: float) -> Proposal:
         trials = {k: Trial("current", current, "", odds) for k, current in currents.items()}
@@ -368,11 +368,11 @@ class Search:
                 continue
             others = self.posterior([i])
             alone, named = self._candidates[i].alone(others), self._candidates[i].explanations(others)
-            best = named[0] if named and alone.gain - named[0].gain < _EQUAL else alone
+            best = named[0] if named and alone.gain - named[0].gain < _TIE_ODDS else alone
             trials = [e.trial for k, e in self.found.items() if k != i]
-            usual = [e for e in named if best.gain - e.gain < _EQUAL and any(e.trial.is_like(t) for t in trials)]
+            usual = [e for e in named if best.gain - e.gain < _TIE_ODDS and any(e.trial.is_like(t) for t in trials)]
             best = usual[0] if usual else best
-            if best.gain >= _STAYS:
+            if best.gain >= _KEEP_ODDS:
                 self.found[i] = replace(best, gain=max(best.gain, now.gain))
                 self._products[i] = best.products
             else:

@@ -18,7 +18,7 @@ from mrdamper.physics.motion import equivalent_sine, measured_motion
 
 _CYCLES = 3  # cycles of a sine that are compared
 _SAMPLES_PER_CYCLE = 96  # samples of the motion
-_MOST_SAMPLES = 1500  # samples of a motion that is no sine
+_MAX_SAMPLES = 1500  # samples of a motion that is no sine
 _ROWS = 144  # rows of the regression per run
 _SAME_MOTION = 0.04  # relative difference of frequencies and amplitudes that are one
 
@@ -97,7 +97,7 @@ def _track(run: Run) -> Track:
         inside = np.arange(run.time.size)
     start, stop = int(inside[0]), int(inside[-1]) + 1
     duration = float(run.time[stop - 1] - run.time[start])
-    wanted = _MOST_SAMPLES
+    wanted = _MAX_SAMPLES
     if sine.is_sine:
         cycles = min(_CYCLES, duration * sine.condition.frequency_Hz)
         wanted = int(_SAMPLES_PER_CYCLE * max(cycles, 0.5))
