@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mrdamper.dampers.base import Envelope
-from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.dampers.joint import JointDamper, JointProblem
 from mrdamper.models import model_type
 from mrdamper.rig_files.dataset_folder import load_dataset
@@ -115,7 +115,7 @@ def main() -> None:
     for title, seconds, peak in rows:
         print(f"{title:45} {1e3 * seconds:9.1f} ms   peak drift {1e3 * peak:8.4f} mm")
     loop = SystemLoop(file.system, spread, {"mr": real}, Passive(0.5), free=True)
-    draws = draw({"mr": certain(real, load_dataset().rig("labcontrol").split("train"))}, 1000)
+    draws = draw({"mr": estimate_uncertainty(real, load_dataset().rig("labcontrol").split("train"))}, 1000)
     begin = time.perf_counter()
     monte_carlo(loop, draws, loop.run(5e-4))
     print(f"{'1,000 draws of it, compilation included':45} {time.perf_counter() - begin:9.1f} s")

@@ -18,7 +18,7 @@ from scipy.signal import lfilter
 
 from mrdamper.dampers.bands import band
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.dampers.joint import JointDamper, JointFit, JointProblem
 from mrdamper.data import SESSIONS_NEEDED, Condition, Floats, Run, session_of
 from mrdamper.identification import identify
@@ -181,14 +181,14 @@ def jointly(name: str, repeats: int, seed: int = 0) -> tuple[Covered, Floats]:
     for repeat in range(repeats):
         runs = rig.draw(rng)
         problem, fit = rig.fit(runs)
-        made = certain(fit.damper, runs, held=fit.at_bounds)
+        made = estimate_uncertainty(fit.damper, runs, held=fit.at_bounds)
         plain = _textbook(problem, fit)
         for i, n in enumerate(names):
             own, truth = made.fitted_parameters[n], rig.truth.fitted_parameters[n].value
-            if made.certainty is None or n not in made.certainty.names:
+            if made.uncertainty is None or n not in made.uncertainty.names:
                 continue
             counted[i] += 1
-            low, high = made.certainty.interval(made, n, LEVEL)
+            low, high = made.uncertainty.interval(made, n, LEVEL)
             ours[i] += low <= truth <= high
             low, high = interval_about(own.value, plain[n], 1e9, LEVEL, own.log)
             textbook[i] += low <= truth <= high

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mrdamper.dampers.certainty import table as intervals
+from mrdamper.dampers.uncertainty import table as intervals
 from mrdamper.study.recipe import catalogue
 from mrdamper.study.validation import Validation, session_drift
 from mrdamper.study.workflow import RigStudy, Study

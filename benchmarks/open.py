@@ -20,7 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from benchmarks.hysteretic import RATE, identified, made_record, sweep
 from mrdamper.dampers.bands import band
-from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.data import Dataset, Floats, Run, current_levels, session_of
 from mrdamper.data.atomic import write_file, write_folder
 from mrdamper.errors import ColumnError, DatasetError, InputError, NonFiniteError, RunError, UnknownNameError
@@ -30,7 +30,7 @@ from mrdamper.rig_files.strict_toml import load_toml
 from mrdamper.statistics.metrics import nrmse_pp
 from mrdamper.study.comparison import compare
 from mrdamper.study.cross_validation import stretches
-from mrdamper.study.recipe import Scored
+from mrdamper.study.recipe import RecipeResult
 from mrdamper.study.validation import score_run
 from mrdamper.systems.oscillator import multisine
 
@@ -186,7 +186,7 @@ def folds(runs: Sequence[Run]) -> dict[str, list[list[int]]]:
     return {kind: parts for kind, parts in groups.items() if len(parts) > 1 or kind == "fastest"}
 
 
-def left_out_errors(entry: Scored, rig: Dataset) -> dict[str, list[float]]:
+def left_out_errors(entry: RecipeResult, rig: Dataset) -> dict[str, list[float]]:
     """Errors of identification runs predicted by refits without their fold; a fold that allows no refit is missing."""
     ids = {score.run_id for score in entry.train.runs}
     runs = [run for run in rig.split("train") if run.id in ids]
@@ -206,12 +206,12 @@ def left_out_errors(entry: Scored, rig: Dataset) -> dict[str, list[float]]:
     return errors
 
 
-def forecasts_of(entry: Scored, rig: Dataset) -> dict[str, Forecast]:
+def forecasts_of(entry: RecipeResult, rig: Dataset) -> dict[str, Forecast]:
     """Validation runs of a rig as a model of `compare` predicts them."""
     ids = {score.run_id for score in entry.train.runs}
     calibrating = [score.predicted for score in entry.cross_validated.runs if score.predicted is not None]
     held = getattr(entry.fit, "at_bounds", ())
-    damper = certain(entry.damper, [run for run in rig.split("train") if run.id in ids], calibrating, held)
+    damper = estimate_uncertainty(entry.damper, [run for run in rig.split("train") if run.id in ids], calibrating, held)
     forecasts = {}
     for run in rig.split("validate"):
         prediction = damper.predict_run(run)

@@ -14,13 +14,13 @@ from dataclasses import replace
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Envelope
-from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.dampers.joint import JointDamper
 from mrdamper.data import Condition, Run
 from mrdamper.models.play_bypass import PlayBypass
 from mrdamper.physics.motion import sine
 from mrdamper.study.limits import Limits
-from mrdamper.study.plan import Reckoning
+from mrdamper.study.plan import TestDesign
 
 TRUTH = PlayBypass(
     f0=40.0, k=800.0, c0=600.0, c1=3800.0, fy0=140.0, fy1=1000.0, d=2e-4, e=2.5e-5, cb=3.6e4, h0=0.4, h1=0.3, vh=3e-3,
@@ -48,17 +48,17 @@ def rig(seed: int) -> Damper:
             f"r{number}", motion.time, motion.displacement, force, condition.current_A, rig="virtual", notes=notes
         )
         runs.append(run)
-    made = certain(truth, runs)
-    assert made.certainty is not None
-    return replace(made, certainty=replace(made.certainty, force=FORM))
+    made = estimate_uncertainty(truth, runs)
+    assert made.uncertainty is not None
+    return replace(made, uncertainty=replace(made.uncertainty, force=FORM))
 
 
-def reckoned(seed: int) -> Reckoning:
+def reckoned(seed: int) -> TestDesign:
     """What records on that rig would tell."""
-    return Reckoning.of(rig(seed), LIMITS, LIMITS.candidates(1.0))
+    return TestDesign.of(rig(seed), LIMITS, LIMITS.candidates(1.0))
 
 
-def designs(reckoning: Reckoning, hours: float, seed: int) -> dict[str, float]:
+def designs(reckoning: TestDesign, hours: float, seed: int) -> dict[str, float]:
     """Expected standard deviation of the force after each design, and before.
 
     Who makes no plan mounts the damper once; the same in as many sessions as the plan takes stands beside.

@@ -16,7 +16,7 @@ from concurrent.futures import ProcessPoolExecutor
 import numpy as np
 
 from mrdamper.dampers.bands import band
-from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.models import Model
 from mrdamper.models.bouc_wen import BoucWen
@@ -90,7 +90,7 @@ def covered(rig: tuple[str, float], seed: int = 0) -> tuple[Floats, float, float
     recipe = jointly("bouc-wen")
     scored = fit_and_score(recipe, runs, identified(recipe.basis, runs, {})[0], [])
     beside = [score.predicted for score in scored.cross_validated.runs if score.predicted is not None]
-    damper = certain(scored.damper, runs, beside)
+    damper = estimate_uncertainty(scored.damper, runs, beside)
     inside, widths = [], []
     for k in range(FUTURE):
         frequency, amplitude = rng.uniform(0.5, 2.0), rng.uniform(0.01, 0.02)
@@ -109,8 +109,8 @@ def covered(rig: tuple[str, float], seed: int = 0) -> tuple[Floats, float, float
             ]
         )
         widths.append(np.mean(around.high - around.low) / 2 / peak_force(predicted))
-    assert damper.certainty is not None
-    return np.mean(inside, axis=0), damper.certainty.force, float(np.median(widths))
+    assert damper.uncertainty is not None
+    return np.mean(inside, axis=0), damper.uncertainty.force, float(np.median(widths))
 
 
 def table(repeats: int, processes: int = 1) -> str:

@@ -45,7 +45,7 @@ ROOMS = (
     _room("paper.output", "paper/test_output.py"),
     _room("paper.sensitivity", "paper/test_sensitivity.py"),
     _room(
-        "dampers.bands dampers.certainty dampers.sessions data.sessions",
+        "dampers.bands dampers.uncertainty dampers.sessions data.sessions",
         "dampers/test_bands_by_hand.py dampers/test_sessions.py data/test_sessions.py",
     ),
     _room(
@@ -54,7 +54,7 @@ ROOMS = (
     ),
     _room(
         "dampers.covariance dampers.run_residuals identification.intervals",
-        "dampers/test_covariance_laws.py dampers/test_bands_by_hand.py dampers/test_certainty.py"
+        "dampers/test_covariance_laws.py dampers/test_bands_by_hand.py dampers/test_parameter_uncertainty.py"
         " identification/test_covariance.py",
         "cover_what_they_say scatter_of_repeated",
     ),
@@ -69,7 +69,10 @@ ROOMS = (
     _room("paper.options paper.assumptions paper.recipes", "paper/test_functions.py paper/test_measured.py"),
     _room("paper.virtual_rig", "paper/test_virtual_rig.py"),
     _room("report.tables study.recipe study.cross_validation", "report/test_tables.py study/test_recipe.py"),
-    _room("paper.functions dampers.modified", "dampers/test_modified.py dampers/test_gram.py study/test_recipe.py"),
+    _room(
+        "paper.functions dampers.modified",
+        "dampers/test_modified.py dampers/test_normal_equations.py study/test_recipe.py",
+    ),
     _room("dampers.joint", "dampers/test_joint.py"),
     _room(
         "dampers.published.ali dampers.published.boada dampers.published.dominguez dampers.published.lei"

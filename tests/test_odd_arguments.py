@@ -12,7 +12,7 @@ from mrdamper import Condition, Dataset, GasSpring, InputError, Run
 from mrdamper.errors import shown
 from mrdamper.models.bingham import Bingham
 from mrdamper.physics.motion import sine
-from mrdamper.study.parallel import HERE
+from mrdamper.study.parallel import IN_PROCESS
 from mrdamper.systems.structure import Link, System
 
 
@@ -131,7 +131,7 @@ def doors(folder):
         "Excitation.delayed": (motion.delayed, {"delay": 0.01}),
         "Excitation.with_current": (motion.with_current, {"current": 0.5}),
         "run_study": (mrdamper.run_study, {
-            "dataset": dataset, "progress": print, "model": "none such", "processes": HERE, "keep": (),
+            "dataset": dataset, "progress": print, "model": "none such", "processes": IN_PROCESS, "keep": (),
         }),
         "check": (mrdamper.check, {"dataset": dataset}),
         "sine": (mrdamper.sine, {"condition": condition, "cycles": 1.0, "samples_per_cycle": 20}),

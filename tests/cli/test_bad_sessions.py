@@ -9,7 +9,7 @@ from support.sessions import session_runs
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
-from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.dampers.model_file import dump_model, parse_model
 from mrdamper.data import Dataset
 from mrdamper.errors import InputError, ModelFileError
@@ -29,7 +29,7 @@ from mrdamper.study.workflow import run_study
 )
 def test_an_uncertainty_that_is_no_number_of_a_damper_is_refused(tmp_path, place, value):
     truth = joint_damper()
-    document = json.loads(dump_model(certain(truth, session_runs(truth))))
+    document = json.loads(dump_model(estimate_uncertainty(truth, session_runs(truth))))
     inner = document["covariance"]
     for key in place[:-1]:
         inner = inner[key]
@@ -48,7 +48,7 @@ def test_a_clock_that_is_no_date_ends_a_study_with_its_code():
     truth = joint_damper()
     runs = [replace(run, notes={"recorded_at": "25:61 yesterday"}) for run in session_runs(truth)]
     with pytest.raises(InputError) as caught:
-        certain(truth, runs)
+        estimate_uncertainty(truth, runs)
     assert caught.value.code == "E_CLOCK"
 
 

@@ -8,9 +8,9 @@ from support.dampers import joint_damper, modified_damper
 from support.sessions import session_runs
 
 from mrdamper.dampers.bands import band, portable_band
-from mrdamper.dampers.certainty import table
-from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.dampers.model_file import dump_model, parse_model
+from mrdamper.dampers.uncertainty import table
 from mrdamper.data import Condition
 from mrdamper.study.limits import Limits
 from mrdamper.study.plan import plan_tests
@@ -34,8 +34,8 @@ LIMITS = Limits((0.0, 1.0), (0.5, 4.0), (2.0, 20.0), velocity_m_s=0.2, force_N=1
 def test_intervals_are_bounded_or_refused(stated, make, runs):
     truth = make()
     every = session_runs(truth, seed=2)[:runs]
-    made = certain(truth, [replace(r, notes={"session": STATED[stated](i)}) for i, r in enumerate(every)])
-    known = made.certainty
+    made = estimate_uncertainty(truth, [replace(r, notes={"session": STATED[stated](i)}) for i, r in enumerate(every)])
+    known = made.uncertainty
     for row in table(made):
         half = (row["high"] - row["low"]) / 2
         assert np.isnan(half) or half < 1e3 * abs(row["value"]), row
@@ -43,7 +43,7 @@ def test_intervals_are_bounded_or_refused(stated, make, runs):
     assert np.isfinite(known.covariance).all()
     assert np.linalg.eigvalsh(known.covariance).min() > -1e-9 * max(np.trace(known.covariance), 1e-30)
     assert known.of_sessions == (runs == 9 and stated in ("three", "one a run"))
-    assert parse_model(dump_model(made)).certainty.run_gain == known.run_gain
+    assert parse_model(dump_model(made)).uncertainty.run_gain == known.run_gain
     around, three = band(made, made.predict(Condition(0.5, 1.0, 0.01))), portable_band(made)
     assert (around is None) == (three is None) == (not known.of_sessions and not known.run_dof)
     assert around is None or np.isfinite([*around.low, *around.high, *around.peak, *around.energy]).all()
@@ -55,6 +55,6 @@ def test_intervals_are_bounded_or_refused(stated, make, runs):
 def test_tests_are_planned_whatever_is_known_of_sessions(stated):
     truth = joint_damper()
     runs = [replace(r, notes={"session": STATED[stated](i)}) for i, r in enumerate(session_runs(truth))]
-    proposals, _ = plan_tests(certain(truth, runs), LIMITS, 0.5)
+    proposals, _ = plan_tests(estimate_uncertainty(truth, runs), LIMITS, 0.5)
     assert proposals
     assert proposals[-1].after < proposals[0].before

@@ -11,10 +11,10 @@ from mrdamper.dampers import bands
 from mrdamper.dampers.bands import band, no_band, portable_band, session_band
 from mrdamper.dampers.base import Prediction
 from mrdamper.dampers.calibration import Growth
-from mrdamper.dampers.certainty import Certainty, unsure
 from mrdamper.dampers.distance import Distance
 from mrdamper.dampers.joint import JointDamper
-from mrdamper.dampers.sessions import Expected, Sessions, Spread, When
+from mrdamper.dampers.sessions import RecordingTime, RunScatter, SessionCorrection, Sessions
+from mrdamper.dampers.uncertainty import Uncertainty, uncertainty_warnings
 from mrdamper.data import Condition
 from mrdamper.errors import InputError
 from mrdamper.models.bingham import Bingham
@@ -31,7 +31,7 @@ GROWN = {  # by each way away from the tests
     "peak": 0.01**2 + 0.002**2 + 0.015**2,
     "energy": 0.012**2 + 0.007**2 + 0.04**2,
 }
-KNOWN = Certainty(
+KNOWN = Uncertainty(
     ("c", "fy"), (False, False), COVARIANCE, np.array([12.0, 5.0]), gain=0.03, offset=4.0, session_dof=3.0,
     run_gain=0.012, run_offset=2.5, run_dof=8.0, force=0.02, peak=0.015, energy=0.05, left_out=9,
     growth=Growth((0.4, 0.05, 0.06), (0.5, 0.02, 0.03), (0.6, 0.07, 0.08)),
@@ -41,7 +41,7 @@ KNOWN = Certainty(
 def damper(known=KNOWN):
     model = Bingham(c=2000.0, fy=100.0, f0=25.0)
     envelope = SimpleNamespace(distance=lambda condition, current: AWAY)
-    return JointDamper("rig", model, ("c", "fy"), envelope, certainty=known)  # type: ignore[arg-type]
+    return JointDamper("rig", model, ("c", "fy"), envelope, uncertainty=known)  # type: ignore[arg-type]
 
 
 PREDICTION = Prediction(MOTION, FORCE, CONDITION, ())
@@ -149,7 +149,7 @@ def test_an_interval_is_as_wide_as_its_level_says():
 
 def test_what_is_known_badly_is_told_number_by_number():
     def said(**more):
-        return " ".join(unsure(damper(replace(KNOWN, **more))))
+        return " ".join(uncertainty_warnings(damper(replace(KNOWN, **more))))
 
     assert "sessions" not in said()
     assert "fewer than two degrees of freedom" in said(session_dof=1.9)
@@ -165,8 +165,8 @@ def test_what_is_known_badly_is_told_number_by_number():
     assert "c ended at" in said(names=("fy",), logs=(False,), covariance=np.eye(1), dof=np.ones(1), one_sided=("c",))
 
 
-SPREAD = Spread(0.03, 0.02, 0.01, 2.0)
-DAY = [When("a", 10.0), When("a", 11.0), When("b", 34.0), When("a")]
+SPREAD = RunScatter(0.03, 0.02, 0.01, 2.0)
+DAY = [RecordingTime("a", 10.0), RecordingTime("a", 11.0), RecordingTime("b", 34.0), RecordingTime("a")]
 
 
 def test_what_runs_share_falls_with_the_hours_between_them_within_a_session():
@@ -179,43 +179,47 @@ def test_what_runs_share_falls_with_the_hours_between_them_within_a_session():
 
 def test_hours_are_counted_from_1970_where_a_clock_is_stated():
     def when(**notes):
-        return When.of(SimpleNamespace(id="r7", notes=notes))
+        return RecordingTime.of(SimpleNamespace(id="r7", notes=notes))
 
-    assert when(recorded_at="1970-01-02T02:30:00") == When("1970-01-02", 26.5)
-    assert when(recorded_at="1970-01-02", session="morning") == When("morning", None)
-    assert (when(), when(session="b")) == (When(None), When("b"))
-    assert not SPREAD.covariance([When(None)], [When(None), When("a")]).any()  # unknown is no session
+    assert when(recorded_at="1970-01-02T02:30:00") == RecordingTime("1970-01-02", 26.5)
+    assert when(recorded_at="1970-01-02", session="morning") == RecordingTime("morning", None)
+    assert (when(), when(session="b")) == (RecordingTime(None), RecordingTime("b"))
+    assert not SPREAD.covariance(
+        [RecordingTime(None)], [RecordingTime(None), RecordingTime("a")]
+    ).any()  # unknown is no session
 
 
 def test_the_mean_given_others_is_that_of_the_joint_normal():
     values = np.array([0.05, 0.01, -0.2])
-    mean, left = SPREAD.given(When("a", 12.0), DAY[:3], values)
-    both = [*DAY[:3], When("a", 12.0)]
+    mean, left = SPREAD.given(RecordingTime("a", 12.0), DAY[:3], values)
+    both = [*DAY[:3], RecordingTime("a", 12.0)]
     K = SPREAD.covariance(both, both) + 1e-4 * np.eye(4)
     # A run has at least a fifth of the spread of its own: here a quarter of it, so 1e-4 it is.
     solved = np.linalg.solve(K[:3, :3], np.column_stack([values, K[:3, 3]]))
     assert mean == pytest.approx(K[3, :3] @ solved[:, 0])
     assert left == pytest.approx(np.sqrt(K[3, 3] - K[3, :3] @ solved[:, 1]))
-    assert SPREAD.given(When("a", 12.0), [], np.zeros(0)) == (0.0, SPREAD.total)
-    assert Spread(0.0, 0.0, 0.0, 1.0).given(DAY[0], DAY, np.ones(4)) == (0.0, 0.0)
-    firm = Spread(0.1, 0.0, 0.0, 1.0)  # no run of its own: a fifth of the spread is left all the same
-    assert firm.given(When("b"), [When("b")] * 50, np.full(50, 0.1))[1] == pytest.approx(0.02, rel=0.02)
+    assert SPREAD.given(RecordingTime("a", 12.0), [], np.zeros(0)) == (0.0, SPREAD.total)
+    assert RunScatter(0.0, 0.0, 0.0, 1.0).given(DAY[0], DAY, np.ones(4)) == (0.0, 0.0)
+    firm = RunScatter(0.1, 0.0, 0.0, 1.0)  # no run of its own: a fifth of the spread is left all the same
+    assert firm.given(RecordingTime("b"), [RecordingTime("b")] * 50, np.full(50, 0.1))[1] == pytest.approx(
+        0.02, rel=0.02
+    )
 
 
 def test_gains_are_expected_of_other_runs_of_the_session_and_bands_follow():
-    sessions = Sessions(SPREAD, Spread(4.0, 0.0, 3.0, 1.0), ("x", "y", "z"), tuple(DAY[:3]), (1.1, 1.2, 0.5),
+    sessions = Sessions(SPREAD, RunScatter(4.0, 0.0, 3.0, 1.0), ("x", "y", "z"), tuple(DAY[:3]), (1.1, 1.2, 0.5),
                         (6.0, 8.0, 90.0))  # fmt: skip
-    at = When("a", 12.0)
+    at = RecordingTime("a", 12.0)
     found = sessions.expected(at, without="y")
     gain = SPREAD.given(at, [DAY[0], DAY[2]], np.array([0.1, -0.5]))
     offset = sessions.offset.given(at, [DAY[0], DAY[2]], np.array([6.0, 90.0]))
     assert (found.gain, found.gain_spread) == pytest.approx((1 + gain[0], gain[1]))
     assert (found.offset, found.offset_spread) == pytest.approx(offset)
-    assert sessions.expected(When("c", 60.0)) is None
-    assert sessions.expected(When("b", 35.0), without="z") is None
+    assert sessions.expected(RecordingTime("c", 60.0)) is None
+    assert sessions.expected(RecordingTime("b", 35.0), without="z") is None
     with pytest.raises(InputError, match="lists differ in length"):
         replace(sessions, gains=(1.0,))
-    known = Expected(1.2, 0.01, 5.0, 2.0)
+    known = SessionCorrection(1.2, 0.01, 5.0, 2.0)
     assert known.corrected(PREDICTION).force == pytest.approx(1.2 * FORCE + 5)
     plain = band(damper(replace(KNOWN, gain=0.01, offset=2.0, run_gain=0.0, run_offset=0.0)), PREDICTION, 0.8)
     moved = session_band(known, damper(), PREDICTION, 0.8)

@@ -12,7 +12,7 @@ from mrdamper.dampers.calibration import (
     Growth,
     ModelError,
     PredictedRun,
-    Scored,
+    StandardizedErrors,
     model_error,
     scatter_between_sessions,
 )
@@ -28,7 +28,7 @@ def run(name, error=0.0, session=None, peak=1.0, energy=1.0):
 
 
 def scored(force, peak=1.0, energy=1.0):
-    return Scored(np.atleast_1d(force), np.atleast_1d(peak), np.atleast_1d(energy))
+    return StandardizedErrors(np.atleast_1d(force), np.atleast_1d(peak), np.atleast_1d(energy))
 
 
 def calibrated(scores, sessions=None):
@@ -91,12 +91,12 @@ def test_peaks_are_calibrated_as_split_conformal_prediction():
 def test_few_units_reach_a_lower_level_and_say_so():
     found = calibrated([scored(1.0, peak=p) for p in (1.0, 2.0, 3.0, 4.0)])
     assert found.reachable == found.level == pytest.approx(0.8)
-    assert "4 independent runs reach 80 % at most" in found.found
+    assert "4 independent runs reach 80 % at most" in found.summary
     assert found.factor("peak", 0.99) == found.factor("peak", 0.8) == pytest.approx(4 / norm.ppf(0.9))
     assert replace(found, peak=()).factor("peak", 0.9) == 1.0
     many = calibrated([scored(1.0, peak=p) for p in np.arange(1.0, 40)])
     assert many.level == 0.9
-    assert "at most" not in many.found
+    assert "at most" not in many.summary
 
 
 @pytest.mark.parametrize("size", [1.0, 0.4, 3.0])
@@ -144,12 +144,12 @@ def test_coverage_is_found_without_the_unit_that_is_covered():
 
 def test_errors_are_over_their_standard_deviations():
     at = replace(run("r", error=np.where(TIME < 0.5, 6.0, -3.0), peak=0.9, energy=1.3), session="a")
-    found = Scored.of(at, np.full(TIME.size, 2.0), 0.05, 0.1)
+    found = StandardizedErrors.of(at, np.full(TIME.size, 2.0), 0.05, 0.1)
     assert found.force == pytest.approx(np.where(TIME < 0.5, 3.0, 1.5))
     assert (found.peak, found.energy) == (pytest.approx([2.0]), pytest.approx([3.0]))
-    exact = Scored.of(run("r"), np.zeros(TIME.size), 0.0, 0.0)
+    exact = StandardizedErrors.of(run("r"), np.zeros(TIME.size), 0.0, 0.0)
     assert not np.any([*exact.force, *exact.peak, *exact.energy])
-    assert np.isinf(Scored.of(replace(run("r"), energy=np.inf), np.ones(TIME.size), 1.0, 1.0).energy).all()
+    assert np.isinf(StandardizedErrors.of(replace(run("r"), energy=np.inf), np.ones(TIME.size), 1.0, 1.0).energy).all()
 
 
 def test_errors_grow_with_the_distance_from_the_tests_as_they_were_made():

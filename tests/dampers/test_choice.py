@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mrdamper.dampers import choice
-from mrdamper.dampers.choice import Evidence, Term, levels_of
+from mrdamper.dampers.choice import CrossValidation, ModelTerm, levels_of
 from mrdamper.data import Condition
 
 RNG = np.random.default_rng(2)
@@ -23,7 +23,7 @@ def rms(weighted, group):
 
 
 def evidence(residual=RESIDUAL, groups=None, names=NAMES):
-    return Evidence(names, VALUES, NEUTRAL, residual, JACOBIAN, groups or {"condition": GROUPS}, rms)
+    return CrossValidation(names, VALUES, NEUTRAL, residual, JACOBIAN, groups or {"condition": GROUPS}, rms)
 
 
 def left_out(active, residual=RESIDUAL, groups=GROUPS):
@@ -58,7 +58,7 @@ def test_lags_of_the_coil_stay_whatever_is_taken_away():
 
 def test_a_term_stays_where_without_it_more_is_missed():
     # Where the values are the residual is noise: without h1 it is large; c1 is made up for by nothing but its own 2.
-    terms = [Term("h1 matters", ("h1",), (0.0,)), Term("c1 does not", ("c1",), (0.0,))]
+    terms = [ModelTerm("h1 matters", ("h1",), (0.0,)), ModelTerm("c1 does not", ("c1",), (0.0,))]
     made = evidence(JACOBIAN @ np.array([0.0, 0.0, 2.0, 0.0]) + 0.01 * RNG.standard_normal(N))
     active, tried = made.choose(terms)
     assert active == frozenset(("d", "h1", "f0"))

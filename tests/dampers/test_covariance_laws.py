@@ -7,8 +7,8 @@ import pytest
 
 from mrdamper.dampers.bands import band
 from mrdamper.dampers.base import UNTESTED
-from mrdamper.dampers.calibration import Calibration, PredictedRun, Scored, model_error
-from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.calibration import Calibration, PredictedRun, StandardizedErrors, model_error
+from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.dampers.joint import JointDamper
 from mrdamper.dampers.run_residuals import RunResiduals, normal_matrix
 from mrdamper.data import Condition, Run
@@ -80,13 +80,13 @@ def test_what_enters_of_a_run_is_its_last_cycles_thinned():
 def test_intervals_scale_with_the_force_and_forget_the_order_of_runs(sessions):
     runs = runs_of(sessions=sessions, session=0.03)
     damper = fitted(runs)
-    plain = certain(damper, runs).certainty
-    turned = certain(damper, runs[::-1]).certainty
+    plain = estimate_uncertainty(damper, runs).uncertainty
+    turned = estimate_uncertainty(damper, runs[::-1]).uncertainty
     if not sessions:  # draws of sessions belong to places in the list
         assert np.sqrt(np.diag(turned.covariance)) == pytest.approx(np.sqrt(np.diag(plain.covariance)), rel=0.12)
     assert turned.run_gain == pytest.approx(plain.run_gain)
     double = [replace(run, force=2 * run.force) for run in runs]
-    twice = certain(fitted(double, 2.0), double).certainty
+    twice = estimate_uncertainty(fitted(double, 2.0), double).uncertainty
     assert twice.covariance == pytest.approx(4 * plain.covariance, rel=1e-6)
     assert (twice.run_gain, twice.run_offset) == pytest.approx((plain.run_gain, 2 * plain.run_offset), rel=1e-6)
     assert (twice.force, twice.peak, twice.energy) == pytest.approx((plain.force, plain.peak, plain.energy), rel=1e-6)
@@ -101,9 +101,9 @@ def test_intervals_hold_the_truth_of_gains_and_noise():
     for seed in range(25):
         runs = runs_of(seed=seed)
         damper = fitted(runs)
-        made = certain(damper, runs)
+        made = estimate_uncertainty(damper, runs)
         for name in ("c", "fy"):
-            low, high = made.certainty.interval(made, name)
+            low, high = made.uncertainty.interval(made, name)
             inside.append(low <= getattr(TRUTH.one_model, name) <= high)
             widths.append((high - low) / getattr(TRUTH.one_model, name))
     # 95 % of 50, pairs of them correlated: three standard errors are 12 points.
@@ -114,7 +114,7 @@ def test_intervals_hold_the_truth_of_gains_and_noise():
 def test_without_gains_the_intervals_are_those_of_the_noise():
     runs = runs_of(gain=0.0, noise=0.01)
     damper = fitted(runs)
-    known = certain(damper, runs).certainty
+    known = estimate_uncertainty(damper, runs).uncertainty
     parts = [RunResiduals.of(damper, run) for run in runs]
     columns = [np.column_stack([p.prediction.motion.velocity, np.sign(p.prediction.motion.velocity)])[p.picked]
                for p in parts]  # fmt: skip
@@ -124,7 +124,7 @@ def test_without_gains_the_intervals_are_those_of_the_noise():
         (c * p.weight**2).T @ (c * p.weight**2) * np.var(p.residual) for c, p in zip(columns, parts, strict=True)
     )
     assert np.sqrt(np.diag(known.covariance)) == pytest.approx(np.sqrt(np.diag(inverse @ square @ inverse)), rel=0.6)
-    few = certain(damper, runs[:3]).certainty
+    few = estimate_uncertainty(damper, runs[:3]).uncertainty
     assert np.all(np.diag(few.covariance) > np.diag(known.covariance))
 
 
@@ -137,7 +137,7 @@ def test_the_model_error_of_cross_validation_takes_the_place_of_the_residuals():
         motion = damper.predict_run(run).motion
         beyond = 0.1 * np.ptp(run.force) * np.sin(3 * np.pi * 2 * run.time / (run.time[-1] / 6))
         seen.append(PredictedRun.of(run, (run.force + beyond) * (1 + 0.06 * rng.standard_normal()), motion.velocity))
-    inside, known = certain(damper, runs).certainty, certain(damper, runs, seen).certainty
+    inside, known = estimate_uncertainty(damper, runs).uncertainty, estimate_uncertainty(damper, runs, seen).uncertainty
     error = model_error(seen)
     assert (known.force, known.peak, known.energy) == (error.force, error.peak, error.energy)
     assert known.run_gain == pytest.approx(np.sqrt(error.gain**2 - known.gain**2))
@@ -147,7 +147,7 @@ def test_the_model_error_of_cross_validation_takes_the_place_of_the_residuals():
     assert known.covariance == pytest.approx(inside.covariance)
     assert (inside.left_out, inside.calibration) == (0, None)
     # The intervals of these very runs hold the share that the level states, whatever the size of the error.
-    made = replace(damper, certainty=known)
+    made = replace(damper, uncertainty=known)
     shares = []
     for run, prediction in zip(runs, seen, strict=True):
         around = band(made, damper.predict_run(run), 0.8)
@@ -157,7 +157,7 @@ def test_the_model_error_of_cross_validation_takes_the_place_of_the_residuals():
     assert np.mean(shares) == pytest.approx(0.8, abs=0.1)
     # Twice the error is a model error of twice the size, and the factor of the calibration stays.
     wide = [replace(p, measured=p.predicted + 2 * (p.measured - p.predicted)) for p in seen]
-    double = certain(damper, runs, wide).certainty
+    double = estimate_uncertainty(damper, runs, wide).uncertainty
     assert double.force == pytest.approx(2 * known.force, rel=0.05)
     assert double.calibration.force == pytest.approx(known.calibration.force, rel=0.1)
 
@@ -165,12 +165,12 @@ def test_the_model_error_of_cross_validation_takes_the_place_of_the_residuals():
 def test_a_parameter_at_its_bound_is_held_and_one_the_runs_do_not_show_is_named():
     runs = [replace(run, force=run.force - 20) for run in runs_of()]
     held = bingham(2000.0, 0.0, 0.0)
-    known = certain(held, runs).certainty
+    known = estimate_uncertainty(held, runs).uncertainty
     assert known.one_sided == ("fy",)
     assert "fy" not in known.names
-    assert certain(held, runs, held=["c"]).certainty.one_sided == ("c", "fy")
-    assert "fy" in certain(held, runs, bounded=False).certainty.names
-    assert certain(held, []) is held
+    assert estimate_uncertainty(held, runs, held=["c"]).uncertainty.one_sided == ("c", "fy")
+    assert "fy" in estimate_uncertainty(held, runs, bounded=False).uncertainty.names
+    assert estimate_uncertainty(held, []) is held
 
 
 def test_cross_validated_errors_are_over_the_whole_error_model():
@@ -182,7 +182,7 @@ def test_cross_validated_errors_are_over_the_whole_error_model():
     for run in runs:
         shifted = run.force * (1 + 0.08 * rng.standard_normal()) + 40 * rng.standard_normal()
         seen.append(PredictedRun.of(run, shifted, damper.predict_run(run).motion.velocity))
-    known = certain(damper, runs, seen).certainty
+    known = estimate_uncertainty(damper, runs, seen).uncertainty
     assert known.of_sessions
     assert min(known.run_gain, known.run_offset, known.force) > 0
     scores = []
@@ -194,7 +194,7 @@ def test_cross_validated_errors_are_over_the_whole_error_model():
         gain, offset, half = model_error(seen).gain ** 2, model_error(seen).offset ** 2, prediction.half
         force = np.sqrt(gain * prediction.predicted**2 + offset + (share + known.force**2) * half**2)
         peak, energy = (np.sqrt(share + gain + e**2) for e in (known.peak, known.energy))
-        scores.append(Scored.of(prediction, force, peak, energy))
+        scores.append(StandardizedErrors.of(prediction, force, peak, energy))
     expected = Calibration.of(seen, scores)
     for name in ("force", "peak", "energy", "coverage"):
         assert getattr(known.calibration, name) == pytest.approx(getattr(expected, name), rel=1e-6)
@@ -202,6 +202,6 @@ def test_cross_validated_errors_are_over_the_whole_error_model():
 
 def test_the_fit_of_one_run_takes_its_gain_and_offset_up():
     (run,) = runs_of(conditions=CONDITIONS[:1])
-    known = certain(fitted([run]), [run]).certainty
+    known = estimate_uncertainty(fitted([run]), [run]).uncertainty
     assert set(known.names) == {"c", "fy", "f0"}
     assert (known.run_gain, known.run_offset, known.run_dof, known.session_dof) == (0.0, 0.0, 0.0, 0.0)

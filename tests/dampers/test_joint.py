@@ -12,11 +12,11 @@ from support.dampers import joint_damper
 
 from mrdamper.dampers import joint
 from mrdamper.dampers.base import UNTESTED, Envelope
-from mrdamper.dampers.certainty import FittedParameter
 from mrdamper.dampers.coil import Coil
+from mrdamper.dampers.concatenated_runs import RunRows, concatenate
 from mrdamper.dampers.joint import FALL, RISE, JointDamper, JointFit, JointProblem, damper_of
 from mrdamper.dampers.model_file import dump_model, parse_model
-from mrdamper.dampers.strung import Part, string
+from mrdamper.dampers.uncertainty import FittedParameter
 from mrdamper.data import Condition, Run
 from mrdamper.errors import IdentificationError, RunError
 from mrdamper.models import Scale
@@ -234,7 +234,7 @@ def test_scales_and_ranges_are_those_of_the_runs(runs, problem):
     ]
     assert joint._scale(made) == Scale(0.02, sorted(c.peak_velocity for c in conditions)[1], 450.0, 0.8)
     changing = replace(runs[3], id="changing", current=np.linspace(0.1, 0.9, runs[3].time.size))
-    sine_, other = problem.parts[0], Part.of(changing)
+    sine_, other = problem.parts[0], RunRows.of(changing)
     plain = Envelope.of([sine_.condition, other.condition])
     extent = np.array([[other.lowest, other.highest]])
     wider = plain.with_motion(other.motion.current, extent, other.motion.velocity)
@@ -246,9 +246,9 @@ def test_scales_and_ranges_are_those_of_the_runs(runs, problem):
 
 
 def test_starts_are_tried_on_six_runs_and_a_single_start_is_taken_as_it_is(runs, problem, monkeypatch):
-    assert len(problem._few.strung.parts) == 6
+    assert len(problem._few.concatenated.parts) == 6
     few = JointProblem(problem.runs, "play-bypass", parts=problem.parts[:4])
-    assert len(few._few.strung.parts) == 4
+    assert len(few._few.concatenated.parts) == 4
     monkeypatch.setattr(JointProblem, "_downhill", lambda self, u: pytest.fail("one start needs no trial"))
     held = problem.with_free((), {"d": 3e-4, "cb": 3e4})
     (start,) = held.promising
@@ -384,7 +384,7 @@ def test_round_trip_of_the_saved_model(runs, problem, fit):
 
 def test_strung_motions_keep_their_samples_and_a_rising_clock():
     a, b = sine(MATRIX[0], 1, 50), sine(MATRIX[5], 1, 50)
-    both = string([a, b])
+    both = concatenate([a, b])
     assert np.all(np.diff(both.time) > 0)
     np.testing.assert_array_equal(both.displacement, np.concatenate([a.displacement, b.displacement]))
 

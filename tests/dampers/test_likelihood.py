@@ -9,7 +9,7 @@ from support.sessions import session_runs
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
-from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.dampers.likelihood import Likelihood, profile
 from mrdamper.dampers.model_file import save_model
 from mrdamper.dampers.posterior import posterior, split_rhat
@@ -23,14 +23,14 @@ FEW = ("f0", "c0", "fy0")
 def few():
     truth = replace(joint_damper(), free=FEW)
     runs = session_runs(truth)
-    made = certain(truth, runs)
+    made = estimate_uncertainty(truth, runs)
     return made, runs, Likelihood.of(made, runs)
 
 
 def test_the_curvature_at_the_estimate_is_the_covariance(few):
     made, _, likelihood = few
     assert likelihood(likelihood.start) == pytest.approx(0.0, abs=1e-9)
-    assert likelihood.covariance == pytest.approx(made.certainty.covariance)
+    assert likelihood.covariance == pytest.approx(made.uncertainty.covariance)
     rng = np.random.default_rng(0)
     for _ in range(5):
         step = 0.05 * np.linalg.cholesky(likelihood.covariance) @ rng.standard_normal(3)
@@ -42,18 +42,18 @@ def test_the_curvature_at_the_estimate_is_the_covariance(few):
 def test_a_profile_is_bounded_one_sided_or_flat(few):
     made, _, likelihood = few
     found = profile(likelihood, "f0")
-    low, high = made.certainty.interval(made, "f0")
+    low, high = made.uncertainty.interval(made, "f0")
     assert found.kind == "bounded"
     # Chi squared has no degrees of freedom to lose: a little inside Student's t.
     assert 0.8 * (high - low) < np.ptp(found.interval) <= high - low
     truth = replace(joint_damper(), free=(*FEW, "c1"))
     held = replace(truth, model=replace(truth.model, c1=0.0))
     runs = session_runs(held)
-    at_zero = profile(Likelihood.of(certain(held, runs), runs), "c1")
+    at_zero = profile(Likelihood.of(estimate_uncertainty(held, runs), runs), "c1")
     assert (at_zero.kind, at_zero.interval[0]) == ("one-sided", 0.0)
     assert 0 < at_zero.interval[1] < np.inf
     still = [run for run in runs if run.current_A == 0.0]
-    assert profile(Likelihood.of(certain(truth, still), still), "c1").kind == "flat"
+    assert profile(Likelihood.of(estimate_uncertainty(truth, still), still), "c1").kind == "flat"
     with pytest.raises(InputError, match="E_CERTAINTY"):
         profile(likelihood, "nothing")
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.joint import damper_of
-from mrdamper.dampers.sessions import Reading, Sessions, Spread, When, known_errors, sessions_known
+from mrdamper.dampers.sessions import GainOffset, RecordingTime, RunScatter, Sessions, known_errors, sessions_known
+from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import Condition, Run
 from mrdamper.errors import InputError
 from mrdamper.models.bingham import Bingham
@@ -25,14 +25,14 @@ def recorded(name, clock, gain=1.0, offset=0.0, amplitude=0.01, **notes):
 
 
 def reading(gain, offset=0.0):
-    return Reading(gain, offset, 0.0, 1e4, 0.04, 400.0)
+    return GainOffset(gain, offset, 0.0, 1e4, 0.04, 400.0)
 
 
 def test_a_reading_is_least_squares_and_knows_every_other_error():
     run = recorded("a", "2024-05-01T10:00:00", gain=1.1, offset=7.0)
     predicted = simulate(DAMPER.one_model, sine(Condition(0.0, 1.0, 0.01), 2, 100)).force
     noisy = run.force + 5 * np.sin(np.arange(run.force.size))
-    found = Reading.of(noisy, predicted)
+    found = GainOffset.of(noisy, predicted)
     assert (found.gain, found.offset) == pytest.approx((1.1, 7.0), rel=0.02)
     for gain, offset in ((1.0, 0.0), (1.3, -20.0)):
         direct = np.sqrt(np.mean((gain * predicted + offset - noisy) ** 2)) / np.ptp(noisy)
@@ -41,19 +41,21 @@ def test_a_reading_is_least_squares_and_knows_every_other_error():
 
 def test_the_three_spreads_are_found_from_many_days():
     rng = np.random.default_rng(0)
-    truth = Spread(0.03, 0.02, 0.01, 2.0)
-    when = [When(f"day {day}", 24.0 * day + hour) for day in range(40) for hour in (0, 1, 2, 4, 7)]
+    truth = RunScatter(0.03, 0.02, 0.01, 2.0)
+    when = [RecordingTime(f"day {day}", 24.0 * day + hour) for day in range(40) for hour in (0, 1, 2, 4, 7)]
     K = truth.covariance(when, when)
     np.fill_diagonal(K, truth.total**2)
-    found = Spread.likeliest(when, np.linalg.cholesky(K) @ rng.standard_normal(len(when)))
+    found = RunScatter.likeliest(when, np.linalg.cholesky(K) @ rng.standard_normal(len(when)))
     assert found.total == pytest.approx(truth.total, rel=0.15)
     assert found.session == pytest.approx(truth.session, rel=0.35)
     assert 0.004 < found.run < 0.02
 
 
 def test_what_is_given_is_the_conditional_normal():
-    spread = Spread(0.03, 0.0, 0.02, 1.0)
-    mean, left = spread.given(When("a"), [When("a"), When("a"), When("b")], np.array([0.05, 0.03, -0.5]))
+    spread = RunScatter(0.03, 0.0, 0.02, 1.0)
+    mean, left = spread.given(
+        RecordingTime("a"), [RecordingTime("a"), RecordingTime("a"), RecordingTime("b")], np.array([0.05, 0.03, -0.5])
+    )
     share = 0.03**2 / (0.03**2 + 0.02**2 / 2)  # two runs of the day, the other day tells nothing
     assert mean == pytest.approx(share * 0.04)
     assert left == pytest.approx(np.sqrt(0.03**2 * (1 - share) + 0.02**2))
@@ -83,7 +85,7 @@ def test_other_runs_of_the_day_take_most_of_a_day_away():
 def test_a_check_run_corrects_its_day_only_and_the_scores_say_so():
     runs, readings = days()
     sessions = Sessions.of(runs, readings, readings)
-    damper = replace(DAMPER, certainty=Certainty((), (), np.zeros((0, 0)), np.zeros(0), sessions=sessions))
+    damper = replace(DAMPER, uncertainty=Uncertainty((), (), np.zeros((0, 0)), np.zeros(0), sessions=sessions))
     hot = [recorded(f"hot {i}", f"2024-06-01T1{i}:00:00", gain=0.9, amplitude=0.01 + 0.002 * i) for i in range(3)]
     other = recorded("other", "2024-06-02T10:00:00", gain=0.9)
     plain = validate(damper, [*hot, other])

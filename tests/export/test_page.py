@@ -12,7 +12,7 @@ from support.browser import AUDIT
 from support.dampers import all_dampers, joint_damper, modified_damper
 from support.sessions import session_runs
 
-from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.dampers.joint import JointDamper
 from mrdamper.dampers.streaming import stepper
 from mrdamper.data import Condition, Run
@@ -172,7 +172,7 @@ def test_beyond_the_tests_curves_are_dashed_and_said_so(opened, no_compiler):
 
 def test_a_band_is_shaded_where_it_was_tested_and_nowhere_else(opened, no_compiler):
     truth = joint_damper()
-    page = opened(certain(truth, session_runs(truth)))
+    page = opened(estimate_uncertainty(truth, session_runs(truth)))
     assert "Shaded: 90 % prediction interval of the force" in page.locator("main").inner_text()
     assert page.locator("#over-displacement path.band, #over-velocity path.band").count() == 2
     assert re.search(r"extension\s+[\d,.]+ ± [\d,.]+ N", page.locator("#numbers").inner_text())

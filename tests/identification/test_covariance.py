@@ -13,10 +13,10 @@ from support.synthetic import synthetic_run
 from mrdamper import identification
 from mrdamper.data import Condition
 from mrdamper.identification import identify
-from mrdamper.identification.certainty import certainty_of_run
 from mrdamper.identification.covariance import spread, standard_errors
 from mrdamper.identification.intervals import interval_about, weaknesses, written
-from mrdamper.identification.problem import RunCertainty
+from mrdamper.identification.problem import RunUncertainty
+from mrdamper.identification.uncertainty import uncertainty_of_run
 from mrdamper.models.bingham import Bingham
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
@@ -173,15 +173,15 @@ def test_an_interval_over_three_decades_is_none():
 def test_what_is_known_is_computed_when_asked_and_travels_without_the_run(monkeypatch):
     run = synthetic_run(CONDITION, 5.0, model=TRUTH)
     asked = []
-    monkeypatch.setattr(identification, "certainty_of_run", lambda *a: asked.append(1) or certainty_of_run(*a))
+    monkeypatch.setattr(identification, "certainty_of_run", lambda *a: asked.append(1) or uncertainty_of_run(*a))
     found = identify(run)
     assert not asked
     there = pickle.loads(pickle.dumps(found))
     assert found.interval("c") == there.interval("c")
     assert asked == [1]
-    assert there.ask is RunCertainty
+    assert there.ask is RunUncertainty
     assert repr(there) == repr(found)
-    assert f"({found.certainty.effective['c']:.0f} of {found.residual.size} samples independent)" in repr(found)
+    assert f"({found.uncertainty.effective['c']:.0f} of {found.residual.size} samples independent)" in repr(found)
 
 
 def test_a_certainty_that_cannot_be_computed_says_so():

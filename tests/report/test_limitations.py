@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from support.dampers import joint_damper
 
-from mrdamper.dampers.joint import JointFit, Valley
+from mrdamper.dampers.joint import JointFit, LocalMinimum
 from mrdamper.data import Condition
 from mrdamper.report.limitations import RANGE, by_group, limitations
 from mrdamper.statistics.ending import StopReason
 from mrdamper.statistics.metrics import Scores
-from mrdamper.study.recipe import Scored, play_and_bypass
+from mrdamper.study.recipe import RecipeResult, play_and_bypass
 from mrdamper.study.validation import RunScore, Validation
 
 NONE = Validation("none", ())
@@ -22,7 +22,7 @@ def texts(fit):
 
 
 def scored(fit):
-    return Scored(play_and_bypass(), fit.damper, fit, (), float("nan"), NONE, NONE, NONE, 0.1)
+    return RecipeResult(play_and_bypass(), fit.damper, fit, (), float("nan"), NONE, NONE, NONE, 0.1)
 
 
 @pytest.mark.parametrize(
@@ -46,7 +46,7 @@ def test_a_search_that_did_not_converge_is_said_so_in_a_sentence(why, said):
 
 def test_a_second_end_of_the_search_is_told_with_its_error():
     fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), StopReason.SETTLED, 9, 0.1)
-    worse, better = (Valley(1.4e-3, e, 4e-4, 0.0266) for e in (0.0273, 0.026))
+    worse, better = (LocalMinimum(1.4e-3, e, 4e-4, 0.0266) for e in (0.0273, 0.026))
     start = "Second local minimum of the fit: yield displacement 1.40 mm instead of 0.40 mm, mean error"
     assert f"{start} 2.73 % instead of 2.66 %." in texts(replace(fit, second=worse))
     chosen = f"{start} 2.60 % instead of 2.66 %; chosen by cross-validation."

@@ -14,7 +14,7 @@ from support.synthetic import synthetic_run
 from mrdamper.dampers.model_file import save_model
 from mrdamper.data import Condition
 from mrdamper.data.encoding import csv_text
-from mrdamper.identification.problem import RunCertainty
+from mrdamper.identification.problem import RunUncertainty
 from mrdamper.models.bingham import Bingham
 from mrdamper.report.study import _validation_table
 from mrdamper.report.tables import identification_rows, prediction_rows, score_row
@@ -73,7 +73,7 @@ def test_an_identification_stands_in_the_columns_that_name_it():
         condition=Condition(1.5, 2.5, 0.0125), scores=scores_of(0.1), floor=0.004, free=("fy", "c"),
         standard_errors={"c": 3.0, "fy": 4.0}, interval={"fy": (290.0, 310.0)}.get, delay=0.002, at_bounds=("fy", "c"),
         evaluations=77, ending="converged", notes=("one", "two"), doubts=("three",),
-        certainty=RunCertainty(effective={"c": 31.0}),
+        uncertainty=RunUncertainty(effective={"c": 31.0}),
     )  # fmt: skip
     (row,) = identification_rows([found])
     wanted = {

@@ -30,5 +30,5 @@ def test_a_third_damper_from_the_command_line(tmp_path):
     assert (row["session"], row["extrapolation"]) == ("unknown", "")
     damper = load_model(model)
     assert (damper.coil.rise_s, damper.coil.fall_s) == pytest.approx((6e-3, 12e-3), rel=0.05)
-    low, high = damper.certainty.interval(damper, "fy1", level=0.999)
+    low, high = damper.uncertainty.interval(damper, "fy1", level=0.999)
     assert low < VIRTUAL.truth.fy1 < high

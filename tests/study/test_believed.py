@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mrdamper.study.workflow import believed, usable_sines
+from mrdamper.study.workflow import accepted_runs, usable_sines
 
 
 @pytest.fixture(scope="module")
@@ -69,12 +69,12 @@ def test_a_run_that_cannot_be_believed_is_left_out_by_name(bundled, runs, harm, 
 def test_the_same_samples_count_once_and_leak_into_nothing(bundled, runs):
     again = replace(runs[0], id="again", split="validate")
     rounded = replace(runs[0], id="rounded", force=np.round(runs[0].force, 3), time=runs[0].time + 5)
-    kept, refused = believed(bundled.only([*runs, again, rounded]))
+    kept, refused = accepted_runs(bundled.only([*runs, again, rounded]))
     assert [run.id for run in kept] == [run.id for run in runs]
     assert all("the same samples as run " + runs[0].id in refused[name] for name in ("again", "rounded"))
 
 
 def test_all_bundled_runs_are_believed(bundled):
-    kept, refused = believed(bundled)
+    kept, refused = accepted_runs(bundled)
     assert len(kept) == len(bundled)
     assert not refused

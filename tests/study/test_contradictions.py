@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mrdamper.study.contradictions import ContradictionError, find_contradictions
-from mrdamper.study.contradictions.evidence import Evidence, Spread
+from mrdamper.study.contradictions.evidence import AssumedScatter, Evidence
 from mrdamper.study.contradictions.tracks import tracks_of
 
 sys.path.insert(0, str(Path(__file__).parent.parent.parent))
@@ -105,7 +105,7 @@ def test_a_gain_of_a_run_multiplies_the_expected_force(sound):
     evidence = Evidence(tracks)
     means = []
     for misfit in (2.0, 0.5):
-        evidence.spread = Spread(misfit)
+        evidence.spread = AssumedScatter(misfit)
         expected = evidence.prior
         for _ in range(3):
             expected = evidence.posterior([expected.weigh(run) for run in evidence.products(tracks)])

@@ -12,14 +12,14 @@ from support.sessions import session_runs
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
-from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.dampers.model_file import save_model
 from mrdamper.data import Condition
 from mrdamper.errors import ConditionError, InputError
 from mrdamper.rig_files.motion_file import load_motion
 from mrdamper.study.first_matrix import first_matrix
 from mrdamper.study.limits import Limits
-from mrdamper.study.plan import Reckoning, plan_tests
+from mrdamper.study.plan import TestDesign, plan_tests
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 from benchmarks.planning import designs, reckoned
@@ -29,12 +29,12 @@ LIMITS = Limits((0.0, 1.0), (0.5, 4.0), (2.0, 20.0), velocity_m_s=0.2, force_N=1
 
 @pytest.fixture(scope="module")
 def damper():
-    return certain(joint_damper(), session_runs(joint_damper()))
+    return estimate_uncertainty(joint_damper(), session_runs(joint_damper()))
 
 
 @pytest.fixture(scope="module")
 def reckoning(damper):
-    return Reckoning.of(damper, LIMITS, LIMITS.candidates(0.5))
+    return TestDesign.of(damper, LIMITS, LIMITS.candidates(0.5))
 
 
 def test_every_record_is_allowed_and_shrinks_the_doubt(reckoning):
@@ -73,7 +73,7 @@ def test_a_sessions_records_tell_what_its_own_gain_leaves(reckoning):
 def test_a_doubt_can_be_chosen(damper, reckoning):
     made, about = plan_tests(damper, LIMITS, 0.3, "c1")
     i = about.names.index("c1")
-    error = np.sqrt(damper.certainty.covariance[i, i]) / damper.fitted_parameters["c1"].value
+    error = np.sqrt(damper.uncertainty.covariance[i, i]) / damper.fitted_parameters["c1"].value
     assert made[0].before == pytest.approx(error, rel=1e-3)
     assert "standard error of c1" in about.said(made)
     whole = reckoning.chosen(0.3)
@@ -86,8 +86,8 @@ def test_a_doubt_can_be_chosen(damper, reckoning):
 
 
 def test_what_no_run_could_tell_is_planned_for():
-    known = certain(joint_damper(), [run for run in session_runs(joint_damper()) if run.current_A == 0.5])
-    assert "c1" in known.certainty.unknown
+    known = estimate_uncertainty(joint_damper(), [run for run in session_runs(joint_damper()) if run.current_A == 0.5])
+    assert "c1" in known.uncertainty.unknown
     made, _ = plan_tests(known, LIMITS, 0.3)
     assert len({item.condition.current_A for item in made}) > 1
     assert made[-1].after < 0.2 * made[0].before

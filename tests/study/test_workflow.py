@@ -205,7 +205,7 @@ def test_our_own_faults_are_not_a_reason_to_leave_a_run_out(bundled, monkeypatch
 
 def test_terms_the_runs_do_not_show_are_not_in_the_model(bundled_study):
     for rig in bundled_study.rigs:
-        known = rig.damper.certainty
+        known = rig.damper.uncertainty
         for name in ("cq", "qb", "c1", "h1", "m"):  # what `identify_jointly` may do without
             if name in known.names:
                 at = known.names.index(name)

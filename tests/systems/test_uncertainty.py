@@ -9,11 +9,11 @@ from support.dampers import ENVELOPE, joint_damper, modified_damper
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
-from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.model_file import save_model
 from mrdamper.dampers.modified import ModifiedModel
 from mrdamper.dampers.parameter_map import ParameterMap
+from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.errors import InputError
 from mrdamper.models import model_type
 from mrdamper.statistics.functions.forms import ParameterFunction
@@ -32,7 +32,7 @@ ROAD = load_input("bump", {"length_s": 1.0})
 def certain(damper, names, sizes, gain=0.0, offset=0.0):
     logs = tuple(damper.fitted_parameters[name].log for name in names)
     many = np.full(len(names), 1e6)
-    return replace(damper, certainty=Certainty(names, logs, np.diag(sizes) ** 2, many, (), (), gain, offset, 1e6))
+    return replace(damper, uncertainty=Uncertainty(names, logs, np.diag(sizes) ** 2, many, (), (), gain, offset, 1e6))
 
 
 DAMPERS = {"joint": (joint_damper(), ("c0", "c1")), "modified": (modified_damper(), ("c.0", "yield_force.3"))}
@@ -75,10 +75,10 @@ def test_draws_scatter_as_the_damper_says():
     )
     draws = draw({"front": damper, "rear": damper}, 4000)
     own = damper.fitted_parameters
-    for i, name in enumerate(damper.certainty.names):
+    for i, name in enumerate(damper.uncertainty.names):
         values = np.array([row["front"].numbers[name] for row in draws])
         moved = np.log(values / own[name].value) if own[name].log else values - own[name].value
-        assert np.std(moved) == pytest.approx(np.sqrt(damper.certainty.covariance[i, i]), rel=0.06)
+        assert np.std(moved) == pytest.approx(np.sqrt(damper.uncertainty.covariance[i, i]), rel=0.06)
     gains = np.array([[row[end].gain for end in ("front", "rear")] for row in draws])
     assert gains.std(axis=0) == pytest.approx([0.03, 0.03], rel=0.06)
     assert abs(np.corrcoef(gains.T)[0, 1]) < 0.1

@@ -17,7 +17,7 @@ from hypothesis.extra.numpy import arrays
 from support.browser import LOGO
 
 from mrdamper.dampers.bands import band
-from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.dampers.joint import JointProblem
 from mrdamper.dampers.kernel import KernelDamper
 from mrdamper.dampers.model_file import dump_model, parse_model
@@ -237,7 +237,7 @@ def test_the_curve_over_current_has_points_where_the_tests_end_on_both_sides(cli
 
 def test_a_band_is_the_dampers_own_and_not_of_a_held_one(client, bench, bundled, joint):
     runs = list(bundled.rig("utfsm").split("train"))[:5]
-    damper = certain(joint, runs)
+    damper = estimate_uncertainty(joint, runs)
     key = put_on(client, bench, damper)
     ask = {"current_A": 0.4, "frequency_Hz": 1.1, "amplitude_m": 0.012, "currents": 0, "band": True}
     head, curves = opened(client.post(f"{bench}/dampers/{key}/predict", json=ask).content)

@@ -10,7 +10,7 @@ from support.browser import AUDIT, LOGO
 from web.conftest import WINDOW, watched_page
 from web.rig_files import csv_of
 
-from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.dampers.joint import JointProblem
 from mrdamper.dampers.model_file import dump_model
 from mrdamper.rig_files.dataset_folder import save_dataset
@@ -183,7 +183,9 @@ def test_from_drop_to_report(page, small_rig, tmp_path, shoot):
 def document(small_rig):
     """A saved model of the rig, with its covariance."""
     runs = small_rig.split("train")
-    return dump_model(certain(JointProblem(runs, "play-bypass").fit(rounds=1, most_steps=6).damper, list(runs)))
+    return dump_model(
+        estimate_uncertainty(JointProblem(runs, "play-bypass").fit(rounds=1, most_steps=6).damper, list(runs))
+    )
 
 
 @pytest.fixture(scope="module")

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from mrdamper.dampers.base import Damper, Prediction
 from mrdamper.dampers.calibration import Quantity
-from mrdamper.dampers.certainty import Certainty
-from mrdamper.dampers.sessions import Expected
+from mrdamper.dampers.sessions import SessionCorrection
 from mrdamper.dampers.slopes import force_slopes
+from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import SESSIONS_NEEDED, Floats
 from mrdamper.identification.intervals import student
 from mrdamper.statistics.metrics import dissipated_power, peak_force
@@ -71,7 +71,7 @@ def band(
         E_LEVEL if the level is not between 0 and 1.
     """
     student(level, 1.0)
-    uncertainty: Certainty | None = damper.certainty
+    uncertainty: Uncertainty | None = damper.uncertainty
     if uncertainty is None or not (uncertainty.of_sessions or uncertainty.run_dof > 0):
         return None
     seen_at = slice(None) if shown is None else shown
@@ -115,7 +115,7 @@ def band(
     )  # fmt: skip
 
 
-def _degrees_of_freedom(uncertainty: Certainty) -> tuple[float, float, float]:
+def _degrees_of_freedom(uncertainty: Uncertainty) -> tuple[float, float, float]:
     """Behind the variances of parameters, sessions and the rest; calibration counts the runs of the last by itself."""
     worst = float(np.min(uncertainty.dof)) if uncertainty.names else 1.0
     runs = np.inf if uncertainty.calibration else max(uncertainty.run_dof, 1.0)
@@ -124,7 +124,7 @@ def _degrees_of_freedom(uncertainty: Certainty) -> tuple[float, float, float]:
 
 def scope(damper: Damper, level: float) -> str:
     """Sessions a band holds for, and how far it is calibrated, as a phrase."""
-    uncertainty: Certainty | None = damper.certainty
+    uncertainty: Uncertainty | None = damper.uncertainty
     if uncertainty is None:
         return ""
     text = (
@@ -147,7 +147,7 @@ def no_band(damper: Damper) -> str:
     """Reason why there is no band."""
     if not damper.fitted_parameters:
         return "no band: the uncertainty of a model of this kind is not known"
-    if damper.certainty is None:
+    if damper.uncertainty is None:
         return "no band: the model was saved without its covariance"
     return "no band: its runs are too few to show how runs differ; test more conditions, on another day too"
 
@@ -193,7 +193,7 @@ def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
     InputError
         E_LEVEL if the level is not between 0 and 1.
     """
-    uncertainty, tested = damper.certainty, damper.envelope
+    uncertainty, tested = damper.uncertainty, damper.envelope
     if uncertainty is None or not tested.tested:
         return None
     at = tested.middle
@@ -220,17 +220,17 @@ def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
 
 
 def session_band(
-    expected: Expected, damper: Damper, prediction: Prediction, level: float, shown: Mask | None = None
+    expected: SessionCorrection, damper: Damper, prediction: Prediction, level: float, shown: Mask | None = None
 ) -> Band | None:
     """Calculate the interval of an uncorrected prediction about the corrected one, for a session of known runs.
 
     None where the damper has no uncertainty.
     """
-    if damper.certainty is None:
+    if damper.uncertainty is None:
         return None
     spreads = {"gain": expected.gain_spread, "offset": expected.offset_spread, "run_gain": 0.0, "run_offset": 0.0}
-    left = replace(damper.certainty, **spreads)
-    uncorrected = band(replace(damper, certainty=left), prediction, level, shown)  # type: ignore[type-var]
+    left = replace(damper.uncertainty, **spreads)
+    uncorrected = band(replace(damper, uncertainty=left), prediction, level, shown)  # type: ignore[type-var]
     if uncorrected is None:
         return None
     peaks = {n: tuple(expected.gain * v for v in getattr(uncorrected, n)) for n in ("peak", "known_session")}

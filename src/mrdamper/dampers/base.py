@@ -16,9 +16,9 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from mrdamper.dampers.causal import SLACK, causal_force
-from mrdamper.dampers.certainty import Certainty, FittedParameter, table
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.distance import Distance, distance_from
+from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty, table
 from mrdamper.data import Condition, Displayable, Floats, Run, same_condition
 from mrdamper.errors import InputError, checked
 from mrdamper.models import Model
@@ -33,7 +33,7 @@ COMBINATION = "combination"  # every quantity was tested, these together were no
 _SUM_WEIGHT = 10.0  # weight of the sum of shares, which is one, against distances in the hull
 _SAME_CURRENT = 1e-3  # A; a current that varies less is one current
 _LOGARITHM_FLOOR = 1e-12  # frequency [Hz] and amplitude [m] that stand for zero in a logarithm
-_MIN_YIELD_SAMPLES = 2  # below, the knee falls between samples
+_MIN_YIELD_SAMPLES = 2  # below, the yield displacement falls between samples
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class Envelope:
 
     @property
     def tested(self) -> bool:
-        """Whether the ranges are known; those of a bare model are not."""
+        """True where the tested ranges are known; a model without a damper has none."""
         return bool(np.isfinite([*self.current_A, *self.amplitude_m]).all())
 
     @property
@@ -115,7 +115,7 @@ class Envelope:
         return [Condition(current, *motion) for current in currents for motion in motions]
 
     def flags(self, condition: Condition) -> tuple[str, ...]:
-        """Which quantities of a condition lie outside: empty inside the envelope."""
+        """List the quantities of a condition outside the tested ranges; empty inside the envelope."""
         checks = (
             ("current", abs(condition.current_A), self.current_A),
             ("frequency", condition.frequency_Hz, self.frequency_Hz),
@@ -140,7 +140,7 @@ class Envelope:
         return replace(nearest, motion=min(nearest.motion, float(np.hypot(larger, faster))))
 
     def _combined(self, condition: Condition) -> bool:
-        """Whether a condition lies in the convex hull of the tested ones, in I, log f and log A (and log f·A)."""
+        """Tell if a condition lies in the convex hull of the tested ones, in I, log f and log A (and log f·A)."""
         if not self.conditions or condition.frequency_Hz <= 0 or condition.amplitude_m <= 0:
             return True
         from scipy.optimize import nnls  # slow to import, and needed only here
@@ -152,7 +152,7 @@ class Envelope:
         return bool(nnls(centred.T, np.array([0.0, 0.0, 0.0, _SUM_WEIGHT]))[1] < SLACK)
 
     def motion_flags(self, motion: Excitation) -> tuple[str, ...]:
-        """Which quantities of a motion that is no sine lie outside."""
+        """List the quantities of a motion that is no sine outside the tested ranges."""
         moved = float(np.ptp(motion.displacement) / 2)
         checks = (
             ("current", float(np.min(np.abs(motion.current))), float(np.max(np.abs(motion.current))), self.current_A),
@@ -166,7 +166,7 @@ class Envelope:
         )
 
 
-def samples_in_knee(motion: Excitation, knee: float) -> float:
+def samples_in_yield_displacement(motion: Excitation, knee: float) -> float:
     """Samples a motion has, after the median reversal, before it has moved on by `knee` [m]."""
     path = motion.path
     inside = np.bincount(path.stroke[path.distance < knee], minlength=path.stroke[-1] + 1)
@@ -212,7 +212,7 @@ class Prediction(Displayable):
 
     @property
     def is_sine(self) -> bool:
-        """Whether the motion is the sine of the condition."""
+        """True where the motion is the sine of the condition."""
         return NOT_A_SINE not in self.extrapolation
 
     @property
@@ -251,7 +251,7 @@ UNTESTED = Envelope(_ANY, _ANY, _ANY, _ANY)
 
 @dataclass(frozen=True)
 class Saved:
-    """What a saved model says of one kind of damper, beside what all kinds share. Subclasses add fields.
+    """Fields that one kind of damper adds to a saved model. Subclasses declare them.
 
     Only numbers, texts, lists and mappings of them: the types are checked when a file is read.
     """
@@ -278,7 +278,7 @@ class Damper(Displayable):
         Ranges of the tests it was identified from.
     provenance : mapping of str to str
     coil : Coil or None
-    certainty : Certainty or None
+    uncertainty : Uncertainty or None
         How sure its numbers and predictions are, where that is known.
 
     Examples
@@ -300,7 +300,7 @@ class Damper(Displayable):
     envelope: Envelope
     provenance: Mapping[str, str]
     coil: Coil | None
-    certainty: Certainty | None
+    uncertainty: Uncertainty | None
 
     @property
     @abstractmethod
@@ -335,11 +335,11 @@ class Damper(Displayable):
 
     @abstractmethod
     def model_at(self, condition: Condition) -> ForceLaw:
-        """What gives the force at a condition."""
+        """Return the force law at a condition."""
 
     @property
     def source(self) -> str:
-        """Where its equations come from."""
+        """Publication of its equations."""
         return ""
 
     @property
@@ -457,7 +457,7 @@ class Damper(Displayable):
             flags = self.envelope.flags(sine.condition)
         else:
             flags = (*self.envelope.motion_flags(motion), *(() if self.envelope.any_motion else (NOT_A_SINE,)))
-        if self.knee is not None and samples_in_knee(motion, self.knee) < _MIN_YIELD_SAMPLES:
+        if self.knee is not None and samples_in_yield_displacement(motion, self.knee) < _MIN_YIELD_SAMPLES:
             flags = (*flags, COARSE)
         prediction = Prediction(motion, np.zeros(len(motion)), sine.condition, flags)
         return replace(prediction, force=self.force_for(prediction))

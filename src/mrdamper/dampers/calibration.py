@@ -279,7 +279,7 @@ class Calibration:
         return float(np.interp(level, LEVELS[: len(values)], values)) if values else 1.0
 
     @classmethod
-    def of(cls, runs: Sequence[PredictedRun], scores: Sequence[Scored]) -> Calibration:
+    def of(cls, runs: Sequence[PredictedRun], scores: Sequence[StandardizedErrors]) -> Calibration:
         """From cross-validated runs and their errors over the standard deviation of the error model.
 
         Parameters
@@ -299,7 +299,7 @@ class Calibration:
 
 
 @dataclass(frozen=True, eq=False)
-class Scored:
+class StandardizedErrors:
     """Errors of one run over their standard deviations, magnitudes: of samples (N,), of the peak, of the energy."""
 
     force: Floats
@@ -307,7 +307,7 @@ class Scored:
     energy: Floats
 
     @classmethod
-    def of(cls, run: PredictedRun, force: Floats, peak: float, energy: float) -> Scored:
+    def of(cls, run: PredictedRun, force: Floats, peak: float, energy: float) -> StandardizedErrors:
         """By standard deviations of the force (N,) [N], and of peak and energy, relative."""
 
         def over(error: Floats | float, deviation: Floats | float) -> Floats:
@@ -318,7 +318,7 @@ class Scored:
         return cls(over(run.measured - run.predicted, force), over(run.peak - 1, peak), over(run.energy - 1, energy))
 
 
-def _factors(units: Sequence[Sequence[Scored]], quantity: Quantity) -> tuple[float, ...]:
+def _factors(units: Sequence[Sequence[StandardizedErrors]], quantity: Quantity) -> tuple[float, ...]:
     """Quantiles of the scores over those of a normal distribution, at the levels that can be reached."""
     reach = len(units) / (len(units) + 1)
     return tuple(
@@ -328,7 +328,7 @@ def _factors(units: Sequence[Sequence[Scored]], quantity: Quantity) -> tuple[flo
     )
 
 
-def _quantile(units: Sequence[Sequence[Scored]], quantity: Quantity, level: float) -> float:
+def _quantile(units: Sequence[Sequence[StandardizedErrors]], quantity: Quantity, level: float) -> float:
     """Quantile of the scores with equal weight of units; for one value a run, with room for a unit to come."""
     scores = [getattr(scored, quantity) for unit in units for scored in unit]
     weights = [np.full(getattr(s, quantity).size, 1 / getattr(s, quantity).size / len(u)) for u in units for s in u]
@@ -340,7 +340,10 @@ def _quantile(units: Sequence[Sequence[Scored]], quantity: Quantity, level: floa
 
 
 def _covered(
-    units: Sequence[Sequence[Scored]], others: Sequence[Sequence[Sequence[Scored]]], quantity: Quantity, level: float
+    units: Sequence[Sequence[StandardizedErrors]],
+    others: Sequence[Sequence[Sequence[StandardizedErrors]]],
+    quantity: Quantity,
+    level: float,
 ) -> float:
     """Share of scores that factors from the other units cover, each unit counting alike."""
     shares = []

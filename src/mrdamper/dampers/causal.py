@@ -1,4 +1,4 @@
-"""A damper one sample after the other: its own array code, run on symbols.
+"""Evaluation of a damper sample by sample: its array code traced on symbols.
 
 What is traced here is streamed, leaves as C and FMU, and predicts motion that is no sine with
 parameters that ask for a frequency and an amplitude: one definition, looking back only.
@@ -27,7 +27,7 @@ _STEADY = 1e-18  # mean square displacement under which nothing moves [m²]
 
 
 def free_name(number: str) -> str:
-    """What one of a damper's own numbers is called in a program that keeps it free."""
+    """Return the name of a parameter of the damper in a program that keeps it free."""
     return number.replace(".", "_")
 
 

@@ -1,8 +1,8 @@
-"""Terms of a joint model that the tests show, chosen by what is predicted when it was left out.
+"""Selection of the terms of a global model by cross-validation.
 
-Terms are tried on the linearisation of one fit: leaving out a condition, a current or a
-session, with a term or without it, is then linear algebra on a few thousand rows, and only the
-terms that win are fitted.
+Terms are tried on the linearisation of one fit: leaving out a condition, a current or a session,
+with a term or without it, is then linear algebra on a few thousand rows, and only the selected
+terms are fitted.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ import numpy as np
 
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.fold_fits import FoldFits
-from mrdamper.dampers.joint import FALL, RISE, JointFit, JointProblem, Valley
+from mrdamper.dampers.joint import FALL, RISE, JointFit, JointProblem, LocalMinimum
 from mrdamper.data import SESSIONS_NEEDED, Floats, Run, same_condition, session_of
 from mrdamper.errors import InputError
 from mrdamper.statistics.functions.selection import Errors, smaller_wins
 from mrdamper.statistics.linear import on_one_blas_thread, solve_linear
 
 _COARSE_TOLERANCE = 1e-4  # relative gain of a step that is enough to tell forms apart
-_NO_PLAY_LENGTH_M = 1e-2  # seat longer than any play: none is left [m]
+_NO_PLAY_LENGTH_M = 1e-2  # longer than any free play, so that none is left [m]
 _BLOCK_CYCLES = 12.0  # cycles of a record that is no sine that are left out together
 _LEVEL_TOLERANCE = 5e-3  # currents closer than this share of the largest are one level
 MODEL = "play-bypass"
@@ -30,8 +30,8 @@ SEARCHED = ("leak", "cq", "qb")  # presets free from the first fit on: without t
 
 
 @dataclass(frozen=True)
-class Term:
-    """Something a model may have or not.
+class ModelTerm:
+    """Optional term of a model.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Term:
     names : tuple of str
         Parameters it takes.
     neutral : tuple of float
-        Their values where the model does without.
+        Their values in the model without the term.
     """
 
     title: str
@@ -48,31 +48,31 @@ class Term:
 
 
 LEVEL_LAWS = (
-    Term("yield force rises over a current of its own", ("Ic",), (0.0,)),
-    Term("yield force saturates with current", ("si",), (0.0,)),
-    Term("yield force rises and saturates over currents of its own", ("Ic", "si"), (0.0, 0.0)),
+    ModelTerm("yield force rises over a current of its own", ("Ic",), (0.0,)),
+    ModelTerm("yield force saturates with current", ("si",), (0.0,)),
+    ModelTerm("yield force rises and saturates over currents of its own", ("Ic", "si"), (0.0, 0.0)),
 )
 _LEVEL_LAW_PARAMETERS = ("Ic", "si")
 TERMS = (
-    Term("viscosity differs by direction", ("cq",), (0.0,)),
-    Term("bypass differs by direction", ("qb",), (0.0,)),
-    Term("yield force differs by direction", ("asymmetry",), (0.0,)),
-    Term("viscosity rises with current", ("c1",), (0.0,)),
-    Term("seated share depends on current", ("h1",), (0.0,)),
-    Term("inertia", ("m",), (0.0,)),
+    ModelTerm("viscosity differs by direction", ("cq",), (0.0,)),
+    ModelTerm("bypass differs by direction", ("qb",), (0.0,)),
+    ModelTerm("yield force differs by direction", ("asymmetry",), (0.0,)),
+    ModelTerm("viscosity rises with current", ("c1",), (0.0,)),
+    ModelTerm("seated share depends on current", ("h1",), (0.0,)),
+    ModelTerm("inertia", ("m",), (0.0,)),
 )
 
 
 @dataclass(frozen=True)
-class Tried:
-    """What the evidence said of a term.
+class TermTrial:
+    """Result of the cross-validation of one term.
 
     Attributes
     ----------
     term : str
     kept : bool
     left_out : mapping of str to float
-        Mean nrmse_pp with it (where it was not kept) or without it (where it was), by what is left out.
+        Mean cross-validated nrmse_pp with the term (if rejected) or without it (if kept), by kind of fold.
     before : mapping of str to float
         The same of the model it was tried on.
     """
@@ -85,7 +85,7 @@ class Tried:
 
 @dataclass(frozen=True, eq=False)
 class JointChoice:
-    """A joint model whose terms were chosen by evidence.
+    """Global model whose terms were selected by cross-validation.
 
     Attributes
     ----------
@@ -93,12 +93,12 @@ class JointChoice:
     fit : JointFit
     tried : tuple of Tried
     left_out : mapping of str to float
-        Mean nrmse_pp by what is left out: "condition", "current", "session".
+        Mean cross-validated nrmse_pp by kind of fold: "condition", "current", "session".
     """
 
     problem: JointProblem
     fit: JointFit
-    tried: tuple[Tried, ...]
+    tried: tuple[TermTrial, ...]
     left_out: Mapping[str, float]
 
 
@@ -106,7 +106,7 @@ class JointChoice:
 def identify_jointly(
     runs: Sequence[Run], progress: Callable[[str, float], None] = lambda what, share: None
 ) -> JointChoice:
-    """Identify one damper from all runs, with the terms that predict what is left out.
+    """Identify one damper from all runs, with the terms selected by cross-validation.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def identify_jointly(
     problem = problem.with_free((*SEARCHED, *law), short.fixed)
     fit = problem.fit(start=problem.from_point(fit), rounds=2, most_steps=8, settled=_COARSE_TOLERANCE / 10)
     progress("which terms the tests show", 0.8)
-    evidence = Evidence.of(problem, fit)
+    evidence = CrossValidation.of(problem, fit)
     chosen, more = evidence.choose([t for t in TERMS if not problem.fixed.keys() & set(t.names)])
     final, best = problem, fit
     off = {name: 0.0 for term in TERMS for name in term.names if name in problem.free and name not in chosen}
@@ -149,15 +149,15 @@ def identify_jointly(
         fixed = {**final.fixed, **dict.fromkeys(gone, 0.0)}
         final = JointProblem(runs, MODEL, fixed, free=final.free, coil=coil, parts=final.parts)
         best = final.fit(start=final.from_point(best), rounds=1, settled=_COARSE_TOLERANCE / 10)
-    left_out, before = (Evidence.of(p, f).everything() for p, f in ((final, best), (problem, fit)))
+    left_out, before = (CrossValidation.of(p, f).everything() for p, f in ((final, best), (problem, fit)))
     if not smaller_wins(
         left_out, before
     ):  # what one step promised, the search did not keep: terms earn their place here too
         final, best = problem, fit
     best = final.fit(start=best.point, rounds=1, settled=_COARSE_TOLERANCE / 10, to_the_last_digit=True)
     progress("one model for all runs", 1.0)
-    left_out = Evidence.of(final, best).everything()
-    left_out = _means({**left_out, **current, **Evidence.of(final, best, _by_session).everything()})
+    left_out = CrossValidation.of(final, best).everything()
+    left_out = _means({**left_out, **current, **CrossValidation.of(final, best, _by_session).everything()})
     tried = (*tried, *more)
     kept = "; ".join(t.term for t in tried if t.kept)
     about = {**best.damper.provenance, "terms": kept or "none beyond the plain form"}
@@ -166,18 +166,18 @@ def identify_jointly(
     return JointChoice(final, best, tried, left_out)
 
 
-def _lost_motion(problem: JointProblem, fit: JointFit) -> tuple[JointProblem, JointFit, tuple[Tried, ...]]:
-    """Whether the damper loses motion after a reversal: the model without it, where that predicts as well."""
+def _lost_motion(problem: JointProblem, fit: JointFit) -> tuple[JointProblem, JointFit, tuple[TermTrial, ...]]:
+    """Remove the free play from the model where it predicts as well without it."""
     without = problem.with_free(problem.free, {"e": _NO_PLAY_LENGTH_M})
     starts = (without.from_point(fit), without.start)  # the play found need not be the way of a seat without play
     fits = [without.fit(start=start, rounds=1, most_steps=10, settled=_COARSE_TOLERANCE) for start in starts]
     refitted = min(fits, key=lambda each: float(np.sum(each.nrmse_pp)))
-    now, scores = (Evidence.of(p, f).everything() for p, f in ((problem, fit), (without, refitted)))
+    now, scores = (CrossValidation.of(p, f).everything() for p, f in ((problem, fit), (without, refitted)))
     kept = not smaller_wins(scores, now)
-    trial = _tried("lost motion after a reversal", kept, now, scores)
+    trial = _tried("free play after a reversal", kept, now, scores)
     if kept:
         return problem, fit, (trial,)
-    return without, replace(refitted, second=Valley.beside(refitted, [fit])), (trial,)
+    return without, replace(refitted, second=LocalMinimum.beside(refitted, [fit])), (trial,)
 
 
 def _absent(problem: JointProblem, fit: JointFit) -> tuple[Coil | Literal["determined"] | None, tuple[str, ...]]:
@@ -191,7 +191,7 @@ def _absent(problem: JointProblem, fit: JointFit) -> tuple[Coil | Literal["deter
     return coil, tuple(name for name in ("leak", "si") if name in least)
 
 
-def _level_laws(problem: JointProblem) -> tuple[Term, ...]:
+def _level_laws(problem: JointProblem) -> tuple[ModelTerm, ...]:
     """Forms of the level law beyond a straight line that the currents of the tests determine, the shortest first.
 
     A law has a parameter fewer than there are levels; a current that changes passes through all.
@@ -202,9 +202,9 @@ def _level_laws(problem: JointProblem) -> tuple[Term, ...]:
 
 
 def _level_law(
-    longest: JointProblem, fit: JointFit, forms: Sequence[Term]
-) -> tuple[tuple[str, ...], JointFit, tuple[Tried, ...], dict[str, Floats]]:
-    """Form of the yield force over current that predicts what is left out, the shortest first.
+    longest: JointProblem, fit: JointFit, forms: Sequence[ModelTerm]
+) -> tuple[tuple[str, ...], JointFit, tuple[TermTrial, ...], dict[str, Floats]]:
+    """Select the form of the yield force over current by cross-validation, the shortest first.
 
     Inner currents are left out where there are some: one step does not carry a form from current to current, so these
     are fitted, from starts that never saw them. The search began with every parameter of the law, for the others make
@@ -215,7 +215,7 @@ def _level_law(
     levels = levels_of(longest)[1:-1]
     without = FoldFits(longest, levels)
     starts = [without.refit([i for i in range(len(longest.parts)) if i not in level]) for level in levels]
-    tried: list[Tried] = []
+    tried: list[TermTrial] = []
     best: tuple[tuple[str, ...], JointFit, Errors] | None = None
     for term in (None, *forms):
         form = term.names if term else ()
@@ -223,7 +223,7 @@ def _level_law(
         trial = fit
         if set(problem.free) != set(longest.free):
             trial = problem.fit(start=problem.from_point(fit), rounds=1, most_steps=10, settled=_COARSE_TOLERANCE)
-        scores: Errors = Evidence.of(problem, trial).everything()
+        scores: Errors = CrossValidation.of(problem, trial).everything()
         if levels:
             scores = {**scores, "current": _left_out_current(problem, starts, levels)}
         if term is None or best is None:
@@ -273,8 +273,8 @@ def _undetermined(runs: Sequence[Run]) -> dict[str, float]:
 Grouping = Callable[[JointProblem, np.ndarray], dict[str, list[np.ndarray]]]
 
 
-class Evidence:
-    """The linearisation of a fit by all parameters, and what to leave out of it."""
+class CrossValidation:
+    """Cross-validation of terms on the linearisation of a fit by all parameters."""
 
     def __init__(
         self,
@@ -292,7 +292,7 @@ class Evidence:
         self.step = np.zeros(len(self.names))
 
     @classmethod
-    def of(cls, problem: JointProblem, fit: JointFit, by: Grouping | None = None) -> Evidence:
+    def of(cls, problem: JointProblem, fit: JointFit, by: Grouping | None = None) -> CrossValidation:
         """Linearise a problem where a fit of it ended; by default conditions are left out."""
         linearised = problem.linearised(fit)
         table, owner = linearised.table, linearised.table.owner
@@ -311,11 +311,11 @@ class Evidence:
         return cls(names, values, neutral, linearised.residual, linearised.jacobian, rows, error)
 
     def everything(self) -> dict[str, Floats]:
-        """Left-out errors with all parameters."""
+        """Return the cross-validated errors with all parameters."""
         return self.scores(frozenset(self.names))
 
     def scores(self, active: frozenset[str]) -> dict[str, Floats]:
-        """Left-out error of every group by what is left out, with the other parameters neutral."""
+        """Return the cross-validated error of every group by kind of fold, with the other parameters neutral."""
         on = np.array([n in active or n.startswith("coil.") for n in self.names])
         shift = np.where(on, 0.0, self.neutral - self.values)
         base = self.residual + self.jacobian @ shift
@@ -336,8 +336,8 @@ class Evidence:
         whole[group] = weighted
         return self.error(whole, group)
 
-    def choose(self, removable: Sequence[Term]) -> tuple[frozenset[str], tuple[Tried, ...]]:
-        """The parameters without which more is missed of what was left out, one term after the other."""
+    def choose(self, removable: Sequence[ModelTerm]) -> tuple[frozenset[str], tuple[TermTrial, ...]]:
+        """Select the terms without which the cross-validated error increases, one after the other."""
         active = frozenset(n for n in self.names if not n.startswith("coil."))
         now, tried = self.scores(active), []
         for term in removable:
@@ -351,7 +351,7 @@ class Evidence:
         return active, tuple(tried)
 
     def start(self, problem: JointProblem) -> Floats:
-        """Where the chosen problem starts: one step of the linearisation from the fit."""
+        """Return the start of the selected problem: one step of the linearisation from the fit."""
         on = np.array([n in self.active or n.startswith("coil.") for n in self.names])
         shift = np.where(on, 0.0, self.neutral - self.values)
         J, base = self.jacobian[:, on], self.residual + self.jacobian @ shift
@@ -371,9 +371,9 @@ def _damped(normal: Floats, right: Floats) -> Floats:
     return np.linalg.solve(stiff, right / scale) / scale
 
 
-def _tried(title: str, kept: bool, larger: Errors, smaller: Errors) -> Tried:
-    """Evidence on a term from the left-out errors of the model with it and of that without it."""
-    return Tried(title, kept, _means(smaller if kept else larger), _means(larger if kept else smaller))
+def _tried(title: str, kept: bool, larger: Errors, smaller: Errors) -> TermTrial:
+    """Compare the cross-validated errors of the models with and without a term."""
+    return TermTrial(title, kept, _means(smaller if kept else larger), _means(larger if kept else smaller))
 
 
 def _means(errors: Errors) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""The coil: how the field, and so the yield force, follows a changing current, and what drives it.
+"""Lag of the field, and so of the yield force, behind the coil current, and the current driver.
 
 Flux builds up and decays with different lags: eddy currents hold both back, the driver's
 free-wheeling the decay. The damper's field is symmetric: a current counts by its magnitude, in
@@ -22,7 +22,7 @@ _MAX_LAG_S = 10.0  # s; a field that needs longer is no coil's
 
 @dataclass(frozen=True)
 class Driver:
-    """What makes the current out of a command voltage.
+    """Current driver: gain, coil lag and limit from the command voltage to the current.
 
     Attributes
     ----------
@@ -132,7 +132,7 @@ def field_current(time: Floats, current: Floats, rise: float, fall: float, signe
 
 
 def _gap(gap: float, change: float, step: float, rise: float, fall: float) -> float:
-    """What is missing to the wanted current a step later: dg/dt = s − g/T, T by the sign of g."""
+    """Advance the difference between commanded and lagged current by one step: dg/dt = s − g/T, T by the sign of g."""
     upward = gap > 0 or (gap == 0 and change > 0)
     constant, slope = (rise if upward else fall), change / step
     if gap * change < 0 and constant > 0:  # met on the way, perhaps: then the other lag from there on

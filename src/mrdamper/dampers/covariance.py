@@ -13,14 +13,14 @@ from mrdamper.dampers.calibration import (
     Calibration,
     Growth,
     PredictedRun,
-    Scored,
+    StandardizedErrors,
     model_error,
     scatter_between_sessions,
 )
-from mrdamper.dampers.certainty import Certainty, FittedParameter
 from mrdamper.dampers.random_effects import Effects, GainsAndOffsets
 from mrdamper.dampers.run_residuals import RunResiduals, normal_matrix
 from mrdamper.dampers.slopes import force_slopes
+from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
 from mrdamper.data import Floats, Run
 from mrdamper.identification.covariance import alike_groups, score_covariance
 from mrdamper.identification.intervals import interval_about, relative_width, weaknesses
@@ -31,7 +31,7 @@ _MIN_EIGENVALUE = 1e-10  # of the largest of the scaled normal matrix, below whi
 _LEVEL = 0.95  # of the intervals by which a parameter is identifiable or not
 
 
-def certain(
+def estimate_uncertainty(
     damper: Damper,
     runs: Sequence[Run],
     cross_validated: Sequence[PredictedRun] = (),
@@ -64,7 +64,7 @@ def certain(
     Returns
     -------
     Damper
-        The same with `certainty`.
+        The same with `uncertainty`.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def certain(
     sized = {name for name in names if bounded or numbers[name].value}
     spread, wide = _identifiable(names, sized, numbers, parts, [s[:, kept] for s in slopes], inverse)
     effects = spread.effects
-    uncertainty = Certainty(
+    uncertainty = Uncertainty(
         spread.names, tuple(numbers[n].log for n in spread.names), spread.covariance, spread.dof, at_bound,
         tuple(name for name in free if name in unknown | wide),
         effects.gain, effects.offset, effects.session_dof, effects.run_gain, effects.run_offset, effects.run_dof,
@@ -100,8 +100,8 @@ def certain(
         taught=dict(zip([p.run.id for p in parts], _shares(spread.information), strict=True)),
         effective=dict(zip(spread.names, spread.effective.tolist(), strict=True)),
     )  # fmt: skip
-    certainty = _with_model_error(uncertainty, parts, spread.slopes, cross_validated, away, other_sessions)
-    return replace(damper, certainty=certainty)  # type: ignore[type-var]
+    uncertainty = _with_model_error(uncertainty, parts, spread.slopes, cross_validated, away, other_sessions)
+    return replace(damper, uncertainty=uncertainty)  # type: ignore[type-var]
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,13 +235,13 @@ def _inside(part: RunResiduals) -> PredictedRun:
 
 
 def _with_model_error(
-    uncertainty: Certainty,
+    uncertainty: Uncertainty,
     parts: Sequence[RunResiduals],
     slopes: Sequence[Floats],
     cross_validated: Sequence[PredictedRun],
     away: Sequence[PredictedRun],
     other_sessions: Sequence[PredictedRun],
-) -> Certainty:
+) -> Uncertainty:
     """Error of the form: what is left after each run's own gain and offset; and the calibration on it."""
     own = {  # mean variance of the force by the parameters, over the square of half the peak-to-peak force
         part.run.id: float(np.mean(np.einsum("np,pq,nq->n", slope, uncertainty.covariance, slope)))
@@ -273,5 +273,5 @@ def _with_model_error(
         grown = {quantity: share + uncertainty.growth.variance(quantity, run.distance) for quantity in QUANTITIES}
         force = gain * run.predicted**2 + error.offset**2 + (grown["force"] + uncertainty.force**2) * run.half**2
         peak, energy = (np.sqrt(grown[q] + gain + getattr(uncertainty, q) ** 2) for q in ("peak", "energy"))
-        scores.append(Scored.of(run, np.sqrt(force), float(peak), float(energy)))
+        scores.append(StandardizedErrors.of(run, np.sqrt(force), float(peak), float(energy)))
     return replace(uncertainty, calibration=Calibration.of(cross_validated, scores))

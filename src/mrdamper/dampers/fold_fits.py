@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mrdamper.dampers.joint import JointFit, JointProblem, Valley
+from mrdamper.dampers.joint import JointFit, JointProblem, LocalMinimum
 
 _MAX_OMITTED_SHARE = 0.5  # share of the runs that a search may be without
 _START_COUNT = 3  # of the model, from which a search goes
@@ -69,7 +69,7 @@ class FoldFits:
             for start in short.promising[:_START_COUNT]
         ]
         ends.sort(key=lambda end: end.error)
-        kept = [ends[0], *(end for end in ends[1:] if Valley.beside(ends[0], [end]))]
+        kept = [ends[0], *(end for end in ends[1:] if LocalMinimum.beside(ends[0], [end]))]
         return [self._in_whole(end) for end in kept[:_START_COUNT]]
 
     def _in_whole(self, end: JointFit) -> JointFit:

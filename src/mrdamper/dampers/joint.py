@@ -19,9 +19,9 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 
 from mrdamper.dampers.base import UNTESTED, Damper, Envelope, Saved, not_held
-from mrdamper.dampers.certainty import Certainty, FittedParameter
 from mrdamper.dampers.coil import Coil
-from mrdamper.dampers.strung import Linearised, Part, Table
+from mrdamper.dampers.concatenated_runs import JointResiduals, Linearisation, RunRows
+from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, ParameterError, require
 from mrdamper.models import Model, Scale, SearchAxis, model_type
@@ -68,7 +68,7 @@ class JointDamper(Damper):
     envelope : Envelope
     provenance : mapping
     coil : Coil, optional
-    certainty : Certainty, optional
+    uncertainty : Uncertainty, optional
     """
 
     kind: ClassVar[str] = "joint"
@@ -80,7 +80,7 @@ class JointDamper(Damper):
     envelope: Envelope
     provenance: Mapping[str, str] = field(default_factory=dict)
     coil: Coil | None = None
-    certainty: Certainty | None = field(default=None, kw_only=True)
+    uncertainty: Uncertainty | None = field(default=None, kw_only=True)
 
     @property
     def title(self) -> str:
@@ -114,7 +114,7 @@ class JointDamper(Damper):
     def holding(self, values: Mapping[str, float]) -> JointDamper:
         if missing := values.keys() - self.model.values().keys():
             raise not_held(self, sorted(missing))
-        return replace(self.with_parameters(values), certainty=None)
+        return replace(self.with_parameters(values), uncertainty=None)
 
     @property
     def fitted_parameters(self) -> Mapping[str, FittedParameter]:
@@ -178,7 +178,7 @@ class JointFit:
     evaluations: int
     seconds: float
     searched: tuple[str, ...] = ()
-    second: Valley | None = None
+    second: LocalMinimum | None = None
 
     @property
     def error(self) -> float:
@@ -187,7 +187,7 @@ class JointFit:
 
 
 @dataclass(frozen=True)
-class Valley:
+class LocalMinimum:
     """Another end of the search: parameters with another knee that describe the same samples nearly as well.
 
     Attributes
@@ -204,7 +204,7 @@ class Valley:
     chosen_error: float
 
     @classmethod
-    def beside(cls, chosen: JointFit, ends: Iterable[JointFit]) -> Valley | None:
+    def beside(cls, chosen: JointFit, ends: Iterable[JointFit]) -> LocalMinimum | None:
         """The best of some ends of a search that differ from the chosen one, if any."""
         own = chosen.damper.knee
         others = [
@@ -217,7 +217,7 @@ class Valley:
 class JointProblem:
     """Runs of one rig prepared for one model type.
 
-    All runs are strung into one motion: a model with fading memory forgets one run while it
+    All runs are concatenated into one motion: a model with fading memory forgets one run while it
     follows the next from 1.5 cycles before its scored samples, and one long array is followed
     faster than many short ones.
 
@@ -247,7 +247,7 @@ class JointProblem:
         *,
         free: Sequence[str] = (),
         coil: Coil | Literal["determined"] | None = "determined",
-        parts: Sequence[Part] = (),
+        parts: Sequence[RunRows] = (),
     ):
         if not runs:
             raise IdentificationError("no runs", remedy="give at least one")
@@ -260,7 +260,7 @@ class JointProblem:
         infos = self.model_type.parameters()
         self.free = tuple(i.name for i in infos if i.name not in self.fixed and (not i.preset or i.name in free))
         self.linear = [info for info in infos if info.linear and info.name in self.free]
-        self.parts = list(parts) or [Part.of(run) for run in runs]
+        self.parts = list(parts) or [RunRows.of(run) for run in runs]
         self.axes: tuple[SearchAxis, ...] = self.model_type.search_axes(_scale(self.parts), self.free)
         self.given_coil: Coil | Literal["determined"] | None = coil
         self.coil = None if coil == "determined" else coil
@@ -282,7 +282,7 @@ class JointProblem:
 
     def errors(self, fit: JointFit, rows: Sequence[int]) -> Floats:
         """(len(rows),) nrmse_pp of some runs predicted by a fit to others."""
-        table = Table(self, [self.parts[i] for i in rows])
+        table = JointResiduals(self, [self.parts[i] for i in rows])
         return np.sqrt(np.bincount(table.owner, table.residual(fit.point, fit.damper.model) ** 2))
 
     @property
@@ -310,10 +310,10 @@ class JointProblem:
         return [end.point for end in ends]
 
     @cached_property
-    def _few(self) -> Table:
+    def _few(self) -> JointResiduals:
         """A few runs on which starts are tried."""
         few = self.parts[:: max(1, len(self.parts) // _TRIAL_RUNS)]
-        return Table(self, [part.steady_end() for part in few])
+        return JointResiduals(self, [part.steady_end() for part in few])
 
     def _downhill(self, start: Floats) -> Minimum:
         """Some steps from a start, on few runs."""
@@ -340,7 +340,7 @@ class JointProblem:
         starts = [*self.promising[:2], *([] if start is None else [self._downhill(start).point])]
         ends = [self.fit(start=u, rounds=rounds, most_steps=most_steps, settled=settled) for u in starts]
         best = min(ends, key=lambda end: _MAX_ERROR_RATIO * end.error if end is ends[0] else end.error)
-        return replace(best, second=Valley.beside(best, ends))
+        return replace(best, second=LocalMinimum.beside(best, ends))
 
     @on_one_blas_thread
     def fit(
@@ -369,13 +369,13 @@ class JointProblem:
         """
         begin = time.perf_counter()
         parts = self.parts if rows is None else [self.parts[i] for i in rows]
-        table, point = Table(self, parts), self.start if start is None else start
+        table, point = JointResiduals(self, parts), self.start if start is None else start
         return self._search(table, parts, point, rounds, most_steps, settled, begin, to_the_last_digit)
 
     def _search(
         self,
-        table: Table,
-        parts: Sequence[Part],
+        table: JointResiduals,
+        parts: Sequence[RunRows],
         point: Floats,
         rounds: int,
         most_steps: int,
@@ -434,19 +434,19 @@ class JointProblem:
         table.weigh(table.solve(point).nrmse_pp)
         return self._search(table, [self.parts[i] for i in rows], point, 1, _REFIT_STEPS, settled, begin)
 
-    def linearised(self, fit: JointFit) -> Linearised:
+    def linearised(self, fit: JointFit) -> Linearisation:
         """All runs linearised at a fit, weighted by the errors it left; remembered for the last fits."""
         linearisation = next((each for one, each in self._linearisations if one is fit), None)
         if linearisation is None:
-            table = Table(self, self.parts)
+            table = JointResiduals(self, self.parts)
             table.weigh(fit.nrmse_pp)
-            linearisation = Linearised(table, fit.point, *table.linearise(fit.point, fit.damper.model))
+            linearisation = Linearisation(table, fit.point, *table.linearise(fit.point, fit.damper.model))
             self._linearisations = [*self._linearisations[1 - _CACHED_LINEARISATIONS :], (fit, linearisation)]
         return linearisation
 
-    _linearisations: Sequence[tuple[JointFit, Linearised]] = ()
+    _linearisations: Sequence[tuple[JointFit, Linearisation]] = ()
 
-    def _damper(self, model: Model, point: Floats, parts: Sequence[Part]) -> JointDamper:
+    def _damper(self, model: Model, point: Floats, parts: Sequence[RunRows]) -> JointDamper:
         about = {"runs": str(len(parts)), "fit": "global fit, all runs"}
         return JointDamper(
             self.rig,
@@ -492,7 +492,7 @@ class JointProblem:
         return self.model_type.build({**self.fixed, **values, **{info.name: 0.0 for info in self.linear}})
 
 
-def _envelope(parts: Sequence[Part]) -> Envelope:
+def _envelope(parts: Sequence[RunRows]) -> Envelope:
     """Ranges of the sines at one current, and every sample of the others."""
     envelope = Envelope.of([part.condition for part in parts])
     others = [part for part in parts if part.changes or not part.is_sine]
@@ -502,7 +502,7 @@ def _envelope(parts: Sequence[Part]) -> Envelope:
     return envelope
 
 
-def _scale(parts: Sequence[Part]) -> Scale:
+def _scale(parts: Sequence[RunRows]) -> Scale:
     """Sizes of all runs: the middle motion, the largest force and current."""
     return Scale(
         amplitude=float(np.median([part.condition.amplitude_m for part in parts])),

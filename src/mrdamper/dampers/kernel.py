@@ -9,9 +9,9 @@ from typing import ClassVar, Self
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Envelope, Saved
-from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.piece import Piece
+from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.data.parameters import ParameterInfo
 from mrdamper.errors import IdentificationError, ParameterError
@@ -102,7 +102,7 @@ class KernelDamper(Damper):
     envelope: Envelope
     provenance: Mapping[str, str] = field(default_factory=dict)
     coil: Coil | None = None
-    certainty: Certainty | None = field(default=None, kw_only=True)
+    uncertainty: Uncertainty | None = field(default=None, kw_only=True)
 
     @property
     def title(self) -> str:

@@ -1,9 +1,9 @@
-"""What the runs say of any values of a damper's numbers: profiles of one, samples of all.
+"""Likelihood of the parameters of a damper, and its profile along one parameter.
 
-The likelihood is that of the score: what a set of numbers leaves over, seen through the derivatives
-at the estimate and weighed by the covariance of that score, noise, repeated model error and sessions
-in it. It is greatest at the estimate, has the damper's covariance as its curvature there, and follows
-the whole, not the linearised model away from it [Hansen 1982, Econometrica 50, 1029].
+The likelihood is that of the score: the residuals projected on the derivatives at the estimate and
+weighted by the covariance of the score, which contains noise, repeated model error and sessions. It
+is greatest at the estimate, its curvature there is the inverse of the damper's covariance, and away
+from it the model is evaluated in full, not linearised [Hansen 1982, Econometrica 50, 1029].
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.certainty import Certainty
-from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.concatenated_runs import concatenate
+from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.dampers.run_residuals import RunResiduals, normal_matrix
 from mrdamper.dampers.slopes import force_slopes
-from mrdamper.dampers.strung import string
+from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import Floats, Run
 from mrdamper.errors import InputError
 from mrdamper.physics.motion import Excitation
@@ -36,14 +36,14 @@ Kind = Literal["bounded", "one-sided", "flat"]
 
 @dataclass(frozen=True, eq=False)
 class Likelihood:
-    """Minus twice the logarithm of the likelihood of a damper's numbers, zero at the estimate.
+    """Minus twice the logarithm of the likelihood of a damper's parameters, zero at the estimate.
 
     Attributes
     ----------
     damper : Damper
         With its covariance.
     names : tuple of str, length P
-        Numbers it is of, those at a bound among them.
+        Its parameters, including those at a bound.
     start : (P,) array
         The estimate; logarithms where the damper has them.
     covariance : (P, P) array
@@ -70,8 +70,8 @@ class Likelihood:
         InputError
             E_CERTAINTY if the runs determine none of its numbers.
         """
-        whole = certain(damper, runs, bounded=False)
-        uncertainty: Certainty | None = whole.certainty
+        whole = estimate_uncertainty(damper, runs, bounded=False)
+        uncertainty: Uncertainty | None = whole.uncertainty
         if uncertainty is None or not uncertainty.names:
             raise InputError(
                 "these runs determine no number of the damper", remedy="give its train runs", code="E_CERTAINTY"
@@ -115,20 +115,20 @@ class Likelihood:
 
     def _force(self, damper: Damper) -> Floats:
         model = damper.one_model
-        if model is None or self._strung is None:
+        if model is None or self._concatenated is None:
             return np.concatenate([damper.force_for(p.prediction)[p.picked] for p in self.parts])
-        whole, picked, motion = self._strung
+        whole, picked, motion = self._concatenated
         return model.force(motion, model.state(whole)[picked])
 
     @cached_property
-    def _strung(self) -> tuple[Excitation, NDArray[np.intp], Excitation] | None:
+    def _concatenated(self) -> tuple[Excitation, NDArray[np.intp], Excitation] | None:
         """All runs in one motion, followed faster than many short ones; None where one does not forget the other."""
         if self.damper.one_model is None or min(int(p.picked[0]) for p in self.parts) < _MEMORY_SAMPLES:
             return None
         motions = [self.damper.with_field_current(p.prediction.motion) for p in self.parts]
         begins = np.cumsum([0, *(len(m) for m in motions)])[:-1]
         picked = np.concatenate([p.picked + b for p, b in zip(self.parts, begins, strict=True)])
-        whole = string(motions)
+        whole = concatenate(motions)
         return whole, picked, whole.part(picked)
 
 
@@ -155,8 +155,8 @@ def _coordinates(bounds: tuple[float, float], log: bool) -> tuple[float, float]:
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
-    """How much worse the best of all other numbers describes the runs as one number moves.
+class LikelihoodProfile:
+    """Profile likelihood: the least misfit over all other parameters as one parameter varies.
 
     Attributes
     ----------
@@ -166,7 +166,7 @@ class Profile:
         Minus twice the logarithm of the likelihood, over its least.
     estimate : float
     interval : (float, float)
-        Where the fall reaches 3.84; infinite on an open side.
+        Ends of the interval within which the fall is below 3.84; infinite on an open side.
     kind : "bounded", "one-sided" or "flat"
     """
 
@@ -179,8 +179,8 @@ class Profile:
     kind: Kind
 
 
-def profile(likelihood: Likelihood, name: str) -> Profile:
-    """Profile likelihood of one of a damper's numbers.
+def profile(likelihood: Likelihood, name: str) -> LikelihoodProfile:
+    """Compute the profile likelihood of one parameter of a damper.
 
     Raises
     ------
@@ -191,9 +191,9 @@ def profile(likelihood: Likelihood, name: str) -> Profile:
     if own is None:
         names = ", ".join(likelihood.damper.fitted_parameters)
         raise InputError(f"no number {name}", remedy=f"known: {names}", code="E_CERTAINTY")
-    if name not in likelihood.names or name in (likelihood.damper.certainty or _NO_PARAMETERS).unknown:
+    if name not in likelihood.names or name in (likelihood.damper.uncertainty or _NO_PARAMETERS).unknown:
         flat = np.array([own.value])
-        return Profile(name, own.unit, flat, np.zeros(1), own.value, (-np.inf, np.inf), "flat")
+        return LikelihoodProfile(name, own.unit, flat, np.zeros(1), own.value, (-np.inf, np.inf), "flat")
     i = likelihood.names.index(name)
     error = float(np.sqrt(likelihood.covariance[i, i]))
     points, falls = [likelihood.start], [likelihood(likelihood.start)]
@@ -221,10 +221,10 @@ def profile(likelihood: Likelihood, name: str) -> Profile:
     closed = int(np.isfinite(low)) + int(np.isfinite(high))
     kind: Kind = ("flat", "one-sided", "bounded")[closed]
     values = np.exp(us) if log else us
-    return Profile(name, own.unit, values, fall, own.value, (ends[0], ends[1]), kind)
+    return LikelihoodProfile(name, own.unit, values, fall, own.value, (ends[0], ends[1]), kind)
 
 
-_NO_PARAMETERS = Certainty((), (), np.zeros((0, 0)), np.zeros(0))
+_NO_PARAMETERS = Uncertainty((), (), np.zeros((0, 0)), np.zeros(0))
 
 
 def _others(likelihood: Likelihood, held: int, value: float, start: Floats) -> tuple[Floats, float]:
@@ -259,7 +259,7 @@ def _others(likelihood: Likelihood, held: int, value: float, start: Floats) -> t
 
 
 def _crossing(values: Floats, fall: Floats) -> float:
-    """Where a fall first reaches `CHI_SQUARED_95` along a side; infinite if it does not."""
+    """Find the value at which a fall first reaches `CHI_SQUARED_95` along a side; infinite if it does not."""
     over = np.flatnonzero(fall >= CHI_SQUARED_95)
     if not over.size or over[0] == 0:
         return float(np.sign(values[-1] - values[0]) or 1.0) * np.inf if not over.size else float(values[0])

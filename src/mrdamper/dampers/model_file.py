@@ -18,9 +18,9 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, 
 from mrdamper.dampers import all_kinds
 from mrdamper.dampers.base import Damper, Envelope
 from mrdamper.dampers.calibration import Calibration, Growth
-from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.coil import Coil, Driver
 from mrdamper.dampers.sessions import Sessions
+from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import require_name
 from mrdamper.data.atomic import path_of, write_file
 from mrdamper.data.regular import open_regular
@@ -187,7 +187,7 @@ def dump_model(damper: Damper) -> str:
         envelope=_Envelope(**{name: getattr(damper.envelope, name) or None for name in _Envelope.model_fields}),  # type: ignore[arg-type]
         provenance={**damper.provenance, **_outside_package(damper)},
         coil=_describe_coil(damper.coil),
-        covariance=_describe_certainty(damper.certainty),
+        covariance=_describe_uncertainty(damper.uncertainty),
         damper={"kind": damper.kind, **asdict(damper.to_saved())},
     )
     return json.dumps(document.model_dump(exclude_none=True), indent=1, ensure_ascii=False) + "\n"
@@ -256,7 +256,7 @@ def parse_model(text: str, where: str = "model") -> Damper:
         coil = _restore_coil(document.coil) if document.coil else None
         envelope = Envelope(**document.envelope.model_dump(exclude_none=True))
         damper = kind.from_saved(saved, document.rig, envelope, document.provenance, coil)
-        return _with_certainty(damper, document.covariance, where) if document.covariance else damper
+        return _with_uncertainty(damper, document.covariance, where) if document.covariance else damper
     except InputError as error:
         package = document.provenance.get(_PACKAGE)
         remedy = f"install the package that the file names: {package!r:.80}" if package else error.remedy
@@ -301,31 +301,35 @@ def _upgraded(raw: dict[str, Any]) -> dict[str, Any]:
     return raw
 
 
-def _describe_certainty(certainty: Certainty | None) -> _Covariance | None:
-    if certainty is None:
+def _describe_uncertainty(uncertainty: Uncertainty | None) -> _Covariance | None:
+    if uncertainty is None:
         return None
     return _Covariance(
-        parameters=certainty.names,
-        logarithmic=certainty.logs,
-        matrix=tuple(tuple(row) for row in certainty.covariance.tolist()),
-        degrees_of_freedom=tuple(certainty.dof.tolist()),
-        one_sided=certainty.one_sided,
-        unknown=certainty.unknown,
-        session=_Session(gain=certainty.gain, offset_N=certainty.offset, degrees_of_freedom=certainty.session_dof),
-        model_error=_ModelError(
-            force=certainty.force, peak=certainty.peak, energy=certainty.energy, left_out=certainty.left_out
+        parameters=uncertainty.names,
+        logarithmic=uncertainty.logs,
+        matrix=tuple(tuple(row) for row in uncertainty.covariance.tolist()),
+        degrees_of_freedom=tuple(uncertainty.dof.tolist()),
+        one_sided=uncertainty.one_sided,
+        unknown=uncertainty.unknown,
+        session=_Session(
+            gain=uncertainty.gain, offset_N=uncertainty.offset, degrees_of_freedom=uncertainty.session_dof
         ),
-        words=certainty.words,
-        taught=dict(certainty.taught),
-        effective=dict(certainty.effective),
-        sessions=certainty.sessions,
-        runs=_Session(gain=certainty.run_gain, offset_N=certainty.run_offset, degrees_of_freedom=certainty.run_dof),
-        calibration=certainty.calibration,
-        growth=certainty.growth,
+        model_error=_ModelError(
+            force=uncertainty.force, peak=uncertainty.peak, energy=uncertainty.energy, left_out=uncertainty.left_out
+        ),
+        words=uncertainty.words,
+        taught=dict(uncertainty.taught),
+        effective=dict(uncertainty.effective),
+        sessions=uncertainty.sessions,
+        runs=_Session(
+            gain=uncertainty.run_gain, offset_N=uncertainty.run_offset, degrees_of_freedom=uncertainty.run_dof
+        ),
+        calibration=uncertainty.calibration,
+        growth=uncertainty.growth,
     )
 
 
-def _with_certainty(damper: Damper, saved: _Covariance, where: str) -> Damper:
+def _with_uncertainty(damper: Damper, saved: _Covariance, where: str) -> Damper:
     """Return the damper with the covariance of its file, once it fits the damper."""
     size, session, model = len(saved.parameters), saved.session, saved.model_error
     square = len(saved.matrix) == size and all(len(row) == size for row in saved.matrix)
@@ -345,13 +349,13 @@ def _with_certainty(damper: Damper, saved: _Covariance, where: str) -> Damper:
                 f"covariance: the variance of {name} is {variance:.3g}", where=where, remedy="write the model again"
             )
     runs = saved.runs or _Session(gain=0.0, offset_N=0.0, degrees_of_freedom=0.0)
-    certainty = Certainty(
+    uncertainty = Uncertainty(
         saved.parameters, saved.logarithmic, matrix, np.array(saved.degrees_of_freedom), saved.one_sided, saved.unknown,
         session.gain, session.offset_N, session.degrees_of_freedom, runs.gain, runs.offset_N, runs.degrees_of_freedom,
         model.force, model.peak, model.energy, model.left_out, saved.words, saved.taught,
         saved.effective, saved.sessions, saved.calibration, saved.growth,
     )  # fmt: skip
-    return replace(damper, certainty=certainty)  # type: ignore[type-var]
+    return replace(damper, uncertainty=uncertainty)  # type: ignore[type-var]
 
 
 def _describe_coil(coil: Coil | None) -> _Coil | None:

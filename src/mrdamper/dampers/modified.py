@@ -1,4 +1,4 @@
-"""The modified model: identified run by run, every parameter then a function of I, f and A.
+"""Modified model: a model whose parameters are functions of I, f and A.
 
 [Qian et al. 2024, Eq. 23–43], with the functions fitted to identifications that do not count
 the hysteretic force twice, and each form chosen by how it predicts conditions left out.
@@ -14,10 +14,10 @@ from typing import ClassVar, Self
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Envelope, Saved, not_held
-from mrdamper.dampers.certainty import Certainty, FittedParameter
 from mrdamper.dampers.coil import Coil
-from mrdamper.dampers.gram import ABSENT, Condensed, Law, choose_forms, condense, fit_jointly
+from mrdamper.dampers.normal_equations import ABSENT, Condensed, Law, choose_forms, condense, fit_jointly
 from mrdamper.dampers.parameter_map import ParameterMap
+from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
 from mrdamper.data import Condition, Floats, Run, same_motion
 from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.identification import Identification
@@ -27,7 +27,7 @@ from mrdamper.statistics.functions.forms import FORMS, ParameterFunction, featur
 from mrdamper.statistics.functions.motion_hull import MotionHull
 
 _RATES = (0.4, 0.8, 1.5, 2.5, 4.0)  # of decaying laws, times the largest current [-]
-_MIN_FREQUENCY_RATIO = 1.2  # highest over lowest frequency from which a mass is told from a stiffness [-]
+_MIN_FREQUENCY_RATIO = 1.2  # highest over lowest frequency from which a mass can be separated from a stiffness [-]
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class ModifiedModel(Damper):
     provenance : mapping
         What it was made from.
     coil : Coil, optional
-    certainty : Certainty, optional
+    uncertainty : Uncertainty, optional
     """
 
     kind: ClassVar[str] = "modified"
@@ -78,7 +78,7 @@ class ModifiedModel(Damper):
     envelope: Envelope
     provenance: Mapping[str, str] = field(default_factory=dict)
     coil: Coil | None = None
-    certainty: Certainty | None = field(default=None, kw_only=True)
+    uncertainty: Uncertainty | None = field(default=None, kw_only=True)
 
     @property
     def title(self) -> str:
@@ -126,7 +126,7 @@ class ModifiedModel(Damper):
             if log and not value > 0:
                 raise ParameterError(f"{name} = {value:g}", where=self.title, remedy="give a value over zero")
             functions[name] = ParameterFunction("constant", (math.log(value) if log else value,), log=log)
-        return replace(self, parameters=replace(self.parameters, functions=functions), certainty=None)
+        return replace(self, parameters=replace(self.parameters, functions=functions), uncertainty=None)
 
     @property
     def fitted_parameters(self) -> Mapping[str, FittedParameter]:
@@ -191,7 +191,7 @@ class ModifiedFit:
 
     @property
     def few_motions(self) -> bool:
-        """Whether the conditions repeat few enough motions to draw a curve for each."""
+        """True where the conditions have few enough motions to draw a curve for each."""
         return len(same_motion(self.conditions, tolerance=0.08)) <= 10
 
 
@@ -323,7 +323,7 @@ def _candidates(data: Condensed, any_motion: bool) -> dict[str, list[str | Law]]
 
 
 def _tells_inertia(model_type: type[Model], conditions: Sequence[Condition]) -> bool:
-    """Whether a mass can be told from a stiffness: the model has one, and the frequencies of the tests differ."""
+    """Tell if a mass can be separated from a stiffness: the model has one, and the frequencies of the tests differ."""
     frequencies = [c.frequency_Hz for c in conditions]
     has_mass = any(info.name == "m" and info.linear for info in model_type.parameters())
     return has_mass and max(frequencies) > _MIN_FREQUENCY_RATIO * min(frequencies)

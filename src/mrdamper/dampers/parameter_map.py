@@ -42,7 +42,7 @@ class ParameterMap:
 
     @property
     def follows_motion(self) -> bool:
-        """Whether any function depends on the frequency or the amplitude."""
+        """True where a function depends on the frequency or the amplitude."""
         return any(form_named(function.form).follows_motion for function in self.functions.values())
 
     @property

@@ -30,7 +30,7 @@ class DamperLike(Protocol):
         ...
 
     @property
-    def certainty(self) -> Any:
+    def uncertainty(self) -> Any:
         """Uncertainty of the parameters, or None."""
         ...
 

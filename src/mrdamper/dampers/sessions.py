@@ -1,9 +1,9 @@
-"""Sessions: gains and offsets that records of one day and hour share, learnt from a damper's own tests.
+"""Gains and offsets that the runs of a test session share, estimated from the tests of a damper.
 
 From day to day the same test differs by a few per cent in force, within an hour by less: oil and
-room temperature, a preload, a load cell's zero. What one run of a day shows then tells of the
-others. Gain and offset are random, with a covariance of three parts: shared by a session (its
-day), shared the more the closer two runs lie in it, and each run's own. [Rasmussen and Williams
+room temperature, preload, zero of the load cell. One run of a day therefore carries information
+on the others. Gain and offset are random, with a covariance of three parts: common to a session (a
+day), decaying with the time between two runs of it, and independent for each run. [Rasmussen and Williams
 2006, Gaussian processes; the three variances by maximum likelihood]
 """
 
@@ -33,7 +33,7 @@ _REMEDY = "record a condition twice a day, on three days or more; state recorded
 
 
 @dataclass(frozen=True)
-class When:
+class RecordingTime:
     """Session and time of a recording.
 
     Attributes
@@ -50,14 +50,14 @@ class When:
     hour: float | None = None
 
     @classmethod
-    def of(cls, run: Run) -> When:
+    def of(cls, run: Run) -> RecordingTime:
         """From the notes of a run; raises E_CLOCK as `session_of`."""
         return cls(session_of(run), hour_of(run))
 
 
 @dataclass(frozen=True)
-class Reading:
-    """How a prediction p of a run would have to be changed to fit best: gain · p + offset.
+class GainOffset:
+    """Gain and offset that fit a prediction p to a run by least squares: gain · p + offset.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class Reading:
     pp: float
 
     @classmethod
-    def of(cls, measured: Floats, predicted: Floats) -> Reading:
+    def of(cls, measured: Floats, predicted: Floats) -> GainOffset:
         """Least squares of one run."""
         mean, square = float(np.mean(predicted)), float(np.mean(predicted**2))
         spread = square - mean**2
@@ -97,7 +97,7 @@ class Reading:
 
 
 @dataclass(frozen=True)
-class Spread:
+class RunScatter:
     """Standard deviations of one quantity between runs.
 
     Attributes
@@ -117,10 +117,10 @@ class Spread:
 
     @property
     def total(self) -> float:
-        """Of a run in a session nobody has seen."""
+        """Standard deviation of a run in a future session."""
         return float(np.sqrt(self.session**2 + self.hour**2 + self.run**2))
 
-    def covariance(self, a: Sequence[When], b: Sequence[When]) -> Floats:
+    def covariance(self, a: Sequence[RecordingTime], b: Sequence[RecordingTime]) -> Floats:
         """(A, B) of runs that are not the same."""
         shared = [[x.session is not None and x.session == y.session for y in b] for x in a]
         same = np.array(shared, dtype=float).reshape(len(a), len(b))
@@ -129,7 +129,7 @@ class Spread:
         near = np.where(np.isfinite(apart), np.exp(-np.nan_to_num(apart) / self.hours), 0.0)
         return same * (self.session**2 + self.hour**2 * near)
 
-    def given(self, at: When, others: Sequence[When], values: Floats) -> tuple[float, float]:
+    def given(self, at: RecordingTime, others: Sequence[RecordingTime], values: Floats) -> tuple[float, float]:
         """Mean and standard deviation of a run's value about zero, those of others being known."""
         if not len(others) or self.total == 0:
             return 0.0, self.total
@@ -141,7 +141,7 @@ class Spread:
         return float(k @ solved[:, 0]), float(np.sqrt(max(left, own)))
 
     @classmethod
-    def likeliest(cls, when: Sequence[When], values: Floats) -> Spread:
+    def likeliest(cls, when: Sequence[RecordingTime], values: Floats) -> RunScatter:
         """Of greatest likelihood: the shares by halving steps from many starts, the scale in closed form."""
         size = len(values)
         alike = cls(1.0, 0.0, 0.0, 1.0).covariance(when, when)
@@ -176,8 +176,8 @@ class Spread:
 
 
 @dataclass(frozen=True)
-class Expected:
-    """Gain and offset of a run, as far as others tell.
+class SessionCorrection:
+    """Expected gain and offset of a run by the other runs of its session, with standard deviations.
 
     Attributes
     ----------
@@ -199,14 +199,14 @@ class Expected:
 
 @dataclass(frozen=True)
 class Sessions:
-    """How sessions differ on a rig, and what is known of those a damper was identified in.
+    """Scatter between the sessions of a rig, and gains and offsets of the sessions a damper was identified in.
 
     Attributes
     ----------
-    gain, offset : Spread
+    gain, offset : RunScatter
         Of gains [-] and of offsets [N].
     run_ids : tuple of str, length R
-    when : tuple of When, length R
+    when : tuple of RecordingTime, length R
     gains, offsets : (R,) tuples of float
         Of the damper's own tests, against the damper.
 
@@ -218,10 +218,10 @@ class Sessions:
 
     __pydantic_config__: ClassVar = STRICT
 
-    gain: Spread
-    offset: Spread
+    gain: RunScatter
+    offset: RunScatter
     run_ids: tuple[str, ...]
-    when: tuple[When, ...]
+    when: tuple[RecordingTime, ...]
     gains: tuple[float, ...]
     offsets: tuple[float, ...]
 
@@ -230,15 +230,15 @@ class Sessions:
             raise InputError("sessions: the lists differ in length", remedy="write the model again")
 
     @classmethod
-    def of(cls, runs: Sequence[Run], left_out: Sequence[Reading], own: Sequence[Reading]) -> Sessions:
-        """Learn them from a damper's tests.
+    def of(cls, runs: Sequence[Run], left_out: Sequence[GainOffset], own: Sequence[GainOffset]) -> Sessions:
+        """Estimate them from the tests of a damper.
 
         Parameters
         ----------
         runs : sequence of Run, length R
-        left_out : sequence of Reading, length R
+        left_out : sequence of GainOffset, length R
             Each predicted without its condition: their spread is that of sessions to come.
-        own : sequence of Reading, length R
+        own : sequence of GainOffset, length R
             Against the damper itself.
 
         Raises
@@ -246,7 +246,7 @@ class Sessions:
         InputError
             E_SESSION if no session has two runs, or there are under three; E_CLOCK if sessions overlap in time.
         """
-        when = tuple(When.of(run) for run in runs)
+        when = tuple(RecordingTime.of(run) for run in runs)
         _refuse_disorder(runs, when)
         names = [w.session for w in when if w.session is not None]
         count = len(set(names))
@@ -255,12 +255,12 @@ class Sessions:
             raise InputError(
                 f"{reason}: the scatter between sessions cannot be estimated", remedy=_REMEDY, code="E_SESSION"
             )
-        gain = Spread.likeliest(when, np.array([r.gain - 1 for r in left_out]))
-        offset = Spread.likeliest(when, np.array([r.offset for r in left_out]))
+        gain = RunScatter.likeliest(when, np.array([r.gain - 1 for r in left_out]))
+        offset = RunScatter.likeliest(when, np.array([r.offset for r in left_out]))
         gains, offsets = tuple(r.gain for r in own), tuple(r.offset for r in own)
         return cls(gain, offset, tuple(run.id for run in runs), when, gains, offsets)
 
-    def expected(self, at: When, without: str = "") -> Expected | None:
+    def expected(self, at: RecordingTime, without: str = "") -> SessionCorrection | None:
         """Gain and offset of a run recorded then; None if nothing is known of its session.
 
         Parameters
@@ -275,10 +275,10 @@ class Sessions:
             return None
         gain, gain_spread = self.gain.given(at, when, np.array([self.gains[i] for i in rows]) - 1)
         offset, offset_spread = self.offset.given(at, when, np.array([self.offsets[i] for i in rows]))
-        return Expected(1 + gain, gain_spread, offset, offset_spread)
+        return SessionCorrection(1 + gain, gain_spread, offset, offset_spread)
 
     def seen(self, damper: Damper, runs: Iterable[Run], own: bool) -> Sessions:
-        """What is known once further runs were looked at, of them alone or of the damper's own tests too.
+        """Return the sessions with the gains and offsets of further runs, with or without the damper's own tests.
 
         Parameters
         ----------
@@ -287,11 +287,11 @@ class Sessions:
             Check runs of a day, say.
         own : bool
         """
-        entries = [(run.id, When.of(run), reading_of(damper, run)) for run in runs]
+        entries = [(run.id, RecordingTime.of(run), gain_offset_of(damper, run)) for run in runs]
         names = {name for name, _, _ in entries}
         if own:
             rows = [i for i, name in enumerate(self.run_ids) if name not in names]
-            still = [Reading(self.gains[i], self.offsets[i], 0.0, 0.0, 0.0, 1.0) for i in rows]
+            still = [GainOffset(self.gains[i], self.offsets[i], 0.0, 0.0, 0.0, 1.0) for i in rows]
             entries += [(self.run_ids[i], self.when[i], r) for i, r in zip(rows, still, strict=True)]
         ids, when, readings = zip(*entries, strict=True) if entries else ((), (), ())
         gains, offsets = tuple(r.gain for r in readings), tuple(r.offset for r in readings)
@@ -299,14 +299,14 @@ class Sessions:
 
 
 def sessions_known(damper: Damper, runs: Iterable[Run] = (), own: bool = False) -> Sessions:
-    """What is known of sessions by check runs, by a damper's own tests, or by both.
+    """Return the sessions as known by check runs, by a damper's own tests, or by both.
 
     Raises
     ------
     InputError
         E_SESSION if the damper's tests could not tell what a session shares.
     """
-    sessions = damper.certainty.sessions if damper.certainty else None
+    sessions = damper.uncertainty.sessions if damper.uncertainty else None
     if sessions is None:
         raise InputError(
             "its tests could not tell what runs of a session share",
@@ -317,13 +317,13 @@ def sessions_known(damper: Damper, runs: Iterable[Run] = (), own: bool = False) 
     return sessions.seen(damper, runs, own)
 
 
-def reading_of(damper: Damper, run: Run) -> Reading:
+def gain_offset_of(damper: Damper, run: Run) -> GainOffset:
     """Gain and offset of a run against a damper, inside the steady window."""
     inside = run.in_window
-    return Reading.of(run.force[inside], damper.predict_run(run).force[inside])
+    return GainOffset.of(run.force[inside], damper.predict_run(run).force[inside])
 
 
-def known_errors(runs: Sequence[Run], left_out: Sequence[Reading]) -> Floats:
+def known_errors(runs: Sequence[Run], left_out: Sequence[GainOffset]) -> Floats:
     """(R,) nrmse_pp of runs predicted without their condition, corrected by the other runs of their session.
 
     Raises
@@ -334,12 +334,12 @@ def known_errors(runs: Sequence[Run], left_out: Sequence[Reading]) -> Floats:
     sessions = Sessions.of(runs, left_out, left_out)
     errors = []
     for run, reading in zip(runs, left_out, strict=True):
-        correction = sessions.expected(When.of(run), without=run.id)
+        correction = sessions.expected(RecordingTime.of(run), without=run.id)
         errors.append(reading.error(correction.gain, correction.offset) if correction else reading.error(1.0, 0.0))
     return np.array(errors)
 
 
-def _refuse_disorder(runs: Sequence[Run], when: Sequence[When]) -> None:
+def _refuse_disorder(runs: Sequence[Run], when: Sequence[RecordingTime]) -> None:
     """A session is one stretch of time: runs of another within it say that a clock or a name is wrong."""
     timed = sorted((i for i, w in enumerate(when) if w.hour is not None), key=lambda i: when[i].hour or 0.0)
     timed = [i for i in timed if when[i].session is not None]

@@ -30,7 +30,7 @@ from mrdamper.fleet.plan import Plan
 from mrdamper.identification.covariance import spread
 from mrdamper.models import Model
 from mrdamper.physics.motion import equivalent_sine
-from mrdamper.study.workflow import agreeing, believed, study_rig, usable
+from mrdamper.study.workflow import accepted_runs, runs_for_global_fit, study_rig, without_contradictions
 
 VERSION = version("mrdamper")  # asked once: the answer takes a millisecond
 OTHER_RIG = "W_OTHER_RIG"  # tested on another rig than most of the line: compared with them all the same
@@ -268,10 +268,10 @@ def _study(dataset: Dataset) -> dict[str, Any]:
 
 def _usable(dataset: Dataset) -> list[Run]:
     """Return the identification runs that are accepted, agree and move; a damper with none raises the first cause."""
-    agreed, contradictions = agreeing(dataset.only(dataset.split("train")))
-    kept, refused = believed(agreed)
+    agreed, contradictions = without_contradictions(dataset.only(dataset.split("train")))
+    kept, refused = accepted_runs(agreed)
     refused |= {one.run_id: str(one) for one in contradictions}
-    runs, unusable = usable(kept)
+    runs, unusable = runs_for_global_fit(kept)
     if runs:
         return runs
     why = next(iter({**refused, **unusable}.values()), "no identification run; check the column split")

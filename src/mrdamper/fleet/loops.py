@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from mrdamper.dampers.strung import string
+from mrdamper.dampers.concatenated_runs import concatenate
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.models import Model
 from mrdamper.physics.motion import equivalent_sine, measured_motion, sine
@@ -60,7 +60,7 @@ def velocity_ladder(
     """Rebound and compression force [N] at mid-stroke of a sine, by current [A] and speed [m/s]."""
     steps = [(current, speed) for current in currents for speed in speeds]
     conditions = [Condition(current, speed / (2 * np.pi * amplitude), amplitude) for current, speed in steps]
-    force = simulate(model, string(sine(c, 2, _PER_CYCLE) for c in conditions)).force
+    force = simulate(model, concatenate(sine(c, 2, _PER_CYCLE) for c in conditions)).force
     last = np.arange(len(steps)) * (2 * _PER_CYCLE + 1) + 2 * _PER_CYCLE
     rebound, compression = force[last], force[last - _PER_CYCLE // 2]
     return {step: (float(up), float(down)) for step, up, down in zip(steps, rebound, compression, strict=True)}

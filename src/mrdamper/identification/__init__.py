@@ -9,9 +9,9 @@ import numpy as np
 
 from mrdamper.data import Run
 from mrdamper.errors import IdentificationError, checked
-from mrdamper.identification.certainty import certainty_of_run
 from mrdamper.identification.methods import all_methods, method_named
 from mrdamper.identification.problem import Identification, Method, Problem, Solution
+from mrdamper.identification.uncertainty import uncertainty_of_run
 from mrdamper.models import Model, model_type
 from mrdamper.physics.gas_spring import GasSpring
 from mrdamper.statistics.linear import on_one_blas_thread
@@ -149,7 +149,7 @@ def conclude(problem: Problem, method: Method, solution: Solution) -> Identifica
         seed=solution.seed,
         notes=(*_notes(problem), *solution.notes),
         residual=residual,
-        ask=partial(certainty_of_run, problem, solution, motion, state, residual),
+        ask=partial(uncertainty_of_run, problem, solution, motion, state, residual),
     )
 
 

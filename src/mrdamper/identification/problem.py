@@ -175,7 +175,7 @@ class Method(ABC):
 
 
 @dataclass(frozen=True)
-class RunCertainty:
+class RunUncertainty:
     """Standard errors of a run's parameters and search coordinates, and what to know of them.
 
     Attributes
@@ -229,7 +229,7 @@ class Identification(Displayable):
     residual : (N,) array
         Predicted minus measured force in the steady window [N].
     ask : callable
-        For the certainty, which takes longer than the search and is computed when first wanted.
+        For the uncertainty, which takes longer than the search and is computed when first wanted.
     """
 
     run_id: str
@@ -249,32 +249,32 @@ class Identification(Displayable):
     seed: int | None
     notes: tuple[str, ...]
     residual: Floats
-    ask: Callable[[], RunCertainty]
+    ask: Callable[[], RunUncertainty]
 
     @cached_property
-    def certainty(self) -> RunCertainty:
+    def uncertainty(self) -> RunUncertainty:
         """Errors, their degrees of freedom, independent samples, and what the samples cannot tell."""
         try:
             return self.ask()
         except (np.linalg.LinAlgError, ArithmeticError) as error:
             unknown = dict.fromkeys(self.free, np.inf)
-            return RunCertainty(
+            return RunUncertainty(
                 unknown, unknown, doubts=(f"the uncertainty of the parameters is {NOT_IDENTIFIABLE}: {error}",)
             )
 
     @property
     def standard_errors(self) -> Mapping[str, float]:
         """Of the free parameters and the search coordinates, as the residual depends on itself."""
-        return self.certainty.errors
+        return self.uncertainty.errors
 
     @property
     def doubts(self) -> tuple[str, ...]:
         """Parameters with the same effect on the samples, and a record too short, in words."""
-        return self.certainty.doubts
+        return self.uncertainty.doubts
 
     def __getstate__(self) -> dict[str, Any]:
-        """With its certainty known, so that no other process needs the run."""
-        return {**self.__dict__, "certainty": self.certainty, "ask": RunCertainty}
+        """With its uncertainty known, so that no other process needs the run."""
+        return {**self.__dict__, "uncertainty": self.uncertainty, "ask": RunUncertainty}
 
     @property
     def headline(self) -> str:
@@ -289,7 +289,9 @@ class Identification(Displayable):
         lines = []
         for name in self.free:
             state, ends = self._state(name), self.interval(name)
-            count = f"{self.certainty.effective[name]:.0f} of {self.residual.size} samples independent" if ends else ""
+            count = (
+                f"{self.uncertainty.effective[name]:.0f} of {self.residual.size} samples independent" if ends else ""
+            )
             lines.append(f"{name} = {written(getattr(self.model, name), ends, infos[name].unit)} ({count or state})")
         return lines
 
@@ -315,7 +317,7 @@ class Identification(Displayable):
             return None
         log = {info.name: info.scale == "log" for info in self.model.parameters()}.get(name, False)
         value = float(getattr(self.model, name))
-        return interval_about(value, error / value if log else error, self.certainty.dof[name], level, log)
+        return interval_about(value, error / value if log else error, self.uncertainty.dof[name], level, log)
 
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:
@@ -330,7 +332,7 @@ class Identification(Displayable):
             "standard_error": [self.standard_errors.get(name) for name in names],
             "low_95": [ends[0] if ends else None for ends in intervals],
             "high_95": [ends[1] if ends else None for ends in intervals],
-            "effective_samples": [self.certainty.effective.get(name) for name in names],
+            "effective_samples": [self.uncertainty.effective.get(name) for name in names],
             "state": [self._state(name) for name in names],
             "meaning": [info.meaning for info in infos],
         }

@@ -10,7 +10,7 @@ from mrdamper.data import Condition, Floats
 from mrdamper.paper.claims_on_tests import Measured, unknown
 from mrdamper.paper.recipes import ALI, CONSISTENT, LITERAL, TRADITIONAL
 from mrdamper.paper.results import Reproduction, function_of, values
-from mrdamper.study.recipe import Scored
+from mrdamper.study.recipe import RecipeResult
 
 _SEARCHED = 2  # parameters that the paper's method searches per run
 
@@ -136,7 +136,7 @@ def generalisation(study: Reproduction) -> Measured:
     return Measured.of(median / literal.per_run, error, evidence=evidence)
 
 
-def _validated(study: Reproduction, *titles: str) -> list[Scored]:
+def _validated(study: Reproduction, *titles: str) -> list[RecipeResult]:
     """Return the methods of these titles, or none if one of them predicts no validation run."""
     methods = [method for title in titles if (method := study.contender(title)) and method.validation.runs]
     return methods if len(methods) == len(titles) else []

@@ -26,7 +26,7 @@ from mrdamper.paper.results import Reproduction, cost_per_run, rate_rows
 from mrdamper.report.page import made_from, render_page
 from mrdamper.report.plots.style import Picture
 from mrdamper.report.tables import identification_rows
-from mrdamper.study.parallel import HERE, Processes
+from mrdamper.study.parallel import IN_PROCESS, Processes
 from mrdamper.study.recipe import Progress
 
 Rows = list[dict[str, Any]]
@@ -39,7 +39,7 @@ def write_reproduction(
     progress: Progress = lambda what, share: None,
     *,
     png: bool = False,
-    processes: Processes = HERE,
+    processes: Processes = IN_PROCESS,
 ) -> list[Path]:
     """Write reproduction.html, tables/ and figures/.
 

@@ -10,10 +10,10 @@ from typing import ClassVar
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Envelope
-from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.modified import ModifiedFit, fit_modified
 from mrdamper.dampers.published import all_published
+from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import Condition, Run
 from mrdamper.identification import Identification
 from mrdamper.identification.harmonic_balance import SineRecord
@@ -133,7 +133,7 @@ class OnePerCurrent(Damper):
     envelope : Envelope
     provenance : mapping
     coil : Coil, optional
-    certainty : Certainty, optional
+    uncertainty : Uncertainty, optional
     """
 
     kind: ClassVar[str] = "one-per-current"
@@ -143,7 +143,7 @@ class OnePerCurrent(Damper):
     envelope: Envelope
     provenance: Mapping[str, str] = field(default_factory=dict)
     coil: Coil | None = None
-    certainty: Certainty | None = None
+    uncertainty: Uncertainty | None = None
 
     @classmethod
     def of(cls, identifications: Sequence[Identification]) -> OnePerCurrent:

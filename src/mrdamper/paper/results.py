@@ -20,7 +20,7 @@ from mrdamper.paper.sensitivity import OneAtATime, Sobol
 from mrdamper.paper.virtual_rig import VirtualRig
 from mrdamper.physics.gas_spring import GasSpring
 from mrdamper.statistics.functions.fitting import FunctionFit
-from mrdamper.study.recipe import Scored
+from mrdamper.study.recipe import RecipeResult
 
 SAME_CURRENT = 0.02  # difference within which two runs have one current [A]
 SAME = 0.08  # relative tolerance within which two runs have one motion
@@ -116,7 +116,7 @@ class Reproduction:
     loops: tuple[LoopAnalysis, ...]
     readings: tuple[ForceReading, ...]
     options: PaperOptions
-    contenders: tuple[Scored, ...] = ()
+    contenders: tuple[RecipeResult, ...] = ()
     there: Mapping[tuple[str, str], Identification | str] = field(default_factory=dict)
     genetic: tuple[GeneticCheck, ...] = ()
     ended: tuple[GeneticEnd, ...] = ()
@@ -133,16 +133,16 @@ class Reproduction:
         """Measured conditions of the identification runs."""
         return tuple(loop.condition for loop in self.loops if loop.split == "train")
 
-    def contender(self, title: str) -> Scored | None:
+    def contender(self, title: str) -> RecipeResult | None:
         """Return the method of that title, where the data allowed it."""
         return next((c for c in self.contenders if c.recipe.title == title), None)
 
-    def named(self, *titles: str) -> list[Scored]:
+    def named(self, *titles: str) -> list[RecipeResult]:
         """Return the methods of these titles, where the data allowed them."""
         return [c for title in titles if (c := self.contender(title))]
 
     @property
-    def best(self) -> Scored | None:
+    def best(self) -> RecipeResult | None:
         """Method with the lowest median validation error, where there are validation runs."""
         scored = [c for c in self.contenders if c.validation.runs]
         return min(scored, key=lambda c: c.validation.median(), default=None)
@@ -203,7 +203,7 @@ def rate_rows(study: Reproduction) -> list[dict[str, Any]]:
     return rows
 
 
-def cost_per_run(study: Reproduction, method: Scored) -> tuple[float, float]:
+def cost_per_run(study: Reproduction, method: RecipeResult) -> tuple[float, float]:
     """Return forces computed (median) and seconds per identification; the paper's own by its genetic search.
 
     Seconds include the share of the fit over conditions.

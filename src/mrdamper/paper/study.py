@@ -44,8 +44,8 @@ from mrdamper.paper.results import GeneticCheck, GeneticEnd, Reproduction
 from mrdamper.paper.sensitivity import OneAtATime, Sobol, one_at_a_time, sobol
 from mrdamper.paper.virtual_rig import CURRENTS, VirtualRig, friction_test, virtual_dataset
 from mrdamper.physics.gas_spring import GasSpring
-from mrdamper.study.parallel import HERE, Processes, identify_quickly, quickened
-from mrdamper.study.recipe import Basis, IdentificationCache, Progress, Recipe, Scored, fit_and_score_all
+from mrdamper.study.parallel import IN_PROCESS, Processes, identify_quickly, shortened_method
+from mrdamper.study.recipe import Basis, IdentificationCache, Progress, Recipe, RecipeResult, fit_and_score_all
 from mrdamper.study.workflow import usable_sines
 
 SOBOL_SAMPLES = 512
@@ -63,7 +63,7 @@ def reproduce(
     with_comparators: bool = True,
     with_models: bool = False,
     seeds: int = 0,
-    processes: Processes = HERE,
+    processes: Processes = IN_PROCESS,
     progress: Progress = lambda what, share: None,
 ) -> Reproduction:
     """Run the study.
@@ -248,7 +248,7 @@ def _identify_all(run: Run, bases: Sequence[Basis], progress: Progress) -> _Iden
             if model_type(basis.model).integrated:
                 cache.runs[key] = identify_quickly(basis, run)
             elif basis.method == DirectGenetic.name or getattr(basis.method, "search", "") == "genetic":
-                method, problem = quickened(basis, run)
+                method, problem = shortened_method(basis, run)
                 assert isinstance(method, Paper | DirectGenetic)
                 minimum = method.genetic_search(problem)
                 one = conclude(basis.problem(run), method, method.solution(problem, minimum))
@@ -263,7 +263,7 @@ def _identify_all(run: Run, bases: Sequence[Basis], progress: Progress) -> _Iden
 
 def _fit_all(
     steps: Steps, held_out: Sequence[Run], cache: IdentificationCache, processes: Processes, progress: Progress
-) -> tuple[list[Scored], dict[str, str]]:
+) -> tuple[list[RecipeResult], dict[str, str]]:
     """Fit over conditions and score, a recipe a task; the joint fit takes longest."""
     tasks = [
         (recipe, runs, {(b, run.id): cache[b, run.id] for run in runs if (b := recipe.basis) and (b, run.id) in cache})
@@ -277,7 +277,7 @@ def _fit_all(
 
 def _fit_one(
     held_out: Sequence[Run], task: tuple[Recipe, Sequence[Run], IdentificationCache], progress: Progress
-) -> tuple[list[Scored], dict[str, str]]:
+) -> tuple[list[RecipeResult], dict[str, str]]:
     recipe, runs, cache = task
     return fit_and_score_all([(recipe, runs)], held_out, progress, leave_out=False, cache=cache)
 

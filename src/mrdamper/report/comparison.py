@@ -19,7 +19,7 @@ from mrdamper.report.plots.comparison import overlaid_loops, ranking
 from mrdamper.report.plots.style import save_figure
 from mrdamper.report.tables import score_row
 from mrdamper.study.comparison import Comparison, RigComparison
-from mrdamper.study.recipe import Progress, Scored
+from mrdamper.study.recipe import Progress, RecipeResult
 
 _LOOPS, _OVERLAID = 3, 5
 
@@ -123,13 +123,13 @@ def _rows(rig: RigComparison) -> list[dict[str, Any]]:
     return rows
 
 
-def _evaluations(entry: Scored) -> int | None:
+def _evaluations(entry: RecipeResult) -> int | None:
     """The budget of an identification: forces computed, median over runs."""
     counts = [i.evaluations for i in entry.identifications]
     return int(np.median(counts)) if counts else None
 
 
-def _reason(entry: Scored, entries: Sequence[Scored]) -> str:
+def _reason(entry: RecipeResult, entries: Sequence[RecipeResult]) -> str:
     """Compare the error and the parameter count of an entry with those of the others."""
     own, best = entry.cross_validated.median(), entries[0]
     text = f"{100 * own:.1f} % in cross-validation with {entry.damper.parameter_count} parameters"

@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrdamper.dampers.base import NOT_A_SINE, Damper
-from mrdamper.dampers.certainty import unsure
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
+from mrdamper.dampers.uncertainty import uncertainty_warnings
 from mrdamper.identification import Identification
 from mrdamper.identification.loop_analysis import LoopAnalysis
-from mrdamper.study.recipe import Scored
+from mrdamper.study.recipe import RecipeResult
 from mrdamper.study.validation import Validation
 
 PREDICTION, TESTS, MODEL, PARAMETERS, RANGE = "Prediction", "Tests", "Model", "Parameters", "Range of validity"
@@ -43,7 +43,7 @@ class Limitation:
     text: str
 
 
-def limitations(scored: Scored, loops: Sequence[LoopAnalysis]) -> list[Limitation]:
+def limitations(scored: RecipeResult, loops: Sequence[LoopAnalysis]) -> list[Limitation]:
     """List the limitations of a model and of the tests it was identified from, the most harmful first."""
     found = {
         PREDICTION: _prediction(scored.cross_validated, scored.validation),
@@ -53,7 +53,7 @@ def limitations(scored: Scored, loops: Sequence[LoopAnalysis]) -> list[Limitatio
             *(_functions(scored.fit) if isinstance(scored.fit, ModifiedFit) else ()),
         ],
         PARAMETERS: [
-            *(unsure(scored.damper) if scored.damper.certainty else ()),
+            *(uncertainty_warnings(scored.damper) if scored.damper.uncertainty else ()),
             *_identifications(scored.identifications),
         ],
         RANGE: [validity(scored.damper)],

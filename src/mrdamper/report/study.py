@@ -12,10 +12,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mrdamper.dampers.bands import scope
-from mrdamper.dampers.certainty import table
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.model_file import save_model
 from mrdamper.dampers.modified import ModifiedFit
+from mrdamper.dampers.uncertainty import table
 from mrdamper.data import Dataset
 from mrdamper.data.atomic import publish
 from mrdamper.data.encoding import csv_text, file_names
@@ -34,8 +34,8 @@ from mrdamper.report.plots.rig_tests import measured_loops, test_analysis, test_
 from mrdamper.report.plots.style import Picture
 from mrdamper.report.summary import error_sentence
 from mrdamper.report.tables import identification_rows, score_row
-from mrdamper.study.parallel import HERE, Processes
-from mrdamper.study.recipe import Progress, Scored, StudyMethod
+from mrdamper.study.parallel import IN_PROCESS, Processes
+from mrdamper.study.recipe import Progress, RecipeResult, StudyMethod
 from mrdamper.study.validation import session_drift
 from mrdamper.study.workflow import RigStudy, Study, require_runs, study_rig
 
@@ -89,7 +89,7 @@ def write_study(
     """
     head = _head(about)
     limits = load_limits(limits) if isinstance(limits, (str, Path)) else tuple(limits)
-    drawn = drawn or HERE.map(partial(_draw, also=tuple(also), limits=limits), study.rigs, progress)
+    drawn = drawn or IN_PROCESS.map(partial(_draw, also=tuple(also), limits=limits), study.rigs, progress)
 
     def fill(work: Path) -> None:
         (work / "figures").mkdir()
@@ -145,7 +145,7 @@ def study_and_draw(
     keep: Sequence[str] = (),
     also: Sequence[str] = (),
     limits: Sequence[Limit] = (),
-    processes: Processes = HERE,
+    processes: Processes = IN_PROCESS,
 ) -> tuple[Study, list[dict[str, Picture]]]:
     """Run a study as `run_study` and draw the figures of each rig in the process that studied it."""
     begin = time.perf_counter()
@@ -289,7 +289,7 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
         )
         + (
             f" Dotted: {100 * BAND_LEVEL:.0f} % prediction interval {scope(chosen.damper, BAND_LEVEL)}."
-            if chosen.damper.certainty
+            if chosen.damper.uncertainty
             else ""
         ),
         "figures": pictures,
@@ -300,12 +300,12 @@ def _free_names(found: Identification) -> list[str]:
     return [name for name in found.model.values() if name in found.free]
 
 
-def _mapped(rig: RigStudy) -> tuple[Scored, ModifiedFit] | None:
+def _mapped(rig: RigStudy) -> tuple[RecipeResult, ModifiedFit] | None:
     """Return the best candidate with parameter functions, if any: its curves are drawn."""
     return next(((c, c.fit) for c in rig.candidates if isinstance(c.fit, ModifiedFit)), None)
 
 
-def _joint_table(chosen: Scored, model: Model) -> list[dict[str, Any]]:
+def _joint_table(chosen: RecipeResult, model: Model) -> list[dict[str, Any]]:
     """List parameters with intervals and their range in cross-validation; fixed parameters have none."""
     known = {row["name"]: row["written"] for row in table(chosen.damper)}
     return [

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrdamper.dampers.certainty import table
+from mrdamper.dampers.uncertainty import table
 from mrdamper.report.limitations import limitations
 from mrdamper.study.validation import Validation, peak_band
 from mrdamper.study.workflow import RigStudy, Study

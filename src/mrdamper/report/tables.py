@@ -32,7 +32,7 @@ def identification_rows(identifications: Sequence[Identification]) -> list[dict[
             **{f"{name} [{unit}]": value for name, unit, value in _values(found)},
             **{f"standard error {name}": value for name, value in found.standard_errors.items()},
             **_ends(found),
-            **{f"effective samples {name}": value for name, value in found.certainty.effective.items()},
+            **{f"effective samples {name}": value for name, value in found.uncertainty.effective.items()},
             "delay_s": found.delay,
             "at_bounds": " ".join(found.at_bounds),
             "evaluations": found.evaluations,

@@ -12,7 +12,7 @@ from mrdamper.data import Dataset, Displayable, Run
 from mrdamper.errors import InputError, checked
 from mrdamper.rig_files.quality.table import judged, with_findings
 from mrdamper.study.contradictions import ContradictionError, find_contradictions
-from mrdamper.study.workflow import believed
+from mrdamper.study.workflow import accepted_runs
 
 Severity = Literal["refused", "set aside", "noted"]
 P = ParamSpec("P")
@@ -113,7 +113,7 @@ def check(dataset: Dataset) -> DatasetCheck:
         rig = dataset.rig(name)
         for run in rig:
             findings += _of_run(run)
-        accepted, refused = believed(rig)
+        accepted, refused = accepted_runs(rig)
         refused_ids = {one.run_id for one in findings if one.severity == "refused"}
         for run_id, why in refused.items():
             if run_id not in refused_ids:

@@ -18,9 +18,15 @@ from mrdamper.data import Dataset, Run
 from mrdamper.errors import IdentificationError, InputError
 from mrdamper.identification import Identification
 from mrdamper.physics.motion import analyse_motion
-from mrdamper.study.parallel import crew
-from mrdamper.study.recipe import Basis, IdentificationCache, Progress, Recipe, Scored, recipes
-from mrdamper.study.workflow import agreeing, believed, judged_on_all, usable, usable_sines
+from mrdamper.study.parallel import worker_pool
+from mrdamper.study.recipe import Basis, IdentificationCache, Progress, Recipe, RecipeResult, recipes
+from mrdamper.study.workflow import (
+    accepted_runs,
+    runs_for_global_fit,
+    usable_sines,
+    with_unused_runs,
+    without_contradictions,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +48,7 @@ class RigComparison:
     rig: str
     dataset: Dataset
     sines: frozenset[str]
-    entries: tuple[Scored, ...]
+    entries: tuple[RecipeResult, ...]
     refused: Mapping[str, str]
     not_identified: Mapping[str, str]
 
@@ -102,7 +108,7 @@ def compare(
         bases = dict.fromkeys(recipe.basis for recipe in recipes_of_rig if recipe.basis)
         tasks += [(basis, run) for basis in bases for run in rig.sines]
         steps += [(recipe, rig.train if recipe.basis else rig.everything) for recipe in recipes_of_rig]
-    with crew(dataset, workers) as processes:
+    with worker_pool(dataset, workers) as processes:
         cache = processes.identify(tasks, lambda what, share: progress(what, 0.5 * share))
         followed = processes.follow(
             [step for step in steps if step[1]],
@@ -128,13 +134,13 @@ class _Seen:
 
 
 def _seen(rig: Dataset) -> _Seen:
-    rig, contradictions = agreeing(rig)
+    rig, contradictions = without_contradictions(rig)
     sines, not_identified = usable_sines(rig)
     not_identified |= {one.run_id: str(one) for one in contradictions}
-    trusted = believed(rig)[0]
+    trusted = accepted_runs(rig)[0]
     train, all_ids = [run for run in sines if run.split == "train"], {run.id for run in sines}
     # Any other motion, or a current that changes: the joint model takes them too.
-    others = usable(run for run in trusted if run.split == "train" and run.id not in all_ids)[0]
+    others = runs_for_global_fit(run for run in trusted if run.split == "train" and run.id not in all_ids)[0]
     if len(train) < 3 and not others:
         raise IdentificationError(
             "fewer than three identification runs with a steady sine",
@@ -161,7 +167,7 @@ def _ranked(
     rig: _Seen,
     chosen: Sequence[Recipe],
     impossible: Mapping[str, str],
-    followed: Mapping[tuple[str, str], Scored | str],
+    followed: Mapping[tuple[str, str], RecipeResult | str],
     cache: IdentificationCache,
 ) -> RigComparison:
     name = rig.dataset.rigs[0]
@@ -169,7 +175,7 @@ def _ranked(
         recipe.name: followed.get((name, recipe.name), "no identification runs with a steady sine") for recipe in chosen
     }
     refused = {recipe: why for recipe, why in results.items() if isinstance(why, str)}
-    entries = [judged_on_all(one, rig.everything) for one in results.values() if isinstance(one, Scored)]
+    entries = [with_unused_runs(one, rig.everything) for one in results.values() if isinstance(one, RecipeResult)]
     if not entries:
         recipe, reason = next(iter(refused.items()))
         raise IdentificationError(

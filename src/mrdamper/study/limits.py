@@ -1,4 +1,4 @@
-"""What a rig can do, and what a test on it costs."""
+"""Limits of a rig, and the rig time of its tests."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _LEVELS = 4  # of each of them on the grid of candidates
 
 @dataclass(frozen=True)
 class Limits:
-    """What a rig can do, and what a test costs.
+    """Limits of a rig, and the time a test takes.
 
     Attributes
     ----------

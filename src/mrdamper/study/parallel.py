@@ -21,7 +21,7 @@ from mrdamper.models import model_type
 from mrdamper.physics.motion import analyse_motion
 from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.study.processes import processes
-from mrdamper.study.recipe import Basis, IdentificationCache, Progress, Recipe, Scored, fit_and_score_all
+from mrdamper.study.recipe import Basis, IdentificationCache, Progress, Recipe, RecipeResult, fit_and_score_all
 
 _CYCLES = 2  # of a run that costly identifications see
 _PER_CYCLE = 200  # samples of a cycle they see
@@ -33,7 +33,7 @@ R = TypeVar("R")
 
 @dataclass(frozen=True)
 class Processes:
-    """Where independent pieces of work are done: here, and in a pool beside it if there is one. `several` makes one."""
+    """The process at hand, and the pool of worker processes beside it if there is one. `several` starts the pool."""
 
     pool: Executor | None = None
     count: int = 1
@@ -45,7 +45,7 @@ class Processes:
         progress: Progress = lambda what, share: None,
         weights: Sequence[float] = (),
     ) -> list[R]:
-        """Results of a function of a module for every item, in order.
+        """Return the results of a function of a module for every item, in order.
 
         A process that starts has imports to do, so this one takes an item too, the last, and goes on from the
         end with those that none has begun: the longest ought to stand first. Weights say how long each takes.
@@ -68,14 +68,14 @@ class Processes:
         return [here[n] if n in here else pending[n].result() for n in range(len(items))]
 
 
-HERE = Processes()
+IN_PROCESS = Processes()
 
 
 @contextmanager
 def several(count: int) -> Iterator[Processes]:
-    """As many processes as `count` says, this one among them, for the length of a block."""
+    """Start `count` processes, this one included, for the length of a block."""
     if count < 2:
-        yield HERE
+        yield IN_PROCESS
         return
     with processes(count - 1) as pool:
         yield Processes(pool, count)
@@ -90,14 +90,14 @@ def _quietly(function: Callable[[T, Progress], R], item: T) -> R:
 
 
 @contextmanager
-def crew(runs: Iterable[Run], workers: int) -> Iterator[Crew]:
+def worker_pool(runs: Iterable[Run], workers: int) -> Iterator[WorkerPool]:
     """Processes that hold these runs, of one thread each, so that their number changes no bit."""
     held = {run.id: run for run in runs}.values()
     before = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update(dict.fromkeys(_THREADS, "1"))
     try:
         with processes(workers, _receive, ([_packed(run) for run in held],)) as pool:
-            yield Crew(pool)
+            yield WorkerPool(pool)
     finally:
         for name, value in before.items():
             if value is None:
@@ -107,8 +107,8 @@ def crew(runs: Iterable[Run], workers: int) -> Iterator[Crew]:
 
 
 @dataclass(frozen=True)
-class Crew:
-    """Processes that hold the runs of a dataset; `crew` makes it."""
+class WorkerPool:
+    """Processes that hold the runs of a dataset; `worker_pool` makes it."""
 
     pool: Executor
 
@@ -123,7 +123,7 @@ class Crew:
         held_out: Mapping[str, Sequence[Run]],
         cache: IdentificationCache,
         progress: Progress,
-    ) -> dict[tuple[str, str], Scored | str]:
+    ) -> dict[tuple[str, str], RecipeResult | str]:
         """Recipes followed from identifications there are already, or why not, by rig and name of the recipe.
 
         Parameters
@@ -173,13 +173,13 @@ def identify_quickly(basis: Basis, run: Run) -> tuple[Identification | str, floa
     """One of many identifications, or why there is none, and its seconds: what is costly sees a few cycles."""
     begin = time.perf_counter()
     try:
-        method, shortened_run = quickened(basis, run)
+        method, shortened_run = shortened_method(basis, run)
         return conclude(basis.problem(run), method, method.solve(shortened_run)), time.perf_counter() - begin
     except InputError as error:
         return str(error), time.perf_counter() - begin
 
 
-def quickened(basis: Basis, run: Run) -> tuple[Method, Problem]:
+def shortened_method(basis: Basis, run: Run) -> tuple[Method, Problem]:
     """The method where it is one of many, and what it sees of a run."""
     method = (method_named(basis.method) if isinstance(basis.method, str) else basis.method).for_many_runs()
     if model_type(basis.model).integrated:
@@ -189,7 +189,7 @@ def quickened(basis: Basis, run: Run) -> tuple[Method, Problem]:
 
 def _follow_one(
     recipe: Recipe, runs: Sequence[str], held_out: Sequence[str], cache: IdentificationCache
-) -> Scored | str:
+) -> RecipeResult | str:
     train = [_RUNS[run_id] for run_id in runs]
     scored, refused = fit_and_score_all([(recipe, train)], [_RUNS[run_id] for run_id in held_out], cache=cache)
     return scored[0] if scored else refused[recipe.name]

@@ -1,9 +1,9 @@
-"""Which tests next: records a rig can play, chosen by how much they shrink the doubt about a damper.
+"""Test planning: records within the limits of a rig that reduce the uncertainty of a damper most.
 
-Records are added one by one, each the one that lowers the mean variance of the force over the
-envelope most for its rig time. Drift is in the reckoning: a session brings a gain and an offset of
-its own, so the tenth record of one session teaches less than the first of the next; but a session
-has to be set up first, and how many pay is chosen too.
+Records are added one after the other, each time the one that reduces the mean variance of the force
+over the envelope most for its rig time. Each session has a gain and an offset of its own, so the
+tenth record of a session carries less information than the first of the next; but setting up a
+session takes time, and the number of sessions is optimised too.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from itertools import count, takewhile
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Prediction
-from mrdamper.dampers.certainty import Certainty
 from mrdamper.dampers.slopes import force_slopes
+from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import InputError, UnknownNameError
 from mrdamper.identification.intervals import student
@@ -45,8 +45,8 @@ def plan_tests(
     hours: float,
     about: str | Condition | None = None,
     progress: Progress = lambda what, share: None,
-) -> tuple[list[Proposal], Reckoning]:
-    """Records that shrink a doubt most, in the order to play them, and how they were chosen.
+) -> tuple[list[Proposal], TestDesign]:
+    """Choose the records that reduce an uncertainty most, in the order to run them.
 
     Parameters
     ----------
@@ -56,16 +56,16 @@ def plan_tests(
     hours : float
         Of rig time, sessions set up in it.
     about : str, Condition or None
-        The doubt: a number of the damper, the force at a condition, or over the whole of the limits.
+        The uncertainty to reduce: of a parameter, of the force at a condition, or over the limits.
     progress : callable
         Told what is being done and the share done, 0...1.
 
     Raises
     ------
     InputError
-        E_CERTAINTY without a covariance; E_LIMITS if the hours hold no record or nothing is allowed.
+        E_CERTAINTY without a covariance; E_LIMITS if no record fits into the hours or the limits.
     UnknownNameError
-        If the damper has no such number.
+        If the damper has no such parameter.
 
     Examples
     --------
@@ -77,7 +77,7 @@ def plan_tests(
     True
     """
     conditions = limits.candidates(hours)
-    reckoning = Reckoning.of(damper, limits, conditions, about, progress)
+    reckoning = TestDesign.of(damper, limits, conditions, about, progress)
     progress("choosing records", 0.9)
     return reckoning.proposals(reckoning.chosen(hours)), reckoning
 
@@ -86,8 +86,8 @@ Sessions = list[list[int]]  # conditions played in each, by their place in the g
 
 
 @dataclass(frozen=True, eq=False)
-class Reckoning:
-    """What records on a grid of C conditions would tell of P numbers, session by session.
+class TestDesign:
+    """Information of records at a grid of C conditions on P parameters, session by session.
 
     Attributes
     ----------
@@ -95,16 +95,16 @@ class Reckoning:
     conditions : sequence of Condition
     names : tuple of str
     prior : (P, P) array
-        Precision of the numbers before any new record.
+        Precision of the parameters before any new record.
     goal : (P, P) array
-        Weight of the numbers' variances in the doubt.
+        Weights of the parameters' variances in the variance to be reduced.
     grams : (C, D, P + 2, P + 2) array
         Of each condition's derivatives by the numbers and by a session's gain and offset, over the error
         of a sample, at D draws of the numbers.
     session : (2,) array
         Precision of the gain and the offset of a session not yet begun.
     about : str
-        The doubt, in words.
+        The uncertainty to reduce, as text.
     beside : float
         Variance of the force beside that by the numbers: an unknown session's, and the form's own.
     """
@@ -127,9 +127,9 @@ class Reckoning:
         conditions: Sequence[Condition],
         about: str | Condition | None = None,
         progress: Progress = lambda what, share: None,
-    ) -> Reckoning:
+    ) -> TestDesign:
         """Of a damper with its covariance; raises as `plan_tests`."""
-        uncertainty: Certainty | None = damper.certainty
+        uncertainty: Uncertainty | None = damper.uncertainty
         if uncertainty is None or not uncertainty.names:
             remedy = "study the tests again, or plan without a model"
             raise InputError("the model does not know how sure it is", remedy=remedy, code="E_CERTAINTY")
@@ -183,7 +183,7 @@ class Reckoning:
         return (sums[..., :size, :size] - shared).mean(axis=-3)
 
     def variance(self, precision: Floats) -> Floats:
-        """(...) of the doubt."""
+        """(...) variance to be reduced."""
         return np.trace(np.linalg.solve(precision, np.broadcast_to(self.goal, precision.shape)), axis1=-2, axis2=-1)
 
     def precision(self, played: Sessions) -> Floats:
@@ -191,17 +191,17 @@ class Reckoning:
         return self.prior + sum(self.information(self.grams[rows].sum(axis=0)) for rows in played if rows)
 
     def spread(self, played: Sessions) -> float:
-        """Standard deviation of the doubt after some records."""
+        """Return the standard deviation to be reduced, after some records."""
         return math.sqrt(self.variance(self.precision(played)))
 
     def chosen(self, hours: float) -> Sessions:
-        """The records of the number of sessions that pays best."""
+        """Choose the records, and the number of sessions that reduces the variance most."""
         least = self.limits.opening + self.minutes.min()
         affordable = takewhile(lambda n: n <= self.limits.sessions and n * least <= 60 * hours, count(1))
         return min((self._exchanged(self._filled(n, hours)) for n in affordable), key=self.spread)
 
     def _filled(self, sessions: int, hours: float) -> Sessions:
-        """Records one by one, each the one that lowers the variance most for its rig time, sessions in turn."""
+        """Add records, each the one that lowers the variance most for its rig time, sessions in turn."""
         played: Sessions = [[] for _ in range(sessions)]
         sums = np.zeros((sessions, *self.grams.shape[1:]))
         information = np.zeros((sessions, *self.prior.shape))
@@ -222,7 +222,7 @@ class Reckoning:
             information[at], left = then[best], left - self.minutes[options[best]]
 
     def _exchanged(self, played: Sessions) -> Sessions:
-        """Each record in turn for the one that tells most in its place and takes no longer, all others being played."""
+        """Exchange each record for the one that lowers the variance most in its place and takes no longer."""
         for rows in played:
             others = self.precision([other for other in played if other is not rows])
             for k, now in enumerate(rows):
@@ -232,7 +232,7 @@ class Reckoning:
         return played
 
     def proposals(self, played: Sessions) -> list[Proposal]:
-        """Records with the doubt before and after each, session by session."""
+        """Return the records with the standard deviation before and after each, session by session."""
         proposals: list[Proposal] = []
         before, so_far = self.spread([]), [[] for _ in played]
         today = np.sqrt(np.diag(np.linalg.inv(self.prior)))
@@ -250,7 +250,7 @@ class Reckoning:
         return proposals
 
     def said(self, proposals: Sequence[Proposal]) -> str:
-        """The doubt before and after, in words."""
+        """State the standard deviation before and after as text."""
         before, after = proposals[0].before, proposals[-1].after
         if self.about in self.names:
             return f"standard error of {self.about} {100 * before:.1f} -> {100 * after:.1f} % of its value"
@@ -265,7 +265,7 @@ class Reckoning:
         )
 
 
-def _slopes(damper: Damper, uncertainty: Certainty, names: Sequence[str], condition: Condition) -> Floats:
+def _slopes(damper: Damper, uncertainty: Uncertainty, names: Sequence[str], condition: Condition) -> Floats:
     """(D, K, P + 2) derivatives over half the peak-to-peak force: by the numbers, by a gain, by an offset [N]."""
     rng = np.random.default_rng(_SEED)
     root = np.linalg.cholesky(uncertainty.covariance + 1e-12 * np.diag(np.diag(uncertainty.covariance)))
@@ -284,8 +284,8 @@ def _slopes(damper: Damper, uncertainty: Certainty, names: Sequence[str], condit
     return np.array(slopes)
 
 
-def taught_least(damper: Damper, least: int = 3) -> list[tuple[str, float]]:
-    """The runs a damper was identified from that say least about its numbers, each with its share of what is known."""
-    uncertainty = damper.certainty
+def least_informative_runs(damper: Damper, least: int = 3) -> list[tuple[str, float]]:
+    """Return the runs that carry least information on the parameters of a damper, each with its share."""
+    uncertainty = damper.uncertainty
     shares = sorted(uncertainty.taught.items(), key=lambda item: item[1]) if uncertainty else []
     return shares[:least] if len(shares) > least else []

@@ -1,4 +1,4 @@
-"""Recipes: the ways from runs of one rig to a damper, and how the damper of each scores.
+"""Recipes: procedures from the runs of one rig to a damper, and the scores of that damper.
 
 A recipe says what is identified from single runs and how one damper over all conditions is
 made of it. A study, a comparison, the reproduction of the paper and the live bench take their
@@ -40,7 +40,7 @@ JOINTLY = "play-bypass"  # the model whose parameters hold for a whole damper
 
 @dataclass(frozen=True)
 class Basis:
-    """What is identified from every single run.
+    """Model, method and options of the identification of every single run.
 
     Attributes
     ----------
@@ -65,13 +65,13 @@ class Basis:
         return identify(run, self.model, self.method, free=self.free, fixed=dict(self.fixed), gas=self.gas)
 
     def problem(self, run: Run) -> Problem:
-        """What there is to identify from a run, for a method of one's own."""
+        """Return the identification problem of a run, for a method of one's own."""
         fixed = dict(self.fixed)
         return Problem.of(run, model_type(self.model), free=self.free, fixed=fixed, gas=self.gas)
 
     @property
     def costly(self) -> bool:
-        """Whether a few cycles of a run have to do where many runs are compared."""
+        """True where only a few cycles of a run are used in a comparison of many runs."""
         return self.method != "projection" or model_type(self.model).integrated
 
 
@@ -80,15 +80,15 @@ IdentificationCache = dict[tuple[Basis, str], tuple[Identification | str, float]
 
 @dataclass(frozen=True, eq=False)
 class FitResult:
-    """What a recipe makes of runs.
+    """Damper that a recipe identified from runs.
 
     Attributes
     ----------
     damper : Damper
     refit : callable
-        Makes it again from the runs at some indices only.
+        Identifies the damper again from the runs at some indices only.
     fit : ModifiedFit, JointFit or None
-        What there is to say about its functions or its search.
+        Details of its functions or its search.
     """
 
     damper: Damper
@@ -105,7 +105,7 @@ class Recipe:
     name : str
         Model, and way where there are several: "bouc-wen:joint".
     basis : Basis or None
-        What is identified from single runs, if anything.
+        Identification of single runs, if any.
     make : callable
         Makes the damper from runs and their identifications.
     way : str
@@ -147,8 +147,8 @@ class Recipe:
 
 
 @dataclass(frozen=True, eq=False)
-class Scored:
-    """A recipe followed on one rig, and how its damper predicts.
+class RecipeResult:
+    """Damper of a recipe on one rig, and its scores.
 
     Attributes
     ----------
@@ -208,7 +208,7 @@ def fit_and_score(
     spent: float = 0.0,
     leave_out: bool = True,
     kinds: bool = False,
-) -> Scored:
+) -> RecipeResult:
     """Make a recipe's damper and score it.
 
     Parameters
@@ -246,7 +246,7 @@ def fit_and_score(
     if leave_out:
         left_out = cross_validate(pieces, refit, title)
     errors = [i.scores.nrmse_pp for i in identifications]
-    return Scored(
+    return RecipeResult(
         recipe=recipe,
         damper=result.damper,
         fit=result.fit,
@@ -275,7 +275,7 @@ def fit_and_score_all(
     leave_out: bool = True,
     kinds: bool = False,
     cache: IdentificationCache | None = None,
-) -> tuple[list[Scored], dict[str, str]]:
+) -> tuple[list[RecipeResult], dict[str, str]]:
     """Follow several recipes on one rig; what more than one of them starts from is identified once.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Which runs to hold out for validation: as told, or a stratified fifth of the conditions."""
+"""Choice of the validation runs: as requested, or a stratified fifth of the conditions."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class SplitError(InputError):
 
 
 @dataclass(frozen=True)
-class Chosen:
-    """What is held out and why.
+class Split:
+    """Validation runs and the reason for their choice.
 
     Attributes
     ----------
@@ -48,8 +48,8 @@ def hold_out(
     every: int | None = None,
     none: bool = False,
     replace: bool = False,
-) -> Chosen:
-    """Choose the runs to hold out; without any wish, a stratified fifth of the conditions.
+) -> Split:
+    """Choose the validation runs; by default a stratified fifth of the conditions.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def hold_out(
             f"{len(same_condition(left))} conditions left to identify from", where=where, remedy="hold fewer runs out"
         )
     shown = {name: "no sine" if c is None else str(c) for name, c in condition_of.items()}
-    return Chosen(frozenset(held), ", ".join(reasons) or "nothing", shown)
+    return Split(frozenset(held), ", ".join(reasons) or "nothing", shown)
 
 
 def _condition(run: Run) -> Condition | None:

@@ -1,4 +1,4 @@
-"""Scores on conditions a damper has not seen."""
+"""Scores of a damper on runs not used for its identification."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from mrdamper.dampers.bands import band, session_band
 from mrdamper.dampers.base import Damper, Prediction
 from mrdamper.dampers.calibration import PredictedRun
-from mrdamper.dampers.sessions import KNOWN, UNKNOWN, Expected, Reading, Sessions, When
+from mrdamper.dampers.sessions import KNOWN, UNKNOWN, GainOffset, RecordingTime, SessionCorrection, Sessions
 from mrdamper.data import Condition, Displayable, Run
 from mrdamper.errors import InputError, RunError, UnknownNameError, checked, require
 from mrdamper.statistics.metrics import Scores, dissipated_power, peak_force, score
@@ -21,7 +21,7 @@ _MIN_SWING_N = 1e-100  # of a force, and its inverse the most [N]: their squares
 
 @dataclass(frozen=True, eq=False)
 class RunScore:
-    """How one run was predicted, inside its steady window.
+    """Scores of the prediction of one run, inside its steady window.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class RunScore:
         force; None where it never does.
     session : str
         "unknown": predicted as it is; "known": corrected by other runs of its session.
-    reading : Reading or None
+    reading : GainOffset or None
         Gain and offset that would have fitted the run best; no score is corrected by them.
     predicted : PredictedRun or None
         Samples of the uncorrected prediction beside the measured ones.
@@ -53,7 +53,7 @@ class RunScore:
     extrapolation: tuple[str, ...]
     rest: float | None = None
     session: str = UNKNOWN
-    reading: Reading | None = None
+    reading: GainOffset | None = None
     predicted: PredictedRun | None = None
 
 
@@ -180,10 +180,10 @@ def score_run(damper: Damper, run: Run, sessions: Sessions | None = None) -> Run
         raise RunError(text, where=f"run {run.id}", remedy="check the channel")
     prediction = damper.predict_run(run)
     inside = run.in_window
-    reading = Reading.of(run.force[inside], prediction.force[inside])
+    reading = GainOffset.of(run.force[inside], prediction.force[inside])
     away = prediction.distance(damper.envelope)
     beside = PredictedRun.of(run, prediction.force, prediction.motion.velocity, away)
-    expected = sessions.expected(When.of(run), without=run.id) if sessions else None
+    expected = sessions.expected(RecordingTime.of(run), without=run.id) if sessions else None
     if expected is not None:
         prediction = expected.corrected(prediction)
     return RunScore(
@@ -207,7 +207,9 @@ def _at_rest(run: Run, prediction: Prediction) -> float | None:
     return float(np.sqrt(np.mean((prediction.force - run.force)[still] ** 2)) / np.ptp(run.force))
 
 
-def peak_band(damper: Damper, run: Run, level: float = 0.9, expected: Expected | None = None) -> dict[str, float]:
+def peak_band(
+    damper: Damper, run: Run, level: float = 0.9, expected: SessionCorrection | None = None
+) -> dict[str, float]:
     """Half the peak-to-peak force [N] and the energy of a cycle [J] in a run's steady window, and their bands.
 
     The ends are missing where the damper does not know how sure it is.
@@ -255,7 +257,7 @@ def leave_out(
 
 @dataclass(frozen=True)
 class SessionDrift:
-    """How much of the error a gain and an offset of each run's own would explain.
+    """Part of the error that a gain and an offset fitted to each run would explain.
 
     Estimated to be stated, never to correct a score.
 

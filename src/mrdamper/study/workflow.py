@@ -1,4 +1,4 @@
-"""The whole method, in order: identify every run, map the parameters, validate what was held out.
+"""The complete procedure: identify every run, fit parameter functions or one global model, validate.
 
 `run_study` reads like the methods section of a paper; everything it returns is a result
 object that plots, reports and files take from there.
@@ -18,7 +18,7 @@ import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.calibration import QUANTITIES, Calibration
-from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.dampers.sessions import Sessions, known_errors
@@ -32,12 +32,12 @@ from mrdamper.rig_files.quality.table import judged, with_findings
 from mrdamper.statistics.functions.selection import mean_error, smaller_wins
 from mrdamper.study.contradictions import Contradiction, find_contradictions
 from mrdamper.study.dissipation import gains_energy
-from mrdamper.study.parallel import HERE, Processes
+from mrdamper.study.parallel import IN_PROCESS, Processes
 from mrdamper.study.recipe import (
     JOINTLY,
     Progress,
     Recipe,
-    Scored,
+    RecipeResult,
     StudyMethod,
     current_only,
     fit_and_score_all,
@@ -91,7 +91,7 @@ class RigStudy(Displayable):
     dataset: Dataset
     loops: tuple[LoopAnalysis, ...]
     ranges: tuple[DynamicRange, ...]
-    candidates: tuple[Scored, ...]
+    candidates: tuple[RecipeResult, ...]
     not_identified: Mapping[str, str]
     refused: Mapping[str, str]
     asked_for: bool = False
@@ -126,7 +126,7 @@ class RigStudy(Displayable):
         ]
 
     @property
-    def chosen(self) -> Scored:
+    def chosen(self) -> RecipeResult:
         """The candidate with the fewest parameters among those of about the smallest error over all kinds of fold."""
         return self.candidates[0]
 
@@ -138,7 +138,7 @@ class RigStudy(Displayable):
     @property
     def calibration(self) -> Calibration | None:
         """Of the chosen damper's prediction intervals."""
-        return self.damper.certainty.calibration if self.damper.certainty else None
+        return self.damper.uncertainty.calibration if self.damper.uncertainty else None
 
     @property
     def interval_coverage(self) -> dict[str, float] | None:
@@ -170,7 +170,7 @@ class Study(Displayable):
 
     @property
     def headline(self) -> str:
-        """What was chosen, rig by rig."""
+        """Selected model and its errors, by rig."""
         return f"study of {self.dataset.name} — " + "; ".join(rig.headline for rig in self.rigs)
 
     @property
@@ -234,7 +234,7 @@ def run_study(
     *,
     model: str | StudyMethod | None = None,
     keep: Sequence[str] = (),
-    processes: Processes = HERE,
+    processes: Processes = IN_PROCESS,
 ) -> Study:
     """Study a dataset: identify, map, validate, rig by rig.
 
@@ -306,13 +306,13 @@ def study_rig(
     method, model = (model, model.name) if isinstance(model, StudyMethod) else (None, model)
     rig = dataset.rigs[0]
     progress(f"{rig or 'rig'}: loops", 0.0)
-    dataset, contradictions = agreeing(dataset, keep)
+    dataset, contradictions = without_contradictions(dataset, keep)
     aside = {one.run_id: str(one) for one in contradictions}
     sines, refused = usable_sines(dataset)
     loops = at_levels([analyse_loop(run) for run in sines])
     train = [run for run in sines if run.split == "train"]
-    trusted, distrusted = believed(dataset)
-    everything, unusable = usable(run for run in trusted if run.split == "train")
+    trusted, distrusted = accepted_runs(dataset)
+    everything, unusable = runs_for_global_fit(run for run in trusted if run.split == "train")
     unusable |= distrusted
     refused = {name: unusable.get(name, f"{why}; the joint model takes it whole") for name, why in refused.items()}
     refused = aside | refused
@@ -334,7 +334,7 @@ def study_rig(
         lambda what, share: progress(f"{rig or 'rig'}: {what}", share),
         kinds=True,
     )
-    candidates = [judged_on_all(c, everything) for c in candidates]
+    candidates = [with_unused_runs(c, everything) for c in candidates]
     eligible = [c for c in candidates if model in (None, c.recipe.model)]
     if not eligible:
         name, reason = next(iter(impossible.items()))
@@ -360,7 +360,8 @@ def study_rig(
     )
     taken = train if chosen.recipe.basis else everything
     chosen = replace(
-        chosen, damper=certain(chosen.damper, taken, beside, held, away=away, other_sessions=other_sessions)
+        chosen,
+        damper=estimate_uncertainty(chosen.damper, taken, beside, held, away=away, other_sessions=other_sessions),
     )
     candidates[0], sessions_note = _with_sessions(chosen, dataset)
     return RigStudy(
@@ -369,7 +370,7 @@ def study_rig(
     )  # fmt: skip
 
 
-def _with_sessions(chosen: Scored, dataset: Dataset) -> tuple[Scored, float | str]:
+def _with_sessions(chosen: RecipeResult, dataset: Dataset) -> tuple[RecipeResult, float | str]:
     """The candidate whose damper knows what sessions share, and its left-out error with them known, or why not."""
     damper, own = chosen.damper, {score.run_id: score.reading for score in chosen.train.runs}
     left_out = [score for score in chosen.cross_validated.runs if own.get(score.run_id) is not None]
@@ -380,14 +381,14 @@ def _with_sessions(chosen: Scored, dataset: Dataset) -> tuple[Scored, float | st
         error = float(np.median(known_errors(runs, readings)))
     except InputError as reason:
         return chosen, str(reason)
-    if damper.certainty is None:
+    if damper.uncertainty is None:
         return chosen, error
-    uncertainty = replace(damper.certainty, sessions=sessions)
-    return replace(chosen, damper=replace(damper, certainty=uncertainty)), error  # type: ignore[type-var]
+    uncertainty = replace(damper.uncertainty, sessions=sessions)
+    return replace(chosen, damper=replace(damper, uncertainty=uncertainty)), error  # type: ignore[type-var]
 
 
-def judged_on_all(candidate: Scored, everything: Sequence[Run]) -> Scored:
-    """The same with the train runs that its recipe could not take among the left-out ones: it never saw them."""
+def with_unused_runs(candidate: RecipeResult, everything: Sequence[Run]) -> RecipeResult:
+    """Add scores of the identification runs that the recipe could not use to its cross-validated ones."""
     scored = {score.run_id for score in (*candidate.train.runs, *candidate.cross_validated.runs)}
     others = validate(candidate.damper, [run for run in everything if run.id not in scored])
     if not others.runs:
@@ -398,7 +399,7 @@ def judged_on_all(candidate: Scored, everything: Sequence[Run]) -> Scored:
     )
 
 
-def errors_by_kind(candidates: Sequence[Scored]) -> list[dict[str, Floats]]:
+def errors_by_kind(candidates: Sequence[RecipeResult]) -> list[dict[str, Floats]]:
     """Cross-validated errors of the runs that all candidates have, by kind of fold, in the order of their names.
 
     A run that a candidate cannot take was left out of it in every way; one that no damper could be made without
@@ -420,15 +421,15 @@ def errors_by_kind(candidates: Sequence[Scored]) -> list[dict[str, Floats]]:
     return by_candidate
 
 
-def _runs(candidate: Scored, kind: str) -> Sequence[RunScore]:
+def _runs(candidate: RecipeResult, kind: str) -> Sequence[RunScore]:
     """Scores of runs whose fold of a kind was left out."""
     if kind == CONDITION:
         return candidate.cross_validated.runs
     return candidate.by_kind[kind].runs if kind in candidate.by_kind else ()
 
 
-def usable(runs: Iterable[Run], clipped: bool = False) -> tuple[list[Run], dict[str, str]]:
-    """The runs of any motion and any current that a joint model takes, and why the others are not used."""
+def runs_for_global_fit(runs: Iterable[Run], clipped: bool = False) -> tuple[list[Run], dict[str, str]]:
+    """Return the runs that a global model accepts, any motion and current, and the reasons for excluding the others."""
     runs_used, refused = [], {}
     for run in runs:
         try:
@@ -444,7 +445,7 @@ def usable(runs: Iterable[Run], clipped: bool = False) -> tuple[list[Run], dict[
     return runs_used, refused
 
 
-def agreeing(dataset: Dataset, keep: Collection[str] = ()) -> tuple[Dataset, tuple[Contradiction, ...]]:
+def without_contradictions(dataset: Dataset, keep: Collection[str] = ()) -> tuple[Dataset, tuple[Contradiction, ...]]:
     """Set aside the runs of a rig that contradict the others.
 
     Raises
@@ -452,13 +453,13 @@ def agreeing(dataset: Dataset, keep: Collection[str] = ()) -> tuple[Dataset, tup
     ContradictionError
         If more than a third of the identification runs contradict the others.
     """
-    contradictions = tuple(find_contradictions(believed(dataset)[0], keep))
+    contradictions = tuple(find_contradictions(accepted_runs(dataset)[0], keep))
     aside = {one.run_id for one in contradictions}
     return dataset.only([run for run in dataset if run.id not in aside]), contradictions
 
 
-def believed(dataset: Iterable[Run]) -> tuple[list[Run], dict[str, str]]:
-    """The runs that physics allows to believe, each once, and why the others are left out of everything."""
+def accepted_runs(dataset: Iterable[Run]) -> tuple[list[Run], dict[str, str]]:
+    """Return the runs accepted by the physical checks, each once, and the reasons for rejecting the others."""
     kept: list[Run] = []
     refused: dict[str, str] = {}
     for run in dataset:
@@ -475,7 +476,7 @@ def believed(dataset: Iterable[Run]) -> tuple[list[Run], dict[str, str]]:
 
 
 def _are_one_test(run: Run, other: Run) -> bool:
-    """Whether two runs hold the same samples, be it rounded otherwise, cut shorter or at another time."""
+    """Tell if two runs hold the same samples, possibly rounded, cropped or shifted in time."""
     size = min(run.time.size, other.time.size)
     for channel in ("displacement", "force"):
         one, two = getattr(run, channel)[:size], getattr(other, channel)[:size]
@@ -509,7 +510,7 @@ def _of_another_size(runs: Sequence[Run]) -> dict[str, str]:
 def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], dict[str, str]]:
     """The runs whose motion is a sine at one current, and why the others are not used."""
     sines = []
-    kept, refused = believed(dataset)
+    kept, refused = accepted_runs(dataset)
     for run in kept:
         try:
             refuse_clipped(with_findings(run), clipped)

@@ -45,7 +45,7 @@ class LoopElement:
 
     @property
     def scaled_given(self) -> tuple[float, ...]:
-        """Gain, offset, parameters: as they are strung together."""
+        """Gain, offset, parameters: as they are concatenated."""
         return (*self.scale, *self.given)
 
     def scaled(self, gain: float, offset: float) -> LoopElement:
@@ -78,10 +78,10 @@ class ElementParameters:
 
     @classmethod
     def of(cls, stages: Sequence[LoopElement]) -> ElementParameters:
-        def strung(name: str) -> Floats:
+        def joined(name: str) -> Floats:
             return np.array([value for stage in stages for value in getattr(stage, name)], dtype=float)
 
-        return cls(strung("scaled_given"), strung("derived"), strung("start"))
+        return cls(joined("scaled_given"), joined("derived"), joined("start"))
 
 
 def interpreted_loop(elements: Sequence[LoopElement], control: LoopElement | None) -> Callable[..., int]:

@@ -55,13 +55,13 @@ def draw(dampers: Mapping[str, Damper], count: int, seed: int = 1) -> list[dict[
     """Draws from what the dampers know of themselves: their numbers, and the session each is in.
 
     Links that share a damper share its numbers; each has a session of its own. Spreads are Student's, by the degrees
-    of freedom behind them. What the form itself is wrong by (`Certainty.force`) is no number and is not drawn. Raises
+    of freedom behind them. What the form itself is wrong by (`Uncertainty.force`) is no number and is not drawn. Raises
     `InputError` (E_CERTAINTY) if a damper was saved without, E_DRAWS if the count is out of range.
 
     Parameters
     ----------
     dampers : mapping of str to Damper
-        By link, with `certainty`.
+        By link, with `uncertainty`.
     count, seed : int
     """
     if not 2 <= count <= _MAX_DRAWS:
@@ -70,8 +70,8 @@ def draw(dampers: Mapping[str, Damper], count: int, seed: int = 1) -> list[dict[
     shared: dict[int, list[dict[str, float]]] = {}
     draws: list[dict[str, Draw]] = [{} for _ in range(count)]
     for link, damper in dampers.items():
-        certainty = damper.certainty
-        if certainty is None:
+        uncertainty = damper.uncertainty
+        if uncertainty is None:
             raise InputError(
                 f"{damper.title} was saved without its uncertainty",
                 where=link,
@@ -80,8 +80,8 @@ def draw(dampers: Mapping[str, Damper], count: int, seed: int = 1) -> list[dict[
             )
         if id(damper) not in shared:
             shared[id(damper)] = _numbers_drawn(damper, count, rng)
-        spread = np.array([certainty.total_gain, certainty.total_offset])
-        dof = certainty.session_dof if certainty.of_sessions else certainty.run_dof
+        spread = np.array([uncertainty.total_gain, uncertainty.total_offset])
+        dof = uncertainty.session_dof if uncertainty.of_sessions else uncertainty.run_dof
         sessions = (_student(rng, dof, count) * rng.standard_normal((count, 2)) * spread).tolist()
         for row, numbers, (gain, offset) in zip(draws, shared[id(damper)], sessions, strict=True):
             row[link] = Draw(numbers, gain, offset)
@@ -89,17 +89,17 @@ def draw(dampers: Mapping[str, Damper], count: int, seed: int = 1) -> list[dict[
 
 
 def _numbers_drawn(damper: Damper, count: int, rng: np.random.Generator) -> list[dict[str, float]]:
-    certainty, own = damper.certainty, damper.fitted_parameters
-    assert certainty is not None
-    if not certainty.names:
+    uncertainty, own = damper.uncertainty, damper.fitted_parameters
+    assert uncertainty is not None
+    if not uncertainty.names:
         return [{} for _ in range(count)]
-    nudges = rng.multivariate_normal(np.zeros(len(certainty.names)), certainty.covariance, count)
-    nudges *= _student(rng, float(np.min(certainty.dof)), count)
+    nudges = rng.multivariate_normal(np.zeros(len(uncertainty.names)), uncertainty.covariance, count)
+    nudges *= _student(rng, float(np.min(uncertainty.dof)), count)
     columns = []
-    for name, log, nudge in zip(certainty.names, certainty.logs, nudges.T, strict=True):
+    for name, log, nudge in zip(uncertainty.names, uncertainty.logs, nudges.T, strict=True):
         moved = own[name].value * np.exp(nudge) if log else own[name].value + nudge
         columns.append(np.clip(moved, *own[name].bounds).tolist())
-    return [dict(zip(certainty.names, row, strict=True)) for row in zip(*columns, strict=True)]
+    return [dict(zip(uncertainty.names, row, strict=True)) for row in zip(*columns, strict=True)]
 
 
 def _student(rng: np.random.Generator, dof: float, count: int) -> Floats:

@@ -20,11 +20,11 @@ from typing import Annotated, Any
 from fastapi import Depends, Request
 
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.data import Dataset
 from mrdamper.data.temporary import temporary_folder
 from mrdamper.errors import InputError, UnknownNameError
-from mrdamper.study.recipe import Scored
+from mrdamper.study.recipe import RecipeResult
 from mrdamper.web.drops import Drop, Intake
 from mrdamper.web.rig_table import RigTable, rig_table
 from mrdamper.web.work import Job
@@ -113,14 +113,14 @@ class Session:
             del self.dampers[next(iter(self.dampers))]
         return bench
 
-    def scored(self, found: Scored, origin: str, note: str, selected: bool = False) -> Bench:
+    def scored(self, found: RecipeResult, origin: str, note: str, selected: bool = False) -> Bench:
         """Add a damper whose covariance is estimated from its runs when it is first asked for."""
         error = found.cross_validated.median() if found.cross_validated.runs else None
-        if found.damper.certainty is not None:
+        if found.damper.uncertainty is not None:
             return self.add(found.damper, origin, note, error=error, selected=selected)
         runs = [self.dataset[run.run_id] for run in found.train.runs]
         beside = [score.predicted for score in found.cross_validated.runs if score.predicted is not None]
-        learn = partial(certain, found.damper, runs, beside)
+        learn = partial(estimate_uncertainty, found.damper, runs, beside)
         return self.add(found.damper, origin, note, error=error, selected=selected, learn=learn)
 
     def damper(self, key: str, sure: bool = False) -> Bench:

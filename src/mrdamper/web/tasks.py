@@ -12,14 +12,14 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.data import Dataset
 from mrdamper.errors import IdentificationError, InputError
 from mrdamper.identification import Identification
 from mrdamper.study.recipe import (
     JOINTLY,
     Basis,
-    Scored,
+    RecipeResult,
     fit_and_score,
     fit_functions_jointly,
     fit_per_run,
@@ -56,7 +56,7 @@ def identify_rig(
     over: str,
     free: Sequence[str] = (),
     fixed: Mapping[str, float] = MappingProxyType({}),
-) -> tuple[tuple[Identification, ...], Scored | str, dict[str, str]]:
+) -> tuple[tuple[Identification, ...], RecipeResult | str, dict[str, str]]:
     """Identify a model from runs of one rig, then over their conditions.
 
     Parameters
@@ -103,7 +103,7 @@ def identify_rig(
             raise
         return tuple(found), str(error), refused
     tell("uncertainty", 0.95)
-    return tuple(found), replace(scored, damper=certain(scored.damper, runs)), refused
+    return tuple(found), replace(scored, damper=estimate_uncertainty(scored.damper, runs)), refused
 
 
 def compare_models(tell: Tell, dataset: Dataset, names: Sequence[str], jobs: int) -> Comparison:

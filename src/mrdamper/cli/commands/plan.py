@@ -37,7 +37,7 @@ def register(app: typer.Typer) -> None:
         from mrdamper.errors import InputError
         from mrdamper.study.first_matrix import first_matrix
         from mrdamper.study.limits import Limits
-        from mrdamper.study.plan import plan_tests, taught_least
+        from mrdamper.study.plan import least_informative_runs, plan_tests
         from mrdamper.study.proposal import rows
 
         require_writable(out)
@@ -72,7 +72,7 @@ def register(app: typer.Typer) -> None:
         if damper is None or reckoning is None:
             return
         typer.echo(reckoning.said(chosen))
-        if least := taught_least(damper):
+        if least := least_informative_runs(damper):
             runs = ", ".join(f"{name} ({100 * share:.1f} %)" for name, share in least)
             typer.echo(f"least informative runs: {runs} of the information")
 

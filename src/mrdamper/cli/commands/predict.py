@@ -93,12 +93,12 @@ def register(app: typer.Typer) -> None:
         known = band(damper, prediction, level)
         if check_run:
             from mrdamper.dampers.bands import session_band
-            from mrdamper.dampers.sessions import When, sessions_known
+            from mrdamper.dampers.sessions import RecordingTime, sessions_known
             from mrdamper.rig_files.dataset_folder import load_dataset
 
             dataset = load_dataset(data)
             runs = [dataset[name] for name in check_run]
-            expected = sessions_known(damper, runs).expected(When.of(runs[-1]))
+            expected = sessions_known(damper, runs).expected(RecordingTime.of(runs[-1]))
             assert expected is not None  # the last check run's own session
             known = session_band(expected, damper, prediction, level)
             prediction = expected.corrected(prediction)

@@ -240,8 +240,8 @@ def _print_bands(done: Simulation, bands: Bands | None, dampers: Mapping[str, Da
     if bands.lost:
         typer.echo(f"warning: {bands.lost} draws had no solution and are omitted", err=True)
     for name, damper in dampers.items():
-        if damper.certainty and damper.certainty.left_out:
-            share = 100 * damper.certainty.force
+        if damper.uncertainty and damper.uncertainty.left_out:
+            share = 100 * damper.uncertainty.force
             typer.echo(f"not included: model error of {name}, {share:.2g} % of half the peak-to-peak force")
 
 

@@ -28,9 +28,9 @@ def register(app: typer.Typer) -> None:
 
         Options add profile likelihoods of single parameters and samples of the posterior.
         """
-        from mrdamper.dampers.certainty import table, unsure
-        from mrdamper.dampers.covariance import certain
+        from mrdamper.dampers.covariance import estimate_uncertainty
         from mrdamper.dampers.model_file import load_model
+        from mrdamper.dampers.uncertainty import table, uncertainty_warnings
         from mrdamper.data.atomic import require_writable, write_result
         from mrdamper.data.encoding import csv_text
         from mrdamper.errors import InputError
@@ -43,17 +43,17 @@ def register(app: typer.Typer) -> None:
         require_writable(out)
         damper = load_model(model)
         runs = []
-        if damper.certainty is None or profile or samples:
+        if damper.uncertainty is None or profile or samples:
             dataset = load_dataset(data)
             if damper.rig not in dataset.rigs:
                 raise InputError(f"the dataset has no rig {damper.rig!r}", remedy=f"rigs: {', '.join(dataset.rigs)}")
             runs = _used(dataset.rig(damper.rig))
-        if damper.certainty is None:
-            damper = certain(damper, runs)
+        if damper.uncertainty is None:
+            damper = estimate_uncertainty(damper, runs)
         rows = table(damper, level)
         for row in rows:
             print(f"{row['name']} = {row['written']}")
-        for doubt in unsure(damper):
+        for doubt in uncertainty_warnings(damper):
             print(doubt)
         found, drawn = [], None
         if profile or samples:
@@ -73,8 +73,8 @@ def register(app: typer.Typer) -> None:
                 print(f"{drawn.steps} steps, autocorrelation time {drawn.time:.0f}, split-R̂ {drawn.split_rhat:.3f}")
         if out is None:
             return
-        from mrdamper.report.plots.certainty import corner, profile_curves, quantiles
         from mrdamper.report.plots.style import save_figure
+        from mrdamper.report.plots.uncertainty import corner, profile_curves, quantiles
 
         with write_result(out) as folder:
             (folder / "parameters.csv").write_text(csv_text(rows), encoding="utf-8")

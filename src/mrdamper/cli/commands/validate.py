@@ -35,7 +35,7 @@ def register(app: typer.Typer) -> None:
         from mrdamper.cli.output import put
         from mrdamper.cli.progress import watched
         from mrdamper.dampers.model_file import load_model
-        from mrdamper.dampers.sessions import KNOWN, When, sessions_known
+        from mrdamper.dampers.sessions import KNOWN, RecordingTime, sessions_known
         from mrdamper.data.atomic import require_writable
         from mrdamper.data.encoding import csv_text
         from mrdamper.errors import InputError, UnknownNameError
@@ -70,7 +70,10 @@ def register(app: typer.Typer) -> None:
         by_id = {run.id: run for run in runs}
         peaks = {
             run.run_id: peak_band(
-                damper, by_id[run.run_id], level, known and known.expected(When.of(by_id[run.run_id]), run.run_id)
+                damper,
+                by_id[run.run_id],
+                level,
+                known and known.expected(RecordingTime.of(by_id[run.run_id]), run.run_id),
             )
             for run in validation.runs
         }

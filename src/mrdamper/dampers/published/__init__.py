@@ -29,7 +29,7 @@ def all_conditioned() -> Mapping[str, type[ConditionedDamper]]:
 
 
 def all_published() -> Mapping[str, Published]:
-    """What is fitted beside the models: the condition-dependent dampers, and a regression without physics."""
+    """Return the published dampers by name: the condition-dependent ones, and a regression without physics."""
     types = {**all_conditioned(), KernelDamper.name: KernelDamper}
     return {name: types[name] for name in sorted(types)}
 

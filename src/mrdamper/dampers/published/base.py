@@ -1,4 +1,4 @@
-"""What the published condition-dependent dampers share: coefficients, and a model at every condition."""
+"""Base class of the published condition-dependent dampers: coefficients, and a model at every condition."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import ClassVar, Self
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Envelope, Saved
-from mrdamper.dampers.certainty import Certainty, FittedParameter
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.piece import Piece
+from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.identification import Identification
@@ -48,7 +48,7 @@ class ConditionedDamper(Damper):
     envelope : Envelope
     provenance : mapping
     coil : Coil, optional
-    certainty : Certainty, optional
+    uncertainty : Uncertainty, optional
     """
 
     kind: ClassVar[str] = "conditioned"
@@ -69,7 +69,7 @@ class ConditionedDamper(Damper):
     envelope: Envelope
     provenance: Mapping[str, str] = field(default_factory=dict)
     coil: Coil | None = field(default=None, kw_only=True)
-    certainty: Certainty | None = field(default=None, kw_only=True)
+    uncertainty: Uncertainty | None = field(default=None, kw_only=True)
 
     @property
     def title(self) -> str:

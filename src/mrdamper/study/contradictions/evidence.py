@@ -38,7 +38,7 @@ _INDEPENDENT_SAMPLES = 12.0  # independent samples of a run's model error
 
 
 @dataclass(frozen=True)
-class Spread:
+class AssumedScatter:
     """Assumed differences between a run and the model of all runs.
 
     Attributes
@@ -57,7 +57,7 @@ class Spread:
 
 
 @dataclass(frozen=True, eq=False)
-class Products:
+class RowProducts:
     """Products of the rows of a run, in units of the median force.
 
     Attributes
@@ -84,7 +84,7 @@ class Products:
         """(E,) or (P,) coefficients of a force of one."""
         return np.tile(np.eye(_ELEMENTS)[0], len(self.gram) // _ELEMENTS)
 
-    def with_force(self, gain: float, offset: float) -> Products:
+    def with_force(self, gain: float, offset: float) -> RowProducts:
         """The same with another gain and offset of the force."""
         one = self.constant
         power = gain**2 * self.power + 2 * gain * offset * float(one @ self.moment) + self.rows * offset**2
@@ -142,7 +142,7 @@ class Posterior:
             self.known[key] = mean, root @ root.T
         return self.known[key]
 
-    def weigh(self, run: Products) -> Moments:
+    def weigh(self, run: RowProducts) -> Moments:
         """Weighted products of a run that is compared with these coefficients."""
         return self.evidence.weigh(run, self.at(run.over)[0])
 
@@ -182,7 +182,7 @@ class Evidence:
     """
 
     def __init__(self, tracks: Sequence[Track]) -> None:
-        self.spread = Spread()
+        self.spread = AssumedScatter()
         self.force = float(np.median([track.half_range for track in tracks])) or 1.0
         self.amplitude = float(np.median([np.ptp(t.displacement) / 2 for t in tracks])) or 1.0
         self._velocity = float(np.median([np.max(np.abs(t.velocity)) for t in tracks])) or 1.0
@@ -210,7 +210,7 @@ class Evidence:
         power = sum(member.power for member in members)
         return float(0.5 * (half @ half) - np.sum(np.log(np.diag(factor))) - 0.5 * power)
 
-    def weigh(self, run: Products, expected: Floats) -> Moments:
+    def weigh(self, run: RowProducts, expected: Floats) -> Moments:
         """Weighted products of a run; its gain multiplies the force of the coefficients expected of it."""
         spread, size = self.spread, run.size
         level = (_MISFIT * size) ** 2 + _MIN_MISFIT**2 * min(1.0, size)
@@ -231,13 +231,13 @@ class Evidence:
             run.over,
         )
 
-    def products(self, tracks: Sequence[Track]) -> list[Products]:
+    def products(self, tracks: Sequence[Track]) -> list[RowProducts]:
         """Products of the rows of runs."""
         yields = np.array(_YIELDS) * self.amplitude
         stops = stop_operators([t.displacement for t in tracks], yields)
         return [self._of_rows(track, stop[track.rows] / yields) for track, stop in zip(tracks, stops, strict=True)]
 
-    def _of_rows(self, track: Track, stops: Floats) -> Products:
+    def _of_rows(self, track: Track, stops: Floats) -> RowProducts:
         rows = track.rows
         x, v = track.displacement[rows] / self.amplitude, track.velocity[rows] / self._velocity
         friction = [np.tanh(v / scale) for scale in _VELOCITIES]
@@ -249,7 +249,7 @@ class Evidence:
         if track.current_changes:
             table = (over[:, :, None] * table[:, None, :]).reshape(rows.size, -1)
         y = track.force[rows] / self.force
-        return Products(
+        return RowProducts(
             table.T @ table, table.T @ y, float(y @ y), rows.size, track.half_range / self.force,
             None if track.current_changes else over[0],
         )  # fmt: skip

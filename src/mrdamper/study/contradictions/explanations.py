@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.study.contradictions.evidence import Evidence, Posterior, Products
+from mrdamper.study.contradictions.evidence import Evidence, Posterior, RowProducts
 from mrdamper.study.contradictions.tracks import Track
 
 Cause = Literal["force", "offset", "current", "displacement", "time", "sign", "damper", "shifted"]
@@ -71,20 +71,20 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """What would make a run agree with the others.
+    """Change of a run's data that would make it agree with the others.
 
     Attributes
     ----------
     trial : Trial
     gain : float
         Logarithm of the odds of the explanation against no explanation.
-    products : Products
+    products : RowProducts
         Of the run as corrected.
     """
 
     trial: Trial
     gain: float
-    products: Products
+    products: RowProducts
 
     @property
     def cause(self) -> Cause:
@@ -92,7 +92,7 @@ class Explanation:
         return self.trial.cause
 
 
-class Candidate:
+class ExplanationCandidate:
     """A run and its changed versions, whose products are computed once.
 
     Parameters
@@ -102,14 +102,14 @@ class Candidate:
     tracks : sequence of Track
         All runs.
     evidence : Evidence
-    products : Products
+    products : RowProducts
         Of the run as it is.
     """
 
-    def __init__(self, index: int, tracks: Sequence[Track], evidence: Evidence, products: Products) -> None:
+    def __init__(self, index: int, tracks: Sequence[Track], evidence: Evidence, products: RowProducts) -> None:
         self.track, self.evidence, self.own = tracks[index], evidence, products
         self._others = [t for k, t in enumerate(tracks) if k != index]
-        self._moved: list[tuple[Trial, Products]] = []
+        self._moved: list[tuple[Trial, RowProducts]] = []
 
     def explanations(self, others: Posterior) -> list[Explanation]:
         """Explanations that are more than differences between sessions, the most probable first.
@@ -137,7 +137,7 @@ class Candidate:
             gain = -np.inf
         return Explanation(Trial("damper", 1.0, "", _ALONE_ODDS), gain, self.own)
 
-    def changed(self, trial: Trial) -> Products:
+    def changed(self, trial: Trial) -> RowProducts:
         """Products of the run as corrected by a trial of force, offset or current."""
         if trial.cause == "current":
             return replace(self.own, over=self.evidence.shares(np.array([trial.value]))[0])
@@ -147,13 +147,13 @@ class Candidate:
 
     @cached_property
     def _is_edge(self) -> bool:
-        """Whether the run is the only one at the lowest or highest current: the others are extrapolated to it."""
+        """Tell if a run is the only one at the lowest or highest current: the others are extrapolated to it."""
         currents = np.concatenate([track.current[[0, -1]] for track in self._others])
         return bool(
             np.all(self.track.current > currents.max() * 1.05) or np.all(self.track.current < currents.min() * 0.95)
         )
 
-    def _trials(self, others: Posterior) -> Iterator[tuple[Trial, Products]]:
+    def _trials(self, others: Posterior) -> Iterator[tuple[Trial, RowProducts]]:
         for trial in (*self._of_the_force(others), *self._of_the_current()):
             yield trial, self.changed(trial)
         if not self._moved:
@@ -231,7 +231,7 @@ class Candidate:
             return replace(moved, force=-self.track.force)
         return self.track.scaled(time=trial.value) if trial.cause == "time" else self.track.scaled(trial.value)
 
-    def _is_large(self, trial: Trial, products: Products, others: Posterior) -> bool:
+    def _is_large(self, trial: Trial, products: RowProducts, others: Posterior) -> bool:
         value, size = trial.value, self.own.size
         if trial.cause in ("force", "displacement", "time"):
             return abs(np.log(value)) > np.log(MIN_FACTOR)
@@ -242,7 +242,7 @@ class Candidate:
             return _rms(products, change) > MIN_CURRENT_EFFECT * size
         return True
 
-    def _unexplained(self, products: Products, others: Posterior) -> float:
+    def _unexplained(self, products: RowProducts, others: Posterior) -> float:
         """RMS error of the force expected by other runs, at the best gain and offset, over the half range."""
         expected, one = others.at(products.over)[0], products.constant
         table = np.column_stack([expected, one])
@@ -257,7 +257,7 @@ class Candidate:
         return abs(np.log(stroke * factor)) < abs(np.log(stroke))
 
 
-def _rms(products: Products, coefficients: Floats) -> float:
+def _rms(products: RowProducts, coefficients: Floats) -> float:
     return float(np.sqrt(max(float(coefficients @ products.gram @ coefficients), 0.0) / products.rows))
 
 

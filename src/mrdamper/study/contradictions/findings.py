@@ -1,4 +1,4 @@
-"""What is said of a run that contradicts the others: code, explanation and remedy."""
+"""Finding on a run that contradicts the others: code, explanation and remedy."""
 
 from __future__ import annotations
 

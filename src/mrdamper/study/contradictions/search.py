@@ -10,8 +10,8 @@ from itertools import combinations
 import numpy as np
 
 from mrdamper.data import Floats, current_levels
-from mrdamper.study.contradictions.evidence import Evidence, Moments, Posterior, Products, Spread
-from mrdamper.study.contradictions.explanations import Candidate, Cause, Explanation, Trial
+from mrdamper.study.contradictions.evidence import AssumedScatter, Evidence, Moments, Posterior, RowProducts
+from mrdamper.study.contradictions.explanations import Cause, Explanation, ExplanationCandidate, Trial
 from mrdamper.study.contradictions.tracks import Track
 
 _ODDS, _FEW_ODDS = 12.0, 36.0  # logarithm of the odds from which an explanation is far better: always, over the runs
@@ -42,7 +42,7 @@ _ROUNDS = 4  # assignments of runs to two groups
 
 
 @dataclass(frozen=True, eq=False)
-class Proposal:
+class JointExplanation:
     """Explanations of some runs together, and the logarithm of their odds against none."""
 
     explanations: dict[int, Explanation]
@@ -51,7 +51,7 @@ class Proposal:
 
 _FALLING_ODDS, _MIN_FALL, _MAX_FALLING_ODDS = 60.0, 0.05, 8.0  # odds against a falling force: per share, from, at most
 _AT_NODE = 0.9  # share of a node from which a run is at its current
-_NO_PROPOSAL = Proposal({}, -np.inf)
+_NO_PROPOSAL = JointExplanation({}, -np.inf)
 
 
 class Search:
@@ -67,7 +67,7 @@ class Search:
         self.found: dict[int, Explanation] = {}
         self.evidence = Evidence(tracks)
         self._products = self.evidence.products(tracks)
-        self._candidates = [Candidate(i, tracks, self.evidence, p) for i, p in enumerate(self._products)]
+        self._candidates = [ExplanationCandidate(i, tracks, self.evidence, p) for i, p in enumerate(self._products)]
         self._members: list[Moments] = []
         self._adapt()
 
@@ -86,7 +86,9 @@ class Search:
 
     def explain(self, track: Track) -> Explanation | None:
         """The named explanation of a further run that is far better than none."""
-        candidate = Candidate(len(self.tracks), [*self.tracks, track], self.evidence, *self.evidence.products([track]))
+        candidate = ExplanationCandidate(
+            len(self.tracks), [*self.tracks, track], self.evidence, *self.evidence.products([track])
+        )
         best = next(iter(candidate.explanations(self.posterior())), None)
         return best if best is not None and best.gain >= self._threshold([best]) else None
 
@@ -109,27 +111,27 @@ class Search:
         """Choose the spread that suits the runs, whatever a minority of them does; weigh the runs with it."""
         agreeing = self._agreeing()
         expected = self.evidence.prior
-        self.evidence.spread = Spread(2.0)
+        self.evidence.spread = AssumedScatter(2.0)
         for _ in range(2):
             expected = self.evidence.posterior([expected.weigh(self._products[k]) for k in agreeing])
-        scores: dict[Spread, float] = {}
+        scores: dict[AssumedScatter, float] = {}
 
-        def score(spread: Spread) -> float:
+        def score(spread: AssumedScatter) -> float:
             self.evidence.spread = spread
             members = [expected.weigh(self._products[k]) for k in agreeing]
             posterior = self.evidence.posterior(members)
             return float(np.median([posterior.log_probability_by_others(member) for member in members]))
 
         for misfit in _MISFITS:
-            scores[Spread(misfit)] = score(Spread(misfit))
+            scores[AssumedScatter(misfit)] = score(AssumedScatter(misfit))
         best = max(scores, key=scores.__getitem__)
         for gain, offset in _DRIFTS[1:]:
-            scores[Spread(best.misfit, gain, offset)] = score(Spread(best.misfit, gain, offset))
+            scores[AssumedScatter(best.misfit, gain, offset)] = score(AssumedScatter(best.misfit, gain, offset))
         self.evidence.spread = max(scores, key=scores.__getitem__)
         expected = self.evidence.posterior([expected.weigh(self._products[k]) for k in agreeing])
         self._members = [expected.weigh(products) for products in self._products]
 
-    def _proposals(self) -> Iterator[Proposal]:
+    def _proposals(self) -> Iterator[JointExplanation]:
         posterior, prior = self.posterior(), self.evidence.prior
         self._base = self._adapted([self._products[k] for k in self._agreeing()], posterior)
         left = [k for k in range(len(self.tracks)) if k not in self.found]
@@ -150,16 +152,16 @@ class Search:
             if best.explanations:
                 yield self._refined_rows(best, posterior)
 
-    def _of_one(self, i: int) -> Proposal:
+    def _of_one(self, i: int) -> JointExplanation:
         """The best explanation of a run."""
         others = self.posterior([i])
         alone = self._candidates[i].alone(others)
         self._options[i] = self._candidates[i].explanations(others)
         named = next(iter(self._options[i]), None)
         best = named if named is not None and alone.gain - named.gain < _TIE_ODDS else alone
-        return Proposal({i: best}, best.gain)
+        return JointExplanation({i: best}, best.gain)
 
-    def _refined(self, proposal: Proposal) -> Proposal:
+    def _refined(self, proposal: JointExplanation) -> JointExplanation:
         """A proposal for one run whose gain counts that all runs agree better afterwards."""
         ((i, explanation),) = proposal.explanations.items()
         rest = self._agreeing([i])
@@ -170,10 +172,10 @@ class Search:
         else:
             gain = self._adapted([*kept, explanation.products], others)
         gain -= self._base + explanation.trial.odds
-        return Proposal({i: replace(explanation, gain=gain)}, gain)
+        return JointExplanation({i: replace(explanation, gain=gain)}, gain)
 
     def _adapted(
-        self, products: Sequence[Products], expected: Posterior, apart: Sequence[Sequence[Products]] = ()
+        self, products: Sequence[RowProducts], expected: Posterior, apart: Sequence[Sequence[RowProducts]] = ()
     ) -> float:
         """Logarithm of the evidence of runs, and of others apart, at the model error most probable for them."""
         spread, best = self.evidence.spread, -np.inf
@@ -271,7 +273,7 @@ class Search:
         self.evidence.spread = spread
         return sorted(group)
 
-    def _of_group(self, group: tuple[int, ...]) -> Proposal:
+    def _of_group(self, group: tuple[int, ...]) -> JointExplanation:
         """The best explanation that several runs have in common: one cause with one value, or another damper."""
         rest = self._agreeing(group)
         others = self.evidence.posterior([self._members[k] for k in rest])
@@ -289,16 +291,16 @@ class Search:
                 moments = [others.weigh(e.products) for e in members.values()]
                 score = self.evidence.log_evidence([*(self._members[k] for k in rest), *moments]) - odds
                 if score > joint:
-                    joint, best = score, Proposal(members, odds)
+                    joint, best = score, JointExplanation(members, odds)
         if best.explanations:
             corrected = [e.products for e in best.explanations.values()]
             gain = self._adapted([*kept, *corrected], others) - base - best.gain
-            best = Proposal({k: replace(e, gain=gain) for k, e in best.explanations.items()}, gain)
+            best = JointExplanation({k: replace(e, gain=gain) for k, e in best.explanations.items()}, gain)
         alone = [self._candidates[k].alone(others) for k in group]
         if sum(np.isfinite(e.gain) for e in alone) > len(group) / 2:
             gain = self._adapted(kept, others, [own]) - base - alone[0].trial.odds
             if gain > best.gain + _TIE_ODDS:
-                best = Proposal({k: replace(e, gain=gain) for k, e in zip(group, alone, strict=True)}, gain)
+                best = JointExplanation({k: replace(e, gain=gain) for k, e in zip(group, alone, strict=True)}, gain)
         return best
 
     def _may_share(self, group: tuple[int, ...], current: float) -> bool:
@@ -309,7 +311,7 @@ class Search:
         outside = {level for k, level in zip(constant, levels, strict=True) if k not in group}
         return inside <= outside and (len(inside) == 1 or current <= _SAME_CURRENT)
 
-    def _smaller(self, proposal: Proposal) -> Proposal:
+    def _smaller(self, proposal: JointExplanation) -> JointExplanation:
         """A proposal for a group without the runs that need no explanation once the others are explained."""
         while len(proposal.explanations) > 2 and proposal.gain >= self._threshold(proposal.explanations.values()):
             members = tuple(proposal.explanations)
@@ -320,7 +322,7 @@ class Search:
             proposal = best
         return proposal
 
-    def _of_rows(self, suspects: Sequence[int]) -> Iterator[Proposal]:
+    def _of_rows(self, suspects: Sequence[int]) -> Iterator[JointExplanation]:
         """Currents of other rows of the table of tests: two rows exchanged, or all shifted by one from some row on."""
         order = [k for k, track in enumerate(self.tracks) if not track.current_changes]
         written = [float(self.tracks[k].current[0]) for k in order]
@@ -339,18 +341,20 @@ class Search:
                     odds = _SHIFT_ODDS - _EMPTY_CELL_ODDS * filled * (empty <= _MAX_IRREGULARITY * len(rows))
                     yield self._of_currents(changed, "shifted", max(odds, _MIN_SHIFT_ODDS))
 
-    def _of_currents(self, currents: dict[int, float], cause: Cause, odds: float) -> Proposal:
+    def _of_currents(self, currents: dict[int, float], cause: Cause, odds: float) -> JointExplanation:
         trials = {k: Trial("current", current, "", odds) for k, current in currents.items()}
         moved = {k: self._candidates[k].changed(trial) for k, trial in trials.items()}
         members = [replace(m, over=moved[k].over) if k in moved else m for k, m in enumerate(self._members)]
         gain = self.evidence.log_evidence(members) - self._own - odds
-        return Proposal({k: Explanation(replace(t, cause=cause), gain, moved[k]) for k, t in trials.items()}, gain)
+        return JointExplanation(
+            {k: Explanation(replace(t, cause=cause), gain, moved[k]) for k, t in trials.items()}, gain
+        )
 
-    def _refined_rows(self, proposal: Proposal, posterior: Posterior) -> Proposal:
+    def _refined_rows(self, proposal: JointExplanation, posterior: Posterior) -> JointExplanation:
         moved = proposal.explanations
         products = [moved[k].products if k in moved else p for k, p in enumerate(self._products)]
         gain = self._adapted(products, posterior) - self._base - next(iter(moved.values())).trial.odds
-        return Proposal({k: replace(e, gain=gain) for k, e in moved.items()}, gain)
+        return JointExplanation({k: replace(e, gain=gain) for k, e in moved.items()}, gain)
 
     def _irregular(self, currents: Sequence[float]) -> int:
         """Repeated tests, and empty cells of the matrix of currents and motions."""

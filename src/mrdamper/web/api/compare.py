@@ -14,7 +14,7 @@ from mrdamper.data import Dataset
 from mrdamper.data.encoding import csv_text
 from mrdamper.report.comparison import summary_rows
 from mrdamper.study.comparison import Comparison, RigComparison
-from mrdamper.study.recipe import JOINTLY, Scored, recipes
+from mrdamper.study.recipe import JOINTLY, RecipeResult, recipes
 from mrdamper.study.validation import RunScore, Validation
 from mrdamper.study.workflow import STUDIED
 from mrdamper.web.answers import archive, download, frame, number
@@ -128,7 +128,7 @@ def _conclude(session: Session, choice: Choice, found: Comparison) -> dict[str, 
     }
 
 
-def _entry(rig: RigComparison, entry: Scored, key: str, keys: dict[str, str]) -> dict[str, Any]:
+def _entry(rig: RigComparison, entry: RecipeResult, key: str, keys: dict[str, str]) -> dict[str, Any]:
     return {
         "damper": key,
         "name": entry.recipe.name,

@@ -11,13 +11,13 @@ from fastapi import APIRouter
 from fastapi.responses import Response
 from pydantic import BaseModel, Field
 
-from mrdamper.dampers.certainty import table as intervals
 from mrdamper.dampers.joint import JointFit
+from mrdamper.dampers.uncertainty import table as intervals
 from mrdamper.errors import InputError
 from mrdamper.identification import Identification, all_methods, identify
 from mrdamper.models import all_models
 from mrdamper.report.about import About, about_of, logo_of
-from mrdamper.study.recipe import JOINTLY, Scored
+from mrdamper.study.recipe import JOINTLY, RecipeResult
 from mrdamper.study.validation import Validation
 from mrdamper.study.workflow import Study
 from mrdamper.web.answers import frame, number
@@ -141,7 +141,7 @@ def _conclude_study(session: Session, found: Study, written: list[Any]) -> dict[
     return {"rigs": rigs, "seconds": round(found.seconds, 1)}
 
 
-def _candidate(candidate: Scored, key: str) -> dict[str, Any]:
+def _candidate(candidate: RecipeResult, key: str) -> dict[str, Any]:
     return {
         "damper": key,
         "title": candidate.title,
@@ -157,13 +157,13 @@ def _conclude_identification(
     session: Session,
     choice: Choice,
     found: tuple[Identification, ...],
-    scored: Scored | str,
+    scored: RecipeResult | str,
     refused: dict[str, str],
 ) -> dict[str, Any]:
     session.results["identified"] = found, scored
     session.results["identified.table"] = session.table(choice.rig)
     damper, held_out, bench = None, None, None
-    if isinstance(scored, Scored):
+    if isinstance(scored, RecipeResult):
         damper, held_out = scored.damper, scored.validation
         bench = session.add(damper, "identification", f"validation {_percent(held_out)}" if held_out.runs else "")
     errors = [i.scores.nrmse_pp for i in found] or _joint_fit(scored).nrmse_pp.tolist()
@@ -198,16 +198,16 @@ def _identified(one: Identification) -> dict[str, Any]:
     }
 
 
-def _joint_fit(scored: Scored | str) -> JointFit:
+def _joint_fit(scored: RecipeResult | str) -> JointFit:
     """The fit of a model of one set of parameters: without identifications there is always one."""
-    assert isinstance(scored, Scored)
+    assert isinstance(scored, RecipeResult)
     assert isinstance(scored.fit, JointFit)
     return scored.fit
 
 
-def _joint(scored: Scored | str) -> dict[str, Any]:
+def _joint(scored: RecipeResult | str) -> dict[str, Any]:
     fit = _joint_fit(scored)
-    assert isinstance(scored, Scored)
+    assert isinstance(scored, RecipeResult)
     return {
         "values": {n: number(v) for n, v in fit.damper.model.values().items()},
         "written": {row["name"]: row["written"] for row in intervals(scored.damper)},
@@ -220,7 +220,7 @@ def _joint(scored: Scored | str) -> dict[str, Any]:
     }
 
 
-def _units(found: tuple[Identification, ...], scored: Scored | str) -> list[dict[str, str]]:
+def _units(found: tuple[Identification, ...], scored: RecipeResult | str) -> list[dict[str, str]]:
     if found:
         infos, free = found[0].model.parameters(), found[0].free
     else:

@@ -1,6 +1,6 @@
-"""Runs strung into one motion: which samples are followed, which enter the least squares, and their residuals.
+"""Runs concatenated into one motion: samples that are simulated, samples of the least squares, residuals.
 
-All runs are strung into one motion: a model with fading memory forgets one run while it
+All runs are concatenated into one motion: a model with fading memory forgets one run while it
 follows the next, and one long array is followed faster than many short ones.
 """
 
@@ -47,8 +47,8 @@ _RIDGE = 1e-11  # keeps columns apart that are nearly alike
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
-    """What of a run is followed, which samples enter, and how much each counts: by the time it stands for.
+class RunRows:
+    """Samples of a run that are simulated, those of the least squares, and their weights by the time they represent.
 
     Of a steady sine the middle cycles are left out: they repeat the last ones. What a record begins
     with, before it has moved by its amplitude, tells of a state nobody knows.
@@ -68,7 +68,7 @@ class Part:
     steady: tuple[int, int]
 
     @classmethod
-    def of(cls, run: Run) -> Part:
+    def of(cls, run: Run) -> RunRows:
         sine = equivalent_sine(run)
         motion = measured_motion(run).about(sine.centre)
         window = np.flatnonzero(run.in_window)
@@ -115,7 +115,7 @@ class Part:
             (int(np.searchsorted(at, inside[0])), int(np.searchsorted(at, inside[-1]))),
         )
 
-    def steady_end(self) -> Part:
+    def steady_end(self) -> RunRows:
         """The last cycles of the steady part, of other records the last third: enough to compare starts and forms."""
         kept = np.flatnonzero((self.picked >= self.steady[0]) & (self.picked <= self.steady[1]))
         kept = kept[-_ROWS if self.is_sine else -max(_ROWS, kept.size // 3) :]
@@ -167,7 +167,7 @@ def _lasting(time: Floats) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
+class LinearSolution:
     """Linear parameters solved for at a point.
 
     Attributes
@@ -190,13 +190,13 @@ class Solved:
     columns: Floats
 
 
-class Strung:
-    """Motions of some runs, one after the other in one motion."""
+class ConcatenatedRuns:
+    """Motions of some runs, concatenated into one motion."""
 
-    def __init__(self, parts: Sequence[Part]):
+    def __init__(self, parts: Sequence[RunRows]):
         self.parts = parts
         self.begins = np.cumsum([0, *(len(part.motion) for part in parts)])[:-1]
-        self.measured = string(part.motion for part in parts)
+        self.measured = concatenate(part.motion for part in parts)
         self.measured.path  # noqa: B018  cut into strokes once, for every current that is laid along
         self._felt: tuple[Coil | None, Excitation] = None, self.measured.with_current(np.abs(self.measured.current))
 
@@ -211,12 +211,12 @@ class Strung:
         return self._felt[1]
 
 
-class Table:
-    """Samples of some runs that were strung together, with the weight of each run."""
+class JointResiduals:
+    """Residuals of concatenated runs, with the weight of each run."""
 
-    def __init__(self, problem: SearchSpace, parts: Sequence[Part]):
-        self.problem, self.strung = problem, Strung(parts)
-        begins = self.strung.begins
+    def __init__(self, problem: SearchSpace, parts: Sequence[RunRows]):
+        self.problem, self.concatenated = problem, ConcatenatedRuns(parts)
+        begins = self.concatenated.begins
         self.picked = np.concatenate([part.picked + at for part, at in zip(parts, begins, strict=True)])
         self.target = np.concatenate([part.target for part in parts])
         self.owner = np.repeat(np.arange(len(parts)), [part.target.size for part in parts])
@@ -227,9 +227,9 @@ class Table:
         self.weights = self.information
         self._seen: tuple[Excitation, Excitation] | None = None
         self._laid: tuple[Floats, Model, Floats, Floats] | None = None
-        self._solved: tuple[Floats, Solved] | None = None
+        self._solved: tuple[Floats, LinearSolution] | None = None
 
-    def only(self, runs: Sequence[int]) -> Table:
+    def only(self, runs: Sequence[int]) -> JointResiduals:
         """The samples of some of the runs, in order; the others are followed all the same, and not looked at."""
         kept, table = np.isin(self.owner, runs), copy(self)
         for name in ("picked", "target", "share", "unit"):
@@ -254,7 +254,7 @@ class Table:
 
     def _followed(self, model: Model, point: Floats) -> tuple[Excitation, Floats]:
         """Motion and state of a model at the samples."""
-        motion = self.strung.with_field_current(self.problem.coil_at(point))
+        motion = self.concatenated.with_field_current(self.problem.coil_at(point))
         if self._seen is None or self._seen[0] is not motion:
             self._seen = motion, motion.part(self.picked)
         return self._seen[1], model.state(motion)[self.picked]
@@ -270,7 +270,7 @@ class Table:
             self._laid = point, bare, *linear_table(bare, self.problem.linear, motion, state)
         return self._laid[1:]
 
-    def solve(self, point: Floats) -> Solved:
+    def solve(self, point: Floats) -> LinearSolution:
         """Linear parameters of least weighted squares at a point of the search axes; remembered for the last."""
         if self._solved is not None and np.array_equal(self._solved[0], point):
             return self._solved[1]
@@ -282,7 +282,7 @@ class Table:
         errors = np.sqrt(np.bincount(self.owner, residual**2)) / self.weights
         model = replace(bare, **{i.name: float(s) for i, s in zip(linear, solution, strict=True)})
         stopped = tuple(i.name for i, h in zip(linear, held, strict=True) if h)
-        self._solved = point, Solved(model, residual, errors, stopped, columns[:, ~held])
+        self._solved = point, LinearSolution(model, residual, errors, stopped, columns[:, ~held])
         return self._solved[1]
 
     def solved_residual(self, point: Floats) -> Floats:
@@ -296,7 +296,7 @@ class Table:
         least squares of its own [Kaufman 1975, BIT 15, 49].
         """
         solved = self.solve(point)
-        return beside(self._moved(point, solved.model, solved.residual), solved.columns)
+        return project_out(self._moved(point, solved.model, solved.residual), solved.columns)
 
     def gradient(self, point: Floats) -> Floats:
         """(D,) half the slope of the cost, the linear parameters following.
@@ -334,12 +334,12 @@ class Table:
 
 
 @dataclass(frozen=True, eq=False)
-class Linearised:
-    """What a table leaves over near a point of the search axes.
+class Linearisation:
+    """Linearisation of the residuals near a point of the search axes.
 
     Attributes
     ----------
-    table : Table
+    table : JointResiduals
     point : (D,) array
     residual : (N,) array
         Weighted: its squares sum to the cost.
@@ -347,7 +347,7 @@ class Linearised:
         By the search axes, then the linear parameters.
     """
 
-    table: Table
+    table: JointResiduals
     point: Floats
     residual: Floats
     jacobian: Floats
@@ -366,7 +366,7 @@ class Linearised:
         errors = np.zeros(0)
         for _ in range(_REFIT_ROUNDS):
             weighted = rows * weights[owner][:, None]
-            left = beside(weighted[:, : own.stop], weighted[:, own.stop :])
+            left = project_out(weighted[:, : own.stop], weighted[:, own.stop :])
             start, slopes = left[:, 0], left[:, own]
             solution = least_squares(
                 lambda u, r=start, J=slopes: r + J @ (u - self.point), point, *box, slopes=lambda _, J=slopes: J
@@ -377,8 +377,8 @@ class Linearised:
         return errors, point
 
 
-def beside(slopes: Floats, columns: Floats) -> Floats:
-    """(N, D) what of some slopes no combination of columns takes up."""
+def project_out(slopes: Floats, columns: Floats) -> Floats:
+    """Project slopes (N, D) onto the orthogonal complement of some columns."""
     gram = columns.T @ columns
     scale = np.sqrt(np.diag(gram))
     scale = np.where(scale > 0, scale, 1.0)
@@ -387,8 +387,8 @@ def beside(slopes: Floats, columns: Floats) -> Floats:
     return np.subtract(slopes, taken, out=taken)
 
 
-def string(motions: Iterable[Excitation]) -> Excitation:
-    """Several motions one after the other, a second apart."""
+def concatenate(motions: Iterable[Excitation]) -> Excitation:
+    """Concatenate motions, a second apart."""
     parts = list(motions)
     time, clock = [], 0.0
     for part in parts:

@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 from mrdamper.cli import application
 from mrdamper.dampers.bands import band, no_band, portable_band
 from mrdamper.dampers.calibration import PredictedRun
-from mrdamper.dampers.certainty import Certainty, table, unsure
-from mrdamper.dampers.covariance import certain
+from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.dampers.model_file import dump_model, parse_model, save_model
+from mrdamper.dampers.uncertainty import Uncertainty, table, uncertainty_warnings
 from mrdamper.data import Condition
 from mrdamper.errors import InputError, ModelFileError
 
@@ -22,7 +22,7 @@ from mrdamper.errors import InputError, ModelFileError
 @pytest.fixture(scope="module")
 def damper():
     truth = joint_damper()
-    return certain(truth, named(session_runs(truth)))
+    return estimate_uncertainty(truth, named(session_runs(truth)))
 
 
 def named(runs):
@@ -32,18 +32,18 @@ def named(runs):
 
 def test_gains_of_sessions_are_found():
     truth = joint_damper()
-    found = [certain(truth, named(session_runs(truth, seed=s, repeats=2))).certainty for s in range(4)]
+    found = [estimate_uncertainty(truth, named(session_runs(truth, seed=s, repeats=2))).uncertainty for s in range(4)]
     # 18 sessions know their spread to a sixth, four repeats to a twelfth.
     assert np.sqrt(np.mean([c.gain**2 for c in found])) == pytest.approx(0.045, rel=0.35)
-    still = certain(truth, named(session_runs(truth, gain=0.0))).certainty
+    still = estimate_uncertainty(truth, named(session_runs(truth, gain=0.0))).uncertainty
     assert still.gain < 0.01
     assert np.all(np.diag(still.covariance) < np.diag(found[0].covariance))
 
 
 def test_a_certainty_is_saved_bit_by_bit(damper):
-    back = parse_model(dump_model(damper)).certainty
-    assert np.array_equal(back.covariance, damper.certainty.covariance)
-    assert np.array_equal(back.dof, damper.certainty.dof)
+    back = parse_model(dump_model(damper)).uncertainty
+    assert np.array_equal(back.covariance, damper.uncertainty.covariance)
+    assert np.array_equal(back.dof, damper.uncertainty.dof)
     for name in (
         "names",
         "gain",
@@ -56,7 +56,7 @@ def test_a_certainty_is_saved_bit_by_bit(damper):
         "unknown",
         "one_sided",
     ):
-        assert getattr(back, name) == getattr(damper.certainty, name)
+        assert getattr(back, name) == getattr(damper.uncertainty, name)
     assert sum(back.taught.values()) == pytest.approx(1.0)
     assert "covariance" not in json.loads(dump_model(joint_damper()))
 
@@ -93,7 +93,7 @@ def test_three_numbers_say_nearly_what_the_whole_covariance_says(damper):
 
 def test_the_band_of_the_peak_holds_new_sessions():
     truth = joint_damper()
-    made = certain(truth, named(session_runs(truth, seed=5, repeats=2)))
+    made = estimate_uncertainty(truth, named(session_runs(truth, seed=5, repeats=2)))
     inside = []
     for run in session_runs(truth, seed=6, repeats=3):
         prediction = made.predict_run(run)
@@ -109,11 +109,11 @@ def test_what_left_out_conditions_were_wrong_by_widens_the_band():
     wrong = [
         PredictedRun.of(r, r.force + s, np.gradient(r.displacement, r.time)) for r, s in zip(runs, steps, strict=True)
     ]
-    sure, unsure = certain(truth, runs), certain(truth, runs, wrong)
+    sure, uncertainty_warnings = estimate_uncertainty(truth, runs), estimate_uncertainty(truth, runs, wrong)
     prediction = truth.predict(Condition(0.5, 1.0, 0.01))
-    assert unsure.certainty.force > 2 * sure.certainty.force
-    assert unsure.certainty.calibration.units == 9
-    assert np.ptp(band(unsure, prediction).peak) > np.ptp(band(sure, prediction).peak)
+    assert uncertainty_warnings.uncertainty.force > 2 * sure.uncertainty.force
+    assert uncertainty_warnings.uncertainty.calibration.units == 9
+    assert np.ptp(band(uncertainty_warnings, prediction).peak) > np.ptp(band(sure, prediction).peak)
 
 
 def test_what_a_bound_holds_and_what_nothing_tells_apart_has_no_interval():
@@ -122,23 +122,23 @@ def test_what_a_bound_holds_and_what_nothing_tells_apart_has_no_interval():
     runs = [
         run for run in session_runs(held, gain=0.0) if run.current_A == 0.0
     ]  # without current nothing shows fy1 and h1
-    made = certain(held, runs)
-    assert "c1" in made.certainty.one_sided
-    assert {"fy1", "h1"} <= set(made.certainty.unknown)
-    said = " ".join(unsure(made))
+    made = estimate_uncertainty(held, runs)
+    assert "c1" in made.uncertainty.one_sided
+    assert {"fy1", "h1"} <= set(made.uncertainty.unknown)
+    said = " ".join(uncertainty_warnings(made))
     assert "c1 ended at its lower limit 0" in said
     assert "fy1 and h1: not identifiable without current" in said
     for name in ("c1", "fy1"):
         with pytest.raises(InputError, match="E_CERTAINTY"):
-            made.certainty.interval(made, name)
+            made.uncertainty.interval(made, name)
 
 
 def test_functions_have_a_spread_too():
     truth = modified_damper()
-    made = certain(truth, session_runs(truth))
-    low, high = made.certainty.interval(made, "f0.0")
+    made = estimate_uncertainty(truth, session_runs(truth))
+    low, high = made.uncertainty.interval(made, "f0.0")
     assert low < 30.0 < high
-    assert isinstance(parse_model(dump_model(made)).certainty, Certainty)
+    assert isinstance(parse_model(dump_model(made)).uncertainty, Uncertainty)
 
 
 def test_the_command_writes_the_band(damper, tmp_path):
@@ -160,9 +160,9 @@ def test_one_session_gives_a_band_for_sessions_like_it_and_one_run_none(tmp_path
     runs = [replace(run, notes={"session": "monday"}) for run in session_runs(truth)]
     ask = ["predict", str(tmp_path / "m.json"), "--current", "0.5", "--frequency", "1", "--amplitude", "10"]
     for few in (runs, runs[:1]):
-        made = certain(truth, few)
-        assert made.certainty.gain == made.certainty.offset == made.certainty.session_dof == 0.0
-        assert "Fewer than three known sessions" in " ".join(unsure(made))
+        made = estimate_uncertainty(truth, few)
+        assert made.uncertainty.gain == made.uncertainty.offset == made.uncertainty.session_dof == 0.0
+        assert "Fewer than three known sessions" in " ".join(uncertainty_warnings(made))
         save_model(made, tmp_path / "m.json")
         got = CliRunner().invoke(application(), ask)
         assert got.exit_code == 0
@@ -180,16 +180,16 @@ def test_one_session_gives_a_band_for_sessions_like_it_and_one_run_none(tmp_path
 
 def test_a_perfect_fit_claims_nothing_infinite_and_writes_zero():
     truth = joint_damper()
-    made = certain(truth, session_runs(truth, gain=0.0, noise=0.0))
-    ends = np.array([made.certainty.interval(made, name) for name in made.certainty.names])
+    made = estimate_uncertainty(truth, session_runs(truth, gain=0.0, noise=0.0))
+    ends = np.array([made.uncertainty.interval(made, name) for name in made.uncertainty.names])
     assert np.isfinite(ends).all()
     assert f"f0 = {truth.model.f0:g}" in repr(made)
 
 
 def test_numbers_held_by_the_search_are_one_sided():
     truth = joint_damper()
-    made = certain(truth, session_runs(truth), held=("h0",))
-    assert made.certainty.one_sided == ("h0",)
+    made = estimate_uncertainty(truth, session_runs(truth), held=("h0",))
+    assert made.uncertainty.one_sided == ("h0",)
     state = {row["name"]: row["state"] for row in table(made)}
     assert state["h0"] == "one-sided: at a limit of what was searched"
     assert "(one-sided" in repr(made)
@@ -197,10 +197,10 @@ def test_numbers_held_by_the_search_are_one_sided():
 
 def test_what_does_the_same_to_the_force_has_no_interval_though_the_rest_has():
     truth = joint_damper()
-    made = certain(truth, [run for run in session_runs(truth, gain=0.0) if run.current_A == 0.5])
-    said = " ".join(unsure(made))
+    made = estimate_uncertainty(truth, [run for run in session_runs(truth, gain=0.0) if run.current_A == 0.5])
+    said = " ".join(uncertainty_warnings(made))
     for pair in ("c0 and c1", "fy0 and fy1", "h0 and h1"):
         assert f"{pair} are not both identifiable from one current" in said
-    assert set(made.certainty.unknown) == {"c0", "c1", "fy0", "fy1", "h0", "h1"}
-    low, high = made.certainty.interval(made, "f0")
+    assert set(made.uncertainty.unknown) == {"c0", "c1", "fy0", "fy1", "h0", "h1"}
+    low, high = made.uncertainty.interval(made, "f0")
     assert low < truth.model.f0 < high

@@ -1,9 +1,9 @@
-"""How sure a damper is: the spread of its numbers, of a session it has not seen, and of its form.
+"""Uncertainty of a damper in three parts: parameters, future test sessions, and model error.
 
-Three parts, stated apart. The numbers it was identified from are uncertain (*parameter*): noise
-and model error within the runs, and gains and offsets that differ from session to session. A
-session nobody has seen brings a gain and an offset of its own (*session*). And the form is not
-the damper (*model*): what conditions left out of the fit were wrong by, beyond the other two.
+The identified parameters are uncertain (*parameter*): noise and model error within the runs, and
+gains and offsets that differ from session to session. A future test session has a gain and an
+offset of its own (*session*). The equations do not describe the damper exactly (*model*): the
+error at cross-validated conditions in excess of the other two.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _MAX_RELATIVE_ERROR = 0.5  # standard error over the estimate from which a param
 
 @dataclass(frozen=True)
 class FittedParameter:
-    """A number of a damper determined from data; `log` where it is searched in the logarithm."""
+    """A parameter of a damper determined from data; `log` where its logarithm is searched."""
 
     value: float
     bounds: tuple[float, float] = (-np.inf, np.inf)
@@ -38,23 +38,23 @@ class FittedParameter:
 
 
 @dataclass(frozen=True, eq=False)
-class Certainty:
-    """What is known of how wrong a damper may be.
+class Uncertainty:
+    """Uncertainty of the parameters and predictions of a damper.
 
     Attributes
     ----------
     names : tuple of str, length P
-        Numbers determined from the data.
+        Parameters determined from the data.
     logs : tuple of bool, length P
         Whether the covariance is that of the logarithm.
     covariance : (P, P) array
     dof : (P,) array
         Degrees of freedom behind each variance.
     one_sided : tuple of str
-        Numbers held by a bound: only the other side is open.
+        Parameters held at a bound: their interval is open to one side.
     unknown : tuple of str
-        Numbers these runs cannot tell apart from others; of those among `names` the spread is what is
-        left where the others are held.
+        Parameters not identifiable from these runs; for those among `names` the variance holds with the
+        others fixed.
     gain, offset : float
         Standard deviations between sessions, of the force as a share and as a shift [N].
     session_dof : float
@@ -65,22 +65,22 @@ class Certainty:
     run_dof : float
         Degrees of freedom behind them; zero where the runs cannot show them.
     force, peak, energy : float
-        Standard deviations of what a run's own gain and offset leave: of the force over half its
+        Standard deviations after a gain and an offset are fitted to each run: of the force over half its
         peak-to-peak value, of the peak force and of the dissipated energy, relative.
     left_out : int
-        Cross-validated runs behind them; zero where the residuals of the fit stand in.
+        Number of cross-validated runs behind them; zero where the residuals of the fit are used instead.
     growth : Growth
         Of the model's error with the distance from the tests.
     calibration : Calibration or None
         Of prediction intervals, on cross-validated runs.
     sessions : Sessions or None
-        What sessions share, day and hour, where the tests could tell.
+        Variation between sessions, days and hours, where the tests determine it.
     words : tuple of str
-        What only the runs could tell of it: numbers that do the same to the force, or rest on one run.
+        Findings that need the runs: correlated parameters, and parameters determined mainly by one run.
     taught : mapping of str to float
-        Share each run has in what is known of the numbers.
+        Share of each run in the information on the parameters.
     effective : mapping of str to float
-        Independent samples that would give each number's error, were there neither sessions nor memory.
+        Independent samples that would give each parameter's standard error, without sessions and correlated noise.
     """
 
     names: tuple[str, ...]
@@ -108,7 +108,7 @@ class Certainty:
 
     @property
     def of_sessions(self) -> bool:
-        """Whether the scatter between sessions is known, so that intervals are for future sessions."""
+        """True where the scatter between sessions is known, so that intervals hold in future sessions."""
         return self.session_dof > 0
 
     @property
@@ -122,7 +122,7 @@ class Certainty:
         return math.hypot(self.offset, self.run_offset)
 
     def ends(self, damper: Damper, name: str, level: float = 0.95) -> tuple[float, float] | None:
-        """Of a number's interval; None where a bound holds it or these runs cannot tell it."""
+        """Return the ends of a parameter's interval; None where it is at a bound or not identifiable."""
         if name not in self.names or name in self.unknown:
             return None
         i = self.names.index(name)
@@ -130,12 +130,12 @@ class Certainty:
         return interval_about(damper.fitted_parameters[name].value, error, self.dof[i], level, self.logs[i])
 
     def interval(self, damper: Damper, name: str, level: float = 0.95) -> tuple[float, float]:
-        """Ends of a number's interval.
+        """Return the ends of a parameter's interval.
 
         Raises
         ------
         InputError
-            E_CERTAINTY if it is not among those whose spread is known.
+            E_CERTAINTY if its variance is not known.
         """
         if ends := self.ends(damper, name, level):
             return ends
@@ -143,9 +143,9 @@ class Certainty:
         raise InputError(f"{name} {why}", remedy="test where it matters", code="E_CERTAINTY")
 
 
-def unsure(damper: Damper) -> list[str]:
-    """Sentences on parameters that are not identifiable or badly determined, and on sessions."""
-    uncertainty: Certainty | None = damper.certainty
+def uncertainty_warnings(damper: Damper) -> list[str]:
+    """State the parameters that are not identifiable or badly determined, and the missing sessions."""
+    uncertainty: Uncertainty | None = damper.uncertainty
     if uncertainty is None:
         return ["The uncertainty of the parameters is not known: the model was saved without it."]
     numbers = damper.fitted_parameters
@@ -198,12 +198,12 @@ def _limit(own: FittedParameter) -> str:
 
 
 def table(damper: Damper, level: float = 0.95) -> list[dict[str, Any]]:
-    """Own numbers with the ends of their intervals and what is known of each, a row a number.
+    """Return the parameters with the ends of their intervals and their state, one row per parameter.
 
     Keys: name, value, unit, low, high (NaN where there are none), effective_samples (NaN where not
     known), state, written (as on a screen).
     """
-    uncertainty: Certainty | None = damper.certainty
+    uncertainty: Uncertainty | None = damper.uncertainty
     rows = []
     for name, own in damper.fitted_parameters.items():
         ends = uncertainty.ends(damper, name, level) if uncertainty else None

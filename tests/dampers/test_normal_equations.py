@@ -5,8 +5,15 @@ import pytest
 from support.synthetic import TRUTH, synthetic_run
 
 from mrdamper.dampers.base import Envelope
-from mrdamper.dampers.gram import _Design, _ShapeSearch, choose_forms, condense, fit_jointly, leave_out_errors
 from mrdamper.dampers.modified import fit_modified, fit_modified_jointly
+from mrdamper.dampers.normal_equations import (
+    _Design,
+    _ShapeSearch,
+    choose_forms,
+    condense,
+    fit_jointly,
+    leave_out_errors,
+)
 from mrdamper.data import Condition, Run, same_condition
 from mrdamper.errors import IdentificationError
 from mrdamper.identification import identify

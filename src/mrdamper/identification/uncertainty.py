@@ -12,7 +12,7 @@ from mrdamper.data import Floats
 from mrdamper.identification.columns import linear_table
 from mrdamper.identification.covariance import ParameterCovariance, spread
 from mrdamper.identification.intervals import weaknesses
-from mrdamper.identification.problem import DELAY, Problem, RunCertainty, Solution
+from mrdamper.identification.problem import DELAY, Problem, RunUncertainty, Solution
 from mrdamper.physics.motion import Excitation
 from mrdamper.statistics.linear import on_one_blas_thread
 
@@ -23,9 +23,9 @@ _MIN_LAGS = 3.0  # lags of its residual below which a record says little of its 
 
 
 @on_one_blas_thread
-def certainty_of_run(
+def uncertainty_of_run(
     problem: Problem, solution: Solution, motion: Excitation, state: Floats, residual: Floats
-) -> RunCertainty:
+) -> RunUncertainty:
     """Differentiate the force by each free coordinate; those at a bound have no error to state.
 
     Parameters
@@ -39,7 +39,7 @@ def certainty_of_run(
     """
     point, names, columns = _sensitivities(problem, solution, motion, state, residual)
     if not columns:
-        return RunCertainty()
+        return RunUncertainty()
     condition = problem.analysis.condition
     estimate = spread(np.column_stack(columns), residual, motion.part(problem.scored).time, condition.frequency_Hz)
     errors, dof, effective = (
@@ -58,7 +58,7 @@ def certainty_of_run(
             f"the record is only {estimate.memory:.1f} times as long as its noise remembers: "
             "intervals are a guess, record longer"
         )
-    return RunCertainty(shown, dof, {name: effective[name] for name in shown}, tuple(doubts))
+    return RunUncertainty(shown, dof, {name: effective[name] for name in shown}, tuple(doubts))
 
 
 def _unseen(

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from mrdamper.dampers.likelihood import CHI_SQUARED_95, Profile
+from mrdamper.dampers.likelihood import CHI_SQUARED_95, LikelihoodProfile
 from mrdamper.dampers.posterior import Samples
 from mrdamper.report.plots.style import PALETTE, WIDTH, house_style, label, new_figure
 
 _BINS = 30
 
 
-def profile_curves(profiles: Sequence[Profile]) -> Figure:
+def profile_curves(profiles: Sequence[LikelihoodProfile]) -> Figure:
     """Fall of the likelihood as each number moves and all others follow; the line is where 95 % end."""
     with house_style():
         columns = min(3, len(profiles))
