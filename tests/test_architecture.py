@@ -57,7 +57,7 @@ def test_the_structure_keeps_its_limits():
     assert len(structure.layers()) <= 13
     assert structure.isinstance_over_dampers() == []
     assert structure.circles() == []
-    assert len(structure.longest_chain()) <= 30
+    assert len(structure.longest_chain()) <= 22
     assert len(structure.long_functions()) <= 19
     assert _of_rewritten(structure.long_functions()) == []
     assert len(structure.repeated_class_names()) <= 17

@@ -21,8 +21,10 @@ from mrdamper.dampers.distance import Distance, distance_from
 from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty, table
 from mrdamper.data import Condition, Displayable, Floats, Run, same_condition
 from mrdamper.errors import InputError, checked
-from mrdamper.models import Model
-from mrdamper.physics.motion import Excitation, equivalent_sine, measured_motion
+from mrdamper.models.base import Model
+from mrdamper.physics.motion.excitation import Excitation
+from mrdamper.physics.motion.measured import measured_motion
+from mrdamper.physics.motion.sines import equivalent_sine
 from mrdamper.physics.simulation import ForceLaw, Response, simulate, steady_loop
 from mrdamper.statistics.functions.forms import ParameterFunction
 from mrdamper.statistics.functions.motion_hull import MotionHull

@@ -16,11 +16,11 @@ from mrdamper.data import Condition, Floats
 from mrdamper.errors import ExcitationError, ParameterError
 from mrdamper.physics.motion.traced import TracedMotion, TracedStep
 from mrdamper.tracing import Program, Tape, program
-from mrdamper.tracing.compiled import RecordProgram
+from mrdamper.tracing.compiled.record import RecordProgram
 
 if TYPE_CHECKING:
     from mrdamper.dampers.protocols import DamperLike as Damper
-    from mrdamper.physics.motion import Excitation
+    from mrdamper.physics.motion.excitation import Excitation
 
 SLACK = 0.02  # a test bench repeats a condition to a few per cent; within that nothing is extrapolated
 _STEADY = 1e-18  # mean square displacement under which nothing moves [m²]

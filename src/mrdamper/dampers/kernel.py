@@ -15,7 +15,7 @@ from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.data.parameters import ParameterInfo
 from mrdamper.errors import IdentificationError, ParameterError
-from mrdamper.identification import Identification
+from mrdamper.identification.problem import Identification
 from mrdamper.physics.motion import Excitation
 
 _MAX_CENTRES = 200

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Protocol
 
-from mrdamper.data import Condition, Floats, Run
+from mrdamper.data.conditions import Condition
 from mrdamper.data.parameters import ParameterInfo
+from mrdamper.data.runs import Floats, Run
 
 
 class DamperLike(Protocol):

@@ -9,8 +9,8 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.parameters import ParameterInfo
-from mrdamper.models import Model
-from mrdamper.physics.motion import Excitation
+from mrdamper.models.base import Model
+from mrdamper.physics.motion.excitation import Excitation
 
 
 def linear_table(

@@ -14,9 +14,11 @@ import numpy as np
 from mrdamper.data import Condition, Displayable, Floats, Run
 from mrdamper.errors import IdentificationError, UnknownNameError, checked
 from mrdamper.identification.intervals import NOT_IDENTIFIABLE, interval_about, written
-from mrdamper.models import Model
+from mrdamper.models.base import Model
 from mrdamper.physics.gas_spring import GasSpring
-from mrdamper.physics.motion import Excitation, MotionAnalysis, analyse_motion, measured_motion
+from mrdamper.physics.motion.excitation import Excitation
+from mrdamper.physics.motion.measured import measured_motion
+from mrdamper.physics.motion.sines import MotionAnalysis, analyse_motion
 from mrdamper.statistics.ending import StopReason
 from mrdamper.statistics.metrics import Scores
 

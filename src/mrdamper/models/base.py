@@ -20,8 +20,8 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.data.parameters import ParameterInfo, is_number, parameters_of
 from mrdamper.errors import ParameterError, shown
-from mrdamper.physics.hysteresis import Shape
-from mrdamper.physics.motion import Excitation
+from mrdamper.physics.hysteresis.shape import Shape
+from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.tracing import plain
 
 GENERAL_FORMS = (

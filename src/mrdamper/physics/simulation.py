@@ -10,7 +10,8 @@ import numpy as np
 from mrdamper.data import Condition, Floats
 from mrdamper.data.parameters import ParameterInfo
 from mrdamper.errors import ExcitationError, require
-from mrdamper.physics.motion import Excitation, sine
+from mrdamper.physics.motion.excitation import Excitation
+from mrdamper.physics.motion.made import sine
 
 _CLOSURE = 1e-9  # relative gap at which a loop counts as closed
 _MOST_CYCLES = 512

@@ -10,8 +10,7 @@ from typing import ClassVar
 
 from mrdamper.tracing import Expression, Program
 from mrdamper.tracing.expression import PARAMETER, SAMPLE
-from mrdamper.tracing.program import Branch, Let, Repeat, Statement
-from mrdamper.tracing.text import FUNCTIONS, Writer
+from mrdamper.tracing.program import FUNCTIONS, Branch, Let, Repeat, Statement, Writer
 
 
 class CWriter(Writer):

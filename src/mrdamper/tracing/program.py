@@ -1,4 +1,4 @@
-"""A traced model in the order in which it is computed: blocks, branches and loops, in no language yet.
+"""A traced model in the order in which it is computed: blocks, branches and loops; and the base class of its writers.
 
 Every operation lands in the innermost block that all its users share, so a branch that is not
 taken costs nothing and cannot fail. What depends on parameters alone is computed once, before
@@ -7,10 +7,11 @@ the first sample.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 from mrdamper.tracing.expression import PARAMETER, Expression
 from mrdamper.tracing.tape import Tape, TracedLoop
@@ -186,3 +187,51 @@ def _fill(result: Program, order: list[Any], scopes: dict[int, Scope]) -> None:
         elif id(node) in result.names and node.op not in (*_LEAVES, "result"):
             home.append(Let(node))
     result.setup, result.step = blocks[(), True], blocks[(), False]
+
+
+FUNCTIONS = {name: name for name in ("sqrt", "exp", "expm1", "log", "log1p", "tan", "tanh")}
+FUNCTIONS |= {"arctan": "atan", "arctanh": "atanh"}  # as C, JavaScript and Python call them
+_MARKS = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}
+_MARKS |= {"less": "<", "less_equal": "<=", "greater": ">", "greater_equal": ">=", "equal": "==", "not_equal": "!="}
+
+
+class Writer(ABC):
+    """Writes expressions of a program; a language says how operations and numbers look."""
+
+    formats: ClassVar[Mapping[str, str]] = {  # what C, JavaScript and Python write alike
+        **{op: f"({{}} {mark} {{}})" for op, mark in _MARKS.items()},
+        "negative": "(-{})",
+    }
+
+    def __init__(self, program: Program):
+        self.program = program
+        self._loops: dict[int, int] = {}
+
+    @abstractmethod
+    def number(self, value: float) -> str:
+        """Write a number, all its digits."""
+
+    def name(self, expression: Expression) -> str:
+        """Name of an expression that has one."""
+        if expression.op in ("carry", "result"):
+            loop, index = expression.args
+            return self.carry(loop, index)
+        return self.program.names[id(expression)]
+
+    def carry(self, loop: TracedLoop, index: int) -> str:
+        """Name of a value that a loop carries."""
+        return f"loop{self._loops.setdefault(id(loop), len(self._loops))}_{index}"
+
+    def text(self, value: Any) -> str:
+        """Write an expression where it is used: its name, or its formula."""
+        if not isinstance(value, Expression):
+            return self.number(value)
+        if value.op in ("carry", "result") or id(value) in self.program.names:
+            return self.name(value)
+        return self.formula(value)
+
+    def formula(self, expression: Expression) -> str:
+        """Write the operation of an expression on its arguments."""
+        if expression.op == "lookup":
+            return f"lookup{expression.args[0]}({self.text(expression.args[1])})"
+        return self.formats[expression.op].format(*(self.text(arg) for arg in expression.args))

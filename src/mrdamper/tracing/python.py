@@ -7,8 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 from mrdamper.tracing.expression import PARAMETER, SAMPLE, sign
-from mrdamper.tracing.program import Branch, Let, Program, Repeat, Statement
-from mrdamper.tracing.text import FUNCTIONS, Writer
+from mrdamper.tracing.program import FUNCTIONS, Branch, Let, Program, Repeat, Statement, Writer
 
 DONE, OUTSIDE = 0, 1  # outside: a question the trace settled has another answer here
 

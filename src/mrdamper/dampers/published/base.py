@@ -15,7 +15,7 @@ from mrdamper.dampers.piece import Piece
 from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, ParameterError
-from mrdamper.identification import Identification
+from mrdamper.identification.problem import Identification
 from mrdamper.models import Model
 from mrdamper.physics.motion import sine
 from mrdamper.statistics.levenberg_marquardt import least_squares

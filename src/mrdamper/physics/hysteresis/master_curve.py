@@ -32,8 +32,9 @@ from typing import Any
 
 import numpy as np
 
-from mrdamper.data import Floats
-from mrdamper.tracing import Expression, choose, functions, settled
+from mrdamper.data.runs import Floats
+from mrdamper.tracing import functions
+from mrdamper.tracing.expression import Expression, choose, settled
 
 CEILING = 11.0  # largest |w| a motion may start from
 STEEPEST = 1e6  # largest |rho| |w|^n: a shorter release than this drowns in rounding

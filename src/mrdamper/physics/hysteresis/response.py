@@ -13,7 +13,7 @@ from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, ParameterError
 from mrdamper.physics.hysteresis.master_curve import CEILING, STEEPEST, MasterCurve, master_curve
 from mrdamper.physics.hysteresis.shape import Shape
-from mrdamper.physics.motion import Path
+from mrdamper.physics.motion.path import Path
 from mrdamper.tracing import Tape, choose, functions, streamed
 
 

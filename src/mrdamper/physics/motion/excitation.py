@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mrdamper.data import Floats
+from mrdamper.data.runs import Floats
 from mrdamper.errors import ExcitationError, checked
 from mrdamper.physics.motion.path import Path
 
