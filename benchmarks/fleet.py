@@ -29,8 +29,8 @@ from typing import Any
 import numpy as np
 import polars as pl
 
+from benchmarks.synthetic_fleet import FAULTS, Population, write_fleet
 from mrdamper.fleet import engine
-from mrdamper.fleet.generator import FAULTS, Population, write_fleet
 from mrdamper.fleet.guard import descendants
 from mrdamper.fleet.item import digest_of
 from mrdamper.fleet.items import find_items
@@ -42,12 +42,11 @@ from mrdamper.fleet.table import TIMES
 from mrdamper.fleet.verdicts import drift, suspects, with_features
 from mrdamper.paper.virtual_rig import VirtualRig
 
-STRONG = VirtualRig(
+STRONG = VirtualRig(  # another make, four times as strong
     gas_pressure=4e6, gas_volume=3e-4, rod_diameter=0.03, offset_force=400.0, yield_off=60.0, yield_per_ampere=3200.0,
     viscosity=4000.0, viscosity_per_ampere=900.0, friction_low=90.0, friction_high=260.0, force_noise=20.0,
     force_step=2.0, mass=9.0, knee=5e-4,
 )  # fmt: skip
-# another make, four times as strong
 _START_UP = 1.5  # seconds, about, before a command begins with its work
 
 

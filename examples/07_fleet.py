@@ -2,23 +2,35 @@
 A line of dampers
 =================
 
-A line of dampers that was never made, tested, identified and watched: who stands out, what drifts."""
+Synthetic dampers of a line, tested, identified and watched: who stands out, which limit is missed."""
 
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
-from mrdamper.fleet.generator import Population, write_fleet
-from mrdamper.fleet.line import run_fleet
+import numpy as np
+
+from mrdamper import Condition, Dataset, run_fleet, save_dataset, sine
 from mrdamper.fleet.page import write_page
 from mrdamper.fleet.profile import ColumnLimits
+from mrdamper.paper.virtual_rig import VirtualRig
 
-line = Population(dampers=8, sessions=3, golden=1, rig_drift=0.03, faults={"low gas": 1}, seed=4)
+rng = np.random.default_rng(4)
 with tempfile.TemporaryDirectory() as folder:
-    write_fleet(line, Path(folder) / "records")
-    found = run_fleet(Path(folder) / "records", Path(folder) / "line", workers=2)
-    said = write_page(
-        found.table, found.plan, {"gas_force_N": ColumnLimits(lower=100)}, found.table.with_name("fleet.html")
-    )
+    for number in range(10):
+        share = 0.6 if number == 5 else 1 + 0.01 * rng.standard_normal()  # of the gas pressure: one damper has lost gas
+        rig = VirtualRig()
+        rig = replace(rig, gas_pressure=share * rig.gas_pressure, offset_force=share * rig.offset_force)
+        runs = []
+        for current in (0.0, 1.0):
+            for frequency in (1.0, 2.0):
+                motion = sine(Condition(current, frequency, 0.020), 4, round(rig.sample_rate / frequency))
+                name, window = f"{frequency:g}Hz-{current:g}A", (1 / frequency, float(motion.time[-1]))
+                runs.append(rig.sense(motion, rig.force(motion), rng, id=name, window=window))
+        save_dataset(Dataset(tuple(runs)), Path(folder) / "records" / f"D{number:03}")
+    line = run_fleet(Path(folder) / "records", Path(folder) / "line", workers=2)
+    limits = {"gas_force_N": ColumnLimits(lower=100)}
+    findings = write_page(line.table, line.plan, limits, line.table.with_name("fleet.html"))
 
-print(f"{found.done} of {found.dampers} identified; planted: {[d.serial for d in line if d.fault]} with low gas")
-print("\n".join(said))
+print(f"{line.done} of {line.dampers} identified; D005 has low gas")
+print("\n".join(findings))

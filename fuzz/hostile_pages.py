@@ -65,8 +65,8 @@ def attack_exports(share: float) -> list[Count]:
 
 def attack_pages(share: float) -> list[Count]:
     """Every command that writes pages and figures, its rig, runs, remarks, folders and dampers by hostile names."""
+    from benchmarks.synthetic_fleet import Population
     from mrdamper.errors import InputError
-    from mrdamper.fleet.generator import Population
     from mrdamper.rig_files.dataset_folder import save_dataset
 
     count, ran = Count("whole result of named runs"), Count("command on named runs")

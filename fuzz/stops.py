@@ -236,8 +236,8 @@ def workplace() -> Iterator[Path]:
 def _prepare(root: Path) -> None:
     from dataclasses import replace
 
+    from benchmarks.synthetic_fleet import Population
     from mrdamper.dampers.model_file import save_model
-    from mrdamper.fleet.generator import Population
     from mrdamper.rig_files.dataset_folder import save_dataset
 
     for n, made in enumerate(Population(dampers=2, sessions=1, golden=0), start=1):

@@ -68,7 +68,7 @@ def test_docstrings_of_rewritten_packages_open_with_a_definition_or_an_imperativ
 
 
 def test_the_measures_find_what_they_look_for():
-    assert "mrdamper.physics.motion" in structure.imports()["mrdamper.identification.problem"]
+    assert "mrdamper.physics.motion.excitation" in structure.imports()["mrdamper.identification.problem"]
     assert structure.longest_chain()[-1] == "mrdamper.errors"
     assert structure.long_functions(most=3)
     assert len(structure.modules()) > 300

@@ -22,7 +22,7 @@ def test_threads_that_ask_at_once_see_every_class(monkeypatch):
     monkeypatch.setattr(discovery, "_registries", {})
     registry = Registry("mrdamper.models", Model, "model")
     seen = []
-    threads = [threading.Thread(target=lambda: seen.append(set(registry.types))) for _ in range(2)]
+    threads = [threading.Thread(target=lambda: seen.append(set(registry.all()))) for _ in range(2)]
     threads[0].start()
     assert begun.wait(5)
     threads[1].start()

@@ -161,8 +161,7 @@ class Registry(Generic[T]):
         self._types: dict[str, type[T]] = {}
         _registries[group] = self
 
-    @property
-    def types(self) -> Mapping[str, type[T]]:
+    def all(self) -> Mapping[str, type[T]]:
         """Every class by its name, sorted."""
         with self._lock:  # another thread waits until all classes are there
             if self._parts is None:
@@ -172,10 +171,9 @@ class Registry(Generic[T]):
                         self._add(cls, package_of(point.dist), is_own=_is_own(point))
         return MappingProxyType(dict(sorted(self._types.items())))
 
-    @property
     def parts(self) -> tuple[ExtensionPart, ...]:
         """Every class of the group and the package it comes from, sorted by name."""
-        return tuple(part for name in self.types if (part := (self._parts or {}).get(name)))
+        return tuple(part for name in self.all() if (part := (self._parts or {}).get(name)))
 
     def type_named(self, name: str) -> type[T]:
         """Return the class of that name.
@@ -185,14 +183,14 @@ class Registry(Generic[T]):
         UnknownNameError
             With the near matches.
         """
-        types = self.types
+        types = self.all()
         if not isinstance(name, str) or name not in types:
             raise UnknownNameError.of(self.kind, str(name)[:100], types)
         return types[name]
 
     def register(self, cls: type[T]) -> None:
         """Add a class of a script or notebook for this process; one of the same name and module is replaced."""
-        earlier = self.types.get(cls.name)  # type: ignore[attr-defined]
+        earlier = self.all().get(cls.name)  # type: ignore[attr-defined]
         if earlier is not None and (earlier.__module__, earlier.__qualname__) != (cls.__module__, cls.__qualname__):
             raise InputError(
                 f"the {self.kind} {cls.name!r} exists already ({earlier.__module__}.{earlier.__qualname__})",  # type: ignore[attr-defined]
@@ -299,5 +297,5 @@ def all_parts() -> tuple[ExtensionPart, ...]:
     for group in GROUPS:  # importing the module that holds a group's registry creates it
         provided_modules(group)
     modules = [part for group, function in HOOKS.items() for part, _ in modules_with(group, function)]
-    parts = [part for registry in _registries.values() for part in registry.parts]
+    parts = [part for registry in _registries.values() for part in registry.parts()]
     return tuple(sorted((*parts, *modules, *_skipped), key=lambda part: (GROUPS.index(part.group), part.name)))

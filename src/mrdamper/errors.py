@@ -136,7 +136,7 @@ def _require_fit(name: str, value: object, kind: object) -> None:
 
 def _fits(value: Any, kind: Any) -> bool:
     origin, inner = get_origin(kind), get_args(kind)
-    if "numpy._typing" in str(kind) or getattr(origin, "__module__", "") == "numpy":  # ArrayLike, NDArray
+    if _is_array(kind):
         return is_series(value)
     if origin in (Union, UnionType):
         return any(_fits(value, one) for one in inner)
@@ -161,6 +161,12 @@ def _fits(value: Any, kind: Any) -> bool:
         return True  # looked at while it is used up
     each = inner[:1] * len(value) if origin is not tuple or inner[-1] is ... else inner
     return len(each) == len(value) and all(map(_fits, value, each))
+
+
+@cache
+def _is_array(kind: Any) -> bool:
+    """Tell if an annotation is one of NumPy's: ArrayLike, NDArray. Its text is long, and asked for once."""
+    return "numpy._typing" in str(kind) or getattr(get_origin(kind), "__module__", "") == "numpy"
 
 
 def is_series(value: object) -> bool:

@@ -3,7 +3,7 @@
 import pytest
 from support.fleets import LINE
 
-from mrdamper.fleet.generator import write_fleet
+from benchmarks.synthetic_fleet import write_fleet
 from mrdamper.fleet.line import run_fleet
 
 

@@ -15,10 +15,10 @@ import pytest
 from support.fleets import LINE, ROWS, planned, same_bits
 from typer.testing import CliRunner
 
+from benchmarks.synthetic_fleet import Population
 from mrdamper.cli import application
 from mrdamper.data import Dataset
 from mrdamper.errors import InputError
-from mrdamper.fleet.generator import Population
 from mrdamper.fleet.item import digest_of
 from mrdamper.fleet.items import find_items
 from mrdamper.fleet.job import Settings, as_job, attempt, read

@@ -5,7 +5,7 @@ import sqlite3
 
 import polars as pl
 
-from mrdamper.fleet.generator import Population
+from benchmarks.synthetic_fleet import Population
 from mrdamper.fleet.table import TIMES
 
 LINE = Population(dampers=4, sessions=2, golden=1, faults={"wrong coil": 1}, seed=3)

@@ -3,30 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from mrdamper.dampers.base import Damper
 from mrdamper.discovery import Registry
 from mrdamper.errors import checked
 from mrdamper.export.base import Exporter, Written, identifier, write_export
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
 __all__ = ["Exporter", "Written", "all_exporters", "export_model", "exporter"]
 
 
 _registry: Registry[Exporter] = Registry("mrdamper.exporters", Exporter, "export format")  # type: ignore[type-abstract]
-
-
-def all_exporters() -> Mapping[str, type[Exporter]]:
-    """Every export format by its name."""
-    return _registry.types
-
-
-def exporter(name: str) -> type[Exporter]:
-    """Return the export format of that name; raises `UnknownNameError` with the near matches."""
-    return _registry.type_named(name)
+all_exporters = _registry.all
+exporter = _registry.type_named
 
 
 @checked()

@@ -2,39 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from mrdamper.discovery import ExtensionPart, Registry
+from mrdamper.discovery import Registry
 from mrdamper.models.base import Model, Scale, SearchAxis
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 __all__ = ["Model", "Scale", "SearchAxis", "all_models", "model_parts", "model_type"]
 
 
 _registry = Registry("mrdamper.models", Model, "model")
-
-
-def all_models() -> Mapping[str, type[Model]]:
-    """Every model by its name."""
-    return _registry.types
-
-
-def model_parts() -> tuple[ExtensionPart, ...]:
-    """Every model with the package that provides it."""
-    return _registry.parts
-
-
-def model_type(name: str) -> type[Model]:
-    """Return the model of that name.
-
-    Raises
-    ------
-    UnknownNameError
-        With the near matches.
-    """
-    return _registry.type_named(name)
+all_models = _registry.all
+model_parts = _registry.parts
+model_type = _registry.type_named
 
 
 def __getattr__(name: str) -> Any:

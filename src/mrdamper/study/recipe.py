@@ -462,6 +462,7 @@ class StudyMethod(ABC):
 
 
 _study_methods: Registry[StudyMethod] = Registry("mrdamper.studies", StudyMethod, "study method")  # type: ignore[type-abstract]
+study_methods = _study_methods.all
 
 
 def study_method(name: str, settings: Mapping[str, str] | None = None, gas: GasSpring | None = None) -> StudyMethod:
@@ -483,11 +484,6 @@ def study_method(name: str, settings: Mapping[str, str] | None = None, gas: GasS
     chosen = _study_methods.type_named(name)
     values = values_of_fields(chosen, settings or {})
     return chosen(**values, **({} if gas is None else {"gas": gas}))
-
-
-def study_methods() -> Mapping[str, type[StudyMethod]]:
-    """Every study method by its name."""
-    return _study_methods.types
 
 
 def catalogue() -> Mapping[str, Recipe]:

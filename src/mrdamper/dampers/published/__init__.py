@@ -6,14 +6,11 @@ reading of descriptions, not a reproduction.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 from mrdamper.dampers.kernel import KernelDamper
 from mrdamper.dampers.published.base import ConditionedDamper
 from mrdamper.discovery import Registry
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 __all__ = ["ConditionedDamper", "Published", "all_conditioned", "all_published", "conditioned_type"]
 
@@ -21,25 +18,11 @@ Published = type[ConditionedDamper] | type[KernelDamper]
 
 
 _registry = Registry("mrdamper.dampers", ConditionedDamper, "condition-dependent damper")
-
-
-def all_conditioned() -> Mapping[str, type[ConditionedDamper]]:
-    """Every condition-dependent damper by its name."""
-    return _registry.types
+all_conditioned = _registry.all
+conditioned_type = _registry.type_named
 
 
 def all_published() -> Mapping[str, Published]:
     """Return the published dampers by name: the condition-dependent ones, and a regression without physics."""
     types = {**all_conditioned(), KernelDamper.name: KernelDamper}
     return {name: types[name] for name in sorted(types)}
-
-
-def conditioned_type(name: str) -> type[ConditionedDamper]:
-    """The condition-dependent damper of that name.
-
-    Raises
-    ------
-    UnknownNameError
-        With the near matches.
-    """
-    return _registry.type_named(name)

@@ -14,11 +14,7 @@ if TYPE_CHECKING:
 
 
 _registry = Registry("mrdamper.methods", Method, "method")
-
-
-def all_methods() -> Mapping[str, type[Method]]:
-    """Every method by its name, those of other packages included."""
-    return _registry.types
+all_methods = _registry.all
 
 
 def method_named(name: str, settings: Mapping[str, str] | None = None) -> Method:

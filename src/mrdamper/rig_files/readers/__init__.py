@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -95,11 +94,7 @@ def reader_of(source: Source) -> Reader:
 
 
 _registry: Registry[Reader] = Registry("mrdamper.readers", Reader, "format")  # type: ignore[type-abstract]
-
-
-def all_readers() -> Mapping[str, type[Reader]]:
-    """Every format by name."""
-    return _registry.types
+all_readers = _registry.all
 
 
 def suffixes() -> tuple[str, ...]:

@@ -12,20 +12,11 @@ from mrdamper.discovery import Registry
 from mrdamper.errors import RecordError, UnknownNameError, checked
 from mrdamper.systems.inputs.base import Input
 
-__all__ = ["Input", "input_type", "input_types", "load_input"]
+__all__ = ["Input", "input_types", "load_input"]
 
 
 _registry = Registry("mrdamper.inputs", Input, "input")
-
-
-def input_types() -> Mapping[str, type[Input]]:
-    """Every input by its name."""
-    return _registry.types
-
-
-def input_type(name: str) -> type[Input]:
-    """Return the input of that name; raises `UnknownNameError` with the near matches."""
-    return _registry.type_named(name)
+input_types = _registry.all
 
 
 def bundled_records() -> dict[str, Path]:
