@@ -20,7 +20,7 @@ from mrdamper.data import Condition, Run
 from mrdamper.models.play_bypass import PlayBypass
 from mrdamper.physics.motion import sine
 from mrdamper.study.limits import Limits
-from mrdamper.study.plan import TestDesign
+from mrdamper.study.plan import ExperimentDesign
 
 TRUTH = PlayBypass(
     f0=40.0, k=800.0, c0=600.0, c1=3800.0, fy0=140.0, fy1=1000.0, d=2e-4, e=2.5e-5, cb=3.6e4, h0=0.4, h1=0.3, vh=3e-3,
@@ -53,12 +53,12 @@ def rig(seed: int) -> Damper:
     return replace(made, uncertainty=replace(made.uncertainty, force=FORM))
 
 
-def reckoned(seed: int) -> TestDesign:
+def reckoned(seed: int) -> ExperimentDesign:
     """What records on that rig would tell."""
-    return TestDesign.of(rig(seed), LIMITS, LIMITS.candidates(1.0))
+    return ExperimentDesign.of(rig(seed), LIMITS, LIMITS.candidates(1.0))
 
 
-def designs(reckoning: TestDesign, hours: float, seed: int) -> dict[str, float]:
+def designs(reckoning: ExperimentDesign, hours: float, seed: int) -> dict[str, float]:
     """Expected standard deviation of the force after each design, and before.
 
     Who makes no plan mounts the damper once; the same in as many sessions as the plan takes stands beside.

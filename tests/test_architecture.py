@@ -60,7 +60,7 @@ def test_the_structure_keeps_its_limits():
     assert len(structure.longest_chain()) <= 22
     assert len(structure.long_functions()) <= 19
     assert _of_rewritten(structure.long_functions()) == []
-    assert len(structure.repeated_class_names()) <= 17
+    assert structure.repeated_class_names() == {}
 
 
 def test_docstrings_of_rewritten_packages_open_with_a_definition_or_an_imperative():

@@ -295,11 +295,11 @@ class UnknownNameError(InputError):
     code = "E_NAME"
 
     @classmethod
-    def of(cls, kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
+    def of(cls, kind: str, name: str, names: Iterable[str]) -> UnknownNameError:
         """Build the error with the near matches as the remedy."""
-        known = sorted(known)
-        near = get_close_matches(name, known, n=3, cutoff=0.5)
-        remedy = f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(known)}"
+        names = sorted(names)
+        near = get_close_matches(name, names, n=3, cutoff=0.5)
+        remedy = f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(names)}"
         return cls(f"no {kind} is called {name!r}", remedy=remedy)
 
 

@@ -19,7 +19,7 @@ from mrdamper.errors import ConditionError, InputError
 from mrdamper.rig_files.motion_file import load_motion
 from mrdamper.study.first_matrix import first_matrix
 from mrdamper.study.limits import Limits
-from mrdamper.study.plan import TestDesign, plan_tests
+from mrdamper.study.plan import ExperimentDesign, plan_tests
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 from benchmarks.planning import designs, reckoned
@@ -34,7 +34,7 @@ def damper():
 
 @pytest.fixture(scope="module")
 def reckoning(damper):
-    return TestDesign.of(damper, LIMITS, LIMITS.candidates(0.5))
+    return ExperimentDesign.of(damper, LIMITS, LIMITS.candidates(0.5))
 
 
 def test_every_record_is_allowed_and_shrinks_the_doubt(reckoning):

@@ -49,13 +49,13 @@ def parse_fixed(pairs: Sequence[str]) -> dict[str, float]:
 
 def parse_pairs(pairs: Sequence[str], option: str) -> dict[str, str]:
     """NAME=VALUE arguments as text; raises `InputError` if one is not of that form."""
-    found = {}
+    values = {}
     for pair in pairs:
         name, equals, text = pair.partition("=")
         if not equals or not name.strip():
             raise InputError(f"{option} {pair}", remedy=f"write {option} NAME=VALUE")
-        found[name.strip()] = text.strip()
-    return found
+        values[name.strip()] = text.strip()
+    return values
 
 
 def parse_named(text: str, option: str) -> tuple[str, dict[str, float]]:

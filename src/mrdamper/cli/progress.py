@@ -37,7 +37,7 @@ def progress_on_stderr(quiet: bool = False, began: float | None = None) -> Itera
 @contextmanager
 def progress_soon(what: str) -> Iterator[Progress]:
     """The same from the second second on: also while nobody tells anything, what is done and for how long."""
-    began, lock, told = time.monotonic(), Lock(), (what, 0.0)
+    began, lock, latest = time.monotonic(), Lock(), (what, 0.0)
     bar: Progress | None = None
     with ExitStack() as stack:
 
@@ -46,12 +46,12 @@ def progress_soon(what: str) -> Iterator[Progress]:
             with lock:
                 if not over:
                     bar = stack.enter_context(progress_on_stderr(began=began))
-                    bar(*told)
+                    bar(*latest)
 
         def tell(what: str, share: float) -> None:
-            nonlocal told
+            nonlocal latest
             with lock:
-                told = what, share
+                latest = what, share
                 if bar is not None:
                     bar(what, share)
 

@@ -58,7 +58,7 @@ TERMS = (
     ModelTerm("bypass differs by direction", ("qb",), (0.0,)),
     ModelTerm("yield force differs by direction", ("asymmetry",), (0.0,)),
     ModelTerm("viscosity rises with current", ("c1",), (0.0,)),
-    ModelTerm("seated share depends on current", ("h1",), (0.0,)),
+    ModelTerm("Stribeck amplitude depends on current", ("h1",), (0.0,)),
     ModelTerm("inertia", ("m",), (0.0,)),
 )
 

@@ -243,12 +243,12 @@ class FormChoice:
     """
 
     forms: Mapping[str, str | Law]
-    fit: FunctionFit
+    fit: JointFunctionFit
     refused: Mapping[str, str]
 
 
 @dataclass(frozen=True, eq=False)
-class FunctionFit:
+class JointFunctionFit:
     """A parameter map fitted to all runs at once.
 
     Attributes
@@ -274,7 +274,7 @@ def fit_jointly(
     reweightings: int = 6,
     most_steps: int = 12,
     polish: bool = True,
-) -> FunctionFit:
+) -> JointFunctionFit:
     """Fit the coefficients of all parameter functions to all runs at once.
 
     Parameters
@@ -318,7 +318,7 @@ def fit_jointly(
 
 @on_one_blas_thread
 def leave_out_errors(
-    data: Condensed, fit: FunctionFit, groups: Sequence[Sequence[int]], forms: Mapping[str, str | Law]
+    data: Condensed, fit: JointFunctionFit, groups: Sequence[Sequence[int]], forms: Mapping[str, str | Law]
 ) -> Floats:
     """(R,) nrmse_pp of runs whose group was left out of the linear coefficients.
 
@@ -457,14 +457,14 @@ def _reweighted(design: _Design, gram: Floats, reweightings: int) -> _Solution:
     return solution
 
 
-def _finish(design: _Design, solution: _Solution, functions: dict[str, ParameterFunction]) -> FunctionFit:
+def _finish(design: _Design, solution: _Solution, functions: dict[str, ParameterFunction]) -> JointFunctionFit:
     parts = np.split(solution.coefficients, np.cumsum(design.sizes)[:-1])
     for (name, form), values in zip(design.forms.items(), parts, strict=True):
         if form.terms:
             functions[name] = ParameterFunction(form.name, tuple(values.tolist()), design.rates[name])
     order = [*design.data.model_type.map_forms(), *functions]
     ordered = {name: functions[name] for name in dict.fromkeys(order) if name in functions}
-    return FunctionFit(ParameterMap(design.data.model_type, ordered), solution.nrmse_pp)
+    return JointFunctionFit(ParameterMap(design.data.model_type, ordered), solution.nrmse_pp)
 
 
 def choose_forms(
@@ -522,8 +522,8 @@ def _supported(laws: Sequence[str | Law], conditions: Sequence[Condition]) -> li
 
 
 def _risen(
-    fit: FunctionFit,
-    trial: FunctionFit,
+    fit: JointFunctionFit,
+    trial: JointFunctionFit,
     name: str,
     conditions: Sequence[Condition],
     dissipating: Mapping[str, str],
@@ -538,7 +538,7 @@ def _risen(
     return better or rises(one, other, dissipating[name], conditions)
 
 
-def _broken(fit: FunctionFit, name: str, conditions: Sequence[Condition], dissipating: Mapping[str, str]) -> str:
+def _broken(fit: JointFunctionFit, name: str, conditions: Sequence[Condition], dissipating: Mapping[str, str]) -> str:
     """The law of physics that the function of a coordinate breaks, if any."""
     function = fit.parameters.functions.get(name)
     return broken_law(function, conditions, dissipating[name]) if function and name in dissipating else ""
@@ -549,7 +549,7 @@ def _tried(
     forms: Mapping[str, str | Law],
     folds: Mapping[str, Sequence[Sequence[int]]],
     shape_values: Floats,
-) -> tuple[FunctionFit, dict[str, Floats]]:
+) -> tuple[JointFunctionFit, dict[str, Floats]]:
     """A fit with some forms, and its errors by kind of fold."""
     for name in data.linear:
         if not law_of(forms[name])[1] and _form(forms[name]).terms:

@@ -132,7 +132,7 @@ _WORDS = {"yield_force": "Fz", "yield_displacement": "xz"}
 
 def latex_symbol(name: str) -> str:
     r"""Write a name as a letter with an index: alpha, k1, kappa_x and fy0 as \alpha, k_1, \kappa_x and f_{y0}."""
-    word = next((known for known in _WORDS if name.startswith(known)), "")
+    word = next((each for each in _WORDS if name.startswith(each)), "")
     head, _, tail = name.removeprefix(word).partition("_")
     if word:
         text, first = _WORDS[word][0], _WORDS[word][1] + head

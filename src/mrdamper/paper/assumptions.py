@@ -61,10 +61,10 @@ class PaperAssumptions:
             longest = max(float(np.ptp(run.displacement)) / 2 for run in train)
             gas.force([-longest, longest])  # refuses motions that leave no gas volume
             return cls(gas)
-        found = [identify(run, BoucWen, Balance()) for run in train]
-        stiffness = [float(i.model.k1) for i in found if isinstance(i.model, BoucWen)]
+        identifications = [identify(run, BoucWen, Balance()) for run in train]
+        stiffness = [float(i.model.k1) for i in identifications if isinstance(i.model, BoucWen)]
         try:
-            apart = separate_mass([i.condition for i in found], stiffness)
+            apart = separate_mass([i.condition for i in identifications], stiffness)
         except IdentificationError as error:
             note = f"the gas spring is unknown and {error}: the mass is not identified, k1 holds k1 − m ω²"
             return cls(None, notes=(note,))

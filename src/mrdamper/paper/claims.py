@@ -207,7 +207,7 @@ def judge_all(study: Reproduction) -> tuple[Claim, ...]:
 
 def _judged(study: Reproduction, key: str, row: _Row, measured: Measured) -> Claim:
     verdict, virtual = judge(key, measured.values), study.rig is not None
-    said = in_words(verdict, row.kind, virtual=virtual)
+    text = in_words(verdict, row.kind, virtual=virtual)
     if row.kind == "damper" and virtual and verdict != "cannot be judged":
         verdict = "not judged"
     listed = [
@@ -216,7 +216,7 @@ def _judged(study: Reproduction, key: str, row: _Row, measured: Measured) -> Cla
     ]
     evidence = "; ".join(part for part in (*listed, measured.evidence) if part)
     seeds = steadiness(verdict, study.seed_verdicts.get(key, ()))
-    return Claim(key, row.text, row.source, verdict, said, evidence, thresholds(key), row.figure, seeds)
+    return Claim(key, row.text, row.source, verdict, text, evidence, thresholds(key), row.figure, seeds)
 
 
 def judge(key: str, values: Sequence[float]) -> Verdict:

@@ -73,9 +73,11 @@ def pictures(
     drawn: dict[str, Picture | str] = {}
     for number, name in enumerate(names):
         progress(f"figure {name}", number / len(names))
-        made = FIGURES[name].make(study, FIGURES[name].axes)
+        figure = FIGURES[name].make(study, FIGURES[name].axes)
         drawn[name] = (
-            made if isinstance(made, str) else Picture.of(draw(made) if isinstance(made, FigureLayout) else made, also)
+            figure
+            if isinstance(figure, str)
+            else Picture.of(draw(figure) if isinstance(figure, FigureLayout) else figure, also)
         )
     return drawn
 
@@ -202,21 +204,21 @@ def _parameter(study: Reproduction, name: str) -> Floats:
 
 def _over_current(name: str, form: str, study: Reproduction, axes: Texts) -> Drawing:
     """Draw a quantity over the current, a colour a motion; with a function of each motion, or the one of all runs."""
-    found, log, whole = _parameter(study, name), name == "beta", function_of(study, name)
-    if not found.size:
+    values, log, whole = _parameter(study, name), name == "beta", function_of(study, name)
+    if not values.size:
         return "the literal method could not be followed"
     if form == "whole" and whole is None:
         return f"{name} has no function"
     (x, y), power = axes[0], 1.0
     if not log:
-        y, power = powered(y, float(np.max(np.abs(found))))
+        y, power = powered(y, float(np.max(np.abs(values))))
     shades, lines = current_colours([study.conditions[g[0]].peak_velocity for g in motions(study)]), []
     for group in motions(study):
         conditions = [study.conditions[i] for i in group]
         first, currents = conditions[0], np.array([c.current_A for c in conditions])
         style = {"color": shades[first.peak_velocity]}
-        function, text = _function_at(study, name, form, conditions, found[group])
-        lines.append(Series(currents, power * found[group], style={**style, **_POINTS, "ls": "" if form else "-"}))
+        function, text = _function_at(study, name, form, conditions, values[group])
+        lines.append(Series(currents, power * values[group], style={**style, **_POINTS, "ls": "" if form else "-"}))
         if function is not None:
             dense = np.linspace(currents.min(), currents.max(), 60)
             scale = power * (study.options.scaled(name, 1.0) if form == "whole" else 1.0)
@@ -230,18 +232,18 @@ def _over_current(name: str, form: str, study: Reproduction, axes: Texts) -> Dra
 
 
 def _function_at(
-    study: Reproduction, name: str, form: str, conditions: Sequence[Condition], found: Floats
+    study: Reproduction, name: str, form: str, conditions: Sequence[Condition], values: Floats
 ) -> tuple[ParameterFunction | None, str]:
     """Return the function drawn through the values of a motion, and a word on its fit."""
     log = name == "beta"
     if form == "whole" and (whole := function_of(study, name)):
         curve = study.options.scaled(name, 1.0) * whole.function(*features(conditions))
-        r2 = _r2(*((np.log(found), np.log(curve)) if log else (found, curve)))
+        r2 = _r2(*((np.log(values), np.log(curve)) if log else (values, curve)))
         return whole.function, f"R² {r2:.3f}" if np.isfinite(r2) else ""
     if not form:
         return None, ""
     try:
-        fit = fit_function(form, conditions, found, log=log)
+        fit = fit_function(form, conditions, values, log=log)
     except IdentificationError:
         return None, "too few currents"
     if form == "constant":  # a mean explains nothing: its value says more than an R² of zero
@@ -252,14 +254,14 @@ def _function_at(
 
 def _r2_over_motions(name: str, form: str, study: Reproduction, axes: Texts) -> Drawing:
     """Draw R² of the function of the current at every motion."""
-    found = _parameter(study, name)
-    if found.size != len(study.conditions):
+    values = _parameter(study, name)
+    if values.size != len(study.conditions):
         return f"{name} was not identified on every run"
     shares: dict[str, float] = {}
     for group in motions(study):
         with suppress(IdentificationError):
             conditions = [study.conditions[i] for i in group]
-            fit = fit_function(form, conditions, found[group], log=name == "beta")
+            fit = fit_function(form, conditions, values[group], log=name == "beta")
             shares[_named(conditions[0]).replace(", ", "\n")] = fit.r2
     if not shares:
         return "too few currents at every motion"
@@ -269,16 +271,16 @@ def _r2_over_motions(name: str, form: str, study: Reproduction, axes: Texts) -> 
 
 def _constant_term(name: str, form: str, study: Reproduction, axes: Texts) -> Drawing:
     """Draw the remainder of a quantity beside its current law, a point a motion, over frequency or f · A."""
-    found = _parameter(study, name)
-    if found.size != len(study.conditions):
+    values = _parameter(study, name)
+    if values.size != len(study.conditions):
         return f"{name} was not identified on every run"
-    found = np.log(np.maximum(found, 1e-12)) if name == "beta" else found
+    values = np.log(np.maximum(values, 1e-12)) if name == "beta" else values
     try:
-        function = fit_function(form, study.conditions, found).function
+        function = fit_function(form, study.conditions, values).function
     except IdentificationError as error:
         return str(error)
     firsts = [study.conditions[group[0]] for group in motions(study)]
-    left = beside_current_law(function, study.conditions, found)
+    left = beside_current_law(function, study.conditions, values)
     level = np.array([float(np.mean(left[group])) for group in motions(study)])
     fitted = np.array([float(function(0.0, c.frequency_Hz, c.amplitude_m)) for c in firsts])
     (x, y), by_speed = axes[0], name == "F0"
@@ -300,15 +302,15 @@ def _constant_term(name: str, form: str, study: Reproduction, axes: Texts) -> Dr
     return FigureLayout([Panel((x, y), lines, title)], 3.0, margins={"right": 2.0})
 
 
-def beside_current_law(function: ParameterFunction, conditions: Sequence[Condition], found: Floats) -> Floats:
+def beside_current_law(function: ParameterFunction, conditions: Sequence[Condition], values: Floats) -> Floats:
     """Return values less what the function gives to the current alone [Qian et al. 2024, Eq. 24, 28, 33, 37]."""
     I, f, A = features(conditions)
-    return found - (function(I, f, A) - function(np.zeros(I.size), f, A))
+    return values - (function(I, f, A) - function(np.zeros(I.size), f, A))
 
 
-def _r2(found: Floats, fitted: Floats) -> float:
-    spread = float(np.sum((found - found.mean()) ** 2))
-    return 1 - float(np.sum((fitted - found) ** 2)) / spread if spread > 0 else float("nan")
+def _r2(values: Floats, fitted: Floats) -> float:
+    spread = float(np.sum((values - values.mean()) ** 2))
+    return 1 - float(np.sum((fitted - values) ** 2)) / spread if spread > 0 else float("nan")
 
 
 def _named(c: Condition) -> str:

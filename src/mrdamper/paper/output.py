@@ -165,11 +165,11 @@ def time_rows(study: Reproduction) -> Rows:
 def _identified_rows(place: int, study: Reproduction) -> Rows:
     """List the identified parameters at the smaller (0) or larger (-1) amplitude [Tables 1 and 2]."""
     literal = study.contender(LITERAL)
-    known = {i.run_id: i for i in (literal.identifications if literal else ())}
+    by_run = {i.run_id: i for i in (literal.identifications if literal else ())}
     readings = dict(zip((run.id for run in study.train), study.readings, strict=False))
     rows = []
-    for run in study.amplitude_group(place) if known else ():
-        if one := known.get(run.id):
+    for run in study.amplitude_group(place) if by_run else ():
+        if one := by_run.get(run.id):
             first = {"F0 [N]": readings[run.id].amplitude, "phi [rad]": readings[run.id].phase}
             rows.append({"run_id": run.id, **_condition(one.condition), **first, **_parameters(study, one.model)})
     return sorted(rows, key=lambda row: (round(row["frequency_Hz"], 2), row["current_A"]))

@@ -103,7 +103,7 @@ class Paper(Method):
 
     def solution(self, problem: Problem, minimum: GeneticMinimum) -> Solution:
         """Complete the end of a search to a solution."""
-        known, notes = self.closed_forms(problem, SineRecord.of(problem.run))
+        determined, notes = self.closed_forms(problem, SineRecord.of(problem.run))
         values = dict(zip(("alpha", "beta"), minimum.point.tolist(), strict=True))
         at_bounds = tuple(
             name
@@ -111,30 +111,30 @@ class Paper(Method):
             if min(value - low, high - value) < 1e-6 * (high - low)
         )
         return Solution(
-            BoucWen.build({**known, **values}), 0.0, at_bounds, {}, {"beta": values["beta"]},
+            BoucWen.build({**determined, **values}), 0.0, at_bounds, {}, {"beta": values["beta"]},
             minimum.evaluations, minimum.ending, self.genetic.seed if self.search == "genetic" else None,
-            notes=(*notes, *(_hysteretic_share(problem, known) if self.explain else ())),
+            notes=(*notes, *(_hysteretic_share(problem, determined) if self.explain else ())),
         )  # fmt: skip
 
     def closed_forms(self, problem: Problem, record: SineRecord) -> tuple[dict[str, float], tuple[str, ...]]:
         """Return every parameter but alpha and beta, and notes [Eq. 16–20]."""
         X, omega = record.condition.amplitude_m, record.omega
         reading = read_force(record, self.force_amplitude, self.phase, self.offset)
-        known, notes = dict(problem.fixed), ()
-        k3 = known.setdefault("k3", 0.0)
+        values, notes = dict(problem.fixed), ()
+        k3 = values.setdefault("k3", 0.0)
         if "k1" in problem.free:
             # Without a gas spring the whole in-phase force is stiffness: at one frequency mass is part of it.
             _, apparent = damping_and_mass(reading, X, omega, 0.0, k3)
-            known["k1"] = (known.get("m", 0.0) - apparent) * omega**2
+            values["k1"] = (values.get("m", 0.0) - apparent) * omega**2
             notes = ("no gas spring is given: k1 was taken from the in-phase force with the mass held, k2 = k3 = 0 "
                      "unless fixed",)  # fmt: skip
-        c, m = damping_and_mass(reading, X, omega, known["k1"], k3)
-        known |= {name: value for name, value in {"c": c, "m": m}.items() if name in problem.free}
+        c, m = damping_and_mass(reading, X, omega, values["k1"], k3)
+        values |= {name: value for name, value in {"c": c, "m": m}.items() if name in problem.free}
         if self.quadratic_stiffness == "dropped":
-            known["k2"] = 0.0
+            values["k2"] = 0.0
         if "f0" in problem.free:
-            known["f0"] = reading.offset - (known.get("k2", 0.0) * X**2 / 2 if self.offset == "mean" else 0.0)
-        return known, notes
+            values["f0"] = reading.offset - (values.get("k2", 0.0) * X**2 / 2 if self.offset == "mean" else 0.0)
+        return values, notes
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,17 +233,17 @@ def _require_bouc_wen(problem: Problem) -> None:
             )
 
 
-def _hysteretic_share(problem: Problem, known: dict[str, float]) -> tuple[str, ...]:
+def _hysteretic_share(problem: Problem, values: dict[str, float]) -> tuple[str, ...]:
     """Note how much of c is hysteretic force according to the consistent balance, if it is much."""
     model = Balance().solve(problem).model
-    if "c" not in problem.free or not isinstance(model, BoucWen) or not known["c"] > 0:
+    if "c" not in problem.free or not isinstance(model, BoucWen) or not values["c"] > 0:
         return ()
     record = SineRecord.of(problem.run)
     surplus, _ = double_counted(model.shape, model.yield_force, record.condition.amplitude_m, record.omega)
-    if surplus < _MAX_HYSTERETIC_SHARE * known["c"]:
+    if surplus < _MAX_HYSTERETIC_SHARE * values["c"]:
         return ()
     return (
-        f"counted twice: {100 * min(surplus / known['c'], 1):.0f} % of c = {known['c']:.4g} N s/m is the first "
+        f"counted twice: {100 * min(surplus / values['c'], 1):.0f} % of c = {values['c']:.4g} N s/m is the first "
         "harmonic of the hysteretic force, which alpha z holds too, and m is shifted likewise; method balance "
         "separates them",
     )

@@ -108,11 +108,11 @@ def about_of(table: Mapping[str, Any], where: str) -> About:
     AboutError
         If a field is unknown, or no text or number.
     """
-    known = [f.name for f in fields(About)]
+    names = [f.name for f in fields(About)]
     for name, value in table.items():
-        if name not in known:
-            near = get_close_matches(name, known, n=1)
-            remedy = f"did you mean {near[0]}?" if near else f"the fields are {', '.join(known)}"
+        if name not in names:
+            near = get_close_matches(name, names, n=1)
+            remedy = f"did you mean {near[0]}?" if near else f"the fields are {', '.join(names)}"
             raise AboutError(f"unknown field {name!r}", where=where, remedy=remedy)
         if isinstance(value, (dict, list, bool)):
             raise AboutError(f"{name} is no text", where=where, remedy=f'write {name} = "..."')
@@ -211,8 +211,8 @@ def _logo_file(path: Path) -> tuple[bytes, str]:
         with path.open("rb") as file:
             data = file.read(_LARGEST_LOGO + 1)
     except (OSError, ValueError) as error:
-        said = getattr(error, "strerror", None) or str(error)
-        raise AboutError(said, where=where, remedy="correct its path") from error
+        reason = getattr(error, "strerror", None) or str(error)
+        raise AboutError(reason, where=where, remedy="correct its path") from error
     return data, where
 
 

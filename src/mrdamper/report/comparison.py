@@ -86,8 +86,15 @@ def run_rows(comparison: Comparison) -> list[dict[str, Any]]:
     for rig in comparison.rigs:
         for entry in rig.entries:
             head = {"rig": rig.rig, "model": entry.recipe.name}
-            for found in entry.identifications:
-                rows.append({**head, "set": "per run", "run_id": found.run_id, "nrmse_pp": found.scores.nrmse_pp})
+            for identification in entry.identifications:
+                rows.append(
+                    {
+                        **head,
+                        "set": "per run",
+                        "run_id": identification.run_id,
+                        "nrmse_pp": identification.scores.nrmse_pp,
+                    }
+                )
             sets = {"train": entry.train, "cross-validation": entry.cross_validated, "validation": entry.validation}
             for name, validation in sets.items():
                 rows += [{**head, "set": name, **score_row(run)} for run in validation.runs]

@@ -61,31 +61,35 @@ def write_test_report(
     """
     from mrdamper.report.pdf import pdf_of
 
-    found = {name: _characterised(name, dataset) for name, dataset in specimens.items()}
-    facts = facts_of_tests(found, ladder, limits)
+    characteristics = {name: _characterised(name, dataset) for name, dataset in specimens.items()}
+    facts = facts_of_tests(characteristics, ladder, limits)
     first = next(iter(specimens.values()))
     about = about or About()
 
     def fill(work: Path) -> None:
         (work / "figures").mkdir()
         also = ("pdf", "png") if png else ("pdf",)
-        pictures = {key: Picture.of(figure, also) for key, figure in figures_of_tests(first, found, limits).items()}
+        pictures = {
+            key: Picture.of(figure, also) for key, figure in figures_of_tests(first, characteristics, limits).items()
+        }
         saved = {key: picture.save(work / "figures" / key) for key, picture in pictures.items()}
         page = render_page(
             "tests.html.j2",
-            about.title or f"Damper test report: {', '.join(found)}",
+            about.title or f"Damper test report: {', '.join(characteristics)}",
             made_from(*specimens.values()) + ".",
             about=about,
             provenance=provenance(specimens),
             lead=facts["summary"],
             t=facts,
             pictures=saved,
-            passed_over={run: why for specimen in found.values() for run, why in specimen.passed_over.items()},
+            passed_over={
+                run: why for specimen in characteristics.values() for run, why in specimen.passed_over.items()
+            },
         )
         (work / "report.html").write_text(page, encoding="utf-8")
         (work / "report.pdf").write_bytes(pdf_of(page, {key: p.files["pdf"] for key, p in pictures.items()}, paper))
         (work / "forces.csv").write_text(csv_text(force_rows(facts)), encoding="utf-8")
-        (work / "tests.csv").write_text(csv_text(_test_rows(found)), encoding="utf-8")
+        (work / "tests.csv").write_text(csv_text(_test_rows(characteristics)), encoding="utf-8")
 
     return publish(folder, "report.html", fill)
 

@@ -45,7 +45,7 @@ class Limitation:
 
 def limitations(scored: RecipeResult, loops: Sequence[LoopAnalysis]) -> list[Limitation]:
     """List the limitations of a model and of the tests it was identified from, the most harmful first."""
-    found = {
+    entries = {
         PREDICTION: _prediction(scored.cross_validated, scored.validation),
         TESTS: _tests(loops),
         MODEL: [
@@ -58,12 +58,12 @@ def limitations(scored: RecipeResult, loops: Sequence[LoopAnalysis]) -> list[Lim
         ],
         RANGE: [validity(scored.damper)],
     }
-    return _explained([Limitation(group, text) for group in _GROUPS for text in found[group]], scored.damper)
+    return _explained([Limitation(group, text) for group in _GROUPS for text in entries[group]], scored.damper)
 
 
-def by_group(found: Sequence[Limitation]) -> Mapping[str, list[str]]:
+def by_group(entries: Sequence[Limitation]) -> Mapping[str, list[str]]:
     """Group the sentences under their headings; headings without sentences are omitted."""
-    groups = {group: [one.text for one in found if one.group == group] for group in _GROUPS}
+    groups = {group: [one.text for one in entries if one.group == group] for group in _GROUPS}
     return {group: texts for group, texts in groups.items() if texts}
 
 
@@ -79,11 +79,11 @@ def validity(damper: Damper) -> str:
     )
 
 
-def _explained(found: Sequence[Limitation], damper: Damper) -> list[Limitation]:
+def _explained(entries: Sequence[Limitation], damper: Damper) -> list[Limitation]:
     """Add the meaning of each parameter where it is named first."""
     parameters = damper.model_at(damper.envelope.middle).parameters()
     meanings = {info.name: info.meaning for info in parameters if info.name not in _WORDS} | _SEARCHED
-    explained = list(found)
+    explained = list(entries)
     for name, meaning in meanings.items():
         named = re.compile(rf"(?<![\w.^])(?<!\d ){re.escape(name)}(\.\d+)?(?![\w^])")
         first = next((i for i, one in enumerate(explained) if named.search(one.text)), None)
@@ -164,12 +164,14 @@ def _joint(fit: JointFit) -> list[str]:
 def _identifications(identifications: Sequence[Identification]) -> list[str]:
     sentences = []
     bound: dict[str, list[str]] = {}
-    for found in identifications:
-        for name in found.at_bounds:
-            bound.setdefault(name, []).append(found.run_id)
+    for identification in identifications:
+        for name in identification.at_bounds:
+            bound.setdefault(name, []).append(identification.run_id)
     for name, runs in bound.items():
         sentences.append(f"{name} at a bound of its range in {len(runs)} individual fits: {_some(runs)}.")
-    for note in dict.fromkeys(n for found in identifications for n in found.notes if n.lower().startswith("mass")):
+    for note in dict.fromkeys(
+        n for identification in identifications for n in identification.notes if n.lower().startswith("mass")
+    ):
         sentences.append(f"{note[0].upper()}{note[1:]}.")
     return sentences
 

@@ -31,8 +31,8 @@ def render_page(template: str, title: str, footer: str, **facts: object) -> str:
 
 def made_from(*datasets: Dataset) -> str:
     """Return the start of a footer: version of mrdamper and the datasets."""
-    said = "; ".join(f"{dataset.name}, {len(dataset)} runs" for dataset in datasets)
-    return f"mrdamper {version('mrdamper')}; dataset{'s' if len(datasets) > 1 else ''}: {said}"
+    text = "; ".join(f"{dataset.name}, {len(dataset)} runs" for dataset in datasets)
+    return f"mrdamper {version('mrdamper')}; dataset{'s' if len(datasets) > 1 else ''}: {text}"
 
 
 def inline_svg(picture: bytes, alt: str) -> Markup:

@@ -166,11 +166,11 @@ class _Writer:
         """Set an element; what is no block of its own is set child by child."""
         if element.tag in ("style", "script", "nav"):
             return
-        known = {"h1": self.heading, "h2": self.heading, "h3": self.heading, "table": self.table}
-        known |= {"figure": self.figure, "li": self.item, "p": self.paragraph, "summary": self.folded}
-        known |= {"img": self.logo}
-        if element.tag in known:
-            known[element.tag](element)
+        writers = {"h1": self.heading, "h2": self.heading, "h3": self.heading, "table": self.table}
+        writers |= {"figure": self.figure, "li": self.item, "p": self.paragraph, "summary": self.folded}
+        writers |= {"img": self.logo}
+        if element.tag in writers:
+            writers[element.tag](element)
         elif "big" in (element.attributes.get("class") or ""):
             self.numbers(element)
         else:
@@ -417,9 +417,9 @@ def _with_figures(text: bytes, places: list[Any], figures: Mapping[str, bytes]) 
         sheet = whole.pages[page]
         shared: Any = sheet["/Resources"].get_object()
         resources = DictionaryObject(shared)  # a page's own: pages share theirs
-        known = resources.get("/XObject", DictionaryObject()).get_object()
+        registered = resources.get("/XObject", DictionaryObject()).get_object()
         resources[NameObject("/XObject")] = DictionaryObject(
-            {**known, **{NameObject(name): reference for name, reference, _ in objects}}
+            {**registered, **{NameObject(name): reference for name, reference, _ in objects}}
         )
         sheet[NameObject("/Resources")] = resources
         more = DecodedStreamObject()
@@ -427,9 +427,9 @@ def _with_figures(text: bytes, places: list[Any], figures: Mapping[str, bytes]) 
         before = sheet.raw_get("/Contents")
         before = list(before) if isinstance(before, ArrayObject) else [before]
         sheet[NameObject("/Contents")] = ArrayObject([*before, whole._add_object(more)])
-    made = io.BytesIO()
-    whole.write(made)
-    return made.getvalue()
+    packed = io.BytesIO()
+    whole.write(packed)
+    return packed.getvalue()
 
 
 def _fonts() -> Path:

@@ -58,7 +58,7 @@ def write_simulation(
             "spectra": save_figure(spectra(runs), work / "figures/spectra"),
         }
         columns = {title: measures(run) for title, run in runs.items()}
-        names = list(dict.fromkeys(name for found in columns.values() for name in found))
+        names = list(dict.fromkeys(name for column in columns.values() for name in column))
         shares = {title: beside.share(title) for title in beside.runs} if beside else {}
         page = render_page(
             "simulation.html.j2",
@@ -74,7 +74,7 @@ def write_simulation(
             figures=figures,
         )
         (work / "simulation.html").write_text(page, encoding="utf-8")
-        rows = [{"measure": name, **{title: found.get(name) for title, found in columns.items()}} for name in names]
+        rows = [{"measure": name, **{title: column.get(name) for title, column in columns.items()}} for name in names]
         for row in rows if bands else []:
             row |= dict(zip((f"{100 * level:g} %" for level in LEVELS), spread[row["measure"]], strict=True))
         (work / "measures.csv").write_text(csv_text(rows), encoding="utf-8")

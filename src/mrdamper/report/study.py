@@ -184,8 +184,8 @@ def _draw(rig: RigStudy, progress: Progress, *, also: tuple[str, ...], limits: t
 
 def _all_identifications(study: Study) -> list[Identification]:
     """Collect every individual fit once; several candidates share them."""
-    found = [i for rig in study.rigs for candidate in rig.candidates for i in candidate.identifications]
-    return list({id(one): one for one in found}.values())
+    identifications = [i for rig in study.rigs for candidate in rig.candidates for i in candidate.identifications]
+    return list({id(one): one for one in identifications}.values())
 
 
 def _validation_table(study: Study) -> str:
@@ -296,8 +296,8 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
     }
 
 
-def _free_names(found: Identification) -> list[str]:
-    return [name for name in found.model.values() if name in found.free]
+def _free_names(identification: Identification) -> list[str]:
+    return [name for name in identification.model.values() if name in identification.free]
 
 
 def _mapped(rig: RigStudy) -> tuple[RecipeResult, ModifiedFit] | None:
@@ -307,9 +307,9 @@ def _mapped(rig: RigStudy) -> tuple[RecipeResult, ModifiedFit] | None:
 
 def _joint_table(chosen: RecipeResult, model: Model) -> list[dict[str, Any]]:
     """List parameters with intervals and their range in cross-validation; fixed parameters have none."""
-    known = {row["name"]: row["written"] for row in table(chosen.damper)}
+    written = {row["name"]: row["written"] for row in table(chosen.damper)}
     return [
-        {"name": info.name, "written": known.get(info.name) or _held(getattr(model, info.name), info.unit)}
+        {"name": info.name, "written": written.get(info.name) or _held(getattr(model, info.name), info.unit)}
         | {"spread": _range(chosen.spread.get(info.name), info.unit), "meaning": info.meaning}
         for info in model.parameters()
     ]
@@ -342,7 +342,7 @@ def _parameters_table(study: Study) -> str:
 
 def _scatter(rig: RigStudy) -> str:
     drift = session_drift(rig.damper, [rig.dataset[run.run_id] for run in rig.chosen.cross_validated.runs])
-    known = (
+    sessions = (
         f"the median cross-validated error corrected for the session is {100 * rig.session_known:.2f} %."
         if isinstance(rig.session_known, float)
         else f"a correction for the session is not possible: {rig.session_known}."
@@ -354,7 +354,7 @@ def _scatter(rig: RigStudy) -> str:
     )
     return omitted + (
         f"Scatter between runs: gain {100 * drift.gain:.1f} %, offset {drift.offset:.0f} N (standard deviations of "
-        f"measured over predicted force). All errors are those of a future test session; {known}"
+        f"measured over predicted force). All errors are those of a future test session; {sessions}"
         + (f" {rig.calibration.summary}." if rig.calibration else "")
     )
 

@@ -114,10 +114,10 @@ def _rig_lines(rig: RigStudy, shown: int, *, verbose: bool) -> tuple[list[str], 
         )
     if verbose:
         lines += [f"  {row['name']} = {row['written']}" for row in table(rig.damper)]
-    found = limitations(chosen, rig.loops)
-    listed = found if verbose else found[:shown]
+    entries = limitations(chosen, rig.loops)
+    listed = entries if verbose else entries[:shown]
     if listed:
-        more = len(found) - len(listed)
+        more = len(entries) - len(listed)
         lines.append(f"  limitations{f' ({more} more with --verbose)' if more else ''}:")
         lines += [f"  - {one.text}" for one in listed]
     return lines, len(listed)

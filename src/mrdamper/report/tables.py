@@ -17,27 +17,27 @@ from mrdamper.study.validation import RunScore
 def identification_rows(identifications: Sequence[Identification]) -> list[dict[str, Any]]:
     """One row an identification: condition, parameters, scores, standard errors, message."""
     rows = []
-    for found in identifications:
+    for identification in identifications:
         row: dict[str, Any] = {
-            "run_id": found.run_id,
-            "rig": found.rig,
-            "model": found.model.name,
-            "method": found.method,
-            "current_A": found.condition.current_A,
-            "frequency_Hz": found.condition.frequency_Hz,
-            "amplitude_m": found.condition.amplitude_m,
-            "nrmse_pp": found.scores.nrmse_pp,
-            "repeatability_nrmse_pp": found.floor,
-            "wape": found.scores.wape,
-            **{f"{name} [{unit}]": value for name, unit, value in _values(found)},
-            **{f"standard error {name}": value for name, value in found.standard_errors.items()},
-            **_ends(found),
-            **{f"effective samples {name}": value for name, value in found.uncertainty.effective.items()},
-            "delay_s": found.delay,
-            "at_bounds": " ".join(found.at_bounds),
-            "evaluations": found.evaluations,
-            "message": str(found.ending),
-            "notes": "; ".join((*found.notes, *found.doubts)),
+            "run_id": identification.run_id,
+            "rig": identification.rig,
+            "model": identification.model.name,
+            "method": identification.method,
+            "current_A": identification.condition.current_A,
+            "frequency_Hz": identification.condition.frequency_Hz,
+            "amplitude_m": identification.condition.amplitude_m,
+            "nrmse_pp": identification.scores.nrmse_pp,
+            "repeatability_nrmse_pp": identification.floor,
+            "wape": identification.scores.wape,
+            **{f"{name} [{unit}]": value for name, unit, value in _values(identification)},
+            **{f"standard error {name}": value for name, value in identification.standard_errors.items()},
+            **_ends(identification),
+            **{f"effective samples {name}": value for name, value in identification.uncertainty.effective.items()},
+            "delay_s": identification.delay,
+            "at_bounds": " ".join(identification.at_bounds),
+            "evaluations": identification.evaluations,
+            "message": str(identification.ending),
+            "notes": "; ".join((*identification.notes, *identification.doubts)),
         }
         rows.append(row)
     return rows
@@ -79,13 +79,15 @@ def score_row(run: RunScore) -> dict[str, Any]:
     }
 
 
-def _ends(found: Identification) -> dict[str, float | None]:
+def _ends(identification: Identification) -> dict[str, float | None]:
     """Ends of the 95 % intervals of the free parameters."""
     columns: dict[str, float | None] = {}
-    for name in (info.name for info in found.model.parameters() if info.name in found.free):
-        columns[f"{name} low 95 %"], columns[f"{name} high 95 %"] = found.interval(name) or (None, None)
+    for name in (info.name for info in identification.model.parameters() if info.name in identification.free):
+        columns[f"{name} low 95 %"], columns[f"{name} high 95 %"] = identification.interval(name) or (None, None)
     return columns
 
 
-def _values(found: Identification) -> list[tuple[str, str, float]]:
-    return [(info.name, info.unit, getattr(found.model, info.name)) for info in found.model.parameters()]
+def _values(identification: Identification) -> list[tuple[str, str, float]]:
+    return [
+        (info.name, info.unit, getattr(identification.model, info.name)) for info in identification.model.parameters()
+    ]

@@ -45,7 +45,7 @@ def plan_tests(
     hours: float,
     about: str | Condition | None = None,
     progress: Progress = lambda what, share: None,
-) -> tuple[list[Proposal], TestDesign]:
+) -> tuple[list[Proposal], ExperimentDesign]:
     """Choose the records that reduce an uncertainty most, in the order to run them.
 
     Parameters
@@ -77,7 +77,7 @@ def plan_tests(
     True
     """
     conditions = limits.candidates(hours)
-    reckoning = TestDesign.of(damper, limits, conditions, about, progress)
+    reckoning = ExperimentDesign.of(damper, limits, conditions, about, progress)
     progress("choosing records", 0.9)
     return reckoning.proposals(reckoning.chosen(hours)), reckoning
 
@@ -86,7 +86,7 @@ Sessions = list[list[int]]  # conditions played in each, by their place in the g
 
 
 @dataclass(frozen=True, eq=False)
-class TestDesign:
+class ExperimentDesign:
     """Information of records at a grid of C conditions on P parameters, session by session.
 
     Attributes
@@ -127,7 +127,7 @@ class TestDesign:
         conditions: Sequence[Condition],
         about: str | Condition | None = None,
         progress: Progress = lambda what, share: None,
-    ) -> TestDesign:
+    ) -> ExperimentDesign:
         """Of a damper with its covariance; raises as `plan_tests`."""
         uncertainty: Uncertainty | None = damper.uncertainty
         if uncertainty is None or not uncertainty.names:

@@ -56,7 +56,7 @@ def archive(written: Sequence[Path], name: str) -> Response:
 def zipped(files: Mapping[str, bytes], name: str) -> Response:
     """Several files by their names."""
     packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as made:
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         for inside, content in files.items():
-            made.writestr(inside, content)
+            archive.writestr(inside, content)
     return download(packed.getvalue(), name, "application/zip")

@@ -27,7 +27,7 @@ from mrdamper.web.api import routers
 from mrdamper.web.drops import NothingTakenError
 from mrdamper.web.page import PageFiles
 from mrdamper.web.security import Guard
-from mrdamper.web.sessions import Sessions
+from mrdamper.web.sessions import BrowserSessions
 from mrdamper.web.work import refusal
 
 _SWEEP_SECONDS = 60.0
@@ -56,7 +56,7 @@ def create_app(
         users of this machine cannot. Without one, anybody who reaches the bench can.
     """
     chart_library = plotly_script().read_bytes()  # sent in one piece: the first picture waits for it
-    sessions = Sessions()
+    sessions = BrowserSessions()
 
     @asynccontextmanager
     async def life(app: FastAPI) -> AsyncIterator[None]:
@@ -97,14 +97,14 @@ def plotly_script() -> Path:
 
     Raises `MissingExtraError` if the package is not installed.
     """
-    found = importlib.util.find_spec("plotly")
-    script = Path(found.origin).parent / "package_data" / "plotly.min.js" if found and found.origin else None
+    spec = importlib.util.find_spec("plotly")
+    script = Path(spec.origin).parent / "package_data" / "plotly.min.js" if spec and spec.origin else None
     if script is None or not script.is_file():
         raise MissingExtraError("the app requires plotly", remedy="pip install 'mrdamper[web]'")
     return script
 
 
-async def _sweep(sessions: Sessions) -> None:
+async def _sweep(sessions: BrowserSessions) -> None:
     while True:
         await asyncio.sleep(_SWEEP_SECONDS)
         await asyncio.to_thread(sessions.sweep)
@@ -130,10 +130,10 @@ def _refuse(request: Request, error: Exception) -> JSONResponse:
 
 
 def _refusal(error: InputError) -> JSONResponse:
-    said: dict[str, Any] = dict(refusal(error))
+    body: dict[str, Any] = dict(refusal(error))
     if isinstance(error, NothingTakenError):
-        said |= {"verdicts": [asdict(v) for v in error.verdicts], "profile": error.profile}
-    return JSONResponse(said, status_code=_STATUS.get(error.code, 422))
+        body |= {"verdicts": [asdict(v) for v in error.verdicts], "profile": error.profile}
+    return JSONResponse(body, status_code=_STATUS.get(error.code, 422))
 
 
 def _decline(request: Request, error: Exception) -> JSONResponse:

@@ -24,9 +24,9 @@ def held_model(damper: Damper, condition: Condition, held: Mapping[str, float]) 
     model = damper.model_at(condition)
     if not held:
         return model
-    known = model.values()
+    values = model.values()
     for name in held:
-        if name not in known:
+        if name not in values:
             raise ParameterError(f"this damper has no parameter {name!r}", remedy="load the page again")
     return replace(model, **held)  # type: ignore[type-var]
 

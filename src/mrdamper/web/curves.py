@@ -66,11 +66,11 @@ def modelled_cycle(model: Model, run: Run, delay: float = 0.0) -> dict[str, Floa
 
 def predicted_on_run(damper: Damper, run: Run) -> tuple[dict[str, Floats], tuple[str, ...]]:
     """The force a damper predicts along the measured motion: last cycle of a sine, or the whole window."""
-    found = damper.predict_run(run)
+    prediction = damper.predict_run(run)
     if equivalent_sine(run).is_sine:
-        return on_screen(found.motion, found.force, *_last_cycle(run)), found.extrapolation
+        return on_screen(prediction.motion, prediction.force, *_last_cycle(run)), prediction.extrapolation
     window = np.flatnonzero(run.in_window)
-    return on_screen(found.motion, found.force, window, most=_MOST_OF_WINDOW), found.extrapolation
+    return on_screen(prediction.motion, prediction.force, window, most=_MOST_OF_WINDOW), prediction.extrapolation
 
 
 def _motion(run: Run) -> Excitation:

@@ -38,9 +38,9 @@ class NothingTakenError(DropError):
 
     code = "E_DROP_REFUSED"
 
-    def __init__(self, found: str, verdicts: tuple[Verdict, ...], profile: str):
+    def __init__(self, problem: str, verdicts: tuple[Verdict, ...], profile: str):
         super().__init__(
-            found, remedy="see each file below; where the form was guessed wrongly, correct the rig profile"
+            problem, remedy="see each file below; where the form was guessed wrongly, correct the rig profile"
         )
         self.verdicts, self.profile = verdicts, profile
 

@@ -78,5 +78,5 @@ def _read_dataset(drop: Drop, parts: Mapping[str, Path]) -> Intake:
     for name, path in parts.items():
         (folder / name).hardlink_to(path)
     drop.names[folder] = top or "the dropped dataset"
-    found = load_dataset(folder)
-    return Intake(Dataset(found.runs, top or "dropped dataset"), "drop")
+    dataset = load_dataset(folder)
+    return Intake(Dataset(dataset.runs, top or "dropped dataset"), "drop")

@@ -89,15 +89,15 @@ def keep(session: Session, state: str, shown: str | None, logo: str = "") -> byt
         current=next((i for i, bench in enumerate(dampers) if bench.key == shown), None),
     )  # fmt: skip
     packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as made:
-        made.writestr(LIST, about.model_dump_json(indent=1))  # first: the page knows the file by it
-        made.writestr(STATE, state)
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(LIST, about.model_dump_json(indent=1))  # first: the page knows the file by it
+        archive.writestr(STATE, state)
         if picture:
-            made.writestr(LOGO, picture)
+            archive.writestr(LOGO, picture)
         for name, bench in zip(files, dampers, strict=True):
-            made.writestr(name, dump_model(bench.damper))
+            archive.writestr(name, dump_model(bench.damper))
         if intake and intake.source != "bundled":
-            _write_data(intake.dataset, made)
+            _write_data(intake.dataset, archive)
     if packed.tell() > FILE_LIMIT:
         raise KeptError(
             f"the bench is {packed.tell() / 1e6:.0f} MB, over the {FILE_LIMIT / 1e6:.0f} MB a bench takes back",
@@ -106,12 +106,12 @@ def keep(session: Session, state: str, shown: str | None, logo: str = "") -> byt
     return packed.getvalue()
 
 
-def _write_data(dataset: Dataset, made: zipfile.ZipFile) -> None:
+def _write_data(dataset: Dataset, archive: zipfile.ZipFile) -> None:
     with temporary_folder() as place:
         folder = place / DATA
         save_dataset(dataset, folder)
         for path in sorted(folder.iterdir()):
-            made.write(path, f"{DATA}/{path.name}")
+            archive.write(path, f"{DATA}/{path.name}")
 
 
 def open_kept(path: Path, place: Path) -> Kept:
@@ -138,9 +138,9 @@ def _read(archive: zipfile.ZipFile, place: Path) -> Kept:
     except ValueError as error:
         raise KeptError("has another version", where=LIST, remedy="update mrdamper, or save it again") from error
     data = [f"{DATA}/{name}" for name in ("runs.csv", *SAMPLE_FILES)]
-    known = {LIST, STATE, LOGO, *(d.file for d in about.dampers), *data}
-    if len(set(names)) != len(names) or not set(names) <= known:
-        odd = next((n for n in names if n not in known), "one name twice")
+    expected = {LIST, STATE, LOGO, *(d.file for d in about.dampers), *data}
+    if len(set(names)) != len(names) or not set(names) <= expected:
+        odd = next((n for n in names if n not in expected), "one name twice")
         raise KeptError(f"holds {PurePosixPath(odd).name!r:.60}", where="the saved project", remedy="save it again")
     if about.current is not None and about.current >= len(about.dampers):
         raise KeptError("names a damper it does not hold", where=LIST, remedy="save it again")

@@ -15,7 +15,7 @@ from mrdamper.errors import InputError
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.rig_import import ImportResult, Refusal
 from mrdamper.rig_files.tests_table import NAME as TESTS
-from mrdamper.rig_files.tests_table import Row, TestsTable, load_tests
+from mrdamper.rig_files.tests_table import TableOfTestsRow, TestsTable, load_tests
 from mrdamper.web.drops import Drop, Intake, NothingTakenError, Verdict
 
 _PROFILES_TRIED = 5  # files looked at for the first whose form can be guessed
@@ -66,8 +66,8 @@ def split_again(dataset: Dataset, held_out: Collection[str] | None) -> Dataset:
 
 def _table_of(drop: Drop) -> TestsTable | None:
     """The table of tests that was dropped beside the files."""
-    found = [path for path, name in drop.names.items() if PurePosixPath(name).name == TESTS]
-    return load_tests(found[0]) if found else None
+    tables = [path for path, name in drop.names.items() if PurePosixPath(name).name == TESTS]
+    return load_tests(tables[0]) if tables else None
 
 
 def _imported(
@@ -75,12 +75,12 @@ def _imported(
 ) -> ImportResult:
     """A file read with what the dropped table says of its tests, and the currents that the page states for them."""
     rows = () if table is None else table.of_file(Path(drop.names[path]))
-    stated = [Row(0, "", run, current) for (file, run), current in drop.currents.items() if file == path]
+    stated = [TableOfTestsRow(0, "", run, current) for (file, run), current in drop.currents.items() if file == path]
     if not rows and not stated:
         return read([path], profile)
     runs = {row.run for row in stated}
-    told = (*stated, *(replace(row, file="") for row in rows if row.run not in runs))
-    return read([path], profile, tests=TestsTable(path.with_name(TESTS), told))
+    statements = (*stated, *(replace(row, file="") for row in rows if row.run not in runs))
+    return read([path], profile, tests=TestsTable(path.with_name(TESTS), statements))
 
 
 def _by_name(drop: Drop) -> list[Path]:

@@ -26,7 +26,7 @@ _FAR, _ALSO = 0.4, 0.2  # beyond, a run says nothing about the condition asked f
 
 
 @dataclass(frozen=True, eq=False)
-class Row:
+class TableRow:
     """One run."""
 
     key: str  # made here
@@ -41,7 +41,7 @@ class RigTable:
     """The runs of one rig, in the order of the file."""
 
     dataset: Dataset
-    rows: tuple[Row, ...]
+    rows: tuple[TableRow, ...]
     _judging: threading.Lock = field(default_factory=threading.Lock, repr=False)
 
     @classmethod
@@ -50,7 +50,7 @@ class RigTable:
         sines, refused = usable_sines(dataset)
         steady = {run.id for run in sines}
         rows = [
-            Row(f"run{i}", run, _condition(run), _loop(run) if run.id in steady else None, refused.get(run.id, ""))
+            TableRow(f"run{i}", run, _condition(run), _loop(run) if run.id in steady else None, refused.get(run.id, ""))
             for i, run in enumerate(dataset)
         ]
         return cls(dataset, tuple(rows))
@@ -66,7 +66,7 @@ class RigTable:
         return quality_table(record_of(row.run) for row in self.rows)
 
     @cached_property
-    def steady(self) -> list[tuple[Row, Condition]]:
+    def steady(self) -> list[tuple[TableRow, Condition]]:
         """Steady sines, each with its condition."""
         return [(row, row.condition) for row in self.rows if row.loop and row.condition]
 
@@ -75,18 +75,18 @@ class RigTable:
         """Levels of the steady sines [A], rising."""
         return sorted(set(current_levels([condition.current_A for _, condition in self.steady])))
 
-    def row(self, key: str) -> Row:
+    def row(self, key: str) -> TableRow:
         """The row of that key; raises `InputError` if there is none."""
         for row in self.rows:
             if row.key == key:
                 return row
         raise InputError("no such run on the bench", remedy="choose one from the table", code="E_NAME")
 
-    def nearest(self, condition: Condition, most: int = _NEAREST, anywhere: bool = False) -> list[Row]:
+    def nearest(self, condition: Condition, most: int = _NEAREST, anywhere: bool = False) -> list[TableRow]:
         """Steady sines measured nearest to a condition, the nearest first; the far ones only if `anywhere`."""
         reach = max((c.current_A for _, c in self.steady), default=0.0) or 1.0
 
-        def distance(steady: tuple[Row, Condition]) -> float:
+        def distance(steady: tuple[TableRow, Condition]) -> float:
             _, c = steady
             return max(
                 abs(c.current_A - condition.current_A) / reach,
@@ -97,12 +97,12 @@ class RigTable:
         ordered = sorted(self.steady, key=distance)[:most]
         return [one[0] for i, one in enumerate(ordered) if anywhere or distance(one) <= (_ALSO if i else _FAR)]
 
-    def at_motion(self, condition: Condition) -> list[Row]:
+    def at_motion(self, condition: Condition) -> list[TableRow]:
         """Steady sines of the motion of a condition, at any current."""
         groups = same_motion([condition, *(c for _, c in self.steady)])
         return [self.steady[i - 1][0] for i in groups[0] if i > 0]
 
-    def motions(self) -> list[list[Row]]:
+    def motions(self) -> list[list[TableRow]]:
         """Steady sines of one motion each, slow and small first: the lines of the test matrix."""
         rows, conditions = [row for row, _ in self.steady], [c for _, c in self.steady]
         groups = same_motion(conditions)
@@ -121,7 +121,7 @@ def rig_table(dataset: Dataset, rig: str) -> RigTable:
     return tables[rig]
 
 
-def describe(row: Row) -> dict[str, Any]:
+def describe(row: TableRow) -> dict[str, Any]:
     """A row as the page shows it, in its units."""
     run, loop = row.run, row.loop
     return {

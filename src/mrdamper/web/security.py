@@ -86,8 +86,8 @@ class Guard:
             await send(message)
 
         if refusal:
-            said = {"text": refusal, "code": "E_STRANGER"}
-            await JSONResponse(said, status_code=403)(scope, receive, send_guarded)
+            body = {"text": refusal, "code": "E_STRANGER"}
+            await JSONResponse(body, status_code=403)(scope, receive, send_guarded)
         else:
             await self.app(scope, receive_some, send_guarded)
 

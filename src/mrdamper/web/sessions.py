@@ -79,10 +79,10 @@ class Session:
             raise InputError("no data on the bench", remedy="open the bundled tests, or drop files", code="E_NO_DATA")
         return self.intake.dataset
 
-    def result(self, name: str, found: str, remedy: str) -> Any:
+    def result(self, name: str, problem: str, remedy: str) -> Any:
         """Return the result of work under a name; raises `InputError` (E_NO_RESULT) where it left nothing."""
         if not self.results.get(name):
-            raise InputError(found, remedy=remedy, code="E_NO_RESULT")
+            raise InputError(problem, remedy=remedy, code="E_NO_RESULT")
         return self.results[name]
 
     def put(self, intake: Intake) -> None:
@@ -113,15 +113,15 @@ class Session:
             del self.dampers[next(iter(self.dampers))]
         return bench
 
-    def scored(self, found: RecipeResult, origin: str, note: str, selected: bool = False) -> Bench:
+    def scored(self, result: RecipeResult, origin: str, note: str, selected: bool = False) -> Bench:
         """Add a damper whose covariance is estimated from its runs when it is first asked for."""
-        error = found.cross_validated.median() if found.cross_validated.runs else None
-        if found.damper.uncertainty is not None:
-            return self.add(found.damper, origin, note, error=error, selected=selected)
-        runs = [self.dataset[run.run_id] for run in found.train.runs]
-        beside = [score.predicted for score in found.cross_validated.runs if score.predicted is not None]
-        learn = partial(estimate_uncertainty, found.damper, runs, beside)
-        return self.add(found.damper, origin, note, error=error, selected=selected, learn=learn)
+        error = result.cross_validated.median() if result.cross_validated.runs else None
+        if result.damper.uncertainty is not None:
+            return self.add(result.damper, origin, note, error=error, selected=selected)
+        runs = [self.dataset[run.run_id] for run in result.train.runs]
+        beside = [score.predicted for score in result.cross_validated.runs if score.predicted is not None]
+        learn = partial(estimate_uncertainty, result.damper, runs, beside)
+        return self.add(result.damper, origin, note, error=error, selected=selected, learn=learn)
 
     def damper(self, key: str, sure: bool = False) -> Bench:
         """A damper on the bench by its key, with its covariance where that is asked for and can be known."""
@@ -168,7 +168,7 @@ class Session:
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
-class Sessions:
+class BrowserSessions:
     """All sessions of one bench."""
 
     def __init__(self) -> None:

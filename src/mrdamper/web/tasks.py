@@ -43,8 +43,8 @@ def study(tell: Tell, dataset: Dataset, folder: Path, about: About | None = None
     from mrdamper.report.study import write_study
 
     result = run_study(dataset, lambda what, share: tell(what, 0.6 * share))
-    told = lambda what, share: tell(what, 0.6 + 0.4 * share)  # noqa: E731
-    return result, write_study(result, folder, told, about=about, also=("pdf",))
+    report = lambda what, share: tell(what, 0.6 + 0.4 * share)  # noqa: E731
+    return result, write_study(result, folder, report, about=about, also=("pdf",))
 
 
 def identify_rig(
@@ -94,16 +94,16 @@ def identify_rig(
         recipe = modified(model, method)
         basis = Basis(model, method, tuple(free), tuple(sorted(fixed.items())))
         recipe = replace(recipe, basis=basis, make=fit_functions_jointly if over == ALL_AT_ONCE else fit_per_run)
-    found, spent = identified(recipe.basis, runs, {}, lambda what, share: tell(what, 0.8 * share))
+    identifications, spent = identified(recipe.basis, runs, {}, lambda what, share: tell(what, 0.8 * share))
     tell("over all conditions", 0.8)
     try:
-        scored = fit_and_score(recipe, runs, found, dataset.split("validate"), spent=spent, leave_out=False)
+        scored = fit_and_score(recipe, runs, identifications, dataset.split("validate"), spent=spent, leave_out=False)
     except InputError as error:
-        if not found:
+        if not identifications:
             raise
-        return tuple(found), str(error), refused
+        return tuple(identifications), str(error), refused
     tell("uncertainty", 0.95)
-    return tuple(found), replace(scored, damper=estimate_uncertainty(scored.damper, runs)), refused
+    return tuple(identifications), replace(scored, damper=estimate_uncertainty(scored.damper, runs)), refused
 
 
 def compare_models(tell: Tell, dataset: Dataset, names: Sequence[str], jobs: int) -> Comparison:

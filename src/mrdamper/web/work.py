@@ -118,20 +118,20 @@ class Job:
     def _listen(self, here: Connection) -> None:
         while True:
             try:
-                kind, *said = here.recv()
+                kind, *content = here.recv()
             except EOFError:
                 if self._stop.is_set():
                     return self._end("cancelled")
                 return self._lose()
             if kind == "tell":
-                self.what, self.share = said
+                self.what, self.share = content
             elif kind == "done":
-                return self._conclude(said[0])
+                return self._conclude(content[0])
             elif kind == "refused":
-                self.error = said[0]
+                self.error = content[0]
                 return self._end("refused")
             else:
-                return self._fail(said[0])
+                return self._fail(content[0])
 
     def _conclude(self, result: Any) -> None:
         if self._stop.is_set():

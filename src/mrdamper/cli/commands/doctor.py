@@ -18,13 +18,13 @@ def register(app: typer.Typer) -> None:
         Integrated models (Spencer, LuGre), play and bypass, and simulated systems are compiled with the C compiler of
         this machine. Without one they run in the interpreter, more slowly, with the same results.
         """
-        found = _facts()
+        facts = _facts()
         if as_json:
-            print(json.dumps(found, indent=1))
+            print(json.dumps(facts, indent=1))
             return
-        for name, value in found.items():
+        for name, value in facts.items():
             print(f"{name.replace('_', ' '):24} {value}")
-        if not found["compiled"]:
+        if not facts["compiled"]:
             print(
                 "remedy: install a C compiler (gcc, clang, Visual C++), or pip install 'mrdamper[compiler]';\n"
                 "  after a repair: mrdamper cache --clear"

@@ -20,15 +20,15 @@ def register(app: typer.Typer) -> None:
         codes = load_codes()
         if code is None:
             width = max(map(len, codes))
-            print("\n".join(f"{name:{width}}  {told['meaning']}" for name, told in codes.items()))
+            print("\n".join(f"{name:{width}}  {entry['meaning']}" for name, entry in codes.items()))
             return
         name = code.strip().strip("[]").upper()
         if name not in codes:
             near = " or ".join(get_close_matches(name, codes, n=3, cutoff=0.5))
             remedy = f"did you mean {near}?" if near else "mrdamper explain lists all codes"
             raise UnknownNameError(f"no code is called {name!r}", remedy=remedy)
-        told = codes[name]
-        print(f"{name}\n\n{told['meaning']}\n\nExample: {told['example']}\n\nWhat to do: {told['remedy']}")
+        entry = codes[name]
+        print(f"{name}\n\n{entry['meaning']}\n\nExample: {entry['example']}\n\nWhat to do: {entry['remedy']}")
 
 
 def load_codes() -> dict[str, dict[str, str]]:
@@ -48,8 +48,8 @@ def codes_page() -> str:
     ]
     for title, prefix in (("Errors", "E_"), ("Warnings", "W_")):
         parts.append(f"## {title}\n")
-        for name, told in load_codes().items():
+        for name, entry in load_codes().items():
             if name.startswith(prefix):
-                parts.append(f"### {name}\n\n{told['meaning']}\n")
-                parts.append(f"Example: `` {told['example']} ``\n\nWhat to do: {told['remedy']}\n")
+                parts.append(f"### {name}\n\n{entry['meaning']}\n")
+                parts.append(f"Example: `` {entry['example']} ``\n\nWhat to do: {entry['remedy']}\n")
     return "\n".join(parts)

@@ -40,15 +40,15 @@ def register(app: typer.Typer) -> None:
                 f"--fmi {fmi} with --to {to}", remedy="leave --fmi out, or export --to fmu", code="E_OPTION"
             )
         options = {} if fmi is None else {"fmi": fmi}
-        made = kind(**options)
+        format_writer = kind(**options)
         require_writable(out)
         damper = load_model(model)
         called = identifier(name or damper.rig or "damper")
         with progress_soon(f"making {to}{' and checking it' if to == 'fmu' else ''}"):
             if inverse:
-                paths, notes = _inverse(damper, f"{called}_inverse", to, made, out)
+                paths, notes = _inverse(damper, f"{called}_inverse", to, format_writer, out)
             else:
-                written = made.export(damper, called)
+                written = format_writer.export(damper, called)
                 paths, notes = write_export(written, out, kind.suffix), written.notes
         for path in paths:
             typer.echo(path)

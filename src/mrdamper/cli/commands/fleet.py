@@ -53,7 +53,7 @@ def register(app: typer.Typer) -> None:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         try:
             with progress_on_stderr() as progress:
-                found = run_fleet(
+                outcome = run_fleet(
                     source,
                     out,
                     profile=load_fleet_profile(profile),
@@ -67,28 +67,28 @@ def register(app: typer.Typer) -> None:
                 progress("page", 1.0)
                 from mrdamper.fleet.page import write_page
 
-                page = found.table.with_name("fleet.html")
-                said = write_page(found.table, found.plan, bounds, page)
+                page = outcome.table.with_name("fleet.html")
+                text = write_page(outcome.table, outcome.plan, bounds, page)
         except KeyboardInterrupt:
             typer.echo("stopped; finished dampers are saved: run the same command again to continue", err=True)
             raise typer.Exit(130) from None
-        for name, status, reason in found.troubled:
+        for name, status, reason in outcome.troubled:
             typer.echo(f"{status}: {name}: {reason}", err=True)
         if as_json:
-            print(json.dumps({**_summary(found), "page": str(page), "said": said}, indent=1, ensure_ascii=False))
+            print(json.dumps({**_summary(outcome), "page": str(page), "messages": text}, indent=1, ensure_ascii=False))
         else:
-            print(f"{found.done} of {found.dampers} dampers identified ({found.already} in an earlier run)")
-            print("\n".join(said), end="\n" if said else "")
-            print(f"table: {found.table}\npage: {page}")
-        if not found.done:
+            print(f"{outcome.done} of {outcome.dampers} dampers identified ({outcome.already} in an earlier run)")
+            print("\n".join(text), end="\n" if text else "")
+            print(f"table: {outcome.table}\npage: {page}")
+        if not outcome.done:
             raise typer.Exit(2)
 
 
-def _summary(found) -> dict:
+def _summary(result) -> dict:
     return {
-        "dampers": found.dampers,
-        "done": found.done,
-        "already": found.already,
-        "troubled": [{"name": n, "status": s, "reason": r} for n, s, r in found.troubled],
-        "table": str(found.table),
+        "dampers": result.dampers,
+        "done": result.done,
+        "already": result.already,
+        "troubled": [{"name": n, "status": s, "reason": r} for n, s, r in result.troubled],
+        "table": str(result.table),
     }

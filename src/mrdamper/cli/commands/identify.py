@@ -48,11 +48,11 @@ def register(app: typer.Typer) -> None:
         if run:
             dataset = dataset.only([dataset[name] for name in run])
         sines, refused = workflow.usable_sines(dataset, clipped)
-        found = []
+        identifications = []
         with progress_on_stderr() as progress:
             for number, entry in enumerate(sines):
                 progress(f"run {entry.id}", number / len(sines))
-                found.append(
+                identifications.append(
                     identification.identify(
                         entry,
                         chosen_model,
@@ -67,8 +67,8 @@ def register(app: typer.Typer) -> None:
             progress("identified", 1.0)
         for name, why in refused.items():
             typer.echo(f"not identified: {name}: {why}", err=True)
-        put(identification_rows(found), out, as_json, csv_text)
-        doubts = [f"warning: run {one.run_id}: {doubt}" for one in found for doubt in one.doubts]
+        put(identification_rows(identifications), out, as_json, csv_text)
+        doubts = [f"warning: run {one.run_id}: {doubt}" for one in identifications for doubt in one.doubts]
         for line in doubts[:_MAX_WARNINGS]:
             typer.echo(line, err=True)
         if len(doubts) > _MAX_WARNINGS:

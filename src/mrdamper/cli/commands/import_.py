@@ -59,23 +59,23 @@ def register(app: typer.Typer) -> None:
         from mrdamper.rig_files.rig_import import import_files
 
         _refuse_taken(out, add)
-        known = load_profile(profile) if profile is not None else Profile()
+        settings = load_profile(profile) if profile is not None else Profile()
         if write_profile is not None:
-            _write_profile(files, known, write_profile)
+            _write_profile(files, settings, write_profile)
         if write_tests is not None:
-            _write_tests(files, known, write_tests)
+            _write_tests(files, settings, write_tests)
         dry = out is None
         if dry and (write_profile is not None or write_tests is not None):
             return
         if dry and not as_json:
-            _print_tree(files, known)
+            _print_tree(files, settings)
         with progress_on_stderr(quiet or as_json) as progress:
-            result = import_files(files, known, tests=tests, progress=progress)
+            result = import_files(files, settings, tests=tests, progress=progress)
             if (_on_terminal() if ask is None else ask) and not as_json:
-                known, result = _asked(files, known, result, tests)
+                settings, result = _asked(files, settings, result, tests)
         wrong = bool(result.refusals) and not skip_refused
         written = bool(result.records) and not wrong and out is not None
-        total = _write_dataset(result, known, out, add) if written and out is not None else 0
+        total = _write_dataset(result, settings, out, add) if written and out is not None else 0
         if as_json:
             import json
 
@@ -102,14 +102,14 @@ def _refuse_taken(out: Path | None, add: bool) -> None:
     require_writable(out)
 
 
-def _write_tests(files: list[Path], known: Profile, target: Path) -> None:
+def _write_tests(files: list[Path], settings: Profile, target: Path) -> None:
     """Every test that can be read, also those whose current is not known yet."""
     from mrdamper.data.atomic import write_file
     from mrdamper.errors import InputError
     from mrdamper.rig_files.rig_import import found_tests
     from mrdamper.rig_files.tests_table import tests_text
 
-    records, refusals = found_tests(files, known)
+    records, refusals = found_tests(files, settings)
     for refusal in refusals:
         typer.echo(f"not in the table: {refusal.error}", err=True)
     if not records:
@@ -122,7 +122,7 @@ def _write_tests(files: list[Path], known: Profile, target: Path) -> None:
     print(f"table of {len(records)} tests: {target}; complete it, then import with it")
 
 
-def _write_profile(files: list[Path], known: Profile, target: Path) -> None:
+def _write_profile(files: list[Path], settings: Profile, target: Path) -> None:
     from mrdamper.data.atomic import write_file
     from mrdamper.errors import InputError
     from mrdamper.rig_files.preview import columns_of, guess_profile
@@ -130,8 +130,8 @@ def _write_profile(files: list[Path], known: Profile, target: Path) -> None:
     from mrdamper.rig_files.rig_import import first_file, read_runs
 
     with first_file(files) as first:
-        guess = guess_profile(first, known)
-        text = profile_text(guess) + _alternatives(columns_of(first, known))
+        guess = guess_profile(first, settings)
+        text = profile_text(guess) + _alternatives(columns_of(first, settings))
         try:
             read_runs(first, guess)
         except InputError as error:
@@ -181,8 +181,8 @@ def _joined(old: Dataset, new: Dataset) -> Dataset:
     from mrdamper.data import Dataset
     from mrdamper.errors import OutputError
 
-    known = {(run.notes.get("sha256"), run.id) for run in old if run.notes.get("sha256")}
-    again = [run.id for run in new if (run.notes.get("sha256"), run.id) in known]
+    stored = {(run.notes.get("sha256"), run.id) for run in old if run.notes.get("sha256")}
+    again = [run.id for run in new if (run.notes.get("sha256"), run.id) in stored]
     if again:
         raise OutputError(
             f"{len(again)} of the tests are there already: {', '.join(again[:5])}{' ...' if again[5:] else ''}",
@@ -205,25 +205,27 @@ def _on_terminal() -> bool:
     return sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
 
 
-def _print_tree(files: list[Path], known: Profile) -> None:
+def _print_tree(files: list[Path], settings: Profile) -> None:
     from mrdamper.rig_files.mapping.tree import tree_lines
     from mrdamper.rig_files.preview import scan
 
     print("In the files:")
-    for line in tree_lines(scan(files, known)):
+    for line in tree_lines(scan(files, settings)):
         print(f"  {line}")
 
 
-def _asked(files: list[Path], known: Profile, result: ImportResult, tests: Path | None) -> tuple[Profile, ImportResult]:
+def _asked(
+    files: list[Path], settings: Profile, result: ImportResult, tests: Path | None
+) -> tuple[Profile, ImportResult]:
     """Ask what the refusals leave open, one question at a time, and read the files again with each answer."""
     from mrdamper.rig_files.mapping.questions import question_of
     from mrdamper.rig_files.preview import columns_of
     from mrdamper.rig_files.profile import profile_text
     from mrdamper.rig_files.rig_import import import_files
 
-    before = known
+    before = settings
     for _ in range(_MOST_QUESTIONS):
-        questions = (question_of(refusal.error, columns_of(refusal.file, known)) for refusal in result.refusals)
+        questions = (question_of(refusal.error, columns_of(refusal.file, settings)) for refusal in result.refusals)
         question = next((question for question in questions if question is not None), None)
         if question is None:
             break
@@ -233,11 +235,11 @@ def _asked(files: list[Path], known: Profile, result: ImportResult, tests: Path 
         chosen = typer.prompt("Number, 0 to stop", type=int, default=0)
         if not 1 <= chosen <= len(question.answers):
             break
-        known = question.answers[chosen - 1].applied(known)
-        result = import_files(files, known, tests=tests)
-    if known != before:
-        typer.echo(f"The answers as a profile:\n{profile_text(known)}")
-    return known, result
+        settings = question.answers[chosen - 1].applied(settings)
+        result = import_files(files, settings, tests=tests)
+    if settings != before:
+        typer.echo(f"The answers as a profile:\n{profile_text(settings)}")
+    return settings, result
 
 
 def _print(result: ImportResult, out: Path | None, total: int, *, dry: bool = False, verbose: bool = False) -> None:
@@ -247,8 +249,8 @@ def _print(result: ImportResult, out: Path | None, total: int, *, dry: bool = Fa
     if len(columns) == 1 and len(result.records) > 1:
         print(f"columns: {columns.pop()}")
     for record in result.records:
-        known = record.time[~(record.time != record.time)]
-        seconds = float(known[-1] - known[0])
+        valid = record.time[~(record.time != record.time)]
+        seconds = float(valid[-1] - valid[0])
         current = "" if record.current is None else f", {_current(record)}"
         more = f", {record.provenance['columns']}" if columns else ""
         print(f"{record.id}: {record.time.size} samples, {seconds:.4g} s{current}{more}")
@@ -290,9 +292,9 @@ def _finding_lines(result: ImportResult, verbose: bool) -> list[str]:
             if finding.code not in _OF_FORM:
                 alike.setdefault(finding.code, []).append((record.id, finding.text))
     lines = []
-    for code, found in alike.items():
-        first = f"{found[0][0]}: {found[0][1]} [{code}]"
-        tests = {name for name, _ in found}
+    for code, group in alike.items():
+        first = f"{group[0][0]}: {group[0][1]} [{code}]"
+        tests = {name for name, _ in group}
         lines.append(f"  {first}" if len(tests) == 1 else f"  {first}, in {len(tests)} tests")
     return lines
 

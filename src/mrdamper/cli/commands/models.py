@@ -20,10 +20,10 @@ def register(app: typer.Typer) -> None:
         from mrdamper.errors import UnknownNameError
         from mrdamper.models import all_models
 
-        known = {**all_models(), **all_published()}
-        if name and name not in known:
-            raise UnknownNameError.of("model", name, known)
-        chosen = [known[name]] if name else list(known.values())
+        types = {**all_models(), **all_published()}
+        if name and name not in types:
+            raise UnknownNameError.of("model", name, types)
+        chosen = [types[name]] if name else list(types.values())
         if as_json:
             print(json.dumps([_entry(model) for model in chosen], indent=1, ensure_ascii=False))
         elif name:

@@ -90,7 +90,7 @@ def register(app: typer.Typer) -> None:
                 f"warning: {WARNINGS.get(flag, f'{flag} lies outside the tested range (extrapolation)')}",
                 err=True,
             )
-        known = band(damper, prediction, level)
+        interval = band(damper, prediction, level)
         if check_run:
             from mrdamper.dampers.bands import session_band
             from mrdamper.dampers.sessions import RecordingTime, sessions_known
@@ -100,7 +100,7 @@ def register(app: typer.Typer) -> None:
             runs = [dataset[name] for name in check_run]
             expected = sessions_known(damper, runs).expected(RecordingTime.of(runs[-1]))
             assert expected is not None  # the last check run's own session
-            known = session_band(expected, damper, prediction, level)
+            interval = session_band(expected, damper, prediction, level)
             prediction = expected.corrected(prediction)
             typer.echo(
                 f"session known by {', '.join(check_run)}: gain {expected.gain:.3f} ± {expected.gain_spread:.3f}, "
@@ -108,11 +108,12 @@ def register(app: typer.Typer) -> None:
                 err=True,
             )
         typer.echo(
-            _said(prediction, known, level, scope(damper, level)) if known else f"note: {no_band(damper)}", err=True
+            _said(prediction, interval, level, scope(damper, level)) if interval else f"note: {no_band(damper)}",
+            err=True,
         )
         if plot is not None:
-            _write_figure(plot, prediction, known, level)
-        put(prediction_rows(prediction, known), out, as_json, csv_text)
+            _write_figure(plot, prediction, interval, level)
+        put(prediction_rows(prediction, interval), out, as_json, csv_text)
 
 
 def _write_figure(path: Path, prediction: Prediction, interval: Band | None, level: float) -> None:
@@ -129,25 +130,26 @@ def _write_figure(path: Path, prediction: Prediction, interval: Band | None, lev
         predicted_force(prediction, interval, level).savefig(target, format=kind, **HOW_SAVED[kind])
 
 
-def _said(prediction: Prediction, known: Band, level: float, where: str) -> str:
+def _said(prediction: Prediction, interval: Band, level: float, where: str) -> str:
     """Describe peak force, energy and damping with their intervals."""
     from mrdamper.statistics.metrics import dissipated_power, peak_force
 
     parts = ", ".join(
         f"{name} {float((part**2).mean() ** 0.5):.3g} N"
-        for name, part in (("parameters", known.parameter), ("session", known.session), ("model", known.model))
+        for name, part in (("parameters", interval.parameter), ("session", interval.session), ("model", interval.model))
     )
     motion, c = prediction.motion, prediction.condition
     power = dissipated_power(prediction.force, motion.velocity, motion.time)
     energy = power / c.frequency_Hz if c.frequency_Hz > 0 else math.nan  # of a cycle
     # Of the linear damper that takes as much out of the same sine: C = E/(π ω X²).
     damping = 2 * power / c.peak_velocity**2 if c.peak_velocity > 0 else math.nan
-    low, high = (1 + share for share in known.energy)
+    low, high = (1 + share for share in interval.energy)
     return "\n".join(
         (
             f"peak force {peak_force(prediction.force):.4g} N, {100 * level:g} % prediction interval "
-            f"{known.peak[0]:.4g} to {known.peak[1]:.4g} N {where}; with gain and offset of the session corrected "
-            f"{known.known_session[0]:.4g} to {known.known_session[1]:.4g} N",
+            f"{interval.peak[0]:.4g} to {interval.peak[1]:.4g} N {where}; "
+            "with gain and offset of the session corrected "
+            f"{interval.known_session[0]:.4g} to {interval.known_session[1]:.4g} N",
             f"dissipated energy {energy:.4g} J per cycle ({energy * low:.4g} to {energy * high:.4g})",
             f"equivalent damping {damping:.4g} N s/m ({damping * low:.4g} to {damping * high:.4g})",
             f"standard deviation of the force: {parts}",

@@ -85,18 +85,18 @@ def register(app: typer.Typer) -> None:
             written = write_reproduction(
                 study, out, lambda what, share: progress(what, 0.85 + 0.15 * share), png=png, processes=processes
             )
-        found = summary(study)
+        text = summary(study)
         if as_json:
-            print(json.dumps(found | {"files": [str(p) for p in written]}, indent=1))
+            print(json.dumps(text | {"files": [str(p) for p in written]}, indent=1))
             return
         if study.rig is not None:
             print("virtual rig: all data are synthetic")
         print(f"  {'validation runs, nrmse_pp':52}{'median':>9}{'worst':>9}{'s':>8}")
-        for row, took in zip(found["verdicts"], found["times"], strict=False):
+        for row, took in zip(text["verdicts"], text["times"], strict=False):
             errors = (row["nrmse_pp"], row["worst_nrmse_pp"])
             shown = "".join(f"{'–':>9}" if error is None else f"{100 * error:7.2f} %" for error in errors)
             print(f"  {row['method']:52}{shown}{took['seconds']:8.1f}")
-        for claim in found["claims"]:
+        for claim in text["claims"]:
             print(f"  {claim['said']:50} {claim['claim']}")
         print(f"page: {written[0]}")
 

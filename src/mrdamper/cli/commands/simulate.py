@@ -74,12 +74,12 @@ def register(app: typer.Typer) -> None:
             require_writable(out)
         elif compare:
             raise InputError("--compare without --out", remedy="give a folder for the report")
-        found = load_system(system)
+        loaded = load_system(system)
         shaken_by = load_input(*parse_named(source, "--input"), time_scale=time_scale)
-        dampers: dict[str, Damper] = {} if without else dict(found.dampers)
+        dampers: dict[str, Damper] = {} if without else dict(loaded.dampers)
         if damper is not None and not without:
-            dampers = dict.fromkeys((link.name for link in found.system.dampers), load_model(damper))
-        empty = [link.name for link in found.system.dampers if link.name not in dampers]
+            dampers = dict.fromkeys((link.name for link in loaded.system.dampers), load_model(damper))
+        empty = [link.name for link in loaded.system.dampers if link.name not in dampers]
         if empty and not without:
             raise InputError(
                 f"no model for the damper {', '.join(empty)}",
@@ -95,23 +95,23 @@ def register(app: typer.Typer) -> None:
         if others and not dampers:
             raise InputError("controllers without a damper", remedy="omit --without-damper or --compare")
         if law_out is not None or law_fmu is not None:
-            _export_law(SystemLoop(found.system, shaken_by, dampers, controller, highest), law_out, law_fmu)
+            _export_law(SystemLoop(loaded.system, shaken_by, dampers, controller, highest), law_out, law_fmu)
         drawn = None
         if draws is not None:
             if not dampers:
                 raise InputError("draws without a damper", remedy="omit --without-damper or --draws")
             drawn = draw(dampers, draws, seed)
         bands, paths = None, []
-        with progress_soon(f"{found.system.title}, time step halved until peaks converge") as tell:
-            done = simulate_system(found.system, shaken_by, dampers, controller, step, highest)
+        with progress_soon(f"{loaded.system.title}, time step halved until peaks converge") as tell:
+            done = simulate_system(loaded.system, shaken_by, dampers, controller, step, highest)
             if drawn is not None:
-                loop = SystemLoop(found.system, shaken_by, dampers, controller, highest, free=True)
+                loop = SystemLoop(loaded.system, shaken_by, dampers, controller, highest, free=True)
                 bands = monte_carlo(loop, drawn, done, tell)
             if out is not None:
                 from mrdamper.report.simulation import write_simulation
                 from mrdamper.systems.contest import contest
 
-                table = contest(found.system, shaken_by, dampers, others, done.step, highest, tell) if others else None
+                table = contest(loaded.system, shaken_by, dampers, others, done.step, highest, tell) if others else None
                 tell("writing", 1.0)
                 paths = write_simulation(done, out, table, bands)
         for path in paths:
@@ -134,8 +134,8 @@ def _export_law(loop: SystemLoop, folder: Path | None, fmu: Path | None) -> None
         raise InputError(f"{name} has no law to export", remedy="give --control a law")
     paths, notes = [] if folder is None else write_program(law, name, title, folder), ()
     if fmu is not None:
-        made, notes = write_program_fmu(law, name, title, loop.control.units, fmu, loop.period, loop.control.start)
-        paths += made
+        path, notes = write_program_fmu(law, name, title, loop.control.units, fmu, loop.period, loop.control.start)
+        paths += path
     for line in (*paths, *(f"note: {note}" for note in notes)):
         typer.echo(f"{line}", err=True)
 
@@ -221,8 +221,8 @@ def _print_bands(done: Simulation, bands: Bands | None, dampers: Mapping[str, Da
         return
     from mrdamper.systems.result import HALVING
 
-    found = bands.quantiles()
-    low, high = ({name: rows[end] for name, rows in found.items()} for end in (0, -1))
+    quantiles = bands.quantiles()
+    low, high = ({name: rows[end] for name, rows in quantiles.items()} for end in (0, -1))
     typer.echo(f"5 to 95 % of {bands.count} draws of the parameters and the session:")
     for i, name in enumerate(done.system.coordinates):
         x, a = "displacement_m", "acceleration_m_s2"

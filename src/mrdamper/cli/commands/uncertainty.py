@@ -55,7 +55,7 @@ def register(app: typer.Typer) -> None:
             print(f"{row['name']} = {row['written']}")
         for doubt in uncertainty_warnings(damper):
             print(doubt)
-        found, drawn = [], None
+        curves, drawn = [], None
         if profile or samples:
             from mrdamper.dampers.likelihood import Likelihood
             from mrdamper.dampers.likelihood import profile as profiled
@@ -63,10 +63,10 @@ def register(app: typer.Typer) -> None:
 
             likelihood = Likelihood.of(damper, runs)
             for name in profile:
-                found.append(profiled(likelihood, name))
-                low, high = found[-1].interval
+                curves.append(profiled(likelihood, name))
+                low, high = curves[-1].interval
                 print(
-                    f"profile of {name}: {found[-1].kind}, 95 % from {low:.4g} to {high:.4g} {found[-1].unit}".strip()
+                    f"profile of {name}: {curves[-1].kind}, 95 % from {low:.4g} to {high:.4g} {curves[-1].unit}".strip()
                 )
             if samples:
                 drawn = posterior(likelihood, steps)
@@ -78,8 +78,8 @@ def register(app: typer.Typer) -> None:
 
         with write_result(out) as folder:
             (folder / "parameters.csv").write_text(csv_text(rows), encoding="utf-8")
-            if found:
-                save_figure(profile_curves(found), folder / "profile")
+            if curves:
+                save_figure(profile_curves(curves), folder / "profile")
             if drawn is not None:
                 save_figure(corner(drawn), folder / "corner")
                 (folder / "samples.csv").write_text(csv_text(quantiles(drawn, level)), encoding="utf-8")

@@ -59,10 +59,10 @@ def register(app: typer.Typer) -> None:
         if not runs:
             raise InputError(f"no {split} runs", where=f"rig {wanted}", remedy="leave out --split")
         whole = dataset.rig(wanted)
-        known = (
+        sessions = (
             sessions_known(damper, [whole[n] for n in check_run], own_sessions) if check_run or own_sessions else None
         )
-        validation = score(damper, watched([run for run in runs if run.id not in check_run], "run"), sessions=known)
+        validation = score(damper, watched([run for run in runs if run.id not in check_run], "run"), sessions=sessions)
         for name, why in validation.refused.items():
             typer.echo(f"not scored: {name}: {why}", err=True)
         if not validation.runs:
@@ -73,7 +73,7 @@ def register(app: typer.Typer) -> None:
                 damper,
                 by_id[run.run_id],
                 level,
-                known and known.expected(RecordingTime.of(by_id[run.run_id]), run.run_id),
+                sessions and sessions.expected(RecordingTime.of(by_id[run.run_id]), run.run_id),
             )
             for run in validation.runs
         }

@@ -54,22 +54,22 @@ def overlaid_loops(runs: Sequence[Run], dampers: Mapping[str, Damper]) -> Figure
     with house_style():
         figure, axes = new_figure(len(runs), 2, 0.7 + 2.5 * len(runs))
         for row, run in enumerate(runs):
-            found = equivalent_sine(run)
-            motion = measured_motion(run).about(found.centre)
+            sine = equivalent_sine(run)
+            motion = measured_motion(run).about(sine.centre)
             last = int(np.flatnonzero(run.in_window)[-1])
-            first = int(np.searchsorted(run.time, run.time[last] - 1 / found.condition.frequency_Hz))
+            first = int(np.searchsorted(run.time, run.time[last] - 1 / sine.condition.frequency_Hz))
             cycle = slice(max(first - 1, 0), last + 1, max(1, (last - first) // 400))
             curves: list[tuple[str, Any, dict[str, Any]]] = [
                 ("measured", run.force, {"color": MEASURED, "lw": 1.8, "alpha": 0.55})
             ]
             for number, (title, damper) in enumerate(dampers.items()):
                 style = {"color": PALETTE[1 + number % (len(PALETTE) - 2)], "lw": 0.9}
-                curves.append((title, damper.force_along(motion, found.condition), style))
+                curves.append((title, damper.force_along(motion, sine.condition), style))
             left, right = axes[2 * row], axes[2 * row + 1]
             for title, force, style in curves:
                 left.plot(MM * motion.displacement[cycle], force[cycle], label=title, **style)
                 right.plot(motion.velocity[cycle], force[cycle], **style)
-            label(left, "Displacement (mm)", "Force (N)", str(found.condition))
+            label(left, "Displacement (mm)", "Force (N)", str(sine.condition))
             label(right, "Velocity (m/s)", "Force (N)")
         axes[0].legend(loc="best", fontsize=6.5)
         return figure

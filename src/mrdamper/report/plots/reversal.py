@@ -31,8 +31,8 @@ def force_since_reversal(runs: Sequence[Run], damper: Damper) -> Figure:
             counts = np.isfinite(curves).sum(axis=0)
             mean = np.where(counts > 0, np.nansum(curves, axis=0) / np.maximum(counts, 1), np.nan)
             for row, (width, shade) in enumerate(((1.8, colour), (0.8, PREDICTED))):
-                seen = np.isfinite(mean[row])
-                axes.plot(MM * middle[seen], mean[row][seen], lw=width, color=shade)
+                finite = np.isfinite(mean[row])
+                axes.plot(MM * middle[finite], mean[row][finite], lw=width, color=shade)
             axes.plot([], [], color=colour, lw=1.8, label=f"{current:g} A")
         axes.plot([], [], color=PREDICTED, lw=0.8, label="predicted")
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))

@@ -193,9 +193,9 @@ class Picture:
         with house_style():
             letter(figure)
             for kind in ("svg", *also):
-                made = io.BytesIO()
-                figure.savefig(made, format=kind, **HOW_SAVED[kind])
-                drawn[kind] = made.getvalue()
+                buffer = io.BytesIO()
+                figure.savefig(buffer, format=kind, **HOW_SAVED[kind])
+                drawn[kind] = buffer.getvalue()
         return cls({**drawn, "csv": figure_data(figure).encode()})
 
     @property
@@ -212,7 +212,7 @@ class Picture:
 
 def figure_data(figure: Figure) -> str:
     """The points of every line and every cloud of marks of a figure as CSV, one row a point."""
-    names, made = ("panel", "x_is", "y_is", "series"), ["panel,x_is,y_is,series,x,y\n"]
+    names, rows = ("panel", "x_is", "y_is", "series"), ["panel,x_is,y_is,series,x,y\n"]
     head = csv_text([], names)
     for number, axes in enumerate(figure.axes, 1):
         series = [(line.get_label(), np.column_stack(line.get_data(orig=True))) for line in axes.get_lines()]
@@ -223,8 +223,8 @@ def figure_data(figure: Figure) -> str:
             label_ = "" if str(name).startswith("_") else str(name)
             about = dict(zip(names, (number, axes.get_xlabel(), axes.get_ylabel(), label_), strict=True))
             begin = csv_text([about]).removeprefix(head).removesuffix("\n")
-            made += [f"{begin},{x!r},{y!r}\n" for x, y in points.tolist()]
-    return "".join(made)
+            rows += [f"{begin},{x!r},{y!r}\n" for x, y in points.tolist()]
+    return "".join(rows)
 
 
 def save_figure(figure: Figure, stem: Path, also: Sequence[str] = ()) -> bytes:

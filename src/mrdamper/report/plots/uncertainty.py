@@ -20,12 +20,12 @@ def profile_curves(profiles: Sequence[LikelihoodProfile]) -> Figure:
         columns = min(3, len(profiles))
         rows = -(-len(profiles) // columns)
         figure, panels = new_figure(rows, columns, 0.9 + 2.1 * rows)
-        for axes, found in zip(panels, profiles, strict=False):
-            axes.plot(found.values, found.fall, marker=".", color=PALETTE[1])
+        for axes, profile in zip(panels, profiles, strict=False):
+            axes.plot(profile.values, profile.fall, marker=".", color=PALETTE[1])
             axes.axhline(CHI_SQUARED_95, color=PALETTE[2], lw=0.8)
-            axes.axvline(found.estimate, color=PALETTE[0], lw=0.6, ls=":")
+            axes.axvline(profile.estimate, color=PALETTE[0], lw=0.6, ls=":")
             axes.set_ylim(0, 3 * CHI_SQUARED_95)
-            label(axes, f"{found.name} ({found.unit or '–'})", "−2 Δ ln L (–)", found.kind)
+            label(axes, f"{profile.name} ({profile.unit or '–'})", "−2 Δ ln L (–)", profile.kind)
         for axes in panels[len(profiles) :]:
             axes.set_visible(False)
     return figure

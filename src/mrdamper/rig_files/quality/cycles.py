@@ -13,7 +13,7 @@ POINTS = 200  # phases of a cycle at which cycles are compared
 
 
 @dataclass(frozen=True, eq=False)
-class Channel:
+class CycleChannel:
     """One channel of K steady cycles.
 
     Attributes
@@ -48,8 +48,8 @@ class Cycles:
 
     starts: Floats  # (K,) [s]
     period: float  # [s]
-    displacement: Channel
-    force: Channel
+    displacement: CycleChannel
+    force: CycleChannel
 
 
 @once_per_run
@@ -78,11 +78,11 @@ def steady_cycles(view: View) -> Cycles | None:
     return Cycles(starts[kept], period, *channels)
 
 
-def _channel(values: Floats) -> Channel:
+def _channel(values: Floats) -> CycleChannel:
     loop = values.mean(axis=0)
     slope = 0.5 * POINTS * (np.roll(loop, -1) - np.roll(loop, 1))
     table = np.column_stack([np.ones(POINTS), loop - loop.mean(), -slope])
     differences = (values - loop).T
     changes = np.linalg.lstsq(table, differences, rcond=1e-9)[0]
     offset, gain, late = changes
-    return Channel(values, loop, slope, offset, gain, late, (differences - table @ changes).T)
+    return CycleChannel(values, loop, slope, offset, gain, late, (differences - table @ changes).T)

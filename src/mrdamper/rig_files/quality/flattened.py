@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.rig_files.quality.cycles import POINTS, Channel, steady_cycles
+from mrdamper.rig_files.quality.cycles import POINTS, CycleChannel, steady_cycles
 from mrdamper.rig_files.quality.effects import NOTED, percent
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding
@@ -77,7 +77,7 @@ def rests_at_its_ends(view: View) -> Iterator[Finding]:
         )
 
 
-def _rest(speed: Floats, force: Channel, extreme: int) -> float:
+def _rest(speed: Floats, force: CycleChannel, extreme: int) -> float:
     """Share of the cycle for which a displacement rests about a reversal, 0 where the force rests too."""
     still = np.roll(speed < _REST, POINTS // 2 - extreme)
     before = int(np.argmin(np.append(still[POINTS // 2 :: -1], False)))
@@ -101,7 +101,7 @@ def _finding(name: str, unit: str, scale: float, tops: list[Top], span: float) -
         )
 
 
-def ends_of(channel: Channel, count: int) -> tuple[Top, Top]:
+def ends_of(channel: CycleChannel, count: int) -> tuple[Top, Top]:
     """Measure the upper and the lower end of the mean of a number of cycles."""
     noise = float(np.sqrt(np.mean(channel.rest**2) / count))
     depth = max(3 * noise, _DEPTH * channel.span)
@@ -148,7 +148,7 @@ def _in_motion(top: Top, speed: Floats) -> bool:
     return bool(np.min(speed[beyond]) > _MOVES * np.max(speed))
 
 
-def _force_goes_on(top: Top, force: Channel) -> bool:
+def _force_goes_on(top: Top, force: CycleChannel) -> bool:
     start, stop = top.edges
     quarter = (stop - start) // 4
     middle = force.loop[np.arange(start + quarter, stop - quarter + 1) % POINTS]

@@ -14,7 +14,7 @@ from mrdamper.rig_files.readers.base import Content, RawTable, Reader, Source, W
 from mrdamper.rig_files.record import Finding, LineNumbers
 from mrdamper.rig_files.text.blocks import Block, find_blocks
 from mrdamper.rig_files.text.bulk import read_bulk
-from mrdamper.rig_files.text.cells import Form, field_count, read_cells, split_rows
+from mrdamper.rig_files.text.cells import RowFormat, field_count, read_cells, split_rows
 from mrdamper.rig_files.text.labview import is_labview, named, stated_form
 from mrdamper.rig_files.text.layout import Layout, find_layout, is_comment, is_footer, split
 from mrdamper.rig_files.text.spool import Spool
@@ -99,7 +99,7 @@ def _form(stream: TextStream, layout: Layout) -> dict[str, str | int]:
 
 
 def _read(stream: TextStream, layout: Layout, block: Block, columns: tuple[int, ...]) -> Content:
-    form = Form(stream, layout, columns)
+    form = RowFormat(stream, layout, columns)
     block, findings = _without_footer(form, block)
     block, cut = _without_cut_row(form, block)
     findings += cut
@@ -132,7 +132,7 @@ def _read(stream: TextStream, layout: Layout, block: Block, columns: tuple[int, 
 
 
 def _words(stream: TextStream, layout: Layout, block: Block, column: int) -> Words:
-    form = Form(stream, layout, (column,))
+    form = RowFormat(stream, layout, (column,))
     block, _ = _without_cut_row(form, _without_footer(form, block)[0])
     known: dict[str, int] = {}
     codes: list[np.ndarray] = []
@@ -155,7 +155,7 @@ def _stretches(lines: np.ndarray, expected: int | None) -> np.ndarray:
     return jumps if expected == lines[0] else np.concatenate(([0], jumps))
 
 
-def _without_footer(form: Form, block: Block) -> tuple[Block, tuple[Finding, ...]]:
+def _without_footer(form: RowFormat, block: Block) -> tuple[Block, tuple[Finding, ...]]:
     """Leave out lines of words below the last row: statistics, the end of a page."""
     stream = form.stream
     size = min(block.stop - block.start, _FOOTER)
@@ -174,7 +174,7 @@ def _without_footer(form: Form, block: Block) -> tuple[Block, tuple[Finding, ...
     return replace(block, stop=stop), (Finding("W_FOOTER", printable(shown)),)
 
 
-def _without_cut_row(form: Form, block: Block) -> tuple[Block, tuple[Finding, ...]]:
+def _without_cut_row(form: RowFormat, block: Block) -> tuple[Block, tuple[Finding, ...]]:
     """Leave out a last row that no line end closes: its last number may be cut."""
     stream = form.stream
     size = min(block.stop - block.start, LONGEST_LINE + 2)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mrdamper.rig_files.text.cells import Form, Rows, read_row
+from mrdamper.rig_files.text.cells import RowFormat, Rows, read_row
 from mrdamper.rig_files.text.layout import SPACES
 from mrdamper.rig_files.text.stream import LONGEST_LINE
 
@@ -18,7 +18,7 @@ _ALLOWED = bytes(range(256))
 _COMMA_MARK = _ALLOWED.replace(b",", b"\0").replace(b".", b"\x01").replace(b"\0", b".")
 
 
-def read_bulk(block: bytes, line: int, form: Form) -> Rows | None:
+def read_bulk(block: bytes, line: int, form: RowFormat) -> Rows | None:
     """Read a block of whole lines; None if it is not plain enough."""
     layout = form.layout
     slow = any(layout.kinds[c] == "stamp" or (layout.behind and layout.behind[c]) for c in form.wanted)
@@ -60,7 +60,7 @@ def _even_lines(block: bytes, separator: int, count: int) -> np.ndarray | None:
     return ends if even else None
 
 
-def _cleaned(block: bytes, form: Form) -> bytes:
+def _cleaned(block: bytes, form: RowFormat) -> bytes:
     """The block in UTF-8, with decimal points and plain line feeds."""
     if not block.isascii():
         block = block.decode(form.stream.encoding, "replace").encode("utf-8")
@@ -71,7 +71,7 @@ def _cleaned(block: bytes, form: Form) -> bytes:
     return block.replace(b"\r\n", b"\n") if b"\r" in block else block
 
 
-def _columns(block: bytes, form: Form) -> list[np.ndarray]:
+def _columns(block: bytes, form: RowFormat) -> list[np.ndarray]:
     """The wanted columns; NaN where polars finds no number, which is at least where we find none."""
     import polars as pl
 

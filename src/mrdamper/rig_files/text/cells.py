@@ -30,7 +30,7 @@ class Rows:
 
 
 @dataclass(eq=False, slots=True)
-class Form:
+class RowFormat:
     """What is needed to read a row: the text, its layout, the columns wanted; and what was met so far."""
 
     stream: TextStream
@@ -55,7 +55,7 @@ class Form:
         CombinedError.raise_from(errors)
 
 
-def read_cells(block: bytes, line: int, form: Form, *, final: bool = False) -> Rows:
+def read_cells(block: bytes, line: int, form: RowFormat, *, final: bool = False) -> Rows:
     """Read every row of a block of whole lines, which starts at a line and may be the text's final one.
 
     Raises at E_LINE_TOO_LONG, E_QUOTE and E_AMBIGUOUS; wrong cells and rows are kept by the form.
@@ -72,13 +72,13 @@ def read_cells(block: bytes, line: int, form: Form, *, final: bool = False) -> R
     return Rows(values, np.array(lines, dtype=np.int64), form.stream.is_odd(block))
 
 
-def read_row(text: str, line: int, form: Form) -> list[float]:
+def read_row(text: str, line: int, form: RowFormat) -> list[float]:
     """The wanted cells of one row; raises as `read_cells`."""
     rows, lines = split_rows([text], line, form, False)
     return [float(_numbers([row[c] for row in rows], c, lines, form)[0]) for row in rows for c in form.wanted]
 
 
-def field_count(form: Form, found: int, line: int, final: bool) -> RigFileError:
+def field_count(form: RowFormat, found: int, line: int, final: bool) -> RigFileError:
     """The refusal of a row with another number of cells than the others."""
     width = form.layout.width
     if final and found < width:
@@ -99,7 +99,7 @@ def field_count(form: Form, found: int, line: int, final: bool) -> RigFileError:
     )
 
 
-def split_rows(texts: Sequence[str], line: int, form: Form, final: bool) -> tuple[list[list[str]], list[int]]:
+def split_rows(texts: Sequence[str], line: int, form: RowFormat, final: bool) -> tuple[list[list[str]], list[int]]:
     """The cells of every row among lines of text, and the lines they stand in.
 
     Raises at E_QUOTE; rows of another width are left out and kept by the form.
@@ -130,7 +130,7 @@ def split_rows(texts: Sequence[str], line: int, form: Form, final: bool) -> tupl
     return rows, lines
 
 
-def _numbers(cells: Sequence[str], column: int, lines: Sequence[int], form: Form) -> Floats:
+def _numbers(cells: Sequence[str], column: int, lines: Sequence[int], form: RowFormat) -> Floats:
     mark = form.layout.decimal
     matches, comma = NUMBER[mark].fullmatch, mark == ","
     for sign, meant in form.layout.writes:
@@ -156,7 +156,7 @@ def _numbers(cells: Sequence[str], column: int, lines: Sequence[int], form: Form
     return values
 
 
-def _stamps(cells: Sequence[str], column: int, lines: Sequence[int], form: Form) -> Floats:
+def _stamps(cells: Sequence[str], column: int, lines: Sequence[int], form: RowFormat) -> Floats:
     values = np.full(len(cells), math.nan)
     for i, cell in enumerate(cells):
         read = stamp(cell)
@@ -177,7 +177,7 @@ def _stamps(cells: Sequence[str], column: int, lines: Sequence[int], form: Form)
     return values
 
 
-def _no_number(cell: str, column: int, line: int, form: Form) -> RigFileError:
+def _no_number(cell: str, column: int, line: int, form: RowFormat) -> RigFileError:
     strange = any("\udc80" <= c <= "\udcff" or c == "\ufffd" for c in cell)
     strange |= not cell.isascii() and form.stream.encoding != "utf-8"
     return form.stream.source.refuse(
@@ -194,5 +194,5 @@ def _shown(cell: str) -> str:
     return ascii(cell[:40]) + ("..." if len(cell) > 40 else "")
 
 
-def _named(form: Form, column: int) -> str:
+def _named(form: RowFormat, column: int) -> str:
     return f"column {form.layout.names[column][:40]!r}" if form.layout.names[column] else f"column {column + 1}"

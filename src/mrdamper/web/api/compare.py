@@ -27,7 +27,7 @@ router = APIRouter(prefix="/sessions/{session}/compare")
 _NOTHING = ("nothing is compared yet", "start a comparison")
 
 
-class Choice(BaseModel, extra="forbid"):
+class CompareRequest(BaseModel, extra="forbid"):
     """Rig and models to compare."""
 
     rig: int = Field(ge=0)
@@ -50,7 +50,7 @@ def choices(session: Current) -> list[dict[str, Any]]:
 
 
 @router.post("")
-def start(choice: Choice, session: Current) -> dict[str, Any]:
+def start(choice: CompareRequest, session: Current) -> dict[str, Any]:
     """Begin a comparison on one rig."""
     table = session.table(choice.rig)
     jobs = max(1, (os.cpu_count() or 2) - 1)  # one processor is left to answer the page
@@ -59,19 +59,19 @@ def start(choice: Choice, session: Current) -> dict[str, Any]:
         "compare",
         compare_models,
         (dataset, choice.models, jobs),
-        lambda found: _conclude(session, choice, found),
+        lambda comparison: _conclude(session, choice, comparison),
     )
 
 
 @router.get("/rigs/{rig}/runs/{key}")
 def overlaid(rig: int, key: str, session: Current) -> Response:
     """One run as measured, and as every compared model predicts it."""
-    found: RigComparison = session.result(f"compared.{rig}", *_NOTHING)
+    comparison: RigComparison = session.result(f"compared.{rig}", *_NOTHING)
     row = session.table(rig).row(key)
     measured = measured_cycle(row.run) if row.loop else measured_window(row.run)
     arrays = {f"measured.{k}": v for k, v in measured.items()}
     shown = []
-    for number_, entry in enumerate(found.entries):
+    for number_, entry in enumerate(comparison.entries):
         curve, flags = predicted_on_run(entry.damper, row.run)
         arrays |= {f"model{number_}.{k}": v for k, v in curve.items()}
         shown.append({"title": entry.recipe.title, "extrapolation": flags})
@@ -107,11 +107,11 @@ def _whole(session: Session, rig: int) -> Comparison:
     return session.result(f"compared.whole.{rig}", *_NOTHING)
 
 
-def _conclude(session: Session, choice: Choice, found: Comparison) -> dict[str, Any]:
-    rig = found.rigs[0]
+def _conclude(session: Session, choice: CompareRequest, comparison: Comparison) -> dict[str, Any]:
+    rig = comparison.rigs[0]
     table = session.table(choice.rig)
     session.results[f"compared.{choice.rig}"] = rig
-    session.results[f"compared.whole.{choice.rig}"] = found
+    session.results[f"compared.whole.{choice.rig}"] = comparison
     keys = {row.run.id: row.key for row in table.rows}
     entries = []
     for entry in rig.entries:
@@ -124,7 +124,7 @@ def _conclude(session: Session, choice: Choice, found: Comparison) -> dict[str, 
         "refused": dict(rig.refused),
         "held_out": [{"key": keys[run.id], "id": run.id} for run in rig.dataset.split("validate")],
         "train": [{"key": keys[run.id], "id": run.id} for run in rig.dataset.split("train")],
-        "seconds": round(found.seconds, 1),
+        "seconds": round(comparison.seconds, 1),
     }
 
 

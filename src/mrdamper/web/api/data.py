@@ -22,7 +22,7 @@ from mrdamper.web.sessions import Current, Session
 router = APIRouter(prefix="/sessions/{session}")
 
 
-class Profile(BaseModel, extra="forbid"):
+class ProfileRequest(BaseModel, extra="forbid"):
     """A rig profile as TOML; empty to guess. It may be for the refused files alone."""
 
     toml: str = Field(default="", max_length=100_000)
@@ -81,7 +81,7 @@ async def take_file(
 
 
 @router.post("/drops/{key}/read")
-def read(key: str, profile: Profile, session: Current) -> dict[str, Any]:
+def read(key: str, profile: ProfileRequest, session: Current) -> dict[str, Any]:
     """Read what was dropped and put it on the bench."""
     session.put(read_drop(_drop(session, key), profile.toml, profile.refused_only))
     return overview(session)
@@ -120,8 +120,8 @@ def quality(number: int, session: Current) -> dict[str, Any]:
     """The verdict on every run of a rig."""
     table = session.table(number)
     return {
-        row.key: {"verdict": found.verdict, "findings": _findings(found)}
-        for row, found in zip(table.rows, table.quality, strict=True)
+        row.key: {"verdict": findings.verdict, "findings": _findings(findings)}
+        for row, findings in zip(table.rows, table.quality, strict=True)
     }
 
 
@@ -138,9 +138,9 @@ def loop(number: int, key: str, part: str, session: Current) -> Response:
     return frame({"key": key, "id": row.run.id, "condition": condition_on_screen(row.condition)}, arrays)
 
 
-def _findings(found: Quality) -> list[dict[str, str]]:
-    refusal = [] if found.refusal is None else [{"code": found.refusal.code, "text": found.refusal.found}]
-    return refusal + [{"code": finding.code, "text": finding.text} for finding in found.findings]
+def _findings(checked: Quality) -> list[dict[str, str]]:
+    refusal = [] if checked.refusal is None else [{"code": checked.refusal.code, "text": checked.refusal.found}]
+    return refusal + [{"code": finding.code, "text": finding.text} for finding in checked.findings]
 
 
 def _motion(group: list[Any], currents: list[float]) -> dict[str, Any]:

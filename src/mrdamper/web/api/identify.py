@@ -29,7 +29,7 @@ from mrdamper.web.tasks import ALL_AT_ONCE, RUN_BY_RUN, identify_rig, study
 router = APIRouter(prefix="/sessions/{session}")
 
 
-class Choice(BaseModel, extra="forbid", allow_inf_nan=False):
+class IdentifyRequest(BaseModel, extra="forbid", allow_inf_nan=False):
     """Model, method and runs of an identification."""
 
     rig: int = Field(ge=0)
@@ -91,12 +91,12 @@ def start_study(session: Current, head: Head = _NO_HEAD) -> dict[str, Any]:
     """Begin the whole method on all data."""
     folder, about = session.folder / session.key("study"), head.given
     return session.start(
-        "study", study, (session.dataset, folder, about), lambda found: _conclude_study(session, *found)
+        "study", study, (session.dataset, folder, about), lambda results: _conclude_study(session, *results)
     )
 
 
 @router.post("/identify")
-def start_identification(choice: Choice, session: Current) -> dict[str, Any]:
+def start_identification(choice: IdentifyRequest, session: Current) -> dict[str, Any]:
     """Begin to identify one model of one rig."""
     table = session.table(choice.rig)
     names = [table.row(key).run.id for key in choice.runs]
@@ -104,7 +104,7 @@ def start_identification(choice: Choice, session: Current) -> dict[str, Any]:
         "identify",
         identify_rig,
         (table.dataset, names, choice.model, choice.method, choice.over, choice.free, choice.fixed),
-        lambda found: _conclude_identification(session, choice, *found),
+        lambda results: _conclude_identification(session, choice, *results),
     )
 
 
@@ -112,13 +112,13 @@ def start_identification(choice: Choice, session: Current) -> dict[str, Any]:
 def residual(number: int, session: Current) -> Response:
     """Measured and identified force of one identified run, and the residual."""
     table = session.result("identified.table", "nothing is identified yet", "start an identification")
-    found, scored = session.results["identified"]
-    ids = [i.run_id for i in found] or [run.run_id for run in scored.train.runs]
+    identifications, scored = session.results["identified"]
+    ids = [i.run_id for i in identifications] or [run.run_id for run in scored.train.runs]
     if not 0 <= number < len(ids):
         raise InputError("no such run", remedy="choose one from the table", code="E_NAME")
     row = next(row for row in table.rows if row.run.id == ids[number])
-    if found:
-        modelled = modelled_cycle(found[number].model, row.run, found[number].delay)
+    if identifications:
+        modelled = modelled_cycle(identifications[number].model, row.run, identifications[number].delay)
     else:
         modelled = predicted_on_run(scored.damper, row.run)[0]
     measured = measured_cycle(row.run)
@@ -127,18 +127,18 @@ def residual(number: int, session: Current) -> Response:
     return frame({"id": row.run.id, "condition": condition_on_screen(row.condition)}, arrays)
 
 
-def _conclude_study(session: Session, found: Study, written: list[Any]) -> dict[str, Any]:
-    session.results["study"] = found
+def _conclude_study(session: Session, study: Study, written: list[Any]) -> dict[str, Any]:
+    session.results["study"] = study
     session.results["study.files"] = written
     rigs = []
-    for rig in found.rigs:
+    for rig in study.rigs:
         listed = []
         for candidate in rig.candidates:
             errors = {"cross-validation": candidate.cross_validated, "validation": candidate.validation}
             note = ", ".join(f"{name} {_percent(scores)}" for name, scores in errors.items() if scores.runs)
             listed.append(_candidate(candidate, session.scored(candidate, "study", note, candidate is rig.chosen).key))
         rigs.append({"rig": rig.rig, "chosen": listed[0]["damper"], "candidates": listed})
-    return {"rigs": rigs, "seconds": round(found.seconds, 1)}
+    return {"rigs": rigs, "seconds": round(study.seconds, 1)}
 
 
 def _candidate(candidate: RecipeResult, key: str) -> dict[str, Any]:
@@ -155,18 +155,18 @@ def _candidate(candidate: RecipeResult, key: str) -> dict[str, Any]:
 
 def _conclude_identification(
     session: Session,
-    choice: Choice,
-    found: tuple[Identification, ...],
+    choice: IdentifyRequest,
+    identifications: tuple[Identification, ...],
     scored: RecipeResult | str,
     refused: dict[str, str],
 ) -> dict[str, Any]:
-    session.results["identified"] = found, scored
+    session.results["identified"] = identifications, scored
     session.results["identified.table"] = session.table(choice.rig)
     damper, held_out, bench = None, None, None
     if isinstance(scored, RecipeResult):
         damper, held_out = scored.damper, scored.validation
         bench = session.add(damper, "identification", f"validation {_percent(held_out)}" if held_out.runs else "")
-    errors = [i.scores.nrmse_pp for i in found] or _joint_fit(scored).nrmse_pp.tolist()
+    errors = [i.scores.nrmse_pp for i in identifications] or _joint_fit(scored).nrmse_pp.tolist()
     return {
         "rig": session.table(choice.rig).dataset.rigs[0],
         "damper": bench.key if bench else None,
@@ -175,9 +175,9 @@ def _conclude_identification(
         "no_damper": scored if isinstance(scored, str) else "",
         "held_out": number(held_out.median()) if held_out else None,
         "median": number(float(np.median(errors))),
-        "runs": [_identified(i) for i in found],
-        "joint": None if found else _joint(scored),
-        "units": _units(found, scored),
+        "runs": [_identified(i) for i in identifications],
+        "joint": None if identifications else _joint(scored),
+        "units": _units(identifications, scored),
         "refused": refused,
     }
 
@@ -220,9 +220,9 @@ def _joint(scored: RecipeResult | str) -> dict[str, Any]:
     }
 
 
-def _units(found: tuple[Identification, ...], scored: RecipeResult | str) -> list[dict[str, str]]:
-    if found:
-        infos, free = found[0].model.parameters(), found[0].free
+def _units(identifications: tuple[Identification, ...], scored: RecipeResult | str) -> list[dict[str, str]]:
+    if identifications:
+        infos, free = identifications[0].model.parameters(), identifications[0].free
     else:
         damper = _joint_fit(scored).damper
         infos, free = damper.model.parameters(), damper.free

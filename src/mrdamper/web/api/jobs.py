@@ -48,12 +48,12 @@ def cancel(key: str, session: Current) -> dict[str, Any]:
 
 
 async def _follow(job: Job, request: Request) -> AsyncIterator[str]:
-    said, silent = "", 0.0
+    sent, silent = "", 0.0
     while not request.app.state.stopping():
         report = job.report()
         text = json.dumps({k: v for k, v in report.items() if k != "seconds"}, allow_nan=False)
-        if text != said or silent >= _SILENCE:
-            said, silent = text, 0.0
+        if text != sent or silent >= _SILENCE:
+            sent, silent = text, 0.0
             yield f"data: {json.dumps(report, allow_nan=False)}\n\n"
         if report["state"] not in ("waiting", "running"):
             return

@@ -33,7 +33,7 @@ _QUANTITIES = ("current_A", "frequency_Hz", "amplitude_m")
 _BEYOND = 1.25  # sliders and curves reach past the tested conditions, where the answer is flagged
 
 
-class Ask(BaseModel, extra="forbid", allow_inf_nan=False):
+class PredictionRequest(BaseModel, extra="forbid", allow_inf_nan=False):
     """Values of the sliders [SI units]."""
 
     current_A: float = Field(ge=0, le=1000)
@@ -60,16 +60,16 @@ def dampers(session: Current) -> list[dict[str, Any]]:
 def damper(key: str, session: Current) -> dict[str, Any]:
     """A damper's sliders and tested envelope."""
     bench = session.damper(key)
-    found, e = bench.damper, bench.damper.envelope
-    start = found.envelope.middle
-    table = session.table_of(found.rig)
+    chosen, e = bench.damper, bench.damper.envelope
+    start = chosen.envelope.middle
+    table = session.table_of(chosen.rig)
     near = table.nearest(start, 1, anywhere=True) if table else []
     if near and near[0].condition:
         start = near[0].condition  # one that was measured: there is something to compare with
     return {
         **_head(bench),
-        "parameters": sliders(found),
-        "follows": found.one_model is None,
+        "parameters": sliders(chosen),
+        "follows": chosen.one_model is None,
         "start": {name: getattr(start, name) for name in _QUANTITIES},
         "envelope": {name: getattr(e, name) for name in (*_QUANTITIES, "peak_velocity_m_s")},
         "reach": {
@@ -77,51 +77,51 @@ def damper(key: str, session: Current) -> dict[str, Any]:
             "frequency_Hz": (e.frequency_Hz[0] / _BEYOND, e.frequency_Hz[1] * _BEYOND),
             "amplitude_m": (e.amplitude_m[0] / _BEYOND, e.amplitude_m[1] * _BEYOND),
         },
-        "provenance": dict(found.provenance),
+        "provenance": dict(chosen.provenance),
     }
 
 
 @router.post("/{key}/predict")
-def predict(key: str, ask: Ask, session: Current) -> Response:
+def predict(key: str, ask: PredictionRequest, session: Current) -> Response:
     """Loops at a condition with a band or why there is none, the curves over current, what was measured nearest."""
-    found = session.damper(key, sure=ask.band and not ask.held).damper
+    damper = session.damper(key, sure=ask.band and not ask.held).damper
     with _TURN:
-        return _predicted(found, ask, session)
+        return _predicted(damper, ask, session)
 
 
-def _predicted(found: Damper, ask: Ask, session: Session) -> Response:
+def _predicted(damper: Damper, ask: PredictionRequest, session: Session) -> Response:
     arrays: dict[str, Any] = {}
     loops = []
-    table, paces = session.table_of(found.rig), []
-    for name, condition in _loops(found, ask, table):
+    table, paces = session.table_of(damper.rig), []
+    for name, condition in _loops(damper, ask, table):
         began = thread_time()  # of this damper's work alone, however busy the machine is
-        prediction = predict_held(found, condition, ask.held)
+        prediction = predict_held(damper, condition, ask.held)
         paces.append(1e3 * (thread_time() - began))
         cycle = predicted_cycle(prediction)
         arrays |= {f"{name}.{axis}": values for axis, values in cycle.items()}
         figures = _figures(prediction.motion, prediction.force, ask.frequency_Hz)
         loops.append({"name": name, "current_A": condition.current_A, **figures})
-        if name == "now" and ask.band and not ask.held and (around := band(found, prediction, _LEVEL)):
+        if name == "now" and ask.band and not ask.held and (around := band(damper, prediction, _LEVEL)):
             for end, force in (("low", around.low), ("high", around.high)):
                 arrays |= {f"{end}.{axis}": v for axis, v in on_screen(prediction.motion, force).items()}
             loops[-1] |= {
                 "peak_from_N": around.peak[0],
                 "peak_to_N": around.peak[1],
                 "level": _LEVEL,
-                "scope": scope(found, _LEVEL),
+                "scope": scope(damper, _LEVEL),
             }
         elif name == "now" and ask.band:
-            loops[-1]["no_band"] = _OF_HAND if ask.held else no_band(found)
+            loops[-1]["no_band"] = _OF_HAND if ask.held else no_band(damper)
     if ask.currents:
         held = tuple(sorted(ask.held.items()))
-        arrays |= _over_current(found, held, ask.frequency_Hz, ask.amplitude_m, ask.currents)
-    model = held_model(found, ask.condition, ask.held)
+        arrays |= _over_current(damper, held, ask.frequency_Hz, ask.amplitude_m, ask.currents)
+    model = held_model(damper, ask.condition, ask.held)
     head = {
         "loops": loops,
         "pace_ms": min(paces),
         "peak_velocity_m_s": ask.condition.peak_velocity,
-        "extrapolation": found.envelope.flags(ask.condition),
-        "tested_A": found.envelope.current_A,
+        "extrapolation": damper.envelope.flags(ask.condition),
+        "tested_A": damper.envelope.current_A,
         "parameters": {n: number(v) for n, v in model.values().items()} if model else {},
         "nearest": [_measured(row) for row in table.nearest(ask.condition)] if table else [],
         "measured": [_measured(row) for row in table.at_motion(ask.condition)] if table else [],
@@ -129,30 +129,30 @@ def _predicted(found: Damper, ask: Ask, session: Session) -> Response:
     return frame(head, arrays)
 
 
-def _loops(found: Damper, ask: Ask, table: RigTable | None) -> list[tuple[str, Condition]]:
+def _loops(damper: Damper, ask: PredictionRequest, table: RigTable | None) -> list[tuple[str, Condition]]:
     """The loop asked for, and where wished those at the currents of the tests."""
     loops = [("now", ask.condition)]
     if ask.family:
-        currents = _tested_currents(found, table)
+        currents = _tested_currents(damper, table)
         loops += [(f"family{i}", Condition(c, ask.frequency_Hz, ask.amplitude_m)) for i, c in enumerate(currents)]
     return loops
 
 
-def _tested_currents(found: Damper, table: RigTable | None) -> list[float]:
+def _tested_currents(damper: Damper, table: RigTable | None) -> list[float]:
     """Levels of the tests on the bench, or the ends of what the damper says was tested."""
-    levels = list(table.currents) if table else list(found.envelope.current_A)
+    levels = list(table.currents) if table else list(damper.envelope.current_A)
     picked = np.linspace(0, len(levels) - 1, min(len(levels), _FAMILY - 1)).round().astype(int)
     return sorted({levels[i] for i in picked})
 
 
 @lru_cache(maxsize=64)  # the same while the current is moved, and in every session with the same damper
 def _over_current(
-    found: Damper, held: tuple[tuple[str, float], ...], frequency_Hz: float, amplitude_m: float, points: int
+    damper: Damper, held: tuple[tuple[str, float], ...], frequency_Hz: float, amplitude_m: float, points: int
 ) -> dict[str, Any]:
-    even = np.linspace(0.0, _BEYOND * (found.envelope.current_A[1] or 1.0), max(points - 2, 2))
-    currents = np.union1d(even, found.envelope.current_A)  # the line changes its dash where the tests end
+    even = np.linspace(0.0, _BEYOND * (damper.envelope.current_A[1] or 1.0), max(points - 2, 2))
+    currents = np.union1d(even, damper.envelope.current_A)  # the line changes its dash where the tests end
     conditions = [Condition(float(I), frequency_Hz, amplitude_m) for I in currents]
-    loops = [loop_held(found, condition, dict(held)) for condition in conditions]
+    loops = [loop_held(damper, condition, dict(held)) for condition in conditions]
     figures = [_figures(loop.excitation, loop.force, frequency_Hz) for loop in loops]
     curves = {f"over.{end}": np.array([f[name] for f in figures]) for end, name in _OVER.items()}
     return {"over.current": currents, **curves}

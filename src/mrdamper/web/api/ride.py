@@ -37,7 +37,7 @@ _GRAVITY = 9.81  # acceleration of gravity [m/s²]
 _SLOWEST = 0.2  # Hz; what of the ground's motion is slower than this is left out of the picture
 
 
-class Ask(BaseModel, extra="forbid", allow_inf_nan=False):
+class RideRequest(BaseModel, extra="forbid", allow_inf_nan=False):
     """Choices of the panel."""
 
     damper: str = Field(max_length=64)
@@ -64,7 +64,7 @@ def choices(session: Current) -> dict[str, Any]:
 
 
 @router.post("")
-def ride(ask: Ask, session: Current) -> Response:
+def ride(ask: RideRequest, session: Current) -> Response:
     """Histories of a system with a damper under a law, and with that damper left without current."""
     if ask.system not in bundled_systems():  # a name, never a path of this machine
         raise UnknownNameError.of("system", ask.system, bundled_systems())
@@ -156,25 +156,25 @@ def _kind(system: System) -> str:
 
 def _source(name: str, system: System) -> Input:
     record, _, speed = name.partition("@")
-    known = made_inputs() if _kind(system) == "road" else bundled_records()
-    if record not in known:
-        raise UnknownNameError.of("input", record, known)
+    sources = made_inputs() if _kind(system) == "road" else bundled_records()
+    if record not in sources:
+        raise UnknownNameError.of("input", record, sources)
     if _kind(system) == "road":
         return load_input(record, {"length_s": _LENGTH})
     return load_input(record, time_scale=5.0 if speed == "5" else 1.0)
 
 
 def _histories(done: Simulation, source: Input) -> dict[str, Floats]:
-    found = {"time": done.time}
+    columns = {"time": done.time}
     for i, name in enumerate(done.system.coordinates):
-        found |= {f"x.{name}": done.x[:, i], f"a.{name}": done.a[:, i]}
+        columns |= {f"x.{name}": done.x[:, i], f"a.{name}": done.a[:, i]}
     for i, link in enumerate(done.links):
         if link.role == "damper":
-            found |= {f"stroke.{link.name}": done.stroke[:, i], f"force.{link.name}": done.force[:, i]}
-            found[f"current.{link.name}"] = done.current[:, i]
+            columns |= {f"stroke.{link.name}": done.stroke[:, i], f"force.{link.name}": done.force[:, i]}
+            columns[f"current.{link.name}"] = done.current[:, i]
     if done.system.ground is not None:
-        return found | {"way.ground": _moved(source.value(done.time), done.step)}
-    return found | {f"way.{name}": done.road[:, i] for i, name in enumerate(done.system.channels)}
+        return columns | {"way.ground": _moved(source.value(done.time), done.step)}
+    return columns | {f"way.{name}": done.road[:, i] for i, name in enumerate(done.system.channels)}
 
 
 def _moved(acceleration: Floats, step: float) -> Floats:

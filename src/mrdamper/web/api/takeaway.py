@@ -15,7 +15,7 @@ from mrdamper.errors import InputError
 from mrdamper.export import all_exporters
 from mrdamper.report.tables import prediction_rows
 from mrdamper.web.answers import archive, download, zipped
-from mrdamper.web.api.model import Ask
+from mrdamper.web.api.model import PredictionRequest
 from mrdamper.web.bench_model import as_damper, predict_held
 from mrdamper.web.kept import Kept, keep, open_kept
 from mrdamper.web.sessions import Current, Session
@@ -78,7 +78,7 @@ def document(key: str, held: Held, session: Current) -> dict[str, str]:
 
 
 @router.post("/dampers/{key}/csv")
-def table(key: str, ask: Ask, session: Current) -> Response:
+def table(key: str, ask: PredictionRequest, session: Current) -> Response:
     """The loop at a condition as CSV."""
     prediction = predict_held(session.damper(key).damper, ask.condition, ask.held)
     text = csv_text(prediction_rows(prediction))
@@ -97,7 +97,7 @@ def start_export(key: str, name: str, held: Held, session: Current) -> dict[str,
     damper = as_damper(session.damper(key).damper, held.held)
     folder = session.folder / session.key("export")
     return session.start(
-        "export", export_damper, (damper, name, folder), lambda made: _conclude(session, folder, *made)
+        "export", export_damper, (damper, name, folder), lambda results: _conclude(session, folder, *results)
     )
 
 

@@ -115,9 +115,9 @@ def split(held: HeldOut, session: Current) -> dict[str, Any]:
 
 
 def _channel(profile: Profile, name: str, chosen: ChosenColumn) -> Channel:
-    known = profile.channel(name)
-    says = known.model_dump(exclude_unset=True, exclude_none=True)
-    if known.scale is None:
+    settings = profile.channel(name)
+    says = settings.model_dump(exclude_unset=True, exclude_none=True)
+    if settings.scale is None:
         says = {key: value for key, value in says.items() if key != "unit"}
         says |= {"unit": chosen.unit} if chosen.unit else {}
     return Channel(**{**says, "column": chosen.column + 1, "sign": chosen.sign})
