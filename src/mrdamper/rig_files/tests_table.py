@@ -36,7 +36,7 @@ class TestsTableError(InputError):
 
 
 @dataclass(frozen=True, slots=True)
-class TableOfTestsRow:
+class StatedTest:
     """What the table says of a test; None where it says nothing."""
 
     line: int
@@ -53,16 +53,16 @@ class TestsTable:
     """A table of tests, and where it stands."""
 
     path: Path
-    rows: tuple[TableOfTestsRow, ...]
+    rows: tuple[StatedTest, ...]
     __test__ = False
 
-    def of(self, path: Path, run: str) -> TableOfTestsRow | None:
+    def of(self, path: Path, run: str) -> StatedTest | None:
         """The row of a test: of its run, else of its file."""
         own = [row for row in self.rows if _is_file(row.file, path) and row.run in ("", run)]
         own.sort(key=lambda row: row.run == "")
         return own[0] if own else None
 
-    def of_file(self, path: Path) -> tuple[TableOfTestsRow, ...]:
+    def of_file(self, path: Path) -> tuple[StatedTest, ...]:
         """The rows of a file's tests."""
         return tuple(row for row in self.rows if _is_file(row.file, path))
 
@@ -142,7 +142,7 @@ def load_tests(path: str | Path) -> TestsTable:
     return TestsTable(path, tuple(found))
 
 
-def applied(record: Record, row: TableOfTestsRow | None, table: TestsTable) -> Record:
+def applied(record: Record, row: StatedTest | None, table: TestsTable) -> Record:
     """A record with what its row says; E_CURRENT_CONTRADICTS if its channel, name or heading states another current."""
     if row is None:
         return record
@@ -240,7 +240,7 @@ def _key(name: str) -> str:
     return header.role if header.role in ("current", "temperature") else bare
 
 
-def _row(line: int, cells: list[str], names: list[str], keys: list[str], wrong: _Wrong) -> TableOfTestsRow:
+def _row(line: int, cells: list[str], names: list[str], keys: list[str], wrong: _Wrong) -> StatedTest:
     if len(cells) > len(names) and any(cell.strip() for cell in cells[len(names) :]):
         wrong(line, f"{len(cells)} cells under {len(names)} names", "quote cells with commas")
     says = {}
@@ -262,7 +262,7 @@ def _row(line: int, cells: list[str], names: list[str], keys: list[str], wrong: 
         wrong(line, f"split is {split!r}", "write train or validate")
     if "temperature" in says:
         notes["temperature_C"] = f"{says['temperature']:g}"
-    return TableOfTestsRow(
+    return StatedTest(
         line, says.get("file", ""), says.get("run", ""), says.get("current"), split, says.get("rig"), notes
     )
 

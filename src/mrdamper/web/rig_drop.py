@@ -15,7 +15,7 @@ from mrdamper.errors import InputError
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.rig_import import ImportResult, Refusal
 from mrdamper.rig_files.tests_table import NAME as TESTS
-from mrdamper.rig_files.tests_table import TableOfTestsRow, TestsTable, load_tests
+from mrdamper.rig_files.tests_table import StatedTest, TestsTable, load_tests
 from mrdamper.web.drops import Drop, Intake, NothingTakenError, Verdict
 
 _PROFILES_TRIED = 5  # files looked at for the first whose form can be guessed
@@ -75,7 +75,7 @@ def _imported(
 ) -> ImportResult:
     """A file read with what the dropped table says of its tests, and the currents that the page states for them."""
     rows = () if table is None else table.of_file(Path(drop.names[path]))
-    stated = [TableOfTestsRow(0, "", run, current) for (file, run), current in drop.currents.items() if file == path]
+    stated = [StatedTest(0, "", run, current) for (file, run), current in drop.currents.items() if file == path]
     if not rows and not stated:
         return read([path], profile)
     runs = {row.run for row in stated}
