@@ -30,8 +30,8 @@ import numpy as np
 import polars as pl
 
 from benchmarks.synthetic_fleet import FAULTS, Population, write_fleet
+from mrdamper.data.child import descendants
 from mrdamper.fleet import engine
-from mrdamper.fleet.guard import descendants
 from mrdamper.fleet.item import digest_of
 from mrdamper.fleet.items import find_items
 from mrdamper.fleet.job import Settings, as_job, attempt

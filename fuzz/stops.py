@@ -345,6 +345,6 @@ def _content(path: Path) -> dict[str, str]:
 
 
 def _descendants(process: int) -> list[int]:
-    from mrdamper.fleet.guard import descendants
+    from mrdamper.data.child import descendants
 
     return descendants(process)

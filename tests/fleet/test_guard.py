@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+from mrdamper.data.child import descendants
 from mrdamper.errors import InputError
-from mrdamper.fleet.guard import JobError, JobLimits, KillableWorker, descendants
+from mrdamper.fleet.guard import JobError, JobLimits, KillableWorker
 
 HERE = "support.bad_jobs"
 SMALL = JobLimits(cpu_s=1.0, wall_s=60.0, memory_bytes=700 * 2**20)

@@ -1,29 +1,24 @@
-"""A process that can be killed: jobs run in it, so that one that crashes, hangs or fills the memory fails alone.
+"""Jobs in a process that can be killed: the child limits its own processor time and memory, the parent its wall time.
 
-Parent and child speak in lines of JSON; nothing is pickled. The child limits its own processor
-time and memory, the parent its wall time and the memory of everything it started. A child that
-is left with memory or processes of a job makes way for a fresh one.
+The parent also limits the memory of everything the child started. A child that is left with
+memory or processes of a job makes way for a fresh one.
 """
 
 from __future__ import annotations
 
-import contextlib
-import json
 import os
-import select
 import signal
-import subprocess
-import sys
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from mrdamper.data.child import Answer, Child, descendants
 from mrdamper.errors import InputError
 
 _MEMORY_CHECK_S = 0.25  # seconds between looks at the memory of a job that takes long
 _KILLED_TRIES, _CRASHED_TRIES = 8, 2  # of a job whose process somebody killed, or that died by itself
-_START = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from mrdamper.fleet.guarded import serve; serve()"
+_GRACE_S = 5  # in which a process that said its last word has to end
 
 
 class JobError(InputError):
@@ -46,7 +41,7 @@ class KillableWorker:
 
     def __init__(self, limits: JobLimits | None = None):
         self._limits = limits or JobLimits()
-        self._process: subprocess.Popen[bytes] | None = None
+        self._child: Child | None = None
         self._closed = False
 
     def call(self, function: str, argument: Any) -> Any:
@@ -78,81 +73,31 @@ class KillableWorker:
         self._closed = True
         self._kill()
 
-    def _ask(self, request: dict[str, Any]) -> tuple[dict[str, Any] | None, int]:
+    def _ask(self, request: Answer) -> tuple[Answer | None, int]:
         """Return the child's answer; or None, and the signal or exit status it died by."""
-        if self._process is None or self._process.poll() is not None:
+        if self._child is None or not self._child.alive:
             self._kill()
-            self._process = _start()
-        process = self._process
-        assert process.stdin is not None
-        assert process.stdout is not None
-        line = b""
-        try:
-            process.stdin.write(json.dumps(request).encode() + b"\n")
-            process.stdin.flush()
-            over = self._watch(process)
-            if over is not None:
-                self._kill()
-                return {"code": over[0], "found": over[1]}, 0
-            line = process.stdout.readline()
-        except (OSError, ValueError):
-            pass  # it died while it was written to: its exit status tells
-        if not line.endswith(b"\n"):
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                process.wait(5)
-            died = -(process.poll() or 0)
+            self._child = Child("mrdamper.fleet.guarded", polars_threads=1, session=True)
+        child = self._child
+        answer = child.ask(request, lambda: self._over(child), _GRACE_S)
+        if answer is None or answer.pop("spent", False):
             self._kill()
-            return None, died
-        answer = json.loads(line)
-        if answer.pop("spent", False):
-            self._kill()
-        return answer, 0
+        return answer, child.died
 
-    def _watch(self, process: subprocess.Popen[bytes]) -> tuple[str, str] | None:
-        """Wait for an answer; which limit is broken, and how, if one is."""
-        begin, answers = time.monotonic(), process.stdout.fileno()  # type: ignore[union-attr]
-        while not select.select([answers], [], [], _MEMORY_CHECK_S)[0]:
+    def _over(self, child: Child) -> Answer | None:
+        """Wait for an answer; the limit that is broken, and how, if one is."""
+        begin = time.monotonic()
+        while child.is_silent(_MEMORY_CHECK_S):
             if time.monotonic() - begin > self._limits.wall_s:
-                return "E_JOB_TIME", f"not done after {self._limits.wall_s:g} s"
-            if sum(map(_resident, [process.pid, *descendants(process.pid)])) > self._limits.memory_bytes:
-                return "E_JOB_MEMORY", f"over {self._limits.memory_bytes / 2**30:.3g} GiB of memory"
+                return {"code": "E_JOB_TIME", "found": f"not done after {self._limits.wall_s:g} s"}
+            if sum(map(_resident, [child.pid, *descendants(child.pid)])) > self._limits.memory_bytes:
+                return {"code": "E_JOB_MEMORY", "found": f"over {self._limits.memory_bytes / 2**30:.3g} GiB of memory"}
         return None
 
     def _kill(self) -> None:
-        process, self._process = self._process, None
-        if process is None:
-            return
-        for pid in [*descendants(process.pid), process.pid]:
-            with contextlib.suppress(OSError):
-                os.kill(pid, signal.SIGKILL)
-        with contextlib.suppress(OSError):
-            os.killpg(process.pid, signal.SIGKILL)
-        for pipe in (process.stdin, process.stdout):
-            with contextlib.suppress(OSError):
-                pipe.close()  # type: ignore[union-attr]
-        process.wait()
-
-
-def descendants(pid: int) -> list[int]:
-    """List the processes that a process started, and those that they started; empty where the system has no list."""
-    processes = []
-    with contextlib.suppress(OSError):
-        for task in Path(f"/proc/{pid}/task").iterdir():
-            for child in map(int, (task / "children").read_text().split()):
-                processes += [child, *descendants(child)]
-    return processes
-
-
-def _start() -> subprocess.Popen[bytes]:
-    environment = {
-        **os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1",
-        "POLARS_MAX_THREADS": "1",
-    }  # fmt: skip
-    return subprocess.Popen(
-        [sys.executable, "-c", _START, json.dumps(sys.path)],
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment,
-        start_new_session=True,  # Ctrl-C at the terminal is for the supervisor alone
-    )  # fmt: skip
+        child, self._child = self._child, None
+        if child is not None:
+            child.close()
 
 
 def _result(answer: dict[str, Any]) -> Any:

@@ -15,8 +15,8 @@ import traceback
 from pathlib import Path
 from typing import Any
 
+from mrdamper.data.child import descendants, send, standard_output, writable_memory
 from mrdamper.errors import InputError
-from mrdamper.fleet.guard import descendants
 
 _MAX_LEFTOVER_BYTES = 256 * 2**20  # bytes that jobs may leave behind before a fresh process takes over
 _TRACEBACK_LINES = 12  # of a traceback that an answer carries
@@ -24,8 +24,7 @@ _TRACEBACK_LINES = 12  # of a traceback that an answer carries
 
 def serve() -> None:
     """Answer requests until the parent hangs up or dies."""
-    replies = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what libraries print must not come between the answers
+    replies = standard_output()
     _adopt_orphans()
     requests: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(requests,), daemon=True).start()
@@ -35,11 +34,10 @@ def serve() -> None:
         answer = _answer(request)
         if os.getpid() != own:
             os._exit(0)  # a fork of a job that came back: it has no say here
-        held = _written()
+        held = writable_memory()
         first = held if first is None else first
         answer["spent"] = held - first > _MAX_LEFTOVER_BYTES or bool(_strangers())
-        replies.write(json.dumps(answer).encode() + b"\n")
-        replies.flush()
+        send(replies, answer)
 
 
 def _listen(requests: queue.SimpleQueue[bytes]) -> None:
@@ -85,14 +83,6 @@ def _limit(seconds: float | None, size: int | None) -> None:
     for what, most in ((resource.RLIMIT_CPU, until), (resource.RLIMIT_DATA, size)):
         hard = resource.getrlimit(what)[1]
         resource.setrlimit(what, (hard if most is None else most, hard))
-
-
-def _written() -> int:
-    """Memory this process may write to [bytes]; 0 where the system does not tell."""
-    status = Path("/proc/self/status")
-    if not status.exists():
-        return 0
-    return next((int(line.split()[1]) * 1024 for line in status.read_text().splitlines() if "VmData" in line), 0)
 
 
 def _strangers() -> list[int]:

@@ -1,20 +1,15 @@
 """A process of its own for libraries that damaged files can crash, hang or fill the memory with.
 
-Readers that name a `library` are run here. Parent and child speak in lines of JSON, with
-the bytes of columns behind them; nothing is pickled. The child stops itself when a file
-takes more processor time or memory than its size warrants, and a new one takes its place.
+Readers that name a `library` are run here. The child stops itself when a file takes more
+processor time or memory than its size warrants, and a new one takes its place.
 """
 
 from __future__ import annotations
 
 import atexit
 import contextlib
-import json
 import os
-import select
 import signal
-import subprocess
-import sys
 import tempfile
 import threading
 import time
@@ -24,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from mrdamper.data.child import Child
 from mrdamper.errors import CombinedError, MissingExtraError
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import (
@@ -42,21 +38,6 @@ _SECONDS = 0.6  # processor time of the child for the smallest file; a busy mach
 _BYTES, _BYTES_PER_BYTE = 96 * 2**20, 3 * MOST_RATIO  # memory the child may write to beyond what its library holds
 _GLANCE, _GLANCES = 0.15, 4  # seconds between looks at a silent child, looks at which it sleeps until it is ended
 _PATIENCE = 30  # real time over processor time, on a loaded machine
-# It ends with its parent even while it still loads libraries, before it listens.
-_START = """
-import json, os, sys, threading, time
-
-def watch(parent):
-    while os.getppid() == parent:
-        time.sleep(0.2)
-    os._exit(0)
-
-if os.name == "posix":
-    threading.Thread(target=watch, args=(int(sys.argv[2]),), daemon=True).start()
-sys.path[:] = json.loads(sys.argv[1])
-from mrdamper.rig_files.sandbox_worker import serve
-serve()
-"""
 
 
 @contextlib.contextmanager
@@ -87,7 +68,7 @@ class _Asked:
         self._sandbox, self._source, self._title, self._patience = sandbox, source, title, patience
 
     def __call__(self, request: dict[str, Any]) -> dict[str, Any]:
-        answer = self._sandbox.ask(request, self._patience)
+        answer = self._sandbox.read(request, self._patience)
         if answer is None and self._sandbox.slain:
             raise self._source.refuse(
                 "E_READER_KILLED",
@@ -127,78 +108,42 @@ class _Asked:
         return RawTable(self._source, read=read, words=words, **says)
 
 
-class _Sandbox:
+class _Sandbox(Child):
     """The child process."""
 
     slain = False  # by somebody else than us
     _ended = False  # by us
 
     def __init__(self) -> None:
-        environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "POLARS_MAX_THREADS": "2"}
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", _START, json.dumps([str(Path(p).absolute()) for p in sys.path]), str(os.getpid())],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment,
-        )  # fmt: skip
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._requests, self._answers = self._process.stdin, self._process.stdout
+        super().__init__("mrdamper.rig_files.sandbox_worker", polars_threads=2)
 
-    @property
-    def alive(self) -> bool:
-        return self._process.poll() is None
-
-    def ask(self, request: dict[str, Any], patience: float) -> dict[str, Any] | None:
-        """The child's answer, None if it died over it."""
-        try:
-            self._say(request)
-            self._watch(patience)
-            answer = self._answers.readline()
-        except (OSError, ValueError):  # the pipe is broken, or was closed when the child ended
-            answer = b""
-        if not answer.endswith(b"\n"):
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                self.slain = not self._ended and self._process.wait(_GLANCE) == -getattr(signal, "SIGKILL", 0)
-            self.close()
-            return None
-        return json.loads(answer)
+    def read(self, request: dict[str, Any], patience: float) -> dict[str, Any] | None:
+        """Return the child's answer, None if it died over it."""
+        answer = self.ask(request, lambda: self._watch(patience), _GLANCE)
+        self.slain = answer is None and not self._ended and self.died == getattr(signal, "SIGKILL", None)
+        return answer
 
     def _watch(self, patience: float) -> None:
         """Wait for an answer; end a child that sleeps on a lock of its own, or takes forever."""
         begin, asleep = time.monotonic(), 0
-        while os.name == "posix" and not select.select([self._answers], [], [], _GLANCE)[0]:
-            asleep = asleep + 1 if _sleeps(self._process.pid) else 0
+        while self.is_silent(_GLANCE):
+            asleep = asleep + 1 if _sleeps(self.pid) else 0
             if asleep >= _GLANCES or time.monotonic() - begin > patience:
                 self._ended = True
-                self._process.kill()
+                self.kill()
                 return
 
     def prepare(self, reader: str) -> None:
         """Load a reader's library while nobody waits."""
         with contextlib.suppress(OSError):
-            self._say({"prepare": reader})
-
-    def _say(self, request: dict[str, Any]) -> None:
-        self._requests.write(json.dumps(request).encode() + b"\n")
-        self._requests.flush()
+            self.say({"prepare": reader})
 
     def receive(self, size: int) -> np.ndarray:
-        """The numbers that follow an answer."""
-        values = np.empty(size)
-        view = values.data.cast("B")
-        at = 0
-        while at < len(view):
-            count = self._answers.readinto(view[at:])  # type: ignore[attr-defined]
-            if not count:
-                raise RigFileError("E_FORMAT", "the reading process ended early")
-            at += count
-        return values
-
-    def close(self) -> None:
-        self._process.kill()
-        for pipe in (self._requests, self._answers):
-            with contextlib.suppress(OSError):
-                pipe.close()
-        self._process.wait()
+        """Read the numbers that follow an answer."""
+        try:
+            return super().receive(size)
+        except EOFError:
+            raise RigFileError("E_FORMAT", "the reading process ended early") from None
 
 
 class _Sandboxes:

@@ -6,13 +6,13 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
+from mrdamper.data.child import send, standard_output, writable_memory
 from mrdamper.errors import CombinedError, MissingExtraError
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import NoTableError, RawTable, Reader, RigFileError, Source
@@ -23,8 +23,7 @@ _TOLD = ("code", "found", "line", "column", "remedy")
 
 def serve() -> None:
     """Answer requests until the parent hangs up."""
-    replies = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what libraries print must not come between the answers
+    replies = standard_output()
     with ExitStack() as keep:
         tables: list[RawTable] = []
         for line in sys.stdin.buffer:
@@ -35,7 +34,7 @@ def serve() -> None:
                 elif "reader" in request:
                     keep.close()
                     tables = _open(request, keep)
-                    _send(replies, {"tables": [{name: getattr(table, name) for name in _SAYS} for table in tables]})
+                    send(replies, {"tables": [{name: getattr(table, name) for name in _SAYS} for table in tables]})
                 elif "words" in request:
                     _send_words(replies, tables[request["table"]], request["words"])
                 else:
@@ -43,9 +42,9 @@ def serve() -> None:
             except MissingExtraError as error:
                 if "prepare" in request:
                     continue
-                _send(replies, {"missing": error.found, "remedy": error.remedy})
+                send(replies, {"missing": error.found, "remedy": error.remedy})
             except (RigFileError, CombinedError) as error:
-                _send(
+                send(
                     replies,
                     {
                         "wrong": [
@@ -92,19 +91,8 @@ def _limit(seconds: float | None, size: float = 0) -> None:
     signal.signal(signal.SIGPROF, signal.SIG_DFL)
     signal.setitimer(signal.ITIMER_PROF, seconds or 0.0)
     hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
-    status = Path("/proc/self/status")
-    if seconds is None or not status.exists():
-        resource.setrlimit(resource.RLIMIT_DATA, (hard, hard))
-        return
-    now = next(int(line.split()[1]) * 1024 for line in status.read_text().splitlines() if line.startswith("VmData"))
-    resource.setrlimit(resource.RLIMIT_DATA, (now + int(size), hard))
-
-
-def _send(replies: BinaryIO, answer: dict[str, Any], arrays: Sequence[np.ndarray] = ()) -> None:
-    replies.write(json.dumps(answer).encode() + b"\n")
-    for array in arrays:
-        replies.write(np.ascontiguousarray(array).data)
-    replies.flush()
+    now = writable_memory()
+    resource.setrlimit(resource.RLIMIT_DATA, (hard if seconds is None or not now else now + int(size), hard))
 
 
 def _send_columns(replies: BinaryIO, table: RawTable, columns: list[int]) -> None:
@@ -116,10 +104,10 @@ def _send_columns(replies: BinaryIO, table: RawTable, columns: list[int]) -> Non
         "lines": None if lines is None else [lines.size, lines.starts, lines.lines],
         "findings": [[finding.code, finding.text] for finding in content.findings],
     }
-    _send(replies, answer, values)
+    send(replies, answer, values)
 
 
 def _send_words(replies: BinaryIO, table: RawTable, column: int) -> None:
     assert table.words is not None
     words = table.words(column)
-    _send(replies, {"size": words.codes.size, "labels": words.labels}, [words.codes.astype(np.float64)])
+    send(replies, {"size": words.codes.size, "labels": words.labels}, [words.codes.astype(np.float64)])

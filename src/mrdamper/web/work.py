@@ -13,10 +13,11 @@ import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from multiprocessing import get_context, parent_process
-from multiprocessing.connection import Connection, wait
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from typing import Any
 
+from mrdamper.data.child import end_with_parent
 from mrdamper.errors import InputError
 
 _AT_ONCE = max(1, os.cpu_count() or 1)  # processes of all sessions together
@@ -188,22 +189,11 @@ def _end_group(process: Any) -> None:
         process.terminate()  # no process groups here, or not yet one of its own
 
 
-def _end_with_parent() -> None:
-    """End this worker and all it started once the bench is gone, however it went."""
-    parent = parent_process()
-    if parent is None:
-        return
-    wait([parent.sentinel])
-    if hasattr(os, "killpg"):
-        os.killpg(0, signal.SIGKILL)  # the group that `_work` made
-    os._exit(1)
-
-
 def _work(pipe: Connection, task: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
     """Run a task and send what comes of it: the body of the worker process."""
     if hasattr(os, "setsid"):
         os.setsid()  # a group of its own, so that cancelling reaches the processes a task starts
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    end_with_parent(group=True)
     last = 0.0
 
     def tell(what: str, share: float) -> None:
