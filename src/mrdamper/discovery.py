@@ -46,30 +46,14 @@ class PluginWarning(UserWarning):
 
 @dataclass(frozen=True)
 class ExtensionPart:
-    """Something an installed package provides.
+    """Something an installed package provides."""
 
-    Attributes
-    ----------
-    group : str
-        One of `GROUPS`.
-    name : str
-        Of the part; of the entry point where it could not be loaded.
-    package : str
-        Distribution that provides it, with its version.
-    target : str
-        Module, or module and class.
-    problem : str
-        Why it was skipped; empty if it is used.
-    own : bool
-        It belongs to mrdamper, or to a script that registered it.
-    """
-
-    group: str
-    name: str
-    package: str
-    target: str
-    problem: str = ""
-    own: bool = False
+    group: str  # one of `GROUPS`
+    name: str  # of the part; of the entry point where it could not be loaded
+    package: str  # distribution that provides it, with its version
+    target: str  # module, or module and class
+    problem: str = ""  # why it was skipped; empty if it is used
+    own: bool = False  # it belongs to mrdamper, or to a script that registered it
 
 
 def package_of(distribution: Distribution | None) -> str:
@@ -178,10 +162,7 @@ class Registry(Generic[T]):
     def type_named(self, name: str) -> type[T]:
         """Return the class of that name.
 
-        Raises
-        ------
-        UnknownNameError
-            With the near matches.
+        Raises `UnknownNameError` with the near matches.
         """
         types = self.all()
         if not isinstance(name, str) or name not in types:

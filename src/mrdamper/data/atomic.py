@@ -82,7 +82,6 @@ def write_result(folder: str | Path, facts: Mapping[str, Any] | None = None) -> 
 
     Parameters
     ----------
-    folder : path
     facts : mapping, optional
         What differs from run to run, such as times: it stands nowhere else.
     """

@@ -44,7 +44,6 @@ class Child:
     ----------
     module : str
         Imported in the process; linear algebra has one thread there.
-    polars_threads : int
     session : bool
         In a session of its own, which Ctrl-C at the terminal does not reach; `serve` ends it with its parent. Else it
         is ended with its parent from the start.

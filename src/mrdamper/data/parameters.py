@@ -22,35 +22,18 @@ _KEY = "mrdamper.parameter"
 
 @dataclass(frozen=True, slots=True)
 class ParameterInfo:
-    """Description of one parameter.
+    """Description of one parameter."""
 
-    Attributes
-    ----------
-    name, unit, meaning : str
-        Field name, SI unit, one phrase a damper engineer understands.
-    bounds : (float, float)
-        Physical limits [unit]; searches stay inside them.
-    scale : "linear" or "log"
-        Scale on which a search moves.
-    linear : bool
-        The force is linear in it, so it is solved for and not searched.
-    preset : bool
-        Held at its default unless the user frees it.
-    default : float or None
-        Value when none is given.
-    symbol : str
-        Letter in equations, as LaTeX.
-    """
-
+    # name, unit, meaning: field name, SI unit, one phrase a damper engineer understands
     name: str
     unit: str
     meaning: str
-    bounds: tuple[float, float]
-    scale: Scale
-    linear: bool
-    preset: bool
-    default: float | None
-    symbol: str
+    bounds: tuple[float, float]  # physical limits [unit]; searches stay inside them
+    scale: Scale  # "linear" or "log"; scale on which a search moves
+    linear: bool  # the force is linear in it, so it is solved for and not searched
+    preset: bool  # held at its default unless the user frees it
+    default: float | None  # value when none is given
+    symbol: str  # letter in equations, as LaTeX
 
 
 def param(
@@ -91,10 +74,7 @@ def parameters_of(owner: type) -> tuple[ParameterInfo, ...]:
 def with_values(kind: type[T], values: Mapping[str, float]) -> T:
     """Make an object with some of its parameters set.
 
-    Raises
-    ------
-    ParameterError
-        If there is no such parameter, one is missing, or a value lies outside its bounds.
+    Raises `ParameterError` if there is no such parameter, one is missing, or a value lies outside its bounds.
     """
     infos = {info.name: info for info in parameters_of(kind)}
     for name, value in values.items():

@@ -12,10 +12,7 @@ from typing import BinaryIO
 def open_regular(path: Path) -> BinaryIO:
     """Open a file for reading bytes, without waiting.
 
-    Raises
-    ------
-    OSError
-        If it cannot be opened, or is a pipe, a socket or a device.
+    Raises `OSError` if it cannot be opened, or is a pipe, a socket or a device.
     """
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     if not stat.S_ISREG(os.fstat(handle).st_mode):

@@ -271,10 +271,7 @@ class Run(Displayable):
 def require_name(what: str, name: object) -> None:
     """Refuse a name that would not stay a name on a page, in a terminal or in a table.
 
-    Raises
-    ------
-    RunError
-        Unless it is printable text of one line.
+    Raises `RunError` unless it is printable text of one line.
     """
     if not isinstance(name, str) or len(name) > _MAX_NAME_CHARACTERS or printable(name) != name:
         raise RunError(

@@ -13,12 +13,8 @@ SESSIONS_NEEDED = 3  # sessions from which the scatter between sessions is estim
 def session_of(run: Run) -> str | None:
     """Session of a run: as stated in its note `session`, else the day of `recorded_at`, else None.
 
-    A run of unknown session (None) belongs to no session, not to one of its own.
-
-    Raises
-    ------
-    InputError
-        E_CLOCK if the clock is needed and is no date.
+    A run of unknown session (None) belongs to no session, not to one of its own. Raises `InputError` (E_CLOCK) if the
+    clock is needed and is no date.
 
     Examples
     --------
@@ -37,10 +33,7 @@ def session_of(run: Run) -> str | None:
 def hour_of(run: Run) -> float | None:
     """Hours since 1970-01-01 at which a run was recorded; None where no time of day is known.
 
-    Raises
-    ------
-    InputError
-        E_CLOCK if the clock is no date.
+    Raises `InputError` (E_CLOCK) if the clock is no date.
     """
     clock = _clock_of(run)
     if clock is None or len(str(run.notes["recorded_at"]).strip()) <= len("2024-05-31"):

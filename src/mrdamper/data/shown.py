@@ -55,10 +55,7 @@ class Displayable(ABC):
     def to_pandas(self) -> Any:
         """Return the table as a `pandas.DataFrame`.
 
-        Raises
-        ------
-        MissingExtraError
-            If pandas is not installed.
+        Raises `MissingExtraError` if pandas is not installed.
         """
         return _library("pandas").DataFrame(dict(self.table))
 

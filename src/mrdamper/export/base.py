@@ -42,7 +42,6 @@ class Exporter(ABC):
 
         Parameters
         ----------
-        damper : Damper or Model
         name : str
             Begins the names of files and symbols; an identifier in C.
         """

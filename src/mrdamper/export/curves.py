@@ -91,7 +91,6 @@ def force_velocity(
 
     Parameters
     ----------
-    damper : Damper
     currents : sequence of float, optional
         [A]; default six over the tested range.
     speeds : sequence of float, optional

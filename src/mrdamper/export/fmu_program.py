@@ -45,7 +45,6 @@ def write_program_fmu(
         Of files and symbols; for people.
     units : mapping of str to str
         Of every input but dt, and every output.
-    out : path
     period : float
         Between two samples [s]; 0: a sample every communication step.
     start : sequence of float

@@ -85,12 +85,8 @@ def cluster_engine(
 ) -> Iterator[tuple[Submit, int]]:
     """Jobs on a Dask cluster, each in a process that can be killed beside its worker; yields as `local_engine`.
 
-    Raises
-    ------
-    MissingExtraError
-        If Dask is not installed.
-    ClusterError
-        If no scheduler answers there, or it has no worker.
+    Raises `MissingExtraError` if Dask is not installed. Raises `ClusterError` if no scheduler answers there, or it
+    has no worker.
     """
     try:
         import distributed

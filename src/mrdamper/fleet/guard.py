@@ -47,14 +47,8 @@ class KillableWorker:
     def call(self, function: str, argument: Any) -> Any:
         """Return the result of `module:function` of an argument, both as JSON.
 
-        A process that somebody killed is no fault of the job: it is done again.
-
-        Raises
-        ------
-        JobError
-            E_JOB_CRASH, E_JOB_TIME or E_JOB_MEMORY.
-        InputError
-            What the function raised.
+        A process that somebody killed is no fault of the job: it is done again. Raises `JobError`: E_JOB_CRASH,
+        E_JOB_TIME or E_JOB_MEMORY. Raises `InputError`: what the function raised.
         """
         killed = crashed = 0
         while True:

@@ -115,7 +115,6 @@ def drift(values: Floats, sessions: Sequence[str], serials: Sequence[str], golde
         Positive, a force say.
     sessions : sequence of str, length N
         In the order of time when sorted.
-    serials, golden : sequences, length N
     """
     order = sorted(set(sessions))
     if len(order) < 3:

@@ -111,10 +111,7 @@ def identify(
 def refuse_clipped(run: Run, clipped: bool = False) -> None:
     """Refuse a run with a channel cut off at its extreme: its peaks are not the damper's.
 
-    Raises
-    ------
-    IdentificationError
-        Unless `clipped` runs are wanted.
+    Raises `IdentificationError` unless `clipped` runs are wanted.
     """
     if "W_CLIPPED" in run.findings and not clipped:
         raise IdentificationError(

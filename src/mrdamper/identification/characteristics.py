@@ -25,33 +25,18 @@ _MIDDLE = 0.25  # share of the amplitude around mid-stroke where the force at mi
 
 @dataclass(frozen=True)
 class Stroke:
-    """Figures of one run, sides apart, gas force not yet taken away.
-
-    Attributes
-    ----------
-    run_id : str
-    condition : Condition
-        Measured, its current rounded to the level of the test matrix.
-    peak_velocity : (float, float)
-        Of rebound and compression, both positive [m/s].
-    peak_force : (float, float)
-        Largest force in the direction of rebound and of compression, signed, median over the cycles [N].
-    mid_force : (float, float)
-        Force at mid-stroke, moving in rebound and in compression, signed [N].
-    zero_force_velocity : float
-        Half the width of the force–velocity loop: velocity at which the force, gas force taken
-        away, passes zero, mean of both sides [m/s].
-    energy : float
-        Dissipated per cycle [J].
-    """
+    """Figures of one run, sides apart, gas force not yet taken away."""
 
     run_id: str
-    condition: Condition
-    peak_velocity: tuple[float, float]
+    condition: Condition  # measured, its current rounded to the level of the test matrix
+    peak_velocity: tuple[float, float]  # of rebound and compression, both positive [m/s]
+    # largest force in the direction of rebound and of compression, signed, median over the cycles [N]
     peak_force: tuple[float, float]
-    mid_force: tuple[float, float]
+    mid_force: tuple[float, float]  # force at mid-stroke, moving in rebound and in compression, signed [N]
+    # half the width of the force–velocity loop: velocity at which the force, gas force taken away, passes zero, mean of
+    # both sides [m/s]
     zero_force_velocity: float
-    energy: float
+    energy: float  # dissipated per cycle [J]
 
     @property
     def gas_force(self) -> float:
@@ -61,29 +46,17 @@ class Stroke:
 
 @dataclass(frozen=True)
 class Characteristics:
-    """Characteristic values of one damper's runs, without any model.
+    """Characteristic values of one damper's runs, without any model."""
 
-    Attributes
-    ----------
-    strokes : tuple of Stroke
-        By current and peak velocity.
-    currents : tuple of float
-        Levels of the test matrix [A].
-    gas_force, friction : float
-        [N]; friction is nan where the tests cannot tell.
-    gas_from, friction_from : str
-        How each was found.
-    passed_over : mapping of run id to the reason
-        Runs that hold no steady cycle at one current.
-    """
-
-    strokes: tuple[Stroke, ...]
-    currents: tuple[float, ...]
+    strokes: tuple[Stroke, ...]  # by current and peak velocity
+    currents: tuple[float, ...]  # levels of the test matrix [A]
+    # gas_force, friction: [N]; friction is nan where the tests cannot tell
     gas_force: float
     friction: float
+    # gas_from, friction_from: how each was found
     gas_from: str
     friction_from: str
-    passed_over: Mapping[str, str]
+    passed_over: Mapping[str, str]  # by run, why it holds no steady cycle at one current
 
     def at(self, current: float) -> tuple[Stroke, ...]:
         """Return the strokes of a level, slow to fast."""
@@ -116,15 +89,12 @@ class Characteristics:
 def characterise(runs: Sequence[Run]) -> Characteristics:
     """Characterise one damper from its steady sine runs; other motion is passed over.
 
+    Raises `IdentificationError` if no run holds a steady cycle at one current.
+
     Parameters
     ----------
     runs : sequence of Run
         Of one rig.
-
-    Raises
-    ------
-    IdentificationError
-        If no run holds a steady cycle at one current.
     """
     usable, passed_over = [], {}
     for run in runs:

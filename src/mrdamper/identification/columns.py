@@ -22,7 +22,6 @@ def linear_table(
     ----------
     bare : Model
         With all the linear parameters at zero.
-    linear : sequence of ParameterInfo, length L
     motion : Excitation
         N samples.
     state : (N,) array

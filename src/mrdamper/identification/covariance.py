@@ -28,29 +28,14 @@ _NO_MORE = 1e-12  # of the largest: eigenvalue of the scaled normal matrix below
 
 @dataclass(frozen=True, eq=False)
 class ParameterCovariance:
-    """Covariance of parameters.
+    """Covariance of parameters."""
 
-    Attributes
-    ----------
-    covariance : (P, P) array
-        Infinite on the diagonal where the data does not determine a parameter.
-    dof : (P,) array
-        Degrees of freedom behind each variance, for Student's t.
-    effective : (P,) array
-        Independent samples that would give each parameter's error, were the residual white.
-    textbook : (P,) array
-        Standard errors by s² (JᵀJ)⁻¹, as if the residual were white.
-    memory : float
-        Length of the record in lags of its residual; a record shorter than some ten says little.
-    alike : tuple of tuples of int
-        Parameters that do the same to the residual: of each group only some combinations are known.
-    """
-
-    covariance: Floats
-    dof: Floats
-    effective: Floats
-    textbook: Floats
-    memory: float
+    covariance: Floats  # (P, P) infinite on the diagonal where the data does not determine a parameter
+    dof: Floats  # (P,) degrees of freedom behind each variance, for Student's t
+    effective: Floats  # (P,) independent samples that would give each parameter's error, were the residual white
+    textbook: Floats  # (P,) standard errors by s² (JᵀJ)⁻¹, as if the residual were white
+    memory: float  # length of the record in lags of its residual; a record shorter than some ten says little
+    # parameters that do the same to the residual: of each group only some combinations are known
     alike: tuple[tuple[int, ...], ...] = ()
 
     @property

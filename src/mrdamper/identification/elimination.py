@@ -29,21 +29,11 @@ _LENGTH, _ASYMMETRY, _SHARPNESS = "yield_displacement", "asymmetry", "n"  # sear
 
 @dataclass(frozen=True, eq=False)
 class Elimination:
-    """A problem whose state fills one column: what stays the same however the search moves.
-
-    Attributes
-    ----------
-    problem : Problem
-    columns : (N, L) array
-        Columns that stay, at the scored samples.
-    right : (N,) array
-        Measured force less the force without linear parameters [N].
-    kind : LinearStructure
-    """
+    """A problem whose state fills one column: what stays the same however the search moves."""
 
     problem: Problem
-    columns: Floats
-    right: Floats
+    columns: Floats  # (N, L) columns that stay, at the scored samples
+    right: Floats  # (N,) measured force less the force without linear parameters [N]
     kind: LinearStructure
 
     @classmethod
@@ -101,30 +91,16 @@ class Elimination:
 
 @dataclass(frozen=True)
 class LinearStructure:
-    """Structure of the search: the linear and the nonlinear parameters of a model.
+    """Structure of the search: the linear and the nonlinear parameters of a model."""
 
-    Attributes
-    ----------
-    coordinates : tuple of str
-        Names of the search coordinates.
-    state : ParameterInfo
-        Parameter whose column the state is.
-    others : tuple of ParameterInfo
-        The other linear parameters.
-    bare : Model
-        With all linear parameters at zero, anywhere on the search: the columns of `others` are its.
-    rho, n : float
-        Of a Bouc–Wen shape of length 1/kappa, where they are not searched.
-    has_shape : bool
-        The state is zeta/kappa of such a shape, and the coordinates are its length, asymmetry and n.
-    """
-
-    coordinates: tuple[str, ...]
-    state: ParameterInfo
-    others: tuple[ParameterInfo, ...]
-    bare: Model
+    coordinates: tuple[str, ...]  # names of the search coordinates
+    state: ParameterInfo  # parameter whose column the state is
+    others: tuple[ParameterInfo, ...]  # the other linear parameters
+    bare: Model  # with all linear parameters at zero, anywhere on the search: the columns of `others` are its
+    # rho, n: of a Bouc–Wen shape of length 1/kappa, where they are not searched
     rho: float = 0.0
     n: float = 2.0
+    # the state is zeta/kappa of such a shape, and the coordinates are its length, asymmetry and n
     has_shape: bool = False
 
     def shape(self, point: Mapping[str, float]) -> tuple[float, float, float] | None:
@@ -142,7 +118,6 @@ def linear_structure(
 
     Parameters
     ----------
-    model_type : type of Model
     free : tuple of str
         Parameters to be determined.
     fixed : tuple of (str, float)
@@ -196,22 +171,13 @@ def _other(axis: SearchAxis) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Projector:
-    """Least squares on columns that stay and one that moves: the ones that stay are solved once.
+    """Least squares on columns that stay and one that moves: the ones that stay are solved once."""
 
-    Attributes
-    ----------
-    fixed : FixedColumns
-        The columns that stay.
-    lower, upper : (L,) arrays
-        Bounds of their coefficients.
-    size_bounds : (float, float)
-        Bounds of the coefficient of the state.
-    """
-
-    fixed: FixedColumns
+    fixed: FixedColumns  # the columns that stay
+    # lower, upper: (L,) bounds of their coefficients
     lower: Floats
     upper: Floats
-    size_bounds: tuple[float, float]
+    size_bounds: tuple[float, float]  # bounds of the coefficient of the state
 
     def residual(self, state: Floats) -> Floats | None:
         """Fitted minus right side for the best coefficients; None where a bound or dependence interferes."""

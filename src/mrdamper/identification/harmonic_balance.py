@@ -30,32 +30,18 @@ _FORCE_HARMONICS = 9  # the first is wanted; the next few must not leak into it 
 
 @dataclass(frozen=True, eq=False)
 class SineRecord:
-    """A steady run as harmonic balance sees it: x = amplitude · sin theta, and the force.
-
-    Attributes
-    ----------
-    run_id : str
-    condition : Condition
-        With the amplitude of the first harmonic of the displacement.
-    theta : (N,) array
-        Phase of the displacement at the samples [rad], from 0 on.
-    force : (N,) array
-        Measured [N].
-    """
+    """A steady run as harmonic balance sees it: x = amplitude · sin theta, and the force."""
 
     run_id: str
-    condition: Condition
-    theta: Floats
-    force: Floats
+    condition: Condition  # with the amplitude of the first harmonic of the displacement
+    theta: Floats  # (N,) phase of the displacement at the samples [rad], from 0 on
+    force: Floats  # (N,) measured [N]
 
     @classmethod
     def of(cls, run: Run) -> SineRecord:
         """Read the steady window of a run.
 
-        Raises
-        ------
-        ExcitationError
-            If it holds under one cycle, or its motion is no sine.
+        Raises `ExcitationError` if it holds under one cycle, or its motion is no sine.
         """
         analysis = analyse_motion(run)
         if not analysis.is_sine:
@@ -89,14 +75,9 @@ class SineRecord:
 
 @dataclass(frozen=True)
 class ForceReading:
-    """Force ≈ offset + amplitude · sin(theta + phase), as the closed forms want it.
+    """Force ≈ offset + amplitude · sin(theta + phase), as the closed forms want it."""
 
-    Attributes
-    ----------
-    amplitude, phase, offset : float
-        F0 [N], its lead phi over the displacement [rad], f0 [N].
-    """
-
+    # amplitude, phase, offset: F0 [N], its lead phi over the displacement [rad], f0 [N]
     amplitude: float
     phase: float
     offset: float
@@ -114,7 +95,6 @@ def read_force(
 
     Parameters
     ----------
-    record : SineRecord
     amplitude : {"first-harmonic", "half-peak-to-peak", "maximum"}
         F0 is the amplitude of the first harmonic, half the peak-to-peak force, or the largest force.
     phase : {"harmonic", "peaks"}
@@ -150,7 +130,6 @@ def damping_and_mass(
 
     Parameters
     ----------
-    reading : ForceReading
     amplitude : float
         X [m].
     omega : float
@@ -177,7 +156,6 @@ def double_counted(shape: Shape, yield_force: float, amplitude: float, omega: fl
 
     Parameters
     ----------
-    shape : Shape
     yield_force : float
         f_z, hysteretic force after yield [N].
     amplitude, omega : float
@@ -197,14 +175,9 @@ def double_counted(shape: Shape, yield_force: float, amplitude: float, omega: fl
 
 @dataclass(frozen=True)
 class StiffnessAndMass:
-    """Stiffness and mass from the in-phase force of several runs.
+    """Stiffness and mass from the in-phase force of several runs."""
 
-    Attributes
-    ----------
-    k1, k3, m : float
-        [N/m], [N/m³], [kg].
-    """
-
+    # k1, k3, m: [N/m], [N/m³], [kg]
     k1: float
     k3: float
     m: float
@@ -215,20 +188,15 @@ def separate_mass(
 ) -> StiffnessAndMass:
     """Tell mass from stiffness by regression of k1 + 3/4 k3 X² − m omega² over several runs.
 
-    At one frequency x and its acceleration are one signal, so one run can not do it.
+    At one frequency x and its acceleration are one signal, so one run can not do it. Raises `IdentificationError`
+    with fewer than two frequencies, or, for k3, than two amplitudes.
 
     Parameters
     ----------
-    conditions : sequence of Condition
     in_phase : sequence of float
         In-phase force over displacement of each run, the hysteretic part removed [N/m].
     with_cubic : bool
         Determine k3 too; needs two amplitudes.
-
-    Raises
-    ------
-    IdentificationError
-        With fewer than two frequencies, or, for k3, than two amplitudes.
     """
     omega = 2 * np.pi * np.array([c.frequency_Hz for c in conditions])
     X = np.array([c.amplitude_m for c in conditions])

@@ -25,10 +25,7 @@ _LOPSIDED = 0.1  # of an interval's half width: shifted by less, it is written w
 def student(level: float, dof: float) -> float:
     """Two-sided quantile of Student's t, to 1e-10 for levels up to 0.999.
 
-    Raises
-    ------
-    InputError
-        E_LEVEL if the level is not between 0 and 1.
+    Raises `InputError` (E_LEVEL) if the level is not between 0 and 1.
 
     References
     ----------
@@ -116,7 +113,6 @@ def weaknesses(
 
     Parameters
     ----------
-    names : sequence of str, length P
     covariance : (P, P) array
         Infinite on the diagonal where nothing is known.
     alike : sequence of sequences of int

@@ -17,30 +17,15 @@ from mrdamper.statistics.metrics import dissipated_power
 
 @dataclass(frozen=True)
 class LoopAnalysis:
-    """Figures of one run's steady loops.
-
-    Attributes
-    ----------
-    run_id : str
-    split : str
-    motion : MotionAnalysis
-    peak_force : float
-        Half the peak-to-peak force, median over the cycles [N].
-    mean_force : float
-        Mean force over whole cycles [N]: gas force, preload, and the load cell's zero.
-    dissipated_energy : float
-        Per cycle [J].
-    equivalent_damping : float
-        Of the viscous damper that dissipates as much, W/(π ω X²) [N s/m].
-    """
+    """Figures of one run's steady loops."""
 
     run_id: str
     split: str
     motion: MotionAnalysis
-    peak_force: float
-    mean_force: float
-    dissipated_energy: float
-    equivalent_damping: float
+    peak_force: float  # half the peak-to-peak force, median over the cycles [N]
+    mean_force: float  # mean force over whole cycles [N]: gas force, preload, and the load cell's zero
+    dissipated_energy: float  # per cycle [J]
+    equivalent_damping: float  # of the viscous damper that dissipates as much, W/(π ω X²) [N s/m]
 
     @property
     def condition(self) -> Condition:
@@ -51,10 +36,7 @@ class LoopAnalysis:
 def analyse_loop(run: Run) -> LoopAnalysis:
     """Analyse the whole cycles inside a run's steady window.
 
-    Raises
-    ------
-    ExcitationError
-        If there is under one cycle.
+    Raises `ExcitationError` if there is under one cycle.
     """
     analysis = analyse_motion(run)
     steady = run.steady()
@@ -105,14 +87,7 @@ def whole_cycles(time: Floats, frequency: float) -> slice:
 
 @dataclass(frozen=True)
 class DynamicRange:
-    """Peak force at each current over that at the lowest, at one motion.
-
-    Attributes
-    ----------
-    frequency_Hz, amplitude_m : float
-    currents_A : tuple of float
-    ratios : tuple of float
-    """
+    """Peak force at each current over that at the lowest, at one motion."""
 
     frequency_Hz: float
     amplitude_m: float

@@ -28,25 +28,13 @@ DELAY_LIMIT = 3e-3  # a free delay between the channels runs away beyond this [s
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """One run, one model, and which of its parameters are free.
-
-    Attributes
-    ----------
-    run : Run
-    model_type : type of Model
-    free : tuple of str
-        Parameters to determine.
-    fixed : mapping of str to float
-        Parameters held at a value.
-    with_delay : bool
-        Also determine a delay of the force channel, within ±3 ms.
-    """
+    """One run, one model, and which of its parameters are free."""
 
     run: Run
     model_type: type[Model]
-    free: tuple[str, ...]
-    fixed: Mapping[str, float]
-    with_delay: bool = False
+    free: tuple[str, ...]  # parameters to determine
+    fixed: Mapping[str, float]  # parameters held at a value
+    with_delay: bool = False  # also determine a delay of the force channel, within ±3 ms
 
     @classmethod
     def of(
@@ -61,6 +49,10 @@ class Problem:
     ) -> Problem:
         """Settle which parameters are free: all but the presets, the fixed ones, and what gas fixes.
 
+        Raises `UnknownNameError` if the model has no such parameter. Raises `IdentificationError` if m and k1 are
+        both to be free: on one frequency a = −ω² x, so no data can tell them apart. Raises `ParameterError` if the
+        motion would compress the gas to no volume at all.
+
         Parameters
         ----------
         free : sequence of str
@@ -69,15 +61,6 @@ class Problem:
             Parameters to hold at a value [SI].
         gas : GasSpring, optional
             A known gas spring fixes k1, k2 and k3 and thereby lets the mass be determined.
-
-        Raises
-        ------
-        UnknownNameError
-            If the model has no such parameter.
-        IdentificationError
-            If m and k1 are both to be free: on one frequency a = −ω² x, so no data can tell them apart.
-        ParameterError
-            If the motion would compress the gas to no volume at all.
         """
         infos = {info.name: info for info in model_type.parameters()}
         held = dict(fixed or {})
@@ -134,25 +117,12 @@ class Problem:
 
 @dataclass(frozen=True)
 class Solution:
-    """Result of an identification method.
-
-    Attributes
-    ----------
-    model : Model
-    delay : float
-        [s]
-    at_bounds : tuple of str
-    start, end : mapping
-        Search coordinates.
-    evaluations : int
-    ending : StopReason
-    seed : int or None
-    notes : tuple of str
-    """
+    """Result of an identification method."""
 
     model: Model
-    delay: float
+    delay: float  # [s]
     at_bounds: tuple[str, ...]
+    # start, end: search coordinates
     start: Mapping[str, float]
     end: Mapping[str, float]
     evaluations: int
@@ -178,22 +148,14 @@ class Method(ABC):
 
 @dataclass(frozen=True)
 class RunUncertainty:
-    """Standard errors of a run's parameters and search coordinates, and what to know of them.
+    """Standard errors of a run's parameters and search coordinates, and what to know of them."""
 
-    Attributes
-    ----------
-    errors, dof : mapping of str to float
-        Standard errors, and the degrees of freedom behind them.
-    effective : mapping of str to float
-        Independent samples that would give each error, were the residual white.
-    doubts : tuple of str
-        What the samples cannot tell.
-    """
-
+    # errors, dof: standard errors, and the degrees of freedom behind them
     errors: Mapping[str, float] = field(default_factory=dict)
     dof: Mapping[str, float] = field(default_factory=dict)
+    # independent samples that would give each error, were the residual white
     effective: Mapping[str, float] = field(default_factory=dict)
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()  # what the samples cannot tell
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -37,25 +37,14 @@ GENERAL_FORMS = (
 
 @dataclass(frozen=True, slots=True)
 class SearchAxis:
-    """One coordinate a nonlinear search moves along.
+    """One coordinate a nonlinear search moves along."""
 
-    Attributes
-    ----------
-    name : str
-        What it is called in results.
-    lower, upper : float
-        Limits in search units (the logarithm's argument for a log scale).
-    grid : tuple of float
-        Start points, in the same units.
-    log : bool
-        The search moves in the logarithm.
-    """
-
-    name: str
+    name: str  # what it is called in results
+    # lower, upper: limits in search units (the logarithm's argument for a log scale)
     lower: float
     upper: float
-    grid: tuple[float, ...]
-    log: bool = False
+    grid: tuple[float, ...]  # start points, in the same units
+    log: bool = False  # the search moves in the logarithm
 
     def coordinate(self, value: float) -> float:
         """Return the position of a value on the axis."""
@@ -85,24 +74,12 @@ class SearchAxis:
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """Sizes of the data that a search is laid out for.
+    """Sizes of the data that a search is laid out for."""
 
-    Attributes
-    ----------
-    amplitude : float
-        Displacement amplitude [m].
-    speed : float
-        Peak velocity [m/s].
-    force : float
-        Largest force, either way from the middle [N].
-    current : float
-        Largest current [A]; 0 where none flowed.
-    """
-
-    amplitude: float
-    speed: float
-    force: float = 1.0
-    current: float = 0.0
+    amplitude: float  # displacement amplitude [m]
+    speed: float  # peak velocity [m/s]
+    force: float = 1.0  # largest force, either way from the middle [N]
+    current: float = 0.0  # largest current [A]; 0 where none flowed
 
     @classmethod
     def of(cls, motion: Excitation, force: Floats, amplitude: float) -> Self:
@@ -227,9 +204,7 @@ class Model(ABC):
 def require_positive(where: str, **values: float) -> None:
     """Refuse letters of a publication that stand below a fraction line and are not above zero.
 
-    Raises
-    ------
-    ParameterError
+    Raises `ParameterError`.
     """
     for name, value in values.items():
         if not 0 < value < math.inf:

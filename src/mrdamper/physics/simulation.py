@@ -40,16 +40,10 @@ class ForceLaw(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """A model's answer to an excitation.
-
-    Attributes
-    ----------
-    excitation : Excitation
-    force, state : (N,) arrays
-        Force [N] and internal state of the model.
-    """
+    """A model's answer to an excitation."""
 
     excitation: Excitation
+    # force, state: (N,) force [N] and internal state of the model
     force: Floats
     state: Floats
 

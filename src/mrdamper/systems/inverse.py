@@ -101,8 +101,6 @@ def invert_on(
 
     Parameters
     ----------
-    tape : Tape
-    damper : Damper
     prefix : str
         Of the names of its memory.
     motion : dict of str to expression

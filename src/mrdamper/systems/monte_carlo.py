@@ -62,7 +62,6 @@ def draw(dampers: Mapping[str, Damper], count: int, seed: int = 1) -> list[dict[
     ----------
     dampers : mapping of str to Damper
         By link, with `uncertainty`.
-    count, seed : int
     """
     if not 2 <= count <= _MAX_DRAWS:
         raise InputError(f"{count} draws", remedy=f"give 2 to {_MAX_DRAWS:,}", code="E_DRAWS")

@@ -34,31 +34,20 @@ _FARTHEST = 1e6  # times the static deflection: a state beyond runs away
 class Oscillator:
     """A force-driven mass with a Bouc–Wen element.
 
-    Attributes
-    ----------
-    m, c, k : float
-        Mass [kg], damping [N s/m], stiffness [N/m].
-    alpha : float
-        Stiffness of the hysteretic element at zero force [N/m].
-    beta, gamma, delta : float
-        beta [N^(1−n)/m] scales gamma, of |v|, and delta, of v [-]; only their products count.
-    n : float
-        Sharpness of the yield [-].
-
-    Raises
-    ------
-    ParameterError
-        If the mass is not positive, the element feeds energy in (beta gamma < 0), or n is below 1.
+    Raises `ParameterError` if the mass is not positive, the element feeds energy in (beta gamma < 0), or n is below
+    1.
     """
 
+    # m, c, k: mass [kg], damping [N s/m], stiffness [N/m]
     m: float
     c: float
     k: float
-    alpha: float
+    alpha: float  # stiffness of the hysteretic element at zero force [N/m]
+    # beta, gamma, delta: beta [N^(1−n)/m] scales gamma, of |v|, and delta, of v [-]; only their products count
     beta: float
     gamma: float
     delta: float
-    n: float = 1.0
+    n: float = 1.0  # sharpness of the yield [-]
 
     def __post_init__(self) -> None:
         for name, good, remedy in (
@@ -73,6 +62,9 @@ class Oscillator:
     def response(self, force: Floats, sample_rate: float, *, periodic: bool = False) -> Floats:
         """Displacement [m] under a force, from rest; of a periodic force, over one settled period.
 
+        Raises `RecordError` if the force is no record of numbers. Raises `StepError` (E_RUNAWAY) if the state runs
+        away.
+
         Parameters
         ----------
         force : (N,) array
@@ -81,13 +73,6 @@ class Oscillator:
             [Hz]
         periodic : bool
             The record is one period of a force that has always been there.
-
-        Raises
-        ------
-        RecordError
-            If the force is no record of numbers.
-        StepError
-            E_RUNAWAY if the state runs away.
         """
         return self._response(force, sample_rate, periodic, _STEPS)
 
@@ -125,26 +110,13 @@ class BoundWarning(UserWarning):
 
 @dataclass(frozen=True, eq=False)
 class OscillatorFit:
-    """An identified oscillator.
+    """An identified oscillator."""
 
-    Attributes
-    ----------
-    oscillator : Oscillator
-        With beta = 1: only beta gamma and beta delta are identifiable.
-    delay_s : float
-        Time by which the displacement channel lags behind the force channel [s].
-    rmse_m : float
-        Of the displacement it was identified from [m].
-    evaluations : int
-    at_bounds : tuple of str
-        Parameters that ended at a bound; their values are no estimates.
-    """
-
-    oscillator: Oscillator
-    delay_s: float
-    rmse_m: float
+    oscillator: Oscillator  # with beta = 1: only beta gamma and beta delta are identifiable
+    delay_s: float  # time by which the displacement channel lags behind the force channel [s]
+    rmse_m: float  # of the displacement it was identified from [m]
     evaluations: int
-    at_bounds: tuple[str, ...] = ()
+    at_bounds: tuple[str, ...] = ()  # parameters that ended at a bound; their values are no estimates
 
 
 def identify_oscillator(
@@ -152,9 +124,9 @@ def identify_oscillator(
 ) -> OscillatorFit:
     """Identify an oscillator and the delay between the channels from one period of force and displacement.
 
-    The linear part comes from the spectra, the rest from the least squares of the simulated
-    displacement. A delay left out would be taken for negative damping: at one sample of delay the
-    damping of a lightly damped mass ends at zero.
+    The linear part comes from the spectra, the rest from the least squares of the simulated displacement. A delay
+    left out would be taken for negative damping: at one sample of delay the damping of a lightly damped mass ends at
+    zero. Raises `RecordError` if the records do not fit together or nothing moves, or the largest delay is negative.
 
     Parameters
     ----------
@@ -167,11 +139,6 @@ def identify_oscillator(
     most_delay : float
         Largest delay between the channels, either way [samples]; zero for channels known to be
         sampled at once.
-
-    Raises
-    ------
-    RecordError
-        If the records do not fit together or nothing moves, or the largest delay is negative.
 
     Warns
     -----

@@ -20,16 +20,12 @@ all_methods = _registry.all
 def method_named(name: str, settings: Mapping[str, str] | None = None) -> Method:
     """Return the method of that name.
 
+    Raises `UnknownNameError` if there is no such method, switch or value; with the near matches.
+
     Parameters
     ----------
-    name : str
     settings : mapping of str to str, optional
         Switches and numbers of the method, as text.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such method, switch or value; with the near matches.
     """
     chosen = _registry.type_named(name)
     return chosen(**values_of_fields(chosen, settings)) if settings else chosen()
@@ -38,12 +34,7 @@ def method_named(name: str, settings: Mapping[str, str] | None = None) -> Method
 def values_of_fields(cls: type, settings: Mapping[str, str]) -> dict[str, Any]:
     """Read the values of a dataclass's fields from text: numbers, ranges LOW:HIGH and choices.
 
-    Raises
-    ------
-    UnknownNameError
-        If there is no such field or choice.
-    InputError
-        If a number cannot be read.
+    Raises `UnknownNameError` if there is no such field or choice. Raises `InputError` if a number cannot be read.
     """
     kinds = {name: read for name, kind in get_type_hints(cls).items() if (read := _reader(kind))}
     for key in settings:

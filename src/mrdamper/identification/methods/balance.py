@@ -32,21 +32,13 @@ _MIN_HARMONICS = 3  # one harmonic gives two equations, for at least four unknow
 class Balance(Method):
     """Match the mean and the harmonics 1...H of the force on the measured sine.
 
-    Attributes
-    ----------
-    harmonics : int
-        H, three at least. Fifteen carry all but 4e-5 of the power of a saturated loop.
-
-    Raises
-    ------
-    IdentificationError
-        If H is under three.
+    Raises `IdentificationError` if H is under three.
     """
 
     name: ClassVar[str] = "balance"
     summary: ClassVar[str] = "harmonic balance over several harmonics on the exact steady loop"
 
-    harmonics: int = 15
+    harmonics: int = 15  # H, three at least. Fifteen carry all but 4e-5 of the power of a saturated loop.
 
     def __post_init__(self) -> None:
         if self.harmonics < _MIN_HARMONICS:
@@ -131,10 +123,7 @@ class _Balanced:
 def steady_state(model: Model, record: SineRecord) -> Floats:
     """Calculate the internal state on the closed loop, at the phases of a record.
 
-    Raises
-    ------
-    IdentificationError
-        If the model has a memory whose closed loop is not known exactly.
+    Raises `IdentificationError` if the model has a memory whose closed loop is not known exactly.
     """
     if type(model).state is Model.state:
         return np.zeros(record.theta.size)

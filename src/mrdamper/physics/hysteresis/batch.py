@@ -25,21 +25,11 @@ _MAX_STATES = 2**17  # states held at a time
 
 @dataclass(frozen=True, eq=False)
 class Products:
-    """Sums over the samples for P shapes.
+    """Sums over the samples for P shapes."""
 
-    Attributes
-    ----------
-    along : (P, L) array
-        zeta · basis.
-    force : (P,) array
-        zeta · rest of the force [N].
-    square : (P,) array
-        zeta · zeta.
-    """
-
-    along: Floats
-    force: Floats
-    square: Floats
+    along: Floats  # (P, L) zeta · basis
+    force: Floats  # (P,) zeta · rest of the force [N]
+    square: Floats  # (P,) zeta · zeta
 
 
 def batch_cost(path: Path, fixed: FixedColumns, shapes: Shape) -> Floats:

@@ -72,15 +72,9 @@ def approach_rate(r: Floats, n: float) -> Floats:
 
 
 class MasterCurve(ABC):
-    """Climb and release for one exponent n.
+    """Climb and release for one exponent n."""
 
-    Attributes
-    ----------
-    full : float
-        Distance past zero at which the state rounds to 1; infinite where no closed form says so.
-    """
-
-    full: float = math.inf
+    full: float = math.inf  # distance past zero at which the state rounds to 1; infinite where no closed form says so
 
     @abstractmethod
     def rise(self, phi: Value, xp: ModuleType) -> Value:

@@ -32,8 +32,9 @@ def follow_step(tape: Tape, shape: Shape, path: Any, zeta0: ArrayLike = 0.0) -> 
 def follow(shape: Shape, path: Path, zeta0: ArrayLike = 0.0) -> Floats:
     """Hysteretic state along a motion.
 
-    Exact for any motion that is monotone between its samples and reversals; the distance of
-    samples does not matter. Accurate to 1e-12 for n = 1 and 2, to 1e-8 for other n.
+    Exact for any motion that is monotone between its samples and reversals; the distance of samples does not matter.
+    Accurate to 1e-12 for n = 1 and 2, to 1e-8 for other n. Raises `ParameterError` if zeta0 lies where the state
+    would run away.
 
     Parameters
     ----------
@@ -48,11 +49,6 @@ def follow(shape: Shape, path: Path, zeta0: ArrayLike = 0.0) -> Floats:
     -------
     (N,) array, or (P, N) for P shapes
         zeta = z/z_max [-] at the samples.
-
-    Raises
-    ------
-    ParameterError
-        If zeta0 lies where the state would run away.
     """
     _check_start(shape, zeta0)
     curve = master_curve(shape.n)
@@ -90,6 +86,9 @@ def step(shape: Shape, zeta: Any, dx: Any) -> Any:
 def stroke(shape: Shape, zeta0: ArrayLike, distance: ArrayLike) -> Floats:
     """State after a monotone stroke, both counted in the direction of motion.
 
+    Raises `ParameterError` if zeta0 lies where the state would run away. Raises `ExcitationError` if a distance is
+    negative.
+
     Parameters
     ----------
     shape : Shape
@@ -101,13 +100,6 @@ def stroke(shape: Shape, zeta0: ArrayLike, distance: ArrayLike) -> Floats:
     -------
     array, with P in front for P shapes
         State after [z_max].
-
-    Raises
-    ------
-    ParameterError
-        If zeta0 lies where the state would run away.
-    ExcitationError
-        If a distance is negative.
     """
     if shape.is_many:
         return np.stack([stroke(one, zeta0, distance) for one in shape])

@@ -19,26 +19,15 @@ HIGHEST_N = 20.0  # the tabulated curves hold 1e-8 up to here (for rho >= −30)
 class Shape:
     """Shape of the hysteresis, without its force scale. One, or P of them with a common n.
 
-    Attributes
-    ----------
-    kappa : float or (P,) array
-        Initial slope dzeta/dx = A/z_max [1/m].
-    rho : float or (P,) array
-        (gamma − beta)/(gamma + beta) [-], at most 1. 0: beta = gamma; −1: gamma = 0; 1: beta = 0, an
-        elastic spring, which forgets where it is once zeta rounds to 1. Above 0, gamma > beta: still
-        dissipating, but bounded only for states that start within rho^(−1/n).
-    n : float
-        Sharpness of the yield [-], from 1 to 20.
-
-    Raises
-    ------
-    ParameterError
-        If a value lies outside these ranges.
+    Raises `ParameterError` if a value lies outside these ranges.
     """
 
-    kappa: float | Floats
+    kappa: float | Floats  # (P,) initial slope dzeta/dx = A/z_max [1/m]
+    # (P,) (gamma − beta)/(gamma + beta) [-], at most 1. 0: beta = gamma; −1: gamma = 0; 1: beta = 0, an elastic spring,
+    # which forgets where it is once zeta rounds to 1. Above 0, gamma > beta: still dissipating, but bounded only for
+    # states that start within rho^(−1/n).
     rho: float | Floats
-    n: float = 2.0
+    n: float = 2.0  # sharpness of the yield [-], from 1 to 20
 
     def __post_init__(self) -> None:
         if not np.all((np.asarray(self.kappa) > 0) & np.isfinite(self.kappa)):
@@ -54,17 +43,14 @@ class Shape:
     def from_bouc_wen(cls, beta: float | Floats, gamma: float | Floats, n: float = 2.0, A: float = 1.0) -> Self:
         """Shape of dz/dt = A v − beta |v| |z|^(n−1) z − gamma v |z|^n.
 
+        Raises `ParameterError` if energy would be created (beta < 0) or z has no bound (beta + gamma <= 0 or A <= 0).
+
         Parameters
         ----------
         beta, gamma : float or (P,) array
             Coefficients of |v| and of v [m^−n for z in m].
         n, A : float
             [-]
-
-        Raises
-        ------
-        ParameterError
-            If energy would be created (beta < 0) or z has no bound (beta + gamma <= 0 or A <= 0).
         """
         if not (np.all(dissipates(beta, gamma)) and A > 0):
             raise ParameterError(

@@ -125,24 +125,16 @@ def saturated_area_deficit(rho: float, n: float) -> float:
 
 @dataclass(frozen=True)
 class _SteadyLoop:
-    """The loading half of the loop of one shape, from −Z to Z.
+    """The loading half of the loop of one shape, from −Z to Z."""
 
-    Attributes
-    ----------
-    curve, n, rho
-        Of the shape.
-    kappa, reach : float
-        kappa · amplitude: amplitude in yield displacements.
-    saturation : float
-        r = −ln(1 − Z), which keeps its digits where Z is 1 to rounding.
-    """
-
+    # curve, n, rho: of the shape
     curve: MasterCurve
     n: float
     rho: float
+    # kappa, reach: kappa · amplitude: amplitude in yield displacements
     kappa: float
     reach: float
-    saturation: float
+    saturation: float  # r = −ln(1 − Z), which keeps its digits where Z is 1 to rounding
 
     @classmethod
     def of(cls, kappa: float, rho: float, n: float, amplitude: float) -> Self:

@@ -37,8 +37,9 @@ def integrate(
 ) -> Floats:
     """State along a motion.
 
-    Between samples the displacement is the cubic with the given values and slopes, the velocity
-    its derivative, and the current straight.
+    Between samples the displacement is the cubic with the given values and slopes, the velocity its derivative, and
+    the current straight. Raises `ExcitationError` if time does not increase. Raises `ParameterError` if the tolerance
+    cannot be kept: the parameters make the model too stiff, or it runs away.
 
     Parameters
     ----------
@@ -59,13 +60,6 @@ def integrate(
     Returns
     -------
     (N, S) array
-
-    Raises
-    ------
-    ExcitationError
-        If time does not increase.
-    ParameterError
-        If the tolerance cannot be kept: the parameters make the model too stiff, or it runs away.
 
     References
     ----------

@@ -25,24 +25,14 @@ _MAX_SPECTRUM_SAMPLES = 2**20  # samples of a spectrum, at most, for the sake of
 
 @dataclass(frozen=True, eq=False)
 class HarmonicSeries:
-    """mean + drift (t − t0) + Σ_k sine_k sin kω(t − t0) + cosine_k cos kω(t − t0), k = 1...K.
+    """mean + drift (t − t0) + Σ_k sine_k sin kω(t − t0) + cosine_k cos kω(t − t0), k = 1...K."""
 
-    Attributes
-    ----------
-    frequency : float
-        ω/2π [Hz].
-    origin : float
-        t0 [s].
-    mean, drift : float
-        [signal], [signal/s].
-    sine, cosine : (K,) arrays
-        [signal].
-    """
-
-    frequency: float
-    origin: float
+    frequency: float  # ω/2π [Hz]
+    origin: float  # t0 [s]
+    # mean, drift: [signal], [signal/s]
     mean: float
     drift: float
+    # sine, cosine: (K,) [signal]
     sine: Floats
     cosine: Floats
 

@@ -19,27 +19,13 @@ LONG = 200_000  # samples from which what could be remembered is not worth its m
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """A sampled motion cut into strokes. Make it with `Path.of`, once for all shapes.
+    """A sampled motion cut into strokes. Make it with `Path.of`, once for all shapes."""
 
-    Attributes
-    ----------
-    stroke : (N,) int array
-        Stroke each sample lies in.
-    distance : (N,) array
-        Distance since the reversal that began the stroke [m].
-    direction : (N,) array
-        +1 or −1, the sign of the velocity in that stroke.
-    lengths : tuple of float
-        Length of every stroke but the last [m].
-    first_direction : float
-        Direction of the first stroke.
-    """
-
-    stroke: np.ndarray
-    distance: Floats
-    direction: Floats
-    lengths: tuple[float, ...]
-    first_direction: float
+    stroke: np.ndarray  # (N,) stroke each sample lies in
+    distance: Floats  # (N,) distance since the reversal that began the stroke [m]
+    direction: Floats  # (N,) +1 or −1, the sign of the velocity in that stroke
+    lengths: tuple[float, ...]  # length of every stroke but the last [m]
+    first_direction: float  # direction of the first stroke
 
     @classmethod
     def of(
@@ -51,6 +37,8 @@ class Path:
     ) -> Self:
         """Cut a motion at its reversals.
 
+        Raises `ExcitationError` if the arrays do not fit together or hold anything but finite numbers.
+
         Parameters
         ----------
         displacement : (N,) array
@@ -61,11 +49,6 @@ class Path:
             A smooth motion turns between two samples, beyond both. "parabola" puts the peak where
             the parabola through the three samples at the reversal has its vertex, "samples" at the
             outermost sample. At 1000 samples a cycle that is an error of zeta of 1e-9 against 1e-4.
-
-        Raises
-        ------
-        ExcitationError
-            If the arrays do not fit together or hold anything but finite numbers.
         """
         x, t = _checked_motion(displacement, time)
         arrival, departure = _reversals(x)

@@ -20,33 +20,15 @@ _MIN_DISPLACEMENT_M = 1e-9  # a displacement that moves less does not move [m]
 
 @dataclass(frozen=True, eq=False)
 class MotionAnalysis:
-    """Result of fitting a sine to a measured motion.
+    """Result of fitting a sine to a measured motion."""
 
-    Attributes
-    ----------
-    condition : Condition
-        Magnitude of the measured current, frequency and amplitude (half the peak-to-peak stroke).
-    series : HarmonicSeries
-        Mean, drift and harmonics of the displacement.
-    cycles : float
-        Length of the record in cycles.
-    distortion : float
-        RMS of harmonics 2 and up over the RMS of the first (THD).
-    drift : float
-        Slow movement of the mean position [m/s].
-    residual : float
-        RMS of what the series does not explain [m].
-    stray : float
-        That RMS over the RMS displacement: a second tone, a random part, a sweep.
-    """
-
-    condition: Condition
-    series: HarmonicSeries
-    cycles: float
-    distortion: float
-    drift: float
-    residual: float
-    stray: float
+    condition: Condition  # magnitude of the measured current, frequency and amplitude (half the peak-to-peak stroke)
+    series: HarmonicSeries  # mean, drift and harmonics of the displacement
+    cycles: float  # length of the record in cycles
+    distortion: float  # RMS of harmonics 2 and up over the RMS of the first (THD)
+    drift: float  # slow movement of the mean position [m/s]
+    residual: float  # RMS of what the series does not explain [m]
+    stray: float  # that RMS over the RMS displacement: a second tone, a random part, a sweep
 
     @property
     def is_sine(self) -> bool:
@@ -58,13 +40,8 @@ class MotionAnalysis:
 def analyse_motion(run: Run) -> MotionAnalysis:
     """Frequency, amplitude, distortion and drift of the run's steady motion.
 
-    Harmonic regression on the samples of the steady window, so the record need not hold a
-    whole number of cycles.
-
-    Raises
-    ------
-    ExcitationError
-        If the steady window holds under one cycle, or no motion.
+    Harmonic regression on the samples of the steady window, so the record need not hold a whole number of cycles.
+    Raises `ExcitationError` if the steady window holds under one cycle, or no motion.
     """
     run = run.steady()
     where = f"run {run.id}"
@@ -100,30 +77,18 @@ def analyse_motion(run: Run) -> MotionAnalysis:
 
 @dataclass(frozen=True)
 class EquivalentSine:
-    """The sine a motion amounts to.
-
-    Attributes
-    ----------
-    condition : Condition
-    centre : float
-        Mean position [m].
-    is_sine : bool
-        Whether the motion is that sine, or only shares its RMS displacement and velocity.
-    """
+    """The sine a motion amounts to."""
 
     condition: Condition
-    centre: float
-    is_sine: bool
+    centre: float  # mean position [m]
+    is_sine: bool  # whether the motion is that sine, or only shares its RMS displacement and velocity
 
 
 @once_per_run
 def equivalent_sine(run: Run) -> EquivalentSine:
     """Measure the sine, or for any other motion the sine of the same RMS displacement and velocity.
 
-    Raises
-    ------
-    ExcitationError
-        If nothing moves.
+    Raises `ExcitationError` if nothing moves.
     """
     steady = run.steady()
     centred = steady.displacement - np.mean(steady.displacement)

@@ -10,17 +10,12 @@ from mrdamper.tracing import Tape, Traced
 
 @dataclass(frozen=True, eq=False)
 class TracedStep(Traced):
-    """A channel that enters by its step from sample to sample only: the path, or time.
-
-    Attributes
-    ----------
-    turns : tuple
-        Steps to the reversals between the last sample and this one, zero where there are none; `step` is what
-        follows them.
-    """
+    """A channel that enters by its step from sample to sample only: the path, or time."""
 
     tape: Tape
     step: Any
+    # steps to the reversals between the last sample and this one, zero where there are none; `step` is what follows
+    # them
     turns: tuple[Any, ...] = ()
 
 

@@ -42,7 +42,6 @@ class NonCausalOptimum(Controller):
 
         Parameters
         ----------
-        A, B, C, D : arrays
         driven, aimed : (N, 2n), (N, P) arrays
             What the input adds to the state in the step that ends there, and to the aims.
         """

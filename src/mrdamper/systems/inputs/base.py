@@ -12,16 +12,11 @@ from mrdamper.data import Floats
 
 
 class Input(ABC):
-    """A ground motion or a road. Subclasses are final, frozen dataclasses of `param` fields.
-
-    Attributes
-    ----------
-    kind : "ground" or "road"
-        The value is the acceleration of the ground [m/s²], or the height of the road [m].
-    """
+    """A ground motion or a road. Subclasses are final, frozen dataclasses of `param` fields."""
 
     name: ClassVar[str]
     title: ClassVar[str]
+    # "ground" or "road"; the value is the acceleration of the ground [m/s²], or the height of the road [m]
     kind: Literal["ground", "road"]
     speed_m_s: float = np.inf  # of travel along a road; without one every wheel meets it at once
     length_s: float  # of a made input; a record has a `duration` of its own

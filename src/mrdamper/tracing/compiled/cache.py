@@ -54,7 +54,6 @@ def load(source: str, holds: Callable[[ctypes.CDLL], bool]) -> ctypes.CDLL | Non
 
     Parameters
     ----------
-    source : str
     holds : function of a library
         Whether a library that was just compiled computes what it should.
     """

@@ -36,17 +36,10 @@ class Built:
 
 @dataclass(frozen=True)
 class Compiler:
-    """A command that compiles C for this machine.
-
-    Attributes
-    ----------
-    command : tuple of str
-    identity : str
-        Changes when the program behind the command, or its flags, are replaced.
-    """
+    """A command that compiles C for this machine."""
 
     command: tuple[str, ...]
-    identity: str
+    identity: str  # changes when the program behind the command, or its flags, are replaced
 
     @property
     def is_visual(self) -> bool:

@@ -24,29 +24,15 @@ _MAX_DIFFERENCE = 1e-9  # relative difference allowed there
 
 @dataclass(frozen=True, eq=False)
 class Along:
-    """A program along a record.
+    """A program along a record."""
 
-    Attributes
-    ----------
-    outputs : (K, N) array
-    memory : tuple of float
-        After the last sample that has an answer.
-    failed : int
-        The first sample without an answer; −1 if all have one.
-    """
-
-    outputs: Floats
-    memory: tuple[float, ...]
-    failed: int
+    outputs: Floats  # (K, N)
+    memory: tuple[float, ...]  # after the last sample that has an answer
+    failed: int  # the first sample without an answer; −1 if all have one
 
 
 class RecordProgram:
-    """A program for one sample, made to run along records.
-
-    Parameters
-    ----------
-    program : Program
-    """
+    """A program for one sample, made to run along records."""
 
     def __init__(self, program: Program):
         self.program = program

@@ -92,7 +92,6 @@ class ArrayWriter(CWriter):
 
     Parameters
     ----------
-    program : Program
     keep : bool
         Keep what hangs on the time step or the current alone until these change; step functions then take one array
         more.
