@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 from scipy.stats import t as students_t
 
 from mrdamper.dampers import bands
@@ -66,23 +67,26 @@ def test_a_band_adds_numbers_sessions_and_form(level, shown):
     found, force, slopes = band(damper(), PREDICTION, level, shown), FORCE[at], SLOPES[at]
     half = (force.max() - force.min()) / 2
     own = np.array([s @ COVARIANCE @ s for s in slopes])
-    session, form = (0.03 * force) ** 2 + 16.0, (0.012 * force) ** 2 + 2.5**2 + (0.02**2 + GROWN["force"]) * half**2
+    session, form = (0.03 * force) ** 2 + 16.0, (0.012 * force) ** 2 + 2.5**2 + 0.02**2 * half**2
     assert found.parameter == pytest.approx(np.sqrt(own))
     assert found.session == pytest.approx(np.sqrt(session))
-    assert found.model == pytest.approx(np.sqrt(form))
+    assert found.model == pytest.approx(np.sqrt(form + GROWN["force"] * half**2))
+    away = {quantity: norm.ppf((1 + level) / 2) * np.sqrt(grown) for quantity, grown in GROWN.items()}
     whole = own + session + form
     t = reach(level, own.mean(), session.mean(), form.mean()) / np.sqrt(whole.mean())
-    assert found.high - force == pytest.approx(t * np.sqrt(whole))
-    assert force - found.low == pytest.approx(t * np.sqrt(whole))
+    assert found.high - force == pytest.approx(np.hypot(t * np.sqrt(whole), away["force"] * half))
+    assert force - found.low == pytest.approx(found.high - force)
     swing = (slopes[force.argmax()] - slopes[force.argmin()]) / 2
-    parts = swing @ COVARIANCE @ swing, (0.03 * half) ** 2, (0.012**2 + 0.015**2 + GROWN["peak"]) * half**2
-    unseen, seen = reach(level, *parts), reach(level, parts[0], 0.0, parts[2])
+    parts = swing @ COVARIANCE @ swing, (0.03 * half) ** 2, (0.012**2 + 0.015**2) * half**2
+    at_tests = reach(level, *parts), reach(level, parts[0], 0.0, parts[2])
+    unseen, seen = (np.hypot(each, away["peak"] * half) for each in at_tests)
     assert found.peak == pytest.approx((half - unseen, half + unseen))
     assert found.known_session == pytest.approx((half - seen, half + seen))
     time, v = MOTION.time[at], MOTION.velocity[at]
     power, *turned = (np.trapezoid(f * v, time) for f in (force, slopes[:, 0], slopes[:, 1]))
     share = np.array(turned) / power
-    loss = reach(level, share @ COVARIANCE @ share, 0.03**2, 0.012**2 + 0.05**2 + GROWN["energy"])
+    loss = reach(level, share @ COVARIANCE @ share, 0.03**2, 0.012**2 + 0.05**2)
+    loss = np.hypot(loss, away["energy"])
     assert found.energy == pytest.approx((-loss, loss))
 
 
@@ -125,7 +129,8 @@ def test_a_portable_band_is_that_of_loops_at_three_currents(monkeypatch):
         0.8, pytest.approx(np.hypot(0.03, 0.012) * t), pytest.approx(np.hypot(4, 2.5) * t),
     )  # fmt: skip
     assert portable.of_peak == pytest.approx(t * np.sqrt(0.02**2 + own))
-    assert portable.of_peak_untested == pytest.approx(t * np.sqrt(0.02**2 + own + GROWN["force"]))
+    away = norm.ppf(0.9) * np.sqrt(GROWN["force"])
+    assert portable.of_peak_untested == pytest.approx(np.hypot(portable.of_peak, away))
     assert asked == [replace(CONDITION, current_A=I) for I in widths]
     slow = SimpleNamespace(**(vars(tested) | {"peak_velocity_m_s": (0.0, 0.05)}))  # slower than the middle of all
     portable_band(replace(made, envelope=slow), 0.8)

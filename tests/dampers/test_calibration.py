@@ -165,7 +165,9 @@ def test_errors_grow_with_the_distance_from_the_tests_as_they_were_made():
     assert found.peak == pytest.approx(PEAK)
     assert found.energy == pytest.approx(ENERGY)
     assert found.variance("peak", ways[2]) == pytest.approx((0.4 * PEAK[1]) ** 2)
-    assert Growth.of(runs[:1], at_tests) == Growth()
+    unshown = Growth.of(runs[:1], at_tests)
+    assert unshown.force == unshown.peak == unshown.energy == (0.25, 0.12, 0.1)
+    assert Growth.of(runs[:2], at_tests).peak == pytest.approx((PEAK[0], 0.12, 0.1))
     none = Growth.of([replace(run("r"), distance=way) for way in ways], at_tests)  # better than at the tests
     assert none == Growth()
 

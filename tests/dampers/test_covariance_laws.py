@@ -190,10 +190,14 @@ def test_cross_validated_errors_are_over_the_whole_error_model():
         part = RunResiduals.of(damper, run)
         velocity = part.prediction.motion.velocity[part.picked]
         slopes = np.column_stack([velocity, np.sign(velocity), np.ones(velocity.size)])
+        time = part.prediction.motion.time[part.picked]
+        power, *lost = (np.trapezoid(f * velocity, time) for f in (part.predicted, *slopes.T))
+        swing = (slopes[part.predicted.argmax()] - slopes[part.predicted.argmin()]) / np.ptp(part.predicted)
         share = np.mean(np.sum(slopes @ known.covariance * slopes, axis=1)) / (np.ptp(part.predicted) / 2) ** 2
+        of_peak, of_energy = (d @ known.covariance @ d for d in (swing, np.array(lost) / power))
         gain, offset, half = model_error(seen).gain ** 2, model_error(seen).offset ** 2, prediction.half
         force = np.sqrt(gain * prediction.predicted**2 + offset + (share + known.force**2) * half**2)
-        peak, energy = (np.sqrt(share + gain + e**2) for e in (known.peak, known.energy))
+        peak, energy = np.sqrt(of_peak + gain + known.peak**2), np.sqrt(of_energy + gain + known.energy**2)
         scores.append(StandardizedErrors.of(prediction, force, peak, energy))
     expected = Calibration.of(seen, scores)
     for name in ("force", "peak", "energy", "coverage"):

@@ -40,7 +40,9 @@ def test_a_motion_is_away_by_the_distance_from_the_hull_in_logarithms():
 
 
 def test_records_with_a_current_that_changes_pass_through_all_currents():
-    record = TESTED.with_motion(np.array([0.0, 2.0]), np.array([-0.02, 0.02]), np.array([0.3]))
+    record = TESTED.with_motion(np.array([0.0, 2.5]), np.array([-0.02, 0.02]), np.array([0.3]))
+    assert away(2.4, 1.0, 0.02, record).beyond == 0 < away(2.4, 1.0, 0.02).beyond
+    assert away(3.0, 1.0, 0.02, record).beyond == pytest.approx(0.5 / 2.5 - 0.02)
     assert away(1.0, 1.0, 0.02, record).between == 0
     assert away(1.0, 2.0, 0.02, record).motion < away(1.0, 2.0, 0.02).motion
     assert away(1.0, 4.0, 0.02, record).motion == pytest.approx(np.log(2 * np.pi * 4 * 0.02 / 0.3))

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from statistics import NormalDist
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.dampers.base import Damper, Prediction
-from mrdamper.dampers.calibration import Quantity
+from mrdamper.dampers.calibration import QUANTITIES, Growth, Quantity
 from mrdamper.dampers.sessions import SessionCorrection
-from mrdamper.dampers.slopes import force_slopes
+from mrdamper.dampers.slopes import force_slopes, relative_variances
 from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import SESSIONS_NEEDED, Floats
 from mrdamper.identification.intervals import student
-from mrdamper.statistics.metrics import dissipated_power, peak_force
+from mrdamper.statistics.metrics import peak_force
 
 Mask = NDArray[np.bool_]
 
@@ -81,15 +83,11 @@ def band(
     half = peak_force(force)
     parameter = np.einsum("np,pq,nq->n", slopes, uncertainty.covariance, slopes)
     session = (uncertainty.gain * force) ** 2 + uncertainty.offset**2
-    model = (
-        (uncertainty.run_gain * force) ** 2
-        + uncertainty.run_offset**2
-        + (uncertainty.force**2 + uncertainty.growth.variance("force", distance)) * half**2
-    )
-    top, bottom = int(np.argmax(force)), int(np.argmin(force))
-    swing = (slopes[top] - slopes[bottom]) / 2
-    own = float(swing @ uncertainty.covariance @ swing)
+    model = (uncertainty.run_gain * force) ** 2 + uncertainty.run_offset**2 + (uncertainty.force * half) ** 2
+    grown = {quantity: uncertainty.growth.variance(quantity, distance) for quantity in QUANTITIES}
+    own = relative_variances(slopes, uncertainty.covariance, force, motion.velocity, motion.time)
     dofs = _degrees_of_freedom(uncertainty)
+    of_run, of_session = uncertainty.run_gain**2, uncertainty.gain**2
 
     def reach(quantity: Quantity, parts: Sequence[float]) -> float:
         whole = sum(parts)
@@ -99,20 +97,27 @@ def band(
         factor = uncertainty.calibration.factor(quantity, level) if uncertainty.calibration else 1.0
         return factor * student(level, dof) * float(np.sqrt(whole))
 
-    t = reach("force", [float(np.mean(v)) for v in (parameter, session, model)])
-    mean = float(np.mean(parameter + session + model))
-    width = (t / np.sqrt(mean) if mean > 0 else 0.0) * np.sqrt(parameter + session + model)
-    of_run = (uncertainty.run_gain**2 + uncertainty.peak**2 + uncertainty.growth.variance("peak", distance)) * half**2
-    unseen = reach("peak", [own, (uncertainty.gain * half) ** 2, of_run])
-    sensed = reach("peak", [own, 0.0, of_run])
-    power = dissipated_power(force, motion.velocity, motion.time) or 1.0
-    turned = np.array([dissipated_power(column, motion.velocity, motion.time) for column in slopes.T]) / power
-    lost = uncertainty.run_gain**2 + uncertainty.energy**2 + uncertainty.growth.variance("energy", distance)
-    loss = reach("energy", [float(turned @ uncertainty.covariance @ turned), uncertainty.gain**2, lost])
+    def with_growth(at_tests: Any, quantity: Quantity) -> Any:
+        return np.sqrt(at_tests**2 + _normal(level) ** 2 * grown[quantity])  # calibration is at tests: not of growth
+
+    variance = parameter + session + model
+    t = reach("force", [float(np.mean(v)) for v in (parameter, session, model)]) / (np.sqrt(np.mean(variance)) or 1.0)
+    width = half * with_growth(t * np.sqrt(variance) / (half or 1.0), "force")
+    future, known_session = (
+        half * with_growth(reach("peak", [own[1], between, of_run + uncertainty.peak**2]), "peak")
+        for between in (of_session, 0.0)
+    )
+    loss = float(with_growth(reach("energy", [own[2], of_session, of_run + uncertainty.energy**2]), "energy"))
+    model = model + grown["force"] * half**2
     return Band(
         force - width, force + width, np.sqrt(parameter), np.sqrt(session), np.sqrt(model),
-        (max(half - unseen, 0.0), half + unseen), (-loss, loss), (max(half - sensed, 0.0), half + sensed),
+        (max(half - future, 0.0), half + future), (-loss, loss), (max(half - known_session, 0.0), half + known_session),
     )  # fmt: skip
+
+
+def _normal(level: float) -> float:
+    """Quantile of a normal distribution of the error's growth with the distance from the tests."""
+    return NormalDist().inv_cdf((1 + level) / 2)
 
 
 def _degrees_of_freedom(uncertainty: Uncertainty) -> tuple[float, float, float]:
@@ -200,10 +205,11 @@ def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
     if not 0 < at.peak_velocity <= tested.peak_velocity_m_s[1]:
         at = replace(at, amplitude_m=tested.peak_velocity_m_s[1] / (2 * np.pi * at.frequency_Hz))
     currents = sorted({*tested.current_A, at.current_A})
+    at_tests: Damper = replace(damper, uncertainty=replace(uncertainty, growth=Growth()))  # type: ignore[type-var]
     own, quantile = [], []
     for current in currents:
         prediction = damper.predict(replace(at, current_A=current))
-        interval = band(damper, prediction, level)
+        interval = band(at_tests, prediction, level)
         if interval is None:
             return None
         parts = np.sqrt(interval.parameter**2 + interval.session**2 + interval.model**2)
@@ -211,11 +217,10 @@ def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
         quantile.append(np.mean(interval.high - prediction.force) / (np.mean(parts) or 1.0))
     t = float(np.mean(quantile))
     grown = [uncertainty.growth.variance("force", tested.distance(c, np.array([c.current_A]))) for c in tested.farthest]
-    at_tests, untested = (
-        t * float(np.sqrt(uncertainty.force**2 + np.mean(own) + more)) for more in (0.0, max(grown, default=0.0))
-    )
+    of_peak = t * float(np.sqrt(uncertainty.force**2 + np.mean(own)))
+    untested = float(np.hypot(of_peak, _normal(level) * np.sqrt(max(grown, default=0.0))))
     return PortableBand(
-        level, t * uncertainty.total_gain, t * uncertainty.total_offset, at_tests, untested, scope(damper, level)
+        level, t * uncertainty.total_gain, t * uncertainty.total_offset, of_peak, untested, scope(damper, level)
     )
 
 

@@ -134,7 +134,7 @@ class Envelope:
         if not self.conditions or condition.frequency_Hz <= 0 or condition.amplitude_m <= 0:
             return Distance()
         tested = [Condition(*point) for point in self.conditions]
-        nearest = distance_from(tested, condition, current, any_current=self.any_motion)
+        nearest = distance_from(tested, condition, current, swept_A=self.current_A if self.any_motion else None)
         if not self.any_motion:
             return nearest
         larger = max(0.0, np.log(condition.amplitude_m / self.amplitude_m[1]))

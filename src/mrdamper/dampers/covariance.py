@@ -19,7 +19,7 @@ from mrdamper.dampers.calibration import (
 )
 from mrdamper.dampers.random_effects import Effects, GainsAndOffsets
 from mrdamper.dampers.run_residuals import RunResiduals, normal_matrix
-from mrdamper.dampers.slopes import force_slopes
+from mrdamper.dampers.slopes import force_slopes, relative_variances
 from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
 from mrdamper.data import Floats, Run
 from mrdamper.identification.covariance import alike_groups, score_covariance
@@ -234,6 +234,12 @@ def _inside(part: RunResiduals) -> PredictedRun:
     return PredictedRun(part.run.id, part.session, part.predicted, part.measured, peak, energy)
 
 
+def _by_parameters(part: RunResiduals, slopes: Floats, covariance: Floats) -> Floats:
+    """(3,) relative variances of a run's force, peak and energy by the parameters."""
+    velocity, time = (getattr(part.prediction.motion, name)[part.picked] for name in ("velocity", "time"))
+    return relative_variances(slopes, covariance, part.predicted, velocity, time)
+
+
 def _with_model_error(
     uncertainty: Uncertainty,
     parts: Sequence[RunResiduals],
@@ -243,9 +249,8 @@ def _with_model_error(
     other_sessions: Sequence[PredictedRun],
 ) -> Uncertainty:
     """Error of the form: what is left after each run's own gain and offset; and the calibration on it."""
-    own = {  # mean variance of the force by the parameters, over the square of half the peak-to-peak force
-        part.run.id: float(np.mean(np.einsum("np,pq,nq->n", slope, uncertainty.covariance, slope)))
-        / max(float(np.ptp(part.predicted)) / 2, 1e-300) ** 2
+    own = {
+        part.run.id: _by_parameters(part, slope, uncertainty.covariance)
         for part, slope in zip(parts, slopes, strict=True)
     }
     shown = cross_validated or [_inside(part) for part in parts]
@@ -264,13 +269,13 @@ def _with_model_error(
         run_dof=max(len(cross_validated) - 1.0, 1.0),
         growth=Growth.of([*cross_validated, *away], error),
     )
-    usual = float(np.median(list(own.values())))
+    usual = np.median(list(own.values()), axis=0)
     scores = []
     for run in cross_validated:
-        share = own.get(run.run_id, usual)
+        shares = zip(QUANTITIES, own.get(run.run_id, usual), strict=True)
         # A fold that saw other runs of the session has taken part of its gain up: the scatter that is left counts.
         gain = error.gain**2
-        grown = {quantity: share + uncertainty.growth.variance(quantity, run.distance) for quantity in QUANTITIES}
+        grown = {q: share + uncertainty.growth.variance(q, run.distance) for q, share in shares}
         force = gain * run.predicted**2 + error.offset**2 + (grown["force"] + uncertainty.force**2) * run.half**2
         peak, energy = (np.sqrt(grown[q] + gain + getattr(uncertainty, q) ** 2) for q in ("peak", "energy"))
         scores.append(StandardizedErrors.of(run, np.sqrt(force), float(peak), float(energy)))

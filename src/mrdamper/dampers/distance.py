@@ -49,7 +49,7 @@ AT_TESTS = Distance()
 
 
 def distance_from(
-    tested: Sequence[Condition], at: Condition, current: Floats, *, any_current: bool = False
+    tested: Sequence[Condition], at: Condition, current: Floats, *, swept_A: tuple[float, float] | None = None
 ) -> Distance:
     """Distance of a condition and the currents along its motion from tested conditions.
 
@@ -61,14 +61,14 @@ def distance_from(
         That the motion amounts to.
     current : (N,) array
         [A]
-    any_current : bool
-        The current changed in tests, so that none between the levels is far from them.
+    swept_A : (float, float), optional
+        Lowest and highest current of tests in which it changed: none between them is far from the tests.
     """
-    levels = np.unique(current_levels([abs(c.current_A) for c in tested]))
+    levels = np.unique(swept_A or current_levels([abs(c.current_A) for c in tested]))
     between, beyond = _current_distances(np.abs(current[:: max(1, current.size // _MAX_SAMPLES)]), levels)
     frequency, amplitude = MotionHull.of(tested).nearest(at.frequency_Hz, at.amplitude_m)
     motion = np.hypot(np.log(at.frequency_Hz / frequency), np.log(at.amplitude_m / amplitude))
-    gaps = 0.0 if any_current else float(np.sqrt(np.mean(between**2)))
+    gaps = 0.0 if swept_A else float(np.sqrt(np.mean(between**2)))
     return Distance(gaps, float(np.sqrt(np.mean(beyond**2))), float(motion))
 
 

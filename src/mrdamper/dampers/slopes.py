@@ -10,6 +10,7 @@ import numpy as np
 from mrdamper.dampers.base import Damper, Prediction
 from mrdamper.data import Floats
 from mrdamper.identification.columns import linear_table
+from mrdamper.statistics.metrics import dissipated_power, peak_force
 
 _RELATIVE_STEP = 1e-4  # of a number
 
@@ -36,6 +37,30 @@ def force_slopes(damper: Damper, prediction: Prediction, names: Sequence[str]) -
     columns = _linear(damper, prediction, names)
     table = [columns[n] if n in columns else _moved(damper, prediction, n) for n in names]
     return np.column_stack(table) if table else np.zeros((prediction.force.size, 0))
+
+
+def relative_variances(slopes: Floats, covariance: Floats, force: Floats, velocity: Floats, time: Floats) -> Floats:
+    """Propagate a covariance of parameters to the force, its peak and the dissipated energy.
+
+    Parameters
+    ----------
+    slopes : (N, P) array
+        Of the force (N,) [N], by parameters of covariance (P, P).
+    velocity, time : (N,) arrays
+        [m/s], [s]
+
+    Returns
+    -------
+    (3,) array
+        Mean variance of the force and that of its peak over the square of half the peak-to-peak value; that of the
+        energy, relative.
+    """
+    half = peak_force(force) or 1.0
+    power = dissipated_power(force, velocity, time) or 1.0
+    mean = float(np.mean(np.einsum("np,pq,nq->n", slopes, covariance, slopes))) / half**2
+    swing = (slopes[int(np.argmax(force))] - slopes[int(np.argmin(force))]) / 2 / half
+    loss = np.array([dissipated_power(column, velocity, time) for column in slopes.T]) / power
+    return np.array([mean, float(swing @ covariance @ swing), float(loss @ covariance @ loss)])
 
 
 def _linear(damper: Damper, prediction: Prediction, names: Sequence[str]) -> dict[str, Floats]:
