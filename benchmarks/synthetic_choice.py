@@ -23,7 +23,7 @@ from mrdamper.study.validation import peak_band, score_run
 from mrdamper.study.workflow import RigStudy, study_rig
 
 LEVEL = 0.9
-ASKED = ("corner", "current")
+ASKED = ("corner", "current", "tested")
 _NEGLIGIBLE = 0.01  # error below which models are alike
 _FUTURE = 10  # sessions a condition is asked for in
 _GOAL, _NEVER = 1.3, 3.0  # times the best candidate's error
@@ -120,7 +120,7 @@ def table(cases: Sequence[Case], details: bool = False) -> str:
                 f"{case.damper:24}{case.design:8}{what:8} ratio {case.ratio(what):5.2f}  inside {shares}  "
                 f"chosen {case.chosen}; {errors}; {case.seconds:.1f} s"
             )
-    lines.append(f"{'cases':28}{'<= 1.3 x':>10}{'worst':>8}{'error':>8}{'peak inside':>13}{'energy inside':>15}")
+    lines.append(f"{'cases':28}{'<= 1.3 x':>10}{'worst':>8}{'error':>8}{'peak inside':>18}{'energy inside':>18}")
     groups = {"all": list(cases)}
     for case in cases:
         groups.setdefault(case.design, []).append(case)
@@ -129,10 +129,12 @@ def table(cases: Sequence[Case], details: bool = False) -> str:
         for what in ASKED:
             ratios = [case.ratio(what) for case in members]
             errors = [case.errors[what][case.chosen] for case in members]
-            peak, energy = np.mean([case.inside[what] for case in members], axis=0)
+            shares = 100 * np.mean([case.inside[what] for case in members], axis=0)
+            halves = 100 * np.median([case.widths[what] for case in members], axis=0)
+            inside = "".join(f"{share:>9.0f} % ±{half:>4.1f} %" for share, half in zip(shares, halves, strict=True))
             lines.append(
                 f"{name + ', ' + what:28}{100 * np.mean(np.array(ratios) <= _GOAL):>8.0f} %{max(ratios):>8.2f}"
-                f"{100 * np.median(errors):>6.1f} %{100 * peak:>11.0f} %{100 * energy:>13.0f} %"
+                f"{100 * np.median(errors):>6.1f} %{inside}"
             )
     seconds = sum(case.seconds for case in cases)
     lines.append(f"{len(cases)} studies, {seconds / len(cases):.1f} s each")

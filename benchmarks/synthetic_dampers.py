@@ -22,6 +22,7 @@ _CYCLES = 5
 _MOTIONS = ((0.5, 1.0), (1.0, 1.0), (2.0, 0.4), (0.5, 0.4), (1.0, 0.4))  # frequency and amplitude; sparse: three
 _CORNERS = ((0.0, 2.0, 1.0), (1.0, 2.0, 1.0), (0.6, 1.6, 0.9))  # current, frequency, amplitude, of the largest
 _CURRENTS = ((0.06, 1.0, 1.0), (0.42, 0.5, 1.0), (0.85, 2.0, 0.4))
+_TESTED = ((0.0, 0.5, 1.0), (1.0, 1.0, 1.0), (1.0, 2.0, 0.4))  # in the full matrix and in the sparse one
 _LEVELS: Mapping[str, tuple[float, ...]] = {"matrix": (0.0, 0.25, 0.5, 0.75, 1.0), "sparse": (0.0, 1 / 3, 2 / 3, 1.0)}
 _RECORDS, _LENGTH = 4, 30  # of the random design; cycles of the middle frequency in each
 
@@ -251,9 +252,9 @@ def tests_of(damper: SyntheticDamper, design: Design, rng: np.random.Generator) 
     return _recorded(damper, _sines(damper, asked), "sine", gains, rng)
 
 
-def asked_of(damper: SyntheticDamper, what: Literal["corner", "current"]) -> list[Run]:
-    """Clean runs at conditions that no test has."""
-    asked = _CORNERS if what == "corner" else _CURRENTS
+def asked_of(damper: SyntheticDamper, what: Literal["corner", "current", "tested"]) -> list[Run]:
+    """Clean runs at untested corners of the motions, at currents between the tested ones, or at tested conditions."""
+    asked = {"corner": _CORNERS, "current": _CURRENTS, "tested": _TESTED}[what]
     return _recorded(damper, _sines(damper, asked), "sine", None, np.random.default_rng(0))
 
 
