@@ -45,14 +45,14 @@ def current_of(
         return profile.current.value, {"current_from": "profile"}
     if profile.current is not None:
         places = (path.name, table.label, f"{path.name}/{table.label}", f"{path.as_posix()}/{table.label}".rstrip("/"))
-        found = next((v for place in places if place and (v := current_in_name(place, profile)) is not None), None)
-        if found is None and channel is None:
+        current = next((v for place in places if place and (v := current_in_name(place, profile)) is not None), None)
+        if current is None and channel is None:
             raise ColumnError(
                 printable(f"the pattern {profile.current.pattern!r} does not match {places[-2].rstrip('/')!r}"),
                 where=printable(table.source.name), remedy="correct [current] pattern of the profile",
                 code="E_CURRENT_MISSING",
             )  # fmt: skip
-        statements = [] if found is None else [Statement(found, "name by the profile's pattern")]
+        statements = [] if current is None else [Statement(current, "name by the profile's pattern")]
     else:
         statements = _statements(table, path)
         if not statements and channel is None:
@@ -93,22 +93,22 @@ def _refuse_contradiction(value: float, channel: Floats | None, statements: list
 def _statements(table: RawTable, path: Path) -> list[Statement]:
     """Every current that stands beside the columns, the surest place first."""
     held = held_current_of(table)
-    found = [] if held is None else [Statement(held, table.stated_in or "a number in the file")]
+    statements = [] if held is None else [Statement(held, table.stated_in or "a number in the file")]
     lines = [line for line in table.remarks if line not in table.titles]
-    found += stated_by_lines(lines, table.form.get("decimal"))  # type: ignore[arg-type]
+    statements += stated_by_lines(lines, table.form.get("decimal"))  # type: ignore[arg-type]
     member = table.source.name.removeprefix(f"{path.name}:").removeprefix(f"{path.name}, sheet ")
     for text, whence in ((table.label, "the title"), (path.name, "file name"), (member, "file name")):
         stated = currents_in(text)
         if len(stated) == 1:
-            found.append(Statement(stated[0], whence if whence == "file name" else f"{whence} {text!r}"))
-    return found
+            statements.append(Statement(stated[0], whence if whence == "file name" else f"{whence} {text!r}"))
+    return statements
 
 
 def _set_points(table: RawTable, rows: slice) -> list[Statement]:
-    """What a column of the current that was asked for states, where it is one number."""
+    """Return the statements of a column of the commanded current that holds a single value."""
     for column, header in enumerate(table.headers):
-        known = header.known
-        if known is None or known.dimension != "current" or not names_condition(header.name, "current"):
+        unit = header.known
+        if unit is None or unit.dimension != "current" or not names_condition(header.name, "current"):
             continue
         try:
             values = table.read([column]).values[column][rows]
@@ -116,7 +116,7 @@ def _set_points(table: RawTable, rows: slice) -> list[Statement]:
             continue
         low, high = np.nanmin(values), np.nanmax(values)
         if low == high:
-            return [Statement(known.factor * float(low), f"the column {table.names[column]!r}")]
+            return [Statement(unit.factor * float(low), f"the column {table.names[column]!r}")]
     return []
 
 

@@ -1,4 +1,4 @@
-"""What the header of a column says: name, unit, and the channel the name stands for."""
+"""Interpretation of column headers: name, unit, and the channel the name stands for."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ _FUSED = re.compile(r"[ _.:-]+")
 
 
 class Header(NamedTuple):
-    """What the header of a column says."""
+    """Header of a column: name, unit and channel."""
 
     name: str  # without the unit
     unit: str
@@ -178,11 +178,11 @@ def role_of(name: str) -> str | None:
 
 
 def _role_of_word(word: str) -> str | None:
-    exact = next((role for role, known in WORDS.items() if word in known), None)
+    exact = next((role for role, words in WORDS.items() if word in words), None)
     if exact is not None:
         return exact
     if _EAST_ASIAN.search(word):  # written without spaces: 线圈电流, 阻尼力; the longest ending, as 压力 is no 力
-        ends = [(len(w), role) for role, known in WORDS.items() for w in known if not w.isascii() and word.endswith(w)]
+        ends = [(len(w), role) for role, words in WORDS.items() for w in words if not w.isascii() and word.endswith(w)]
         return max(ends)[1] if ends else None
     if len(word) < 5:
         return None
@@ -190,39 +190,39 @@ def _role_of_word(word: str) -> str | None:
 
 
 def names_coil(name: str) -> bool:
-    """Whether a name says that a current is the coil's."""
+    """Tell if a name states that a current is the coil's."""
     return any(word.casefold() in _COIL for word in words_of(name))
 
 
 def names_compression(name: str) -> bool:
-    """Whether a name speaks of compression, which most rigs that do count positive."""
+    """Tell if a name contains compression, which rigs that use the word mostly count positive."""
     return any(word.casefold().startswith(_COMPRESSION) for word in words_of(name))
 
 
 def names_computed(name: str) -> bool:
-    """Whether a name says that something is filtered, averaged or computed."""
+    """Tell if a name states a filtered, averaged or computed quantity."""
     return any(word.casefold() in _MADE for word in words_of(name))
 
 
 def names_condition(key: str, role: str) -> bool:
-    """Whether a line's or an attribute's name stands for a channel's value in the whole test, set or measured."""
+    """Tell if the name of a line or an attribute stands for a channel's value in the whole test, set or measured."""
     kept = [word for word in words_of(key) if word.casefold() not in _SET]
     return bool(kept) and role_of(" ".join(kept)) == role
 
 
 def names_weight(name: str) -> bool:
-    """Whether a name is of a load that is shown as a weight."""
+    """Tell if a name is that of a load displayed as a weight."""
     return any(word.casefold().rstrip("0123456789") in _WEIGHT for word in words_of(name))
 
 
 def says_nothing(name: str) -> bool:
-    """Whether a name holds no word of a channel, of a command or of another place."""
+    """Tell if a name holds no word of a channel, of a command or of another place."""
     words = [w.casefold().rstrip("0123456789") for w in re.split(r"[^\w]+|_", name) if w]
-    known = {w for words_of in WORDS.values() for w in words_of} | _NOT_MEASURED | _MADE | _ELSEWHERE | _SET
-    return not any(word in known for word in words)
+    meaningful = {w for words_of in WORDS.values() for w in words_of} | _NOT_MEASURED | _MADE | _ELSEWHERE | _SET
+    return not any(word in meaningful for word in words)
 
 
 def unknown_unit(header: str) -> str:
-    """What stands in brackets behind a name, though it is no unit that is known."""
+    """Return the text in brackets behind a name that is no known unit."""
     match = _BRACKETED.match(header[:_LONGEST_NAME])
     return "" if match is None or match["unit"].strip("- ") == "" else match["unit"].strip()

@@ -1,4 +1,4 @@
-"""Which column is time, displacement, force, ...: by its name and unit, or by the profile."""
+"""Assignment of columns to time, displacement, force, ..., by name and unit, or by the profile."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _INDEX = frozenset(("sample", "samples", "sample no", "sample number", "index", 
 
 @dataclass(frozen=True, slots=True)
 class Assigned:
-    """Where a channel comes from and how its numbers become SI: factor * number + offset."""
+    """Column of a channel and its conversion to SI: factor * value + offset."""
 
     column: int  # position in the table
     name: str  # as the file has it, without the unit
@@ -69,30 +69,34 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
     RigFileError
         E_DUPLICATE_COLUMN if columns of one name differ.
     """
-    found: dict[str, int] = {}
+    columns: dict[str, int] = {}
     problems: list[InputError] = []
     for role in ROLES:
         column = profile.channel(role).column
         if column is not None:
             try:
-                found[role] = _named(table, column, role)
+                columns[role] = _named(table, column, role)
             except ColumnError as error:
                 if role in REQUIRED:
                     problems.append(error)
     for role in ROLES:
-        if role in found or (role == "time" and profile.file.sample_rate_Hz) or (role == "current" and profile.current):
+        if (
+            role in columns
+            or (role == "time" and profile.file.sample_rate_Hz)
+            or (role == "current" and profile.current)
+        ):
             continue
         try:
-            choice = _choose(table, role, found.values())
+            choice = _choose(table, role, columns.values())
         except InputError as error:
             problems.append(error)
             continue
         if choice is not None:
-            found[role] = choice
+            columns[role] = choice
     if not problems:
-        problems += _missing(table, found, profile)
+        problems += _missing(table, columns, profile)
     assigned = {}
-    for role, column in found.items():
+    for role, column in columns.items():
         channel = profile.channel(role)
         try:
             if role in REQUIRED and not isinstance(channel.column, int):
@@ -111,18 +115,18 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
 
 def partly_assigned(table: RawTable, profile: Profile) -> dict[str, Assigned]:
     """The channels of a table that is no whole test, as far as they are known beyond doubt."""
-    found: dict[str, Assigned] = {}
+    assigned: dict[str, Assigned] = {}
     for role in ROLES:
         try:
             stated = profile.channel(role).column
-            column = _choose(table, role, [e.column for e in found.values()]) if stated is None else None
+            column = _choose(table, role, [e.column for e in assigned.values()]) if stated is None else None
             column = _named(table, stated, role) if stated is not None else column
             entry = None if column is None else _convert(table, role, column, profile.channel(role))
         except InputError:
             continue
         if entry is not None:
-            found[role] = entry
-    return found
+            assigned[role] = entry
+    return assigned
 
 
 def rate_of(table: RawTable, profile: Profile) -> float | None:
@@ -141,19 +145,19 @@ def rate_of(table: RawTable, profile: Profile) -> float | None:
 
 def index_of_samples(table: RawTable) -> int | None:
     """The column that counts samples, None if there is none or several may."""
-    found = [i for i, name in enumerate(table.names) if name.strip(" .#").casefold() in _INDEX]
-    return found[0] if len(found) == 1 else None
+    columns = [i for i, name in enumerate(table.names) if name.strip(" .#").casefold() in _INDEX]
+    return columns[0] if len(columns) == 1 else None
 
 
-def left_out(table: RawTable, profile: Profile, found: Mapping[str, Assigned]) -> dict[str, str]:
+def left_out(table: RawTable, profile: Profile, assigned: Mapping[str, Assigned]) -> dict[str, str]:
     """Optional channels that a column is named after but that its unit forbids to use, and why.
 
     A column without a unit is only told of if it may be the coil current, which no test can do without.
     """
-    taken = {entry.column for entry in found.values()}
+    taken = {entry.column for entry in assigned.values()}
     reasons = {}
     for role in OPTIONAL:
-        if role in found or (role == "current" and profile.current):
+        if role in assigned or (role == "current" and profile.current):
             continue
         stated = profile.channel(role).column
         try:
@@ -231,8 +235,8 @@ def _choose(table: RawTable, role: str, taken: Collection[int]) -> int | None:
 def _named(table: RawTable, column: str | int, role: str) -> int:
     if isinstance(column, int):
         if not 1 <= column <= len(table.names):
-            found = f"no column {column}: there are {len(table.names)}"
-            raise _refusal(ColumnError, table, found, f"correct [channels.{role}]")
+            problem = f"no column {column}: there are {len(table.names)}"
+            raise _refusal(ColumnError, table, problem, f"correct [channels.{role}]")
         return column - 1
     wanted = column.strip()
     for names in (table.names, [header.name for header in table.headers]):
@@ -240,13 +244,13 @@ def _named(table: RawTable, column: str | int, role: str) -> int:
         matches = matches or [i for i, name in enumerate(names) if name.casefold() == wanted.casefold()]
         if matches:
             return matches[0]
-    found = f"no column {column!r} for {role} (found {', '.join(filter(None, table.names))})"
-    raise _refusal(ColumnError, table, found, f"correct [channels.{role}] of the profile")
+    problem = f"no column {column!r} for {role} (found {', '.join(filter(None, table.names))})"
+    raise _refusal(ColumnError, table, problem, f"correct [channels.{role}] of the profile")
 
 
-def _missing(table: RawTable, found: Mapping[str, int], profile: Profile) -> list[InputError]:
+def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> list[InputError]:
     """A refusal for every channel that no column is known to be."""
-    missing = [r for r in REQUIRED if r not in found and not (r == "time" and rate_of(table, profile))]
+    missing = [r for r in REQUIRED if r not in columns and not (r == "time" and rate_of(table, profile))]
     if missing and not any(table.names):
         what = f"{len(table.names)} columns without names or units"
         remedy = "name them in a profile: [file] names = [...], [channels.force] unit = ..."
@@ -305,13 +309,13 @@ def _unit_problem(table: RawTable, role: str, column: int, unit: str) -> UnitErr
     named = f"column {table.names[column] or column + 1!r}"
     if parsed is None and not unit and table.odd and table.odd[column]:
         stamps = ", or time stamps like 2024-03-31 01:59:59.123" if role == "time" else ""
-        found = f"{named} holds no numbers but {table.odd[column][:40]!r}"
-        return _refusal(UnitError, table, found, f"export it as numbers with a unit{stamps}", "E_NUMBER")
+        problem = f"{named} holds no numbers but {table.odd[column][:40]!r}"
+        return _refusal(UnitError, table, problem, f"export it as numbers with a unit{stamps}", "E_NUMBER")
     if parsed is None:
         unit = unit or unknown_unit(table.names[column])
-        found = f"{named} has no unit" if not unit else f"{named} has the unit {unit!r}, which is not known"
+        problem = f"{named} has no unit" if not unit else f"{named} has the unit {unit!r}, which is not known"
         remedy = f'write it into the header, or say [channels.{role}] unit = "..." in a profile'
-        return _refusal(UnitError, table, found, remedy, "E_UNITS_MISSING")
+        return _refusal(UnitError, table, problem, remedy, "E_UNITS_MISSING")
     if parsed.dimension == DIMENSION[role]:
         return None
     remedy = f'say [channels.{role}] unit = "..." in a profile, or name another column'
@@ -320,8 +324,8 @@ def _unit_problem(table: RawTable, role: str, column: int, unit: str) -> UnitErr
         remedy = f'if the force of that weight is meant, say [channels.force] unit = "{force}" in a profile'
     if parsed.dimension == "voltage":
         remedy = f"give the calibration: [channels.{role}] unit and scale (unit per {unit}) in a profile"
-    found = f"{named} is in {unit}, which is no unit of {DIMENSION[role]}"
-    return _refusal(UnitError, table, found, remedy, "E_UNITS_DIMENSION")
+    problem = f"{named} is in {unit}, which is no unit of {DIMENSION[role]}"
+    return _refusal(UnitError, table, problem, remedy, "E_UNITS_DIMENSION")
 
 
 def _refuse_two_units(table: RawTable, role: str, column: int, unit: str) -> None:
@@ -396,6 +400,6 @@ def _agree(a: Floats, one: Header, b: Floats, other: Header) -> bool:
     return bool(np.allclose(one.known.factor * a, other.known.factor * b, rtol=0, atol=1e-3 * spread, equal_nan=True))
 
 
-def _refusal(kind: type, table: RawTable, found: str, remedy: str, code: str | None = None):
+def _refusal(kind: type, table: RawTable, problem: str, remedy: str, code: str | None = None):
     where = table.source.name + (f", line {table.line}" if table.line else "")
-    return kind(printable(found), where=printable(where), remedy=remedy, code=code)
+    return kind(printable(problem), where=printable(where), remedy=remedy, code=code)

@@ -83,8 +83,8 @@ def currents_in(text: str) -> tuple[float, ...]:
     stated = [match for match in _IN_NAME.finditer(text) if match[2] or not re.fullmatch("0[1-9]+", match[1])]
     stated = [match for match in stated if not _NEXT_NUMBER.match(text, match.end(1))]
     signs = [-1.0 if _NEGATIVE.search(text[: match.start()]) else 1.0 for match in stated]
-    found = [sign * amperes(match[1], f"{match[2]}A") + 0.0 for sign, match in zip(signs, stated, strict=True)]
-    return tuple(dict.fromkeys(found))
+    currents = [sign * amperes(match[1], f"{match[2]}A") + 0.0 for sign, match in zip(signs, stated, strict=True)]
+    return tuple(dict.fromkeys(currents))
 
 
 def currents_in_cells(line: str) -> list[float]:
@@ -108,31 +108,31 @@ def stated_by_lines(lines: Iterable[str], decimal: str | None = None) -> list[St
 
     With the file's decimal mark it is known which numbers have a thousands mark.
     """
-    lines, found, rated = list(lines), [], []
+    lines, currents, rated = list(lines), [], []
     for line in lines:
-        for key, value, known in _quantities(line, decimal):
+        for key, value, unit in _quantities(line, decimal):
             coil = names_condition(key, "current") or (names_coil(key) and not _RATING.search(key))
-            if known.dimension != "current" or _OTHER_TIME.search(key):
+            if unit.dimension != "current" or _OTHER_TIME.search(key):
                 continue
             if re.search("rated", key, re.IGNORECASE):
                 rated.append(value)
             elif coil and not _LABELLED_RATING.search(key):
-                found.append(Statement(value, f"the line {line.strip()[:60]!r}"))
+                currents.append(Statement(value, f"the line {line.strip()[:60]!r}"))
     shares = [(match, line) for line in lines if len(set(rated)) == 1 and (match := _SHARE.match(line[:_LONGEST_LINE]))]
     for match, line in shares:
         share = float(match["number"].replace(",", ".")) / 100
-        found.append(Statement(share * rated[0], f"the line {line.strip()[:60]!r}"))
-    return found
+        currents.append(Statement(share * rated[0], f"the line {line.strip()[:60]!r}"))
+    return currents
 
 
 def stated_in_titles(lines: Iterable[str]) -> list[Statement]:
     """The current in the free text of lines that name no limit or range, if all say one: "Test 3: 0.4 A, 2 Hz"."""
-    found = []
+    statements = []
     for line in lines:
         stated = () if _RATING.search(line) else currents_in(line)
         if len(stated) == 1:
-            found.append(Statement(stated[0], f"the line {line.strip()[:60]!r}"))
-    return found if len({statement.amperes for statement in found}) == 1 else []
+            statements.append(Statement(stated[0], f"the line {line.strip()[:60]!r}"))
+    return statements if len({statement.amperes for statement in statements}) == 1 else []
 
 
 def rate_in_name(name: str) -> float | None:
@@ -149,16 +149,16 @@ def stated_rate(lines: Iterable[str], numbers: Mapping[str, float], decimal: str
 
     Raises ValueError if two of them contradict each other.
     """
-    stated = [(key, value, known) for line in lines for key, value, known in _quantities(line, decimal)]
+    stated = [(key, value, unit) for line in lines for key, value, unit in _quantities(line, decimal)]
     for name, number in numbers.items():
         header = split_name(name)
         if header.known is not None:
             stated.append((header.name, header.known.factor * number, header.known))
     rates = []
-    for key, value, known in stated:
-        if value > 0 and known.dimension == "frequency" and _RATE.search(key):
+    for key, value, unit in stated:
+        if value > 0 and unit.dimension == "frequency" and _RATE.search(key):
             rates.append(value)
-        elif value > 0 and known.dimension == "time" and _STEP.search(key):
+        elif value > 0 and unit.dimension == "time" and _STEP.search(key):
             rates.append(1 / value)
     if rates and max(rates) > 1.001 * min(rates):
         raise ValueError(f"{min(rates):g} Hz and {max(rates):g} Hz")
@@ -173,12 +173,12 @@ def stated_speed(lines: Iterable[str], numbers: Mapping[str, float], decimal: st
 
     Raises ValueError if two of them contradict each other.
     """
-    stated = [(key, value, known) for line in lines for key, value, known in _quantities(line, decimal)]
+    stated = [(key, value, unit) for line in lines for key, value, unit in _quantities(line, decimal)]
     for name, number in numbers.items():
         header = split_name(name)
         if header.known is not None:
             stated.append((name, header.known.factor * number, header.known))
-    speeds = [v for key, v, known in stated if known.dimension == "frequency" and v > 0 and _TURNS.search(key)]
+    speeds = [v for key, v, unit in stated if unit.dimension == "frequency" and v > 0 and _TURNS.search(key)]
     if speeds and max(speeds) > 1.01 * min(speeds):
         raise ValueError(f"{60 * min(speeds):g} rpm and {60 * max(speeds):g} rpm")
     return speeds[0] if speeds else None
@@ -195,10 +195,10 @@ def _quantities(line: str, decimal: str | None) -> Iterator[tuple[str, float, Un
             continue
         key, unit = split_name(match["key"].strip().strip('"'))
         unit = match["unit"] or unit
-        known = parse_unit(unit)
+        unit_of = parse_unit(unit)
         value = _value(match["number"], decimal)
-        if known is not None and value is not None:
-            yield key, known.factor * value, known
+        if unit_of is not None and value is not None:
+            yield key, unit_of.factor * value, unit_of
 
 
 def _value(number: str, decimal: str | None) -> float | None:
@@ -228,11 +228,11 @@ def agreed(statements: Sequence[Statement]) -> Statement | None:
 
 def contradicted(channel: Floats, stated: float) -> float | None:
     """The mean of a constant current channel that contradicts what is stated [A]; None where it does not."""
-    known = channel[np.isfinite(channel)]
-    mean, change = held_current(known) if known.size >= 3 else (stated, "")
+    finite = channel[np.isfinite(channel)]
+    mean, change = held_current(finite) if finite.size >= 3 else (stated, "")
     return mean if not change and contradicts(mean, stated) else None
 
 
 def contradicts(one: float, other: float) -> bool:
-    """Whether two currents [A] cannot be one, nominal and measured; a dash before a number may be a sign or none."""
+    """Tell if a nominal and a measured current [A] contradict; a dash before a number may be a sign or none."""
     return abs(abs(one) - abs(other)) > _AGREE_A + _AGREE * min(abs(one), abs(other))

@@ -112,11 +112,11 @@ def tables_of_tests(tables: list[RawTable], profile: Profile) -> tuple[list[RawT
 
 def _resembles_a_test(table: RawTable, tests: list[RawTable], profile: Profile) -> bool:
     """Return whether a table beside tests has as many columns, as many rows and two of their channels."""
-    known = [entry.column for role, entry in partly_assigned(table, profile).items() if role in REQUIRED]
+    columns = [entry.column for role, entry in partly_assigned(table, profile).items() if role in REQUIRED]
     alike = next((test for test in tests if len(test.names) == len(table.names)), None)
-    if alike is None or names_computed(table.label) or len(known) < len(REQUIRED) - 1:
+    if alike is None or names_computed(table.label) or len(columns) < len(REQUIRED) - 1:
         return False
-    return _rows(table, known[0]) >= _ROWS_OF_A_TEST * _rows(alike, assign(alike, profile)["force"].column)
+    return _rows(table, columns[0]) >= _ROWS_OF_A_TEST * _rows(alike, assign(alike, profile)["force"].column)
 
 
 def _rows(table: RawTable, column: int) -> int:

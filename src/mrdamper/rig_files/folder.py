@@ -35,16 +35,18 @@ def files_in(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:
             if not name.startswith((".", "~$")) and name != TESTS
         )
         inside = [file for file in inside if file.is_file() and not is_packed_folder(file)]  # no pipes
-        known = [file for file in inside if file.suffix.lower() in suffixes()]
-        known = known or [file for file in inside if _is_table(file)]  # suffixes of a laboratory's own: run.001
-        files += known
-        read = set(known)
+        recognised = [file for file in inside if file.suffix.lower() in suffixes()]
+        recognised = recognised or [
+            file for file in inside if _is_table(file)
+        ]  # suffixes of a laboratory's own: run.001
+        files += recognised
+        read = set(recognised)
         others += [file for file in inside if file not in read]
     if not files:
         where = ", ".join(path.name for path in paths)
-        found = f"no rig's file in this folder (found {', '.join(file.name for file in others[:5]) or 'nothing'})"
+        problem = f"no rig's file in this folder (found {', '.join(file.name for file in others[:5]) or 'nothing'})"
         remedy = "export them as CSV, or give another folder" if others else "give another folder"
-        raise RigFileError("E_NO_DATA", found, file=where, remedy=remedy)
+        raise RigFileError("E_NO_DATA", problem, file=where, remedy=remedy)
     return files, others
 
 

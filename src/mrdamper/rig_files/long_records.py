@@ -30,7 +30,7 @@ def judge_long(record: Record, judge: Callable[[Record], Record]) -> Record:
     """
     if record.time.size <= 2 * PART:
         return judge(record)
-    found: dict[str, tuple[Finding, int]] = {}
+    finding_of: dict[str, tuple[Finding, int]] = {}
     segments: list[tuple[int, int]] = []
     moving, resting, count = 0, None, 0
     for start, (noticed, ranges, error) in _judged_parts(record, judge):
@@ -38,12 +38,12 @@ def judge_long(record: Record, judge: Callable[[Record], Record]) -> Record:
         moving += error is None
         resting = resting or error
         for finding in noticed:
-            first, times = found.get(finding.code, (finding, 0))
-            found[finding.code] = first, times + 1
+            first, times = finding_of.get(finding.code, (finding, 0))
+            finding_of[finding.code] = first, times + 1
         _extend(segments, ranges, start)
     if resting is not None and not moving:
         raise resting
-    findings = (*record.findings, *_summed(found, count, moving), *change_of(record, None))
+    findings = (*record.findings, *_summed(finding_of, count, moving), *change_of(record, None))
     return replace(record, findings=findings, segments=tuple(segments))
 
 
@@ -91,8 +91,8 @@ def _extend(segments: list[tuple[int, int]], new: tuple[tuple[int, int], ...], s
             segments.append((start + a, start + b))
 
 
-def _summed(found: dict[str, tuple[Finding, int]], parts: int, moving: int) -> Iterator[Finding]:
-    for finding, times in found.values():
+def _summed(findings: dict[str, tuple[Finding, int]], parts: int, moving: int) -> Iterator[Finding]:
+    for finding, times in findings.values():
         if finding.code in _ONCE or (finding.code in _OF_THE_WHOLE and times < moving):
             continue
         more = f" (first of {times} parts out of {parts})" if times > 1 else ""

@@ -34,16 +34,16 @@ _NESTED = (".zip", ".gz", ".tgz", ".tar", ".bz2", ".xz", ".7z", ".rar")
 def unpacked(paths: Iterable[str | Path]) -> Iterator[list[Path]]:
     """The same paths, with a folder in the place of every archive of several files; raises as `opened`."""
     with contextlib.ExitStack() as stack:
-        found = []
+        members = []
         for path in map(Path, paths):
-            found += [_folder_of(path, stack)] if is_packed_folder(path) else [path]
+            members += [_folder_of(path, stack)] if is_packed_folder(path) else [path]
             inside = sorted(path.rglob("*")) if path.is_dir() else ()
-            found += [_folder_of(archive, stack) for archive in inside if is_packed_folder(archive)]
-        yield found
+            members += [_folder_of(archive, stack) for archive in inside if is_packed_folder(archive)]
+        yield members
 
 
 def is_packed_folder(path: Path) -> bool:
-    """Whether a file is a tar, or a zip of several files."""
+    """Tell if a file is a tar, or a zip of several files."""
     name = path.name.lower()
     if name.startswith(".") or not path.is_file():
         return False

@@ -48,15 +48,15 @@ def _run_column(table: RawTable, form: FileForm) -> int | None:
         named = [i for i, of in enumerate(words) if _RUN_WORDS & {*of} and {*of} <= _RUN_WORDS | _NUMBER_WORDS]
         return named[0] if named and table.words is not None else None
     if isinstance(wanted, int):
-        found = [wanted - 1] if wanted <= len(table.names) else []
+        columns = [wanted - 1] if wanted <= len(table.names) else []
     else:
-        found = [i for i, name in enumerate(table.names) if name.strip().casefold() == wanted.strip().casefold()]
-    if not found:
+        columns = [i for i, name in enumerate(table.names) if name.strip().casefold() == wanted.strip().casefold()]
+    if not columns:
         shown = ", ".join(name for name in table.names if name)
         raise table.source.refuse(
             "E_COLUMN", f"no column {wanted!r} of runs (found {shown})", "correct run_column under [file]"
         )
-    return found[0]
+    return columns[0]
 
 
 def _by_run(table: RawTable, column: int, *, stated: bool) -> list[RawTable]:
@@ -100,8 +100,8 @@ def _remembered(table: RawTable) -> Callable[[tuple[int, ...]], Content]:
 
     @lru_cache(maxsize=2)
     def read(columns: tuple[int, ...]) -> Content:
-        known = every()
-        return known if known is not None and set(columns) <= set(known.values) else table.read(columns)
+        result = every()
+        return result if result is not None and set(columns) <= set(result.values) else table.read(columns)
 
     return read
 
@@ -219,7 +219,7 @@ def _members(table: RawTable) -> dict[str, dict[str, int]]:
 
 
 def _key(name: str, role: str) -> str:
-    """What a name says beside its channel: the group's number or condition."""
+    """Return the part of a name beside its channel: the number or condition of the group."""
     words = [w for w in re.split(r"[\s_:;/|()\[\]-]+", name) if w]
     rest = [w for w in words if role_of(w) != role or w.rstrip("0123456789") != w]
     rest = [re.sub(r"^[^\W\d]+(?=[0-9]+$)", "", w) if role_of(w) == role else w for w in rest]
@@ -248,7 +248,7 @@ def _filled(table: RawTable, read: Callable[[tuple[int, ...]], Content], roles: 
 
 
 def stretches_of_time(time: np.ndarray) -> list[slice]:
-    """Where a time starts again from its first value, again and again: a test each.
+    """Return the stretches between restarts of a time that repeatedly starts from its first value: a test each.
 
     One stretch where it does not. A clock that wraps, midnight, a change of daylight time or
     swapped rows are no new test: they do not come back to the first value, or they leave from
@@ -257,10 +257,10 @@ def stretches_of_time(time: np.ndarray) -> list[slice]:
     whole = [slice(0, time.size)]
     if not _turns_back(time):
         return whole
-    known = np.flatnonzero(np.isfinite(time))
-    if known.size < 2 * _FEWEST_ROWS:
+    finite = np.flatnonzero(np.isfinite(time))
+    if finite.size < 2 * _FEWEST_ROWS:
         return whole
-    stamps = time[known]
+    stamps = time[finite]
     steps = np.diff(stamps)
     back = np.flatnonzero(steps < 0)
     if not back.size or back.size > MOST_RUNS:
@@ -274,7 +274,7 @@ def stretches_of_time(time: np.ndarray) -> list[slice]:
         return whole
     if any(_wraps(float(stamps[i]) + step - float(stamps[0]), step) for i in back):
         return whole
-    at = [0, *(int(known[i + 1]) for i in back), time.size]
+    at = [0, *(int(finite[i + 1]) for i in back), time.size]
     return [slice(a, b) for a, b in pairwise(at)]
 
 
@@ -289,7 +289,7 @@ def _turns_back(time: np.ndarray) -> bool:
 
 
 def _wraps(end: float, step: float) -> bool:
-    """Whether a time ends where a counter does: at a power of two, wherever the decimal point is."""
+    """Tell if a time ends where a counter does: at a power of two, wherever the decimal point is."""
     if end <= 0:
         return False
     for bits in (8, 12, 15, 16, 24, 31, 32):

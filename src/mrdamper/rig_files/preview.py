@@ -24,7 +24,7 @@ _ROWS_SHOWN, _MOST_SHOWN = 6, 30  # rows and columns of a preview
 
 @dataclass(frozen=True, eq=False)
 class Preview:
-    """How a file begins, and what its columns are taken for."""
+    """Beginning of a file, and the channels its columns are assigned to."""
 
     names: tuple[str, ...]  # one a column
     units: tuple[str, ...]
@@ -33,7 +33,7 @@ class Preview:
 
 
 def guess_profile(path: str | Path, profile: Profile | str | Path | None = None) -> Profile:
-    """How a file is read, as a profile that can be saved, completed and used for its folder.
+    """Return the form of a file as a profile that can be saved, completed and used for its folder.
 
     Reading with it gives the same record. What the file does not say is left out of it.
 
@@ -63,7 +63,7 @@ def guess_profile(path: str | Path, profile: Profile | str | Path | None = None)
 
 
 def preview(path: str | Path, profile: Profile | str | Path | None = None) -> Preview:
-    """How a file begins, for columns to be chosen by eye.
+    """Return the beginning of a file, to choose its columns from.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def _guess_channels(tables: list[RawTable], profile: Profile) -> tuple[RawTable,
 
 
 def scan(paths: Iterable[str | Path], profile: Profile | str | Path | None = None) -> tuple[FileTree, ...]:
-    """What is in files and folders: of every file its tables, their columns, and what stands beside them."""
+    """List the contents of files and folders: the tables of every file, their columns, and the text beside them."""
     profile = profile_of(profile)
     trees = []
     with unpacked(paths) as given:

@@ -118,7 +118,7 @@ class Correction(Table):
 
 
 class Profile(Table):
-    """What a rig's files do not say.
+    """Information that the files of a rig do not contain.
 
     Attributes
     ----------
@@ -143,17 +143,17 @@ class Profile(Table):
     @field_validator("channels")
     @classmethod
     def _channels_exist(cls, channels: dict[str, Channel]) -> dict[str, Channel]:
-        known = (*REQUIRED, *OPTIONAL)
+        roles = (*REQUIRED, *OPTIONAL)
         for name, channel in channels.items():
-            if name not in known:
-                raise ValueError(f"no channel is called {name!r}; known: {', '.join(known)}")
+            if name not in roles:
+                raise ValueError(f"no channel is called {name!r}; known: {', '.join(roles)}")
             unit = parse_unit(channel.unit or "")
             if channel.unit and (unit is None or unit.dimension != DIMENSION[name]):
                 raise ValueError(f"{channel.unit!r} is no unit of {DIMENSION[name]} ({name})")
         return channels
 
     def channel(self, name: str) -> Channel:
-        """What is said of a channel."""
+        """Return the settings of a channel."""
         return self.channels.get(name, Channel())
 
 
@@ -189,8 +189,8 @@ def profile_text(profile: Profile) -> str:
         says = channel.model_dump(exclude_none=True)
         sections[f"channels.{name}"] = {k: v for k, v in says.items() if v != plain.get(k) or k == "sign"}
     for name in ("current", "correction"):
-        said = getattr(profile, name)
-        sections[name] = {} if said is None else said.model_dump(exclude_none=True)
+        table = getattr(profile, name)
+        sections[name] = {} if table is None else table.model_dump(exclude_none=True)
     for name, section in sections.items():
         if section or name.startswith("channels."):
             lines += ["", f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in section.items())]
@@ -220,8 +220,8 @@ def current_in_name(name: str, profile: Profile) -> float | None:
     """
     source = profile.current
     if source is None or source.pattern is None:
-        found = currents_in(name)
-        return found[0] if len(found) == 1 else None
+        currents = currents_in(name)
+        return currents[0] if len(currents) == 1 else None
     match = re.fullmatch(_as_expression(source.pattern), name[:255])
     if match is None:
         return None

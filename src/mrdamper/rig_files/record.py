@@ -1,4 +1,4 @@
-"""What a rig's file holds after reading: channels in SI, what is missing, what was noticed.
+"""Record of a rig's file: channels in SI, missing information, findings.
 
 Readers make a `Record`, quality checks add findings to it or refuse it, `to_run` hands it on.
 Nothing is filled in or moved: missing samples stay NaN here and are left out of the run.

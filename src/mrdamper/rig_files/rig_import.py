@@ -48,7 +48,7 @@ class Refusal:
 
 @dataclass(frozen=True, eq=False)
 class ImportResult:
-    """What came of a set of files."""
+    """Result of the import of a set of files."""
 
     records: tuple[Record, ...]  # accepted, with their findings, in the order of the files
     refusals: tuple[Refusal, ...] = ()
@@ -199,16 +199,16 @@ class _Intake:
         self.refusals += [Refusal(str(path), problem) for problem in problems]
         self.met += [(path, record.id) for record in records]
         for record in records:
-            known, problems = record, []
+            completed, problems = record, []
             if self._table is not None:
                 try:
-                    known = applied(record, self._table.of(path, record.id), self._table)
+                    completed = applied(record, self._table.of(path, record.id), self._table)
                 except InputError as error:
                     problems.append(error)
-            if known.current is None and not problems:
-                self._pending.append((path, known))
+            if completed.current is None and not problems:
+                self._pending.append((path, completed))
             else:
-                self._check(path, known, problems, several=len(records) > 1)
+                self._check(path, completed, problems, several=len(records) > 1)
 
     def _check(self, path: Path, record: Record, problems: list[InputError], *, several: bool) -> None:
         from mrdamper.rig_files.quality import judge
@@ -290,10 +290,10 @@ class _Intake:
 
     def _refuse(self, errors: Mapping[int, InputError]) -> None:
         """Refuse accepted tests, each by its place among them."""
-        found = sorted(self._found, key=lambda entry: entry[0])
+        problems_by_place = sorted(self._found, key=lambda entry: entry[0])
         files = self._tests()
         self.refusals += [Refusal(str(files[i][0]), error, files[i][1].id) for i, error in errors.items()]
-        self._found = [entry for i, entry in enumerate(found) if i not in errors]
+        self._found = [entry for i, entry in enumerate(problems_by_place) if i not in errors]
 
 
 def found_tests(
@@ -344,10 +344,10 @@ def _with_current(record: Record) -> Record:
 
 def with_unique_ids(records: Iterable[Record]) -> tuple[Record, ...]:
     """Records told apart by their names: files of different folders may share one."""
-    found: dict[str, Record] = {}
+    by_id: dict[str, Record] = {}
     for record in records:
         name, count = record.id, 2
-        while name in found:
+        while name in by_id:
             name, count = f"{record.id}_{count}", count + 1
-        found[name] = record if name == record.id else replace(record, id=name)
-    return tuple(found.values())
+        by_id[name] = record if name == record.id else replace(record, id=name)
+    return tuple(by_id.values())

@@ -42,28 +42,28 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
         If a channel is missing, has no unit, or holds something else than numbers, or if two
         places contradict each other about the current.
     """
-    found = assign(table, profile)
-    raw, findings, lines = _read(table, found)
-    channels = {name: rescale(raw[of.column], of.factor, of.offset) for name, of in found.items()}
+    assigned = assign(table, profile)
+    raw, findings, lines = _read(table, assigned)
+    channels = {name: rescale(raw[of.column], of.factor, of.offset) for name, of in assigned.items()}
     size, rate = next(iter(raw.values())).size, ""
-    _refuse_tiny_currents(table, found, channels)
+    _refuse_tiny_currents(table, assigned, channels)
     if "time" not in channels:
         channels["time"], rate = _counted_time(table, profile, size)
-    further = _further(table, found, size)
+    further = _further(table, assigned, size)
     stretches = [slice(0, size)] if profile.file.blocks == "join" else stretches_of_time(channels["time"])
     if len(stretches) == 1 and profile.file.blocks != "join":
         stretches = stretches_of_session(channels["time"], channels["displacement"], channels.get("current"))
         if len(stretches) > 1:
             text = f'cut at its rests or steps of the current into {len(stretches)} tests (blocks = "join" keeps it)'
             findings.append(Finding("W_CUT", text))
-    remarks = {**_remarks(table, found), **({"time_from": rate} if rate else {})}
-    for name, why in left_out(table, profile, found).items():
+    remarks = {**_remarks(table, assigned), **({"time_from": rate} if rate else {})}
+    for name, why in left_out(table, profile, assigned).items():
         findings.append(Finding("W_COLUMN", f"the {name} channel is left out: {why}"))
     records = []
     for number, stretch in enumerate(stretches, 1):
         part = {name: values[stretch] for name, values in channels.items()}
         others = {name: values[stretch] for name, values in further.items()}
-        part, its_lines = _aligned(part, found, None if lines is None else lines.part(stretch.start, stretch.stop))
+        part, its_lines = _aligned(part, assigned, None if lines is None else lines.part(stretch.start, stretch.stop))
         if its_lines is not None and len(its_lines) != stretch.stop - stretch.start:
             others = {}  # delays were taken off: the samples are no longer those of the file
         if profile.correction is not None:
@@ -87,9 +87,9 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
     return records
 
 
-def _read(table: RawTable, found: dict[str, Assigned]):
+def _read(table: RawTable, assigned: dict[str, Assigned]):
     """The columns' numbers, what was noticed, the lines; a damaged cell of a further channel costs that channel."""
-    content = table.read([entry.column for name, entry in found.items() if name not in _LENIENT])
+    content = table.read([entry.column for name, entry in assigned.items() if name not in _LENIENT])
     raw = dict(content.values)
     for column, values in raw.items():
         if content.lines is not None and thousands_in(values):
@@ -100,33 +100,33 @@ def _read(table: RawTable, found: dict[str, Assigned]):
                 "export it without separators of thousands",
                 column=column + 1,
             )
-    _refuse_unscaled(table, found, raw)
+    _refuse_unscaled(table, assigned, raw)
     findings = [*table.findings, *content.findings]
-    for name in [name for name in found if name in _LENIENT]:
+    for name in [name for name in assigned if name in _LENIENT]:
         try:
-            raw[found[name].column] = table.read([found[name].column]).values[found[name].column]
+            raw[assigned[name].column] = table.read([assigned[name].column]).values[assigned[name].column]
         except InputError as error:
             code = "W_ENCODING" if error.code == "E_ENCODING" else "W_COLUMN"
             findings.append(Finding(code, f"the {name} channel is left out: {error.found}"))
-            del found[name]
-    for name in [name for name in found if name in OPTIONAL]:
-        if any(np.isfinite(piece).any() for _, piece in pieces(raw[found[name].column])):
+            del assigned[name]
+    for name in [name for name in assigned if name in OPTIONAL]:
+        if any(np.isfinite(piece).any() for _, piece in pieces(raw[assigned[name].column])):
             continue
         findings.append(Finding("W_COLUMN", f"the {name} channel is left out: its column is empty"))
-        del found[name]
+        del assigned[name]
     return raw, findings, content.lines
 
 
-def _refuse_unscaled(table: RawTable, found: dict[str, Assigned], raw: dict[int, Floats]) -> None:
+def _refuse_unscaled(table: RawTable, assigned: dict[str, Assigned], raw: dict[int, Floats]) -> None:
     """Refuse whole numbers beside which their scale stands: nobody says whether they were multiplied by it."""
     for key, value in table.constants.items():
         words = [word for word in re.split(r"[^A-Za-z]+", key.casefold()) if word]
         rest = " ".join(word for word in words if word not in _SCALES)
         role = role_of(rest) if len(rest.split()) < len(words) else None
-        role = role if role in found else next((r for r, e in found.items() if e.name.casefold() in rest), None)
+        role = role if role in assigned else next((r for r, e in assigned.items() if e.name.casefold() in rest), None)
         if role is None or len(rest.split()) == len(words) or value in (0.0, 1.0):
             continue
-        some = raw.get(found[role].column, np.empty(0))[:_SAMPLE]
+        some = raw.get(assigned[role].column, np.empty(0))[:_SAMPLE]
         if some.size and np.array_equal(some, np.round(some), equal_nan=True):
             raise table.source.refuse(
                 "E_AMBIGUOUS",
@@ -135,9 +135,9 @@ def _refuse_unscaled(table: RawTable, found: dict[str, Assigned], raw: dict[int,
             )
 
 
-def _refuse_tiny_currents(table: RawTable, found: dict[str, Assigned], channels: dict[str, Floats]) -> None:
+def _refuse_tiny_currents(table: RawTable, assigned: dict[str, Assigned], channels: dict[str, Floats]) -> None:
     """Refuse currents in MA, written in capitals, that are amperes by their size."""
-    if "current" not in found or found["current"].unit != "MA":
+    if "current" not in assigned or assigned["current"].unit != "MA":
         return
     largest = max((float(np.max(np.abs(piece), initial=0.0, where=np.isfinite(piece)))
                    for _, piece in pieces(channels["current"])), default=0.0)  # fmt: skip
@@ -146,7 +146,7 @@ def _refuse_tiny_currents(table: RawTable, found: dict[str, Assigned], channels:
             "E_AMBIGUOUS",
             f"the current in MA is {1e3 * largest:.3g} at most: milliamperes would be no current of a coil",
             'say [channels.current] unit = "A" or unit = "mA" in a profile',
-            column=found["current"].column + 1,
+            column=assigned["current"].column + 1,
         )
 
 
@@ -167,31 +167,31 @@ def corrected_force(channels: dict[str, Floats], correction: Correction) -> tupl
     acceleration = measured if measured is not None else _curvature(channels["time"], channels["displacement"])
     force = channels["force"] - correction.moving_mass_kg * acceleration + correction.gas_force_N
     whence = "the accelerometer" if measured is not None else "the displacement"
-    said = [f"{correction.moving_mass_kg:g} kg times acceleration by {whence} taken off"] * bool(
+    notes = [f"{correction.moving_mass_kg:g} kg times acceleration by {whence} taken off"] * bool(
         correction.moving_mass_kg
     )
-    said += [f"{correction.gas_force_N:g} N of gas force added"] * bool(correction.gas_force_N)
-    return force, ", ".join(said) or "none"
+    notes += [f"{correction.gas_force_N:g} N of gas force added"] * bool(correction.gas_force_N)
+    return force, ", ".join(notes) or "none"
 
 
 def _curvature(time: Floats, displacement: Floats) -> Floats:
     """Acceleration [m/s²] by local quadratics, NaN where a sample is missing."""
     there = np.isfinite(time) & np.isfinite(displacement)
-    found = np.full(time.shape, np.nan)
-    found[there] = smooth(time[there], displacement[there])[2]
-    return found
+    acceleration = np.full(time.shape, np.nan)
+    acceleration[there] = smooth(time[there], displacement[there])[2]
+    return acceleration
 
 
-def _further(table: RawTable, found: dict[str, Assigned], size: int) -> dict[str, Floats]:
+def _further(table: RawTable, assigned: dict[str, Assigned], size: int) -> dict[str, Floats]:
     """Second sensors of a kind, in SI, by their name and unit: kept, never identified from."""
-    used = {entry.column for entry in found.values()}
+    used = {entry.column for entry in assigned.values()}
     wanted: dict[str, tuple[int, Unit]] = {}
     for column, header in enumerate(table.headers):
-        known = header.known
-        if column in used or known is None or known.dimension not in _KEPT or len(wanted) >= _MOST_FURTHER:
+        unit_of = header.known
+        if column in used or unit_of is None or unit_of.dimension not in _KEPT or len(wanted) >= _MOST_FURTHER:
             continue
         bare = re.sub(r"[^A-Za-z0-9]+", "_", header.name).strip("_")[:40].lower() or "column"
-        wanted.setdefault(f"{bare}_{_KEPT[known.dimension]}", (column, known))
+        wanted.setdefault(f"{bare}_{_KEPT[unit_of.dimension]}", (column, unit_of))
     values = _at_once(table, [column for column, _ in wanted.values()])
     return {
         key: rescale(values[column], unit.factor, unit.offset)
@@ -205,14 +205,14 @@ def _at_once(table: RawTable, columns: list[int]) -> dict[int, Floats]:
     try:
         return dict(table.read(columns).values) if columns else {}
     except InputError:
-        found: dict[int, Floats] = {}
+        values: dict[int, Floats] = {}
         for column in columns if len(columns) > 1 else ():
-            found |= _at_once(table, [column])
-        return found
+            values |= _at_once(table, [column])
+        return values
 
 
 def thousands_in(values: Floats) -> bool:
-    """Whether marks of thousands were read as decimal marks: 998, 1.003 for 1003, 1.012, ...
+    """Tell if marks of thousands were read as decimal marks: 998, 1.003 for 1003, 1.012, ...
 
     Integers up to 999 beside numbers from 1 on with three decimals, and a fall from the one to the other.
     """
@@ -232,18 +232,18 @@ def thousands_in(values: Floats) -> bool:
     return bool(np.any(falls | rises))
 
 
-def _aligned(channels: dict[str, Floats], found: dict[str, Assigned], lines):
+def _aligned(channels: dict[str, Floats], assigned: dict[str, Assigned], lines):
     """Take known delays off, by linear interpolation; samples without a partner are left out."""
-    delays = {name: entry.delay for name, entry in found.items() if entry.delay and name != "time"}
+    delays = {name: entry.delay for name, entry in assigned.items() if entry.delay and name != "time"}
     if not delays:
         return channels, lines
     time = channels["time"]
-    known = np.isfinite(time)
+    finite = np.isfinite(time)
     shifted = {}
     for name, delay in delays.items():
-        shifted[name] = np.interp(time + delay, time[known], channels[name][known], left=np.nan, right=np.nan)
+        shifted[name] = np.interp(time + delay, time[finite], channels[name][finite], left=np.nan, right=np.nan)
     late, early = max(0.0, *delays.values()), min(0.0, *delays.values())
-    if not known.any():
+    if not finite.any():
         return channels, lines
     keep = np.flatnonzero((time + late <= np.nanmax(time)) & (time + early >= np.nanmin(time)))
     if not keep.size:
@@ -253,11 +253,13 @@ def _aligned(channels: dict[str, Floats], found: dict[str, Assigned], lines):
     return cut, None if lines is None else lines.part(inside.start, inside.stop)
 
 
-def _remarks(table: RawTable, found: dict[str, Assigned]) -> dict[str, str]:
-    used = {entry.column for entry in found.values()}
-    known = [i for i, header in enumerate(table.headers) if header.dimension in _KEPT]
-    ignored = [name for i, name in enumerate(table.names) if name and i not in used and i not in known]
-    taken = [f"{role} = {table.names[e.column] or f'column {e.column + 1}'} in {e.unit}" for role, e in found.items()]
+def _remarks(table: RawTable, assigned: dict[str, Assigned]) -> dict[str, str]:
+    used = {entry.column for entry in assigned.values()}
+    columns = [i for i, header in enumerate(table.headers) if header.dimension in _KEPT]
+    ignored = [name for i, name in enumerate(table.names) if name and i not in used and i not in columns]
+    taken = [
+        f"{role} = {table.names[e.column] or f'column {e.column + 1}'} in {e.unit}" for role, e in assigned.items()
+    ]
     remarks = {"columns": ", ".join(taken)}
     if ignored:
         remarks["ignored_columns"] = ", ".join(ignored[:20]) + (" ..." if len(ignored) > 20 else "")

@@ -84,8 +84,8 @@ class _Asked:
         if "missing" in answer:
             raise MissingExtraError(answer["missing"], where=self._source.name, remedy=answer["remedy"])
         CombinedError.raise_from(
-            (NoTableError if told.pop("no_table") else RigFileError)(file=self._source.name, **told)
-            for told in answer.get("wrong", ())
+            (NoTableError if wrong.pop("no_table") else RigFileError)(file=self._source.name, **wrong)
+            for wrong in answer.get("wrong", ())
         )
         return answer
 
@@ -177,7 +177,7 @@ class _Sandboxes:
 
 
 def _sleeps(pid: int) -> bool:
-    """Whether every thread of a process waits for something else than a processor or a disk."""
+    """Tell if every thread of a process waits for something else than a processor or a disk."""
     try:
         states = [stat.read_text().rpartition(")")[2].split()[0] for stat in Path(f"/proc/{pid}/task").glob("*/stat")]
     except (OSError, IndexError):

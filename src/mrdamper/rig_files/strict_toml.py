@@ -20,7 +20,7 @@ T = TypeVar("T", bound=BaseModel)
 
 
 def load_toml(path: Path, kind: type[T], refuse: type[InputError], help: str, largest: int = 2**16) -> T:
-    """What a TOML file says, by its schema.
+    """Read a TOML file by its schema.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def load_toml(path: Path, kind: type[T], refuse: type[InputError], help: str, la
 
 
 def parse_toml(text: str, kind: type[T], refuse: type[InputError], help: str, where: str) -> T:
-    """What a TOML text says, by its schema; arguments as `load_toml`, `where` the text is from."""
+    """Parse a TOML text by its schema; arguments as `load_toml`, `where` names its origin."""
     try:
         return kind.model_validate(read_toml(text))
     except tomllib.TOMLDecodeError as error:
@@ -57,9 +57,9 @@ def parse_toml(text: str, kind: type[T], refuse: type[InputError], help: str, wh
         place = ".".join(str(part) for part in first["loc"])
         more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
         unknown = first["type"] == "extra_forbidden"
-        found = f"unknown key {place}" if unknown else f"{place}: {first['msg'].removeprefix('Value error, ')}"
+        problem = f"unknown key {place}" if unknown else f"{place}: {first['msg'].removeprefix('Value error, ')}"
         near = _nearest(kind, first["loc"]) if unknown else ""
-        raise refuse(found + near + more, where=where, remedy=help) from error
+        raise refuse(problem + near + more, where=where, remedy=help) from error
 
 
 def _nearest(kind: type[BaseModel], place: tuple[int | str, ...]) -> str:

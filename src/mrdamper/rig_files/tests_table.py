@@ -37,7 +37,7 @@ class TestsTableError(InputError):
 
 @dataclass(frozen=True, slots=True)
 class StatedTest:
-    """What the table says of a test; None where it says nothing."""
+    """Entry of the table of tests; None where a cell is empty."""
 
     line: int
     file: str
@@ -103,8 +103,8 @@ def _is_file(name: str, path: Path) -> bool:
     if not name:
         return True
     parts = PurePath(name.replace("\\", "/").casefold()).parts  # as file systems of Windows tell them apart
-    known = PurePath(str(path).casefold())
-    return known.parts[-len(parts) :] == parts or (len(parts) == 1 and known.stem == parts[0])
+    normalised = PurePath(str(path).casefold())
+    return normalised.parts[-len(parts) :] == parts or (len(parts) == 1 and normalised.stem == parts[0])
 
 
 def load_tests(path: str | Path) -> TestsTable:
@@ -124,22 +124,22 @@ def load_tests(path: str | Path) -> TestsTable:
     keys = [_key(name) for name in names]
     problems: list[InputError] = []
 
-    def wrong(line: int, found: str, remedy: str) -> None:
-        problems.append(TestsTableError(found, where=f"{path.name}, line {line}", remedy=remedy))
+    def wrong(line: int, problem: str, remedy: str) -> None:
+        problems.append(TestsTableError(problem, where=f"{path.name}, line {line}", remedy=remedy))
 
     if "file" not in keys and "run" not in keys:
         wrong(1, "neither a column file nor a column run", f"name one of {', '.join(COLUMNS)}")
-    found = [_row(line, cells, names, keys, wrong) for line, cells in rows[1:]]
-    seen: dict[tuple[str, str], int] = {}
-    for row in found:
+    stated = [_row(line, cells, names, keys, wrong) for line, cells in rows[1:]]
+    lines_of: dict[tuple[str, str], int] = {}
+    for row in stated:
         what = " ".join(filter(None, (row.file, row.run)))
         if not what:
             wrong(row.line, "names neither file nor run", "fill the cell or remove the row")
-        elif (row.file, row.run) in seen:
-            wrong(row.line, f"{what!r} stands in line {seen[row.file, row.run]} already", "remove one row")
-        seen.setdefault((row.file, row.run), row.line)
+        elif (row.file, row.run) in lines_of:
+            wrong(row.line, f"{what!r} stands in line {lines_of[row.file, row.run]} already", "remove one row")
+        lines_of.setdefault((row.file, row.run), row.line)
     CombinedError.raise_from(problems)
-    return TestsTable(path, tuple(found))
+    return TestsTable(path, tuple(stated))
 
 
 def applied(record: Record, row: StatedTest | None, table: TestsTable) -> Record:
@@ -213,8 +213,10 @@ def _cells(path: Path) -> list[tuple[int, list[str]]]:
     except csv.Error as error:
         raise TestsTableError(str(error), where=path.name, remedy="save it as CSV again") from error
     if len(rows) > _MOST_ROWS + 1:
-        found = f"{len(rows) - 1} rows; a table of tests has at most {_MOST_ROWS}"
-        raise TestsTableError(found, where=path.name, remedy="is this a table of tests, or of samples? Import in parts")
+        problem = f"{len(rows) - 1} rows; a table of tests has at most {_MOST_ROWS}"
+        raise TestsTableError(
+            problem, where=path.name, remedy="is this a table of tests, or of samples? Import in parts"
+        )
     if len(rows) < 2:
         raise TestsTableError("no rows", where=path.name, remedy=f"write one row a test: {', '.join(COLUMNS)}")
     return rows
@@ -269,14 +271,14 @@ def _row(line: int, cells: list[str], names: list[str], keys: list[str], wrong: 
 
 def _quantity(line: int, key: str, name: str, cell: str, wrong: _Wrong) -> float | None:
     match = _NUMBER.fullmatch(cell)
-    known = parse_unit((match[2] if match else "") or split_name(name).unit)
+    unit_of = parse_unit((match[2] if match else "") or split_name(name).unit)
     if match is None:
         wrong(line, f"{name} is {cell!r}", "write a number")
-    elif known is None or known.dimension != key:
+    elif unit_of is None or unit_of.dimension != key:
         example = "current_A or current_mA" if key == "current" else "temperature_C"
         wrong(line, f"{name} {cell} has no unit of {key}", f"name the column {example}")
     else:
-        value = known.factor * float(match[1].replace(",", ".")) + known.offset
+        value = unit_of.factor * float(match[1].replace(",", ".")) + unit_of.offset
         if key != "current" or abs(value) <= LARGEST_STATED:
             return value
         wrong(line, f"{name} is {value:g} A", "no damper's coil takes that: mA?")

@@ -18,7 +18,7 @@ G = 9.80665
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """What multiplies and shifts a number to make it SI.
+    """Unit: factor and offset that convert a value to SI.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ def parse_unit(text: str) -> Unit | None:
 
 
 def is_unit(text: str) -> bool:
-    """Whether a text is nothing but one of the field's units."""
+    """Tell if a text is nothing but one of the field's units."""
     return len(text) <= 40 and _from_table(text) is not None
 
 

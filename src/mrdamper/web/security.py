@@ -92,7 +92,7 @@ class Guard:
             await self.app(scope, receive_some, send_guarded)
 
     def refusal(self, method: str, headers: Headers) -> str | None:
-        """Why a request is not answered, or None."""
+        """Return the reason a request is refused, or None."""
         if headers.get("host", "").lower() not in self.hosts:
             return "This host name is not the bench's."
         if headers.get("sec-fetch-site", "same-origin") not in _OWN_SITES:

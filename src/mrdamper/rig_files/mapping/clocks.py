@@ -40,10 +40,10 @@ def _with_thousandths(table: RawTable, clock: int) -> RawTable:
 
     def read(columns: Sequence[int]) -> Content:
         content = inner(sorted({*columns, part} if clock in columns else {*columns}))
-        found = dict(content.values)
-        if clock in found:
-            found[clock] = found[clock] + found[part] / 1000
-        return Content({i: found[i] for i in columns}, content.lines, content.findings)
+        completed = dict(content.values)
+        if clock in completed:
+            completed[clock] = completed[clock] + completed[part] / 1000
+        return Content({i: completed[i] for i in columns}, content.lines, content.findings)
 
     return replace(table, read=read)
 
@@ -62,14 +62,14 @@ def _with_crank(table: RawTable) -> RawTable:
         ) from error
     if speed is None:
         return table
-    inner, column, known = table.read, angles[0], table.headers[angles[0]].known
-    assert known is not None
+    inner, column, unit_of = table.read, angles[0], table.headers[angles[0]].known
+    assert unit_of is not None
 
     def read(columns: Sequence[int]) -> Content:
         content = inner(columns)
         if column not in content.values:
             return content
-        angle = known.factor * content.values[column]
+        angle = unit_of.factor * content.values[column]
         there = np.isfinite(angle)
         turned = np.full(angle.shape, np.nan)
         turned[there] = np.unwrap(angle[there]) / (2 * np.pi * speed)

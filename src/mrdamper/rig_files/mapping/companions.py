@@ -44,11 +44,11 @@ def part_of(path: Path, profile: Profile) -> Part | None:
             if len(tables) != 1:
                 return None
             table = completed(tables[0])
-            found = partly_assigned(table, profile)
-            if "time" not in found or len(found) < 2:
+            assigned = partly_assigned(table, profile)
+            if "time" not in assigned or len(assigned) < 2:
                 return None
-            raw = table.read([entry.column for entry in found.values()]).values
-            channels = {role: e.factor * raw[e.column] + e.offset for role, e in found.items()}
+            raw = table.read([entry.column for entry in assigned.values()]).values
+            channels = {role: e.factor * raw[e.column] + e.offset for role, e in assigned.items()}
             current, _ = current_of(table, profile, path, channels.get("current"), slice(None))
     except InputError:
         return None
@@ -97,7 +97,7 @@ def joined_parts(parts: Sequence[Part], profile: Profile) -> list[tuple[Record, 
     by_number: dict[tuple[str, ...], list[Part]] = defaultdict(list)
     for part in parts:
         by_number[number_of(part.path)].append(part)
-    found = []
+    records = []
     for group in by_number.values():
         loads = [part for part in group if "force" in part.channels]
         names = [name for part in group for name in part.channels]
@@ -119,13 +119,13 @@ def joined_parts(parts: Sequence[Part], profile: Profile) -> list[tuple[Record, 
         files = [part.path.name for part in group]
         stem = re.sub(r"[^\w.+=-]+", "_", loads[0].path.stem)
         remarks = {"file": as_data(files[0]), "files": as_data(", ".join(files)), "columns": ", ".join(names)}
-        said = Finding("W_RASTER", f"joined from {' and '.join(files)}, on the force's clock")
+        note = Finding("W_RASTER", f"joined from {' and '.join(files)}, on the force's clock")
         record = Record(
-            id=stem, time=clock, findings=(said,), provenance=remarks, rig=profile.rig, excitation=profile.excitation,
+            id=stem, time=clock, findings=(note,), provenance=remarks, rig=profile.rig, excitation=profile.excitation,
             split=profile.split, **channels,  # type: ignore[arg-type]
         )  # fmt: skip
-        found.append((record, tuple(part.path for part in group)))
-    return found
+        records.append((record, tuple(part.path for part in group)))
+    return records
 
 
 def results_of(path: Path) -> Results | None:
@@ -138,8 +138,8 @@ def results_of(path: Path) -> Results | None:
                 return None
             return results_in(_decoded(content).splitlines())
         with raw_tables(path) as tables:
-            found = [results for table in tables[:20] if (results := results_in(lines_of(table)))]
-            return found[0] if len(found) == 1 else None
+            tables_of_results = [results for table in tables[:20] if (results := results_in(lines_of(table)))]
+            return tables_of_results[0] if len(tables_of_results) == 1 else None
     except (InputError, OSError, UnicodeError):
         return None
 
@@ -159,9 +159,9 @@ def with_results_of(pending: Sequence[tuple[Path, Record]], results: Results, pa
     currents = results.by_test(tests)
     if len(currents) < len(pending):
         return None
-    said = {"current_from": as_data(f"{path.name}, {results.title}")}
+    note = {"current_from": as_data(f"{path.name}, {results.title}")}
     return [
-        replace(record, current=constant(currents[i], record.time), provenance={**record.provenance, **said})
+        replace(record, current=constant(currents[i], record.time), provenance={**record.provenance, **note})
         for i, (_, record) in enumerate(pending)
     ]
 
@@ -186,7 +186,7 @@ def contradictions_with(
 
 
 def is_list(path: Path) -> bool:
-    """Whether a file holds only short tables without a time, or a displacement and a force: a plan, peak values."""
+    """Tell if a file holds only short tables without a time, or a displacement and a force: a plan, peak values."""
     try:
         with raw_tables(path) as tables:
             rows = [table.words(0).codes.size if table.words is not None else _FEWEST_ROWS for table in tables]

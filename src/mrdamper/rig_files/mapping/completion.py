@@ -93,9 +93,9 @@ def _with_keyed_units(table: RawTable) -> RawTable:
     for line in table.remarks:
         for separator in _SEPARATORS:
             key, *cells = [cell.strip().strip('"') for cell in line[:_LONGEST_LINE].split(separator)]
-            known = [cell if is_unit(cell) else "" for cell in cells[: len(table.names) - 1]]
-            if _UNITS_KEY.fullmatch(key) and len(known) == len(table.names) - 1 and all(known):
-                return replace(table, units=("", *known))
+            units = [cell if is_unit(cell) else "" for cell in cells[: len(table.names) - 1]]
+            if _UNITS_KEY.fullmatch(key) and len(units) == len(table.names) - 1 and all(units):
+                return replace(table, units=("", *units))
     return table
 
 
@@ -144,20 +144,20 @@ def _with_listed_units(table: RawTable) -> RawTable:
         return table
     wanted = {table.names[i].strip().casefold(): i for i in bare}
     for separator in _SEPARATORS:
-        found: dict[int, list[str]] = {}
+        units_of: dict[int, list[str]] = {}
         for line in table.remarks:
             cells = [cell.strip().strip('"') for cell in line[:_LONGEST_LINE].lstrip("#%/ ").split(separator)]
             named = [wanted[cell.casefold()] for cell in cells if cell.casefold() in wanted]
             if len(named) == 1 and len(cells) > 1:
-                found[named[0]] = [cell.strip("[]()") for cell in cells]
-        if len(found) < 2:
+                units_of[named[0]] = [cell.strip("[]()") for cell in cells]
+        if len(units_of) < 2:
             continue
-        width = min(map(len, found.values()))
-        column = next((c for c in range(width) if sum(is_unit(cells[c]) for cells in found.values()) >= 2), None)
+        width = min(map(len, units_of.values()))
+        column = next((c for c in range(width) if sum(is_unit(cells[c]) for cells in units_of.values()) >= 2), None)
         if column is None:
             continue
         units = list(table.units)
-        for i, cells in found.items():
+        for i, cells in units_of.items():
             units[i] = cells[column] if is_unit(cells[column]) else units[i]
         return replace(table, units=tuple(units))
     return table
@@ -171,7 +171,7 @@ def _with_stated_time_unit(table: RawTable) -> RawTable:
     stated = {
         m["unit"] for line in table.remarks if (m := _TIME_UNIT.match(line[:_LONGEST_LINE])) and is_unit(m["unit"])
     }
-    units = [unit for unit in stated if (known := parse_unit(unit)) and known.dimension == "time"]
+    units = [unit for unit in stated if (unit_of := parse_unit(unit)) and unit_of.dimension == "time"]
     if len(units) != 1:
         return table
     return replace(table, units=tuple(units[0] if i == times[0] else u for i, u in enumerate(table.units)))
@@ -225,22 +225,22 @@ def _stated_scale(table: RawTable, column: int, volts: Sequence[int]) -> tuple[s
     name = table.headers[column].name
     own = [table.names[column], *table.over[column : column + 1]]
     for lines in (own, [part for line in table.remarks for part in _parts(line[:_LONGEST_LINE])]):
-        found = []
+        scales = []
         for line in lines:
             for unit, factor in _scales(line):
-                known = parse_unit(unit)
-                role = next((r for r, d in DIMENSION.items() if known is not None and d == known.dimension), None)
+                unit_of = parse_unit(unit)
+                role = next((r for r, d in DIMENSION.items() if unit_of is not None and d == unit_of.dimension), None)
                 if role is None or role in ("voltage", "time"):
                     continue
                 words = {word.casefold() for word in words_of(name)}
                 meant = role_of(name) == role or lines is own or name.casefold() in line.casefold()
                 meant = meant or (role == "current" and bool(words & _MONITOR))
                 alone = len(volts) == 1 and role_of(name) in (None, "voltage") and role == "current"
-                has = any(header.dimension == known.dimension for header in table.headers) if known else True
+                has = any(header.dimension == unit_of.dimension for header in table.headers) if unit_of else True
                 if (meant or alone) and not has:
-                    found.append((unit, factor, line))
-        if found:
-            return found[0] if len({entry[:2] for entry in found}) == 1 else None
+                    scales.append((unit, factor, line))
+        if scales:
+            return scales[0] if len({entry[:2] for entry in scales}) == 1 else None
     return None
 
 
@@ -251,7 +251,7 @@ def _parts(line: str) -> list[str]:
 
 def _scales(line: str) -> list[tuple[str, float]]:
     """Unit and number per volt of every scale that a line states: 0.5 A/V, 100 mV/A, 1 V = 2 A."""
-    found = []
+    scales = []
     for match in _SCALE.finditer(line):
         one, other = parse_unit(match["unit"]), parse_unit(match["volt"])
         if one is None or other is None or (one.dimension in _SIGNALS) == (other.dimension in _SIGNALS):
@@ -260,10 +260,10 @@ def _scales(line: str) -> list[tuple[str, float]]:
         if not left or not right:
             continue
         if other.dimension in _SIGNALS:
-            found.append((match["unit"], left / (right * other.factor)))
+            scales.append((match["unit"], left / (right * other.factor)))
         else:
-            found.append((match["volt"], right / (left * one.factor)))
-    return found
+            scales.append((match["volt"], right / (left * one.factor)))
+    return scales
 
 
 def _scaled(table: RawTable, column: int, name: str, unit: str, factor: float, text: str) -> RawTable:

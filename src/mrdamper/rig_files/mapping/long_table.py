@@ -82,8 +82,8 @@ def _pivoted(
     def words(i: int) -> Words:
         if i >= len(others):
             return Words(np.zeros(base.size, dtype=np.int32), ("",))
-        found = of_table(others[i])
-        return Words(found.codes[base], found.labels)
+        layout = of_table(others[i])
+        return Words(layout.codes[base], layout.labels)
 
     names = (*(table.names[i] for i in others), *labels)
     own = (*(table.units[i] for i in others), *units)
@@ -104,10 +104,10 @@ def _units(table: RawTable, words: Words, column: list[int]) -> list[str] | None
     if not column or table.words is None:
         return [""] * len(words.labels)
     stated = table.words(column[0])
-    found = []
+    units = []
     for code in range(len(words.labels)):
         codes = np.unique(stated.codes[words.codes == code])
         if codes.size != 1:
             return None
-        found.append(stated.labels[codes[0]].strip("[]() "))
-    return found
+        units.append(stated.labels[codes[0]].strip("[]() "))
+    return units

@@ -92,14 +92,14 @@ def ranked_candidates(table: RawTable, open_roles: dict[str, list[int]]) -> list
         values = table.read(wanted).values
     except InputError:
         return []
-    found = []
+    candidates = []
     for columns in list(product(*open_roles.values()))[: _MOST_TRIED + 1]:
         if len(set(columns)) < len(columns):
             continue
         chosen = dict(zip(open_roles, columns, strict=True))
         score = damping_share(*(values[chosen[role]] for role in REQUIRED))
-        found.append(Candidate(chosen, score))
-    return sorted(found, key=lambda candidate: -candidate.score) if len(found) <= _MOST_TRIED else []
+        candidates.append(Candidate(chosen, score))
+    return sorted(candidates, key=lambda candidate: -candidate.score) if len(candidates) <= _MOST_TRIED else []
 
 
 def damping_share(time: Floats, displacement: Floats, force: Floats) -> float:

@@ -33,14 +33,14 @@ class Answer:
         """The profile with this answer."""
         if not self.channel:
             return profile.model_copy(update={"current": CurrentSource(**dict(self.change))})  # type: ignore[arg-type]
-        said = profile.channel(self.channel).model_dump(exclude_unset=True, exclude_none=True)
-        channel = Channel(**{**said, **dict(self.change)})  # type: ignore[arg-type]
+        settings = profile.channel(self.channel).model_dump(exclude_unset=True, exclude_none=True)
+        channel = Channel(**{**settings, **dict(self.change)})  # type: ignore[arg-type]
         return profile.model_copy(update={"channels": {**profile.channels, self.channel: channel}})
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """What a file leaves open, and the answers there are."""
+    """Question that a file leaves open, and its possible answers."""
 
     text: str
     answers: tuple[Answer, ...]

@@ -56,8 +56,8 @@ def with_joined_rasters(tables: list[RawTable]) -> list[RawTable]:
     for label, members in groups.items():
         timed = [table for table in members if any(header.role == "time" for header in table.headers)]
         roles = [{h.role for h in _named(table).headers} for table in timed]
-        whole = [i for i, known in enumerate(roles) if {"displacement", "force"} <= known]
-        every = [role for known in roles for role in known if role not in ("time", None)]
+        whole = [i for i, roles_of in enumerate(roles) if {"displacement", "force"} <= roles_of]
+        every = [role for roles_of in roles for role in roles_of if role not in ("time", None)]
         needed = {"displacement", "force"} <= set(every) and len(set(every)) == len(every)
         if len(timed) < 2 or len(whole) > 1 or not needed or (whole and "current" in roles[whole[0]]):
             continue
@@ -203,6 +203,6 @@ def resampled(table: RawTable, name: str, target: Floats, time: Floats, values: 
         )
     if name and role_of(name) == "current" and time.size < target.size and not held_current(values)[1]:
         return np.full(target.shape, held_current(values)[0])  # between its samples there is nothing but noise
-    found = np.interp(target, time, values)
-    found[~inside] = np.nan
-    return found
+    resampled_values = np.interp(target, time, values)
+    resampled_values[~inside] = np.nan
+    return resampled_values

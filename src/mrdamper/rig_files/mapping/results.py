@@ -42,8 +42,8 @@ class Results:
         """
         names = [_names(texts) for texts in tests]
         for exact in (True, False):
-            found = [match for column in zip(*self.cells, strict=True) if (match := _match(column, names, exact))]
-            currents = [{i: self.current[row] for i, row in match.items()} for match in found]
+            matches = [match for column in zip(*self.cells, strict=True) if (match := _match(column, names, exact))]
+            currents = [{i: self.current[row] for i, row in match.items()} for match in matches]
             if currents:
                 return currents[0] if all(other == currents[0] for other in currents) else {}
         return {}
@@ -51,13 +51,13 @@ class Results:
 
 def results_in(lines: Sequence[str], decimal: str | None = None) -> Results | None:
     """The table of results among lines of text; None if there is none or several."""
-    found = {}
+    columns = {}
     for separator in _SEPARATORS:
         for results in _tables(lines[:_MOST_LINES], separator):
-            found[results.current, results.cells] = results
-        if found:
+            columns[results.current, results.cells] = results
+        if columns:
             break
-    return next(iter(found.values())) if len(found) == 1 else None
+    return next(iter(columns.values())) if len(columns) == 1 else None
 
 
 def with_results(tables: list[RawTable]) -> list[RawTable]:
@@ -77,15 +77,15 @@ def with_results(tables: list[RawTable]) -> list[RawTable]:
     currents = results.by_test(tests)
     if len(currents) < len(tables):
         return others
-    said = f"table of results, {results.title}"
+    note = f"table of results, {results.title}"
     return [
-        replace(table, constants={**_without_current(table.constants), "current [A]": currents[i]}, stated_in=said)
+        replace(table, constants={**_without_current(table.constants), "current [A]": currents[i]}, stated_in=note)
         for i, table in enumerate(tables)
     ]
 
 
 def _may_be_results(table: RawTable) -> bool:
-    """Whether a table names a current and is no record of a test."""
+    """Tell if a table names a current and is no record of a test."""
     return any(map(_is_current, table.names)) and "time" not in {header.role for header in table.headers}
 
 
@@ -152,15 +152,15 @@ def _is_units_row(cells: Sequence[str], width: int) -> bool:
 
 def _amperes(cell: str, unit: str) -> float | None:
     match = _QUANTITY.fullmatch(cell)
-    number, known = (match[1], parse_unit(match[2])) if match else (cell, parse_unit(unit))
-    if not _NUMBER.fullmatch(number) or known is None or known.dimension != "current":
+    number, unit_of = (match[1], parse_unit(match[2])) if match else (cell, parse_unit(unit))
+    if not _NUMBER.fullmatch(number) or unit_of is None or unit_of.dimension != "current":
         return None
-    value = known.factor * float(number.replace(",", "."))
+    value = unit_of.factor * float(number.replace(",", "."))
     return value if np.isfinite(value) and abs(value) <= 100 else None
 
 
 def _names(texts: Iterable[str]) -> tuple[set[str], set[str]]:
-    """What a test is called, in full, and the numbers in it."""
+    """Return the full name of a test, and the numbers in it."""
     whole: set[str] = set()
     numbers: set[str] = set()
     for text in texts:
@@ -186,10 +186,10 @@ def _match(column: Sequence[str], names: Sequence[tuple[set[str], set[str]]], ex
     keys = [_key(cell) for cell in column]
     if len(set(keys)) < len(keys) or "" in keys:
         return None
-    found = {}
+    matches = {}
     for test, (whole, numbers) in enumerate(names):
         candidates = [row for row, key in enumerate(keys) if key in (whole if exact else numbers | whole)]
         if len(candidates) != 1:
             return None
-        found[test] = candidates[0]
-    return found if found and len(set(found.values())) == len(found) else None
+        matches[test] = candidates[0]
+    return matches if matches and len(set(matches.values())) == len(matches) else None

@@ -77,11 +77,11 @@ def _steps(time: Floats, x: Floats, current: Floats) -> list[tuple[int, int]]:
         return []
     ahead = np.abs(current[size:] - current[:-size]) > _ALIKE_A  # two sides of a step are so far apart
     edges = np.flatnonzero(np.diff(np.concatenate([[False], ahead, [False]]).astype(int)))
-    found = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    if not found or any(not 0.5 * size <= b - a <= 2 * size for a, b in found):
+    steps = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    if not steps or any(not 0.5 * size <= b - a <= 2 * size for a, b in steps):
         return []
     # The first sample of which the one `size` ahead differs stands `size` before the step.
-    borders = [(a + size, max(b, a + size)) for a, b in found]
+    borders = [(a + size, max(b, a + size)) for a, b in steps]
     bounds = [0, *(start for _, start in borders), time.size]
     longest = [np.count_nonzero((strokes.reversals >= a) & (strokes.reversals < b)) for a, b in pairwise(bounds)]
     return borders if min(longest) >= _FEWEST_REVERSALS_HELD else []
@@ -109,8 +109,8 @@ def _condition(time: Floats, x: Floats, current: Floats) -> tuple[float, float, 
     if strokes.reversals.size < _FEWEST_REVERSALS or strokes.period is None:
         return None
     inside = slice(int(strokes.reversals[0]), int(strokes.reversals[-1]) + 1)
-    known = current[inside][np.isfinite(current[inside])]
-    mean, change = held_current(known) if known.size >= 3 else (0.0, "no samples")
+    finite = current[inside][np.isfinite(current[inside])]
+    mean, change = held_current(finite) if finite.size >= 3 else (0.0, "no samples")
     return None if change else (strokes.period, float(np.median(strokes.lengths)), mean)
 
 

@@ -40,14 +40,14 @@ class FileTree:
 
 def nodes_of(tables: Iterable[RawTable]) -> tuple[Node, ...]:
     """The tables of a file as nodes of its tree."""
-    found = []
+    nodes = []
     for table in tables:
         if table.fallback:
             continue
         columns = tuple(Column(header.name, header.unit) for header in table.headers)
         beside = [f"{name} = {value:g}" for name, value in table.constants.items()]
-        found.append(Node(table.label, columns, (*beside, *table.remarks)))
-    return tuple(found)
+        nodes.append(Node(table.label, columns, (*beside, *table.remarks)))
+    return tuple(nodes)
 
 
 def tree_lines(trees: Sequence[FileTree]) -> list[str]:
@@ -75,5 +75,5 @@ def tree_lines(trees: Sequence[FileTree]) -> list[str]:
 
 
 def problem_of(error: InputError) -> str:
-    """What keeps a file from being opened, in a line."""
+    """Return the reason a file cannot be opened, in a line."""
     return f"{error.found} [{error.code}]"

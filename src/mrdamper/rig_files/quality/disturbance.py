@@ -67,12 +67,12 @@ def motion_is_one(view: View) -> Iterator[Finding]:
             f"another motion of {line.frequency:.4g} Hz and {1e3 * stroke:.2g} mm runs on the displacement (mains hum, "
             "if 50 or 60 Hz): shield the sensor's cable"
         )
-    found = (
+    spectrum = (
         f"{100 * share:.2g} % of the velocity's power is no part of the periodic motion, which moves the damping by "
     )
     if share > REFUSED:
-        raise view.refused("E_DISTURBED", found + f"{percent(share)}: {what}", "record again, or smooth the channel")
-    yield Finding("W_DISTURBED", found + f"{percent(share)}; {what}")
+        raise view.refused("E_DISTURBED", spectrum + f"{percent(share)}: {what}", "record again, or smooth the channel")
+    yield Finding("W_DISTURBED", spectrum + f"{percent(share)}; {what}")
 
 
 def _periodic_velocity(view: View, velocity: Floats) -> Floats:
@@ -96,10 +96,10 @@ def force_lines(view: View) -> Iterator[Finding]:
     time, force = view.steady.time, view.steady.force
     place = (time - cycles.starts[0]) / cycles.period % 1.0 * POINTS
     loop = cycles.force.loop
-    found = [strongest_line(time, force - np.interp(place, np.arange(POINTS + 1), np.append(loop, loop[0])),
+    lines = [strongest_line(time, force - np.interp(place, np.arange(POINTS + 1), np.append(loop, loop[0])),
                             1.5 * motion.condition.frequency_Hz)]  # fmt: skip
-    found.append(_odd_harmonic(loop, 1 / cycles.period))
-    strong = [line for line in found if line is not None and line.above > _ABOVE]
+    lines.append(_odd_harmonic(loop, 1 / cycles.period))
+    strong = [line for line in lines if line is not None and line.above > _ABOVE]
     half = 0.5 * cycles.force.span
     if not strong:
         return

@@ -54,9 +54,9 @@ def damping(x: Floats, v: Floats, force: Floats) -> float:
     normal = tables.transpose(0, 2, 1) @ tables
     normal[:, range(4), range(4)] *= 1 + 1e-9
     right = tables.transpose(0, 2, 1) @ force
-    found = np.linalg.solve(normal, right[..., None])[..., 0]
-    explained = np.sum(right * found, axis=1)
-    return float(found[int(np.argmax(explained)), 2]) / fastest
+    solution = np.linalg.solve(normal, right[..., None])[..., 0]
+    explained = np.sum(right * solution, axis=1)
+    return float(solution[int(np.argmax(explained)), 2]) / fastest
 
 
 def change(before: float, after: float) -> float:

@@ -48,12 +48,12 @@ def clipped(view: View) -> Iterator[Finding]:
 def frozen(view: View) -> Iterator[Finding]:
     """Report a channel that stands still while the other goes on."""
     for name, other in _OTHER.items():
-        found = frozen_stretches(view, name)
-        if len(found):
+        stretches = frozen_stretches(view, name)
+        if len(stretches):
             yield Finding(
                 "W_FROZEN",
-                f"{name} stands still in {len(found)} place{'s' * (len(found) > 1)} while {other} goes on: "
-                f"{_samples(found)} samples, the first {view.place(int(found[0, 0]))}",
+                f"{name} stands still in {len(stretches)} place{'s' * (len(stretches) > 1)} while {other} goes on: "
+                f"{_samples(stretches)} samples, the first {view.place(int(stretches[0, 0]))}",
             )
 
 
@@ -80,16 +80,16 @@ def frozen_stretches(view: View, name: str) -> np.ndarray:
     """Find stretches in which a channel repeats one sample inside its range while the other channel moves."""
     channel, other, time = _channels(view)[name], view.channels[_OTHER[name]], view.record.time
     at_end = np.isin(channel.values[channel.equal[:, 0]], (channel.low, channel.high))
-    found = channel.equal[~at_end | channel.leaps(channel.equal)]
-    bounds = found.reshape(-1)
+    stretches = channel.equal[~at_end | channel.leaps(channel.equal)]
+    bounds = stretches.reshape(-1)
     high, low = (extreme.reduceat(other, bounds[bounds < other.size])[::2] for extreme in (np.fmax, np.fmin))
-    found, spread = found[high - low > 0], (high - low)[high - low > 0]
+    stretches, spread = stretches[high - low > 0], (high - low)[high - low > 0]
     # The other channel went through a third of its range, for longer than a reversal takes.
     period = np.inf if view.strokes.period is None else view.strokes.period
-    long_while = (time[found[:, 1] - 1] - time[found[:, 0]] > period / 6) & (
+    long_while = (time[stretches[:, 1] - 1] - time[stretches[:, 0]] > period / 6) & (
         spread > (np.nanmax(other) - np.nanmin(other)) / 3
     )
-    return found[channel.odd(found, long_while)]
+    return stretches[channel.odd(stretches, long_while)]
 
 
 def flagged_samples(view: View) -> np.ndarray:
@@ -103,12 +103,12 @@ def flagged_samples(view: View) -> np.ndarray:
 
 @once_per_run
 def _channels(view: View) -> dict[str, _Channel]:
-    found = {}
+    channels = {}
     for name in _OTHER:
         values = view.channels[name]
         low, high = float(np.nanmin(values)), float(np.nanmax(values))
-        found[name] = _Channel(values, _equal_stretches(values), low, high, name == "displacement")
-    return found
+        channels[name] = _Channel(values, _equal_stretches(values), low, high, name == "displacement")
+    return channels
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,11 +133,11 @@ class _Channel:
     def odd(self, stretches: np.ndarray, sure: np.ndarray | bool = False) -> np.ndarray:
         """(K,) mask of the stretches that are sure, or that neither motion nor noise makes."""
         fine = self.level < _COARSE * self.span
-        found = sure | (self._kink(stretches) if self.smooth or fine else np.zeros(len(stretches), dtype=bool))
+        frozen_ones = sure | (self._kink(stretches) if self.smooth or fine else np.zeros(len(stretches), dtype=bool))
         if fine or not self.smooth:
-            for i in np.flatnonzero(~found):
-                found[i] = self._too_quiet(*stretches[i].tolist())
-        return found
+            for i in np.flatnonzero(~frozen_ones):
+                frozen_ones[i] = self._too_quiet(*stretches[i].tolist())
+        return frozen_ones
 
     def leaps(self, stretches: np.ndarray) -> np.ndarray:
         """(K,) mask of the stretches that end with a step much larger than the next ones."""
@@ -197,7 +197,7 @@ class _Channel:
 
 def _equal_stretches(values: Floats) -> np.ndarray:
     """Stretches of at least five equal samples, found a piece at a time to keep memory small."""
-    found: list[list[int]] = []
+    stretches: list[list[int]] = []
     for start in range(0, values.size, _CHUNK):
         equal = np.diff(values[start : start + _CHUNK + FLAT - 1]) == 0
         size = equal.size - FLAT + 2
@@ -206,13 +206,13 @@ def _equal_stretches(values: Floats) -> np.ndarray:
         begins = np.all([equal[i : i + size] for i in range(FLAT - 1)], axis=0)  # a stretch begins or goes on here
         for a, b in zip(*runs_of(begins), strict=True):
             a, b = int(start + a), int(start + b + FLAT - 1)
-            if found and a <= found[-1][1] - FLAT + 1:
-                found[-1][1] = b
+            if stretches and a <= stretches[-1][1] - FLAT + 1:
+                stretches[-1][1] = b
             else:
-                found.append([a, b])
-        if len(found) > _MOST:
+                stretches.append([a, b])
+        if len(stretches) > _MOST:
             break
-    return np.array(found, dtype=int).reshape(-1, 2)
+    return np.array(stretches, dtype=int).reshape(-1, 2)
 
 
 def _resolution(values: Floats) -> float:

@@ -47,12 +47,17 @@ def force_follows(view: View) -> None:
             "check the load cell, and that the damper is mounted",
         )
     _force_rests_with_the_motion(view)
-    found = repeatability(view)
-    if found is None or found[0] < _UNLIKE or view.noticed("W_FROZEN") or held_in(view.record, steady_window(view))[1]:
+    repeated = repeatability(view)
+    if (
+        repeated is None
+        or repeated[0] < _UNLIKE
+        or view.noticed("W_FROZEN")
+        or held_in(view.record, steady_window(view))[1]
+    ):
         return
     raise view.refused(
         "E_UNRELATED",
-        f"the force differs from cycle to cycle by {100 * found[0]:.0f} % of its peak-to-peak value: it does not "
+        f"the force differs from cycle to cycle by {100 * repeated[0]:.0f} % of its peak-to-peak value: it does not "
         "follow the motion",
         "check that force and displacement are of the same test, and that the load cell does not drift",
     )

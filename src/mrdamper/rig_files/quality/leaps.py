@@ -20,12 +20,12 @@ def spikes(view: View) -> None:
     """Refuse single samples far from their neighbours on both sides, which agree with each other."""
     for name in ("displacement", "force"):
         values = view.channels[name][:_CHUNK]
-        found = spikes_in(values, OFF_BY[name])
-        if found.size:
+        positions = spikes_in(values, OFF_BY[name])
+        if positions.size:
             raise view.refused(
                 "E_SPIKE",
-                f"{name} has {found.size} sample{'s' * (found.size > 1)} far off between ordinary ones, "
-                f"first {view.place(int(found[0]))}: a glitch of the logger",
+                f"{name} has {positions.size} sample{'s' * (positions.size > 1)} far off between ordinary ones, "
+                f"first {view.place(int(positions[0]))}: a glitch of the logger",
                 "leave these cells empty: up to 2 % are taken",
             )
 
@@ -90,11 +90,11 @@ def leaps_in(values: Floats, of_range: float, *, against: bool) -> np.ndarray:
     there = np.flatnonzero(np.isfinite(values))
     if there.size < 20:
         return np.empty(0, dtype=int)
-    known = values[there]
-    steps = np.diff(known)
-    big = np.abs(steps) >= of_range * float(np.ptp(known))
+    finite = values[there]
+    steps = np.diff(finite)
+    big = np.abs(steps) >= of_range * float(np.ptp(finite))
     count = int(np.count_nonzero(big))
-    if not count or count > _MOST * known.size:
+    if not count or count > _MOST * finite.size:
         return np.empty(0, dtype=int)
     own = float(np.max(np.abs(steps), where=~big, initial=0.0))
     at = np.flatnonzero(big & (np.abs(steps) > _FAR * own))

@@ -200,10 +200,10 @@ def _exchanged(view: View) -> bool:
 
 def repeats(view: View) -> Iterator[Finding]:
     """Report cycles of a record that differ from each other by more than noise."""
-    found = repeatability(view)
-    if found is None:
+    repeated = repeatability(view)
+    if repeated is None:
         return
-    scatter, noise = found
+    scatter, noise = repeated
     beyond = float(np.sqrt(max(scatter**2 - noise**2, 0.0)))
     if beyond > POOR_REPEATABILITY:
         yield Finding(

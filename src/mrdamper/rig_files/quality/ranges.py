@@ -34,7 +34,7 @@ def exchanged_or_out_of_range(view: View) -> None:
         moves += f", force {force:.4g} N"
         exchanged = "displacement and force look exchanged: name the columns the other way round"
     changes = "check the load cell, the unit of force (kN?), or whether columns are exchanged"
-    for wrong, found, remedy in (
+    for wrong, problem, remedy in (
         (stroke > LONGEST_STROKE, moves, exchanged),
         (largest > LARGEST_FORCE, f"force reaches {largest:.4g} N", "give the unit of force"),
         (force < SMALLEST_FORCE, f"force changes by {force:.3g} N in the whole record", changes),
@@ -46,7 +46,7 @@ def exchanged_or_out_of_range(view: View) -> None:
         ),
     ):
         if wrong:
-            raise view.refused("E_RANGE", found, remedy)
+            raise view.refused("E_RANGE", problem, remedy)
 
 
 def unusual(view: View) -> Iterator[Finding]:

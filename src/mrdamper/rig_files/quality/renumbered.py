@@ -42,10 +42,10 @@ def lost_or_doubled(view: View) -> Iterator[Finding]:
     lost = float(np.sum(np.round(ratio[whole]) - 1)) / of
     share = count / of
     what = "lost and the rest numbered anew" if lost > 0 else "written twice"
-    found = f"{percent(share)} of the samples are {what}: speed and damping are off by as much or more"
+    problem = f"{percent(share)} of the samples are {what}: speed and damping are off by as much or more"
     if share > REFUSED:
-        raise view.refused("E_SAMPLES_LOST", found, "export the samples with their own time stamps")
-    yield Finding("W_SAMPLES_LOST", f"{found}; export the samples with their own time stamps")
+        raise view.refused("E_SAMPLES_LOST", problem, "export the samples with their own time stamps")
+    yield Finding("W_SAMPLES_LOST", f"{problem}; export the samples with their own time stamps")
 
 
 def copied(view: View) -> Iterator[Finding]:
@@ -76,13 +76,13 @@ def copied(view: View) -> Iterator[Finding]:
     share = float(np.mean(copies))
     if not share:
         return
-    found = (
+    problem = (
         f"{percent(share)} of the samples repeat earlier cycles exactly, noise included: the record holds "
         f"{motion.cycles * (1 - share):.2g} measured cycles of {motion.cycles:.2g}, and its scatter means nothing"
     )
     if share > REFUSED:
-        raise view.refused("E_COPIED", found, "export the cycles that were measured")
-    yield Finding("W_COPIED", found)
+        raise view.refused("E_COPIED", problem, "export the cycles that were measured")
+    yield Finding("W_COPIED", problem)
 
 
 def _level_share(values: Floats) -> float:

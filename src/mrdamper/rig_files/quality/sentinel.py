@@ -141,8 +141,8 @@ def _codes_among(values: Floats) -> set[float]:
     codes = np.outer(decades, _DIGITS).reshape(-1)
     middles = 0.5 * (codes[1:] + codes[:-1])
     near = np.abs(size / codes[np.searchsorted(middles, size)] - 1) < 1e-9
-    found, counts = np.unique(values[near | (size == 0.0)], return_counts=True)
-    return set(found[counts >= _OFTEN].tolist())
+    repeated, counts = np.unique(values[near | (size == 0.0)], return_counts=True)
+    return set(repeated[counts >= _OFTEN].tolist())
 
 
 def _levels_around(values: Floats, value: float) -> tuple[int, np.ndarray]:
@@ -163,9 +163,9 @@ def _repeated_leaps(values: Floats, leap: float) -> list[tuple[float, int]]:
         piece = values[start : start + _CHUNK + 2]
         steps = np.abs(np.diff(piece)) > leap
         leaps.append(piece[1:-1][steps[1:] & steps[:-1]][: _CHUNK // 100])
-    found, counts = np.unique(np.concatenate(leaps), return_counts=True)
+    sizes, counts = np.unique(np.concatenate(leaps), return_counts=True)
     most = np.argsort(counts)[::-1][:200]
-    return [(float(found[i]), int(counts[i])) for i in most if counts[i] > 1 or _known(float(found[i]))]
+    return [(float(sizes[i]), int(counts[i])) for i in most if counts[i] > 1 or _known(float(sizes[i]))]
 
 
 def _known(value: float) -> bool:
@@ -175,12 +175,12 @@ def _known(value: float) -> bool:
 def _are_known(values: Floats) -> np.ndarray:
     """(N,) mask of the values that are codes in use."""
     size = np.abs(values)
-    known = size >= 1e20
-    there = np.flatnonzero(~known & (size > 0))
+    is_code = size >= 1e20
+    there = np.flatnonzero(~is_code & (size > 0))
     digits = size[there] / 10.0 ** np.floor(np.log10(size[there]))
     nearest = np.searchsorted(_MIDDLES, digits)
-    known[there] = np.abs(digits / _DIGITS[nearest] - 1) < 1e-9
-    return known
+    is_code[there] = np.abs(digits / _DIGITS[nearest] - 1) < 1e-9
+    return is_code
 
 
 def _scattered(values: Floats, value: float, leap: float) -> tuple[int, float]:

@@ -45,7 +45,7 @@ def _reversals(x: Floats) -> np.ndarray:
     rising = moves[moving] > 0
     turn = np.flatnonzero(rising[1:] != rising[:-1])
     turns = (moving[turn] + 1 + moving[turn + 1]) // 2  # the middle of a dwell
-    found: list[int] = []
+    reversals: list[int] = []
     top = bottom = (float(x[0]), -1)
     up: bool | None = None  # until the motion has gone far enough in one direction
     for value, at in (*zip(x[turns].tolist(), turns.tolist(), strict=True), (float(x[-1]), -1)):
@@ -54,12 +54,12 @@ def _reversals(x: Floats) -> np.ndarray:
         if up is not True and value < bottom[0]:
             bottom = value, at
         if up is not False and value <= top[0] - least:
-            found += [top[1]] if up else []
+            reversals += [top[1]] if up else []
             up, bottom = False, (value, at)
         elif up is not True and value >= bottom[0] + least:
-            found += [bottom[1]] if up is False else []
+            reversals += [bottom[1]] if up is False else []
             up, top = True, (value, at)
-    return np.array(found, dtype=int)
+    return np.array(reversals, dtype=int)
 
 
 def _steady(

@@ -74,7 +74,7 @@ def record_of(run: Run) -> Record:
 
 @once_per_run
 def judged(run: Run) -> tuple[QualityError | None, tuple[Finding, ...]]:
-    """Why a stored run cannot be believed, None if it can, and what else was noticed: as if it were imported now.
+    """Check a stored run as if it were imported now: the reason for its rejection, or None, and other findings.
 
     The search for a late force, which refuses nothing and takes as long as all other checks, is left out.
     """
@@ -89,8 +89,8 @@ def judged(run: Run) -> tuple[QualityError | None, tuple[Finding, ...]]:
 
 def with_findings(run: Run) -> Run:
     """The run with the codes of what is noticed today: a dataset written elsewhere, or arrays, state none."""
-    seen = dict.fromkeys([*run.findings, *(finding.code for finding in judged(run)[1])])
-    return replace(run, notes={**run.notes, "findings": " ".join(seen)}) if len(seen) > len(run.findings) else run
+    codes = dict.fromkeys([*run.findings, *(finding.code for finding in judged(run)[1])])
+    return replace(run, notes={**run.notes, "findings": " ".join(codes)}) if len(codes) > len(run.findings) else run
 
 
 def row(quality: Quality) -> dict[str, Any]:

@@ -35,25 +35,25 @@ def velocity_channel(view: View) -> None:
         return
     measured = np.interp(run.time, run.time[there], measured[there])
     period = view.strokes.period or float(np.ptp(run.time))  # a record without two reversals is a cycle at most
-    found = delay_between(run.time, view.moving.velocity, measured, period)
-    late = abs(found.delay) > max(SAMPLES * view.step, OF_PERIOD * period)
-    if found.unexplained > UNLIKE:
+    delay = delay_between(run.time, view.moving.velocity, measured, period)
+    late = abs(delay.delay) > max(SAMPLES * view.step, OF_PERIOD * period)
+    if delay.unexplained > UNLIKE:
         what = "is not the derivative of displacement, at any delay"
-    elif found.gain < 0:
+    elif delay.gain < 0:
         what = "runs against the derivative of displacement"
     elif late:
-        side = "behind" if found.delay > 0 else "ahead of"
-        what = f"is {1e3 * abs(found.delay):.4g} ms {side} the derivative of displacement"
-    elif abs(found.gain - 1) > GAIN:
-        what = f"is {found.gain:.3g} times the derivative of displacement"
+        side = "behind" if delay.delay > 0 else "ahead of"
+        what = f"is {1e3 * abs(delay.delay):.4g} ms {side} the derivative of displacement"
+    elif abs(delay.gain - 1) > GAIN:
+        what = f"is {delay.gain:.3g} times the derivative of displacement"
     else:
         return
     raise view.refused(
         "E_CHANNEL_LAG",
         f"velocity {what}",
         (
-            f"say [channels.velocity] delay_ms = {1e3 * found.delay:.4g} in a profile"
-            if late and found.gain > 0 and found.unexplained <= UNLIKE
+            f"say [channels.velocity] delay_ms = {1e3 * delay.delay:.4g} in a profile"
+            if late and delay.gain > 0 and delay.unexplained <= UNLIKE
             else "correct its unit or sign in a profile"
         )
         + ", or leave the column out",

@@ -43,9 +43,9 @@ class View:
         """Name of the record in messages."""
         return self.record.provenance.get("file", "") or f"run {self.record.id}"
 
-    def refused(self, code: str, found: str, remedy: str) -> QualityError:
+    def refused(self, code: str, problem: str, remedy: str) -> QualityError:
         """The refusal of the record."""
-        return QualityError(found, where=self.where, remedy=remedy, code=code)
+        return QualityError(problem, where=self.where, remedy=remedy, code=code)
 
     def place(self, sample: int) -> str:
         """Place of a sample in its file: its line, or its number."""
@@ -89,14 +89,14 @@ class View:
     def strokes(self) -> Strokes:
         """Reversals of the motion, and the part in which they are regular: of segments, in the longest."""
         time, x, segments = self.run.time, self.run.displacement, self.run.segments or ()
-        found = find_strokes(time, x)
-        if found.steady is not None or len(segments) < 2:
-            return found
+        result = find_strokes(time, x)
+        if result.steady is not None or len(segments) < 2:
+            return result
         start, stop = max(segments, key=lambda ends: ends[1] - ends[0])
         inside = find_strokes(time[start:stop], x[start:stop]).steady
-        if inside is None and found.period is not None and time[stop - 1] - time[start] >= found.period:
+        if inside is None and result.period is not None and time[stop - 1] - time[start] >= result.period:
             inside = 0, stop - start
-        return found if inside is None else replace(found, steady=(start + inside[0], start + inside[1]))
+        return result if inside is None else replace(result, steady=(start + inside[0], start + inside[1]))
 
     @cached_property
     def steady(self) -> Run:
@@ -108,10 +108,10 @@ class View:
     def motion(self) -> MotionAnalysis | None:
         """The sine of the steady part; None under a cycle, or where no sine with harmonics and drift explains it."""
         try:
-            found = analyse_motion(self._thinned(self.steady))
+            analysis = analyse_motion(self._thinned(self.steady))
         except ExcitationError:
             return None
-        return found if found.residual < _UNEXPLAINED * float(np.std(self.steady.displacement)) else None
+        return analysis if analysis.residual < _UNEXPLAINED * float(np.std(self.steady.displacement)) else None
 
     def _thinned(self, run: Run) -> Run:
         """Leave out samples that a sine of this period does not need, but not the last."""

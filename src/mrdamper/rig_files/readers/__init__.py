@@ -75,14 +75,14 @@ def reader_of(source: Source) -> Reader:
         raise source.refuse("E_UNSAFE", "pickled Python objects, which run code when loaded", "export plain numbers")
     readers = all_readers()
     named = next((r for r in readers.values() if source.suffix in r.suffixes), None)
-    found = next((r for r in readers.values() if r.binary and r().recognises(source)), None)
+    reader = next((r for r in readers.values() if r.binary and r().recognises(source)), None)
     foreign = next((title for magic, title in _FOREIGN.items() if head.lstrip().startswith(magic)), None)
-    if found is None and foreign is None and (named is None or not named.binary):
+    if reader is None and foreign is None and (named is None or not named.binary):
         return readers["text"]()
-    if found is None or (named is not None and source.suffix not in found.suffixes):
-        text = found is None and foreign is None and b"\0" not in head
-        is_now = found.title if found is not None else foreign or ("text" if text else "something else")
-        remedy = f"rename it to {found.suffixes[0]}" if found else "rename it to .csv" if text else "export it as CSV"
+    if reader is None or (named is not None and source.suffix not in reader.suffixes):
+        text = reader is None and foreign is None and b"\0" not in head
+        is_now = reader.title if reader is not None else foreign or ("text" if text else "something else")
+        remedy = f"rename it to {reader.suffixes[0]}" if reader else "rename it to .csv" if text else "export it as CSV"
         if foreign in _PICTURES:
             remedy = "give the numbers it was drawn from"
         raise source.refuse(
@@ -90,7 +90,7 @@ def reader_of(source: Source) -> Reader:
             f"the name says {named.title if named else source.suffix or 'nothing'}, the content is {is_now}",
             remedy,
         )
-    return found()
+    return reader()
 
 
 _registry: Registry[Reader] = Registry("mrdamper.readers", Reader, "format")  # type: ignore[type-abstract]

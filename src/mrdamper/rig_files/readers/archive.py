@@ -33,8 +33,8 @@ def opened(path: Path, *, folder: bool = False) -> Iterator[Source]:
         head = source.head()
         packed = head.startswith(_GZIP) or is_plain_zip(source)
         if source.suffix in (".gz", ".zip") and not packed:
-            code, found = "E_TRUNCATED" if source.size < 4 else "E_FORMAT", f"no {source.suffix[1:]} archive"
-            raise source.refuse(code, f"the content is {found}", "copy the file again, or correct its name")
+            code, problem = "E_TRUNCATED" if source.size < 4 else "E_FORMAT", f"no {source.suffix[1:]} archive"
+            raise source.refuse(code, f"the content is {problem}", "copy the file again, or correct its name")
         if folder:
             yield _gunzip(source) if head.startswith(_GZIP) else source
             return
@@ -53,19 +53,19 @@ def opened(path: Path, *, folder: bool = False) -> Iterator[Source]:
 def as_it_is(path: Path) -> Iterator[Source]:
     """Open a file, whatever it holds."""
     try:
-        found = "is a folder" if path.is_dir() else "" if path.is_file() else "no such file"
-        size, file = (0, None) if found else (path.stat().st_size, path.open("rb"))
+        problem = "is a folder" if path.is_dir() else "" if path.is_file() else "no such file"
+        size, file = (0, None) if problem else (path.stat().st_size, path.open("rb"))
     except (OSError, ValueError) as error:
-        found, size, file = getattr(error, "strerror", None) or str(error), 0, None
+        problem, size, file = getattr(error, "strerror", None) or str(error), 0, None
     if file is None:
-        raise RigFileError("E_FILE", found, file=str(path), remedy="give the path of a rig's file")
+        raise RigFileError("E_FILE", problem, file=str(path), remedy="give the path of a rig's file")
     with contextlib.ExitStack() as stack:
         stack.enter_context(file)
         yield Source(path, path.name, path.suffix.lower(), file, size, stack)
 
 
 def is_plain_zip(source: Source) -> bool:
-    """Whether the content is a zip that is not itself a document or a NumPy file."""
+    """Tell if the content is a zip that is not itself a document or a NumPy file."""
     if not source.head().startswith((b"PK\x03\x04", b"PK\x05\x06")):
         return False
     if source.suffix in (".xlsx", ".xlsm", ".xlsb", ".ods", ".npz"):
@@ -87,13 +87,13 @@ def zipped_names(source: Source) -> list[str]:
 
 
 def is_workbook(names: list[str]) -> bool:
-    """Whether a zip of these members is a workbook."""
+    """Tell if a zip of these members is a workbook."""
     excel = "[Content_Types].xml" in names and any(name.startswith("xl/") for name in names)
     return excel or {"mimetype", "content.xml", "META-INF/manifest.xml"} <= set(names)
 
 
 def is_arrays(names: list[str]) -> bool:
-    """Whether a zip of these members holds NumPy arrays."""
+    """Tell if a zip of these members holds NumPy arrays."""
     return bool(names) and all(name.endswith(".npy") for name in names)
 
 
@@ -149,7 +149,7 @@ def _one_member(source: Source, members: list[zipfile.ZipInfo]) -> zipfile.ZipIn
 
 
 def is_junk(name: str) -> bool:
-    """Whether a file is one that systems leave in folders: .DS_Store, __MACOSX/._run1.csv, Thumbs.db."""
+    """Tell if a file is one that systems leave in folders: .DS_Store, __MACOSX/._run1.csv, Thumbs.db."""
     parts = PurePosixPath(name).parts
     return not parts or "__MACOSX" in parts or parts[-1].startswith((".", "~$")) or parts[-1] == "Thumbs.db"
 
@@ -177,7 +177,7 @@ def _gunzip(source: Source) -> Source:
 
 
 def _inflated(source: Source) -> Iterator[bytes]:
-    """What a gz holds, piece by piece; one member only, as several may be several files."""
+    """Yield the content of a gz, block by block; one member only, as several may be several files."""
     decoder = zlib.decompressobj(wbits=31)
     while not decoder.eof:
         packed = decoder.unconsumed_tail or source.file.read(_PIECE)
@@ -186,8 +186,8 @@ def _inflated(source: Source) -> Iterator[bytes]:
         yield decoder.decompress(packed, _PIECE)
     rest = (decoder.unused_data + source.file.read(_PIECE)).lstrip(b"\0")
     if rest:
-        found = "more than one member" if rest.startswith(_GZIP) else "bytes behind the archive's end"
-        raise source.refuse("E_ARCHIVE", found, "unpack it first")
+        problem = "more than one member" if rest.startswith(_GZIP) else "bytes behind the archive's end"
+        raise source.refuse("E_ARCHIVE", problem, "unpack it first")
 
 
 def _unpacked(source: Source, pieces: Iterable[bytes], packed: int) -> tuple[IO[bytes], int]:

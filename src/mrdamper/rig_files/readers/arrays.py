@@ -1,4 +1,4 @@
-"""What readers of binary formats share: named arrays as a table, and damage as a refusal."""
+"""Common functions of the readers of binary formats: named arrays as a table, and damage as a refusal."""
 
 from __future__ import annotations
 
@@ -82,9 +82,9 @@ def array_table(
 
 def words_of(cells: Sequence[str]) -> Words:
     """A column of words from its cells."""
-    known: dict[str, int] = {}
-    codes = np.fromiter((known.setdefault(cell, len(known)) for cell in cells), dtype=np.int32, count=len(cells))
-    return Words(codes, tuple(known))
+    indices: dict[str, int] = {}
+    codes = np.fromiter((indices.setdefault(cell, len(indices)) for cell in cells), dtype=np.int32, count=len(cells))
+    return Words(codes, tuple(indices))
 
 
 def _word(item: object) -> str:
@@ -104,8 +104,8 @@ def as_floats(source: Source, array: np.ndarray, name: str, column: int) -> Floa
     if kind == "O":
         raise source.refuse("E_UNSAFE", f"column {name!r} holds objects or links, not numbers", **place)
     if kind not in "iufMm":
-        found = _NO_NUMBERS.get(kind, "text or lists")
-        raise source.refuse("E_NUMBER", f"column {name!r} holds {found}, not plain numbers", **place)
+        problem = _NO_NUMBERS.get(kind, "text or lists")
+        raise source.refuse("E_NUMBER", f"column {name!r} holds {problem}, not plain numbers", **place)
     if array.ndim > 1:
         array = array.squeeze()
     if array.ndim != 1:

@@ -1,4 +1,4 @@
-"""What every reader of rig files shares: the file, the table it makes, and how it refuses.
+"""Base of the readers of rig files: the file, the table read from it, and refusals.
 
 A reader is a class found by discovery: it says by the first bytes whether a file is its
 own, and gives named columns without deciding what they mean.
@@ -89,10 +89,10 @@ class Source:
         return start
 
     def refuse(
-        self, code: str, found: str, remedy: str = "", *, line: int | None = None, column: int | None = None
+        self, code: str, problem: str, remedy: str = "", *, line: int | None = None, column: int | None = None
     ) -> RigFileError:
         """A refusal that names this file."""
-        return RigFileError(code, found, file=self.name, line=line, column=column, remedy=remedy)
+        return RigFileError(code, problem, file=self.name, line=line, column=column, remedy=remedy)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +135,7 @@ class RawTable:
 
     @cached_property
     def headers(self) -> tuple[Header, ...]:
-        """What the header of every column says."""
+        """Header of every column."""
         return tuple(split_name(name, unit) for name, unit in zip(self.names, self.units, strict=True))
 
 
@@ -155,7 +155,7 @@ class Reader(ABC):
 
     @abstractmethod
     def recognises(self, source: Source) -> bool:
-        """Whether the content, not the name, is of this format."""
+        """Tell if the content, not the name, is of this format."""
 
     @abstractmethod
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:

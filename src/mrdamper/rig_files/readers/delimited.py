@@ -93,7 +93,7 @@ def _with_whole_quotes(lines: list[str]) -> list[str]:
 
 
 def _form(stream: TextStream, layout: Layout) -> dict[str, str | int]:
-    """What a profile may keep: not the place of the header, which differs from file to file."""
+    """Return the form that a profile may keep: not the place of the header, which differs from file to file."""
     form: dict[str, str | int] = {"separator": layout.separator, "decimal": layout.decimal}
     return form if stream.original_encoding.startswith("utf") else {**form, "encoding": stream.original_encoding}
 
@@ -134,17 +134,17 @@ def _read(stream: TextStream, layout: Layout, block: Block, columns: tuple[int, 
 def _words(stream: TextStream, layout: Layout, block: Block, column: int) -> Words:
     form = RowFormat(stream, layout, (column,))
     block, _ = _without_cut_row(form, _without_footer(form, block)[0])
-    known: dict[str, int] = {}
+    indices: dict[str, int] = {}
     codes: list[np.ndarray] = []
     line, at = block.line, block.start
     for chunk in stream.chunks(block.start, block.stop):
         at += len(chunk)
         texts = stream.decode(chunk).split("\n")
         rows, _ = split_rows(texts, line, form, at >= stream.stop)
-        codes.append(np.array([known.setdefault(row[column], len(known)) for row in rows], dtype=np.int32))
+        codes.append(np.array([indices.setdefault(row[column], len(indices)) for row in rows], dtype=np.int32))
         line += chunk.count(b"\n")
     form.refuse_wrong()
-    return Words(np.concatenate(codes) if codes else np.empty(0, dtype=np.int32), tuple(known))
+    return Words(np.concatenate(codes) if codes else np.empty(0, dtype=np.int32), tuple(indices))
 
 
 def _stretches(lines: np.ndarray, expected: int | None) -> np.ndarray:

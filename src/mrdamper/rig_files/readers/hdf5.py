@@ -57,24 +57,26 @@ def hdf5_tables(source: Source, title: str) -> list[RawTable]:
     with refusing_damage(source, title):
         file = h5py.File(source.path, "r")
         source.keep.callback(file.close)
-        found = _Found(source)
-        _walk(file, "", found)
+        content = _Found(source)
+        _walk(file, "", content)
     groups = {
-        group: _frame(columns) or _titled(columns, found.lists.get(group, []))
-        for group, columns in found.groups.items()
+        group: _frame(columns) or _titled(columns, content.lists.get(group, []))
+        for group, columns in content.groups.items()
     }
-    objects = found.objects
+    objects = content.objects
     tables = []
     for group, columns in groups.items():
-        constants = {**found.constants.get("", {}), **found.constants.get(group, {})}
-        above = [lines for path, lines in found.remarks.items() if f"{group}/".startswith(f"{path}/")]
+        constants = {**content.constants.get("", {}), **content.constants.get(group, {})}
+        above = [lines for path, lines in content.remarks.items() if f"{group}/".startswith(f"{path}/")]
         tables.append(_table(source, columns, title, group, constants, [line for lines in above for line in lines]))
     if len(groups) > 1:
         every = [column for columns in groups.values() for column in columns]
-        tables.append(_table(source, every, title, "", found.constants.get("", {}), fallback=True))
+        tables.append(_table(source, every, title, "", content.constants.get("", {}), fallback=True))
     if not tables:
-        code, found = ("E_UNSAFE", f"only objects ({objects[0]})") if objects else ("E_NO_DATA", "no array of numbers")
-        raise source.refuse(code, found, "save the channels as arrays of numbers")
+        code, problem = (
+            ("E_UNSAFE", f"only objects ({objects[0]})") if objects else ("E_NO_DATA", "no array of numbers")
+        )
+        raise source.refuse(code, problem, "save the channels as arrays of numbers")
     return tables
 
 
@@ -106,7 +108,7 @@ def _table(
 
 @dataclass
 class _Found:
-    """What a walk through a file meets: by group its columns and single numbers; what is never loaded."""
+    """Content of a file: by group its columns and single numbers; and objects that are never loaded."""
 
     source: Source
     groups: dict[str, list[tuple]] = field(default_factory=lambda: defaultdict(list))
@@ -118,64 +120,64 @@ class _Found:
     numbers: int = 0
 
 
-def _walk(group: Any, path: str, found: _Found) -> None:
+def _walk(group: Any, path: str, content: _Found) -> None:
     import h5py
 
-    found.remarks[path] = _attributes(group)
+    content.remarks[path] = _attributes(group)
     for name in group:
-        found.seen += 1
-        if found.seen > _MOST_OBJECTS or path.count("/") > _DEEPEST:
-            raise found.source.refuse(
+        content.seen += 1
+        if content.seen > _MOST_OBJECTS or path.count("/") > _DEEPEST:
+            raise content.source.refuse(
                 "E_TOO_MANY_COLUMNS",
                 f"over {_MOST_OBJECTS} objects, or groups within groups without end",
                 "export fewer channels",
             )
         link = group.get(name, getlink=True)
         if isinstance(link, (h5py.ExternalLink, h5py.SoftLink)):  # leads elsewhere, and is not followed
-            found.objects.append(f"{name}: a link")
-            found.groups[path].append((str(name), "", None, None))
+            content.objects.append(f"{name}: a link")
+            content.groups[path].append((str(name), "", None, None))
             continue
         item = group.get(name)
         if isinstance(item, h5py.Group) and name != "#refs#" and name != "#subsystem#":
-            _walk(item, f"{path}/{name}", found)
+            _walk(item, f"{path}/{name}", content)
         elif isinstance(item, h5py.Dataset) and h5py.check_ref_dtype(item.dtype) is h5py.Reference:
-            _follow(item, str(name), path, found)
+            _follow(item, str(name), path, content)
         elif isinstance(item, h5py.Dataset):
             if _is_words(item):
-                found.lists[path].append(_words(item[()]))
-            if columns := _columns(item, str(name), path, found):
-                found.groups[path] += columns
+                content.lists[path].append(_words(item[()]))
+            if columns := _columns(item, str(name), path, content):
+                content.groups[path] += columns
             if item.dtype.names:  # a table of records states its conditions itself
-                found.remarks[path] += _attributes(item)
+                content.remarks[path] += _attributes(item)
 
 
-def _follow(references: Any, name: str, path: str, found: _Found) -> None:
+def _follow(references: Any, name: str, path: str, content: _Found) -> None:
     """Arrays of structs and cells of MATLAB 7.3: what lies in #refs# is met where its reference stands."""
     import h5py
 
     cells = references.size if references.size <= MOST_STRUCTS else 0
     if path.count("/") > _DEEPEST or not cells or "MATLAB_class" not in _file_marks(references):
-        found.objects.append(name)
-        found.groups[path].append((name, "", None, None))
+        content.objects.append(name)
+        content.groups[path].append((name, "", None, None))
         return
     cell = _text(references.attrs.get("MATLAB_class")) == "cell"  # else a field of an array of structs
     words: list[str] = []
     for number, reference in enumerate(np.reshape(references[()], -1), 1):
-        found.seen += 1
+        content.seen += 1
         item = references.file[reference] if reference else None
-        if found.seen > _MOST_OBJECTS:
-            raise found.source.refuse("E_TOO_MANY_COLUMNS", f"over {_MOST_OBJECTS} objects", "export fewer")
+        if content.seen > _MOST_OBJECTS:
+            raise content.source.refuse("E_TOO_MANY_COLUMNS", f"over {_MOST_OBJECTS} objects", "export fewer")
         inner = f"{path}_{number}" if cells > 1 and not cell else path
         if isinstance(item, h5py.Group):
-            _walk(item, f"{inner}/{name}_{number}" if cell else f"{inner}/{name}", found)
+            _walk(item, f"{inner}/{name}_{number}" if cell else f"{inner}/{name}", content)
         elif isinstance(item, h5py.Dataset) and _text(item.attrs.get("MATLAB_class")) == "char":
             text = "".join(map(chr, np.reshape(item[()], -1)[:200].tolist())) if item.dtype.kind in "iu" else ""
             words.append(text)
-            found.remarks[inner].append(f"{name}: {text}")
-        elif isinstance(item, h5py.Dataset) and not cell and (columns := _columns(item, name, inner, found)):
-            found.groups[inner] += columns
+            content.remarks[inner].append(f"{name}: {text}")
+        elif isinstance(item, h5py.Dataset) and not cell and (columns := _columns(item, name, inner, content)):
+            content.groups[inner] += columns
     if cell and len(words) == cells:
-        found.lists[path].append(words)
+        content.lists[path].append(words)
 
 
 def _frame(columns: list[tuple]) -> list[tuple]:
@@ -228,17 +230,17 @@ def _attributes(item: Any) -> list[str]:
     return lines
 
 
-def _columns(dataset: Any, name: str, path: str, found: _Found) -> list[tuple]:
-    kind, source = dataset.dtype, found.source
+def _columns(dataset: Any, name: str, path: str, content: _Found) -> list[tuple]:
+    kind, source = dataset.dtype, content.source
     if dataset.external or dataset.is_virtual:
         raise source.refuse("E_UNSAFE", f"{name!r} lies in another file", "export one whole file")
     if kind.hasobject:
-        found.objects.append(name)
+        content.objects.append(name)
         return [(name, "", dataset, None)] if dataset.size > 1 else []
     characters = _text(dataset.attrs.get("MATLAB_class")) in ("char", "cell")
-    if dataset.size == 1 and kind.kind in "iuf" and not characters and found.numbers < MOST_COLUMNS:
-        found.numbers += 1
-        found.constants[path][name] = float(np.reshape(dataset[()], -1)[0])
+    if dataset.size == 1 and kind.kind in "iuf" and not characters and content.numbers < MOST_COLUMNS:
+        content.numbers += 1
+        content.constants[path][name] = float(np.reshape(dataset[()], -1)[0])
     if dataset.size < 2 or characters:
         return []
     check_unpacked(source, int(dataset.size) * max(8, kind.itemsize if not kind.names else 8))
@@ -247,7 +249,7 @@ def _columns(dataset: Any, name: str, path: str, found: _Found) -> list[tuple]:
     stated = [dataset.attrs[name] for name in _UNIT_NAMES if name in dataset.attrs]
     for key in dataset.attrs if kind.kind in "iu" else ():
         if np.asarray(dataset.attrs[key]).dtype.kind in "iuf" and np.size(dataset.attrs[key]) == 1:
-            found.constants[path][f"{name}_{key}"] = float(np.reshape(dataset.attrs[key], -1)[0])
+            content.constants[path][f"{name}_{key}"] = float(np.reshape(dataset.attrs[key], -1)[0])
     unit = next((_text(value) for value in stated if np.asarray(value).dtype.kind in "SUO"), "")
     unit = unit.partition(" since ")[0]  # netCDF counts time from a date
     shape = dataset.shape[::-1] if "MATLAB_class" in dataset.attrs else dataset.shape
@@ -255,7 +257,7 @@ def _columns(dataset: Any, name: str, path: str, found: _Found) -> list[tuple]:
 
 
 def _is_words(item: Any) -> bool:
-    """Whether a dataset is a short list of texts."""
+    """Tell if a dataset is a short list of texts."""
     import h5py
 
     if not isinstance(item, h5py.Dataset) or item.ndim != 1 or not 1 < len(item) <= MOST_COLUMNS:

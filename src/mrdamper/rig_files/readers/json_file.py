@@ -50,11 +50,11 @@ class Json(Reader):
 
 def _parsed(source: Source, content: bytes) -> Any:
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        found = dict(pairs)
-        if len(found) < len(pairs):
+        members = dict(pairs)
+        if len(members) < len(pairs):
             names = [name for name, _ in pairs]
             raise twice(source, next(name for name in names if names.count(name) > 1))
-        return found
+        return members
 
     text = ""
     try:
@@ -102,8 +102,8 @@ def _tree(value: Any) -> Any:
         return "" if value is None else value
     if len(value) > 1 and all(isinstance(item, str) for item in value):
         stamps = [stamp(item) for item in value] if stamp(value[0]) is not None else [None]
-        known = [entry[0] for entry in stamps if entry is not None]
-        return (np.array(known) - known[0]) / 1e9 if len(known) == len(value) else value
+        stamped = [entry[0] for entry in stamps if entry is not None]
+        return (np.array(stamped) - stamped[0]) / 1e9 if len(stamped) == len(value) else value
     if value and all(item is None or isinstance(item, (int, float)) for item in value):
         return np.array([np.nan if item is None else item for item in value], dtype=float)
     rows = value and all(isinstance(item, list) and len(item) == len(value[0]) for item in value)

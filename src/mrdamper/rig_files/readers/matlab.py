@@ -68,8 +68,8 @@ def _tree(value: Any, depth: int = 0) -> Any:
     if array.dtype.names:
         names = array.dtype.names
         items = array.reshape(-1)[:MOST_STRUCTS] if depth < DEEPEST else []
-        found = [{name: _tree(item[name], depth + 1) for name in names} for item in items]
-        return found[0] if len(found) == 1 else found
+        members = [{name: _tree(item[name], depth + 1) for name in names} for item in items]
+        return members[0] if len(members) == 1 else members
     words = _words(array) if size > 1 else []
     if words:
         return words

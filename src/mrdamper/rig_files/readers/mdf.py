@@ -65,7 +65,7 @@ def _table(source: Source, file: Any, places: list, title: str, *, fallback: boo
     def column_of(column: int) -> np.ndarray:
         name, _, group, index = places[column]
         signal = file.get(name, group=group, index=index, ignore_invalidation_bits=True)
-        if stamps and not any(np.array_equal(signal.timestamps, known) for known in stamps.values()):
+        if stamps and not any(np.array_equal(signal.timestamps, other) for other in stamps.values()):
             raise source.refuse(
                 "E_RASTER",
                 f"channel {name!r} is recorded at other times than the others",

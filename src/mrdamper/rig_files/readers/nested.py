@@ -105,15 +105,15 @@ def _paired(tree: Mapping[str, Any], units: Mapping[str, str]) -> Mapping[str, A
         if (stem := _BODY.sub("", key)) in heads and _BODY.search(key) and isinstance(tree[key], np.ndarray)
     }
     used = set(pairs.values())
-    found = {}
+    partners = {}
     for key, value in tree.items():
         if key in pairs and isinstance(value, np.ndarray):
-            found[key] = {**tree[pairs[key]], "data": value}
+            partners[key] = {**tree[pairs[key]], "data": value}
         elif isinstance(value, np.ndarray) and key in units:
-            found[key] = {"name": key, "unit": units[key], "data": value}
+            partners[key] = {"name": key, "unit": units[key], "data": value}
         elif key not in used:
-            found[key] = value
-    return found
+            partners[key] = value
+    return partners
 
 
 def _items(key: str, items: list[Any], node: _Node) -> list[tuple[str, Mapping[str, Any]]]:
@@ -201,7 +201,7 @@ def _title(stated: str) -> str:
 
 
 def _is_plain(value: Any) -> bool:
-    """Whether nothing in a node is an array or a list of nodes: it only describes the nodes beside it."""
+    """Tell if nothing in a node is an array or a list of nodes: it only describes the nodes beside it."""
     if isinstance(value, Mapping):
         return all(_is_plain(item) for item in value.values())
     return not isinstance(value, (np.ndarray, list)) or (isinstance(value, list) and not value)
@@ -218,8 +218,8 @@ def _tell(node: _Node, says: Mapping[str, Any], above: str) -> None:
             _tell(node, value, key)
         elif isinstance(value, float) and len(node.constants) < MOST_COLUMNS:
             key = f"{key} [{node.units[key]}]" if key in node.units else key
-            known = node.constants.get(key, value)
-            node.constants[key if known == value else f"{above} {key}"] = value
+            value_of = node.constants.get(key, value)
+            node.constants[key if value_of == value else f"{above} {key}"] = value
         elif isinstance(value, str) and len(node.remarks) < MOST_COLUMNS:
             node.remarks.append(f"{key}: {value}"[:_MOST_TEXT])
 

@@ -28,24 +28,26 @@ class NetCdf(Reader):
 
             source.file.seek(0)
             file = netcdf_file(source.file, mmap=False)
-            found = {name: variable for name, variable in file.variables.items() if np.prod(variable.shape) > 1}
-            check_unpacked(source, 8 * sum(int(np.prod(variable.shape)) for variable in found.values()))
-            units = [_text(getattr(variable, "units", "")).partition(" since ")[0] for variable in found.values()]
+            arrays = {name: variable for name, variable in file.variables.items() if np.prod(variable.shape) > 1}
+            check_unpacked(source, 8 * sum(int(np.prod(variable.shape)) for variable in arrays.values()))
+            units = [_text(getattr(variable, "units", "")).partition(" since ")[0] for variable in arrays.values()]
             single = {
                 f"{name} [{_text(getattr(variable, 'units', ''))}]": float(np.reshape(variable[...], -1)[0])
                 for name, variable in file.variables.items()
                 if variable.shape == () and np.asarray(variable.data).dtype.kind in "iuf"
             }
             remarks = [f"{name}: {_text(value)}"[:200] for name, value in file._attributes.items()]
-        if not found:
+        if not arrays:
             raise source.refuse("E_NO_DATA", "no array of numbers", "export the file again")
-        variables = list(found.values())
+        variables = list(arrays.values())
 
         def column_of(column: int) -> np.ndarray:
             variable = variables[column]
             return unpacked(variable._attributes, np.array(variable[:]).astype(variable[:].dtype.newbyteorder("=")))
 
-        return [array_table(source, list(found), units, column_of, title=self.title, constants=single, remarks=remarks)]
+        return [
+            array_table(source, list(arrays), units, column_of, title=self.title, constants=single, remarks=remarks)
+        ]
 
 
 def _text(value: object) -> str:

@@ -55,13 +55,13 @@ class Npz(Reader):
 
 def _titled(columns: list[_Column], lists: list[list[str]]) -> list[_Column]:
     """The columns with the names and units that lists of words give those of a matrix."""
-    found = []
+    titled = []
     for member, group in groupby(columns, key=lambda column: column[2][0]):
         across = list(group)
         titles = titles_of(len(across), lists) if isinstance(across[0][2][1], int) else None
         names, units = titles or ([c[0] for c in across], [c[1] for c in across])
-        found += [(n, u, (member, c[2][1])) for n, u, c in zip(names, units, across, strict=True)]
-    return found
+        titled += [(n, u, (member, c[2][1])) for n, u, c in zip(names, units, across, strict=True)]
+    return titled
 
 
 def _columns(source: Source) -> tuple[list[_Column], list[str], list[str]]:
@@ -72,7 +72,7 @@ def _columns(source: Source) -> tuple[list[_Column], list[str], list[str]]:
         raise damaged(source, Npz.title, "end of file not found") from error
     with archive:
         check_sizes(source, archive.infolist())
-        found: list[_Column] = []
+        columns: list[_Column] = []
         single: list[str] = []
         worded: list[str] = []
         names = [member.filename for member in archive.infolist()]
@@ -95,12 +95,12 @@ def _columns(source: Source) -> tuple[list[_Column], list[str], list[str]]:
             if dtype.kind == "U" and split_name(name).role is None and 1 < np.prod(shape, dtype=object) <= MOST_COLUMNS:
                 worded.append(name)
             elif dtype.names:
-                found += [(field, "", (name, field)) for field in dtype.names]
+                columns += [(field, "", (name, field)) for field in dtype.names]
             elif np.prod(shape, dtype=object) > 1:
                 unit = "s" if dtype.kind in "Mm" else ""
-                found += [(column, unit, (name, part)) for column, part in expand(name, shape)]
+                columns += [(column, unit, (name, part)) for column, part in expand(name, shape)]
             elif dtype.kind in "iuf" and np.prod(shape, dtype=object) == 1:
                 single.append(name)
-    if not found:
+    if not columns:
         raise source.refuse("E_NO_DATA", "no array of numbers", "save the channels as arrays")
-    return found, single, worded
+    return columns, single, worded

@@ -79,5 +79,5 @@ def _function(lines: list[str], number: int) -> dict[str, object]:
 
 def _axis(line: str) -> _Axis:
     name, unit = line[26:46].strip(), line[47:67].strip()
-    known = _KINDS.get(int(line[:10]), "")
-    return _Axis(known if name in ("", "NONE") else name, "" if unit == "NONE" else unit)
+    kind = _KINDS.get(int(line[:10]), "")
+    return _Axis(kind if name in ("", "NONE") else name, "" if unit == "NONE" else unit)

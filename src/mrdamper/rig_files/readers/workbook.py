@@ -51,7 +51,7 @@ class Workbook(Reader):
         with refusing_damage(source, self.title):
             sheets = _sheets(source, form)
         form = form.model_copy(update={"separator": "\t", "encoding": "utf-8"})
-        found: list[RawTable] = []
+        all_tables: list[RawTable] = []
         beside: list[str] = []
         first: InputError | None = None
         for name, sheet in sheets:
@@ -61,12 +61,12 @@ class Workbook(Reader):
                 first = first or error
                 tables = []
             tables = [table for table in tables if len(table.names) >= _FEWEST]
-            found += [replace(table, label=table.label or name, form={"sheet": name}) for table in tables]
+            all_tables += [replace(table, label=table.label or name, form={"sheet": name}) for table in tables]
             beside += () if tables else sheet.head(_NOTES).decode("utf-8", "replace").splitlines()
-        if not found:
+        if not all_tables:
             raise first or source.refuse("E_NO_DATA", "no sheet holds data", "export the file again")
-        found = [replace(table, remarks=(*table.remarks, *beside)) for table in found]
-        return found if len(found) > 1 else [replace(found[0], label="")]
+        all_tables = [replace(table, remarks=(*table.remarks, *beside)) for table in all_tables]
+        return all_tables if len(all_tables) > 1 else [replace(all_tables[0], label="")]
 
 
 def _sheets(source: Source, form: FileForm) -> list[tuple[str, Source]]:

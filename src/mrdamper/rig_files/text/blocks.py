@@ -35,10 +35,10 @@ def find_blocks(stream: TextStream, layout: Layout, start: int, stop: int) -> li
     remarks: tuple[str, ...] = ()
     for chunk in stream.chunks(start, stop):
         stream.check(chunk, line)
-        found = chunk.find(header)
-        while found >= 0:
-            line_start = chunk.rfind(b"\n", 0, found) + 1
-            line_end = chunk.find(b"\n", found)
+        position = chunk.find(header)
+        while position >= 0:
+            line_start = chunk.rfind(b"\n", 0, position) + 1
+            line_end = chunk.find(b"\n", position)
             line_end = len(chunk) if line_end < 0 else line_end + 1
             if chunk[line_start:line_end].strip() == header.strip():
                 before = (tail + chunk[:line_start])[-_LOOK_BACK:]
@@ -49,7 +49,7 @@ def find_blocks(stream: TextStream, layout: Layout, start: int, stop: int) -> li
                 header_line = line + chunk.count(b"\n", 0, line_start)
                 size, skipped = _units_below(stream, layout, at + line_end, header_line)
                 begin, begin_line = at + line_end + size, header_line + 1 + skipped
-            found = chunk.find(header, line_end)
+            position = chunk.find(header, line_end)
         line += chunk.count(b"\n")
         at += len(chunk)
         tail = chunk[-_LOOK_BACK:]
@@ -88,7 +88,7 @@ def _remarks(before: bytes, stream: TextStream, layout: Layout) -> int:
 
 
 def _is_data(text: str, layout: Layout) -> bool:
-    """Whether a line is a row, even a damaged one: those must not pass for remarks."""
+    """Tell if a line is a row, even a damaged one: those must not pass for remarks."""
     if not text.strip() or is_comment(text) or _SEGMENT.match(text) or is_footer(text, layout):
         return False
     try:

@@ -31,7 +31,7 @@ class Rows:
 
 @dataclass(eq=False, slots=True)
 class RowFormat:
-    """What is needed to read a row: the text, its layout, the columns wanted; and what was met so far."""
+    """Settings to read rows: the text, its layout, the columns wanted; and the errors so far."""
 
     stream: TextStream
     layout: Layout
@@ -78,20 +78,20 @@ def read_row(text: str, line: int, form: RowFormat) -> list[float]:
     return [float(_numbers([row[c] for row in rows], c, lines, form)[0]) for row in rows for c in form.wanted]
 
 
-def field_count(form: RowFormat, found: int, line: int, final: bool) -> RigFileError:
+def field_count(form: RowFormat, fields: int, line: int, final: bool) -> RigFileError:
     """The refusal of a row with another number of cells than the others."""
     width = form.layout.width
-    if final and found < width:
+    if final and fields < width:
         return form.stream.source.refuse(
             "E_TRUNCATED",
-            f"the file ends inside a row: {found} of {width} fields",
+            f"the file ends inside a row: {fields} of {width} fields",
             "copy or export the file again, or remove the last line",
             line=line,
         )
-    comma = found > width and form.layout.separator == ","
+    comma = fields > width and form.layout.separator == ","
     return form.stream.source.refuse(
         "E_FIELD_COUNT",
-        f"{found} fields where the other rows have {width}",
+        f"{fields} fields where the other rows have {width}",
         "correct this line; numbers with decimal commas need semicolons between the fields"
         if comma
         else "correct or remove this line",

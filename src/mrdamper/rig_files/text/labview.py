@@ -14,7 +14,7 @@ _SEPARATORS: Mapping[str, str] = {"tab": "\t", "comma": ",", "semicolon": ";"}
 
 
 def is_labview(lines: Sequence[str]) -> bool:
-    """Whether a text is of this kind."""
+    """Tell if a text is of this kind."""
     return bool(lines) and lines[0].lstrip("\ufeff").startswith(_MARK)
 
 
@@ -22,12 +22,12 @@ def stated_form(lines: Sequence[str], form: FileForm) -> FileForm:
     """The form with what the headers say, where the profile says nothing."""
     says = _entries(lines)
     names = next((i for i, line in enumerate(lines, 1) if line.startswith(_NAMES)), None)
-    known = {
+    forms = {
         "separator": _SEPARATORS.get(says.get("Separator", "").lower()),
         "decimal": says.get("Decimal_Separator") if says.get("Decimal_Separator") in (".", ",") else None,
         "header_line": names,
     }
-    return form.model_copy(update={k: v for k, v in known.items() if v is not None and getattr(form, k) is None})
+    return form.model_copy(update={k: v for k, v in forms.items() if v is not None and getattr(form, k) is None})
 
 
 def named(layout: Layout, lines: Sequence[str]) -> Layout:
@@ -50,14 +50,14 @@ def named(layout: Layout, lines: Sequence[str]) -> Layout:
 
 
 def _entries(lines: Sequence[str]) -> dict[str, str]:
-    """What the first header says, key by key, whatever it separates them with."""
+    """Return the entries of the first header by key, with any separator."""
     entries = {}
     for line in lines[1:]:
         if line.startswith("***End_of_Header***"):
             break
         for mark in ("\t", ",", ";"):
-            key, found, value = line.partition(mark)
-            if found:
+            key, present, value = line.partition(mark)
+            if present:
                 entries[key.strip()] = value.strip() if key == "Decimal_Separator" else value.strip("\t ,;")
                 break
     return entries

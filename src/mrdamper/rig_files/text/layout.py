@@ -43,7 +43,7 @@ _GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """How a delimited text is laid out; lines count from one, tuples hold one entry a column."""
+    """Layout of a delimited text; lines count from one, tuples hold one entry per column."""
 
     separator: str  # a space stands for any run of spaces
     decimal: str
@@ -137,15 +137,15 @@ def _below_names(lines: Sequence[str], header: int | None, units: int | None, fi
 
 def _levels(above: Sequence[str], separator: str, width: int) -> list[tuple[str, ...]]:
     """The lines of cells right above the names of columns, one cell a column."""
-    found: list[tuple[str, ...]] = []
+    levels: list[tuple[str, ...]] = []
     for line in reversed(above[-_MOST_LEVELS:]):
         if not line.strip() or is_comment(line) or separator == SPACES:
             break
         cells = cells_of(line, separator)
         if len(cells) != width or sum(map(bool, cells)) < 2:
             break
-        found.append(tuple(cell.strip('"') for cell in cells))
-    return found
+        levels.append(tuple(cell.strip('"') for cell in cells))
+    return levels
 
 
 def _with_levels(names: tuple[str, ...], levels: list[tuple[str, ...]]) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -206,11 +206,11 @@ def _unit_behind(cells: Sequence[str]) -> str:
 
 def _writes(rows: Sequence[Sequence[str]]) -> tuple[tuple[str, str], ...]:
     cells = [cell for row in rows for cell in row if cell]
-    found: tuple[tuple[str, str], ...] = ()
+    exchanges: tuple[tuple[str, str], ...] = ()
     if 2 * sum(FORTRAN.fullmatch(cell) is not None for cell in cells) > len(cells):
-        found = (("D", "E"), ("d", "e"))
+        exchanges = (("D", "E"), ("d", "e"))
     negative = [cell[0] for cell in cells if cell[0] in "-−" and looks_numeric(cell) and len(cell) > 1]
-    return (*found, ("−", "-")) if len(negative) > 1 and set(negative) == {"−"} else found
+    return (*exchanges, ("−", "-")) if len(negative) > 1 and set(negative) == {"−"} else exchanges
 
 
 def _below_preamble(lines: Sequence[str], first: int, separator: str) -> int:
@@ -240,7 +240,7 @@ def _notes_beside(rows: Sequence[Sequence[str]]) -> tuple[str, ...]:
 
 
 def is_footer(line: str, layout: Layout) -> bool:
-    """Whether a line that stands where rows do begins with a word in a column of numbers: Maximum; 12.5; 3.4."""
+    """Tell if a line among the rows begins with a word in a column of numbers: Maximum; 12.5; 3.4."""
     cells = cells_of(line, layout.separator)
     if not any(cells):
         return False
@@ -280,7 +280,7 @@ def units_in(line: str, layout: Layout) -> tuple[str, ...]:
 
 
 def is_comment(line: str) -> bool:
-    """Whether a line is marked as a remark."""
+    """Tell if a line is marked as a remark."""
     return line.lstrip()[:1] in _MARKS and _COMMENT.match(line) is not None
 
 
@@ -357,7 +357,7 @@ def _first_row(content: Sequence[tuple[int, str]], above: int, separator: str, s
 
 
 def _is_prose(cells: Sequence[str]) -> bool:
-    """Whether a line with numbers holds several words, too."""
+    """Tell if a line with numbers holds several words, too."""
     return sum(_WORD.match(cell) is not None for cell in cells) >= 2
 
 
@@ -477,18 +477,18 @@ def _cells(line: str, separator: str, width: int) -> tuple[str, ...]:
 
 def _is_units(cells: Sequence[str]) -> bool:
     filled = [cell for cell in cells if cell and cell not in ("-", "--", "[-]", "(-)")]
-    known = sum(is_unit(_unbracket(cell)) for cell in filled)
-    return known >= 1 and 2 * known >= len(filled)
+    count = sum(is_unit(_unbracket(cell)) for cell in filled)
+    return count >= 1 and 2 * count >= len(filled)
 
 
 def _is_times(cells: Sequence[str]) -> bool:
-    """Whether a line of units gives the same unit of time to several columns."""
+    """Tell if a line of units gives the same unit of time to several columns."""
     units = [cell for cell in map(_unbracket, cells) if is_unit(cell)]
     return len(units) > 1 and {split_name("", unit).dimension for unit in units} == {"time"}
 
 
 def _is_keyed(cells: Sequence[str]) -> bool:
-    """Whether a line is a key followed by units, by numbers, or by one text for all columns."""
+    """Tell if a line is a key followed by units, by numbers, or by one text for all columns."""
     rest = cells[1:]
     return _WORD.match(cells[0]) is not None and (
         _is_units(rest) or len(set(rest)) == 1 or all(looks_numeric(cell) for cell in rest)
@@ -515,8 +515,8 @@ def _mismatch(
     source: Source, separator: str, names: int, fields: int, first: int, lines: Sequence[str]
 ) -> RigFileError:
     if fields < names and not any(line.strip() for line in lines[first + 1 :]):
-        found = f"the file ends inside its first row: {fields} of {names} fields"
-        return source.refuse("E_TRUNCATED", found, "copy or export the file again", line=first + 1)
+        problem = f"the file ends inside its first row: {fields} of {names} fields"
+        return source.refuse("E_TRUNCATED", problem, "copy or export the file again", line=first + 1)
     comma = separator == "," and fields > names
     return source.refuse(
         "E_AMBIGUOUS" if comma and fields % names == 0 else "E_FIELD_COUNT",

@@ -47,7 +47,7 @@ class TextStream:
         return line.decode(self.encoding, "replace")
 
     def is_odd(self, block: bytes) -> bool:
-        """Whether there are bytes that are not in the text's encoding."""
+        """True where there are bytes that are not in the text's encoding."""
         if block.isascii() or self.encoding != "utf-8":
             return not block.isascii() and self.original_encoding == "cp1252"
         try:
@@ -218,7 +218,7 @@ def _as_utf8(source: Source, encoding: str, mark: int) -> tuple[IO[bytes], int]:
 
 
 def _without_end_mark(file: IO[bytes], size: int) -> int:
-    """Where the text ends: old programs close it with Ctrl-Z."""
+    """Return the length of the text: old programs close it with Ctrl-Z."""
     tail = max(0, size - 64)
     file.seek(tail)
     end = file.read(size - tail)

@@ -57,7 +57,7 @@ def number(token: str, mark: str) -> float | None:
 
 
 def looks_numeric(token: str) -> bool:
-    """Whether a cell is meant as a value, in whatever writing: tells rows of data from headers."""
+    """Tell if a cell is meant as a value, in any notation: separates rows of data from headers."""
     token = token.strip(" \t")
     if (
         NUMBER["."].fullmatch(token)
