@@ -48,6 +48,7 @@ def test_the_structure_keeps_its_limits():
     assert structure.circles() == []
     assert len(structure.longest_chain()) <= 22
     assert len(structure.long_functions()) <= 19
+    assert {place.split(".")[1] for place in structure.long_functions()} <= {"cli", "paper", "study"}
     assert structure.repeated_class_names() == {}
 
 
