@@ -5,8 +5,8 @@ import tomllib
 
 import pytest
 
+from mrdamper.data.strict_text import read_toml
 from mrdamper.rig_files.profile import ProfileError, parse_profile
-from mrdamper.rig_files.strict_toml import read_toml
 
 HOSTILE = {
     "a name of 30,000 parts": "a." * 30_000 + "b = 1",

@@ -23,8 +23,7 @@ from mrdamper.dampers.sessions import Sessions
 from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import require_name
 from mrdamper.data.atomic import path_of, write_file
-from mrdamper.data.regular import open_regular
-from mrdamper.data.strict_json import parse_json
+from mrdamper.data.strict_text import open_regular, parse_json
 from mrdamper.errors import InputError, ModelFileError, require
 from mrdamper.models import model_parts
 

@@ -15,9 +15,9 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+from mrdamper.data.strict_text import read_toml_file
 from mrdamper.errors import InputError
 from mrdamper.rig_files.limits_file import FORCE_LIMITS, require_known_keys
-from mrdamper.rig_files.strict_toml import read_toml_file
 
 _LARGEST_LOGO = 500_000  # bytes; it stands in every page
 _LONGEST = 5_000  # letters of a field

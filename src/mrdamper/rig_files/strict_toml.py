@@ -1,20 +1,16 @@
-"""TOML that people write: short, and no name of many parts, for which the standard reader takes minutes."""
+"""TOML files that people write, by their schema."""
 
 from __future__ import annotations
 
 import difflib
-import re
 import tomllib
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from mrdamper.data.regular import open_regular
+from mrdamper.data.strict_text import open_regular, read_toml
 from mrdamper.errors import InputError
-
-_LONGEST = 200_000  # characters; the profiles of the documentation have under 3,000
-_DOTTED = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++\s*+\.\s*+){17}""")  # ours have two parts
 
 T = TypeVar("T", bound=BaseModel)
 
@@ -77,48 +73,3 @@ def _models(annotation: Any) -> list[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [model for inner in get_args(annotation) for model in _models(inner)]
-
-
-def read_toml_file(path: Path) -> dict[str, Any]:
-    """A TOML file without a schema; no more of it is read than one may hold, whatever it is.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read.
-    tomllib.TOMLDecodeError
-        Also if it is no UTF-8.
-    """
-    with open_regular(path) as file:
-        content = file.read(4 * _LONGEST + 1)
-    try:
-        return read_toml(content.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise tomllib.TOMLDecodeError("no UTF-8 text") from error
-
-
-def read_toml(text: str) -> dict[str, Any]:
-    r"""A TOML document.
-
-    Raises
-    ------
-    tomllib.TOMLDecodeError
-        If it is none, too long or nested too deeply.
-
-    Examples
-    --------
-    >>> read_toml("[channels.force]\nsign = -1")
-    {'channels': {'force': {'sign': -1}}}
-    """
-    if len(text) > _LONGEST:
-        raise tomllib.TOMLDecodeError(f"{len(text):,} characters; at most {_LONGEST:,}")
-    if _DOTTED.search(text):
-        raise tomllib.TOMLDecodeError("a name of more than 16 parts between dots")
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError:
-        raise
-    except RecursionError:
-        raise tomllib.TOMLDecodeError("nested too deeply") from None
-    except ValueError as error:  # an integer of thousands of digits
-        raise tomllib.TOMLDecodeError(str(error)) from error

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePath
 
 from mrdamper.data import held_current
-from mrdamper.data.regular import open_regular
+from mrdamper.data.strict_text import open_regular
 from mrdamper.errors import CombinedError, InputError
 from mrdamper.rig_files.coil_current import constant
 from mrdamper.rig_files.column_names import split_name

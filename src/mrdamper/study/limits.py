@@ -13,8 +13,8 @@ import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Condition
+from mrdamper.data.strict_text import read_toml_file
 from mrdamper.rig_files.limits_file import RIG_LIMITS, LimitsError, require_known_keys
-from mrdamper.rig_files.strict_toml import read_toml_file
 
 _MAX_SAMPLES = 500_000  # of a planned record
 _RANGES = ("current_A", "frequency_Hz", "amplitude_mm")

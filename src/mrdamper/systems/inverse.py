@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -171,6 +170,8 @@ class Inverse:
 
     def __init__(self, program: Program, title: str):
         self.program, self.title = program, title
+        prepare, self._advance = python_functions(program)
+        self._derived = prepare(())[1]
         self.reset()
 
     def reset(self) -> None:
@@ -205,18 +206,6 @@ class Inverse:
         rows = [self.step(*sample) for sample in zip(*(c.tolist() for c in channels), strict=True)]
         table = np.array([[r.current, r.force, r.lowest, r.highest] for r in rows])
         return table[:, 0], table[:, 1], table[:, 2], table[:, 3]
-
-    @cached_property
-    def _functions(self) -> tuple[Any, Any]:
-        return python_functions(self.program)
-
-    @property
-    def _advance(self) -> Any:
-        return self._functions[1]
-
-    @cached_property
-    def _derived(self) -> tuple[float, ...]:
-        return self._functions[0](())[1]
 
 
 @checked()

@@ -95,70 +95,25 @@ def interpreted_loop(elements: Sequence[LoopElement], control: LoopElement | Non
     control : LoopElement, optional
         From signals and dt to one command [A] an element.
     """
-    command: Any = _no_command
-    if control is not None:
-        p, d, m = (_cut(b, size) for b, size in zip((2, 0, 0), control.sizes, strict=True))
-        inputs = _cut(0, len(control.program.tape.inputs))
-        command = _command(control.step, p, d, m, inputs, _keeper(0, len(control.start)))
-    evaluate: Any = _nothing
-    ends = np.cumsum([[2, 0, 0], *([2 + p, d, m] for p, d, m in (e.sizes for e in elements))], axis=0)
-    for index in reversed(range(len(elements))):
-        stage, begin = elements[index], ends[index].tolist()
-        p, d, m = (_cut(b, size) for b, size in zip(begin, stage.sizes, strict=True))
-        first = _one(stage.step, begin[0] - 2, p, d, m, _keeper(begin[2], len(stage.start)))
-        evaluate = _either(index, first, evaluate)
+    ends = np.cumsum([[0, 0, 0], *([2 + p, d, m] for p, d, m in (e.sizes for e in elements))], axis=0).tolist()
+
+    def evaluate(j, p, d, memory, later, x, v, a, current, dt):
+        (p0, d0, m0), (p1, d1, m1) = ends[j : j + 2]
+        given = (_numbers(part) for part in (p[p0 + 2 : p1], d[d0:d1], memory[m0:m1]))
+        status, out, later[m0:m1] = elements[j].step(*given, (x, v, a, current, dt))
+        return status, p[p0] * out[0] + p[p0 + 1], out[1]
+
+    def command(p, d, memory, y, out):
+        assert control is not None
+        inputs = _numbers(y[: len(control.program.tape.inputs)])
+        status, out[:], memory[:] = control.step(_numbers(p[2:]), _numbers(d), _numbers(memory), inputs)
+        return status
+
     return partial(walk, evaluate, command)
 
 
-def _cut(begin: int, size: int) -> Any:
-    return lambda values: tuple(values[begin : begin + size].tolist())
-
-
-def _nothing(j, p, d, memory, later, x, v, a, current, dt):
-    return 1, 0.0, 0.0
-
-
-def _no_command(p, d, memory, y, out):
-    return 0
-
-
-def _keeper(begin: int, size: int) -> Any:
-    """Return a function that puts a tuple into an array."""
-
-    def keep(values, new):
-        for i in range(size):
-            values[begin + i] = new[i]
-
-    return keep
-
-
-def _one(step: Step, scale: int, given: Any, derived: Any, held: Any, keep: Any) -> Any:
-    def one(p, d, memory, later, x, v, a, current, dt):
-        status, out, new = step(given(p), derived(d), held(memory), (x, v, a, current, dt))
-        keep(later, new)
-        return status, p[scale] * out[0] + p[scale + 1], out[1]
-
-    return one
-
-
-def _either(index: int, first: Any, rest: Any) -> Any:
-    def either(j, p, d, memory, later, x, v, a, current, dt):
-        if j == index:
-            return first(p, d, memory, later, x, v, a, current, dt)
-        return rest(j, p, d, memory, later, x, v, a, current, dt)
-
-    return either
-
-
-def _command(step: Step, given: Any, derived: Any, held: Any, inputs: Any, keep: Any) -> Any:
-    def command(p, d, memory, y, out):
-        status, outputs, new = step(given(p), derived(d), held(memory), inputs(y))
-        keep(memory, new)
-        for i in range(len(outputs)):
-            out[i] = outputs[i]
-        return status
-
-    return command
+def _numbers(values: Floats) -> tuple[float, ...]:
+    return tuple(values.tolist())
 
 
 def search(evaluate, j, p, d, memory, later, state, free, compliance, current, dt, slope, scale):

@@ -19,7 +19,7 @@ from pydantic import BaseModel, Field
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.model_file import dump_model, parse_model
 from mrdamper.data import Dataset
-from mrdamper.data.strict_json import parse_json
+from mrdamper.data.strict_text import parse_json
 from mrdamper.data.temporary import temporary_folder
 from mrdamper.errors import InputError
 from mrdamper.report.about import logo_of

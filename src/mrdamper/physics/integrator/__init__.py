@@ -17,9 +17,9 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, ParameterError
 from mrdamper.physics.integrator.streamed import Rate, integrate_step
+from mrdamper.physics.motion.traced import TracedStep
 from mrdamper.tracing import Tape, program, streamed
 from mrdamper.tracing.compiled import RecordProgram
-from mrdamper.tracing.functions import Step
 
 _RUNAWAY = 1e6  # state over its scale
 _MAX_STEPS_PER_SAMPLE = 20_000  # between two samples of a record
@@ -120,7 +120,7 @@ def _traced(rate: Rate, states: int, given: tuple[float, ...]) -> Any:
         tape,
         rate,
         numbers[:own],
-        (Step(dt), x, v, current),
+        (TracedStep(tape, dt), x, v, current),
         (0.0,) * states,
         numbers[own:-1],
         tolerance=numbers[-1],

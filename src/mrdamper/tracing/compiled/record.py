@@ -6,7 +6,6 @@ import ctypes
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,6 +36,7 @@ class RecordProgram:
     def __init__(self, program: Program):
         self.program = program
         self.starts = tuple(program.tape.starts.values())
+        self._prepare, self._step = python_functions(program)
         self._walked = 0
 
     def prepare(self, given: Sequence[float]) -> tuple[float, ...] | None:
@@ -91,18 +91,6 @@ class RecordProgram:
                 return Along(outputs, held, i)
             outputs[:, i], held = out, after
         return Along(outputs, held, -1)
-
-    @cached_property
-    def _functions(self) -> tuple[Any, Any]:
-        return python_functions(self.program)
-
-    @property
-    def _prepare(self) -> Any:
-        return self._functions[0]
-
-    @property
-    def _step(self) -> Any:
-        return self._functions[1]
 
     @cached_property
     def _lines(self) -> int:

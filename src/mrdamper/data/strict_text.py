@@ -1,0 +1,120 @@
+"""Files and texts that anybody may have written: what a format leaves to its reader is refused instead of guessed.
+
+JSON without doubt, and TOML as people write it: short, and no name of many parts, for which the
+standard reader takes minutes. A file is opened without waiting for a writer, and has an end.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import math
+import os
+import re
+import stat
+import tomllib
+from pathlib import Path
+from typing import Any, BinaryIO, NoReturn
+
+_MAX_DEPTH = 64  # objects and arrays inside each other
+_MAX_DIGITS = 40  # characters of a whole number
+_LONGEST = 200_000  # characters; the profiles of the documentation have under 3,000
+_DOTTED = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++\s*+\.\s*+){17}""")  # ours have two parts
+
+
+def open_regular(path: Path) -> BinaryIO:
+    """Open a file for reading bytes, without waiting.
+
+    Raises `OSError` if it cannot be opened, or is a pipe, a socket or a device.
+    """
+    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    if not stat.S_ISREG(os.fstat(handle).st_mode):
+        os.close(handle)
+        raise OSError(errno.EINVAL, "not a regular file", str(path))
+    return os.fdopen(handle, "rb")
+
+
+def parse_json(text: str) -> Any:
+    """Values of a JSON text.
+
+    Raises `ValueError`, also for a key that stands twice, NaN and infinity, numbers beyond a double, whole numbers of
+    more than forty digits, and nesting beyond 64.
+    """
+    try:
+        value = json.loads(
+            text, object_pairs_hook=_object, parse_constant=_refuse, parse_float=_number, parse_int=_whole
+        )
+    except json.JSONDecodeError as error:
+        raise ValueError(f"not JSON at line {error.lineno}: {error.msg}") from error
+    except RecursionError:
+        raise ValueError(f"nested deeper than {_MAX_DEPTH}") from None
+    if _depth(value) > _MAX_DEPTH:
+        raise ValueError(f"nested deeper than {_MAX_DEPTH}")
+    return value
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    members = dict(pairs)
+    if len(members) < len(pairs):
+        names = [name for name, _ in pairs]
+        raise ValueError(f"{next(n for n in names if names.count(n) > 1)!r:.60} stands twice")
+    return members
+
+
+def _refuse(constant: str) -> NoReturn:
+    raise ValueError(f"{constant} is no number")
+
+
+def _number(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text:.20} is too large a number")
+    return value
+
+
+def _whole(text: str) -> int:
+    if len(text) > _MAX_DIGITS:
+        raise ValueError(f"a whole number of {len(text)} digits")
+    return int(text)
+
+
+def _depth(value: Any) -> int:
+    """Level by level, so that depth costs no stack."""
+    depth, level = 0, [value]
+    while level:
+        depth += 1
+        inner = [v for v in level if isinstance(v, dict | list)]
+        level = [part for v in inner for part in (v.values() if isinstance(v, dict) else v)]
+    return depth
+
+
+def read_toml_file(path: Path) -> dict[str, Any]:
+    """Read a TOML file without a schema; no more of it is read than one may hold, whatever it is.
+
+    Raises `OSError` if it cannot be read, `tomllib.TOMLDecodeError` also if it is no UTF-8.
+    """
+    with open_regular(path) as file:
+        content = file.read(4 * _LONGEST + 1)
+    try:
+        return read_toml(content.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise tomllib.TOMLDecodeError("no UTF-8 text") from error
+
+
+def read_toml(text: str) -> dict[str, Any]:
+    """Return a TOML document.
+
+    Raises `tomllib.TOMLDecodeError` if it is none, too long or nested too deeply.
+    """
+    if len(text) > _LONGEST:
+        raise tomllib.TOMLDecodeError(f"{len(text):,} characters; at most {_LONGEST:,}")
+    if _DOTTED.search(text):
+        raise tomllib.TOMLDecodeError("a name of more than 16 parts between dots")
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        raise
+    except RecursionError:
+        raise tomllib.TOMLDecodeError("nested too deeply") from None
+    except ValueError as error:  # an integer of thousands of digits
+        raise tomllib.TOMLDecodeError(str(error)) from error
