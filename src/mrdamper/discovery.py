@@ -128,14 +128,8 @@ def skip(part: ExtensionPart, problem: Exception | str) -> None:
 class Registry(Generic[T]):
     """The classes of one extension point by their `name`.
 
-    Parameters
-    ----------
-    group : str
-        Entry-point group.
-    base : type
-        Every class of the group is a subclass of it that is not abstract and has a `name` of its own.
-    kind : str
-        What one of them is called in messages.
+    `group`: entry-point group; `base`: every class of the group is a subclass of it that is not abstract and has a
+    `name` of its own; `kind`: what one of them is called in messages.
     """
 
     def __init__(self, group: str, base: type[T], kind: str):

@@ -13,7 +13,7 @@ from support.synthetic import synthetic_run
 from mrdamper import identification
 from mrdamper.data import Condition
 from mrdamper.identification import identify
-from mrdamper.identification.covariance import spread, standard_errors
+from mrdamper.identification.covariance import spread
 from mrdamper.identification.intervals import interval_about, weaknesses, written
 from mrdamper.identification.problem import RunUncertainty
 from mrdamper.identification.uncertainty import uncertainty_of_run
@@ -121,8 +121,8 @@ def test_white_noise_gives_the_textbook_errors():
     residual = 2.0 * rng.standard_normal(4000)
     textbook = np.sqrt(np.sum(residual**2) / (4000 - 3) * np.diag(np.linalg.inv(J.T @ J)))
     # White noise has an autocorrelation time of one, estimated from 4000 samples to some per cent.
-    assert standard_errors(J, residual) == pytest.approx(textbook, rel=0.08)
-    assert np.isinf(standard_errors(np.column_stack([J, np.zeros(4000)]), residual)[3])
+    assert spread(J, residual).errors == pytest.approx(textbook, rel=0.08)
+    assert np.isinf(spread(np.column_stack([J, np.zeros(4000)]), residual).errors[3])
 
 
 @pytest.mark.parametrize(("rho", "time"), [(0.0, 1.0), (0.5, 3.0), (0.8, 9.0)])

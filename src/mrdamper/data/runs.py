@@ -343,10 +343,7 @@ def held_current(current: Floats) -> tuple[float, str]:
     does. What is left after averaging over stretches of the record counts as wandering, less
     what white noise leaves there, so that noise of any size is none.
 
-    Parameters
-    ----------
-    current : (N,) array
-        At least three samples [A].
+    `current` (N,): at least three samples [A].
     """
     low, high = float(current.min()), float(current.max())
     if low == high:

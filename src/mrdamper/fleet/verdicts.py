@@ -109,12 +109,7 @@ class Drift:
 def drift(values: Floats, sessions: Sequence[str], serials: Sequence[str], golden: Sequence[bool]) -> Drift:
     """Tell the drift of the rig, seen on golden dampers, from the line's, seen on the others beside them.
 
-    Parameters
-    ----------
-    values : (N,) array
-        Positive, a force say.
-    sessions : sequence of str, length N
-        In the order of time when sorted.
+    `values` (N,): positive, a force say; `sessions`: in the order of time when sorted.
     """
     order = sorted(set(sessions))
     if len(order) < 3:

@@ -91,10 +91,7 @@ def characterise(runs: Sequence[Run]) -> Characteristics:
 
     Raises `IdentificationError` if no run holds a steady cycle at one current.
 
-    Parameters
-    ----------
-    runs : sequence of Run
-        Of one rig.
+    `runs`: of one rig.
     """
     usable, passed_over = [], {}
     for run in runs:

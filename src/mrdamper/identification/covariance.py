@@ -104,10 +104,7 @@ def alike_groups(vectors: Floats) -> list[tuple[list[int], int]]:
     Two pairs that are alike span a plane, and any mixture of them is an eigenvector as well: each
     group is told by the reduced form of the basis, in which it has a parameter of its own.
 
-    Parameters
-    ----------
-    vectors : (P, K) array
-        Combinations of parameters that change nothing.
+    `vectors` (P, K): combinations of parameters that change nothing.
     """
     basis, own = vectors.T.copy(), []
     for k in range(len(basis)):
@@ -268,10 +265,3 @@ def _powers(base: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:
     for k in range(count):
         np.multiply(powers[k - 1] if k else 1.0, base, out=powers[k])
     return powers
-
-
-def standard_errors(
-    jacobian: Floats, residual: Floats, time: Floats | None = None, frequency: float | None = None
-) -> Floats:
-    """(P,) standard errors; arguments as `spread`."""
-    return spread(jacobian, residual, time, frequency).errors

@@ -116,17 +116,8 @@ def linear_structure(
 ) -> LinearStructure | None:
     """Ask a model what its state is, at two places of the search.
 
-    Parameters
-    ----------
-    free : tuple of str
-        Parameters to be determined.
-    fixed : tuple of (str, float)
-        Parameters held at a value.
-
-    Returns
-    -------
-    LinearStructure or None
-        None where the state fills no column of its own, or that column's parameter is held.
+    `free`: parameters to be determined; `fixed`: parameters held at a value. Returns None where the state fills no
+    column of its own, or that column's parameter is held.
     """
     linear = tuple(i for i in model_type.parameters() if i.linear and i.name in free)
     axes = model_type.search_axes(_SCALE, free)

@@ -154,17 +154,8 @@ def double_counted(shape: Shape, yield_force: float, amplitude: float, omega: fl
     c_closed − c = f_z zc_1/(X omega),  m_closed − m = −f_z zs_1/(X omega²), with zs_1, zc_1
     the exact first harmonics of zeta. Derived for this package.
 
-    Parameters
-    ----------
-    yield_force : float
-        f_z, hysteretic force after yield [N].
-    amplitude, omega : float
-        [m], [rad/s].
-
-    Returns
-    -------
-    c, m : float
-        [N s/m], [kg].
+    `yield_force`: f_z, hysteretic force after yield [N]; `amplitude`, `omega` [m], [rad/s]. Returns c, m [N s/m],
+    [kg].
     """
     sine, cosine = loop_harmonics(shape, amplitude, (1,))
     return (

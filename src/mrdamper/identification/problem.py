@@ -53,14 +53,8 @@ class Problem:
         both to be free: on one frequency a = −ω² x, so no data can tell them apart. Raises `ParameterError` if the
         motion would compress the gas to no volume at all.
 
-        Parameters
-        ----------
-        free : sequence of str
-            Presets to free as well.
-        fixed : mapping
-            Parameters to hold at a value [SI].
-        gas : GasSpring, optional
-            A known gas spring fixes k1, k2 and k3 and thereby lets the mass be determined.
+        `free`: presets to free as well; `fixed`: parameters to hold at a value [SI]; `gas`: a known gas spring fixes
+        k1, k2 and k3 and thereby lets the mass be determined.
         """
         infos = {info.name: info for info in model_type.parameters()}
         held = dict(fixed or {})

@@ -28,14 +28,8 @@ def uncertainty_of_run(
 ) -> RunUncertainty:
     """Differentiate the force by each free coordinate; those at a bound have no error to state.
 
-    Parameters
-    ----------
-    motion : Excitation
-        With the delay that was found.
-    state : (N,) array
-        Of the solution inside the scored samples.
-    residual : (N,) array
-        Predicted minus measured force there [N].
+    `motion`: with the delay that was found; `state` (N,): of the solution inside the scored samples; `residual` (N,):
+    predicted minus measured force there [N].
     """
     point, names, columns = _sensitivities(problem, solution, motion, state, residual)
     if not columns:

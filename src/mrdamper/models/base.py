@@ -72,6 +72,11 @@ class SearchAxis:
         return min(coordinate - low, high - coordinate) < 1e-3 * (high - low)
 
 
+def axes_of(free: Sequence[str], *axes: SearchAxis) -> tuple[SearchAxis, ...]:
+    """Return the axes of the parameters that are free."""
+    return tuple(axis for axis in axes if axis.name in free)
+
+
 @dataclass(frozen=True, slots=True)
 class Scale:
     """Sizes of the data that a search is laid out for."""

@@ -11,7 +11,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.data.parameters import param
 from mrdamper.errors import ParameterError
-from mrdamper.models.base import Model, Scale, SearchAxis
+from mrdamper.models.base import Model, Scale, SearchAxis, axes_of
 from mrdamper.physics.motion import Excitation
 
 
@@ -92,12 +92,9 @@ class Biviscous(Model):
     @classmethod
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """Both widths lie below the peak velocity."""
-        return _axes(scale.speed, free)
-
-
-def _axes(speed: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-    axes = {
-        "vy": SearchAxis("vy", 1e-4 * speed, 2 * speed, tuple(speed * np.geomspace(3e-3, 0.6, 7)), log=True),
-        "vh": SearchAxis("vh", 0.0, speed, (0.003 * speed, 0.03 * speed, 0.2 * speed)),
-    }
-    return tuple(axis for name, axis in axes.items() if name in free)
+        speed = scale.speed
+        return axes_of(
+            free,
+            SearchAxis("vy", 1e-4 * speed, 2 * speed, tuple(speed * np.geomspace(3e-3, 0.6, 7)), log=True),
+            SearchAxis("vh", 0.0, speed, (0.003 * speed, 0.03 * speed, 0.2 * speed)),
+        )

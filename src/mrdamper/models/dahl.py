@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.parameters import param
-from mrdamper.models.base import GENERAL_FORMS, Model, Scale, SearchAxis
+from mrdamper.models.base import GENERAL_FORMS, Model, Scale, SearchAxis, axes_of
 from mrdamper.physics.hysteresis import Shape, follow
 from mrdamper.physics.motion import Excitation
 
@@ -59,8 +59,7 @@ class Dahl(Model):
         """Search the displacement in which the friction builds up."""
         amplitude = scale.amplitude
         ladder = tuple(amplitude * np.geomspace(1e-4, 2.0, 14))
-        axis = SearchAxis("yield_displacement", amplitude * 1e-5, amplitude * 10, ladder, log=True)
-        return (axis,) if axis.name in free else ()
+        return axes_of(free, SearchAxis("yield_displacement", amplitude * 1e-5, amplitude * 10, ladder, log=True))
 
     @classmethod
     def map_forms(cls) -> Mapping[str, tuple[str, ...]]:

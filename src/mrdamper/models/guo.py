@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.parameters import param
-from mrdamper.models.base import Model, Scale, SearchAxis
+from mrdamper.models.base import Model, Scale, SearchAxis, axes_of
 from mrdamper.models.sides import side
 from mrdamper.physics.motion import Excitation
 
@@ -60,13 +60,10 @@ class Guo(Model):
     @classmethod
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """Search the yield of the curve between a thousandth and all of the peak velocity."""
-        return _axes(scale.speed, scale.amplitude, free)
-
-
-def _axes(speed: float, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-    axes = {
-        "kappa": SearchAxis("kappa", 0.1 / speed, 1e5 / speed, tuple(np.geomspace(2, 2e3, 6) / speed), log=True),
-        "v0": SearchAxis("v0", 0.0, speed, (0.003 * speed, 0.03 * speed, 0.2 * speed)),
-        "xs": SearchAxis("xs", 1e-4 * amplitude, amplitude, (0.05 * amplitude,), log=True),
-    }
-    return tuple(axis for name, axis in axes.items() if name in free)
+        speed, amplitude = scale.speed, scale.amplitude
+        return axes_of(
+            free,
+            SearchAxis("kappa", 0.1 / speed, 1e5 / speed, tuple(np.geomspace(2, 2e3, 6) / speed), log=True),
+            SearchAxis("v0", 0.0, speed, (0.003 * speed, 0.03 * speed, 0.2 * speed)),
+            SearchAxis("xs", 1e-4 * amplitude, amplitude, (0.05 * amplitude,), log=True),
+        )

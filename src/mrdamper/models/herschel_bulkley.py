@@ -11,7 +11,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.parameters import param
-from mrdamper.models.base import Model, Scale, SearchAxis, require_positive
+from mrdamper.models.base import Model, Scale, SearchAxis, axes_of, require_positive
 from mrdamper.physics.motion import Excitation
 from mrdamper.tracing import Tape, choose, streamed
 
@@ -95,7 +95,13 @@ class HerschelBulkley(Model):
     @classmethod
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """v_c from a hundredth of the peak velocity (viscous) to a hundred times it (all yield)."""
-        return _axes(scale.speed, free)
+        speed = scale.speed
+        ladder = tuple(speed * np.geomspace(1e-2, 1e2, 6))
+        return axes_of(
+            free,
+            SearchAxis("vc", 1e-4 * speed, 1e4 * speed, ladder, log=True),
+            SearchAxis("m", 0.1, 2.0, (0.3, 0.6, 1.0)),
+        )
 
 
 def flow_step(tape: Tape, speed: Any, m: Any) -> Any:
@@ -117,17 +123,7 @@ def flow_step(tape: Tape, speed: Any, m: Any) -> Any:
 def flow_curve(speed: Floats, m: float) -> Floats:
     """Force over yield force at a speed.
 
-    Parameters
-    ----------
-    speed : (N,) array
-        |v|/v_c [-], not negative.
-    m : float
-        Flow index [-].
-
-    Returns
-    -------
-    (N,) array
-        G = 1/T, one at rest.
+    `speed` (N,): |v|/v_c [-], not negative; `m`: flow index [-]. Returns (N,) array: G = 1/T, one at rest.
     """
     knots, values = _table(m)
     y = np.log(np.maximum(speed, np.exp(knots[0])))
@@ -156,12 +152,3 @@ def _log_speed(u: Floats, m: float) -> tuple[Floats, Floats]:
 def _table(m: float) -> tuple[Floats, Floats]:
     u = np.linspace(-30.0, 40.0, _KNOTS)
     return _log_speed(u, m)[0], u
-
-
-def _axes(speed: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-    ladder = tuple(speed * np.geomspace(1e-2, 1e2, 6))
-    axes = {
-        "vc": SearchAxis("vc", 1e-4 * speed, 1e4 * speed, ladder, log=True),
-        "m": SearchAxis("m", 0.1, 2.0, (0.3, 0.6, 1.0)),
-    }
-    return tuple(axis for name, axis in axes.items() if name in free)

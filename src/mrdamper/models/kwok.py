@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.parameters import param
-from mrdamper.models.base import Model, Scale, SearchAxis
+from mrdamper.models.base import Model, Scale, SearchAxis, axes_of
 from mrdamper.models.sides import side
 from mrdamper.physics.motion import Excitation
 
@@ -59,13 +59,10 @@ class Kwok(Model):
     @classmethod
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """Search the yield of the curve between a thousandth and all of the peak velocity."""
-        return _axes(scale.speed, scale.amplitude, free)
-
-
-def _axes(speed: float, amplitude: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-    axes = {
-        "beta": SearchAxis("beta", 0.1 / speed, 1e4 / speed, tuple(np.geomspace(1, 300, 6) / speed), log=True),
-        "delta": SearchAxis("delta", 0.0, 10.0, (0.1, 0.8, 2.0)),
-        "xs": SearchAxis("xs", 1e-4 * amplitude, amplitude, (0.05 * amplitude,), log=True),
-    }
-    return tuple(axis for name, axis in axes.items() if name in free)
+        speed, amplitude = scale.speed, scale.amplitude
+        return axes_of(
+            free,
+            SearchAxis("beta", 0.1 / speed, 1e4 / speed, tuple(np.geomspace(1, 300, 6) / speed), log=True),
+            SearchAxis("delta", 0.0, 10.0, (0.1, 0.8, 2.0)),
+            SearchAxis("xs", 1e-4 * amplitude, amplitude, (0.05 * amplitude,), log=True),
+        )

@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.parameters import param
-from mrdamper.models.base import Model, Scale, SearchAxis, require_positive
+from mrdamper.models.base import Model, Scale, SearchAxis, axes_of, require_positive
 from mrdamper.physics.integrator import integrate
 from mrdamper.physics.motion import Excitation
 
@@ -95,20 +95,17 @@ class LuGre(Model):
     @classmethod
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """Search the velocity over which the onset force fades, well below the peak velocity."""
-        return _axes(scale.amplitude, scale.speed, free)
+        amplitude, speed = scale.amplitude, scale.speed
+        lengths = tuple(amplitude * np.geomspace(1e-3, 0.3, 5))
+        return axes_of(
+            free,
+            SearchAxis("presliding", 1e-4 * amplitude, amplitude, lengths, log=True),
+            SearchAxis("stribeck", 0.3, 5.0, (1.0,), log=True),
+            SearchAxis("vs", 1e-3 * speed, speed, (0.02 * speed, 0.2 * speed), log=True),
+        )
 
 
 def bristle_rate(x: float, v: float, current: float, state: Floats, p: Floats, out: Floats) -> None:
     """du/dt for p = (z_c, s, v_s)."""
     onset = 1 + (p[1] - 1) * np.exp(-((v / p[2]) ** 2))
     out[0] = (v - abs(v) * state[0] / onset) / p[0]
-
-
-def _axes(amplitude: float, speed: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-    lengths = tuple(amplitude * np.geomspace(1e-3, 0.3, 5))
-    axes = {
-        "presliding": SearchAxis("presliding", 1e-4 * amplitude, amplitude, lengths, log=True),
-        "stribeck": SearchAxis("stribeck", 0.3, 5.0, (1.0,), log=True),
-        "vs": SearchAxis("vs", 1e-3 * speed, speed, (0.02 * speed, 0.2 * speed), log=True),
-    }
-    return tuple(axis for name, axis in axes.items() if name in free)

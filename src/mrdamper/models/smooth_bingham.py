@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.parameters import param
-from mrdamper.models.base import Model, Scale, SearchAxis
+from mrdamper.models.base import Model, Scale, SearchAxis, axes_of
 from mrdamper.physics.motion import Excitation
 
 
@@ -45,9 +45,6 @@ class SmoothBingham(Model):
     @classmethod
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """Search the yield velocity between a thousandth and all of the peak velocity."""
-        return _axes(scale.speed, free)
-
-
-def _axes(speed: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-    ladder = tuple(speed * np.geomspace(3e-3, 1.0, 8))
-    return (SearchAxis("vs", 1e-4 * speed, 10 * speed, ladder, log=True),) if "vs" in free else ()
+        speed = scale.speed
+        ladder = tuple(speed * np.geomspace(3e-3, 1.0, 8))
+        return axes_of(free, SearchAxis("vs", 1e-4 * speed, 10 * speed, ladder, log=True))

@@ -11,7 +11,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.data.parameters import param
 from mrdamper.errors import ParameterError
-from mrdamper.models.base import GENERAL_FORMS, Model, Scale, SearchAxis, require_positive
+from mrdamper.models.base import GENERAL_FORMS, Model, Scale, SearchAxis, axes_of, require_positive
 from mrdamper.physics.integrator import integrate
 from mrdamper.physics.motion import Excitation
 
@@ -179,7 +179,18 @@ class Spencer(Model):
     @classmethod
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """Search the creep of the series damper between a hundredth and all of the peak velocity."""
-        return _axes(scale.amplitude, scale.speed, free)
+        amplitude, speed = scale.amplitude, scale.speed
+        return axes_of(
+            free,
+            SearchAxis("c0_ratio", 1e-3, 10.0, (0.05,), log=True),
+            SearchAxis("k0_rate", 0.0, 20 * speed / amplitude, (0.1,)),
+            SearchAxis("creep", 1e-4 * speed, 10 * speed, (0.03 * speed, 0.3 * speed), log=True),
+            SearchAxis(
+                "yield_displacement", 1e-5 * amplitude, amplitude, (3e-3 * amplitude, 5e-2 * amplitude), log=True
+            ),
+            SearchAxis("asymmetry", -0.98, 0.98, (0.0,)),
+            SearchAxis("n", 1.0, 10.0, (2.0,)),
+        )
 
     @classmethod
     def map_forms(cls) -> Mapping[str, tuple[str, ...]]:
@@ -217,17 +228,3 @@ def series_rate(x: float, v: float, current: float, state: Floats, p: Floats, ou
     grip = abs(zeta) ** p[5]
     out[0] = slip
     out[1] = p[3] * (slip * (1 - 0.5 * (1 + p[4]) * grip) - 0.5 * (1 - p[4]) * abs(slip) * np.sign(zeta) * grip)
-
-
-def _axes(amplitude: float, speed: float, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-    axes = {
-        "c0_ratio": SearchAxis("c0_ratio", 1e-3, 10.0, (0.05,), log=True),
-        "k0_rate": SearchAxis("k0_rate", 0.0, 20 * speed / amplitude, (0.1,)),
-        "creep": SearchAxis("creep", 1e-4 * speed, 10 * speed, (0.03 * speed, 0.3 * speed), log=True),
-        "yield_displacement": SearchAxis(
-            "yield_displacement", 1e-5 * amplitude, amplitude, (3e-3 * amplitude, 5e-2 * amplitude), log=True
-        ),
-        "asymmetry": SearchAxis("asymmetry", -0.98, 0.98, (0.0,)),
-        "n": SearchAxis("n", 1.0, 10.0, (2.0,)),
-    }
-    return tuple(axis for name, axis in axes.items() if name in free)

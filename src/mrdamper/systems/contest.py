@@ -40,14 +40,8 @@ def contest(
 ) -> Contest:
     """Run controllers one after the other, all at the step that the first one settles at.
 
-    Parameters
-    ----------
-    system, source, dampers, step, highest
-        As `simulate_system`.
-    controllers : sequence of Controller
-        Beside no current, the highest current, and the preview.
-    progress : callable
-        Told what is being done and the share done, 0...1.
+    `system`, `source`, `dampers`, `step`, `highest`: as `simulate_system`; `controllers`: beside no current, the
+    highest current, and the preview; `progress`: told what is being done and the share done, 0...1.
     """
     if highest is None:
         highest = max(damper.envelope.current_A[1] for damper in dampers.values())

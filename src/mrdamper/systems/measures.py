@@ -17,19 +17,8 @@ _WINDOW = 1.0  # s, of the running mean square behind MTVV
 def comfort(acceleration: Floats, step: float, weighting: str = "Wk") -> dict[str, float]:
     """Measures of ISO 2631-1 for one axis.
 
-    Parameters
-    ----------
-    acceleration : (N,) array
-        [m/s²]
-    step : float
-        [s]
-    weighting : str
-        "Wk" (seat, vertical), "Wd" (seat, horizontal), "Wf" (motion sickness).
-
-    Returns
-    -------
-    dict
-        a_w [m/s²], mtvv [m/s²], vdv [m/s^1.75], crest factor [-].
+    `acceleration` (N,) [m/s²]; `step` [s]; `weighting`: "Wk" (seat, vertical), "Wd" (seat, horizontal), "Wf" (motion
+    sickness). Returns dict: a_w [m/s²], mtvv [m/s²], vdv [m/s^1.75], crest factor [-].
     """
     weighted = frequency_weighted(acceleration, step, weighting)
     squares = weighted**2

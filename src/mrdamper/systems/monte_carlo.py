@@ -58,10 +58,7 @@ def draw(dampers: Mapping[str, Damper], count: int, seed: int = 1) -> list[dict[
     of freedom behind them. What the form itself is wrong by (`Uncertainty.force`) is no number and is not drawn. Raises
     `InputError` (E_CERTAINTY) if a damper was saved without, E_DRAWS if the count is out of range.
 
-    Parameters
-    ----------
-    dampers : mapping of str to Damper
-        By link, with `uncertainty`.
+    `dampers`: by link, with `uncertainty`.
     """
     if not 2 <= count <= _MAX_DRAWS:
         raise InputError(f"{count} draws", remedy=f"give 2 to {_MAX_DRAWS:,}", code="E_DRAWS")

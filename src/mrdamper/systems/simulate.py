@@ -105,14 +105,8 @@ def simulate_system(
 class SystemLoop:
     """A system with its links and controller made ready; `run` may be called again and again.
 
-    Parameters
-    ----------
-    system, source, dampers, controller, highest
-        As `simulate_system`.
-    period : float
-        Time between two looks of the control law [s].
-    free : bool
-        Keep the dampers' own numbers free to change from run to run.
+    `system`, `source`, `dampers`, `controller`, `highest`: as `simulate_system`; `period`: time between two looks of
+    the control law [s]; `free`: keep the dampers' own numbers free to change from run to run.
     """
 
     def __init__(

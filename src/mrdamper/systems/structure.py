@@ -134,10 +134,7 @@ def shear_building(
 ) -> System:
     """Storeys one above the other.
 
-    Parameters
-    ----------
-    masses, stiffnesses, dampings : (n,) sequences
-        By storey from below [kg], [N/m], [N s/m].
+    `masses`, `stiffnesses`, `dampings`: by storey from below [kg], [N/m], [N s/m].
     """
     floors = tuple(f"floor{i + 1}" for i in range(len(masses)))
     M = np.diag(np.array(masses, dtype=float))
@@ -207,14 +204,8 @@ def half_car(
 ) -> System:
     """Half a car seen from the side: heave and pitch on two axles.
 
-    Parameters
-    ----------
-    body, inertia : float
-        Mass [kg] and moment of inertia in pitch [kg m²].
-    front_arm, rear_arm : float
-        From the centre of gravity to the axles [m].
-    wheels, springs, tyres : (float, float)
-        Front and rear [kg], [N/m], [N/m].
+    `body`, `inertia`: mass [kg] and moment of inertia in pitch [kg m²]; `front_arm`, `rear_arm`: from the centre of
+    gravity to the axles [m]; `wheels`, `springs`, `tyres`: front and rear [kg], [N/m], [N/m].
     """
     corners = {"body_front": np.array([1.0, -front_arm, 0, 0]), "body_rear": np.array([1.0, rear_arm, 0, 0])}
     length = front_arm + rear_arm

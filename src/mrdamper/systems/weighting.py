@@ -61,14 +61,7 @@ def frequency_weighted(acceleration: Floats, step: float, weighting: str) -> Flo
     it, as the bilinear transform would towards half the rate. Raises `UnknownNameError` if there is no such
     weighting.
 
-    Parameters
-    ----------
-    acceleration : (N,) array
-        [m/s²]
-    step : float
-        [s]
-    weighting : str
-        "Wk", "Wd", "Wf".
+    `acceleration` (N,) [m/s²]; `step` [s]; `weighting`: "Wk", "Wd", "Wf".
     """
     if weighting not in WEIGHTINGS:
         raise UnknownNameError.of("weighting", weighting, WEIGHTINGS)

@@ -22,10 +22,7 @@ def method_named(name: str, settings: Mapping[str, str] | None = None) -> Method
 
     Raises `UnknownNameError` if there is no such method, switch or value; with the near matches.
 
-    Parameters
-    ----------
-    settings : mapping of str to str, optional
-        Switches and numbers of the method, as text.
+    `settings`: switches and numbers of the method, as text.
     """
     chosen = _registry.type_named(name)
     return chosen(**values_of_fields(chosen, settings)) if settings else chosen()

@@ -246,12 +246,7 @@ def crowded_nodes(end: float) -> Floats:
 class _CurveTable:
     """r over distance and distance over r, for dr/dphi = rate(r).
 
-    Parameters
-    ----------
-    r : (K,) array
-        Nodes, increasing.
-    rate : function
-        r -> dr/dphi and the derivative of that with respect to r.
+    `r` (K,): nodes, increasing; `rate`: r -> dr/dphi and the derivative of that with respect to r.
     """
 
     def __init__(self, r: Floats, rate: Callable[[Floats], tuple[Floats, Floats]]):

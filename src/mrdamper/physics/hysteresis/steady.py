@@ -41,19 +41,8 @@ def steady_peak(shape: Shape, amplitude: ArrayLike) -> float | Floats:
 def steady_loop(shape: Shape, amplitude: float, theta: ArrayLike) -> Floats:
     """State on the steady loop of x = amplitude · sin(theta).
 
-    Parameters
-    ----------
-    shape : Shape
-        One shape, or P of them.
-    amplitude : float
-        [m]
-    theta : (N,) array
-        Phase [rad].
-
-    Returns
-    -------
-    (N,) array, or (P, N)
-        zeta [-].
+    `shape`: one shape, or P of them; `amplitude` [m]; `theta` (N,): phase [rad]. Returns (N,) array, or (P, N): zeta
+    [-].
     """
     half_cycle, since_reversal = np.divmod(np.asarray(theta, dtype=float) + np.pi / 2, np.pi)
     sign, share = 1.0 - 2.0 * (half_cycle % 2), _share_of_stroke(since_reversal)

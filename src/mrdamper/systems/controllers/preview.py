@@ -40,10 +40,7 @@ class NonCausalOptimum(Controller):
     def forces(self, A: Floats, B: Floats, driven: Floats, C: Floats, D: Floats, aimed: Floats) -> Floats:
         """(N, E) forces of least cost for z⁺ = A z + B (f + f⁺)/2 + driven⁺, y = C z + D f + aimed.
 
-        Parameters
-        ----------
-        driven, aimed : (N, 2n), (N, P) arrays
-            What the input adds to the state in the step that ends there, and to the aims.
+        `driven` (N, 2n), `aimed` (N, P): what the input adds to the state in the step that ends there, and to the aims.
         """
         n, count = B.shape
         # The state takes the last force along; the next force is what is decided on.

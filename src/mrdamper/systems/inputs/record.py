@@ -53,12 +53,8 @@ def load_record(path: str | Path, time_scale: float = 1.0) -> RecordedInput:
     Raises `DatasetError` or `ColumnError` or `UnitError` or `RecordError` if the file cannot be read, says no unit,
     or has steps that differ.
 
-    Parameters
-    ----------
-    path : path
-        CSV with time_s and one of acceleration_m_s2, acceleration_g (1 g = 9.81 m/s²), height_m.
-    time_scale : float
-        How many times faster than recorded it is played.
+    `path`: CSV with time_s and one of acceleration_m_s2, acceleration_g (1 g = 9.81 m/s²), height_m; `time_scale`:
+    how many times faster than recorded it is played.
     """
     path = Path(path)
     table = read_table(path, "give a CSV with time_s and acceleration_m_s2")

@@ -52,10 +52,7 @@ def cache_folder() -> Path:
 def load(source: str, holds: Callable[[ctypes.CDLL], bool]) -> ctypes.CDLL | None:
     """Load the library of a C source, compiled when it is not in the cache; None without a usable compiler.
 
-    Parameters
-    ----------
-    holds : function of a library
-        Whether a library that was just compiled computes what it should.
+    `holds`: whether a library that was just compiled computes what it should.
     """
     compiler = find_compiler()
     if compiler is None:
