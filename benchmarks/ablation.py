@@ -17,13 +17,13 @@ from mrdamper.study.validation import leave_out, validate
 WITHOUT = {
     "nothing: the whole model": {},
     "viscous bypass": {"cb": 1.0},
-    "fading of the seated force with velocity": {"h0": 0.0, "h1": 0.0},
+    "Stribeck effect": {"h0": 0.0, "h1": 0.0},
     "rise of the fading with current": {"h1": 0.0},
     "lag": {"T": 0.0},
     "stiffness": {"k": 0.0},
     "asymmetry": {"asymmetry": 0.0},
     "inertia": {"m": 0.0},
-    "lost motion (seat as long as the play)": {"d": 2e-5, "e": 2e-5},
+    "free play (series spring as long as the play)": {"d": 2e-5, "e": 2e-5},
 }
 
 

@@ -64,7 +64,7 @@ def _of_the_main_job(results: Any) -> list[Goal]:
         ),
         Goal("48 conditions in process, all of identify()", 60, _least(many, "identify()"), "ms", why=analysis),
         Goal("of that, analysing the motions", 25, motion, "ms"),
-        Goal("both bundled rigs run by run, and jointly", 2, sum(real) if real else None, "s"),
+        Goal("both bundled rigs, per-run and global fit", 2, sum(real) if real else None, "s"),
         Goal("mrdamper study, caches empty", 8, _least(process, "study, caches empty"), "s", why=_STUDY),
         Goal("mrdamper study, caches filled", 4, _least(process, "study, caches filled"), "s", why=_STUDY),
         Goal("mrdamper study, peak memory", 500, _least(memory, "mrdamper study"), "MB"),

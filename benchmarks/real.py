@@ -26,7 +26,7 @@ def real_rows() -> list[RealRow]:
     begin = time.process_time()
     for run in sines:
         identify(replace(run))
-    rows = [RealRow(f"{len(sines)} runs one by one, Bouc–Wen", time.process_time() - begin)]
+    rows = [RealRow(f"{len(sines)} individual fits, Bouc–Wen", time.process_time() - begin)]
     for rig in dataset.rigs:
         train = [run for run in dataset.rig(rig).split("train") if run.excitation == "sine"]
         begin = time.process_time()

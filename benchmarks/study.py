@@ -73,7 +73,7 @@ class _Clock:
         now = time.process_time()
         self.spent[self.what] += now - self.last
         for run in self.runs:
-            what = what.replace(f"run {run}", "run by run") if what.endswith(run) else what
+            what = what.replace(f"run {run}", "per-run fits") if what.endswith(run) else what
         self.last, self.what = now, what if what != "loops" else self.what
 
     def stopped(self) -> dict[str, float]:

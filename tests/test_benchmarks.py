@@ -93,10 +93,10 @@ def test_parts_of_a_study_add_up_run_by_run():
     clock = study._Clock(["rig_1", "rig_2"])
     for what in ("loops", "bouc-wen run rig_1", "bouc-wen run rig_2", "bouc-wen over all conditions, joint"):
         clock.tell(what, 0.0)
-    parts = ["motions and loops", "bouc-wen run by run", "bouc-wen over all conditions, joint"]
+    parts = ["motions and loops", "bouc-wen per-run fits", "bouc-wen over all conditions, joint"]
     assert list(clock.stopped()) == parts
     text = page.page(page.Results(quick=True, study=[study.PartRow(part, (0.5, 1.0)) for part in parts]))
-    assert "| bouc-wen run by run | 1.50 | 0.500 + 1.00 |" in text
+    assert "| bouc-wen per-run fits | 1.50 | 0.500 + 1.00 |" in text
 
 
 def test_a_missed_goal_says_why():

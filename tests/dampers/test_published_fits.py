@@ -45,7 +45,9 @@ def regressed(name, coefficients, conditions=CONDITIONS):
     """Coefficients from the models that a damper with known ones has at the conditions."""
     cls = all_published()[name]
     truth = cls("bench", coefficients, REFERENCE, Envelope.of(conditions))
-    return cls.regressed(identified([truth.model_at(c) for c in conditions], conditions), {"train runs": "16"}), truth
+    return cls.regressed(
+        identified([truth.model_at(c) for c in conditions], conditions), {"identification runs": "16"}
+    ), truth
 
 
 def close(found, wanted):
@@ -69,7 +71,7 @@ def test_the_reference_is_the_middle_of_the_motions_and_everything_is_kept():
         (0.3, REFERENCE.frequency_Hz, REFERENCE.amplitude_m)
     )
     close(found.coefficients, LEI)
-    assert (found.rig, dict(found.provenance)) == ("bench", {"train runs": "16"})
+    assert (found.rig, dict(found.provenance)) == ("bench", {"identification runs": "16"})
     assert found.envelope == Envelope.of(CONDITIONS)
     assert {n: found.numbers[n] for n in ("I_r", "f_r", "A_r", "fy0")} == pytest.approx(
         {"I_r": 0.3, "f_r": REFERENCE.frequency_Hz, "A_r": REFERENCE.amplitude_m, "fy0": 100.0}

@@ -90,7 +90,7 @@ def test_the_search_is_judged_by_parameters_on_either_side(factor, want):
     found = claims_on_fits.search(study_of(ended=ended))
     assert list(found.values) == pytest.approx([factor, factor])
     assert verdict("search", found) == want
-    assert verdict("search", claims_on_fits.search(study_of(ended=()))) == "cannot be judged"
+    assert verdict("search", claims_on_fits.search(study_of(ended=()))) == "cannot be checked"
 
 
 @pytest.mark.parametrize(("own", "want"), [(0.020, "agrees"), (0.028, "agrees in part"), (0.09, "differs")])
@@ -186,7 +186,7 @@ def test_presets_are_judged_by_what_is_left_and_not_by_the_effect():
     assert verdict("presets", claims_on_fits.presets(effects(0.01, 0.01, 1e-12))) == "agrees"
     assert verdict("presets", claims_on_fits.presets(effects(0.04, 0.01, 1e-12))) == "agrees in part"
     assert verdict("presets", claims_on_fits.presets(effects(0.4, 0.4, 0.4))) == "differs"
-    assert verdict("presets", claims_on_fits.presets(study_of(sensitivity=()))) == "cannot be judged"
+    assert verdict("presets", claims_on_fits.presets(study_of(sensitivity=()))) == "cannot be checked"
 
 
 def test_rising_shares_count_steps_at_one_motion_and_at_one_amplitude():

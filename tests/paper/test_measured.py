@@ -202,7 +202,7 @@ def test_a_claim_is_said_with_its_numbers_and_what_was_built_in_is_recovered():
     assert (built_in.verdict, built_in.said) == ("agrees", "recovered (built into the virtual damper)")
     assert open_.said == "agrees with the paper on the virtual damper"
     assert real.said == "agrees with the paper on this damper"
-    assert (values.verdict, values.said) == ("not judged", "values beside the paper's (virtual damper)")
+    assert (values.verdict, values.said) == ("not checked", "values beside the paper's (virtual damper)")
     assert (built_in.key, built_in.text, built_in.source, built_in.figure) == (
         "quadratic",
         "the text",

@@ -76,7 +76,7 @@ def test_every_claim_is_judged_with_numbers_and_its_threshold_printed(study):
     claims = {c.key: c for c in judge_all(study)}
     assert set(claims) == set(ROWS)
     for claim in claims.values():
-        assert claim.verdict == "cannot be judged" or any(ch.isdigit() for ch in claim.evidence), claim
+        assert claim.verdict == "cannot be checked" or any(ch.isdigit() for ch in claim.evidence), claim
         assert all(limit.text in claim.threshold for limit in ROWS[claim.key].limits)
     assert claims["viscosity"].verdict == "differs"
     assert claims["quadratic"].verdict == "agrees"
@@ -85,7 +85,7 @@ def test_every_claim_is_judged_with_numbers_and_its_threshold_printed(study):
     assert claims["phase"].said == "values beside the paper's (virtual damper)"
     assert claims["accuracy"].said == "differs from the paper on the virtual damper"
     # Without the comparators, claims that need them say so.
-    assert claims["few parameters"].verdict == "cannot be judged"
+    assert claims["few parameters"].verdict == "cannot be checked"
     assert "Ali's model could not be followed" in claims["few parameters"].evidence
 
 
@@ -230,7 +230,7 @@ def test_the_same_study_runs_on_real_data_whose_gas_spring_is_unknown(bundled, q
     assert found.friction is None
     assert not found.seed_errors
     assert any("the gas spring is unknown: k1 =" in note for note in found.notes)
-    assert all(c.said.endswith(" on this damper") or c.said == "cannot be judged" for c in judge_all(found))
+    assert all(c.said.endswith(" on this damper") or c.said == "cannot be checked" for c in judge_all(found))
     write_reproduction(found, tmp_path / "out")
     assert "fig03 is not drawn: the data hold no friction test" in (tmp_path / "out" / "reproduction.html").read_text(
         encoding="utf-8"
@@ -249,7 +249,7 @@ def test_thin_data_give_what_they_allow_and_say_why_the_rest_is_missing(
     found = reproduce(whole.only([*train, *held_out]), with_comparators=False)
     written = write_reproduction(found, tmp_path / "out")
     page = written[0].read_text(encoding="utf-8")
-    unjudged = [c for c in judge_all(found) if c.verdict == "cannot be judged"]
+    unjudged = [c for c in judge_all(found) if c.verdict == "cannot be checked"]
     assert unjudged
     assert all(c.evidence for c in unjudged)
     for path in (tmp_path / "out" / "tables").glob("*.csv"):
@@ -332,7 +332,7 @@ def test_the_direct_search_comes_near_on_an_easy_run():
 
 def test_what_cannot_be_studied_is_refused_with_the_remedy():
     dataset = virtual_dataset(currents=(1.0,))
-    with pytest.raises(IdentificationError, match="no train run"):
+    with pytest.raises(IdentificationError, match="no identification run"):
         reproduce(dataset.only(dataset.split("validate")))
     with pytest.raises(ParameterError, match="leaves no gas volume"):
         reproduce(dataset, gas=GasSpring(1.5e6, 1e-5, 3e-4))

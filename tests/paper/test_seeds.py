@@ -16,7 +16,7 @@ def test_a_seed_gives_the_errors_and_the_verdicts_of_its_own_noise(monkeypatch):
     first, other = (study._one_seed(loud, PaperOptions(), seed, lambda what, share: None) for seed in (1, 2))
     assert set(first.verdicts) == set(ROWS)
     assert first.verdicts["viscosity"] == other.verdicts["viscosity"] == "differs"
-    assert first.verdicts["search"] == "cannot be judged"
+    assert first.verdicts["search"] == "cannot be checked"
     for seed in (first, other):
         assert seed.errors[CONSISTENT] < 0.6 * seed.errors[LITERAL]
         assert not {JOINT, HALF} & set(seed.errors)

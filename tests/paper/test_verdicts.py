@@ -51,7 +51,7 @@ def test_the_thresholds_are_those_that_were_settled():
 def test_a_claim_holds_at_its_limits_and_not_beyond_the_wider_ones(key):
     assert judge(key, numbers(key, lambda x: x.holds)) == "agrees"
     assert judge(key, numbers(key, lambda x: beyond(x, x.near))) == "differs"
-    assert judge(key, numbers(key, lambda x: math.nan)) == "cannot be judged"
+    assert judge(key, numbers(key, lambda x: math.nan)) == "cannot be checked"
     for limit in LIMITS[key]:
         assert limit.text in thresholds(key)
         assert f"{limit.holds:g}" in thresholds(key)
@@ -66,8 +66,8 @@ def test_one_number_that_misses_makes_a_claim_hold_in_part(key, place):
     far = judge(key, [*good[:place], beyond(limit, limit.near), *good[place + 1 :]])
     others = any(x.alone for x in LIMITS[key] if x is not limit)
     assert far == ("agrees in part" if others else "differs")
-    assert judge(key, [*good[:place], math.nan, *good[place + 1 :]]) == "cannot be judged"
-    assert judge(key, good[1:]) == "cannot be judged"
+    assert judge(key, [*good[:place], math.nan, *good[place + 1 :]]) == "cannot be checked"
+    assert judge(key, good[1:]) == "cannot be checked"
 
 
 @pytest.mark.parametrize(("sense", "values"), [("below", (1.0, 1.5, 2.1)), ("above", (2.1, 1.5, 0.9))])
@@ -107,8 +107,8 @@ def test_a_limit_without_a_wider_one_is_its_own():
         ("agrees", ["agrees"] * 3, "3 of 3"),
         ("agrees", [*["differs"] * 2, "agrees", "agrees in part"], "1 of 4; 2 differs; 1 agrees in part"),
         ("agrees in part", ["agrees", "agrees"], "0 of 2; 2 agrees"),
-        ("agrees", ["cannot be judged"] * 2, ""),
-        ("cannot be judged", ["cannot be judged"] * 2, ""),
+        ("agrees", ["cannot be checked"] * 2, ""),
+        ("cannot be checked", ["cannot be checked"] * 2, ""),
         ("agrees", [], ""),
     ],
 )  # fmt: skip

@@ -267,7 +267,9 @@ def test_joint_ways_hand_on_what_their_fits_make(monkeypatch):
     monkeypatch.setattr(recipes, "fit_modified_jointly", lambda *given: asked.append(given) or (fit, "refit"))
     made_ = recipes.fit_functions_jointly("ab", identifications)
     assert (made_.damper, made_.refit, made_.fit) == ("damper", "refit", fit)
-    assert asked == [("ab", identifications, {"method": "balance", "train runs": "2", "functions": "global fit"})]
+    assert asked == [
+        ("ab", identifications, {"method": "balance", "identification runs": "2", "functions": "global fit"})
+    ]
     folds = SimpleNamespace(refit=lambda rows: SimpleNamespace(damper=("without", rows)))
     monkeypatch.setattr(recipes, "identify_jointly", lambda runs: SimpleNamespace(problem="problem", fit=fit))
     monkeypatch.setattr(recipes, "all_folds", lambda runs: [[0], [1]])
@@ -277,10 +279,10 @@ def test_joint_ways_hand_on_what_their_fits_make(monkeypatch):
     assert asked[-1] == ("problem", [[0], [1]])
     law = SimpleNamespace(basis="spencer", fit=lambda *given: given)
     made_ = recipes.fit_published(law, "abc", [7, 8, 9])
-    assert made_.damper == (["a", "b", "c"], [7, 8, 9], {"train runs": "3"})
-    assert made_.refit([2, 0]) == (["c", "a"], [9, 7], {"train runs": "3"})
+    assert made_.damper == (["a", "b", "c"], [7, 8, 9], {"identification runs": "3"})
+    assert made_.refit([2, 0]) == (["c", "a"], [9, 7], {"identification runs": "3"})
     law.basis = None
-    assert recipes.fit_published(law, "abc", []).damper == (["a", "b", "c"], [], {"train runs": "3"})
+    assert recipes.fit_published(law, "abc", []).damper == (["a", "b", "c"], [], {"identification runs": "3"})
 
 
 def test_steps_tell_how_far_they_are_and_take_pure_sines_where_they_must(monkeypatch):

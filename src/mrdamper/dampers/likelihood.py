@@ -74,7 +74,9 @@ class Likelihood:
         uncertainty: Uncertainty | None = whole.uncertainty
         if uncertainty is None or not uncertainty.names:
             raise InputError(
-                "these runs determine no number of the damper", remedy="give its train runs", code="E_CERTAINTY"
+                "these runs determine no parameter of the damper",
+                remedy="give the runs it was identified from",
+                code="E_CERTAINTY",
             )
         names, numbers = uncertainty.names, damper.fitted_parameters
         parts = tuple(RunResiduals.of(damper, run) for run in runs)

@@ -29,7 +29,7 @@ _CORRELATION_HOURS = (0.5, 1.0, 2.0, 4.0, 8.0)  # over which what an hour shares
 _MIN_RUN_SHARE = (
     0.2  # of the spread: each run has at least so much of its own, for the model misses every condition anew
 )
-_REMEDY = "record a condition twice a day, on three days or more; state recorded_at or session in runs.csv"
+_REMEDY = "repeat a condition on each of three days or more; state recorded_at or session in runs.csv"
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from mrdamper.paper import claims_on_fits, claims_on_tests
 from mrdamper.paper.claims_on_tests import Measured
 from mrdamper.paper.results import Reproduction
 
-Verdict = Literal["agrees", "agrees in part", "differs", "not judged", "cannot be judged"]
+Verdict = Literal["agrees", "agrees in part", "differs", "not checked", "cannot be checked"]
 Kind = Literal["method", "damper", "built in"]  # claim on the method, on the authors' damper, on what the virtual has
 _RECOVERED = {"agrees": "recovered", "agrees in part": "recovered in part", "differs": "not recovered"}
 
@@ -208,8 +208,8 @@ def judge_all(study: Reproduction) -> tuple[Claim, ...]:
 def _judged(study: Reproduction, key: str, row: _Row, measured: Measured) -> Claim:
     verdict, virtual = judge(key, measured.values), study.rig is not None
     text = in_words(verdict, row.kind, virtual=virtual)
-    if row.kind == "damper" and virtual and verdict != "cannot be judged":
-        verdict = "not judged"
+    if row.kind == "damper" and virtual and verdict != "cannot be checked":
+        verdict = "not checked"
     listed = [
         f"{limit.value} {value:.3g}" if math.isfinite(value) else f"{limit.value}: not tested"
         for limit, value in zip(row.limits, measured.values, strict=False)
@@ -238,7 +238,7 @@ def judge(key: str, values: Sequence[float]) -> Verdict:
         raise UnknownNameError.of("claim", key, ROWS)
     limits = ROWS[key].limits
     if len(values) != len(limits) or not all(map(math.isfinite, values)):
-        return "cannot be judged"
+        return "cannot be checked"
     grades = [limit.grade(value) for limit, value in zip(limits, values, strict=True)]
     if min(grades) == 2:
         return "agrees"
@@ -274,7 +274,7 @@ def thresholds(key: str) -> str:
 def steadiness(verdict: str, over_seeds: Sequence[str]) -> str:
     """Count the noise seeds with the same verdict and the other verdicts; empty where it was not judged again."""
     others = Counter(over_seeds)
-    if set(others) <= {"cannot be judged"}:
+    if set(others) <= {"cannot be checked"}:
         return ""
     same = others.pop(verdict, 0)
     return "; ".join([f"{same} of {len(over_seeds)}", *(f"{n} {other}" for other, n in others.most_common())])

@@ -54,7 +54,11 @@ def fit_paper_functions(
     runs: Sequence[Run], identifications: Sequence[Identification], mass_law: str = "exponential"
 ) -> FitResult:
     """Make the modified model of the paper from the identifications of single runs [Eq. 41–43]."""
-    about = {"method": "Qian et al. 2024, literal", "train runs": str(len(identifications)), "mass law": mass_law}
+    about = {
+        "method": "Qian et al. 2024, literal",
+        "identification runs": str(len(identifications)),
+        "mass law": mass_law,
+    }
     fit = paper_functions(identifications, mass_law, about)
 
     def refit(rows: Sequence[int]) -> Damper:

@@ -172,7 +172,9 @@ def _tests(
     train, held_out = (tuple(run for run in pure if run.split == split) for split in ("train", "validate"))
     if not train:
         raise IdentificationError(
-            "no train run with a steady sine", where=dataset.name, remedy="mark some in the split column of runs.csv"
+            "no identification run with a steady sine",
+            where=dataset.name,
+            remedy="mark some in the split column of runs.csv",
         )
     if not held_out:
         refused["every prediction"] = "no validate run with a steady sine; mark some in the split column of runs.csv"

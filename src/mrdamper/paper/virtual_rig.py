@@ -47,7 +47,7 @@ class VirtualRig:
     yield_per_ampere: float = param("N/A", "yield force gained per ampere, unsaturated", default=850.0)
     saturation_current: float = param("A", "current at which the magnetic circuit saturates", default=1.5)
     knee: float = param("m", "yield displacement", bounds=(0, np.inf), default=7e-4)
-    knee_sharpness: float = param("-", "exponent n of the knee", bounds=(1, 20), default=1.6)
+    knee_sharpness: float = param("-", "exponent n of the hysteresis", bounds=(1, 20), default=1.6)
     knee_asymmetry: float = param("-", "(gamma − beta)/(gamma + beta)", bounds=(-100, 1), default=-0.3)
     knee_lag: float = param("s", "time in which the hysteretic force follows", bounds=(0, np.inf), default=3e-3)
     viscosity: float = param("N s/m", "viscous damping at low speed", bounds=(0, np.inf), default=1300.0)
@@ -156,7 +156,7 @@ def virtual_dataset(
     Returns
     -------
     Dataset
-        20 mm at 1.0, 1.5, 2.0 Hz and 50 mm at 0.5, 1.0, 1.5 Hz as train runs, 80 mm at 1 Hz as validate runs.
+        20 mm at 1.0, 1.5, 2.0 Hz and 50 mm at 0.5, 1.0, 1.5 Hz for identification, 80 mm at 1 Hz for validation.
     """
     chosen = rig or VirtualRig()
     runs = []

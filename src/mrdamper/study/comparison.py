@@ -2,7 +2,7 @@
 
 A model is identified run by run, then made a damper over all conditions in its own way:
 parameter functions, the published laws over current, frequency and amplitude, or one joint
-fit. All are judged alike: on the train runs, on conditions left out, on held-out runs.
+fit. All are scored alike: on identification runs, on cross-validated conditions, on validation runs.
 """
 
 from __future__ import annotations

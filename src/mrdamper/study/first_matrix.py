@@ -1,4 +1,4 @@
-"""The first tests of a damper nobody has tested, a reason for every row."""
+"""First test matrix of a damper without tests, with a reason for every row."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def first_matrix(limits: Limits, hours: float) -> list[Proposal]:
         (i_low, f_mid, a_mid, "passive: viscous damping, friction and gas without the field"),
         (i_high, f_mid, a_mid, "full field at the same motion: the range of the yield force"),
         (i_low, f_low, a_mid, "slow and passive: offset, gas spring and friction, hardly any viscous force"),
-        (i_high, f_high, a_low, "short strokes, full field: play, seat and knee before the yield"),
+        (i_high, f_high, a_low, "short strokes, full field: free play and stiffness before yield"),
         (i_mid, f_mid, a_mid, "half the field: whether the yield force saturates"),
         (i_low, f_high, a_mid, "fast and passive: viscous damping and whether it thins"),
         (i_high, f_low, a_high, "long and slow, full field: the plateau of the yield force"),
         (i_high, f_high, a_mid, "fast, full field: damping that grows with current, and lag"),
         (i_low + 0.25 * (i_high - i_low), f_mid, a_mid, "a quarter of the field: where the yield force begins"),
-        (i_mid, f_low, a_low, "slow and short: rate dependence of the knee, apart from amplitude"),
+        (i_mid, f_low, a_low, "slow and short: rate dependence before yield, separated from amplitude"),
         (i_mid, f_high, a_low, "fast and short at half the field: frequency and amplitude apart"),
     ]
     repeat = (i_high, f_mid, a_mid, "a repeat in another session: how much sessions differ")

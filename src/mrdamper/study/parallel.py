@@ -128,7 +128,7 @@ class WorkerPool:
 
         Parameters
         ----------
-        steps : sequence of (Recipe, train runs)
+        steps : sequence of (Recipe, identification runs)
             The runs of one step are of one rig.
         held_out : mapping of rig to runs
         cache : mapping

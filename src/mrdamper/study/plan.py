@@ -132,7 +132,7 @@ class ExperimentDesign:
         uncertainty: Uncertainty | None = damper.uncertainty
         if uncertainty is None or not uncertainty.names:
             remedy = "study the tests again, or plan without a model"
-            raise InputError("the model does not know how sure it is", remedy=remedy, code="E_CERTAINTY")
+            raise InputError("the model was saved without its uncertainty", remedy=remedy, code="E_CERTAINTY")
         # What no run could tell is planned for too: anything within a factor, or what moves the force by all of it.
         unknown = [n for n in damper.fitted_parameters if n not in uncertainty.names and n not in uncertainty.one_sided]
         names = (*uncertainty.names, *unknown)

@@ -156,11 +156,11 @@ class RecipeResult:
     damper : Damper
     fit : ModifiedFit, JointFit or None
     identifications : tuple of Identification
-        Of the train runs; empty where nothing is identified from single runs.
+        Of the identification runs; empty where nothing is identified from single runs.
     per_run : float
         Median nrmse_pp of runs identified for themselves: what one run allows; NaN without.
     train, cross_validated, validation : Validation
-        Train runs; train runs predicted without their condition; held-out runs.
+        Identification runs; the same cross-validated by condition; validation runs.
     seconds : float
         Spent on identification and the fit over conditions.
     by_kind : mapping of str to Validation
@@ -217,13 +217,13 @@ def fit_and_score(
     train : sequence of Run, length N
         Of one rig; the damper is made of these.
     identifications : sequence of Identification
-        Of train runs, as `identified` gives them for the recipe's basis.
+        Of identification runs, as `identified` gives them for the recipe's basis.
     held_out : sequence of Run
         Predicted only.
     spent : float
         Seconds the identifications took.
     leave_out : bool
-        Predict every train run without its condition, too.
+        Predict every identification run without its condition, too.
     kinds : bool
         And without its current, the fastest motions, its session and other records.
 
@@ -280,7 +280,7 @@ def fit_and_score_all(
 
     Parameters
     ----------
-    steps : sequence of (Recipe, train runs)
+    steps : sequence of (Recipe, identification runs)
     held_out : sequence of Run
     progress : callable
     leave_out, kinds : bool
@@ -370,7 +370,7 @@ def fit_global_model(runs: Sequence[Run], identifications: Sequence[Identificati
 
 def fit_published(cls: Published, runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
     """The laws of a published damper, started from single runs and refined on all."""
-    about = {"train runs": str(len(runs))}
+    about = {"identification runs": str(len(runs))}
 
     def refit(rows: Sequence[int]) -> Damper:
         return cls.fit([runs[i] for i in rows], [identifications[i] for i in rows] if cls.basis else [], about)
@@ -529,4 +529,4 @@ def _closed_shapes() -> list[str]:
 
 
 def _about(runs: Sequence[Run], identifications: Sequence[Identification], functions: str) -> dict[str, str]:
-    return {"method": identifications[0].method, "train runs": str(len(runs)), "functions": functions}
+    return {"method": identifications[0].method, "identification runs": str(len(runs)), "functions": functions}

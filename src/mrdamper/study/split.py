@@ -63,7 +63,7 @@ def hold_out(
     before = [run.id for run in dataset if run.split == "validate"]
     if before and not replace:
         raise SplitError(
-            f"{len(before)} runs are held out already", where=where, remedy="give --replace to choose anew"
+            f"{len(before)} runs are validation runs already", where=where, remedy="give --replace to choose anew"
         )
     condition_of = {run.id: _condition(run) for run in dataset}
     held: set[str] = set()
@@ -161,8 +161,8 @@ def _stratified(condition_of: dict[str, Condition | None], where: str) -> tuple[
             taken[level] += 1
     if not chosen:
         raise SplitError(
-            "no condition can be held out without losing a current or a motion", where=where,
-            remedy="say which: --run, --current or --condition",
+            "every choice of validation runs would lose a current or a motion", where=where,
+            remedy="name the runs: --run, --current or --condition",
         )  # fmt: skip
     held = {names[i] for group in chosen for i in group}
     return held, f"stratified, {len(chosen)} of {len(groups)} conditions; every current and every motion stays in"

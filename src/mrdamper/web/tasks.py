@@ -65,7 +65,7 @@ def identify_rig(
     dataset : Dataset
         Of one rig.
     run_ids : sequence of str
-        Runs to identify from; empty for all train runs with a steady sine.
+        Runs to identify from; empty for all identification runs with a steady sine.
     model, method : str
     over : str
         How one damper is made of them: "functions" through the identified values, or "joint",

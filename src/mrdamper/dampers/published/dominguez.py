@@ -36,7 +36,7 @@ class DominguezType(ConditionedDamper):
     source: ClassVar[str] = "after Dominguez, Sedaghati and Stiharu 2008; equations not seen"
     unverified: ClassVar[str] = (
         "which coefficients carry the current and by which law, and that one power law of frequency and "
-        "amplitude multiplies the whole force; of the 16 numbers two only scale others"
+        "amplitude multiplies the whole force; of the 16 parameters two only scale others"
     )
     equation: ClassVar[str] = (
         r"F = s \left[c\,v + (k_1 + k_2 I)\,x + \alpha z\right] + f_0,\quad "

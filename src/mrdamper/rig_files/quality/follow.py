@@ -25,7 +25,7 @@ def motion_is_told(view: View) -> None:
             raise view.refused(
                 "E_NOISE",
                 f"the {name} is noise: it does not go on from sample to sample",
-                "check the sensor's cable and amplifier, and that the record has enough samples a cycle",
+                "check the sensor's cable and amplifier, and that the record has enough samples per cycle",
             )
     x = view.channels["displacement"]
     steps = np.abs(np.diff(x[np.isfinite(x)]))
@@ -33,8 +33,8 @@ def motion_is_told(view: View) -> None:
     if leaps > _LEAPS * float(np.sum(steps)):
         raise view.refused(
             "E_UNRESOLVED",
-            "the displacement leaps from sample to sample: no speed can be told",
-            "record at least eight samples a cycle, and a motion that the drive can follow",
+            "the displacement leaps from sample to sample: the speed cannot be determined",
+            "record at least eight samples per cycle, and a motion that the drive can follow",
         )
 
 

@@ -51,8 +51,7 @@ def dissipates(view: View) -> None:
             remedy = "say [channels.force] sign = -1 in a profile"
         raise view.refused(
             "E_DISSIPATION_SIGN",
-            f"the loop gives energy instead of taking it ({-100 * share:.0f} % of the force pushes along with the "
-            f"motion): {what}",
+            f"negative dissipated energy ({-100 * share:.0f} % of the force acts along the motion): {what}",
             remedy,
         )
 

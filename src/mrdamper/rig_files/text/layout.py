@@ -521,7 +521,7 @@ def _mismatch(
     return source.refuse(
         "E_AMBIGUOUS" if comma and fields % names == 0 else "E_FIELD_COUNT",
         f"{fields} fields under {names} names",
-        "decimal commas between commas cannot be told apart: export with semicolons or decimal points"
+        "decimal commas cannot be distinguished from separating commas: export with semicolons or decimal points"
         if comma
         else "export the file again with one name a column",
         line=first + 1,
