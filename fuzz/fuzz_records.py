@@ -29,7 +29,7 @@ from fuzz.synthetic_records import clean_record
 from mrdamper.errors import InputError, QualityError
 from mrdamper.physics.motion.harmonics import fundamental_frequency
 from mrdamper.physics.motion.measured import smooth
-from mrdamper.rig_files.quality import View, judge
+from mrdamper.rig_files.quality import View, check_record
 from mrdamper.rig_files.record import Record
 
 LARGE, MODERATE = 0.10, 0.05  # effects from which on faults are counted
@@ -56,7 +56,7 @@ class Trial:
 def codes_of(record: Record) -> frozenset[str]:
     """Return the codes of all findings, or of the refusal; CRASHED for any other exception."""
     try:
-        return frozenset(finding.code for finding in judge(record).findings)
+        return frozenset(finding.code for finding in check_record(record).findings)
     except QualityError as error:
         return frozenset({error.code})
     except Exception:

@@ -8,7 +8,7 @@ import pytest
 from mrdamper.data import Condition, Run
 from mrdamper.identification.harmonic_balance import ForceReading
 from mrdamper.paper import claims_on_fits, claims_on_tests
-from mrdamper.paper.claims import judge
+from mrdamper.paper.claims import verdict_on
 from mrdamper.paper.recipes import ALI, CONSISTENT, LITERAL, TRADITIONAL
 from mrdamper.paper.results import GeneticEnd
 from mrdamper.paper.sensitivity import OneAtATime
@@ -19,7 +19,7 @@ CONDITIONS = [Condition(I, f, A) for f, A in ((1.0, 0.02), (2.0, 0.02), (0.5, 0.
 
 
 def verdict(key, measured):
-    return judge(key, measured.values)
+    return verdict_on(key, measured.values)
 
 
 def study_of(readings=None, contenders=(), **more):

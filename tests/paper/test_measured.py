@@ -9,7 +9,7 @@ import pytest
 from mrdamper.data import Condition, Run
 from mrdamper.paper import claims, claims_on_fits, claims_on_tests
 from mrdamper.paper import results as found_module
-from mrdamper.paper.claims import judge_all
+from mrdamper.paper.claims import check_claims
 from mrdamper.paper.claims_on_tests import Measured, friction_along, lost_length
 from mrdamper.paper.recipes import ALI, CONSISTENT, DIRECT, LITERAL
 from mrdamper.paper.results import GeneticEnd, function_of
@@ -195,7 +195,7 @@ def test_a_claim_is_said_with_its_numbers_and_what_was_built_in_is_recovered():
         row = claims._Row("the text", "Eq. 23", "fig11", kind, measure, limits)
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(claims, "ROWS", {"quadratic": row})
-            return judge_all(study)[0]
+            return check_claims(study)[0]
 
     built_in, open_, values = (judged(kind, virtual) for kind in ("built in", "method", "damper"))
     real = judged("built in", study_of())

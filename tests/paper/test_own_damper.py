@@ -16,7 +16,7 @@ from support.command import mrdamper
 from mrdamper.dampers.model_file import load_model
 from mrdamper.data import Condition, Dataset, Run
 from mrdamper.errors import IdentificationError, ParameterError
-from mrdamper.paper.claims import judge_all
+from mrdamper.paper.claims import check_claims
 from mrdamper.paper.options import PaperOptions
 from mrdamper.paper.study import reproduce
 from mrdamper.physics.gas_spring import GasSpring
@@ -234,7 +234,7 @@ def test_a_damper_without_a_defect_at_the_stroke_end_does_not_show_one(monkeypat
     """After a reversal a Bouc–Wen damper's force is back after the same distance at every speed."""
     monkeypatch.setattr("mrdamper.paper.study.SOBOL_SAMPLES", 4)
     study = reproduce(matrix(currents=(1.0, 2.0)), GAS, with_comparators=False)
-    claim = next(claim for claim in judge_all(study) if claim.key == "stroke end")
+    claim = next(claim for claim in check_claims(study) if claim.key == "stroke end")
     assert (claim.verdict, claim.said) == ("differs", "differs from the paper on this damper"), claim.evidence
     assert study.rig is None
 

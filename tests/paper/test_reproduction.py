@@ -21,7 +21,7 @@ from mrdamper.identification import identify
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.paper import figures
 from mrdamper.paper import study as study_module
-from mrdamper.paper.claims import ROWS, judge_all
+from mrdamper.paper.claims import ROWS, check_claims
 from mrdamper.paper.claims_on_tests import friction_along, lost_length
 from mrdamper.paper.direct_genetic import DirectGenetic
 from mrdamper.paper.figures import FIGURES
@@ -73,7 +73,7 @@ def test_the_consistent_balance_predicts_what_the_literal_recipe_cannot(study):
 
 
 def test_every_claim_is_judged_with_numbers_and_its_threshold_printed(study):
-    claims = {c.key: c for c in judge_all(study)}
+    claims = {c.key: c for c in check_claims(study)}
     assert set(claims) == set(ROWS)
     for claim in claims.values():
         assert claim.verdict == "cannot be checked" or any(ch.isdigit() for ch in claim.evidence), claim
@@ -135,7 +135,7 @@ def test_the_study_is_written_whole_every_figure_under_its_number_with_its_conte
 
 
 def test_tables_1_and_2_hold_the_two_amplitudes_and_table_4_every_current(study):
-    tables, _ = all_tables(study, judge_all(study))
+    tables, _ = all_tables(study, check_claims(study))
     for name, amplitude in (("table1", 0.020), ("table2", 0.050)):
         rows = tables[name]
         assert len(rows) == 3 * len(CURRENTS)
@@ -193,7 +193,7 @@ def test_boxes_that_hold_no_optimum_leave_searches_unjudged(quick, undrawn, tmp_
     found = reproduce(chosen, options=PaperOptions(alpha_box=(0.0, 1.0), beta_box=(0.0, 1.0)))
     assert all(np.isfinite([end.alpha, end.beta]).all() for end in found.ended)
     assert len(found.ended) < len(found.train)
-    assert all(c.evidence for c in judge_all(found))
+    assert all(c.evidence for c in check_claims(found))
     write_reproduction(found, tmp_path / "out")
     for path in (tmp_path / "out" / "tables").glob("genetic*.csv"):
         assert ",inf" not in path.read_text(encoding="utf-8"), path.name
@@ -230,7 +230,7 @@ def test_the_same_study_runs_on_real_data_whose_gas_spring_is_unknown(bundled, q
     assert found.friction is None
     assert not found.seed_errors
     assert any("the gas spring is unknown: k1 =" in note for note in found.notes)
-    assert all(c.said.endswith(" on this damper") or c.said == "cannot be checked" for c in judge_all(found))
+    assert all(c.said.endswith(" on this damper") or c.said == "cannot be checked" for c in check_claims(found))
     write_reproduction(found, tmp_path / "out")
     assert "fig03 is not drawn: the data hold no friction test" in (tmp_path / "out" / "reproduction.html").read_text(
         encoding="utf-8"
@@ -249,7 +249,7 @@ def test_thin_data_give_what_they_allow_and_say_why_the_rest_is_missing(
     found = reproduce(whole.only([*train, *held_out]), with_comparators=False)
     written = write_reproduction(found, tmp_path / "out")
     page = written[0].read_text(encoding="utf-8")
-    unjudged = [c for c in judge_all(found) if c.verdict == "cannot be checked"]
+    unjudged = [c for c in check_claims(found) if c.verdict == "cannot be checked"]
     assert unjudged
     assert all(c.evidence for c in unjudged)
     for path in (tmp_path / "out" / "tables").glob("*.csv"):

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from mrdamper.errors import UnknownNameError
-from mrdamper.paper.claims import ROWS, ClaimLimit, _above, _below, judge, steadiness, thresholds
+from mrdamper.paper.claims import ROWS, ClaimLimit, _above, _below, steadiness, thresholds, verdict_on
 
 LIMITS = {key: row.limits for key, row in ROWS.items()}
 
@@ -49,9 +49,9 @@ def test_the_thresholds_are_those_that_were_settled():
 
 @pytest.mark.parametrize("key", LIMITS)
 def test_a_claim_holds_at_its_limits_and_not_beyond_the_wider_ones(key):
-    assert judge(key, numbers(key, lambda x: x.holds)) == "agrees"
-    assert judge(key, numbers(key, lambda x: beyond(x, x.near))) == "differs"
-    assert judge(key, numbers(key, lambda x: math.nan)) == "cannot be checked"
+    assert verdict_on(key, numbers(key, lambda x: x.holds)) == "agrees"
+    assert verdict_on(key, numbers(key, lambda x: beyond(x, x.near))) == "differs"
+    assert verdict_on(key, numbers(key, lambda x: math.nan)) == "cannot be checked"
     for limit in LIMITS[key]:
         assert limit.text in thresholds(key)
         assert f"{limit.holds:g}" in thresholds(key)
@@ -62,12 +62,12 @@ def test_one_number_that_misses_makes_a_claim_hold_in_part(key, place):
     good = numbers(key, lambda x: x.holds)
     limit = LIMITS[key][place]
     if limit.near != limit.holds:
-        assert judge(key, [*good[:place], beyond(limit, limit.holds), *good[place + 1 :]]) == "agrees in part"
-    far = judge(key, [*good[:place], beyond(limit, limit.near), *good[place + 1 :]])
+        assert verdict_on(key, [*good[:place], beyond(limit, limit.holds), *good[place + 1 :]]) == "agrees in part"
+    far = verdict_on(key, [*good[:place], beyond(limit, limit.near), *good[place + 1 :]])
     others = any(x.alone for x in LIMITS[key] if x is not limit)
     assert far == ("agrees in part" if others else "differs")
-    assert judge(key, [*good[:place], math.nan, *good[place + 1 :]]) == "cannot be checked"
-    assert judge(key, good[1:]) == "cannot be checked"
+    assert verdict_on(key, [*good[:place], math.nan, *good[place + 1 :]]) == "cannot be checked"
+    assert verdict_on(key, good[1:]) == "cannot be checked"
 
 
 @pytest.mark.parametrize(("sense", "values"), [("below", (1.0, 1.5, 2.1)), ("above", (2.1, 1.5, 0.9))])
@@ -78,7 +78,7 @@ def test_a_limit_grades_by_its_sense(sense, values):
 
 def test_unknown_claims_are_refused():
     with pytest.raises(UnknownNameError):
-        judge("weather", [])
+        verdict_on("weather", [])
 
 
 def test_how_well_a_function_fits_says_nothing_by_itself():
@@ -90,9 +90,9 @@ def test_how_well_a_function_fits_says_nothing_by_itself():
     }  # fmt: skip
     for key in ("mass", "alpha", "beta"):
         fits = numbers(key, lambda x: beyond(x, x.near) if x.alone else x.holds)
-        assert judge(key, fits) == "differs"
+        assert verdict_on(key, fits) == "differs"
         misfits = numbers(key, lambda x: x.holds if x.alone else beyond(x, x.near))
-        assert judge(key, misfits) == "agrees in part"
+        assert verdict_on(key, misfits) == "agrees in part"
 
 
 def test_a_limit_without_a_wider_one_is_its_own():

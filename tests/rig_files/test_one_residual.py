@@ -114,11 +114,11 @@ def test_a_fault_of_a_size_that_matters_is_found(kind):
 
 
 def test_findings_state_their_effect_in_per_cent():
-    from mrdamper.rig_files.quality import judge
+    from mrdamper.rig_files.quality import check_record
 
     for name in ("mains hum, 50 Hz, on the force", "gain of the force drifts", "force clipped before noise"):
         kind = next(kind for kind in KINDS if kind.name == name)
-        found = judge(kind.change(sine_record(), SEVERE[name], np.random.default_rng(3))).findings
+        found = check_record(kind.change(sine_record(), SEVERE[name], np.random.default_rng(3))).findings
         assert any("%" in finding.text for finding in found), name
 
 

@@ -9,7 +9,7 @@ from support import rig_detection as rig
 from support.rig_records import chirp_record, clean_record, codes_of, random_record, with_channel
 
 from mrdamper.physics.motion import analyse_motion
-from mrdamper.rig_files.quality import judge
+from mrdamper.rig_files.quality import check_record
 from mrdamper.rig_files.quality.table import record_of
 
 
@@ -80,7 +80,7 @@ def test_a_gap_in_time_splits_the_record(good):
         time[300:] += 0.3
         time[500:] += 0.1
 
-    judged = judge(replace(with_channel(good, "time", leap), velocity=None))
+    judged = check_record(replace(with_channel(good, "time", leap), velocity=None))
     assert judged.findings[0].code == "W_TIME_GAP"
     assert judged.segments == ((0, 300), (300, 500), (500, 801))
 
@@ -100,11 +100,11 @@ def test_a_gap_brings_no_other_finding():
 
 
 def test_a_record_without_gap_is_one_segment(good):
-    assert judge(good).segments == ((0, good.time.size),)
+    assert check_record(good).segments == ((0, good.time.size),)
 
 
 def test_channels_are_not_changed(good):
-    judged = judge(good)
+    judged = check_record(good)
     for name in ("time", "displacement", "force", "velocity"):
         assert getattr(judged, name) is getattr(good, name)
 

@@ -9,7 +9,7 @@ from support import rig_detection as rig
 from support.rig_records import clean_record, codes_of, random_record, with_channel
 
 from mrdamper.errors import QualityError
-from mrdamper.rig_files.quality import judge
+from mrdamper.rig_files.quality import check_record
 
 
 @pytest.fixture
@@ -22,7 +22,7 @@ def test_infinite_values_are_refused(good):
         force[17] = np.inf
 
     with pytest.raises(QualityError, match="sample 17") as caught:
-        judge(with_channel(good, "force", overflow))
+        check_record(with_channel(good, "force", overflow))
     assert caught.value.code == "E_NONFINITE"
 
 
@@ -46,7 +46,7 @@ def test_samples_missing_in_turn_from_one_channel_and_the_other_are_a_hole(good)
         values[first : first + 8 : 2] = np.nan
         record = replace(record, **{name: values})
     with pytest.raises(QualityError, match="8 samples in a row") as caught:
-        judge(record)
+        check_record(record)
     assert caught.value.code == "E_MISSING"
 
 
@@ -55,7 +55,7 @@ def test_a_few_missing_samples_are_counted(good):
         values[50:55] = np.nan
         values[300] = np.nan
 
-    judged = judge(with_channel(good, "force", lose))
+    judged = check_record(with_channel(good, "force", lose))
     assert [finding.code for finding in judged.findings] == ["W_MISSING"]
     assert "6 of 801" in judged.findings[0].text
     assert "5 in a row" in judged.findings[0].text
@@ -115,7 +115,7 @@ def test_repeated_time_stamps_are_refused(good):
         time[120] = time[119]
 
     with pytest.raises(QualityError, match="sample 120") as caught:
-        judge(with_channel(good, "time", repeat))
+        check_record(with_channel(good, "time", repeat))
     assert caught.value.code == "E_TIME_DUPLICATE"
 
 
@@ -125,7 +125,7 @@ def test_time_running_backwards_is_refused_with_its_line(good):
 
     record = replace(with_channel(good, "time", swap), lines=np.arange(good.time.size) + 3)
     with pytest.raises(QualityError, match="line 204") as caught:
-        judge(record)
+        check_record(record)
     assert caught.value.code == "E_TIME_ORDER"
 
 
@@ -162,7 +162,7 @@ def test_the_message_tells_exchanged_columns_from_a_wrong_sign():
             ("exchanged", replace(record, displacement=record.force * 1e-4, force=record.displacement * 1e4)),
         ):
             with pytest.raises(QualityError) as caught:
-                judge(wrong)
+                check_record(wrong)
             told[name] += name in str(caught.value)
     assert told["opposite"] >= 38
     assert told["exchanged"] >= 38
@@ -182,7 +182,7 @@ def test_units_out_of_all_proportion_are_refused(good, change, what):
     (name, factor) = next(iter(change.items()))
     values = getattr(good, name) * factor + (1e3 if name == "current" else 0.0)
     with pytest.raises(QualityError, match=what) as caught:
-        judge(replace(good, **{name: values}, velocity=None))
+        check_record(replace(good, **{name: values}, velocity=None))
     assert caught.value.code == "E_RANGE"
 
 
@@ -196,13 +196,13 @@ def test_a_late_velocity_channel_is_refused_with_its_lag():
 )
 def test_a_velocity_of_wrong_sign_or_unit_is_refused(good, factor, what):
     with pytest.raises(QualityError, match=what) as caught:
-        judge(replace(good, velocity=factor * good.velocity))
+        check_record(replace(good, velocity=factor * good.velocity))
     assert caught.value.code == "E_CHANNEL_LAG"
 
 
 def test_another_quantity_under_the_name_of_velocity_is_refused(good):
     with pytest.raises(QualityError, match="not the derivative") as caught:
-        judge(replace(good, velocity=np.random.default_rng(1).standard_normal(good.time.size)))
+        check_record(replace(good, velocity=np.random.default_rng(1).standard_normal(good.time.size)))
     assert caught.value.code == "E_CHANNEL_LAG"
 
 
@@ -216,13 +216,13 @@ def test_a_late_velocity_is_found_on_random_motion():
     velocity = np.gradient(record.displacement, record.time)
     assert codes_of(replace(record, velocity=velocity)) == ["W_NOT_SINE"]
     with pytest.raises(QualityError, match=r"\b(9\.9|10|10\.[01])\d* ms behind"):
-        judge(replace(record, velocity=np.interp(record.time - 0.01, record.time, velocity)))
+        check_record(replace(record, velocity=np.interp(record.time - 0.01, record.time, velocity)))
 
 
 def test_time_of_day_past_midnight_is_named(good):
     clock = (86_399.0 + good.time - good.time[0]) % 86_400.0
     with pytest.raises(QualityError, match="midnight") as caught:
-        judge(replace(good, time=clock))
+        check_record(replace(good, time=clock))
     assert caught.value.code == "E_TIME_ORDER"
 
 

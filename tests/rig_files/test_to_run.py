@@ -11,7 +11,7 @@ from mrdamper.errors import ColumnError, ExcitationError, QualityError
 from mrdamper.identification import identify
 from mrdamper.physics.motion import analyse_motion
 from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
-from mrdamper.rig_files.quality import judge
+from mrdamper.rig_files.quality import check_record
 from mrdamper.rig_files.quality.table import quality_table, record_of, row
 from mrdamper.rig_files.to_run import to_run
 
@@ -126,8 +126,8 @@ def test_findings_and_provenance_survive_on_disk(record, tmp_path):
 
 
 def test_a_run_gets_the_same_verdict_again(record):
-    first = judge(record)
-    again = judge(record_of(to_run(first)))
+    first = check_record(record)
+    again = check_record(record_of(to_run(first)))
     assert [f.code for f in again.findings] == [f.code for f in first.findings]
 
 

@@ -1,4 +1,4 @@
-"""A study, a comparison and an identification judge stored runs as the import does."""
+"""A study, a comparison and an identification check stored runs as the import does."""
 
 from dataclasses import replace
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.errors import QualityError
 from mrdamper.physics.motion import analyse_motion
-from mrdamper.rig_files.quality import judge
+from mrdamper.rig_files.quality import check_record
 from mrdamper.rig_files.quality.table import record_of
 from mrdamper.rig_files.record import Record
 from mrdamper.rig_files.to_run import to_run
@@ -155,7 +155,7 @@ def late_velocity_found(count: int, seed: int = 5) -> Rate:
 def stated_lag(record: Record) -> float | None:
     """Lag of the velocity channel [s] for which a record is refused, None if it is not."""
     try:
-        judge(record)
+        check_record(record)
     except QualityError as error:
         words = error.found.split()
         if error.code == "E_CHANNEL_LAG" and "ms" in words:

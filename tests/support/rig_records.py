@@ -8,7 +8,7 @@ from mrdamper.errors import QualityError
 from mrdamper.models import model_type
 from mrdamper.physics.motion import Excitation, random_motion, sweep
 from mrdamper.physics.simulation import simulate
-from mrdamper.rig_files.quality import judge
+from mrdamper.rig_files.quality import check_record
 from mrdamper.rig_files.record import Record
 
 
@@ -121,7 +121,7 @@ def _of(motion, seed, noise, kind):
 def codes_of(record):
     """Codes of what judging a record finds, or of what refuses it."""
     try:
-        return [finding.code for finding in judge(record).findings]
+        return [finding.code for finding in check_record(record).findings]
     except QualityError as error:
         return [error.code]
 

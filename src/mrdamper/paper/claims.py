@@ -2,9 +2,9 @@
 
 A claim agrees where each of its values meets its limit, agrees in part where some do or come within the wider limit,
 and differs where none comes near. The quality of a fit must be good enough for a claim to agree, but is no support by
-itself. A claim without all of its values cannot be judged. A property that the virtual damper was built with is
-recovered, in part, or not; a claim on the authors' own damper is not judged on the virtual one: values stand beside the
-paper's.
+itself. A claim without all of its values cannot be checked. A property that the virtual damper was built with is
+recovered, in part, or not; a claim on the authors' own damper is not checked on the virtual one: values stand beside
+the paper's.
 """
 
 from __future__ import annotations
@@ -178,7 +178,7 @@ class Claim:
     text, source : str
         The claim; equation or section of Qian et al. 2024.
     verdict : str
-        By `judge`.
+        By `verdict_on`.
     said : str
         The verdict for a reader, with the damper it rests on.
     evidence, threshold : str
@@ -186,7 +186,7 @@ class Claim:
     figure : str
         Name of the figure that shows it.
     seeds : str
-        Number of noise seeds with the same verdict, and the other verdicts; empty where it was judged once.
+        Number of noise seeds with the same verdict, and the other verdicts; empty where it was checked once.
     """
 
     key: str
@@ -200,13 +200,13 @@ class Claim:
     seeds: str
 
 
-def judge_all(study: Reproduction) -> tuple[Claim, ...]:
-    """Measure and judge every claim; one that the data do not allow states why."""
-    return tuple(_judged(study, key, row, row.measure(study)) for key, row in ROWS.items())
+def check_claims(study: Reproduction) -> tuple[Claim, ...]:
+    """Measure and check every claim; one that the data do not allow states why."""
+    return tuple(_checked(study, key, row, row.measure(study)) for key, row in ROWS.items())
 
 
-def _judged(study: Reproduction, key: str, row: _Row, measured: Measured) -> Claim:
-    verdict, virtual = judge(key, measured.values), study.rig is not None
+def _checked(study: Reproduction, key: str, row: _Row, measured: Measured) -> Claim:
+    verdict, virtual = verdict_on(key, measured.values), study.rig is not None
     text = in_words(verdict, row.kind, virtual=virtual)
     if row.kind == "damper" and virtual and verdict != "cannot be checked":
         verdict = "not checked"
@@ -219,7 +219,7 @@ def _judged(study: Reproduction, key: str, row: _Row, measured: Measured) -> Cla
     return Claim(key, row.text, row.source, verdict, text, evidence, thresholds(key), row.figure, seeds)
 
 
-def judge(key: str, values: Sequence[float]) -> Verdict:
+def verdict_on(key: str, values: Sequence[float]) -> Verdict:
     """Return the verdict on a claim.
 
     Parameters
@@ -272,7 +272,7 @@ def thresholds(key: str) -> str:
 
 
 def steadiness(verdict: str, over_seeds: Sequence[str]) -> str:
-    """Count the noise seeds with the same verdict and the other verdicts; empty where it was not judged again."""
+    """Count the noise seeds with the same verdict and the other verdicts; empty where it was not checked again."""
     others = Counter(over_seeds)
     if set(others) <= {"cannot be checked"}:
         return ""

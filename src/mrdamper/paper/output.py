@@ -19,7 +19,7 @@ from mrdamper.errors import InputError
 from mrdamper.identification.harmonic_balance import SineRecord
 from mrdamper.models import Model, model_type
 from mrdamper.models.bouc_wen import BoucWen
-from mrdamper.paper.claims import Claim, judge_all
+from mrdamper.paper.claims import Claim, check_claims
 from mrdamper.paper.figures import FIGURES, caption, pictures
 from mrdamper.paper.recipes import ALI, CONSISTENT, DIRECT, LITERAL, TRADITIONAL
 from mrdamper.paper.results import Reproduction, cost_per_run, rate_rows
@@ -65,7 +65,7 @@ def write_reproduction(
     OutputError
         If the folder cannot be written to.
     """
-    claims, names, parts = judge_all(study), tuple(FIGURES), 2 * processes.count
+    claims, names, parts = check_claims(study), tuple(FIGURES), 2 * processes.count
     drawn: dict[str, Picture | str] = {}
     draw = partial(pictures, study, ("png",) if png else ())
     for part in processes.map(draw, [names[n::parts] for n in range(parts)], progress):
@@ -112,7 +112,7 @@ def summary(study: Reproduction) -> dict[str, Any]:
     return {
         "synthetic": study.rig is not None,
         "verdicts": method_rows(study),
-        "claims": [{key: getattr(c, name) for key, name in names.items()} for c in judge_all(study)],
+        "claims": [{key: getattr(c, name) for key, name in names.items()} for c in check_claims(study)],
         "notes": list(study.notes),
         "times": time_rows(study),
     }

@@ -24,7 +24,7 @@ from mrdamper.identification.methods.balance import Balance
 from mrdamper.models import model_type
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.paper.assumptions import PaperAssumptions, missing_functions, outside_paper_range
-from mrdamper.paper.claims import judge_all
+from mrdamper.paper.claims import check_claims
 from mrdamper.paper.direct_genetic import DirectGenetic
 from mrdamper.paper.genetic import GeneticSettings
 from mrdamper.paper.options import PaperOptions
@@ -360,5 +360,5 @@ def _one_seed(rig: VirtualRig, options: PaperOptions, seed: int, progress: Progr
     steps = recipes_of_paper(study.train, study.held_out, assumptions, options, explain=False)
     quick = [step for step in steps if step[0].title not in (JOINT, HALF)]
     contenders, _ = fit_and_score_all(quick, study.held_out, leave_out=False)
-    claims = judge_all(replace(study, contenders=tuple(contenders)))
+    claims = check_claims(replace(study, contenders=tuple(contenders)))
     return _Seed({c.recipe.title: c.validation.median() for c in contenders}, {c.key: c.verdict for c in claims})

@@ -23,17 +23,17 @@ _ONCE = ("W_CURRENT_VARIES",)  # judged over the whole record: parts may each ho
 _Verdict = tuple[tuple[Finding, ...], tuple[tuple[int, int], ...], InputError | None]
 
 
-def judge_long(record: Record, judge: Callable[[Record], Record]) -> Record:
+def check_long_record(record: Record, check: Callable[[Record], Record]) -> Record:
     """Judge a record, whose channels may be memory-mapped, part by part; one of a few parts' length as one.
 
-    Raises as `judge`; that nothing moves, only if nothing moves in any part.
+    Raises as `check`; that nothing moves, only if nothing moves in any part.
     """
     if record.time.size <= 2 * PART:
-        return judge(record)
+        return check(record)
     finding_of: dict[str, tuple[Finding, int]] = {}
     segments: list[tuple[int, int]] = []
     moving, resting, count = 0, None, 0
-    for start, (noticed, ranges, error) in _judged_parts(record, judge):
+    for start, (noticed, ranges, error) in _checked_parts(record, check):
         count += 1
         moving += error is None
         resting = resting or error
@@ -47,14 +47,14 @@ def judge_long(record: Record, judge: Callable[[Record], Record]) -> Record:
     return replace(record, findings=findings, segments=tuple(segments))
 
 
-def _judged_parts(record: Record, judge: Callable[[Record], Record]) -> Iterator[tuple[int, _Verdict]]:
+def _checked_parts(record: Record, check: Callable[[Record], Record]) -> Iterator[tuple[int, _Verdict]]:
     """Start of every part and what came of it, in order, two judged at once."""
 
     def one(part: Record) -> _Verdict:
         try:
             with np.errstate(all="ignore"):  # each thread has its own
-                judged = judge(part)
-            return judged.findings, judged.segments, None
+                checked = check(part)
+            return checked.findings, checked.segments, None
         except InputError as error:
             if error.code not in _MAY_REST:
                 raise

@@ -14,7 +14,7 @@ from mrdamper.data import Dataset
 from mrdamper.errors import ColumnError, CombinedError, InputError
 from mrdamper.rig_files.file_records import records_of_file
 from mrdamper.rig_files.folder import files_in, is_left_out
-from mrdamper.rig_files.long_records import judge_long
+from mrdamper.rig_files.long_records import check_long_record
 from mrdamper.rig_files.mapping.agreement import contradictions
 from mrdamper.rig_files.mapping.companions import (
     contradictions_with,
@@ -56,7 +56,7 @@ class ImportResult:
 
 
 def read_run(path: str | Path, profile: Profile | str | Path | None = None) -> Record:
-    """Read one test from a rig's file and judge it.
+    """Read one test from a rig's file and check it.
 
     Parameters
     ----------
@@ -88,13 +88,13 @@ def read_run(path: str | Path, profile: Profile | str | Path | None = None) -> R
 
 
 def read_runs(path: str | Path, profile: Profile | str | Path | None = None) -> tuple[Record, ...]:
-    """Read every test of a rig's file and judge it: testing machines record several blocks; as `read_run`."""
-    from mrdamper.rig_files.quality import judge
+    """Read every test of a rig's file and check it: testing machines record several blocks; as `read_run`."""
+    from mrdamper.rig_files.quality import check_record
 
     with np.errstate(all="ignore"):  # numbers near the end of the range overflow in sums and are refused as such
         records, problems = records_of_file(Path(path), profile_of(profile))
         CombinedError.raise_from(problems)
-        return tuple(judge_long(record, judge) for record in records)
+        return tuple(check_long_record(record, check_record) for record in records)
 
 
 @contextlib.contextmanager
@@ -111,7 +111,7 @@ def import_files(
     tests: str | Path | TestsTable | None = None,
     progress: Callable[[str, float], None] = lambda what, share: None,
 ) -> ImportResult:
-    """Read and judge files and folders of files; a refused file or test does not stop the others.
+    """Read and check files and folders of files; a refused file or test does not stop the others.
 
     Parameters
     ----------
@@ -211,19 +211,19 @@ class _Intake:
                 self._check(path, completed, problems, several=len(records) > 1)
 
     def _check(self, path: Path, record: Record, problems: list[InputError], *, several: bool) -> None:
-        from mrdamper.rig_files.quality import judge
+        from mrdamper.rig_files.quality import check_record
 
-        judged = record
-        for step in (_with_current, lambda record: judge_long(record, judge)):
+        checked = record
+        for step in (_with_current, lambda record: check_long_record(record, check_record)):
             try:
                 with np.errstate(all="ignore"):
-                    judged = step(judged)
+                    checked = step(checked)
             except InputError as error:
                 problems.append(error)
         where = f"{path}, {record.id}" if several else str(path)
         self.refusals += [Refusal(where, problem, record.id) for problem in problems]
         if not problems:
-            self._found.append((self._order[str(path)], judged))
+            self._found.append((self._order[str(path)], checked))
 
     def join(self) -> None:
         """Join tests with what other files state of them, check what was waiting, and compare tests with each other."""
@@ -299,7 +299,7 @@ class _Intake:
 def found_tests(
     paths: Iterable[str | Path], profile: Profile | str | Path | None = None
 ) -> tuple[tuple[Record, ...], tuple[Refusal, ...]]:
-    """Every test that files hold, not judged, and the files that cannot be read: for a table of tests."""
+    """Every test that files hold, unchecked, and the files that cannot be read: for a table of tests."""
     records: list[Record] = []
     refusals: list[Refusal] = []
     with unpacked(paths) as given:

@@ -1,4 +1,4 @@
-"""From a table of a rig's file to a record: channels in SI, delays taken off, current found."""
+"""From a table of a rig's file to a record: channels in SI, delays subtracted, current found."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
         others = {name: values[stretch] for name, values in further.items()}
         part, its_lines = _aligned(part, assigned, None if lines is None else lines.part(stretch.start, stretch.stop))
         if its_lines is not None and len(its_lines) != stretch.stop - stretch.start:
-            others = {}  # delays were taken off: the samples are no longer those of the file
+            others = {}  # delays were subtracted: the samples are no longer those of the file
         if profile.correction is not None:
             others["force_raw_N"] = part["force"]
             part["force"], remarks["force_correction"] = corrected_force(part, profile.correction)
@@ -167,7 +167,7 @@ def corrected_force(channels: dict[str, Floats], correction: Correction) -> tupl
     acceleration = measured if measured is not None else _curvature(channels["time"], channels["displacement"])
     force = channels["force"] - correction.moving_mass_kg * acceleration + correction.gas_force_N
     whence = "the accelerometer" if measured is not None else "the displacement"
-    notes = [f"{correction.moving_mass_kg:g} kg times acceleration by {whence} taken off"] * bool(
+    notes = [f"{correction.moving_mass_kg:g} kg times acceleration by {whence} subtracted"] * bool(
         correction.moving_mass_kg
     )
     notes += [f"{correction.gas_force_N:g} N of gas force added"] * bool(correction.gas_force_N)

@@ -9,7 +9,7 @@ import numpy as np
 from mrdamper.data import Run
 from mrdamper.data.pieces import pieces, release
 from mrdamper.errors import ColumnError, RunError
-from mrdamper.rig_files.quality import judge
+from mrdamper.rig_files.quality import check_record
 from mrdamper.rig_files.quality.loop import repeatability
 from mrdamper.rig_files.quality.motion import steady_window
 from mrdamper.rig_files.quality.view import SHORTEST, View
@@ -39,7 +39,7 @@ def to_run(record: Record) -> Run:
         If under three samples are left.
     """
     if not record.segments:
-        record = judge(record)
+        record = check_record(record)
     if record.current is None:
         raise ColumnError("no current", where=f"run {record.id}", remedy="name its column or value in the rig profile")
     keep = _kept(record)

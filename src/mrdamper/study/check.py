@@ -10,7 +10,7 @@ from typing import Any, Concatenate, Literal, ParamSpec
 from mrdamper import identification
 from mrdamper.data import Dataset, Displayable, Run
 from mrdamper.errors import InputError, checked
-from mrdamper.rig_files.quality.table import judged, with_findings
+from mrdamper.rig_files.quality.table import check_run, with_findings
 from mrdamper.study.contradictions import ContradictionError, find_contradictions
 from mrdamper.study.workflow import accepted_runs
 
@@ -123,7 +123,7 @@ def check(dataset: Dataset) -> DatasetCheck:
 
 
 def _of_run(run: Run) -> list[DatasetFinding]:
-    refusal, noted = judged(run)
+    refusal, noted = check_run(run)
     findings = [DatasetFinding(run.id, run.rig, finding.code, "noted", str(finding)) for finding in noted]
     if isinstance(refusal, InputError):
         findings.append(DatasetFinding(run.id, run.rig, refusal.code, "refused", str(refusal)))
@@ -147,7 +147,7 @@ def _of_accepted_runs(
     def identify_accepted(run: Run, *args: P.args, **kwargs: P.kwargs) -> identification.Identification:
         if not isinstance(run, Run):
             return identify_run(run, *args, **kwargs)  # says what to give instead
-        refusal, noted = judged(run)
+        refusal, noted = check_run(run)
         if refusal is not None:
             raise refusal
         result = identify_run(with_findings(run), *args, **kwargs)

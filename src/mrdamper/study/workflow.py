@@ -28,7 +28,7 @@ from mrdamper.identification import refuse_clipped
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, at_levels, dynamic_ranges
 from mrdamper.models import all_models
 from mrdamper.physics.motion import analyse_motion, equivalent_sine
-from mrdamper.rig_files.quality.table import judged, with_findings
+from mrdamper.rig_files.quality.table import check_run, with_findings
 from mrdamper.statistics.functions.selection import mean_error, smaller_wins
 from mrdamper.study.contradictions import Contradiction, find_contradictions
 from mrdamper.study.dissipation import gains_energy
@@ -464,7 +464,7 @@ def accepted_runs(dataset: Iterable[Run]) -> tuple[list[Run], dict[str, str]]:
     refused: dict[str, str] = {}
     for run in dataset:
         twin = next((other.id for other in kept if _are_one_test(run, other)), None)
-        error, _ = judged(run)
+        error, _ = check_run(run)
         if twin is not None:
             refused[run.id] = f"the same samples as run {twin}: a test counts once [E_TWICE]"
         elif error is not None:

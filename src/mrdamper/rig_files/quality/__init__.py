@@ -37,7 +37,7 @@ from mrdamper.rig_files.quality import (
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding, Record
 
-__all__ = ["CHECKS", "QualityError", "View", "judge"]
+__all__ = ["CHECKS", "QualityError", "View", "check_record"]
 
 Check = Callable[[View], Iterable[Finding] | None]
 
@@ -89,7 +89,7 @@ def _dropped_in() -> tuple[Check, ...]:
     return tuple(module.check for _, module in modules_with("mrdamper.checks", "check"))
 
 
-def judge(record: Record, without: Collection[Check] = ()) -> Record:
+def check_record(record: Record, without: Collection[Check] = ()) -> Record:
     """Run every check on a record.
 
     Parameters

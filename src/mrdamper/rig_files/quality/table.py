@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data import Condition, Run, once_per_run
 from mrdamper.errors import QualityError
-from mrdamper.rig_files.quality import judge
+from mrdamper.rig_files.quality import check_record
 from mrdamper.rig_files.quality.current import held_in
 from mrdamper.rig_files.quality.follow import force_follows
 from mrdamper.rig_files.quality.force_lag import force_channel
@@ -73,13 +73,13 @@ def record_of(run: Run) -> Record:
 
 
 @once_per_run
-def judged(run: Run) -> tuple[QualityError | None, tuple[Finding, ...]]:
+def check_run(run: Run) -> tuple[QualityError | None, tuple[Finding, ...]]:
     """Check a stored run as if it were imported now: the reason for its rejection, or None, and other findings.
 
     The search for a late force, which refuses nothing and takes as long as all other checks, is left out.
     """
     try:
-        record = judge(record_of(run), without=(force_channel,))
+        record = check_record(record_of(run), without=(force_channel,))
         if any(finding.code == "W_FROZEN" for finding in record.findings):
             force_follows(View(replace(record, findings=())))  # of a channel that died there may be nothing to identify
         return None, record.findings
@@ -89,7 +89,7 @@ def judged(run: Run) -> tuple[QualityError | None, tuple[Finding, ...]]:
 
 def with_findings(run: Run) -> Run:
     """The run with the codes of what is noticed today: a dataset written elsewhere, or arrays, state none."""
-    codes = dict.fromkeys([*run.findings, *(finding.code for finding in judged(run)[1])])
+    codes = dict.fromkeys([*run.findings, *(finding.code for finding in check_run(run)[1])])
     return replace(run, notes={**run.notes, "findings": " ".join(codes)}) if len(codes) > len(run.findings) else run
 
 
@@ -116,19 +116,19 @@ def row(quality: Quality) -> dict[str, Any]:
 
 def _quality(record: Record) -> Quality:
     try:
-        judged = record if record.segments else judge(record)
+        check_run = record if record.segments else check_record(record)
     except QualityError as refusal:
         return Quality(record, refusal=refusal)
-    view = View(replace(judged, findings=()))
+    view = View(replace(check_run, findings=()))
     motion, scatter = view.motion, repeatability(view)
-    current, change = held_in(judged, steady_window(view))
+    current, change = held_in(check_run, steady_window(view))
     steady = view.steady
     whole = slice(None)
     if motion is not None:
         count = max(1, int(motion.cycles + 0.02))
         whole = steady.time >= steady.time[-1] - count / motion.condition.frequency_Hz
     return Quality(
-        judged,
+        check_run,
         condition=None if motion is None else motion.condition,
         current=np.nan if change else current,
         cycles=cycles_of(view),

@@ -1,4 +1,4 @@
-"""The Data view: drop files, judge them, see the test matrix and the loops."""
+"""The Data view: drop files, check them, see the test matrix and the loops."""
 
 from __future__ import annotations
 

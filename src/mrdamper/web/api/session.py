@@ -57,7 +57,7 @@ def end(session: Current, request: Request) -> dict[str, bool]:
 
 
 def _read_ahead() -> None:
-    """Analyse and judge the bundled tests before they are asked for: they open at once, no drop waits for an import."""
+    """Analyse and check the bundled tests before they are asked for: they open at once, no drop waits for an import."""
     data = bundled().dataset
     for table in [rig_table(data, rig) for rig in data.rigs]:
         _ = table.quality  # also brings the libraries that judging takes
