@@ -1,4 +1,4 @@
-"""Changes that change nothing a test could see, and why. They are not planted, and their number is told."""
+"""Faults that no test can detect, with the reason. They are not planted; their number is printed."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ EXPLAINED = (
     Explained("paper.", "path.direction[inside][0]", "0 → 1", "a stroke has one direction"),
     Explained("study.recipe", "Scale(1.0, 1.0)", "", "which axes there are does not depend on the scale"),
     Explained("study.recipe", "identifications[0].method", "", "all identifications are by one method"),
-    Explained("study.recipe", 'cls(None, (("k1"', "items", _ORDER),
+    Explained("paper.assumptions", 'cls(None, (("k1"', "items", _ORDER),
     Explained("study.recipe", "in ([],", "items", _ORDER),
-    Explained("study.recipe", "[-longest, longest]", "", "the gas is compressed at one end alone"),
+    Explained("paper.assumptions", "[-longest, longest]", "", "the gas is compressed at one end alone"),
     Explained("paper.", "range(1, path.stroke[-1])", "1 → 2", "the last two samples lie in one stroke"),
     Explained("paper.", "np.mean(steady.force)", "mean → median", "a loop's force has its mean in its middle"),
     Explained("paper.", "np.mean(record.force", "mean → median", "samples within five degrees have one force"),
@@ -62,27 +62,24 @@ EXPLAINED = (
     Explained("dampers.random_effects", "self.unit = ", "", _SCALE),
     Explained("dampers.calibration", "min(at, values.size - 1)", "", _GUARD),
     Explained("dampers.joint", "evaluations, ending", "0 → 1", "where nothing is searched nothing is counted"),
-    Explained("dampers.joint", "curved = settled", "", _BUDGET),
-    Explained("dampers.joint", "found = least_squares(", "slopes and curved exchanged", _BUDGET),
+    Explained("dampers.joint", "curved = 0, StopReason.SOLVED, settled", "", _BUDGET),
+    Explained("dampers.joint", "solution = least_squares(", "slopes and curved exchanged", _BUDGET),
     Explained("dampers.joint", "_TRIAL_STEPS", "0.001 → 0.01", _BUDGET),
-    Explained("dampers.joint", "table.weights / known", "", "known slopes lead; the last round has its own"),
     Explained("dampers.joint", "len(axis.grid) > 1", "1 → 2", "no axis has two starts before the one of lengths"),
     Explained("dampers.joint", "(RISE, FALL)", "items", _ORDER),
     Explained("models.play_bypass", "turned = path.first_direction", "Mult → Div", _SIGN),
-    Explained("models.play_bypass", "loaded * np.sign(v)", "Mult → Div", _SIGN),
     Explained(
-        "functions.forms",
+        "statistics.functions.forms",
         "slope * slope[0]",
         "",
         "only the sign of the product of two signs is asked, wherever it begins",
     ),
     Explained(
-        "functions.fitting",
+        "statistics.functions.fitting",
         "np.linalg.qr(weighted",
         "Div → Mult",
         "the space columns span does not depend on their lengths",
     ),
-    Explained("statistics.functions.fitting", "or 1.0)", "1.0 → 10.0", "nothing over any number is nothing"),
     Explained("statistics.functions.fitting", "grid", "", _BUDGET),
     Explained("identification.harmonic_balance", '"peaks":', "arguments", _ORDER),
     Explained(
@@ -112,14 +109,8 @@ EXPLAINED = (
     Explained("identification.covariance", "reshape(-1, block", "1 → 2", _ALIKE),
     Explained("identification.covariance", "powers[k - 1] if k", "", "a product of two"),
     Explained("identification.covariance", "np.finfo(float)", "", _GUARD),
-    Explained(
-        "rig_files.quality.loop",
-        "np.sign(np.median(force))",
-        "",
-        "a sign divides as it multiplies; a force of zero has none",
-    ),
-    Explained("rig_files.quality.loop", "t = motion.time", "", "a constant beside a column of ones"),
-    Explained("rig_files.quality.loop", "scale[scale == 0]", "", _SCALE),
+    Explained("identification.loop_analysis", "t = motion.time", "", "a constant beside a column of ones"),
+    Explained("identification.loop_analysis", "scale[scale == 0]", "", _SCALE),
     Explained("rig_files.quality.loop", "fit_harmonics(", "7 → 8", _BUDGET),
 )
 

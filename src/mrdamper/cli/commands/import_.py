@@ -42,11 +42,11 @@ def register(app: typer.Typer) -> None:
         write_tests: Path | None = typer.Option(
             None, "--write-tests", help="Write the tests found as a table to be completed; - for standard output."
         ),
-        skip_refused: bool = typer.Option(False, "--skip-refused", help="Write the good files, list the others."),
+        skip_refused: bool = typer.Option(False, "--skip-refused", help="Write the accepted files, list the refused ones."),
         ask: bool | None = typer.Option(
-            None, "--ask/--no-ask", help="Ask for what the files leave open; default: on a terminal."
+            None, "--ask/--no-ask", help="Ask for information missing in the files; default: on a terminal."
         ),
-        verbose: bool = typer.Option(False, "--verbose", help="Every note, of every file."),
+        verbose: bool = typer.Option(False, "--verbose", help="Print all findings of all files."),
         quiet: bool = typer.Option(False, "--quiet", help="No progress."),
         as_json: bool = typer.Option(False, "--json", help="Print JSON a program can read."),
     ) -> None:
