@@ -95,7 +95,7 @@ def test_a_unit_that_is_missing_is_asked_for(tests, tmp_path):
 
 
 def test_an_answer_changes_the_profile_as_its_lines_say():
-    error = InputError("no unit", remedy='say [channels.force] unit = "..." in a profile', code="E_UNITS_MISSING")
+    error = InputError("no unit", remedy='set [channels.force] unit = "..." in a profile', code="E_UNITS_MISSING")
     question = question_of(error)
     assert question is not None
     for answer in question.answers:
@@ -227,7 +227,7 @@ def test_a_sheet_with_a_heading_of_its_own_is_refused_and_leaving_it_out_takes_t
     (refusal,) = found.refusals
     assert refusal.error.code == "E_COLUMN"
     assert f"table {tests[1].current:g} A" in refusal.error.where
-    remedy = re.search(r"say \[file\] (.*) in a profile", refusal.error.remedy)[1]
+    remedy = re.search(r"set \[file\] (.*) in a profile", refusal.error.remedy)[1]
     left = import_files([tmp_path], parse_profile(f"[file]\n{remedy}"))
     assert len(left.records) == 2
     assert not left.refusals

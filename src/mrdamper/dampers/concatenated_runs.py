@@ -28,11 +28,8 @@ if TYPE_CHECKING:
     from mrdamper.dampers.protocols import SearchSpace
 
 _ROWS = 400  # samples of a steady run that enter the least squares, about
-_SAMPLES_TURNING, _SAMPLES_RUNNING, _SAMPLES_RESTING = (
-    400,
-    60,
-    15,
-)  # samples of a cycle that are followed: where it turns, runs on, rests
+# Samples of a cycle that are simulated: at a reversal, between reversals, at rest.
+_SAMPLES_TURNING, _SAMPLES_RUNNING, _SAMPLES_RESTING = 400, 60, 15
 _TURNING_VELOCITY_RATIO = 0.4  # of the peak velocity, below which a motion turns
 _REST_CYCLES = 0.05  # cycles of rest around a sample at which nothing turns any more
 _CURRENT_TOLERANCE = 1e-3  # of the largest current; where it changes by more, every sample is followed

@@ -10,12 +10,9 @@ import numpy as np
 from mrdamper.dampers.joint import JointFit, JointProblem, LocalMinimum
 
 _MAX_OMITTED_SHARE = 0.5  # share of the runs that a search may be without
-_START_COUNT = 3  # of the model, from which a search goes
-_SEARCH_ROUNDS, _SEARCH_STEPS, _SEARCH_TOLERANCE = (
-    1,
-    10,
-    1e-4,
-)  # of a search on steady ends, and relative gain of a step at which it ends
+_START_COUNT = 3  # starts of a search
+_SEARCH_ROUNDS, _SEARCH_STEPS = 1, 10  # of a search on steady ends
+_SEARCH_TOLERANCE = 1e-4  # relative gain of a step at which such a search ends
 _MAX_ERROR_RATIO = 1.05  # times the smallest error on the remaining runs, up to which a start is followed
 _FIT_TOLERANCE = 1e-4  # relative gain of a step at which a fit without a fold ends
 

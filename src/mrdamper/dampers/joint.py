@@ -33,10 +33,8 @@ RISE, FALL = "coil.rise_s", "coil.fall_s"  # names of the coil's lags on the sea
 _SEARCH_TOLERANCE = 1e-6  # relative gain of a step at which the search ends
 _LAG_BOUNDS_S, _START_LAG_S = (1e-4, 0.2), 8e-3  # of a coil's field [s]
 _TRIAL_RUNS, _TRIAL_STEPS = 6, 5  # runs on which starts are tried, and steps from each
-_REFIT_TOLERANCE, _REFIT_STEPS = (
-    5e-4,
-    15,
-)  # relative gain of a step at which a fit without some runs ends, and its steps
+_REFIT_TOLERANCE = 5e-4  # relative gain of a step at which a fit without some runs ends
+_REFIT_STEPS = 15  # of such a fit
 _MAX_COST_RATIO = 0.85  # share of the first start's cost that another one must come below
 _MAX_ERROR_RATIO = 0.995  # share of the first end's error that another one must come below
 _CACHED_LINEARISATIONS = 8  # linearisations

@@ -139,7 +139,7 @@ def rate_of(table: RawTable, profile: Profile) -> float | None:
         return stated or rate_in_name(table.source.name)
     except ValueError as error:
         raise table.source.refuse(
-            "E_AMBIGUOUS", f"two sampling rates: {error}", "say [file] sample_rate_Hz = ... in a profile"
+            "E_AMBIGUOUS", f"two sampling rates: {error}", "set [file] sample_rate_Hz = ... in a profile"
         ) from error
 
 
@@ -257,7 +257,7 @@ def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> l
         return [_refusal(UnitError, table, what, remedy, "E_UNITS_MISSING")]
     shown = ", ".join(name or f"column {i}" for i, name in enumerate(table.names, 1))
     shown += "" if any(header.unit for header in table.headers) else ", without units"
-    remedy = 'say [channels.{}] column = "..."{} in a profile'
+    remedy = 'set [channels.{}] column = "..."{} in a profile'
     fixed = {"time": " or, with a fixed rate, [file] sample_rate_Hz = ..."}
     return [
         _refusal(
@@ -272,7 +272,7 @@ def _ambiguous(table: RawTable, role: str, names: Sequence[str]) -> RigFileError
     return table.source.refuse(
         "E_AMBIGUOUS",
         f"{shown} may both be the {role}",
-        f'say [channels.{role}] column = "..." in a profile',
+        f'set [channels.{role}] column = "..." in a profile',
         line=table.line,
     )
 
@@ -295,7 +295,7 @@ def _convert(table: RawTable, role: str, column: int, channel: Channel) -> Assig
             ColumnError,
             table,
             f"column {name!r} may count compression positive",
-            f"say [channels.{role}] sign = -1 in a profile, or sign = 1 if it counts extension positive",
+            f"set [channels.{role}] sign = -1 in a profile, or sign = 1 if it counts extension positive",
             "E_SIGN_CONVENTION",
         )
     si = parse_unit(unit) or Unit("", 1.0)
@@ -314,14 +314,14 @@ def _unit_problem(table: RawTable, role: str, column: int, unit: str) -> UnitErr
     if parsed is None:
         unit = unit or unknown_unit(table.names[column])
         problem = f"{named} has no unit" if not unit else f"{named} has the unit {unit!r}, which is not known"
-        remedy = f'write it into the header, or say [channels.{role}] unit = "..." in a profile'
+        remedy = f'write it into the header, or set [channels.{role}] unit = "..." in a profile'
         return _refusal(UnitError, table, problem, remedy, "E_UNITS_MISSING")
     if parsed.dimension == DIMENSION[role]:
         return None
-    remedy = f'say [channels.{role}] unit = "..." in a profile, or name another column'
+    remedy = f'set [channels.{role}] unit = "..." in a profile, or name another column'
     if parsed.dimension == "mass" and role == "force":
         force = "kgf" if parsed.factor == 1 else "lbf"
-        remedy = f'if the force of that weight is meant, say [channels.force] unit = "{force}" in a profile'
+        remedy = f'if the force of that weight is meant, set [channels.force] unit = "{force}" in a profile'
     if parsed.dimension == "voltage":
         remedy = f"give the calibration: [channels.{role}] unit and scale (unit per {unit}) in a profile"
     problem = f"{named} is in {unit}, which is no unit of {DIMENSION[role]}"
@@ -337,7 +337,7 @@ def _refuse_two_units(table: RawTable, role: str, column: int, unit: str) -> Non
     raise table.source.refuse(
         "E_AMBIGUOUS",
         f"column {table.names[column]!r} is in {inner.unit} by its name and in {unit} by its row of units",
-        f'say which: [channels.{role}] unit = "..." in a profile',
+        f'set one: [channels.{role}] unit = "..." in a profile',
         line=table.line,
         column=column + 1,
     )
@@ -359,7 +359,7 @@ def _refuse_two_values(table: RawTable, column: int) -> None:
         raise table.source.refuse(
             "E_DUPLICATE_COLUMN",
             f"{len(same)} columns are called {own.name!r} and differ",
-            "rename one, or say which by its number: column = 2 in a profile",
+            "rename one, or set its number: column = 2 in a profile",
             line=table.line,
             column=same[1] + 1,
         )

@@ -129,7 +129,7 @@ def _incomplete(table: RawTable, error: InputError) -> InputError:
     return ColumnError(
         error.found,
         where=f"{printable(table.source.name)}, table {printable(table.label)}",
-        remedy=f"give it the headings of the other tables, or say [file] leave_out = [{label}] in a profile",
+        remedy=f"give it the headings of the other tables, or set [file] leave_out = [{label}] in a profile",
         code=error.code,
     )
 

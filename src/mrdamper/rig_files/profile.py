@@ -1,6 +1,6 @@
 """The rig profile: what a rig's files do not say by themselves, once for a whole folder.
 
-A TOML file. Every key may be left out where the files say it.
+A TOML file. Every key may be omitted where the files state it.
 """
 
 from __future__ import annotations
@@ -233,7 +233,7 @@ def current_in_name(name: str, profile: Profile) -> float | None:
         what = f"is followed by {behind[1]!r}" if behind and other else "has no unit behind it"
         raise ProfileError(
             f"the pattern {source.pattern!r} finds {match['current']}, which {what}: is it a current?", where=name,
-            remedy='correct the pattern, or say [current] unit = "A"' if not other else "correct the pattern",
+            remedy='correct the pattern, or set [current] unit = "A"' if not other else "correct the pattern",
             code="E_AMBIGUOUS",
         )  # fmt: skip
     stated = "unit" not in source.model_fields_set and unit is not None

@@ -336,7 +336,7 @@ def _with_current(record: Record) -> Record:
     raise ColumnError(
         why[0] if why else "no coil current in a column or in the file name",
         where=Path(record.provenance.get("file", record.id)).name,
-        remedy='write the currents into tests.csv (--write-tests), or say [current] pattern = "*_{current}A_*", '
+        remedy='write the currents into tests.csv (--write-tests), or set [current] pattern = "*_{current}A_*", '
         '[channels.current] column = "..." or, if all tests have one, [current] value = 0.5 in a profile',
         code="E_CURRENT_MISSING",
     )

@@ -131,7 +131,7 @@ def _refuse_unscaled(table: RawTable, assigned: dict[str, Assigned], raw: dict[i
             raise table.source.refuse(
                 "E_AMBIGUOUS",
                 f"{role} is whole numbers, and {key} is {value:g}: are they scaled?",
-                f"say [channels.{role}] unit and scale in a profile",
+                f"set [channels.{role}] unit and scale in a profile",
             )
 
 
@@ -145,7 +145,7 @@ def _refuse_tiny_currents(table: RawTable, assigned: dict[str, Assigned], channe
         raise table.source.refuse(
             "E_AMBIGUOUS",
             f"the current in MA is {1e3 * largest:.3g} at most: milliamperes would be no current of a coil",
-            'say [channels.current] unit = "A" or unit = "mA" in a profile',
+            'set [channels.current] unit = "A" or unit = "mA" in a profile',
             column=assigned["current"].column + 1,
         )
 

@@ -1,4 +1,8 @@
-"""Cross-validation of a damper by kind of fold: runs that are left out together, scored as whole runs again."""
+"""Cross-validation of a damper by kind of fold.
+
+A fold is a set of runs that are left out together: those of a condition, a current, a motion or a session, or a
+stretch of a long record. Every run is predicted by a damper identified without its fold and scored as a whole.
+"""
 
 from __future__ import annotations
 
@@ -17,15 +21,13 @@ from mrdamper.study.validation import RunScore, Validation, leave_out, score_run
 
 _MOTION_TOLERANCE = 0.05  # frequencies and amplitudes this close are one motion
 _FAST_VELOCITY_RATIO = 0.8  # of the largest peak velocity, from which a motion is among the fastest
-_MIN_STRETCH_CYCLES, _MAX_STRETCHES = (
-    12,
-    8,
-)  # cycles of a long record that are left out together, at least; stretches at most
+_MIN_STRETCH_CYCLES = 12  # cycles of a long record that are left out together, at least
+_MAX_STRETCHES = 8  # stretches of a record
 _STRETCH_NOTE = "stretch of"  # note of a stretch: the record it was cut from
 
 
 def cross_validate(pieces: Sequence[Run], refit: Callable[[Sequence[int]], Damper], title: str) -> Validation:
-    """Every run and record scored with a damper made without its condition, or without the stretch that is scored.
+    """Score every run with a damper identified without its condition, and every stretch of a record without it.
 
     Parameters
     ----------

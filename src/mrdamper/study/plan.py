@@ -30,10 +30,8 @@ from mrdamper.study.recipe import Progress
 _SAMPLES = 24  # of a cycle that count; model error leaves fewer independent ones than a rig records
 _DRAWS = 2  # of the parameters, beside the estimate
 _MIN_ERROR_RATIO = 0.01  # of half the peak-to-peak force: what no record is better than
-_MIN_SESSION_GAIN, _MIN_SESSION_OFFSET = (
-    1e-4,
-    1e-3,
-)  # least spread of sessions: a share, and of half the peak-to-peak force
+_MIN_SESSION_GAIN = 1e-4  # standard deviation of the gain between sessions, at least [-]
+_MIN_SESSION_OFFSET = 1e-3  # the same of the offset, over half the peak-to-peak force
 _PRIOR_LOG_DEVIATION = 1.0  # standard deviation of the logarithm of a number that no run could tell
 _LEVEL = 0.9  # of bands
 _SEED = 20240813

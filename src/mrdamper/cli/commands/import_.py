@@ -42,7 +42,9 @@ def register(app: typer.Typer) -> None:
         write_tests: Path | None = typer.Option(
             None, "--write-tests", help="Write the tests found as a table to be completed; - for standard output."
         ),
-        skip_refused: bool = typer.Option(False, "--skip-refused", help="Write the accepted files, list the refused ones."),
+        skip_refused: bool = typer.Option(
+            False, "--skip-refused", help="Write the accepted files, list the refused ones."
+        ),
         ask: bool | None = typer.Option(
             None, "--ask/--no-ask", help="Ask for information missing in the files; default: on a terminal."
         ),

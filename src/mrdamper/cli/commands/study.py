@@ -40,7 +40,7 @@ def register(app: typer.Typer) -> None:
         png: bool = typer.Option(False, "--png", help="Also write every figure as PNG."),
         lag: bool = typer.Option(False, "--lag", help="Require tests from which the coil lag can be identified."),
         keep: list[str] = typer.Option(
-            [], "--keep", help="Use this run although it contradicts the others; repeatable."
+            [], "--keep", help="Use this run although it contradicts the others; may be repeated."
         ),
         verbose: bool = typer.Option(False, "--verbose", help="Print every model, parameter and limitation."),
         as_json: bool = typer.Option(False, "--json", help="Print the summary as JSON."),

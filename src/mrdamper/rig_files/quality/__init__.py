@@ -1,8 +1,8 @@
 """Quality checks of a record in their order: findings are added, or the record is refused.
 
-A check is a function of a `View` that yields findings, or only raises `QualityError`. The
-order matters: a check may trust what the ones before it made sure of. A module dropped in here
-with a function `check` is found and comes last, when everything else is made sure of.
+A check is a function of a `View` that yields findings or raises `QualityError`. The order
+matters: a check relies on those before it. A further module of this folder with a function
+`check` is run last.
 """
 
 from __future__ import annotations

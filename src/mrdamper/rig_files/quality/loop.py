@@ -48,7 +48,7 @@ def dissipates(view: View) -> None:
             remedy = "name the columns the other way round: [channels.force] column = ... in a profile"
         else:
             what = "force and displacement count in opposite directions"
-            remedy = "say [channels.force] sign = -1 in a profile"
+            remedy = "set [channels.force] sign = -1 in a profile"
         raise view.refused(
             "E_DISSIPATION_SIGN",
             f"negative dissipated energy ({-100 * share:.0f} % of the force acts along the motion): {what}",

@@ -52,7 +52,7 @@ def velocity_channel(view: View) -> None:
         "E_CHANNEL_LAG",
         f"velocity {what}",
         (
-            f"say [channels.velocity] delay_ms = {1e3 * delay.delay:.4g} in a profile"
+            f"set [channels.velocity] delay_ms = {1e3 * delay.delay:.4g} in a profile"
             if late and delay.gain > 0 and delay.unexplained <= UNLIKE
             else "correct its unit or sign in a profile"
         )

@@ -65,7 +65,7 @@ def load_record(path: str | Path, time_scale: float = 1.0) -> RecordedInput:
     if "time_s" not in table.columns or not present:
         missing = f"no column {'time_s' if present else ' or '.join(_COLUMNS)} (found {', '.join(table.columns)})"
         likely = any(c.lower().startswith(("time", "t_", "acc", "a_", "height")) for c in table.columns)
-        remedy = "say the unit in the name: time_s, and acceleration_m_s2 or acceleration_g"
+        remedy = "state the unit in the name: time_s, and acceleration_m_s2 or acceleration_g"
         raise (UnitError if likely else ColumnError)(missing, where=str(path), remedy=remedy)
     columns = {}
     for name in ("time_s", present[0]):
