@@ -8,7 +8,7 @@ from support.synthetic import TRUTH, synthetic_run
 from mrdamper.data import Condition, Dataset, Run
 from mrdamper.errors import IdentificationError, RunError, UnknownNameError
 from mrdamper.identification import identify
-from mrdamper.identification.covariance import spread, standard_errors
+from mrdamper.identification.covariance import spread
 from mrdamper.identification.methods import all_methods, projection
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.models.spencer import Spencer
@@ -133,8 +133,8 @@ def test_standard_errors_widen_with_autocorrelation():
     assert 4_000 / spread(column, white).memory == pytest.approx(1, abs=0.3)
     assert 4_000 / spread(column, slow).memory == pytest.approx(19, rel=0.4)  # (1 + 0.9)/(1 − 0.9)
     assert spread(column, slow).effective[0] == pytest.approx(4_000 / 19, rel=0.4)
-    assert standard_errors(column, slow)[0] > 3 * standard_errors(column, slow[rng.permutation(4_000)])[0]
-    assert standard_errors(np.zeros((10, 1)), np.ones(10))[0] == np.inf
+    assert spread(column, slow).errors[0] > 3 * spread(column, slow[rng.permutation(4_000)]).errors[0]
+    assert spread(np.zeros((10, 1)), np.ones(10)).errors[0] == np.inf
 
 
 @pytest.mark.parametrize(("rig", "model", "bound"), [
