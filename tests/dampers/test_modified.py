@@ -65,6 +65,14 @@ def test_the_papers_functions_come_back_and_predict_where_nobody_tested():
     assert fit.values["c"] == pytest.approx([by_the_papers_laws(c).c for c in CONDITIONS])
 
 
+def test_a_rate_at_a_bound_of_its_search_is_stated():
+    def fading(c):
+        return replace(by_the_papers_laws(c), m=30.0 - 5.0 * c.frequency_Hz)  # a decay slower than any that is searched
+
+    assert "m" not in paper_functions(identified(by_the_papers_laws)).at_bounds
+    assert "m" in paper_functions(identified(fading)).at_bounds
+
+
 @pytest.mark.parametrize("law", ["exponential", "inverse-square", "power"])
 def test_the_law_of_the_mass_is_a_switch(law):
     assert paper_functions(identified(by_the_papers_laws), law).functions["m"].function.form == f"mass-{law}"

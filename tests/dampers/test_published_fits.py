@@ -9,7 +9,7 @@ import pytest
 
 from mrdamper.dampers.base import Envelope
 from mrdamper.dampers.published import all_published
-from mrdamper.dampers.published.base import fit_quadratic
+from mrdamper.dampers.published.base import AT_BOUNDS, fit_quadratic
 from mrdamper.data import Condition, Run
 from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.models.bingham import Bingham
@@ -149,6 +149,9 @@ def test_refining_on_runs_finds_the_coefficients_they_were_made_with():
     start = {**truth, "fy0": 180.0, "fy1": 800.0, "m": 0.8, "f0": -11.0}
     found = cls("bench", start, REFERENCE, Envelope.of(CONDITIONS)).refined(runs)
     assert found.coefficients == pytest.approx(truth, rel=0.02)
+    assert AT_BOUNDS not in found.provenance
+    far = replace(found, coefficients={**truth, "fy1": 300.0}).refined(runs)  # truth is three times the start
+    assert "fy1" in far.provenance[AT_BOUNDS].split(", ")
 
 
 @pytest.mark.parametrize("currents", [(0.7,), (0.0, 1.0), (0.0, 0.5, 1.0), (0.0, 0.5, 1.0, 2.0)])

@@ -29,9 +29,9 @@ _MAX_SAMPLES = 400  # of a run
 _ENOUGH_UNITS = 9  # independent units that reach a level of 90 %
 _MAX_FACTOR = 1e3  # standard deviations; an error beyond is no longer told apart
 _MAX_GROWTH = 10.0  # relative error per unit of distance; one beyond is no longer told apart
-# Growth by each distance where no fold is so far from its tests (one motion, two currents, random records alone):
-# the typical one of dampers of known truth (`benchmarks.synthetic_choice`).
-_UNSHOWN_GROWTH = (0.25, 0.12, 0.1)
+# Growth by each distance that is typical of dampers of known truth (`benchmarks.synthetic_choice`): alone where
+# no fold is so far from its tests (one motion, two currents, random records alone), and beside the folds that are
+_TYPICAL_GROWTH = (0.25, 0.12, 0.1)
 _SHOWN = (0.01, 0.05, 0.1)  # distances of a fold from its tests from which it shows growth
 _NORMAL_MEDIAN = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
 
@@ -197,7 +197,8 @@ class Growth:
     def of(cls, runs: Sequence[PredictedRun], at_tests: ModelError) -> Growth:
         """Least squares of the squared errors in excess of those at the tests, by the squared distances.
 
-        A distance that no run has gets a stated growth.
+        The fastest motions, or an edge current, are one observation, and a lucky one would leave no growth: the typical
+        growth is a second one. A distance that no run has gets the typical growth alone.
 
         Parameters
         ----------
@@ -209,14 +210,16 @@ class Growth:
 
         away = [run for run in runs if run.distance.squares.any()]
         if not away:
-            return cls(*(_UNSHOWN_GROWTH for _ in QUANTITIES))
+            return cls(*(_TYPICAL_GROWTH for _ in QUANTITIES))
         table = np.array([run.distance.squares for run in away])
         size = np.sqrt(np.mean(table**2, axis=0))
         size[size == 0] = 1.0
         shown = table.max(axis=0) > np.square(_SHOWN)
         excess = np.array([_squared_errors(run) - _expected(run, at_tests) for run in away])
-        slopes = [np.sqrt(nnls(table / size, np.maximum(column, 0.0))[0] / size) for column in excess.T]
-        return cls(*(tuple(np.where(shown, np.minimum(s, _MAX_GROWTH), _UNSHOWN_GROWTH).tolist()) for s in slopes))
+        slopes = np.array([nnls(table / size, np.maximum(column, 0.0))[0] / size for column in excess.T])
+        typical = np.square(_TYPICAL_GROWTH)
+        growth = np.sqrt(np.where(shown, (np.minimum(slopes, _MAX_GROWTH**2) + typical) / 2, typical))
+        return cls(*(tuple(values) for values in growth.tolist()))
 
 
 def _squared_errors(run: PredictedRun) -> Floats:

@@ -246,7 +246,7 @@ def fit_modified(
         provenance={**(provenance or {}), **_about_forms({name: fit.function for name, fit in fits.items()})},
     )
     broken = {f"{name}: {form}": why for name, fit in fits.items() for form, why in fit.refused.items()}
-    return ModifiedFit(damper, fits, values, conditions, _clipped(damper.parameters, conditions), broken)
+    return ModifiedFit(damper, fits, values, conditions, functions_at_bounds(damper.parameters, conditions), broken)
 
 
 def fit_modified_jointly(
@@ -299,7 +299,7 @@ def fit_modified_jointly(
     functions = joint.parameters.functions
     values = {name: np.array([_coordinate(i, name) for i in identifications]) for name in functions}
     fits = {name: assess(function, data.conditions, values[name]) for name, function in functions.items()}
-    at_bounds = tuple(dict.fromkeys((*joint.at_bounds, *_clipped(joint.parameters, data.conditions))))
+    at_bounds = tuple(dict.fromkeys((*joint.at_bounds, *functions_at_bounds(joint.parameters, data.conditions))))
     fit = ModifiedFit(model(data, joint.parameters), fits, values, data.conditions, at_bounds, chosen.refused)
     return fit, refit
 
@@ -335,14 +335,16 @@ def _dissipating(model_type: type[Model]) -> dict[str, str]:
     return units | ({"yield_force": "N"} if "yield_force" in model_type.map_forms() else {})
 
 
-def _clipped(parameters: ParameterMap, conditions: Sequence[Condition]) -> tuple[str, ...]:
-    """Parameters whose function leaves their bounds at a test."""
+def functions_at_bounds(parameters: ParameterMap, conditions: Sequence[Condition]) -> tuple[str, ...]:
+    """Parameters whose function leaves their bounds at a test, or has a rate at a bound of the search."""
     bounds = {info.name: info.bounds for info in parameters.model_type.parameters()}
     names = []
     for name, function in parameters.functions.items():
         low, high = bounds.get(name, (0.0 if name == "yield_force" else -np.inf, np.inf))
         values = function(*features(conditions))
-        if np.any(values < low) or np.any(values > high):
+        ends = zip(function.rates, FORMS[function.form].rate_bounds, strict=True)
+        ended = any(np.isclose(rate, bounds_of_rate, rtol=1e-6).any() for rate, bounds_of_rate in ends)
+        if ended or np.any(values < low) or np.any(values > high):
             names.append(name)
     return tuple(names)
 

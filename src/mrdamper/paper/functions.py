@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Envelope
-from mrdamper.dampers.modified import ModifiedFit, ModifiedModel
+from mrdamper.dampers.modified import ModifiedFit, ModifiedModel, functions_at_bounds
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError
@@ -47,7 +47,7 @@ def paper_functions(
     functions = {name: _fit(form, conditions, values[name], log=name == "beta") for name, form in forms.items()}
     parameters = ParameterMap(BoucWen, {name: fit.function for name, fit in functions.items()})
     damper = ModifiedModel(identifications[0].rig, parameters, Envelope.of(conditions), dict(provenance or {}))
-    return ModifiedFit(damper, functions, values, conditions)
+    return ModifiedFit(damper, functions, values, conditions, functions_at_bounds(damper.parameters, conditions))
 
 
 def fit_paper_functions(

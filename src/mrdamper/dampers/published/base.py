@@ -21,6 +21,7 @@ from mrdamper.physics.motion import sine
 from mrdamper.statistics.levenberg_marquardt import least_squares
 
 _MAX_STEPS = 8
+AT_BOUNDS = "at a bound of the search"  # entry of the provenance: coefficients whose values are no estimates
 _COEFFICIENT_RANGE = 0.8  # a coefficient may move by this share of its start, or of one
 
 
@@ -145,7 +146,12 @@ class ConditionedDamper(Damper):
         solution = least_squares(
             residual, centre, centre - _COEFFICIENT_RANGE, centre + _COEFFICIENT_RANGE, most_steps=_MAX_STEPS
         )
-        return replace(self, coefficients=dict(zip(names, (solution.point * size).tolist(), strict=True)))
+        refined = replace(self, coefficients=dict(zip(names, (solution.point * size).tolist(), strict=True)))
+        ended = np.abs(solution.point - centre) > (1 - 1e-6) * _COEFFICIENT_RANGE
+        if not ended.any():
+            return refined
+        held = ", ".join(name for name, at_bound in zip(names, ended, strict=True) if at_bound)
+        return replace(refined, provenance={**self.provenance, AT_BOUNDS: held})
 
     @property
     def fitted_parameters(self) -> Mapping[str, FittedParameter]:
