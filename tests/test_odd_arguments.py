@@ -122,7 +122,7 @@ def doors(folder):
         "Stepper.run": (stepped.run, {**along, "current": 0.5}),
         "Stepper.set_parameters": (stepped.set_parameters, {"c": 1e3}),
         "Stepper.state": (lambda state: setattr(stepped, "state", state), {"state": stepped.state}),
-        "validate": (mrdamper.validate, {"damper": joint, "runs": runs, "title": None, "known": None}),
+        "validate": (mrdamper.validate, {"damper": joint, "runs": runs, "title": None, "sessions": None}),
         "Validation.median": (scores.median, {"name": "nrmse_pp"}),
         "Validation.worst": (scores.worst, {"name": "nrmse_pp"}),
         "Validation.worst_error": (scores.worst_error, {"name": "nrmse_pp"}),

@@ -233,7 +233,7 @@ def test_amplitudes_far_over_the_yield_displacement_are_never_called_unseen():
 def test_a_damper_without_a_defect_at_the_stroke_end_does_not_show_one(monkeypatch):
     """After a reversal a Bouc–Wen damper's force is back after the same distance at every speed."""
     monkeypatch.setattr("mrdamper.paper.study.SOBOL_SAMPLES", 4)
-    study = reproduce(matrix(currents=(1.0, 2.0)), GAS, with_comparators=False)
+    study = reproduce(matrix(currents=(1.0, 2.0)), PaperOptions(gas=GAS), with_comparators=False)
     claim = next(claim for claim in check_claims(study) if claim.key == "stroke end")
     assert (claim.verdict, claim.said) == ("differs", "differs from the paper on this damper"), claim.evidence
     assert study.rig is None
@@ -246,6 +246,9 @@ def test_a_comparison_of_models_offers_the_method():
     assert entry.recipe.title == "Method of Qian et al. 2024"
     assert entry.damper.functions["c"].form == "viscous-paper"
     assert any("the gas spring is unknown" in note for note in entry.recipe.notes)
+    (known,) = compare(matrix(), ["paper"], method=PaperOptions(gas=GAS), jobs=1).rigs
+    assert known.entries[0].recipe.notes == ()
+    assert known.entries[0].recipe.basis.gas == GAS
     few = matrix(motions=((0.020, 1.0), (0.020, 1.5)), currents=(1.0,))
     with pytest.raises(IdentificationError, match="fewer than three identification runs of a pure sine"):
         catalogue()["paper"].for_runs(list(few.split("train")))

@@ -204,7 +204,7 @@ def test_two_runs_write_the_same_bytes_but_for_the_seconds(quick, undrawn, tmp_p
     few = virtual_dataset(currents=(0.0, 2.0), cycles=2)
     chosen = few.only([*list(few.split("train"))[:4], next(iter(few.split("validate")))])
     for name in ("one", "two"):
-        study = reproduce(chosen, VirtualRig().gas, with_comparators=comparators)
+        study = reproduce(chosen, PaperOptions(gas=VirtualRig().gas), with_comparators=comparators)
         write_reproduction(study, tmp_path / name)
     files = [path.relative_to(tmp_path / "one") for path in (tmp_path / "one").rglob("*") if path.is_file()]
     assert len(files) > 30
@@ -335,7 +335,7 @@ def test_what_cannot_be_studied_is_refused_with_the_remedy():
     with pytest.raises(IdentificationError, match="no identification run"):
         reproduce(dataset.only(dataset.split("validate")))
     with pytest.raises(ParameterError, match="leaves no gas volume"):
-        reproduce(dataset, gas=GasSpring(1.5e6, 1e-5, 3e-4))
+        reproduce(dataset, PaperOptions(gas=GasSpring(1.5e6, 1e-5, 3e-4)))
     conditions = [Condition(1.0, f, 0.02) for f in (1.0, 1.5, 2.0)]
     with pytest.raises(IdentificationError, match="current"):
         fit_function("quadratic-current", conditions, [1.0, 2.0, 3.0])

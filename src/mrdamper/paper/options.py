@@ -145,15 +145,13 @@ class PaperOptions(StudyMethod):
         """Return the method with the optimum that its genetic search approaches, and shorter functions if need be."""
         return replace(self, search="optimum", functions="shorter")
 
-    @classmethod
-    def compared(cls) -> Sequence[Recipe]:
+    def compared(self) -> Sequence[Recipe]:
         """Return the method itself, and Bouc–Wen by the genetic searches with functions as of other models."""
         searches = [replace(modified("bouc-wen", method), on_request=True) for method in ("paper", "direct-genetic")]
         heading = Recipe("paper", None, fit_paper_functions, "paper, literal", _TITLE, _SOURCE, _LIMITS)
-        return [replace(heading, complete=partial(_beside_others, cls)), *searches]
+        return [replace(heading, complete=self._recipe_beside_others), *searches]
 
-
-def _beside_others(cls: type[PaperOptions], train: Sequence[Run]) -> Recipe:
-    if len(train) < 3:
-        raise IdentificationError("fewer than three identification runs of a pure sine", remedy="test sines")
-    return cls().beside_others().recipe(train)
+    def _recipe_beside_others(self, train: Sequence[Run]) -> Recipe:
+        if len(train) < 3:
+            raise IdentificationError("fewer than three identification runs of a pure sine", remedy="test sines")
+        return self.beside_others().recipe(train)

@@ -57,9 +57,8 @@ _SENSITIVITY, _CHECK, _SEED, _RUN = 3.0, 1.5, 1.2, 0.5  # relative durations of 
 
 def reproduce(
     dataset: Dataset | None = None,
-    gas: GasSpring | None = None,
-    *,
     options: PaperOptions | None = None,
+    *,
     with_comparators: bool = True,
     with_models: bool = False,
     seeds: int = 0,
@@ -72,11 +71,8 @@ def reproduce(
     ----------
     dataset : Dataset, optional
         One rig with train and validate runs. Default: the virtual rig, synthetic.
-    gas : GasSpring, optional
-        Of the dataset's rig. Unknown: k1 and m are taken from a regression of the consistent
-        in-phase stiffness over the frequencies, k2 = k3 = 0.
     options : PaperOptions, optional
-        Choices that the paper's text leaves open.
+        Gas spring of the dataset's rig, presets, and choices that the paper's text leaves open.
     with_comparators : bool
         The paper's own comparators: all parameters by the genetic algorithm, and Ali's model.
     with_models : bool
@@ -102,7 +98,7 @@ def reproduce(
     chosen = options or PaperOptions()
     progress("tests", 0.0)
     rig = VirtualRig() if dataset is None else None
-    gas = rig.gas if rig else gas or chosen.gas
+    gas = rig.gas if rig else chosen.gas
     study = _tests(virtual_dataset(rig, CURRENTS) if dataset is None else dataset, rig, gas, chosen)
     train, held_out = study.train, study.held_out
     assumptions = PaperAssumptions.of(train, gas).preset(chosen.fixed)

@@ -19,7 +19,7 @@ from mrdamper.errors import IdentificationError, InputError
 from mrdamper.identification import Identification
 from mrdamper.physics.motion import analyse_motion
 from mrdamper.study.parallel import worker_pool
-from mrdamper.study.recipe import Basis, IdentificationCache, Progress, Recipe, RecipeResult, recipes
+from mrdamper.study.recipe import Basis, IdentificationCache, Progress, Recipe, RecipeResult, StudyMethod, recipes
 from mrdamper.study.workflow import (
     accepted_runs,
     runs_for_global_fit,
@@ -68,6 +68,7 @@ def compare(
     names: Sequence[str] = (),
     *,
     genetic: bool = False,
+    method: StudyMethod | None = None,
     jobs: int | None = None,
     progress: Progress = lambda what, share: None,
 ) -> Comparison:
@@ -80,6 +81,8 @@ def compare(
         Models; default all but the genetic ones.
     genetic : bool
         Include identification by genetic algorithm.
+    method : StudyMethod, optional
+        Options of a published method, as the gas spring and presets of `PaperOptions`.
     jobs : int, optional
         Processes; default one a core. Any number gives the same bits.
     progress : callable
@@ -99,7 +102,7 @@ def compare(
     'utfsm'
     """
     begin = time.perf_counter()
-    chosen = recipes(names, genetic)
+    chosen = recipes(names, genetic, method)
     workers = jobs or os.cpu_count() or 1
     rigs = [_seen(dataset.rig(name)) for name in dataset.rigs]
     completed = [_completed(chosen, rig) for rig in rigs]

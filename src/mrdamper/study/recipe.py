@@ -455,8 +455,7 @@ class StudyMethod(ABC):
         """Return the method with the effort that is affordable beside other recipes."""
         return self
 
-    @classmethod
-    def compared(cls) -> Sequence[Recipe]:
+    def compared(self) -> Sequence[Recipe]:
         """Recipes that a comparison of models offers besides."""
         return ()
 
@@ -486,16 +485,23 @@ def study_method(name: str, settings: Mapping[str, str] | None = None, gas: GasS
     return chosen(**values, **({} if gas is None else {"gas": gas}))
 
 
-def catalogue() -> Mapping[str, Recipe]:
-    """Every recipe that can be compared, by name; models and dampers dropped in are found."""
+def catalogue(method: StudyMethod | None = None) -> Mapping[str, Recipe]:
+    """Every recipe that can be compared, by name; models and dampers dropped in are found.
+
+    Parameters
+    ----------
+    method : StudyMethod, optional
+        A published method with options, in place of its own defaults.
+    """
     all_recipes = [modified(name) for name in all_models() if name != JOINTLY]
     all_recipes += [jointly(name) for name in _closed_shapes()]
-    all_recipes += [recipe for method in study_methods().values() for recipe in method.compared()]
+    methods = {name: cls() for name, cls in study_methods().items()} | ({method.name: method} if method else {})
+    all_recipes += [recipe for one in methods.values() for recipe in one.compared()]
     all_recipes += [play_and_bypass(), *(conditioned(cls) for cls in all_published().values())]
     return {recipe.name: recipe for recipe in all_recipes}
 
 
-def recipes(names: Sequence[str] = (), genetic: bool = False) -> list[Recipe]:
+def recipes(names: Sequence[str] = (), genetic: bool = False, method: StudyMethod | None = None) -> list[Recipe]:
     """Recipes of some names, or all.
 
     Parameters
@@ -503,13 +509,15 @@ def recipes(names: Sequence[str] = (), genetic: bool = False) -> list[Recipe]:
     names : sequence of str
     genetic : bool
         Of all, also those that identify by a genetic algorithm, which take most of the time.
+    method : StudyMethod, optional
+        A published method with options, in place of its own defaults.
 
     Raises
     ------
     UnknownNameError
         With the near matches.
     """
-    by_name = catalogue()
+    by_name = catalogue(method)
     for name in names:
         if name not in by_name:
             raise UnknownNameError.of("model", name, by_name)

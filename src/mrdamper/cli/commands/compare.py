@@ -19,6 +19,14 @@ def register(app: typer.Typer) -> None:
         genetic: bool = typer.Option(
             False, "--genetic", help="Also identify by genetic algorithm, 60 generations (minutes)."
         ),
+        gas: str | None = typer.Option(
+            None,
+            "--gas",
+            help="Known gas spring, for the model paper: pressure MPa, volume cm3, rod area mm2 as P,V,A.",
+        ),
+        setting: list[str] = typer.Option(
+            [], "--set", help="OPTION=VALUE of the model paper, as for study --model paper; may be repeated."
+        ),
         jobs: int | None = typer.Option(None, "--jobs", min=1, help="Number of processes; default: one per core."),
         png: bool = typer.Option(False, "--png", help="Also write every figure as PNG."),
         as_json: bool = typer.Option(False, "--json", help="Print the table as JSON."),
@@ -28,12 +36,13 @@ def register(app: typer.Typer) -> None:
         Reported per model: cross-validated and validation error, number of parameters, number of
         runs needed, computing time.
         """
+        from mrdamper.cli.output import parse_gas, parse_pairs
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.data.atomic import require_writable
         from mrdamper.report.comparison import summary_rows, text_table, write_comparison
         from mrdamper.rig_files.dataset_folder import load_dataset
         from mrdamper.study import comparison as comparing
-        from mrdamper.study.recipe import recipes
+        from mrdamper.study.recipe import recipes, study_method
 
         require_writable(out)
         names = [name.strip() for entry in models for name in entry.split(",") if name.strip()]
@@ -44,6 +53,7 @@ def register(app: typer.Typer) -> None:
                 dataset,
                 names,
                 genetic=genetic,
+                method=study_method("paper", parse_pairs(setting, "--set"), parse_gas(gas)),
                 jobs=jobs,
                 progress=lambda what, share: progress(what, 0.9 * share),
             )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import typer
 
@@ -31,15 +30,7 @@ def register(app: typer.Typer) -> None:
             None, "--gas", help="Known gas spring of the data: pressure MPa, volume cm3, rod area mm2, as P,V,A."
         ),
         setting: list[str] = typer.Option(
-            [], "--set", help="OPTION=VALUE of the method, as of study --model paper; may be repeated."
-        ),
-        preset: list[str] = typer.Option(
-            [], "--preset", help="A=, n= or gamma= (SI; gamma is tied to beta unless given); may be repeated."
-        ),
-        mass_law: str = typer.Option("exponential", "--mass-law", help="Eq. 29: exponential, inverse-square or power."),
-        friction: str = typer.Option("dry", "--friction-test", help="dry, as in the paper, or filled."),
-        box: list[str] = typer.Option(
-            [], "--box", help="alpha=LOW:HIGH or beta=LOW:HIGH of the genetic search; may be repeated."
+            [], "--set", help="OPTION=VALUE of the method, as for study --model paper; may be repeated."
         ),
         jobs: int | None = typer.Option(None, "--jobs", min=1, help="Number of processes; default: one per core."),
         png: bool = typer.Option(False, "--png", help="Also write the figures as PNG."),
@@ -48,21 +39,24 @@ def register(app: typer.Typer) -> None:
         """Example: mrdamper reproduce --out result/"""
         import os
 
-        from mrdamper.cli.output import parse_gas
+        from mrdamper.cli.output import parse_gas, parse_pairs
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.data.atomic import require_writable
         from mrdamper.errors import InputError
+        from mrdamper.paper.options import PaperOptions
         from mrdamper.paper.output import summary, write_reproduction
         from mrdamper.paper.study import reproduce as run_reproduction
         from mrdamper.rig_files.dataset_folder import load_dataset
         from mrdamper.study.parallel import several
+        from mrdamper.study.recipe import study_method
 
         require_writable(out)
         if gas is not None and data is None:
             raise InputError(
                 "--gas without --data: the virtual rig has its own gas spring", remedy="give --data DATASET"
             )
-        options = _options(preset, box, mass_law, friction, setting)
+        options = study_method("paper", parse_pairs(setting, "--set"), parse_gas(gas))
+        assert isinstance(options, PaperOptions)
         dataset = None if data is None else load_dataset(data)
         if dataset is None and rig is not None:
             raise InputError("--rig without --data", remedy="give --data DATASET, or leave --rig out")
@@ -74,8 +68,7 @@ def register(app: typer.Typer) -> None:
         with progress_on_stderr() as progress, several(jobs or os.cpu_count() or 1) as processes:
             study = run_reproduction(
                 dataset,
-                parse_gas(gas),
-                options=options,
+                options,
                 with_comparators=comparators,
                 with_models=with_models,
                 seeds=seeds,
@@ -99,29 +92,3 @@ def register(app: typer.Typer) -> None:
         for claim in text["claims"]:
             print(f"  {claim['said']:50} {claim['claim']}")
         print(f"page: {written[0]}")
-
-
-def _options(preset: list[str], box: list[str], mass_law: str, friction: str, setting: list[str]):
-    from mrdamper.cli.output import parse_pairs
-    from mrdamper.errors import InputError, UnknownNameError
-    from mrdamper.identification.methods import values_of_fields
-    from mrdamper.paper.options import PaperOptions
-
-    given: dict[str, Any] = {"mass_law": mass_law, "friction_test": friction}
-    for option, pairs, names in (("--preset", preset, ("A", "n", "gamma")), ("--box", box, ("alpha", "beta"))):
-        for name, text in parse_pairs(pairs, option).items():
-            if name not in names:
-                raise UnknownNameError.of(f"name after {option}", name, names)
-            try:
-                numbers = tuple(float(part) for part in text.split(":"))
-                given[name if option == "--preset" else f"{name}_box"] = _one(numbers, option)
-            except ValueError as error:
-                form = "NAME=NUMBER" if option == "--preset" else "NAME=LOW:HIGH"
-                raise InputError(f"{option} {name}={text}", remedy=f"write {option} {form}") from error
-    return PaperOptions(**(given | values_of_fields(PaperOptions, parse_pairs(setting, "--set"))))
-
-
-def _one(numbers: tuple[float, ...], option: str) -> float | tuple[float, ...]:
-    if len(numbers) != (1 if option == "--preset" else 2):
-        raise ValueError("wrong count")
-    return numbers[0] if option == "--preset" else numbers
