@@ -5,6 +5,7 @@ import re
 import tomllib
 
 import jsonschema
+import polars as pl
 import pytest
 from support.dampers import conditioned_damper, joint_damper, modified_damper
 from typer.testing import CliRunner
@@ -19,7 +20,7 @@ def schema(name):
     return json.loads(done.stdout)
 
 
-@pytest.mark.parametrize("name", ["model", "profile", "limits", "about", "fleet", "system"])
+@pytest.mark.parametrize("name", ["model", "profile", "limits", "about", "fleet", "system", "plan", "results"])
 def test_a_schema_is_valid(name):
     jsonschema.Draft202012Validator.check_schema(schema(name))
 
@@ -51,3 +52,21 @@ def test_a_limit_of_another_side_violates_the_schema():
     for change in ({"side": "extension"}, {"lower": 1.0}, {"upper_N": "high"}):
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate({"limit": [{**limit, **change}]}, schema("limits"))
+
+
+def test_the_record_of_a_result_and_the_rows_of_a_plan_follow_their_schemas(tmp_path):
+    limits = tmp_path / "limits.toml"
+    limits.write_text("current_A = [0, 1]\nfrequency_Hz = [0.5, 2]\namplitude_mm = [5, 20]\n", encoding="utf-8")
+    out = tmp_path / "next"
+    done = CliRunner().invoke(application(), ["plan", "--limits", str(limits), "--hours", "1", "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    record = json.loads((out / "made.json").read_text(encoding="utf-8"))
+    jsonschema.validate(record, schema("results"))
+    with pytest.raises(jsonschema.ValidationError, match="3 is not of type"):
+        jsonschema.validate({**record, "files": 3}, schema("results"))
+    rows = pl.read_csv(out / "plan.csv").to_dicts()
+    assert rows
+    assert [row["file"] for row in rows] == [name for name in record["files"] if name != "plan.csv"]
+    jsonschema.validate(rows, schema("plan"))
+    with pytest.raises(jsonschema.ValidationError, match="'late' is not of type"):
+        jsonschema.validate([{**rows[0], "minutes": "late"}], schema("plan"))

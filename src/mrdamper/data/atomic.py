@@ -17,8 +17,8 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from mrdamper.data.temporary import temporary_folder
 from mrdamper.errors import OutputError, resource_error, shown
@@ -27,6 +27,25 @@ MADE = "made.json"  # which files of a folder are a result's, and what differs f
 _MAX_NAME_BYTES = 255  # bytes, of a file or folder
 _MAX_FOREIGN_FILES = 200  # foreign files of a folder that are carried over into its successor
 _REMEDY = "choose a folder you may write to"
+
+
+@dataclass(frozen=True)
+class ResultRecord:
+    """Contents of `made.json`: the files of a result, and what differs from one computation to the next.
+
+    Attributes
+    ----------
+    files : tuple of str
+        Paths relative to the folder, sorted.
+    seconds : mapping
+        Durations [s] by what was computed, or by rig and model.
+    processes : int or None
+        Number of processes that worked on it.
+    """
+
+    files: tuple[str, ...] = ()
+    seconds: Mapping[str, float | Mapping[str, float]] = field(default_factory=dict)
+    processes: int | None = None
 
 
 def path_of(path: object) -> Path:
@@ -74,34 +93,32 @@ def write_into(folder: str | Path) -> Iterator[Path]:
 
 
 @contextmanager
-def write_result(folder: str | Path, facts: Mapping[str, Any] | None = None) -> Iterator[Path]:
+def write_result(folder: str | Path, record: ResultRecord | None = None) -> Iterator[Path]:
     """Give a temporary folder whose files take the place of an earlier result in one step when the block ends.
 
     Files of the earlier result that this one does not have are gone afterwards; files of others stay. `made.json`
-    says which are the result's, and holds `facts`. Raises `OutputError` if the folder cannot be made or written to.
+    says which are the result's. Raises `OutputError` if the folder cannot be made or written to.
 
     Parameters
     ----------
-    facts : mapping, optional
-        What differs from run to run, such as times: it stands nowhere else.
+    record : ResultRecord, optional
+        Durations and processes, which stand nowhere else.
     """
     final = Path(folder)
     with _beside(final) as work:
         yield work
-        contents = {
-            "files": sorted(p.relative_to(work).as_posix() for p in work.rglob("*") if p.is_file()),
-            **(facts or {}),
-        }
+        files = tuple(sorted(p.relative_to(work).as_posix() for p in work.rglob("*") if p.is_file()))
+        contents = asdict(replace(record or ResultRecord(), files=files))
         (work / MADE).write_text(json.dumps(contents, indent=1) + "\n", encoding="utf-8")
         _sync(work)
         _put(work, final, _earlier(final))
 
 
 def publish(
-    folder: str | Path, first: str, fill: Callable[[Path], None], facts: Mapping[str, Any] | None = None
+    folder: str | Path, first: str, fill: Callable[[Path], None], record: ResultRecord | None = None
 ) -> list[Path]:
     """Have `fill` write a result as `write_result` does; what was written, the page `first` before the others."""
-    with write_result(folder, facts) as work:
+    with write_result(folder, record) as work:
         fill(work)
         written = [p.relative_to(work) for p in work.rglob("*") if p.is_file()]
     return [Path(folder) / p for p in sorted(written, key=lambda p: (p.name != first, len(p.parts), str(p)))]

@@ -13,7 +13,7 @@ import numpy as np
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.dampers.published import all_published
 from mrdamper.data import Condition
-from mrdamper.data.atomic import publish
+from mrdamper.data.atomic import ResultRecord, publish
 from mrdamper.data.encoding import csv_text
 from mrdamper.errors import InputError
 from mrdamper.identification.harmonic_balance import SineRecord
@@ -101,7 +101,7 @@ def write_reproduction(
         (work / "reproduction.html").write_text(page, encoding="utf-8")
 
     took = {method.recipe.title: method.seconds for method in study.contenders}
-    written = publish(folder, "reproduction.html", fill, {"seconds": {"in all": study.seconds, **took}})
+    written = publish(folder, "reproduction.html", fill, ResultRecord(seconds={"in all": study.seconds, **took}))
     progress("written", 1.0)
     return written
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from mrdamper.dampers.model_file import save_model
 from mrdamper.data import Run
-from mrdamper.data.atomic import publish
+from mrdamper.data.atomic import ResultRecord, publish
 from mrdamper.data.encoding import csv_text, file_names
 from mrdamper.report.page import made_from, render_page
 from mrdamper.report.plots.comparison import overlaid_loops, ranking
@@ -69,8 +69,8 @@ def write_comparison(
         (work / "comparison.json").write_text(json.dumps(rows, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
     took = {rig.rig: {entry.recipe.name: entry.seconds for entry in rig.entries} for rig in comparison.rigs}
-    facts = {"seconds": {"in all": comparison.seconds, **took}, "processes": comparison.jobs}
-    written = publish(folder, "comparison.html", fill, facts)
+    record = ResultRecord(seconds={"in all": comparison.seconds, **took}, processes=comparison.jobs)
+    written = publish(folder, "comparison.html", fill, record)
     progress("written", 1.0)
     return written
 

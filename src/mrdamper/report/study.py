@@ -17,7 +17,7 @@ from mrdamper.dampers.model_file import save_model
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.dampers.uncertainty import table
 from mrdamper.data import Dataset
-from mrdamper.data.atomic import publish
+from mrdamper.data.atomic import ResultRecord, publish
 from mrdamper.data.encoding import csv_text, file_names
 from mrdamper.errors import IdentificationError
 from mrdamper.identification import Identification
@@ -125,7 +125,7 @@ def write_study(
         (work / "coverage.csv").write_text(csv_text(covered), encoding="utf-8")
 
     took = {rig.rig: {c.recipe.name: c.seconds for c in rig.candidates} for rig in study.rigs}
-    written = publish(folder, "report.html", fill, {"seconds": {"in all": study.seconds, **took}})
+    written = publish(folder, "report.html", fill, ResultRecord(seconds={"in all": study.seconds, **took}))
     progress("written", 1.0)
     return written
 

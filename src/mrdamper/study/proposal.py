@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -55,20 +53,26 @@ class Proposal:
         return eased, limits.force_N * share * np.tanh(velocity / (0.05 * condition.peak_velocity))
 
 
-def rows(proposals: Sequence[Proposal], files: Sequence[str]) -> list[dict[str, Any]]:
-    """Columns of plan.csv."""
-    return [
-        {
-            "order": number,
-            "session": item.session,
-            "file": name,
-            "current_A": item.condition.current_A,
-            "frequency_Hz": item.condition.frequency_Hz,
-            "amplitude_mm": 1e3 * item.condition.amplitude_m,
-            "minutes": round(item.minutes, 2),
-            "band_before": "" if math.isnan(item.before) else item.before,
-            "band_after": "" if math.isnan(item.after) else item.after,
-            "reason": item.reason,
-        }
-        for number, (item, name) in enumerate(zip(proposals, files, strict=True), start=1)
-    ]
+@dataclass(frozen=True)
+class PlanRow:
+    """One row of plan.csv; the bands are in the unit of the quantity to be determined, empty without a model."""
+
+    order: int
+    session: int
+    file: str
+    current_A: float
+    frequency_Hz: float
+    amplitude_mm: float
+    minutes: float
+    band_before: float | None
+    band_after: float | None
+    reason: str
+
+    @classmethod
+    def of(cls, order: int, item: Proposal, file: str) -> PlanRow:
+        """Take the row of a record whose motion stands in a file."""
+        c, (before, after) = item.condition, (None if math.isnan(b) else b for b in (item.before, item.after))
+        return cls(
+            order, item.session, file, c.current_A, c.frequency_Hz, 1e3 * c.amplitude_m, round(item.minutes, 2),
+            before, after, item.reason,
+        )  # fmt: skip

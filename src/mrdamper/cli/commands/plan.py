@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 
 import typer
@@ -38,7 +39,7 @@ def register(app: typer.Typer) -> None:
         from mrdamper.study.first_matrix import first_matrix
         from mrdamper.study.limits import Limits
         from mrdamper.study.plan import least_informative_runs, plan_tests
-        from mrdamper.study.proposal import rows
+        from mrdamper.study.proposal import PlanRow
 
         require_writable(out)
         damper = load_model(model) if model else None
@@ -47,7 +48,7 @@ def register(app: typer.Typer) -> None:
         if about is not None and damper is None:
             raise InputError("--about without a model", remedy="give a model.json")
         allowed = Limits.read(limits) if limits else Limits.of(damper)  # type: ignore[arg-type]
-        names = []
+        rows = []
         with progress_soon("planning") as tell, write_result(out) as folder:
             if damper:
                 chosen, reckoning = plan_tests(damper, allowed, hours, _doubt(about), tell)
@@ -61,8 +62,8 @@ def register(app: typer.Typer) -> None:
                 text = "time_s,displacement_m,force_N,current_A\n"
                 text += "".join(",".join(f"{v:.9g}" for v in row) + "\n" for row in table.tolist())
                 (folder / name).write_text(text, encoding="utf-8")
-                names.append(name)
-            (folder / "plan.csv").write_text(csv_text(rows(chosen, names)), encoding="utf-8")
+                rows.append(asdict(PlanRow.of(number, item, name)))
+            (folder / "plan.csv").write_text(csv_text(rows), encoding="utf-8")
         sessions = len({item.session for item in chosen})
         minutes = sessions * allowed.opening + sum(item.minutes for item in chosen)
         typer.echo(

@@ -6,7 +6,7 @@ import json
 
 import typer
 
-_FORMATS = ("model", "profile", "limits", "about", "fleet", "system")
+_FORMATS = ("model", "profile", "limits", "about", "fleet", "system", "plan", "results")
 
 
 def register(app: typer.Typer) -> None:
@@ -16,7 +16,7 @@ def register(app: typer.Typer) -> None:
     def schema(
         name: str = typer.Argument(..., help=f"File format: {', '.join(_FORMATS)}."),
     ) -> None:
-        """Print the JSON Schema of a model, a profile or a limits file."""
+        """Print the JSON Schema of a file that is read or written; of plan.csv that of its rows."""
         from mrdamper.errors import UnknownNameError
 
         if name not in _FORMATS:
@@ -41,6 +41,8 @@ def _schema(name: str) -> dict:
         from mrdamper.fleet.profile import FleetProfile
 
         document = FleetProfile.model_json_schema()
+    elif name in ("plan", "results"):
+        document = _written(name)
     else:
         from mrdamper.systems.system_file import SystemDocument
 
@@ -75,3 +77,14 @@ def _about() -> dict:
 
     properties = {field.name: {"type": ["string", "number"]} for field in fields(About)}
     return {"title": "About", "type": "object", "properties": properties, "additionalProperties": False}
+
+
+def _written(name: str) -> dict:
+    """Schema of the rows of plan.csv, or of made.json in the folder of a result."""
+    from pydantic import TypeAdapter
+
+    from mrdamper.data.atomic import ResultRecord
+    from mrdamper.study.proposal import PlanRow
+
+    adapter = TypeAdapter(list[PlanRow]) if name == "plan" else TypeAdapter(ResultRecord)
+    return adapter.json_schema(mode="serialization")
