@@ -168,8 +168,7 @@ def test_presets_and_laws_are_switches(study, quick):
     few = virtual_dataset(currents=(0.0, 1.0, 2.0), cycles=2)
     switched = reproduce(
         few,
-        VirtualRig().gas,
-        options=PaperOptions(A=2.0, n=3.0, mass_law="inverse-square"),
+        PaperOptions(gas=VirtualRig().gas, A=2.0, n=3.0, mass_law="inverse-square"),
         with_comparators=False,
     )
     fits = {c.recipe.title: c.fit for c in switched.contenders}
