@@ -16,7 +16,7 @@ def register(app: typer.Typer) -> None:
     def schema(
         name: str = typer.Argument(..., help=f"File format: {', '.join(_FORMATS)}."),
     ) -> None:
-        """Print the JSON Schema of a file that is read or written; of plan.csv that of its rows."""
+        """Print the JSON Schema of a file format."""
         from mrdamper.errors import UnknownNameError
 
         if name not in _FORMATS:
