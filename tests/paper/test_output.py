@@ -108,7 +108,7 @@ def test_everything_is_written_and_shown_in_its_place(monkeypatch, tmp_path):
         page.update(given, template=template, about=about)
         return "<p>page</p>"
 
-    monkeypatch.setattr(output, "judge_all", lambda study: (claim,))
+    monkeypatch.setattr(output, "check_claims", lambda study: (claim,))
     figures = {name: Entry(name, "Eq. 1", (), None) for name in ("fig09", "fig12", "seeds")}
     monkeypatch.setattr(output, "FIGURES", figures)
     monkeypatch.setattr(output, "caption", lambda name: f"caption of {name}")
@@ -229,7 +229,7 @@ def test_parameters_at_the_held_out_condition_are_listed_way_by_way(monkeypatch)
 
 def test_a_program_reads_verdicts_and_whether_the_data_are_synthetic(monkeypatch):
     claim = Claim("phase", "text", "Eq. 1", "agrees", "recovered", "1 rad", "limit", "fig12", "20 of 20")
-    monkeypatch.setattr(output, "judge_all", lambda study: (claim,))
+    monkeypatch.setattr(output, "check_claims", lambda study: (claim,))
     made = study(notes=("one",), seconds=12.0)
     found = output.summary(made)
     assert found["claims"] == [
