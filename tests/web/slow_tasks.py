@@ -1,6 +1,7 @@
 """Tasks for the tests of worker processes; a spawned process imports them by name."""
 
 import multiprocessing
+import os
 import time
 from pathlib import Path
 
@@ -12,6 +13,10 @@ def count(tell, steps):
         tell(f"step {step}", step / steps)
         time.sleep(0.06)
     return steps
+
+
+def niceness(tell):
+    return os.nice(0)
 
 
 def refuse(tell):

@@ -13,6 +13,8 @@ import pytest
 from web import slow_tasks
 from web.processes import alive
 
+from mrdamper.study.workflow import Study
+from mrdamper.web.api.identify import Head
 from mrdamper.web.work import Job
 
 
@@ -165,3 +167,29 @@ def test_work_of_one_kind_takes_the_place_of_the_same_kind_only(client, app, ben
     assert {job.key for job in session.newest.values()} == {study["key"], second["key"]}
     assert session.newest["study"]._stop.is_set() is False
     assert ended(session.jobs[first["key"]]).state == "cancelled"
+
+
+def test_a_known_result_is_recalled_without_a_worker():
+    job = ended(Job("job1", "test", slow_tasks.break_down, (), lambda result: {"result": result}, lambda: 7).start())
+    assert (job.state, job.answer, job._process) == ("done", {"result": 7}, None)
+
+
+def test_workers_leave_the_processors_to_the_page():
+    assert ended(run(slow_tasks.niceness)).answer == {"result": min(os.nice(0) + 15, 19)}
+
+
+def test_a_study_of_the_bundled_tests_is_calculated_once_for_all_sessions(client, app, bench, tmp_path):
+    (session,) = app.state.sessions
+    report = tmp_path / "report.html"
+    report.write_text("report")
+    shared = app.state.sessions.studies
+    shared.keep(Head().model_dump_json(), Study(session.dataset, (), 1.0), tmp_path, [report])
+    report.unlink()  # the first session is over
+    job = client.post(f"{bench}/study").json()
+    assert ended(session.job(job["key"])).state == "done"
+    assert [path.read_text() for path in session.results["study.files"]] == ["report"]
+    assert session.results["study.files"][0].is_relative_to(session.folder)
+    assert shared.find("another head", tmp_path / "none") is None
+    for i in range(9):
+        shared.keep(str(i), Study(session.dataset, (), 1.0), tmp_path, [])
+    assert len(list(app.state.sessions.folder.glob("*-*"))) == 4

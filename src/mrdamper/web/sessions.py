@@ -25,7 +25,9 @@ from mrdamper.data import Dataset
 from mrdamper.data.temporary import temporary_folder
 from mrdamper.errors import InputError, UnknownNameError
 from mrdamper.study.recipe import RecipeResult
+from mrdamper.web.bundled_studies import BundledStudies
 from mrdamper.web.drops import Drop, Intake
+from mrdamper.web.intake import bundled
 from mrdamper.web.rig_table import RigTable, rig_table
 from mrdamper.web.work import Job
 
@@ -78,6 +80,11 @@ class Session:
         if self.intake is None:
             raise InputError("no data on the bench", remedy="open the bundled tests, or drop files", code="E_NO_DATA")
         return self.intake.dataset
+
+    @property
+    def bundled(self) -> bool:
+        """True where the data are the bundled tests as they are."""
+        return self.intake is not None and self.intake.source == "bundled" and self.dataset is bundled().dataset
 
     def result(self, name: str, problem: str, remedy: str) -> Any:
         """Return the result of work under a name; raises `InputError` (E_NO_RESULT) where it left nothing."""
@@ -138,12 +145,13 @@ class Session:
         task: Callable[..., Any],
         arguments: tuple[Any, ...],
         conclude: Callable[[Any], dict[str, Any]],
+        recall: Callable[[], Any] = lambda: None,
     ) -> dict[str, Any]:
-        """Begin long work, in place of what is being done of the same kind; gives its report."""
+        """Begin long work, or recall its result, in place of work of the same kind; gives its report."""
         if before := self.newest.get(kind):
             before.cancel()
         self.jobs = {key: job for key, job in self.jobs.items() if not job.ended}
-        job = Job(self.key("job"), kind, task, arguments, conclude)
+        job = Job(self.key("job"), kind, task, arguments, conclude, recall)
         self.jobs[job.key] = self.newest[kind] = job.start()
         return job.report()
 
@@ -174,6 +182,7 @@ class BrowserSessions:
     def __init__(self) -> None:
         self._keep = ExitStack()
         self.folder = self._keep.enter_context(temporary_folder())
+        self.studies = BundledStudies(self.folder)
         self._open: dict[str, Session] = {}
         self._lock = threading.Lock()
 

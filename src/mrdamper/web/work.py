@@ -21,6 +21,7 @@ from mrdamper.data.child import end_with_parent
 from mrdamper.errors import InputError
 
 _AT_ONCE = max(1, os.cpu_count() or 1)  # processes of all sessions together
+_NICENESS = 15  # of workers, so that the page is answered first
 _BETWEEN = 0.05  # seconds between two reports: a page shows no more
 _FREE = threading.BoundedSemaphore(_AT_ONCE)
 
@@ -34,6 +35,7 @@ class Job:
     task: Callable[..., Any]
     arguments: tuple[Any, ...]
     conclude: Callable[[Any], dict[str, Any]]
+    recall: Callable[[], Any] = lambda: None  # a result that is known already, asked for when it is this work's turn
     # "waiting", "running", "done", "refused" (by the input), "failed" (our fault) or "cancelled"
     state: str = "waiting"
     what: str = "waiting for a free processor"  # is being done
@@ -93,6 +95,8 @@ class Job:
         try:
             if self._stop.is_set():
                 self._end("cancelled")
+            elif (known := self.recall()) is not None:
+                self._conclude(known)
             else:
                 self._run()
         except Exception:
@@ -193,6 +197,7 @@ def _work(pipe: Connection, task: Callable[..., Any], arguments: tuple[Any, ...]
     """Run a task and send what comes of it: the body of the worker process."""
     if hasattr(os, "setsid"):
         os.setsid()  # a group of its own, so that cancelling reaches the processes a task starts
+        os.nice(_NICENESS)
     end_with_parent(group=True)
     last = 0.0
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from inspect import signature
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
 from fastapi.responses import Response
 from pydantic import BaseModel, Field
 
@@ -21,6 +23,7 @@ from mrdamper.study.recipe import JOINTLY, RecipeResult
 from mrdamper.study.validation import Validation
 from mrdamper.study.workflow import Study
 from mrdamper.web.answers import frame, number
+from mrdamper.web.bundled_studies import BundledStudies
 from mrdamper.web.curves import measured_cycle, modelled_cycle, predicted_on_run
 from mrdamper.web.rig_table import condition_on_screen
 from mrdamper.web.sessions import Current, Session
@@ -87,12 +90,19 @@ _NO_HEAD = Head()
 
 
 @router.post("/study")
-def start_study(session: Current, head: Head = _NO_HEAD) -> dict[str, Any]:
-    """Begin the whole method on all data."""
+def start_study(session: Current, request: Request, head: Head = _NO_HEAD) -> dict[str, Any]:
+    """Begin the whole method on all data; of the bundled tests, a study that is there already is recalled."""
     folder, about = session.folder / session.key("study"), head.given
-    return session.start(
-        "study", study, (session.dataset, folder, about), lambda results: _conclude_study(session, *results)
-    )
+    shared: BundledStudies | None = request.app.state.sessions.studies if session.bundled else None
+    key = head.model_dump_json()
+
+    def conclude(results: tuple[Study, list[Path]]) -> dict[str, Any]:
+        if shared is not None:
+            shared.keep(key, results[0], folder, results[1])
+        return _conclude_study(session, *results)
+
+    recall = partial(shared.find, key, folder) if shared is not None else lambda: None
+    return session.start("study", study, (session.dataset, folder, about), conclude, recall)
 
 
 @router.post("/identify")
@@ -127,8 +137,7 @@ def residual(number: int, session: Current) -> Response:
     return frame({"id": row.run.id, "condition": condition_on_screen(row.condition)}, arrays)
 
 
-def _conclude_study(session: Session, study: Study, written: list[Any]) -> dict[str, Any]:
-    session.results["study"] = study
+def _conclude_study(session: Session, study: Study, written: list[Path]) -> dict[str, Any]:
     session.results["study.files"] = written
     rigs = []
     for rig in study.rigs:
